@@ -1,0 +1,1 @@
+"""The front door of alphacut: case files, units, command line, stages, report."""

@@ -1,0 +1,1 @@
+"""Vibration of structures with fuzzy parameters."""

@@ -1,0 +1,57 @@
+"""The cell: two elastic phases and a random radius, and the loads it is homogenised under."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stochastic import RadiusMap
+from stochastic.truncated_normal import Array
+
+STRAIN = 0.01  # eq. 15
+LOADS = np.array([[STRAIN, STRAIN, 0.0], [0.0, 0.0, 2 * STRAIN]])  # eq. 15 as (ε11, ε22, 2 ε12); ε12 is the tensor component
+
+
+@dataclass(frozen=True)
+class Phase:
+    """An isotropic elastic material in plane strain.
+
+    Args:
+        modulus: Young's modulus in Pa, positive.
+        poisson: Poisson's ratio, inside (−1, 0.5).
+
+    Raises:
+        ValueError: A value lies outside its range.
+    """
+
+    modulus: float
+    poisson: float = 0.3
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.modulus) and self.modulus > 0):
+            raise ValueError(f"Young's modulus is {self.modulus:g} Pa; it must be positive and finite")
+        if not -1 < self.poisson < 0.5:
+            raise ValueError(f"Poisson's ratio is {self.poisson:g}; it must lie inside (-1, 0.5)")
+
+    @property
+    def stiffness(self) -> Array:
+        """Plane-strain stiffness in Voigt order (11, 22, 12 with 2 ε12), shape (3, 3), in Pa (eq. 6)."""
+        e, nu = self.modulus, self.poisson
+        unit = np.array([[1 - nu, nu, 0], [nu, 1 - nu, 0], [0, 0, (1 - 2 * nu) / 2]])
+        return e / ((1 + nu) * (1 - 2 * nu)) * unit
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Periodic square cell of side 2 with one centred circular particle of random radius r(θ).
+
+    Args:
+        matrix: Material outside the particle.
+        inclusion: Material of the particle.
+        radius: Map θ ↦ r(θ) in (0, 1), with the law of θ.
+    """
+
+    matrix: Phase
+    inclusion: Phase
+    radius: RadiusMap
