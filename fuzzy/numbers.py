@@ -1,11 +1,19 @@
-"""Fuzzy numbers and intervals by their α-cuts (paper, appendix A)."""
+"""Fuzzy numbers and intervals by their α-cuts (paper, appendix A, Fig. 36)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+import itertools
+from abc import ABC, abstractmethod
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
 
 
 class Cut(NamedTuple):
@@ -20,19 +28,118 @@ class Cut(NamedTuple):
         return self.upper - self.lower
 
 
-class FuzzyNumber(Protocol):
-    """A normal, convex fuzzy set over the reals."""
+class Cuts(NamedTuple):
+    """Nested α-cuts between which the ends are linear: rising `alpha` from 0 to 1, `lower` rising, `upper` falling."""
+
+    alpha: tuple[float, ...]
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+
+
+class FuzzyNumber(ABC):
+    """A normal, convex fuzzy set over the reals whose membership is piecewise linear."""
 
     @property
+    @abstractmethod
+    def cuts(self) -> Cuts:
+        """The α-cuts at the corners of the membership function."""
+
+    @cached_property
     def modal(self) -> float:
         """The value of membership 1, or the middle of the modal interval."""
+        lower, upper = self.cut(1.0)
+        return lower if lower == upper else (lower + upper) / 2
+
+    @property
+    def support(self) -> Cut:
+        """The closed support, which is the cut at α = 0."""
+        return self.cut(0.0)
 
     def cut(self, alpha: float) -> Cut:
-        """The set of values with membership at least `alpha` in [0, 1]; at 0 the closed support."""
+        """The set of values with membership at least `alpha` in [0, 1]; at 0 the closed support.
+
+        Raises:
+            ValueError: `alpha` lies outside [0, 1].
+        """
+        if not 0 <= alpha <= 1:
+            raise ValueError(f"the α of a cut is {alpha:g}; it must lie in [0, 1]")
+        levels, lower, upper = self.cuts
+        return Cut(_interpolate(alpha, levels, lower), _interpolate(alpha, levels, upper))
+
+    def membership(self, x: ArrayLike) -> Array:
+        """Grade of membership μ in [0, 1] at `x`, any shape."""
+        levels, lower, upper = map(np.asarray, self.cuts)
+        x = np.asarray(x, float)
+        return np.minimum(_highest_level(x, levels, lower), _highest_level(-x, levels, -upper))
+
+
+def _interpolate(alpha: float, levels: Sequence[float], ends: Sequence[float]) -> float:
+    """The end of the cut at `alpha`, exact at the given levels."""
+    right = bisect_right(levels, alpha)
+    if right == len(levels):
+        return ends[-1]
+    share = (alpha - levels[right - 1]) / (levels[right] - levels[right - 1])
+    rise = ends[right] - ends[right - 1]
+    return ends[right - 1] + share * rise if share < 0.5 else ends[right] - (1 - share) * rise
+
+
+def _highest_level(x: Array, levels: Array, lower: Array) -> Array:
+    """The highest α whose lower end does not exceed x; 0 where none does."""
+    right = np.searchsorted(lower, x, side="right")
+    inner = np.clip(right, 1, len(lower) - 1)
+    rise = lower[inner] - lower[inner - 1]
+    share = np.divide(x - lower[inner - 1], rise, out=np.zeros_like(x), where=rise > 0)
+    level = levels[inner - 1] + share * (levels[inner] - levels[inner - 1])
+    return np.where(right == 0, 0.0, np.where(right == len(lower), 1.0, level))
+
+
+def _require_order(kind: str, values: Sequence[float], order: str) -> None:
+    if not (np.isfinite(values).all() and all(a <= b for a, b in itertools.pairwise(values))):
+        shown = ", ".join(f"{value:g}" for value in values)
+        raise ValueError(f"the {kind} is [{shown}]; it needs {order}, all finite")
 
 
 @dataclass(frozen=True)
-class Triangular:
+class Crisp(FuzzyNumber):
+    """A single value of membership 1.
+
+    Raises:
+        ValueError: The value is not finite.
+    """
+
+    value: float
+
+    def __post_init__(self) -> None:
+        _require_order("crisp number", [self.value], "one value")
+
+    @property
+    def cuts(self) -> Cuts:
+        """The value itself at every level."""
+        return Cuts((0.0, 1.0), (self.value,) * 2, (self.value,) * 2)
+
+
+@dataclass(frozen=True)
+class Interval(FuzzyNumber):
+    """A crisp interval: membership 1 between its ends, 0 outside.
+
+    Raises:
+        ValueError: The ends are not finite or not in order.
+    """
+
+    lower: float
+    upper: float
+
+    def __post_init__(self) -> None:
+        _require_order("interval", [self.lower, self.upper], "lower <= upper")
+
+    @property
+    def cuts(self) -> Cuts:
+        """The interval itself at every level."""
+        return Cuts((0.0, 1.0), (self.lower,) * 2, (self.upper,) * 2)
+
+
+@dataclass(frozen=True)
+class Triangular(FuzzyNumber):
     """Triangular fuzzy number.
 
     Args:
@@ -45,15 +152,74 @@ class Triangular:
     """
 
     lower: float
-    modal: float
+    modal: float = field()  # declared anew: the base class derives it from the cuts
     upper: float
 
     def __post_init__(self) -> None:
-        if not (np.isfinite([self.lower, self.modal, self.upper]).all() and self.lower <= self.modal <= self.upper):
-            raise ValueError(
-                f"the triangle is [{self.lower:g}, {self.modal:g}, {self.upper:g}]; it needs lower <= modal <= upper, all finite"
-            )
+        _require_order("triangle", [self.lower, self.modal, self.upper], "lower <= modal <= upper")
 
-    def cut(self, alpha: float) -> Cut:
-        """The α-cut, `alpha` in [0, 1]."""
-        return Cut(self.lower + alpha * (self.modal - self.lower), self.upper + alpha * (self.modal - self.upper))
+    @property
+    def cuts(self) -> Cuts:
+        """Support and modal value."""
+        return Cuts((0.0, 1.0), (self.lower, self.modal), (self.upper, self.modal))
+
+
+@dataclass(frozen=True)
+class Trapezoidal(FuzzyNumber):
+    """Fuzzy interval with straight flanks.
+
+    Args:
+        lower: Left end of the support.
+        left: Left end of the modal interval.
+        right: Right end of the modal interval.
+        upper: Right end of the support.
+
+    Raises:
+        ValueError: The four are not finite or not in order.
+    """
+
+    lower: float
+    left: float
+    right: float
+    upper: float
+
+    def __post_init__(self) -> None:
+        _require_order("trapezoid", [self.lower, self.left, self.right, self.upper], "lower <= left <= right <= upper")
+
+    @property
+    def cuts(self) -> Cuts:
+        """Support and modal interval."""
+        return Cuts((0.0, 1.0), (self.lower, self.left), (self.upper, self.right))
+
+
+@dataclass(frozen=True)
+class PiecewiseLinear(FuzzyNumber):
+    """Fuzzy number from nested α-cuts, linear between them: what one stage hands to the next.
+
+    Args:
+        alpha: Levels, rising from 0 to 1, at least two.
+        lower: Lower ends of the cuts, not falling with α.
+        upper: Upper ends of the cuts, not rising with α.
+
+    Raises:
+        ValueError: Lengths differ, levels do not rise from 0 to 1, or cuts are not finite, nested intervals.
+    """
+
+    alpha: tuple[float, ...]
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        for name in ("alpha", "lower", "upper"):  # arrays are welcome; tuples are kept
+            object.__setattr__(self, name, tuple(float(value) for value in getattr(self, name)))
+        if not len(self.alpha) == len(self.lower) == len(self.upper) >= 2:
+            sizes = f"{len(self.alpha)} levels, {len(self.lower)} lower and {len(self.upper)} upper ends"
+            raise ValueError(f"the α-cuts have {sizes}; they need as many ends as levels, two levels or more")
+        if self.alpha[0] != 0 or self.alpha[-1] != 1 or not all(np.diff(self.alpha) > 0):
+            raise ValueError(f"the levels of the α-cuts are {list(self.alpha)}; they must rise from 0 to 1")
+        _require_order("row of cut ends", [*self.lower, *self.upper[::-1]], "nested cuts, lower ends rising and upper ends falling with α")
+
+    @property
+    def cuts(self) -> Cuts:
+        """The cuts it was made from."""
+        return Cuts(self.alpha, self.lower, self.upper)
