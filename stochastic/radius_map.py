@@ -48,8 +48,9 @@ class HermiteMap:
     distribution: TruncatedNormal = field(default_factory=TruncatedNormal)
 
     def __post_init__(self) -> None:
-        low, high = self.extremes()
-        if not (0 < low and high < 1):  # also catches nan
+        finite = bool(np.isfinite([self.a1, self.a2, self.a3, self.a4]).all())
+        low, high = self.extremes() if finite else (np.nan, np.nan)
+        if not (low > 0 and high < 1):  # also catches nan
             raise ValueError(
                 f"the radius map a1 = {self.a1:g}, a2 = {self.a2:g}, a3 = {self.a3:g}, a4 = {self.a4:g} gives radii from {low:.4g} to "
                 f"{high:.4g}; they must stay inside (0, 1), in halves of the cell's side: lower a1 or a3, or the slopes a2, a4"
@@ -87,4 +88,4 @@ class HermiteMap:
         _, b, c, d = self.monomials
         turning = [-c / (3 * d)] if d else []
         lowest = [b + 2 * c * x + 3 * d * x * x for x in (0.0, 1.0, *(x for x in turning if 0 < x < 1))]
-        return min(lowest) >= 0
+        return bool(min(lowest) >= 0)
