@@ -34,12 +34,14 @@ class StressCurve:
         weights: Quadrature weights with f_Θ inside, shape (n,), sum 1.
         s11: σ11 under load 1 at the nodes, shape (n,), in Pa.
         s12: σ12 under load 2 at the nodes, shape (n,), in Pa.
+        stiffness: The whole planar stiffness at the nodes, Voigt order (11, 22, 12 with 2 ε12), shape (n, 3, 3), in Pa, if known.
     """
 
     theta: Array
     weights: Array
     s11: Array
     s12: Array
+    stiffness: Array | None = None
 
     @property
     def mean(self) -> tuple[float, float]:
@@ -82,6 +84,17 @@ class Homogenised:
     def poisson(self) -> float:
         """Effective Poisson's ratio of eq. 16."""
         return effective_modulus(*self.curve.mean)[1]
+
+    @property
+    def stiffness(self) -> Array | None:
+        """Mean planar stiffness under f_Θ, Voigt order, shape (3, 3), in Pa; None if the model did not make it."""
+        curve = self.curve
+        return None if curve.stiffness is None else np.tensordot(curve.weights, curve.stiffness, axes=1)
+
+    @property
+    def estimated_error(self) -> float:
+        """Estimated relative error of E, all sources together; nan where none was made."""
+        return sum(self.error.values()) if self.error else float("nan")
 
 
 def relative(value: float, reference: float) -> float:
