@@ -1,0 +1,8 @@
+"""``alphacut …`` and ``python -m alphacut …``."""
+
+import sys
+
+from alphacut.entry import main
+
+if __name__ == "__main__":
+    sys.exit(main())

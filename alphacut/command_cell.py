@@ -1,0 +1,81 @@
+"""``alphacut cell``, also ``python -m rve solve``: homogenise one crisp cell."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, TextIO
+
+from alphacut import cell
+from alphacut.loading import load
+from alphacut.options import CELL_OPTIONS, add_common, add_keys, changes
+from alphacut.output import as_json, write_text
+from alphacut.problem import BadInput, Problem
+from alphacut.schema import CELL_METHODS
+
+if TYPE_CHECKING:
+    from rve.result import Homogenised
+
+ABOUT = "homogenise the cell at crisp values; a fuzzy input takes its modal value"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    add_common(parser)
+    add_keys(parser, CELL_OPTIONS)
+    parser.add_argument("--exclude", metavar="NAMES", default="", help="models that method auto must not take, separated by commas")
+    parser.add_argument(
+        "--cross-check", metavar="A,B", default="", help="run two models; fail if their moduli differ by more than --tolerance"
+    )
+
+
+def named_models(option: str, text: str) -> tuple[str, ...]:
+    """Names of models, separated by commas."""
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    for name in names:
+        if name not in CELL_METHODS:
+            raise BadInput(Problem(option, f"there is no model {name}", text, ", ".join(CELL_METHODS)))
+    return names
+
+
+def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
+    """Solve and report."""
+    case = load(options.case, changes(options, CELL_OPTIONS), modal=True)
+    choice = cell.cell_choice(case, exclude=named_models("--exclude", options.exclude), petsc=petsc)
+    pair = named_models("--cross-check", options.cross_check)
+    if pair:
+        result = cross_check([cell.solve(case, replace(choice, method=name).model()) for name in pair], pair, choice.tolerance)
+    else:
+        result = cell.solve(case, choice.model())
+    document = as_json(cell.document(result), indent=None if options.json == "-" else 2)
+    if options.json == "-":
+        out.write(document)
+    elif options.json:
+        write_text(options.json, document)
+    if options.json != "-" and not options.quiet:
+        out.write(summary(result))
+    return 0
+
+
+def cross_check(results: list[Homogenised], names: tuple[str, ...], tolerance: float) -> Homogenised:
+    """The first of the results, if all moduli agree with it."""
+    first, *others = results
+    for name, other in zip(names[1:], others, strict=True):
+        gap = abs(other.modulus - first.modulus) / first.modulus
+        if not gap <= tolerance:
+            message = f"{names[0]} gives E = {first.modulus / cell.GPA:.9g} GPa and {name} {other.modulus / cell.GPA:.9g} GPa"
+            raise RuntimeError(f"{message}: they differ by {gap:.2g}, more than the tolerance of {tolerance:g}")
+    return first
+
+
+def summary(result: Homogenised) -> str:
+    """The result in a few lines for people."""
+    s11, s12 = (stress / cell.GPA for stress in result.curve.mean)
+    seconds = ", ".join(f"{name} {value:.3f}" for name, value in result.seconds.items())
+    return (
+        f"E = {result.modulus / cell.GPA:.6f} GPa, nu = {result.poisson:.6f} (eq. 16)\n"
+        f"mean s11 = {s11:.9f} GPa, mean s12 = {s12:.9f} GPa\n"
+        f"{result.method}, {result.unknowns} unknowns, {result.solver}, iterations {', '.join(map(str, result.iterations)) or 'none'}\n"
+        f"seconds: {seconds}\n"
+    )

@@ -1,0 +1,123 @@
+"""What a case must fulfil as a whole, beyond each value being right on its own."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from alphacut.case import Case
+from alphacut.problem import Problem
+from alphacut.reading import nearest
+from alphacut.schema import NEEDED
+from stochastic import HermiteMap, TruncatedNormal
+
+SLOPES = ("a1", "a2", "a3", "a4")
+GROUPS = ("E", "I", "m", "l", "d", "q0", "v0")
+
+
+def inconsistencies(case: Case, *, modal: bool = False) -> Iterator[Problem]:
+    """Every problem of a case whose single values are all right."""
+    yield from missing_sections(case)
+    yield from files(case)
+    if case.has("radius.a1"):
+        yield from radius(case, 1.0 if modal else 0.0)
+    for section in ("modulus", "envelope"):
+        if case.has(f"{section}.alpha"):
+            yield from levels(case, f"{section}.alpha")
+    if case.has("frame.masses"):
+        yield from floors(case)
+    if case.has("envelope.step"):
+        yield from times(case)
+
+
+def missing_sections(case: Case) -> Iterator[Problem]:
+    """Sections that the wanted stages need."""
+    replaced = any(case.has(f"modulus.{key}") for key in ("value", "file", "measured"))
+    for stage in case.stages:
+        for section in NEEDED.get(stage, ()):
+            if not any(key.startswith(f"{section}.") for key in case.values) and not (stage == "modulus" and replaced):
+                yield Problem(section, f"section [{section}] is missing; stage {stage} needs it")
+
+
+def files(case: Case) -> Iterator[Problem]:
+    """Files that the case names must be there."""
+    for key in ("modulus.file", "modulus.measured"):
+        if case.has(key) and not beside(case, case.text(key)).is_file():
+            yield Problem(key, "there is no such file", case.text(key), f"a path from the case's folder, {case.path.parent}")
+
+
+def beside(case: Case, name: str) -> Path:
+    """A file that the case names, looked for from the case's folder."""
+    return case.path.parent / name
+
+
+def radius(case: Case, alpha: float) -> Iterator[Problem]:
+    """r(θ) must stay inside (0, 1) in every corner of the α-cuts; r is linear in a1 … a4, so corners suffice."""
+    theta = case.numbers("radius.theta")
+    if len(theta) != 2 or not theta[0] < theta[1]:
+        yield Problem("radius.theta", "the support of θ needs two ends in rising order", str(list(theta)), "for example [-3, 3]")
+        return
+    law = TruncatedNormal(*theta)
+    for corner in itertools.product(*(sorted(set(case.fuzzy(f"radius.{name}").cut(alpha))) for name in SLOPES)):
+        a1, a2, a3, a4 = corner
+        try:
+            HermiteMap(a1, a2, a3, a4, law)
+        except ValueError as error:
+            key = guilty(corner)
+            yield Problem(f"radius.{key}", str(error), str(case.written.get(f"radius.{key}", "")))
+            return
+
+
+def guilty(corner: tuple[float, ...]) -> str:
+    """The slope to name when r(θ) leaves (0, 1): the one whose taming alone cures it, else the steeper."""
+    a1, a2, a3, a4 = corner
+    tame = a3 - a1
+    for name, slope2, slope4 in (("a2", tame, a4), ("a4", a2, tame)):
+        try:
+            HermiteMap(a1, slope2, a3, slope4)
+        except ValueError:
+            continue
+        return name
+    return "a2" if abs(a2 - tame) > abs(a4 - tame) else "a4"
+
+
+def levels(case: Case, key: str) -> Iterator[Problem]:
+    """α-levels must rise."""
+    alpha = case.numbers(key)
+    if any(low >= high for low, high in itertools.pairwise(alpha)):
+        yield Problem(key, "the α-levels are not in rising order", str(list(alpha)), "for example [0, 0.25, 0.5, 0.75, 1]")
+
+
+def floors(case: Case) -> Iterator[Problem]:
+    """Every array of the frame has one entry for each floor; one entry alone holds for all of them."""
+    count = len(case.fuzzies("frame.masses"))
+    for name in ("lengths", "dampers", "displacements", "velocities"):
+        found = len(case.fuzzies(f"frame.{name}"))
+        if found not in (1, count):
+            yield Problem(f"frame.{name}", f"got {found} values for {count} floors", allowed=f"{count} values, or one for all floors")
+    for key in ("envelope.fuzzy", *(f"study[{i}].fuzzy" for i in range(int(str(case.values.get("study", 0)))))):
+        for name in case.names(key) if case.has(key) else ():
+            yield from known_input(key, name, count)
+
+
+def known_input(key: str, name: str, count: int) -> Iterator[Problem]:
+    """A fuzzy input of the frame: a group or one floor's member of it."""
+    members = [f"{group}{floor + 1}" for group in ("m", "l", "d") for floor in range(count)]
+    members += [f"{group}{floor + 1}_0" for group in ("q", "v") for floor in range(count)]
+    if name not in GROUPS and name not in members:
+        allowed = f"{', '.join(GROUPS)}, or one floor: m1 to m{count}, l1, d1, q1_0, v1_0 …"
+        yield Problem(key, f"the frame has no input {name}", name, allowed, nearest(name, members) if re.match("[mldqv]", name) else "")
+
+
+def times(case: Case) -> Iterator[Problem]:
+    """The step must fit into every duration."""
+    step = case.number("envelope.step")
+    for key in ("envelope.duration", *(f"study[{i}].duration" for i in range(int(str(case.values.get("study", 0)))))):
+        if case.has(key) and case.number(key) < step:
+            yield Problem(
+                "envelope.step",
+                f"the step {step:g} s is longer than the {key} of {case.number(key):g} s",
+                str(case.written["envelope.step"]),
+            )

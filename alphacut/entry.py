@@ -1,0 +1,87 @@
+"""The one entry point: commands, exit statuses, and errors as single lines."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from types import ModuleType
+
+from alphacut import command_cell
+from alphacut.options import Parser, split_petsc
+from alphacut.output import rank, ranks, say, standard_output
+from alphacut.problem import BadInput
+from alphacut.provenance import own_version
+
+COMMANDS: dict[str, ModuleType] = {
+    "cell": command_cell,
+}
+STATUSES = """\
+exit status:
+  0    done
+  1    a computation failed: one line says which and what to do
+  2    bad input: one line for each problem; nothing was computed or written
+  3    a campaign ended with failed samples: the others are kept
+  130  interrupted; what was finished is kept, and the same command goes on from there
+"""
+
+
+def parser(program: str, commands: Mapping[str, ModuleType]) -> Parser:
+    """The parser of a program with the given commands, by their names there."""
+    top = Parser(
+        prog=program,
+        description="From an uncertain microstructure to the fuzzy vibration of a structure.",
+        epilog=STATUSES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    top.add_argument("--version", action="version", version=f"alphacut {own_version()}")
+    inner = top.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
+    for name, module in commands.items():
+        about = module.ABOUT
+        module.arguments(inner.add_parser(name, help=about, description=f"{about[:1].upper()}{about[1:]}.", allow_abbrev=False))
+    return top
+
+
+def main(arguments: Sequence[str] | None = None, *, program: str = "alphacut", names: Mapping[str, str] | None = None) -> int:
+    """Run one command.
+
+    Args:
+        arguments: The command line after the program's name; the process's own if left out.
+        program: The program's name, for messages.
+        names: Names of the commands here to their names in `COMMANDS`; all of them under their own names if left out.
+
+    Returns:
+        Exit status, see `STATUSES`.
+    """
+    commands = COMMANDS if names is None else {here: COMMANDS[there] for here, there in names.items()}
+    try:
+        ours, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
+        options = parser(program, commands).parse_args(ours)
+        with standard_output(getattr(options, "json", None) == "-") as out:
+            return int(commands[options.command].run(options, petsc, out))
+    except BadInput as error:
+        for problem in error.problems:
+            say(str(problem))
+        return 2
+    except KeyboardInterrupt:
+        say("interrupted; what was finished is kept, and the same command goes on from there")
+        return 130
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        return 0
+    except (RuntimeError, ValueError, ArithmeticError, OSError, MemoryError) as error:
+        return failed(error)
+
+
+def failed(error: Exception) -> int:
+    """One line about a computation that failed; under mpirun the other ranks are told to stop as well."""
+    if os.environ.get("ALPHACUT_TRACEBACK"):
+        raise error
+    message = " ".join(str(error).split()) or type(error).__name__
+    if ranks() > 1 and "mpi4py.MPI" in sys.modules:
+        print(f"alphacut: rank {rank()}: {message}", file=sys.stderr, flush=True)
+        sys.modules["mpi4py.MPI"].COMM_WORLD.Abort(1)
+    say(message)
+    return 1

@@ -1,0 +1,183 @@
+"""From a TOML file to a checked case; every problem is found before anything is computed."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from alphacut.case import Case
+from alphacut.consistency import inconsistencies
+from alphacut.position import key_at, lines_of_keys
+from alphacut.problem import BadInput, Problem
+from alphacut.reading import Unfit, allowed, nearest, read
+from alphacut.schema import SECTIONS, Key, Section, dotted, every_key
+
+Raw = dict[str, Any]
+
+
+def load(path: Path | str, changes: Sequence[str] = (), *, modal: bool = False) -> Case:
+    """Read and check a case file.
+
+    Args:
+        path: TOML file.
+        changes: ``KEY=VALUE`` each; the key in full (``cell.matrix_modulus``) or alone where that is clear.
+        modal: Only modal values are wanted: fuzzy inputs need not fit together over their whole supports.
+
+    Raises:
+        BadInput: With every problem found.
+    """
+    path = Path(path)
+    text = contents(path)
+    raw = parsed(path, text)
+    lines = lines_of_keys(text)
+    changed = {apply_change(raw, change) for change in changes}
+    values: dict[str, object] = {}
+    written: dict[str, object] = {}
+    problems = [located(problem, path, lines, changed) for problem in checked(raw, values, written)]
+    case = Case(path, values, written, lines)
+    if not problems:
+        problems = [located(problem, path, lines, changed) for problem in inconsistencies(case, modal=modal)]
+    if problems:
+        raise BadInput(sorted(problems, key=lambda problem: problem.line))
+    return case
+
+
+def contents(path: Path) -> str:
+    """Text of a file, or what is wrong with it: missing, a folder, not UTF-8."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        reason = {FileNotFoundError: "there is no such file", IsADirectoryError: "this is a folder"}.get(type(error), error.strerror)
+        raise BadInput(Problem(str(path), f"{reason}", allowed="a case file such as cases/paper.toml")) from None
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        before = data[: error.start].decode("utf-8")
+        line = before.count("\n") + 1
+        key, _ = key_at(data.decode("utf-8", "replace"), line)
+        raise BadInput(
+            Problem(key, f"byte {data[error.start]:#04x} is not UTF-8", allowed="text in UTF-8", file=str(path), line=line)
+        ) from None
+
+
+def parsed(path: Path, text: str) -> Raw:
+    """The TOML tree, or the line and key where it is broken."""
+    try:
+        return tomllib.loads(text.replace("\r\n", "\n"))
+    except tomllib.TOMLDecodeError as error:
+        where = re.search(r"\(at line (\d+), column \d+\)", str(error))
+        line = int(where[1]) if where else max(1, len(text.splitlines()))
+        reason = re.sub(r"\s*\(at .*\)$", "", str(error)).rstrip(".")
+        shown = text.splitlines()[line - 1].strip() if text.splitlines() else ""
+        key, _ = key_at(text, line)
+        problem = Problem(key, f"this is not TOML: {reason[:1].lower()}{reason[1:]}, at '{shown}'", file=str(path), line=line)
+        raise BadInput(problem) from None
+
+
+def apply_change(raw: Raw, change: str) -> str:
+    """Put one ``KEY=VALUE`` into the tree; returns the key's full name."""
+    name, equals, value = change.partition("=")
+    name = name.strip().replace("-", "_")
+    known = every_key()
+    full = [name] if name in known else [key for key in known if key.rpartition(".")[2] == name]
+    if not equals:
+        raise BadInput(Problem("--set", "there is no = in it", change, "KEY=VALUE, for example cell.matrix_modulus='20 GPa'"))
+    if not full:
+        raise BadInput(Problem("--set", f"there is no key {name}", change, "any key of the case", nearest(name, known)))
+    present = [key for key in full if key.rpartition(".")[2] in raw.get(key.rpartition(".")[0], {})] if len(full) > 1 else full
+    if len(present) != 1 or present[0].startswith("study."):
+        raise BadInput(Problem("--set", f"the key {name} is not clear", change, "one of " + ", ".join(full)))
+    section, _, key = present[0].rpartition(".")
+    table = raw.setdefault(section, {}) if section else raw
+    if isinstance(table, dict):
+        table[key] = toml_or_text(value.strip())
+    return present[0]
+
+
+def toml_or_text(value: str) -> object:
+    """A value from a command line: TOML where it is TOML, such as an array in quotes and brackets, else text."""
+    try:
+        return tomllib.loads(f"x = {value}")["x"]
+    except tomllib.TOMLDecodeError:
+        return value
+
+
+def checked(raw: Raw, values: dict[str, object], written: dict[str, object]) -> Iterator[Problem]:
+    """Check the tree against the schema; fills `values` and `written` on the way."""
+    for name in raw:
+        if name not in SECTIONS and name not in SECTIONS[""].keys:
+            yield unknown(name, "", raw[name])
+    top = {key: value for key, value in raw.items() if key in SECTIONS[""].keys}
+    yield from checked_section("", SECTIONS[""], top, values, written)
+    for name, section in SECTIONS.items():
+        if name and name in raw:
+            yield from checked_table(name, section, raw[name], values, written)
+
+
+def checked_table(name: str, section: Section, table: object, values: dict[str, object], written: dict[str, object]) -> Iterator[Problem]:
+    """Check ``[name]``, or every ``[[name]]``."""
+    tables = table if section.repeated and isinstance(table, list) else [table]
+    if section.repeated:
+        values[name] = len(tables)
+    for index, entry in enumerate(tables):
+        full = f"{name}[{index}]" if section.repeated else name
+        if isinstance(entry, dict) and isinstance(table, list) == section.repeated:
+            yield from checked_section(full, section, entry, values, written)
+        else:
+            yield Problem(full, "this is a section", str(entry), f"[[{name}]]" if section.repeated else f"[{name}] with its keys below")
+
+
+def checked_section(
+    name: str, section: Section, table: Mapping[str, object], values: dict[str, object], written: dict[str, object]
+) -> Iterator[Problem]:
+    """Check the keys of one table, and that none is missing."""
+    for key, value in table.items():
+        if key not in section.keys:
+            yield unknown(key, name, value)
+    for key, entry in section.keys.items():
+        full = dotted(name, key)
+        if key not in table:
+            if entry.required:
+                yield Problem(full, f"missing: {entry.about}", allowed=allowed(entry))
+            values[full] = entry.default
+            continue
+        written[full] = table[key]
+        try:
+            values[full] = read(table[key], entry)
+        except Unfit as unfit:
+            yield Problem(full, unfit.what, as_written(table[key]), unfit.allowed or allowed(entry), unfit.nearest)
+
+
+def unknown(key: str, section: str, value: object) -> Problem:
+    """The problem of a key or section that does not exist, with the nearest that does."""
+    plain = section.partition("[")[0]
+    here = SECTIONS[plain].keys
+    close = nearest(key, [*here, *(() if section else filter(None, SECTIONS))])
+    if not close:
+        elsewhere = {name.rpartition(".")[2]: name for name in every_key()}
+        close = elsewhere.get(nearest(key, elsewhere), "")
+    kind = "section" if isinstance(value, dict | list) and not section else "key"
+    shown = "" if kind == "section" else as_written(value)
+    return Problem(dotted(section, key), f"there is no such {kind}", shown, "" if close else ", ".join(here), close)
+
+
+def as_written(value: object) -> str:
+    """A value as it stood in the file, near enough."""
+    return f'"{value}"' if isinstance(value, str) else str(value).replace("'", '"')
+
+
+def located(problem: Problem, path: Path, lines: Mapping[str, int], changed: Collection[str]) -> Problem:
+    """The problem with its file and line; a missing key points at its section, one from the command line at that."""
+    if problem.key in changed:
+        return Problem(problem.key, problem.what, problem.value, problem.allowed, problem.nearest, "command line")
+    section = problem.key.rpartition(".")[0]
+    line = lines.get(problem.key) or lines.get(section) or 0
+    return Problem(problem.key, problem.what, problem.value, problem.allowed, problem.nearest, str(path), line)
+
+
+def describe(key: Key) -> str:
+    """One line of help for a key: what it is and what it may hold."""
+    return f"{key.about}; {allowed(key)}"

@@ -1,0 +1,85 @@
+"""Where a result comes from: versions, command, case; and the fingerprint by which it is known again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, is_dataclass
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+FORMAT = 1  # of the NetCDF files and of summary.json
+PACKAGES = {
+    "dolfinx": "fenics-dolfinx",
+    "basix": "fenics-basix",
+    "petsc4py": "petsc4py",
+    "mpi4py": "mpi4py",
+    "gmsh": "gmsh",
+    "numpy": "numpy",
+    "scipy": "scipy",
+    "xarray": "xarray",
+}
+
+
+@cache
+def own_version() -> str:
+    """Version of alphacut: from its installation, else from pyproject.toml beside it."""
+    try:
+        return version("alphacut")
+    except PackageNotFoundError:
+        import tomllib
+
+        project = Path(__file__).resolve().parent.parent / "pyproject.toml"
+        return str(tomllib.loads(project.read_text(encoding="utf-8"))["project"]["version"])
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Versions of alphacut, Python and of the packages that are installed."""
+    found = {"alphacut": own_version(), "python": platform.python_version()}
+    for name, distribution in PACKAGES.items():
+        try:
+            found[name] = version(distribution)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+@cache
+def source_digest(packages: tuple[str, ...]) -> str:
+    """Digest of the source of some of this project's packages: a changed program does not trust what an older one stored."""
+    root = Path(__file__).resolve().parent.parent
+    digest = hashlib.sha256()
+    for package in packages:
+        for file in sorted((root / package).glob("*.py")):
+            digest.update(file.name.encode() + file.read_bytes())
+    return digest.hexdigest()
+
+
+def fingerprint(inputs: Mapping[str, Any], packages: Sequence[str]) -> str:
+    """Digest of everything that a result depends on: its inputs, the program's source, the versions of the libraries."""
+    content = {"inputs": inputs, "source": source_digest(tuple(packages)), "versions": versions(), "format": FORMAT}
+    return hashlib.sha256(json.dumps(content, sort_keys=True, default=_canonical).encode()).hexdigest()
+
+
+def _canonical(value: object) -> object:
+    if is_dataclass(value) and not isinstance(value, type):
+        return [type(value).__name__, asdict(value)]
+    return str(value)
+
+
+def attributes(case_text: str, key: str) -> dict[str, str | int]:
+    """Attributes that every NetCDF file carries."""
+    return {
+        "format_version": FORMAT,
+        "created_by": f"alphacut {own_version()}",
+        "command": " ".join(sys.argv),
+        "versions": json.dumps(versions()),
+        "case": case_text,
+        "fingerprint": key,
+    }

@@ -1,0 +1,189 @@
+"""The case file's keys: one table that the checks, the JSON Schema, the help texts and the docs all read.
+
+A key's kind says what the file may hold: ``fuzzy`` a crisp or fuzzy quantity, ``number`` a crisp one, ``fuzzy list`` and
+``numbers`` arrays of them, ``integer``, ``text``, ``choice``, ``choices`` (an array of names), ``flag``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+VERSION = 1
+STAGES = ("microstructure", "modulus", "envelope")
+PLANS = ("general", "reduced", "extended", "signed")
+CELL_METHODS = ("prism", "slices", "table", "series", "auto")
+ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)
+
+
+@dataclass(frozen=True)
+class Range:
+    """Allowed values, in SI: between two ends that belong to it or not, told in words."""
+
+    words: str
+    lower: float = float("-inf")
+    upper: float = float("inf")
+    closed: bool = False
+
+    def holds(self, value: float) -> bool:
+        """Whether `value` is allowed; never for nan."""
+        return self.lower <= value <= self.upper if self.closed else self.lower < value < self.upper
+
+
+POSITIVE = Range("greater than 0", lower=0.0)
+NOT_NEGATIVE = Range("0 or greater", lower=0.0, upper=float("inf"), closed=True)
+POISSON = Range("inside (-1, 0.5)", lower=-1.0, upper=0.5)
+UNIT = Range("inside (0, 1)", lower=0.0, upper=1.0)
+MEMBERSHIP = Range("from 0 to 1", lower=0.0, upper=1.0, closed=True)
+KNOWN_VERSION = Range(f"equal to {VERSION}", lower=VERSION, upper=VERSION, closed=True)
+COUNT = Range("1 or more", lower=1.0, closed=True)
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key of a case file.
+
+    Args:
+        about: What it is, for help texts and docs.
+        kind: What the file may hold; see the head of this module.
+        unit: SI unit; empty for a number without a unit.
+        required: Whether its section cannot do without it.
+        default: What stands in for it, in SI, where it is left out.
+        allowed: Range of every number in it.
+        choices: The names allowed, for the kinds choice and choices.
+    """
+
+    about: str
+    kind: str = "fuzzy"
+    unit: str = ""
+    required: bool = False
+    default: object = None
+    allowed: Range | None = None
+    choices: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Section:
+    """One table of a case file; `repeated` if it is written ``[[name]]``."""
+
+    about: str
+    keys: Mapping[str, Key] = field(default_factory=dict)
+    repeated: bool = False
+
+
+TOP = Section(
+    "What the case is.",
+    {
+        "schema": Key("version of the case format", "integer", required=True, allowed=KNOWN_VERSION),
+        "title": Key("one line, for figures and the report", "text", required=True),
+        "about": Key("a paragraph: what the case shows", "text", required=True),
+        "source": Key("where the values come from", "text", default=""),
+        "stages": Key("stages that `alphacut run` computes, in order", "choices", required=True, choices=STAGES),
+    },
+)
+
+RADIUS = Section(
+    "Random radius of the particle over half the cell's side: cubic Hermite map of the truncated normal θ (eq. 12).",
+    {
+        "theta": Key("support of θ in standard deviations", "numbers", default=(-3.0, 3.0)),
+        "a1": Key("radius at the lower end of θ", required=True, allowed=UNIT),
+        "a2": Key("slope dr/dξ at the lower end", required=True),
+        "a3": Key("radius at the upper end of θ", required=True, allowed=UNIT),
+        "a4": Key("slope dr/dξ at the upper end", required=True),
+    },
+)
+
+CELL = Section(
+    "The two elastic phases of the periodic cell, in plane strain.",
+    {
+        "matrix_modulus": Key("Young's modulus of the matrix", unit="Pa", required=True, allowed=POSITIVE),
+        "matrix_poisson": Key("Poisson's ratio of the matrix", required=True, allowed=POISSON),
+        "inclusion_modulus": Key("Young's modulus of the particle", unit="Pa", required=True, allowed=POSITIVE),
+        "inclusion_poisson": Key("Poisson's ratio of the particle", required=True, allowed=POISSON),
+    },
+)
+
+MESH = Section(
+    "Discretisation of the product domain.",
+    {
+        "layers": Key("element layers in θ", "integer", required=True, allowed=COUNT),
+        "size": Key("element size over half the cell's side", "number", required=True, allowed=UNIT),
+        "interface": Key(
+            "conforming, or sign(z) at quadrature points (eq. 13)", "choice", default="conforming", choices=("conforming", "sign")
+        ),
+    },
+)
+
+MODULUS = Section(
+    "The fuzzy modulus: how it is computed, or what stands in for it.",
+    {
+        "method": Key("model of the cell", "choice", default="prism", choices=CELL_METHODS),
+        "plan": Key("samples of the transformation method", "choice", default="general", choices=PLANS),
+        "alpha": Key("α-levels", "numbers", default=ALPHA, allowed=MEMBERSHIP),
+        "tolerance": Key("relative tolerance on E, for method auto", "number", default=1e-4, allowed=POSITIVE),
+        "value": Key("a known modulus instead of a computed one", unit="Pa", allowed=POSITIVE),
+        "file": Key("α-cuts from a NetCDF file instead of computed ones", "text"),
+        "measured": Key("CSV file of measured moduli instead of computed ones", "text"),
+    },
+)
+
+FRAME = Section(
+    "Storey frame: rigid floors on elastic columns, numbered from the ground.",
+    {
+        "masses": Key("mass of each floor", "fuzzy list", "kg", required=True, allowed=POSITIVE),
+        "lengths": Key("length of the columns below each floor", "fuzzy list", "m", required=True, allowed=POSITIVE),
+        "modulus": Key("Young's modulus where none is handed on", unit="Pa", allowed=POSITIVE),
+        "second_moment": Key("second moment of area of one column", unit="m^4", required=True, allowed=POSITIVE),
+        "dampers": Key("viscous damper of each floor", "fuzzy list", "N*s/m", required=True, allowed=NOT_NEGATIVE),
+        "damper_placement": Key("to the ground, or between storeys", "choice", required=True, choices=("ground", "storey")),
+        "displacements": Key("displacement of each floor at the start", "fuzzy list", "m", required=True),
+        "velocities": Key("velocity of each floor at the start", "fuzzy list", "m/s", required=True),
+    },
+)
+
+STUDY = Section(
+    "One envelope that `alphacut run` computes; what it leaves out is taken from [envelope].",
+    {
+        "name": Key("name of the study and of its file envelope_NAME.nc", "text", required=True),
+        "fuzzy": Key("inputs that are fuzzy; all others take their modal value", "choices", required=True),
+        "duration": Key("length of the simulation", "number", "s", required=True, allowed=POSITIVE),
+        "figures": Key("figure of the paper for each output, or for one", "choices", default=()),
+        "output": Key("the one output that is drawn; all if left out", "text", default=""),
+    },
+    repeated=True,
+)
+
+ENVELOPE = Section(
+    "Fuzzy forward dynamics.",
+    {
+        "fuzzy": Key("inputs that are fuzzy: E, m or m1, m2 …, l, I, d, q0, v0", "choices", required=True),
+        "alpha": Key("α-levels", "numbers", default=ALPHA, allowed=MEMBERSHIP),
+        "method": Key("how the envelope is found", "choice", default="graph-follower", choices=("graph-follower",)),
+        "order": Key("order κ of the Taylor models", "integer", default=2, allowed=Range("1 or 2", 1, 2, closed=True)),
+        "tolerance": Key("gain that is worth a new trajectory", "number", "m", required=True, allowed=POSITIVE),
+        "duration": Key("length of the simulation", "number", "s", required=True, allowed=POSITIVE),
+        "step": Key("time step", "number", "s", required=True, allowed=POSITIVE),
+    },
+)
+
+SECTIONS: dict[str, Section] = {
+    "": TOP,
+    "radius": RADIUS,
+    "cell": CELL,
+    "mesh": MESH,
+    "modulus": MODULUS,
+    "frame": FRAME,
+    "study": STUDY,
+    "envelope": ENVELOPE,
+}
+NEEDED = {"modulus": ("radius", "cell", "mesh"), "envelope": ("frame", "envelope")}  # sections that a stage cannot do without
+
+
+def dotted(section: str, key: str) -> str:
+    """Full name of a key, ``cell.matrix_modulus``."""
+    return f"{section}.{key}" if section else key
+
+
+def every_key() -> dict[str, Key]:
+    """All keys by their full names."""
+    return {dotted(name, key): entry for name, section in SECTIONS.items() for key, entry in section.keys.items()}

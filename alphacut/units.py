@@ -1,0 +1,67 @@
+"""Units at the border: what the user writes becomes SI, exactly, by way of decimals."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+from functools import cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pint
+
+QUANTITIES = {  # SI unit: (name of the quantity, a value as a user would write it)
+    "": ("number without a unit", "0.3"),
+    "Pa": ("stress or modulus", "80 GPa"),
+    "m": ("length", "2.5 m"),
+    "m^2": ("area", "0.01 m^2"),
+    "m^4": ("second moment of area", "1e-6 m^4"),
+    "kg": ("mass", "20 t"),
+    "s": ("time", "30 s"),
+    "m/s": ("velocity", "-0.5 m/s"),
+    "m/s^2": ("acceleration", "9.81 m/s^2"),
+    "N*s/m": ("damping coefficient", "50 N s/m"),
+    "N*m*s": ("rotational damping coefficient", "0.1 N m s"),
+    "N/m": ("stiffness", "30 kN/m"),
+    "N": ("force", "0.02 N"),
+    "rad": ("angle", "1.5 rad"),
+    "rad/s": ("angular velocity", "0.1 rad/s"),
+}
+
+
+@cache
+def registry() -> pint.UnitRegistry:
+    """The one unit registry; decimals, so that 250 cm and 2.5 m become the same float."""
+    import pint
+
+    return pint.UnitRegistry(non_int_type=Decimal)
+
+
+@cache
+def factor(unit: str, si: str) -> Decimal:
+    """How many `si` one `unit` is.
+
+    Raises:
+        ValueError: The unit is unknown, or measures something else.
+    """
+    import pint
+
+    if not si:
+        if unit in ("", "1"):
+            return Decimal(1)
+        if unit == "%":
+            return Decimal("0.01")
+        raise ValueError(f'the unit "{unit}" is wrong')
+    if not unit:
+        raise ValueError("the unit is missing")
+    try:
+        one = registry().Quantity(Decimal(1), registry().parse_units(unit))
+        return Decimal(one.to(si).magnitude)
+    except (pint.UndefinedUnitError, pint.DimensionalityError):
+        raise ValueError(f'the unit "{unit}" is wrong') from None
+    except Exception:  # pint's tokeniser raises whatever Python's does on text that is not a unit at all
+        raise ValueError(f'the unit "{unit}" cannot be read') from None
+
+
+def shown(value: float, unit: str, si: str) -> float:
+    """A value in `si`, in `unit`, for people."""
+    return float(Decimal(repr(float(value))) / factor(unit, si))
