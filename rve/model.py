@@ -1,0 +1,73 @@
+"""The interface that every model of the cell answers to, the table of their names, and two models checked against one another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Any, Protocol
+
+from rve.cell import Phase
+from rve.result import Homogenised
+from stochastic import RadiusMap
+
+MODELS = {  # name → module and class; imported when asked for, so that none is paid for in vain
+    "prism": ("rve.prism", "PrismModel"),
+    "slices": ("rve.slices", "SlicesModel"),
+    "table": ("rve.table", "TableModel"),
+    "series": ("rve.series", "SeriesModel"),
+    "auto": ("rve.choice", "AutoModel"),
+}
+
+
+class Model(Protocol):
+    """A way to homogenise the cell; a frozen dataclass of its resolution."""
+
+    @property
+    def name(self) -> str:
+        """Name in `MODELS`."""
+
+    def solve(self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]) -> list[Homogenised]:
+        """One result for each of `inclusions`, in their order; what they share is done once.
+
+        Raises:
+            RuntimeError: The model does not reach what it declares; the message says why and what would help.
+        """
+
+
+def named(name: str, **options: Any) -> Model:
+    """The model called `name` with its own options, e.g. ``named("slices", order=3)``.
+
+    Raises:
+        ValueError: No such model, no such option of it, or a value out of range.
+    """
+    if name not in MODELS:
+        raise ValueError(f"the model is {name!r}; known models are {', '.join(MODELS)}")
+    module, cls = MODELS[name]
+    maker = getattr(import_module(module), cls)
+    unknown = sorted(set(options) - set(maker.__dataclass_fields__))
+    if unknown:
+        allowed = ", ".join(maker.__dataclass_fields__)
+        raise ValueError(f"the model {name} has no option {unknown[0]!r}; its options are {allowed}")
+    model: Model = maker(**options)
+    return model
+
+
+class CrossCheckError(RuntimeError):
+    """Two models of the same cell disagree."""
+
+
+def cross_check(first: Sequence[Homogenised], second: Sequence[Homogenised], *, tolerance: float) -> float:
+    """The largest relative difference in E between two models' results of the same cells.
+
+    Raises:
+        CrossCheckError: The difference is above `tolerance`.
+    """
+    gaps = [abs(a.modulus - b.modulus) / abs(b.modulus) for a, b in zip(first, second, strict=True)]
+    worst = max(range(len(gaps)), key=gaps.__getitem__)
+    if not gaps[worst] <= tolerance:
+        a, b = first[worst], second[worst]
+        raise CrossCheckError(
+            f"{a.method} gives E = {a.modulus:.10g} Pa and {b.method} {b.modulus:.10g} Pa: {gaps[worst]:.2e} apart, {tolerance:.2e} is "
+            f"allowed; refine the coarser of the two or allow more"
+        )
+    return gaps[worst]
