@@ -1,5 +1,31 @@
 """Fuzzy inputs through any model: α-cuts, plans of samples, fuzzy results."""
 
+from fuzzy.campaign import CampaignError
+from fuzzy.domain import Domain, levels
 from fuzzy.numbers import Crisp, Cut, FuzzyNumber, Interval, PiecewiseLinear, Trapezoidal, Triangular
+from fuzzy.plan import Plan
+from fuzzy.propagation import propagate
+from fuzzy.response_surface import ResponseSurface
+from fuzzy.result import FuzzyResult, Nature
+from fuzzy.transformation import Extended, General, Reduced
 
-__all__ = ["Crisp", "Cut", "FuzzyNumber", "Interval", "PiecewiseLinear", "Trapezoidal", "Triangular"]
+__all__ = [
+    "CampaignError",
+    "Crisp",
+    "Cut",
+    "Domain",
+    "Extended",
+    "FuzzyNumber",
+    "FuzzyResult",
+    "General",
+    "Interval",
+    "Nature",
+    "PiecewiseLinear",
+    "Plan",
+    "Reduced",
+    "ResponseSurface",
+    "Trapezoidal",
+    "Triangular",
+    "levels",
+    "propagate",
+]

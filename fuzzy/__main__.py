@@ -1,0 +1,8 @@
+"""``python -m fuzzy modulus CASE``: the fuzzy effective modulus; the same as ``alphacut modulus``."""
+
+import sys
+
+from alphacut.entry import main
+
+if __name__ == "__main__":
+    sys.exit(main(program="python -m fuzzy", names={"modulus": "modulus"}))

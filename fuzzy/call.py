@@ -1,0 +1,119 @@
+"""How a user's function is called: one point, points that share a set-up, or arrays. Runs in the workers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fuzzy.model import Layout, flatten
+from fuzzy.numbers import Array
+
+Function = Callable[..., Any]
+_BATCH = 1024  # points per call of a vectorised function
+
+
+class Sample(NamedTuple):
+    """Outputs at one point."""
+
+    layout: Layout
+    row: Array
+
+
+class Failure(NamedTuple):
+    """Why a point has no outputs."""
+
+    error: str
+
+
+Outcome = Sample | Failure
+
+
+@dataclass(frozen=True)
+class Call:
+    """A function of named inputs with the way it is called.
+
+    Args:
+        function: See `shared` and `vectorised`; without either it gets the inputs of one point by name.
+        names: Names of the inputs, in column order.
+        shared: Inputs whose equality lets points share work: the function gets a list of points (mappings of names to numbers)
+            that agree in them, and returns a list of outputs.
+        vectorised: The function gets arrays by name, shape (n,), and returns arrays whose first axis is n.
+
+    Raises:
+        ValueError: Both ways are asked for, or a shared name is no input.
+    """
+
+    function: Function
+    names: tuple[str, ...]
+    shared: tuple[str, ...] = ()
+    vectorised: bool = False
+
+    def __post_init__(self) -> None:
+        if self.shared and self.vectorised:
+            raise ValueError("shared and vectorised are both given; a function is called in one way: give one")
+        unknown = [name for name in self.shared if name not in self.names]
+        if unknown:
+            raise ValueError(f"the shared inputs name {', '.join(unknown)}; there are {', '.join(self.names)}")
+
+    def tasks(self, points: Array) -> list[list[int]]:
+        """Rows of the points that go into one call each; the same whatever the workers."""
+        if self.vectorised:
+            return [list(range(start, min(start + _BATCH, len(points)))) for start in range(0, len(points), _BATCH)]
+        if not self.shared:
+            return [[row] for row in range(len(points))]
+        columns = [self.names.index(name) for name in self.shared]
+        groups: dict[bytes, list[int]] = {}
+        for row in range(len(points)):
+            groups.setdefault(points[row, columns].tobytes(), []).append(row)
+        return list(groups.values())
+
+    def __call__(self, points: Array) -> list[Outcome]:
+        """Outputs of one task; if it fails as a whole, each point is tried alone, so one bad point spoils no other."""
+        try:
+            return self._outcomes(points)
+        except Exception as error:
+            if len(points) == 1:
+                return [Failure(f"{type(error).__name__}: {error}")]
+            return [self(point[None])[0] for point in points]
+
+    def _outcomes(self, points: Array) -> list[Outcome]:
+        outputs = self._outputs(points)
+        if len(outputs) != len(points):
+            raise ValueError(f"the function returned {len(outputs)} outputs for {len(points)} points; it must return one for each")
+        return [_outcome(output) for output in outputs]
+
+    def _outputs(self, points: Array) -> Sequence[Any]:
+        if self.vectorised:
+            return _split(self.function(**dict(zip(self.names, points.T, strict=True))), len(points))
+        named = [named_point(self.names, point) for point in points]
+        return self.function(named) if self.shared else [self.function(**point) for point in named]
+
+
+def named_point(names: Sequence[str], point: Array) -> dict[str, float]:
+    """The inputs of one point by name, as Python numbers."""
+    return {name: float(value) for name, value in zip(names, point, strict=True)}
+
+
+def _outcome(output: Any) -> Outcome:
+    if isinstance(output, Exception):
+        return Failure(f"{type(output).__name__}: {output}")
+    try:
+        return Sample(*flatten(output))
+    except (TypeError, ValueError) as error:
+        return Failure(f"{type(error).__name__}: {error}")
+
+
+def _split(outputs: Any, n: int) -> Sequence[Any]:
+    """The outputs of a vectorised function, point by point; a constant output is spread over the points."""
+    if isinstance(outputs, Mapping):
+        arrays = {name: _spread(value, n) for name, value in outputs.items()}
+        return [{name: array[row] for name, array in arrays.items()} for row in range(n)]
+    return list(_spread(outputs, n))
+
+
+def _spread(value: Any, n: int) -> Array:
+    array = np.asarray(value, float)
+    return np.broadcast_to(array, (n,)) if array.ndim == 0 else array

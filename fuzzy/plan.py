@@ -1,0 +1,16 @@
+"""The one interface of all plans."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from fuzzy.domain import Domain
+from fuzzy.model import Model
+from fuzzy.result import FuzzyResult
+
+
+class Plan(Protocol):
+    """A way to search the boxes of the inputs for the extremes of a model."""
+
+    def run(self, model: Model, domain: Domain) -> FuzzyResult:
+        """Bounds of every output of the model on every level."""

@@ -1,0 +1,57 @@
+"""From a function and its fuzzy inputs to its fuzzy outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import nullcontext
+from time import perf_counter
+
+from fuzzy.call import Call, Function
+from fuzzy.campaign import Campaign, Progress
+from fuzzy.domain import Domain, levels
+from fuzzy.numbers import FuzzyNumber
+from fuzzy.plan import Plan
+from fuzzy.result import FuzzyResult
+from fuzzy.transformation import General
+from fuzzy.workers import pool
+
+
+def propagate(
+    function: Function,
+    inputs: Mapping[str, FuzzyNumber],
+    plan: Plan | None = None,
+    *,
+    alpha: Sequence[float] | None = None,
+    shared: Sequence[str] = (),
+    vectorised: bool = False,
+    workers: int = 1,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> FuzzyResult:
+    """Fuzzy outputs of a function of fuzzy inputs.
+
+    Args:
+        function: Gets the inputs by name and returns a number, an array, or a mapping of names to either. With `shared` it gets a list
+            of points (mappings of names to numbers) that agree in those inputs and returns a list of outputs; with `vectorised` it gets
+            arrays, shape (n,), and returns arrays whose first axis is n.
+        inputs: Fuzzy number of each input.
+        plan: How the boxes of the inputs are searched; the general transformation method if not given.
+        alpha: Rising levels; 0, ¼, ½, ¾, 1 if not given.
+        shared: Inputs whose equality lets samples share one call.
+        vectorised: Whether the function takes arrays.
+        workers: Processes of this machine; the result is the same for any number. The function must be importable by them.
+        executor: Any `concurrent.futures` executor, instead of `workers`.
+        progress: Called with the share done, 0 … 1.
+
+    Raises:
+        ValueError: An argument is wrong.
+        CampaignError: Samples failed; the others were run first.
+    """
+    domain = Domain(inputs, levels(4) if alpha is None else alpha)
+    call = Call(function, domain.names, tuple(shared), vectorised)
+    start = perf_counter()
+    with nullcontext(executor) if executor else pool(workers) as running:
+        campaign = Campaign(call, running, progress)
+        result = (plan or General()).run(campaign, domain)
+    return result.charged(calls=campaign.calls, seconds=perf_counter() - start)

@@ -1,0 +1,168 @@
+"""What every plan returns: bounds on each α-level, the inputs that reach them, and what they are worth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fuzzy.domain import Domain
+from fuzzy.model import Values
+from fuzzy.numbers import Array, PiecewiseLinear
+from fuzzy.response_surface import ResponseSurface
+
+if TYPE_CHECKING:
+    import xarray
+
+
+class Nature(StrEnum):
+    """What a bound is worth."""
+
+    GUARANTEED = "guaranteed"  # proved: the true range lies inside
+    INNER = "inner"  # attained by the model: the true range reaches at least so far
+    ESTIMATED = "estimated"  # from a surrogate, with an estimate of its error
+
+
+@dataclass(frozen=True)
+class FuzzyResult:
+    """Fuzzy outputs by their α-cuts.
+
+    Args:
+        domain: Inputs and levels.
+        outputs: Name of each output column.
+        lower: Lower ends, shape (levels, outputs).
+        upper: Upper ends, shape (levels, outputs).
+        lower_at: Inputs that reach the lower ends, shape (levels, outputs, inputs).
+        upper_at: Inputs that reach the upper ends, shape (levels, outputs, inputs).
+        nature: What the bounds are worth, the weakest of all.
+        plan: Name of the plan.
+        runs: Samples of the model that the bounds took.
+        verification_runs: Samples spent on verifying the plan's assumption, counted apart.
+        error: Estimated error of the bounds, shape (levels, outputs); zero where attained.
+        enforced: Where nesting had to be enforced, shape (levels, outputs).
+        notes: What the plan found on its way, one sentence each.
+        points: Samples of the model, shape (n, inputs).
+        values: Outputs at `points`.
+        calls: Calls of the model, each for the samples that share a set-up.
+        seconds: Wall time of the whole propagation.
+    """
+
+    domain: Domain
+    outputs: tuple[str, ...]
+    lower: Array
+    upper: Array
+    lower_at: Array
+    upper_at: Array
+    nature: Nature
+    plan: str
+    runs: int
+    verification_runs: int = 0
+    error: Array = field(default_factory=lambda: np.zeros(0))
+    enforced: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, bool))
+    notes: tuple[str, ...] = ()
+    points: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    values: Values = field(default_factory=lambda: Values((), np.zeros((0, 0))))
+    calls: int = 0
+    seconds: float = 0.0
+
+    @classmethod
+    def attained(
+        cls,
+        domain: Domain,
+        points: Array,
+        values: Values,
+        *,
+        lowest: NDArray[np.intp],
+        highest: NDArray[np.intp],
+        enforced: NDArray[np.bool_],
+        plan: str,
+    ) -> FuzzyResult:
+        """Inner bounds taken from samples.
+
+        Args:
+            domain: Inputs and levels.
+            points: Samples, shape (n, inputs).
+            values: Outputs at the samples.
+            lowest: Row of the sample that reaches each lower end, shape (levels, outputs).
+            highest: Row of the sample that reaches each upper end, shape (levels, outputs).
+            enforced: Where nesting had to be enforced, shape (levels, outputs).
+            plan: Name of the plan.
+        """
+        columns = np.arange(values.array.shape[1])
+        return cls(
+            domain=domain,
+            outputs=values.columns,
+            lower=values.array[lowest, columns],
+            upper=values.array[highest, columns],
+            lower_at=points[lowest],
+            upper_at=points[highest],
+            nature=Nature.INNER,
+            plan=plan,
+            runs=len(points),
+            error=np.zeros(lowest.shape),
+            enforced=enforced,
+            points=points,
+            values=values,
+        )
+
+    @property
+    def alpha(self) -> Array:
+        """Levels, rising."""
+        return np.array(self.domain.alpha)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs, in the order of the last axis of `lower_at` and `upper_at`."""
+        return self.domain.names
+
+    def column(self, output: str) -> int:
+        """Index of an output.
+
+        Raises:
+            ValueError: There is no such output.
+        """
+        if output not in self.outputs:
+            raise ValueError(f"there is no output {output!r}; there are {', '.join(self.outputs)}")
+        return self.outputs.index(output)
+
+    def bounds(self, output: str = "y") -> tuple[Array, Array]:
+        """Lower and upper ends of one output over the levels, two arrays of shape (levels,)."""
+        column = self.column(output)
+        return self.lower[:, column], self.upper[:, column]
+
+    def number(self, output: str = "y") -> PiecewiseLinear:
+        """One output as a fuzzy number, linear between its α-cuts.
+
+        Raises:
+            ValueError: The levels do not reach from 0 to 1.
+        """
+        lower, upper = self.bounds(output)
+        return PiecewiseLinear(tuple(self.alpha), tuple(lower), tuple(upper))
+
+    def surface(self, output: str = "y") -> ResponseSurface:
+        """Response surface of one output through the samples of the model."""
+        return ResponseSurface.fit(self.points, self.values.array[:, [self.column(output)]])
+
+    def charged(self, *, calls: int, seconds: float) -> FuzzyResult:
+        """The same result with what it cost."""
+        return replace(self, calls=calls, seconds=seconds)
+
+    def to_dataset(self) -> xarray.Dataset:
+        """Bounds over (alpha, output), where they are reached over (alpha, output, parameter)."""
+        import xarray
+
+        bounds, places = ("alpha", "output"), ("alpha", "output", "parameter")
+        return xarray.Dataset(
+            {
+                "lower": (bounds, self.lower),
+                "upper": (bounds, self.upper),
+                "error": (bounds, self.error),
+                "lower_at": (places, self.lower_at),
+                "upper_at": (places, self.upper_at),
+            },
+            coords={"alpha": self.alpha, "output": list(self.outputs), "parameter": list(self.inputs)},
+            attrs={"plan": self.plan, "nature": str(self.nature), "runs": self.runs, "verification_runs": self.verification_runs},
+        )

@@ -1,0 +1,116 @@
+"""Hanss' transformation method: reduced, general and extended (M. Hanss, Applied Fuzzy Arithmetic, Springer 2005).
+
+Level j of m counts m + 1 − j points per input: the ends of its cut, and between them the midpoints of neighbouring points of the next
+level up. The general method runs the model on the grid of these points, the reduced method on the corners of each cut only, the extended
+method takes the ends only of those inputs in which the model is monotone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise, product
+from math import prod
+
+import numpy as np
+
+from fuzzy.design import Design
+from fuzzy.domain import Domain
+from fuzzy.model import Model
+from fuzzy.numbers import FuzzyNumber
+from fuzzy.result import FuzzyResult
+
+_SAME = 1e-13  # of the support: points of different levels closer than this differ by round-off only, and are one point
+
+
+def hanss_points(number: FuzzyNumber, alpha: Sequence[float]) -> list[list[float]]:
+    """Points of every level by Hanss' recursion.
+
+    Args:
+        number: A fuzzy number or interval.
+        alpha: Rising levels.
+
+    Returns:
+        For each level, from the lowest, its points in rising order: n at the top (one where the cut is a single value, otherwise its two
+        ends), n + 1 at the next level down, and so on.
+    """
+    known: list[float] = []
+    rows: list[list[float]] = []
+    for level in reversed(alpha):
+        lower, upper = number.cut(level)
+        between = [(left + right) / 2 for left, right in pairwise(rows[-1])] if rows else []
+        rows.append([_settled(x, known, number.support.width) for x in ([lower, *between, upper] if lower < upper else [lower])])
+    return rows[::-1]
+
+
+def _settled(x: float, known: list[float], width: float) -> float:
+    """The point already known that differs from x by round-off only, otherwise x, which is known from now on."""
+    for other in known:
+        if abs(x - other) <= _SAME * width:
+            return other
+    known.append(x)
+    return x
+
+
+@dataclass(frozen=True)
+class _Transformation:
+    """What the three methods share: a grid per level, and the retransformation."""
+
+    def _refined(self, names: Sequence[str]) -> set[str]:
+        """Inputs that get the recursion's inner points."""
+        raise NotImplementedError
+
+    def grids(self, domain: Domain) -> list[list[list[float]]]:
+        """For each level and input, the points in rising order."""
+        refined = self._refined(domain.names)
+        columns = []
+        for name, number in domain.inputs.items():
+            rows = hanss_points(number, domain.alpha)
+            columns.append(rows if name in refined else [sorted({row[0], row[-1]}) for row in rows])
+        return [list(level) for level in zip(*columns, strict=True)]
+
+    def size(self, domain: Domain) -> int:
+        """Samples over all levels, counted without listing them; points that two levels share count twice."""
+        return sum(prod(len(points) for points in grid) for grid in self.grids(domain))
+
+    def points(self, domain: Domain) -> Design:
+        """The samples of every level, each distinct one listed once."""
+        return Design.from_levels(domain, [np.array(list(product(*grid))) for grid in self.grids(domain)])
+
+    def run(self, model: Model, domain: Domain) -> FuzzyResult:
+        """Evaluate the samples and rearrange them into α-cuts."""
+        design = self.points(domain)
+        return design.bounds(model(design.points), plan=type(self).__name__.lower())
+
+
+@dataclass(frozen=True)
+class General(_Transformation):
+    """The general transformation method: all combinations of the recursion's points. For any model; 225 samples in the paper's case."""
+
+    def _refined(self, names: Sequence[str]) -> set[str]:
+        return set(names)
+
+
+@dataclass(frozen=True)
+class Reduced(_Transformation):
+    """The reduced transformation method: corners of each cut. Exact where the model is monotone in every input."""
+
+    def _refined(self, names: Sequence[str]) -> set[str]:
+        return set()
+
+
+@dataclass(frozen=True)
+class Extended(_Transformation):
+    """The extended transformation method: ends only of the monotone inputs, all points of the others.
+
+    Args:
+        monotone: Inputs in which the model rises or falls throughout.
+    """
+
+    monotone: tuple[str, ...] = ()
+
+    def _refined(self, names: Sequence[str]) -> set[str]:
+        unknown = set(self.monotone) - set(names)
+        if unknown:
+            raise ValueError(f"the monotone inputs name {sorted(unknown)}, which is no fuzzy input; there are {list(names)}")
+        return set(names) - set(self.monotone)

@@ -1,0 +1,119 @@
+"""Campaigns: grouping, workers, failures, outputs."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from fuzzy import CampaignError, Interval, Triangular, propagate
+
+INPUTS = {"a": Triangular(0.0, 0.5, 1.0), "b": Triangular(-1.0, 0.0, 2.0)}
+
+
+def model(a, b):
+    return {"sum": a + b, "curve": [a, a * b, np.sin(b)]}
+
+
+def shared_model(points):
+    assert len({point["a"] for point in points}) == 1
+    return [model(**point) for point in points]
+
+
+def fragile(a, b):
+    if a > 0.9:
+        raise RuntimeError("no convergence")
+    return a + b if b < 1.9 else np.nan
+
+
+def same(one, other):
+    return (one.values.array == other.values.array).all() and (one.lower == other.lower).all() and (one.upper_at == other.upper_at).all()
+
+
+def test_result_is_the_same_bits_for_any_workers():
+    reference = propagate(model, INPUTS)
+    for workers in (2, 3):
+        assert same(propagate(model, INPUTS, workers=workers), reference)
+    with ThreadPoolExecutor(4) as executor:
+        assert same(propagate(model, INPUTS, executor=executor), reference)
+
+
+def test_three_ways_of_calling_agree():
+    reference = propagate(model, INPUTS)
+    grouped = propagate(shared_model, INPUTS, shared=("a",))
+    arrays = propagate(lambda a, b: {"sum": a + b, "curve": np.stack([a, a * b, np.sin(b)], axis=1)}, INPUTS, vectorised=True)
+    assert same(grouped, reference)
+    assert grouped.calls < grouped.runs
+    np.testing.assert_allclose(arrays.values.array, reference.values.array, rtol=1e-15)
+    assert arrays.calls == 1
+
+
+def test_outputs_are_named_and_shaped():
+    result = propagate(model, INPUTS)
+    assert result.outputs == ("sum", "curve[0]", "curve[1]", "curve[2]")
+    assert result.values.output("curve").shape == (result.runs, 3)
+    assert propagate(lambda a, b: a, INPUTS).outputs == ("y",)
+    with pytest.raises(ValueError, match="no output 'total'; there are sum, curve"):
+        result.bounds("total")
+    with pytest.raises(ValueError, match="no output 'total'; there are sum, curve"):
+        result.values.output("total")
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_failed_samples_are_reported_and_the_others_run(workers):
+    with pytest.raises(CampaignError, match=r"9 of 55 samples failed, the others are done: at a = 0, b = 2: ValueError") as caught:
+        propagate(fragile, INPUTS, workers=workers)
+    errors = [error for _, error in caught.value.failures]
+    assert sum("must be a finite number" in error for error in errors) == 4
+    assert sum("no convergence" in error for error in errors) == 5
+    assert caught.value.total == 55
+
+
+def test_one_bad_point_spoils_no_other_of_its_call():
+    def grouped(points):
+        return [fragile(**point) for point in points]
+
+    with pytest.raises(CampaignError) as caught:
+        propagate(grouped, INPUTS, shared=("b",))
+    assert len(caught.value.failures) == 9
+
+
+def test_progress_rises_to_one():
+    shares = []
+    propagate(model, INPUTS, progress=shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1
+    assert len(shares) == 55
+
+
+def test_wrong_calls_are_refused():
+    with pytest.raises(ValueError, match="shared inputs name c; there are a, b"):
+        propagate(model, INPUTS, shared=("c",))
+    with pytest.raises(ValueError, match="shared and vectorised are both given"):
+        propagate(model, INPUTS, shared=("a",), vectorised=True)
+    with pytest.raises(ValueError, match="number of workers is 0"):
+        propagate(model, INPUTS, workers=0)
+
+
+def test_outputs_must_agree_between_samples():
+    with pytest.raises(ValueError, match="all must have the same names and shapes"):
+        propagate(lambda x: {"y": x} if x < 0.5 else {"z": x}, {"x": Interval(0, 1)})
+
+
+def test_response_surface_reproduces_a_quadratic_and_states_its_error():
+    result = propagate(lambda a, b: 1 + a * b - b**2, INPUTS)
+    surface = result.surface()
+    assert surface.degree == 2
+    assert surface.error[0] < 1e-12
+    np.testing.assert_allclose(surface([[0.3, 0.7]]), 1 + 0.21 - 0.49)
+    wavy = propagate(lambda a, b: np.sin(4 * a + b), INPUTS).surface()
+    points = np.random.default_rng(1).uniform([0, -1], [1, 2], (500, 2))
+    true = np.sin(4 * points[:, 0] + points[:, 1])
+    seen = np.sqrt(np.mean((wavy(points)[:, 0] - true) ** 2))
+    assert seen < 3 * wavy.error[0] < 0.3
+
+
+def test_dataset_carries_bounds_and_places():
+    data = propagate(model, INPUTS).to_dataset()
+    assert data["lower"].dims == ("alpha", "output")
+    assert data["upper_at"].dims == ("alpha", "output", "parameter")
+    assert float(data["upper"].sel(alpha=0, output="sum")) == 3
