@@ -33,6 +33,11 @@ class Case:
         return self.path.stem
 
     @property
+    def text_of_file(self) -> str:
+        """The file as it stands."""
+        return self.path.read_text(encoding="utf-8-sig")
+
+    @property
     def stages(self) -> tuple[str, ...]:
         """The stages that a run computes, in order."""
         return cast(tuple[str, ...], self.values["stages"])

@@ -8,14 +8,17 @@ import sys
 from collections.abc import Mapping, Sequence
 from types import ModuleType
 
-from alphacut import command_cell
+from alphacut import command_cell, command_envelope, command_modulus
 from alphacut.options import Parser, split_petsc
 from alphacut.output import rank, ranks, say, standard_output
 from alphacut.problem import BadInput
 from alphacut.provenance import own_version
+from fuzzy import CampaignError
 
 COMMANDS: dict[str, ModuleType] = {
     "cell": command_cell,
+    "modulus": command_modulus,
+    "envelope": command_envelope,
 }
 STATUSES = """\
 exit status:
@@ -71,6 +74,9 @@ def main(arguments: Sequence[str] | None = None, *, program: str = "alphacut", n
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 0
+    except CampaignError as error:
+        say(str(error))
+        return 3
     except (RuntimeError, ValueError, ArithmeticError, OSError, MemoryError) as error:
         return failed(error)
 

@@ -1,15 +1,37 @@
-"""From the name of a cell model to the model: the only place of the front door that brings in DOLFINx."""
+"""From the name of a cell model to the model: the only place of the front door that may bring in DOLFINx."""
 
 from __future__ import annotations
 
+from dataclasses import fields
+from importlib import import_module
+from typing import Any, cast
+
 from alphacut.cell import CellChoice, CellModel
 from alphacut.problem import BadInput, Problem
+from rve.model import MODELS, named
 
 
 def cell_model(choice: CellChoice) -> CellModel:
-    """The model that `choice` names, at its resolution.
+    """The model that `choice` names, with those of its options that the model has.
 
     Raises:
-        BadInput: The model needs what is not installed.
+        BadInput: The model needs what is not installed, or refuses an option.
     """
-    raise BadInput(Problem("modulus.method", "there is no such model here", choice.method))
+    module, maker = MODELS[choice.method]
+    try:
+        known = {field.name for field in fields(getattr(import_module(module), maker))}
+    except ImportError as error:
+        what = f"this model cannot be loaded ({error}); ./enter brings an environment that has everything"
+        raise BadInput(Problem("modulus.method", what, choice.method, "series needs NumPy and SciPy alone")) from None
+    offered: dict[str, Any] = {
+        "layers": choice.layers,
+        "mesh_size": choice.size,
+        "interface": choice.interface,
+        "petsc": dict(choice.petsc),
+        "tolerance": choice.tolerance,
+        "exclude": choice.exclude,
+    }
+    try:
+        return cast(CellModel, named(choice.method, **{name: value for name, value in offered.items() if name in known}))
+    except ValueError as error:
+        raise BadInput(Problem("mesh", str(error))) from None

@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 
 VERSION = 1
 STAGES = ("microstructure", "modulus", "envelope")
+ENVELOPE_METHODS = ("graph-follower", "vertex", "monte-carlo", "quasi-monte-carlo")
+INTEGRATORS = ("midpoint", "newmark", "rk4", "gauss4", "exact")
 PLANS = ("general", "reduced", "extended", "signed")
 CELL_METHODS = ("prism", "slices", "table", "series", "auto")
 ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -158,7 +160,8 @@ ENVELOPE = Section(
     {
         "fuzzy": Key("inputs that are fuzzy: E, m or m1, m2 …, l, I, d, q0, v0", "choices", required=True),
         "alpha": Key("α-levels", "numbers", default=ALPHA, allowed=MEMBERSHIP),
-        "method": Key("how the envelope is found", "choice", default="graph-follower", choices=("graph-follower",)),
+        "method": Key("how the envelope is found", "choice", default="graph-follower", choices=ENVELOPE_METHODS),
+        "integrator": Key("time stepping", "choice", default="midpoint", choices=INTEGRATORS),
         "order": Key("order κ of the Taylor models", "integer", default=2, allowed=Range("1 or 2", 1, 2, closed=True)),
         "tolerance": Key("gain that is worth a new trajectory", "number", "m", required=True, allowed=POSITIVE),
         "duration": Key("length of the simulation", "number", "s", required=True, allowed=POSITIVE),

@@ -1,0 +1,97 @@
+"""``alphacut envelope``, also ``python -m frame envelope``: fuzzy forward dynamics of the structure."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, TextIO
+
+from alphacut import envelope, quantity
+from alphacut.loading import load
+from alphacut.modulus import read_number
+from alphacut.options import add_common, add_keys, changes
+from alphacut.output import as_json, write_text
+from alphacut.problem import BadInput, Problem
+from alphacut.progress import progress
+from alphacut.provenance import fingerprint
+from fuzzy import FuzzyNumber
+
+if TYPE_CHECKING:
+    from frame import Envelope
+
+ABOUT = "lower and upper envelopes of the structure's vibration on every α-cut"
+KEYS = {
+    "--fuzzy": "envelope.fuzzy",
+    "--duration": "envelope.duration",
+    "--step": "envelope.step",
+    "--alpha": "envelope.alpha",
+    "--method": "envelope.method",
+    "--integrator": "envelope.integrator",
+    "--order": "envelope.order",
+    "--tolerance": "envelope.tolerance",
+}
+BARE = {"--duration": "s", "--step": "s", "--tolerance": "m"}  # options that may leave the unit out
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    add_common(parser)
+    add_keys(parser, KEYS)
+    parser.add_argument(
+        "--modulus", metavar="QUANTITY|FILE.nc", help="Young's modulus: '[22, 24, 26] GPa' or the α-cuts of a file (default: the case's)"
+    )
+    parser.add_argument("--strict", action="store_true", help="refuse a step with ω_max·h above 0.5 instead of warning")
+    parser.add_argument("--out", metavar="FILE.nc", help="write envelopes and where they are reached as NetCDF")
+
+
+def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
+    """Compute and report."""
+    add_units(options)
+    case = load(options.case, changes(options, KEYS))
+    handed = given_modulus(options.modulus)
+    task = envelope.task_of(case)
+    with progress("Envelopes", quiet=options.quiet) as tick:
+        found = envelope.compute(case, task, modulus=handed, strict=options.strict, progress=tick)
+    if options.out:
+        key = fingerprint({"case": case.values, "task": task, "modulus": handed}, ("fuzzy", "frame"))
+        envelope.write(found.to_dataset(), options.out, case_text=case.text_of_file, key=key)
+    document = as_json(envelope.document(found), indent=None if options.json == "-" else 2)
+    if options.json == "-":
+        out.write(document)
+    elif options.json:
+        write_text(options.json, document)
+    if options.json != "-" and not options.quiet:
+        out.write(summary(found))
+    return 0
+
+
+def add_units(options: argparse.Namespace) -> None:
+    """``--duration 30`` means 30 s, ``--step 0.01`` 0.01 s, ``--tolerance 1e-4`` 1e-4 m."""
+    for option, unit in BARE.items():
+        name = option.removeprefix("--")
+        text = getattr(options, name)
+        if text is not None and quantity.SINGLE.fullmatch(text.strip()) and not text.strip()[-1].isalpha():
+            setattr(options, name, f"{text} {unit}")
+
+
+def given_modulus(text: str | None) -> FuzzyNumber | None:
+    """The modulus of ``--modulus`` in Pa: a quantity, or the α-cuts of a file."""
+    if text is None:
+        return None
+    if text.endswith(".nc"):
+        return read_number(text)
+    try:
+        number = quantity.fuzzy(text, "Pa")
+    except ValueError as error:
+        raise BadInput(Problem("--modulus", str(error), text, "a stress such as '[22.8, 24.8, 25.8] GPa', or FILE.nc")) from None
+    if not number.support.lower > 0:
+        raise BadInput(Problem("--modulus", "out of range", text, "greater than 0"))
+    return number
+
+
+def summary(found: Envelope) -> str:
+    """Extremes at the lowest level as a small table."""
+    ends = zip(found.outputs, found.minimum[0], found.maximum[0], strict=True)
+    rows = "".join(f"{name:>8}  {low:10.4f}  {high:10.4f}\n" for name, low, high in ends)
+    cost = f"{found.trajectories} trajectories, {found.seconds:.1f} s, {found.nature}"
+    return f"  output       min m       max m   (α = {found.alpha[0]:g})\n{rows}{cost}\n"

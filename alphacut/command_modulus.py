@@ -1,0 +1,73 @@
+"""``alphacut modulus``, also ``python -m fuzzy modulus``: the fuzzy effective modulus of the cell."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, TextIO
+
+from alphacut import modulus
+from alphacut.cell import GPA
+from alphacut.command_cell import named_models
+from alphacut.loading import load
+from alphacut.options import CELL_OPTIONS, add_common, add_keys, add_workers, changes, check_workers
+from alphacut.output import as_json, write_text
+from alphacut.progress import progress
+from alphacut.provenance import fingerprint
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+ABOUT = "fuzzy effective modulus by the transformation method over all fuzzy inputs of the cell"
+KEYS = {**CELL_OPTIONS, "--plan": "modulus.plan", "--alpha": "modulus.alpha"}
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    add_common(parser)
+    add_keys(parser, KEYS)
+    add_workers(parser)
+    parser.add_argument("--out", metavar="FILE.nc", help="write the α-cuts and all samples as NetCDF")
+    parser.add_argument("--exclude", metavar="NAMES", default="", help="models that method auto must not take, separated by commas")
+
+
+def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
+    """Compute and report."""
+    check_workers(options.workers)
+    case = load(options.case, changes(options, KEYS))
+    exclude = named_models("--exclude", options.exclude)
+    with progress("Fuzzy modulus", quiet=options.quiet) as tick, cluster() as executor:
+        found = modulus.compute(case, petsc=petsc, workers=options.workers, executor=executor, progress=tick, exclude=exclude)
+    if options.out:
+        key = fingerprint(case.values, ("stochastic", "rve", "fuzzy"))
+        modulus.write(found, options.out, case_text=case.text_of_file, key=key)
+    document = as_json(found.document(), indent=None if options.json == "-" else 2)
+    if options.json == "-":
+        out.write(document)
+    elif options.json:
+        write_text(options.json, document)
+    if options.json != "-" and not options.quiet:
+        out.write(summary(found))
+    return 0
+
+
+@contextmanager
+def cluster() -> Iterator[Executor | None]:
+    """The other MPI processes when started by ``mpirun -n N python -m mpi4py.futures -m fuzzy …``, else None."""
+    if "mpi4py.futures" not in sys.modules:
+        yield None
+        return
+    from mpi4py.futures import MPIPoolExecutor
+
+    with MPIPoolExecutor() as executor:
+        yield executor if executor.num_workers else None
+
+
+def summary(found: modulus.FuzzyModulus) -> str:
+    """The α-cuts as a small table."""
+    lower, upper = (ends / GPA for ends in found.result.bounds("E"))
+    rows = "".join(f"{a:5.2f}  {low:10.5f}  {high:10.5f}\n" for a, low, high in zip(found.result.alpha, lower, upper, strict=True))
+    cost = f"{found.result.runs} samples, {found.solves} linear systems, {found.result.seconds:.1f} s, {found.choice.method}"
+    return f"alpha  lower GPa   upper GPa   (E of eq. 16)\n{rows}{cost}\n"

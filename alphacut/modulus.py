@@ -1,0 +1,209 @@
+"""The fuzzy modulus of a case: samples of the cell, rearranged into α-cuts; as a document, a dataset and a fuzzy number."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from alphacut.case import Case
+from alphacut.cell import GPA, INPUTS, SHARED, CellChoice, cell_choice, key_of, parts
+from alphacut.output import whole_file
+from alphacut.problem import BadInput, Problem
+from alphacut.progress import Tick
+from alphacut.provenance import attributes, versions
+from fuzzy import Crisp, Extended, FuzzyNumber, FuzzyResult, General, PiecewiseLinear, Plan, Reduced, propagate
+from stochastic.truncated_normal import Array
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    import xarray
+
+QUANTITIES = {"E": ("Pa", "effective Young's modulus, eq. 16"), "nu": ("1", "effective Poisson's ratio, eq. 16")}
+STRESSES = {"s11": ("Pa", "mean homogenised stress 11 under load 1"), "s12": ("Pa", "mean homogenised stress 12 under load 2")}
+BOUNDS = QUANTITIES | STRESSES
+
+
+@dataclass(frozen=True)
+class CellTask:
+    """One task of the campaign: samples that share everything but the inclusion's modulus. Runs in any process.
+
+    Args:
+        choice: Model of the cell.
+        crisp: Inputs that are not fuzzy, by name, in SI.
+        theta: Support of θ.
+    """
+
+    choice: CellChoice
+    crisp: Mapping[str, float]
+    theta: tuple[float, ...]
+
+    def __call__(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float | Array]]:
+        """Outputs of each point: E, nu, mean stresses, the stress curves over theta, and the linear systems solved."""
+        values = [{**self.crisp, **point} for point in points]
+        radius, matrix, _ = parts(values[0], self.theta)
+        inclusions = [parts(value, self.theta)[2] for value in values]
+        results = self.choice.model().solve(radius, matrix, inclusions)
+        outputs: list[dict[str, float | Array]] = []
+        for result in results:
+            s11, s12 = result.curve.mean
+            curve = {"theta": result.curve.theta, "curve11": result.curve.s11, "curve12": result.curve.s12}
+            means = {"E": result.modulus, "nu": result.poisson, "s11": s11, "s12": s12}
+            outputs.append({**means, "systems": len(result.iterations), **curve})
+        return outputs
+
+
+@dataclass(frozen=True)
+class FuzzyModulus:
+    """The campaign's result for one case.
+
+    Args:
+        result: Bounds of every output over the levels, with all samples.
+        choice: Model of the cell that was used.
+    """
+
+    result: FuzzyResult
+    choice: CellChoice
+
+    @property
+    def number(self) -> PiecewiseLinear:
+        """The fuzzy modulus in Pa, to be handed on."""
+        return self.result.number("E")
+
+    @property
+    def solves(self) -> int:
+        """Linear systems solved."""
+        return int(self.result.values.output("systems").sum())
+
+    def document(self) -> dict[str, Any]:
+        """The result as it is printed with ``--json``; moduli and stresses in GPa."""
+        found = {name: self.result.bounds(name) for name in BOUNDS}
+        scaled = {("nu" if name == "nu" else f"{name}_GPa"): (1.0 if name == "nu" else GPA, ends) for name, ends in found.items()}
+        return {
+            "alpha": self.result.alpha,
+            **{name: {"lower": lower / unit, "upper": upper / unit} for name, (unit, (lower, upper)) in scaled.items()},
+            "samples": self.result.runs,
+            "solves": self.solves,
+            "verification_samples": self.result.verification_runs,
+            "calls": self.result.calls,
+            "seconds": self.result.seconds,
+            "nature": str(self.result.nature),
+            "notes": list(self.result.notes),
+            "plan": self.result.plan,
+            "method": self.choice.method,
+            "versions": versions(),
+        }
+
+    def dataset(self) -> xarray.Dataset:
+        """α-cuts of every quantity (alpha, bound), where they are reached, and all samples with their stress curves."""
+        import xarray
+
+        result = self.result
+        variables: dict[str, Any] = {}
+        for name, (unit, about) in BOUNDS.items():
+            column = result.column(name)
+            ends = np.stack(result.bounds(name), axis=1)
+            places = np.stack([result.lower_at[:, column], result.upper_at[:, column]], axis=1)
+            variables[name] = (("alpha", "bound"), ends, {"units": unit, "long_name": about})
+            variables[f"{name}_at"] = (
+                ("alpha", "bound", "parameter"),
+                places,
+                {"long_name": f"inputs that reach the ends of {name}, in SI"},
+            )
+            variables[f"{name}_sample"] = (("sample",), result.values.output(name), {"units": unit, "long_name": about})
+        variables["point"] = (("sample", "parameter"), result.points, {"long_name": "inputs of each sample, in SI"})
+        curves = {"theta": ("theta", "1"), "curve11": ("stress 11 under load 1", "Pa"), "curve12": ("stress 12 under load 2", "Pa")}
+        for name, (about, unit) in curves.items():
+            variables[name] = (("sample", "node"), result.values.output(name), {"units": unit, "long_name": about})
+        coordinates = {"alpha": result.alpha, "bound": ["lower", "upper"], "parameter": list(result.inputs)}
+        numbers = {"samples": result.runs, "solves": self.solves, "seconds": result.seconds, "nature": str(result.nature)}
+        return xarray.Dataset(variables, coordinates, {"method": self.choice.method, "plan": result.plan, **numbers})
+
+
+def plan_of(case: Case) -> Plan:
+    """The plan that a case asks for."""
+    name = case.text("modulus.plan")
+    if name == "signed":
+        import fuzzy
+
+        if not hasattr(fuzzy, "Signed"):
+            raise case.refuse("modulus.plan", "this plan is not available", "general, reduced, extended")
+        return fuzzy.Signed()  # type: ignore[no-any-return]
+    plans: dict[str, Plan] = {"general": General(), "reduced": Reduced(), "extended": Extended()}
+    return plans[name]
+
+
+def fuzzy_inputs(case: Case) -> dict[str, FuzzyNumber]:
+    """The inputs of the cell that are fuzzy, by name, in SI."""
+    numbers = {name: case.fuzzy(key_of(name)) for name in INPUTS}
+    found = {name: number for name, number in numbers.items() if number.support.width > 0}
+    return found or {"inclusion_modulus": numbers["inclusion_modulus"]}
+
+
+def compute(
+    case: Case,
+    *,
+    petsc: Mapping[str, str] | None = None,
+    workers: int = 1,
+    executor: Executor | None = None,
+    progress: Tick | None = None,
+    exclude: tuple[str, ...] = (),
+) -> FuzzyModulus:
+    """Run the campaign of a case.
+
+    Args:
+        case: With the sections radius, cell, mesh and modulus.
+        petsc: PETSc options that override the solver's.
+        workers: Processes; the result is the same for any number.
+        executor: Any `concurrent.futures` executor instead.
+        progress: Told the share done.
+        exclude: Models that method auto must not take.
+    """
+    inputs = fuzzy_inputs(case)
+    crisp = {name: case.fuzzy(key_of(name)).modal for name in INPUTS if name not in inputs}
+    choice = cell_choice(case, exclude=exclude, petsc=petsc)
+    shared = tuple(name for name in inputs if name in SHARED)
+    result = propagate(
+        CellTask(choice, crisp, case.numbers("radius.theta")),
+        inputs,
+        plan_of(case),
+        alpha=case.numbers("modulus.alpha"),
+        shared=shared or ("inclusion_modulus",),
+        workers=workers,
+        executor=executor,
+        progress=progress,
+    )
+    return FuzzyModulus(result, choice)
+
+
+def write(modulus: FuzzyModulus, path: Path | str, *, case_text: str, key: str) -> None:
+    """Write ``modulus.nc``, whole or not at all."""
+    dataset = modulus.dataset().assign_attrs(attributes(case_text, key))
+    with whole_file(path) as partial:
+        dataset.to_netcdf(partial)
+
+
+def read_number(path: Path | str, option: str = "--modulus") -> FuzzyNumber:
+    """The fuzzy modulus in Pa from a file that `write` made.
+
+    Raises:
+        BadInput: The file is missing or holds no modulus.
+    """
+    import xarray
+
+    if not Path(path).is_file():
+        raise BadInput(Problem(option, "there is no such file", str(path)))
+    try:
+        with xarray.open_dataset(path) as dataset:
+            alpha, ends = dataset["alpha"].values, dataset["E"].transpose("alpha", "bound").values
+    except (OSError, ValueError, KeyError) as error:
+        raise BadInput(
+            Problem(option, f"the file holds no α-cuts of a modulus ({error})", str(path), "a modulus.nc of this program")
+        ) from None
+    if len(alpha) == 1:
+        return Crisp(float(ends.mean()))
+    return PiecewiseLinear(tuple(map(float, alpha)), tuple(map(float, ends[:, 0])), tuple(map(float, ends[:, 1])))

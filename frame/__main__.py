@@ -1,0 +1,8 @@
+"""``python -m frame envelope CASE``: fuzzy forward dynamics; the same as ``alphacut envelope``."""
+
+import sys
+
+from alphacut.entry import main
+
+if __name__ == "__main__":
+    sys.exit(main(program="python -m frame", names={"envelope": "envelope"}))
