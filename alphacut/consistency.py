@@ -112,12 +112,12 @@ def known_input(key: str, name: str, count: int) -> Iterator[Problem]:
 
 
 def times(case: Case) -> Iterator[Problem]:
-    """The step must fit into every duration."""
+    """Every duration is a whole number of steps."""
     step = case.number("envelope.step")
     for key in ("envelope.duration", *(f"study[{i}].duration" for i in range(int(str(case.values.get("study", 0)))))):
-        if case.has(key) and case.number(key) < step:
-            yield Problem(
-                "envelope.step",
-                f"the step {step:g} s is longer than the {key} of {case.number(key):g} s",
-                str(case.written["envelope.step"]),
-            )
+        if not case.has(key):
+            continue
+        duration = case.number(key)
+        if round(duration / step) < 1 or abs(round(duration / step) * step - duration) > 1e-9 * duration:
+            what = f"{duration:g} s is not a whole number of steps of {step:g} s"
+            yield Problem(key, what, str(case.written.get(key, "")), "a multiple of envelope.step")

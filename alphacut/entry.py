@@ -30,8 +30,8 @@ exit status:
 """
 
 
-def parser(program: str, commands: Mapping[str, ModuleType]) -> Parser:
-    """The parser of a program with the given commands, by their names there."""
+def parsers(program: str, commands: Mapping[str, ModuleType]) -> tuple[Parser, dict[str, Parser]]:
+    """The parser of a program with the given commands, and those of the commands, by their names there."""
     top = Parser(
         prog=program,
         description="From an uncertain microstructure to the fuzzy vibration of a structure.",
@@ -41,10 +41,12 @@ def parser(program: str, commands: Mapping[str, ModuleType]) -> Parser:
     )
     top.add_argument("--version", action="version", version=f"alphacut {own_version()}")
     inner = top.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
+    made: dict[str, Parser] = {}
     for name, module in commands.items():
         about = module.ABOUT
-        module.arguments(inner.add_parser(name, help=about, description=f"{about[:1].upper()}{about[1:]}.", allow_abbrev=False))
-    return top
+        made[name] = inner.add_parser(name, help=about, description=f"{about[:1].upper()}{about[1:]}.", allow_abbrev=False)
+        module.arguments(made[name])
+    return top, made
 
 
 def main(arguments: Sequence[str] | None = None, *, program: str = "alphacut", names: Mapping[str, str] | None = None) -> int:
@@ -61,7 +63,10 @@ def main(arguments: Sequence[str] | None = None, *, program: str = "alphacut", n
     commands = COMMANDS if names is None else {here: COMMANDS[there] for here, there in names.items()}
     try:
         ours, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
-        options = parser(program, commands).parse_args(ours)
+        top, made = parsers(program, commands)
+        options, left = top.parse_known_args(ours)
+        if left:
+            made[options.command].refuse([word for word in left if word.startswith("-")] or left)
         with standard_output(getattr(options, "json", None) == "-") as out:
             return int(commands[options.command].run(options, petsc, out))
     except BadInput as error:

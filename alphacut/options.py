@@ -33,10 +33,14 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Raise instead of printing usage and leaving."""
-        unknown = re.search(r"unrecognized arguments: (-\S+)", message)
+        raise BadInput(Problem(self.prog, message))
+
+    def refuse(self, words: Sequence[str]) -> NoReturn:
+        """Complain about words that are no options of this command, with the nearest that is."""
         known = [name for name in self._option_string_actions if name.startswith("--")]
-        close = nearest(unknown[1].partition("=")[0], known) if unknown else ""
-        raise BadInput(Problem(self.prog, message.replace("unrecognized arguments", "there is no such option"), nearest=close))
+        raise BadInput(
+            [Problem(self.prog, f"there is no such option: {word}", nearest=nearest(word.partition("=")[0], known)) for word in words]
+        )
 
 
 def split_petsc(arguments: Sequence[str]) -> tuple[list[str], dict[str, str]]:

@@ -1,0 +1,58 @@
+"""Imports point one way, and every package imports quickly and without DOLFINx."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+MAY_IMPORT = {
+    "stochastic": set(),
+    "fuzzy": set(),
+    "rve": {"stochastic"},
+    "frame": {"fuzzy"},
+    "alphacut": {"stochastic", "fuzzy", "rve", "frame"},
+}
+HEAVY = {"dolfinx", "petsc4py", "mpi4py", "basix", "ufl", "gmsh", "pyvista", "matplotlib", "xarray", "pandas", "sklearn", "skimage", "rich"}
+SECONDS = 1.0  # for a fresh interpreter with NumPy and SciPy's special functions; most of it is theirs
+
+
+def imported(tree: ast.AST) -> set[str]:
+    """Top-level names of the modules that a syntax tree imports."""
+    found: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found |= {alias.name.partition(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found.add(node.module.partition(".")[0])
+    return found
+
+
+def wrong_directions(package: str, file_name: str, tree: ast.AST) -> set[str]:
+    """Packages of this project that a file imports and may not."""
+    allowed = MAY_IMPORT[package] | {package} | ({"alphacut"} if file_name == "__main__.py" else set())
+    return (imported(tree) & set(MAY_IMPORT)) - allowed
+
+
+@pytest.mark.parametrize("package", MAY_IMPORT)
+def test_imports_point_one_way(package):
+    files = sorted((ROOT / package).rglob("*.py"))
+    assert files
+    wrong = {file.name: wrong_directions(package, file.name, ast.parse(file.read_text(encoding="utf-8"))) for file in files}
+    assert not {name: found for name, found in wrong.items() if found}
+
+
+def test_a_wrong_direction_would_be_seen():
+    assert wrong_directions("fuzzy", "plan.py", ast.parse("def f():\n    from rve.cell import Phase\n")) == {"rve"}
+    assert wrong_directions("rve", "cell.py", ast.parse("import alphacut")) == {"alphacut"}
+    assert not wrong_directions("rve", "__main__.py", ast.parse("import alphacut.entry"))
+
+
+@pytest.mark.parametrize("package", [*MAY_IMPORT, "alphacut.entry"])
+def test_a_package_imports_fast_and_without_dolfinx(package):
+    program = f"import sys, time; t = time.perf_counter(); import {package}; s = time.perf_counter() - t; print(s, *sys.modules)"
+    runs = [subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split() for _ in range(2)]
+    assert not HEAVY & set(runs[0])
+    assert min(float(run[0]) for run in runs) < SECONDS
