@@ -1,0 +1,115 @@
+"""The boxes P_α of the uncertain parameters, and trajectories over the unit box."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from frame.flow import Flow
+from frame.jet import Array, Jet
+from fuzzy import FuzzyNumber
+
+ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Boxes:
+    """Nested boxes, one per level, in physical and in unit coordinates.
+
+    The unit coordinate of a parameter runs over [−1, 1] on its widest cut: p = centre + radius u.
+
+    Args:
+        names: Parameters, d of them.
+        alpha: Levels, rising, shape (A,).
+        lower: Lower ends, shape (A, d), in SI units.
+        upper: Upper ends, shape (A, d).
+        modal: Values of membership 1, shape (d,).
+
+    Raises:
+        ValueError: No parameter, or a level outside [0, 1], or levels not rising.
+    """
+
+    names: tuple[str, ...]
+    alpha: Array
+    lower: Array
+    upper: Array
+    modal: Array
+
+    def __post_init__(self) -> None:
+        if not self.names:
+            raise ValueError("no uncertain parameter: name at least one")
+        if not len(self.alpha) or self.alpha.min() < 0 or self.alpha.max() > 1 or (np.diff(self.alpha) <= 0).any():
+            raise ValueError(f"alpha: {[float(a) for a in self.alpha]} must rise within [0, 1]")
+
+    @property
+    def centre(self) -> Array:
+        """Middle of the widest box, shape (d,)."""
+        middle: Array = (self.lower[0] + self.upper[0]) / 2
+        return middle
+
+    @property
+    def radius(self) -> Array:
+        """Half widths of the widest box, shape (d,)."""
+        half: Array = (self.upper[0] - self.lower[0]) / 2
+        return half
+
+    def to_unit(self, points: Array) -> Array:
+        """Unit coordinates of physical points (…, d); a parameter without width is at 0."""
+        unit: Array = (points - self.centre) / np.where(self.radius > 0, self.radius, 1.0)
+        return unit
+
+    def to_physical(self, unit: Array) -> Array:
+        """Physical points of unit coordinates (…, d), never outside the widest box."""
+        points: Array = np.clip(self.centre + self.radius * unit, self.lower[0], self.upper[0])
+        return points
+
+    def unit(self, level: int) -> tuple[Array, Array]:
+        """Lower and upper ends of a level in unit coordinates."""
+        return self.to_unit(self.lower[level]), self.to_unit(self.upper[level])
+
+
+def boxes(inputs: Mapping[str, FuzzyNumber], alpha: Sequence[float] = ALPHA) -> Boxes:
+    """The α-cuts of `inputs` as boxes.
+
+    Raises:
+        ValueError: As `Boxes`.
+    """
+    levels = np.asarray(sorted(alpha), float)
+    cuts = np.array([[number.cut(a) for number in inputs.values()] for a in levels], float).reshape(len(levels), len(inputs), 2)
+    modal = np.array([number.modal for number in inputs.values()])
+    return Boxes(tuple(inputs), levels, cuts[..., 0], cuts[..., 1], modal)
+
+
+@dataclass(frozen=True, eq=False)
+class UnitFlow:
+    """A flow in unit coordinates.
+
+    Args:
+        flow: The flow in physical parameters.
+        boxes: The boxes; its names must be those of `flow`.
+    """
+
+    flow: Flow
+    boxes: Boxes
+
+    @property
+    def time(self) -> Array:
+        """Nodes, shape (T,), in s."""
+        return self.flow.time
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the observed quantities."""
+        return self.flow.outputs
+
+    def values(self, unit: Array) -> Array:
+        """Trajectories at unit coordinates (S, d), shape (S, T, outputs)."""
+        return self.flow.values(self.boxes.to_physical(unit))
+
+    def taylor(self, unit: Array) -> Jet:
+        """Trajectories with derivatives by the unit coordinates, V = (S, T, outputs)."""
+        jet, r = self.flow.taylor(self.boxes.to_physical(unit)), self.boxes.radius
+        first = jet.first * r[:, None, None, None]
+        return Jet(jet.value, first, jet.second * (r[:, None] * r)[:, :, None, None, None])

@@ -1,0 +1,100 @@
+"""Envelopes: the α-cut bounds of the outputs over time, with the parameters that reach them and what they cost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from frame.jet import Array
+
+if TYPE_CHECKING:
+    import xarray
+
+NATURES = ("inner", "estimated", "verified by sampling", "guaranteed")
+
+
+@dataclass(frozen=True, eq=False)
+class Envelope:
+    """Discrete fuzzy mapping of an output quantity (eq. 20).
+
+    Args:
+        alpha: Levels, rising, shape (A,).
+        time: Nodes, shape (T,), in s.
+        outputs: Names of the observed quantities, m of them.
+        parameters: Names of the uncertain parameters, d of them.
+        lower: Lower bounds, shape (A, T, m), in SI units.
+        upper: Upper bounds, shape (A, T, m).
+        lower_at: Parameters that reach the lower bounds, shape (A, T, m, d), in SI units.
+        upper_at: Parameters that reach the upper bounds, shape (A, T, m, d).
+        method: Name of the method.
+        nature: "inner": attained by the given parameters; "estimated": with `error`; "verified by sampling" or "guaranteed": certified.
+        trajectories: Number of trajectories (or eigen-analyses) computed.
+        seconds: Wall time of computing.
+        error: Estimated envelope error, shape (A, T, m), in the units of the outputs; None where none was made.
+        outer_lower: Certified bound below `lower`, shape (A, T, m), or None.
+        outer_upper: Certified bound above `upper`, or None.
+        facts: Further numbers and words: step error, reason of a choice, counts.
+    """
+
+    alpha: Array
+    time: Array
+    outputs: tuple[str, ...]
+    parameters: tuple[str, ...]
+    lower: Array
+    upper: Array
+    lower_at: Array
+    upper_at: Array
+    method: str
+    nature: str
+    trajectories: int
+    seconds: float
+    error: Array | None = None
+    outer_lower: Array | None = None
+    outer_upper: Array | None = None
+    facts: Mapping[str, float | str] = field(default_factory=dict)
+
+    @property
+    def minimum(self) -> Array:
+        """Least value over time, shape (A, m)."""
+        least: Array = self.lower.min(1)
+        return least
+
+    @property
+    def maximum(self) -> Array:
+        """Greatest value over time, shape (A, m)."""
+        greatest: Array = self.upper.max(1)
+        return greatest
+
+    def nesting_violation(self) -> float:
+        """By how much an α-cut leaves the next wider one, at most; 0 when nested."""
+        low = np.diff(self.lower, axis=0).min(initial=0.0)
+        high = np.diff(self.upper, axis=0).max(initial=0.0)
+        return float(max(-low, high, 0.0))
+
+    def to_dataset(self) -> xarray.Dataset:
+        """The envelope as an xarray dataset with units; ready for NetCDF."""
+        import xarray
+
+        band, at = ("alpha", "time", "output"), ("alpha", "time", "output", "parameter")
+        data: dict[str, Any] = {name: (band, getattr(self, name)) for name in ("lower", "upper")}
+        data |= {name: (at, getattr(self, name)) for name in ("lower_at", "upper_at")}
+        data |= {name: (band, getattr(self, name)) for name in ("error", "outer_lower", "outer_upper") if getattr(self, name) is not None}
+        axes = {"alpha": self.alpha, "time": self.time, "output": list(self.outputs), "parameter": list(self.parameters)}
+        counts = {"trajectories": self.trajectories, "seconds": self.seconds}
+        dataset = xarray.Dataset(data, axes, {"method": self.method, "nature": self.nature, **counts, **self.facts})
+        dataset["time"].attrs["units"] = "s"
+        units = sorted({output_unit(name) for name in self.outputs})
+        for name in set(data) - {"lower_at", "upper_at"}:
+            dataset[name].attrs["units"] = units[0] if len(units) == 1 else "SI, by output"
+        for name in ("lower_at", "upper_at"):
+            dataset[name].attrs["units"] = "SI, by parameter"
+        return dataset
+
+
+def output_unit(name: str) -> str:
+    """SI unit of an output by its name."""
+    kind = name.rstrip("0123456789")
+    return {"q": "m", "drift": "m", "v": "m/s", "shear": "N", "base_shear": "N", "force": "N", "phi": "rad"}.get(kind, "SI")

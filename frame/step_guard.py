@@ -1,0 +1,56 @@
+"""Whether a step resolves the fastest oscillation, and what it costs when it does not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan, pi
+
+from frame.linear import LinearSystem, frequencies
+
+LIMIT = 0.5
+"""Largest ω_max h that passes without a warning."""
+
+
+@dataclass(frozen=True)
+class StepGuard:
+    """Resolution of the fastest mode by a midpoint step.
+
+    Args:
+        frequency: Largest undamped angular frequency, in rad/s.
+        step: Step, in s.
+        duration: Length of the simulation, in s.
+    """
+
+    frequency: float
+    step: float
+    duration: float
+
+    @property
+    def resolution(self) -> float:
+        """ω_max h; π would be two steps per cycle."""
+        return self.frequency * self.step
+
+    @property
+    def ok(self) -> bool:
+        """Whether the step resolves the fastest mode."""
+        return self.resolution <= LIMIT
+
+    @property
+    def phase_error(self) -> float:
+        """Phase by which the fastest mode lags at the end, in rad: the midpoint rule turns by 2 atan(ωh/2) instead of ωh per step."""
+        return (self.resolution - 2 * atan(self.resolution / 2)) * self.duration / self.step
+
+    @property
+    def message(self) -> str:
+        """One sentence for a warning or an error."""
+        cure = LIMIT / self.frequency
+        return (
+            f"step: {self.step:g} s gives omega_max h = {self.resolution:.3g} with omega_max = {self.frequency:.4g} rad/s; above {LIMIT:g} "
+            f"the fastest mode lags by {self.phase_error:.3g} rad ({self.phase_error / (2 * pi):.3g} cycles) after {self.duration:g} s; "
+            f"take a step of at most {cure:.2g} s, or check the units of masses and stiffness"
+        )
+
+
+def guard(system: LinearSystem, step: float, duration: float) -> StepGuard:
+    """The guard of a structure at its modal parameters."""
+    return StepGuard(float(frequencies(system)[-1]), step, duration)
