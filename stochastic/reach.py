@@ -1,0 +1,102 @@
+"""Which discs come near which: searches over discs of very different radii, by classes of size, in periodic and open rectangles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from stochastic.discs import Discs
+from stochastic.truncated_normal import Array
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Ordered pairs (i, j) of discs, grouped by i, one for each periodic image of j.
+
+    Args:
+        first: i, shape (m,), rising.
+        second: j, shape (m,).
+        apart: Vector from the centre of i to that image of j, shape (m, 2), in m.
+    """
+
+    first: Array
+    second: Array
+    apart: Array
+
+    def where(self, keep: Array) -> Pairs:
+        """The pairs that `keep` (mask or order) selects."""
+        return Pairs(self.first[keep], self.second[keep], self.apart[keep])
+
+    @staticmethod
+    def join(parts: list[Pairs]) -> Pairs:
+        """All pairs of `parts`, grouped by i again."""
+        first = np.concatenate([part.first for part in parts])
+        order = np.argsort(first, kind="stable")
+        second, apart = np.concatenate([part.second for part in parts]), np.concatenate([part.apart for part in parts])
+        return Pairs(first[order], second[order], apart[order])
+
+
+def size_classes(radii: Array) -> Iterator[Array]:
+    """Indices of discs whose radii lie within a factor of two, class by class; together all discs."""
+    top = radii.max()
+    level = np.floor(np.log2(np.maximum(radii, top * 2.0**-20) / top)) if top > 0 else np.zeros_like(radii)
+    for value in np.unique(level):
+        yield np.flatnonzero(level == value)
+
+
+def nearest_in_each_class(discs: Discs, number: int) -> Pairs:
+    """For each disc the `number` nearest centres of each size class (nearest images only), itself left out."""
+    from scipy.spatial import KDTree
+
+    parts = []
+    for members in size_classes(discs.radii):
+        tree = KDTree(discs.centres[members], boxsize=discs.size if discs.periodic else None)
+        wanted = min(number + 1, len(members))
+        _, found = tree.query(discs.centres, k=np.arange(1, wanted + 1))
+        first, second = np.repeat(np.arange(len(discs)), wanted), members[found.ravel()]
+        apart = first != second
+        first, second = first[apart], second[apart]
+        parts.append(Pairs(first, second, discs.separation(first, second)))
+    return Pairs.join(parts)
+
+
+def within_reach(discs: Discs, reach: Array) -> Pairs:
+    """All pairs, every periodic image of j (of i itself too), with |c_j − c_i| < reach_i + r_j.
+
+    Args:
+        discs: The discs.
+        reach: shape (n,), in m; may be negative.
+    """
+    from scipy.spatial import KDTree
+
+    parts = []
+    for members in size_classes(discs.radii):
+        largest = discs.radii[members].max()
+        second, shift = _images(discs, members, float(reach.max() + largest))
+        tree = KDTree(discs.centres[second] + shift)
+        found = tree.query_ball_point(discs.centres, np.maximum(reach + largest, 0) * (1 + 1e-12), return_sorted=False)
+        counts = np.fromiter(map(len, found), int, len(found))
+        image = np.fromiter((k for one in found for k in one), int, counts.sum())
+        pairs = Pairs(np.repeat(np.arange(len(discs)), counts), second[image], np.zeros((0, 2)))
+        apart = discs.centres[pairs.second] - discs.centres[pairs.first] + shift[image]  # the same, with its sign, seen from j
+        distance = np.hypot(*apart.T)
+        keep = (distance < reach[pairs.first] + discs.radii[pairs.second]) & ((pairs.first != pairs.second) | (distance > 0))
+        parts.append(Pairs(pairs.first[keep], pairs.second[keep], apart[keep]))
+    return Pairs.join(parts)
+
+
+def _images(discs: Discs, members: Array, margin: float) -> tuple[Array, Array]:
+    """Indices of `members`, and shifts that carry them to all images within `margin` of the rectangle."""
+    if not discs.periodic:
+        return members, np.zeros((len(members), 2))
+    indices, shifts = [], []
+    tiles = np.ceil(np.maximum(margin, 0) / discs.size).astype(int)
+    for i in range(-tiles[0], tiles[0] + 1):
+        for j in range(-tiles[1], tiles[1] + 1):
+            image = discs.centres[members] + discs.size * (i, j)
+            near = members[((image > -margin) & (image < discs.size + margin)).all(axis=1) | (i == j == 0)]
+            indices.append(near)
+            shifts.append(np.broadcast_to(discs.size * (i, j), (len(near), 2)))
+    return np.concatenate(indices), np.concatenate(shifts)
