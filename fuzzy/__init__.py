@@ -2,11 +2,14 @@
 
 from fuzzy.campaign import CampaignError
 from fuzzy.domain import Domain, levels
+from fuzzy.known import Known
+from fuzzy.monotone import Verification
 from fuzzy.numbers import Crisp, Cut, FuzzyNumber, Interval, PiecewiseLinear, Trapezoidal, Triangular
 from fuzzy.plan import Plan
 from fuzzy.propagation import propagate
 from fuzzy.response_surface import ResponseSurface
 from fuzzy.result import FuzzyResult, Nature
+from fuzzy.signed import Signed
 from fuzzy.transformation import Extended, General, Reduced
 
 __all__ = [
@@ -19,13 +22,16 @@ __all__ = [
     "FuzzyResult",
     "General",
     "Interval",
+    "Known",
     "Nature",
     "PiecewiseLinear",
     "Plan",
     "Reduced",
     "ResponseSurface",
+    "Signed",
     "Trapezoidal",
     "Triangular",
+    "Verification",
     "levels",
     "propagate",
 ]

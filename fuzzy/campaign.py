@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fuzzy.call import Call, Failure, named_point
+from fuzzy.known import Known
 from fuzzy.model import Layout, Values
 from fuzzy.numbers import Array
 from fuzzy.workers import completed
@@ -45,6 +46,7 @@ class Campaign:
         call: The function with the way it is called.
         executor: Any `concurrent.futures` executor; None runs in this process.
         progress: Called with the share done, 0 … 1, of each batch of points.
+        known: What the caller knows about the model.
         runs: Samples run so far.
         calls: Calls of the function so far.
     """
@@ -52,6 +54,7 @@ class Campaign:
     call: Call
     executor: Executor | None = None
     progress: Progress | None = None
+    known: Known = field(default_factory=Known)
     runs: int = 0
     calls: int = 0
     _layout: Layout | None = field(default=None, repr=False)

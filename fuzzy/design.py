@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fuzzy.domain import Domain
 from fuzzy.model import Values
-from fuzzy.numbers import Array
+from fuzzy.numbers import Array, Mask, Rows
 from fuzzy.result import FuzzyResult
 
-Rows = NDArray[np.intp]
+_ROUND_OFF = 1e-12  # of the support: points this close to a box lie in it
 
 
 @dataclass(frozen=True)
@@ -22,7 +21,7 @@ class Design:
 
     Args:
         domain: Inputs and levels.
-        points: Distinct samples, shape (n, inputs), in lexicographic order.
+        points: Distinct samples, shape (n, inputs).
         levels: For each level, the rows of its samples.
     """
 
@@ -37,6 +36,14 @@ class Design:
         ends = np.cumsum([len(rows) for rows in points])[:-1]
         return cls(domain, distinct, tuple(np.split(inverse.ravel(), ends)))
 
+    @classmethod
+    def from_samples(cls, domain: Domain, points: Array) -> Design:
+        """Let every level use all points, shape (n, inputs), that lie in its box."""
+        lower, upper = domain.boxes
+        slack = _ROUND_OFF * (upper[0] - lower[0])
+        inside = [((points >= a - slack) & (points <= b + slack)).all(axis=1) for a, b in zip(list(lower), list(upper), strict=True)]
+        return cls(domain, points, tuple(np.flatnonzero(rows) for rows in inside))
+
     def bounds(self, values: Values, *, plan: str) -> FuzzyResult:
         """Retransformation: the extremes of each level's samples and of every level above, so cuts are nested by construction.
 
@@ -50,11 +57,11 @@ class Design:
             self.domain, self.points, values, lowest=lowest, highest=highest, enforced=low_enforced | high_enforced, plan=plan
         )
 
-    def _extremes(self, values: Array) -> tuple[Rows, NDArray[np.bool_]]:
+    def _extremes(self, values: Array) -> tuple[Rows, Mask]:
         """Rows of the least values (levels, outputs), and where a level's own samples would have missed the level above."""
         columns = np.arange(values.shape[1])
         best: list[Rows] = []
-        enforced: list[NDArray[np.bool_]] = []
+        enforced: list[Mask] = []
         for rows in reversed(self.levels):
             own = rows[values[rows].argmin(axis=0)]
             missed = values[best[-1], columns] < values[own, columns] if best else np.zeros(len(columns), bool)

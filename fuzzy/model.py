@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fuzzy.known import Known
 from fuzzy.numbers import Array
 
 Output = float | Sequence[float] | Mapping[str, ArrayLike] | ArrayLike
@@ -50,9 +51,24 @@ class Values:
             start += size
         raise ValueError(f"there is no output {name!r}; there are {', '.join(other for other, _ in self.layout)}")
 
+    def select(self, columns: Sequence[str]) -> Array:
+        """The named columns, shape (n, len(columns)).
+
+        Raises:
+            ValueError: There is no such column.
+        """
+        missing = [name for name in columns if name not in self.columns]
+        if missing:
+            raise ValueError(f"there is no output {', '.join(missing)}; there are {', '.join(self.columns)}")
+        return self.array[:, [self.columns.index(name) for name in columns]]
+
 
 class Model(Protocol):
     """A model as plans call it."""
+
+    @property
+    def known(self) -> Known:
+        """What the caller knows about the model."""
 
     def __call__(self, points: Array) -> Values:
         """Outputs at the points, shape (n, inputs)."""

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Rows = NDArray[np.intp]
 
 
 class Cut(NamedTuple):
@@ -64,7 +66,7 @@ class FuzzyNumber(ABC):
         if not 0 <= alpha <= 1:
             raise ValueError(f"the α of a cut is {alpha:g}; it must lie in [0, 1]")
         levels, lower, upper = self.cuts
-        return Cut(_interpolate(alpha, levels, lower), _interpolate(alpha, levels, upper))
+        return Cut(float(_interpolate(alpha, levels, lower)), float(_interpolate(alpha, levels, upper)))
 
     def membership(self, x: ArrayLike) -> Array:
         """Grade of membership μ in [0, 1] at `x`, any shape."""

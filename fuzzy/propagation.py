@@ -10,6 +10,7 @@ from time import perf_counter
 from fuzzy.call import Call, Function
 from fuzzy.campaign import Campaign, Progress
 from fuzzy.domain import Domain, levels
+from fuzzy.known import Known
 from fuzzy.numbers import FuzzyNumber
 from fuzzy.plan import Plan
 from fuzzy.result import FuzzyResult
@@ -27,6 +28,7 @@ def propagate(
     vectorised: bool = False,
     workers: int = 1,
     executor: Executor | None = None,
+    known: Known | None = None,
     progress: Progress | None = None,
 ) -> FuzzyResult:
     """Fuzzy outputs of a function of fuzzy inputs.
@@ -42,6 +44,7 @@ def propagate(
         vectorised: Whether the function takes arrays.
         workers: Processes of this machine; the result is the same for any number. The function must be importable by them.
         executor: Any `concurrent.futures` executor, instead of `workers`.
+        known: Facts about the function, such as the signs of its effects, on which guaranteed bounds rest.
         progress: Called with the share done, 0 … 1.
 
     Raises:
@@ -49,9 +52,11 @@ def propagate(
         CampaignError: Samples failed; the others were run first.
     """
     domain = Domain(inputs, levels(4) if alpha is None else alpha)
+    known = known or Known()
+    known.check(domain.names)
     call = Call(function, domain.names, tuple(shared), vectorised)
     start = perf_counter()
     with nullcontext(executor) if executor else pool(workers) as running:
-        campaign = Campaign(call, running, progress)
+        campaign = Campaign(call, running, progress, known)
         result = (plan or General()).run(campaign, domain)
     return result.charged(calls=campaign.calls, seconds=perf_counter() - start)

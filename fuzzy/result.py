@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from fuzzy.domain import Domain
 from fuzzy.model import Values
-from fuzzy.numbers import Array, PiecewiseLinear
+from fuzzy.numbers import Array, Mask, PiecewiseLinear
 from fuzzy.response_surface import ResponseSurface
 
 if TYPE_CHECKING:
@@ -37,11 +38,12 @@ class FuzzyResult:
         upper: Upper ends, shape (levels, outputs).
         lower_at: Inputs that reach the lower ends, shape (levels, outputs, inputs).
         upper_at: Inputs that reach the upper ends, shape (levels, outputs, inputs).
-        nature: What the bounds are worth, the weakest of all.
+        base: What the bounds are worth where they are not proved.
         plan: Name of the plan.
         runs: Samples of the model that the bounds took.
         verification_runs: Samples spent on verifying the plan's assumption, counted apart.
         error: Estimated error of the bounds, shape (levels, outputs); zero where attained.
+        proved: Where the true range is proved to lie inside the bounds, shape (levels, outputs).
         enforced: Where nesting had to be enforced, shape (levels, outputs).
         notes: What the plan found on its way, one sentence each.
         points: Samples of the model, shape (n, inputs).
@@ -56,12 +58,13 @@ class FuzzyResult:
     upper: Array
     lower_at: Array
     upper_at: Array
-    nature: Nature
+    base: Nature
     plan: str
     runs: int
     verification_runs: int = 0
     error: Array = field(default_factory=lambda: np.zeros(0))
-    enforced: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, bool))
+    proved: Mask = field(default_factory=lambda: np.zeros(0, bool))
+    enforced: Mask = field(default_factory=lambda: np.zeros(0, bool))
     notes: tuple[str, ...] = ()
     points: Array = field(default_factory=lambda: np.zeros((0, 0)))
     values: Values = field(default_factory=lambda: Values((), np.zeros((0, 0))))
@@ -77,7 +80,7 @@ class FuzzyResult:
         *,
         lowest: NDArray[np.intp],
         highest: NDArray[np.intp],
-        enforced: NDArray[np.bool_],
+        enforced: Mask,
         plan: str,
     ) -> FuzzyResult:
         """Inner bounds taken from samples.
@@ -99,14 +102,31 @@ class FuzzyResult:
             upper=values.array[highest, columns],
             lower_at=points[lowest],
             upper_at=points[highest],
-            nature=Nature.INNER,
+            base=Nature.INNER,
             plan=plan,
             runs=len(points),
             error=np.zeros(lowest.shape),
+            proved=np.zeros(lowest.shape, bool),
             enforced=enforced,
             points=points,
             values=values,
         )
+
+    def proving(self, holds: Callable[[FuzzyResult], Mask]) -> FuzzyResult:
+        """The same bounds, proved where `holds` says so (shape (levels, outputs)) unless the samples themselves contradict it."""
+        proved = holds(self)
+        refuted = [self.outputs[column] for column in np.flatnonzero((proved & self.enforced).any(axis=0))]
+        notes = tuple(f"the samples contradict what is stated of {name}: its bounds are inner only" for name in refuted)
+        return replace(self, proved=self.proved | (proved & ~self.enforced.any(axis=0)), notes=(*self.notes, *notes))
+
+    @property
+    def nature(self) -> Nature:
+        """What the bounds are worth: the weakest over all levels and outputs."""
+        return Nature.GUARANTEED if self.proved.size and self.proved.all() else self.base
+
+    def nature_of(self, output: str = "y") -> tuple[Nature, ...]:
+        """What the bounds of one output are worth on each level."""
+        return tuple(Nature.GUARANTEED if proved else self.base for proved in self.proved[:, self.column(output)])
 
     @property
     def alpha(self) -> Array:

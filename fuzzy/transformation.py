@@ -8,7 +8,7 @@ method takes the ends only of those inputs in which the model is monotone.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import pairwise, product
 from math import prod
 
@@ -16,8 +16,11 @@ import numpy as np
 
 from fuzzy.design import Design
 from fuzzy.domain import Domain
+from fuzzy.known import Known
+from fuzzy.memo import Memo
 from fuzzy.model import Model
-from fuzzy.numbers import FuzzyNumber
+from fuzzy.monotone import Verification, verified, verify
+from fuzzy.numbers import FuzzyNumber, Mask
 from fuzzy.result import FuzzyResult
 
 _SAME = 1e-13  # of the support: points of different levels closer than this differ by round-off only, and are one point
@@ -54,7 +57,7 @@ def _settled(x: float, known: list[float], width: float) -> float:
 
 @dataclass(frozen=True)
 class _Transformation:
-    """What the three methods share: a grid per level, and the retransformation."""
+    """What the methods share: a grid per level, and the retransformation."""
 
     def _refined(self, names: Sequence[str]) -> set[str]:
         """Inputs that get the recursion's inner points."""
@@ -80,7 +83,16 @@ class _Transformation:
     def run(self, model: Model, domain: Domain) -> FuzzyResult:
         """Evaluate the samples and rearrange them into α-cuts."""
         design = self.points(domain)
-        return design.bounds(model(design.points), plan=type(self).__name__.lower())
+        result = design.bounds(model(design.points), plan=type(self).__name__.lower())
+        return result.proving(lambda bounds: corners_suffice(bounds, model.known))
+
+
+def corners_suffice(result: FuzzyResult, known: Known) -> Mask:
+    """Where bounds that hold all corners of each cut are proved: the output is stated to be monotone in every input."""
+    lower, upper = result.domain.boxes
+    monotone = known.monotone_in(result.inputs, result.outputs)
+    proved: Mask = (monotone[None] | (lower == upper)[:, None, :]).all(axis=2)
+    return proved
 
 
 @dataclass(frozen=True)
@@ -104,13 +116,28 @@ class Extended(_Transformation):
     """The extended transformation method: ends only of the monotone inputs, all points of the others.
 
     Args:
-        monotone: Inputs in which the model rises or falls throughout.
+        monotone: Inputs in which the model rises or falls throughout. If not given, what the caller knows of the model, and for the other
+            inputs a verification at probes.
+        verification: How monotonicity is looked for.
     """
 
-    monotone: tuple[str, ...] = ()
+    monotone: tuple[str, ...] | None = None
+    verification: Verification = field(default_factory=Verification)
 
     def _refined(self, names: Sequence[str]) -> set[str]:
-        unknown = set(self.monotone) - set(names)
+        unknown = set(self.monotone or ()) - set(names)
         if unknown:
             raise ValueError(f"the monotone inputs name {sorted(unknown)}, which is no fuzzy input; there are {list(names)}")
-        return set(names) - set(self.monotone)
+        return set(names) - set(self.monotone or ())
+
+    def run(self, model: Model, domain: Domain) -> FuzzyResult:
+        """Find the monotone inputs if they are not given, evaluate the samples and rearrange them into α-cuts."""
+        if self.monotone is not None:
+            known = replace(model.known, monotone=(*model.known.monotone, *self.monotone))
+            return super().run(model, domain).proving(lambda bounds: corners_suffice(bounds, known))
+        memo = Memo(model)
+        effects = verify(memo, domain, self.verification)
+        widest = effects.signs[0] != 0
+        classes = (widest | model.known.monotone_in(domain.names, effects.outputs)).all(axis=0)
+        chosen = replace(self, monotone=tuple(name for name, holds in zip(domain.names, classes, strict=True) if holds))
+        return verified(super(Extended, chosen).run(memo, domain), memo, effects)

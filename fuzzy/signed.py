@@ -1,0 +1,60 @@
+"""The signed plan: where the sign of an effect is known, one end of the cut gives the lower bound and the other the upper."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+
+from fuzzy.design import Design
+from fuzzy.domain import Domain
+from fuzzy.known import Signs
+from fuzzy.memo import Memo
+from fuzzy.model import Model
+from fuzzy.monotone import Effects, Verification, verified, verify
+from fuzzy.numbers import Array
+from fuzzy.result import FuzzyResult
+from fuzzy.transformation import General
+
+
+@dataclass(frozen=True)
+class Signed:
+    """Two corners per level where all effects have a sign; an input without one gets the points of the general method instead.
+
+    Signs are stated by the caller (`Known.signs`), proved from a range of the gradient, or seen at probes. The bounds are guaranteed
+    where all signs are stated or proved, and inner otherwise.
+
+    Args:
+        outputs: Outputs whose bounds matter; all if none is named. The others get what the same samples give.
+        verification: How signs are looked for where they are not stated.
+    """
+
+    outputs: tuple[str, ...] = ()
+    verification: Verification = field(default_factory=Verification)
+
+    def run(self, model: Model, domain: Domain) -> FuzzyResult:
+        """Verify the signs, run the corners, rearrange them into α-cuts."""
+        memo = Memo(model)
+        effects = verify(memo, domain, self.verification, outputs=self.outputs)
+        design = Design.from_levels(domain, self._points(effects, domain))
+        result = design.bounds(memo(design.points), plan="signed")
+        return verified(result, memo, effects)
+
+    def _points(self, effects: Effects, domain: Domain) -> list[Array]:
+        """For each level, the corners that the signs name, times the general method's points of the inputs without a sign."""
+        grids = General().grids(domain)
+        return [_level_points(np.unique(signs, axis=0), grid) for signs, grid in zip(effects.signs, grids, strict=True)]
+
+
+def _level_points(signs: Signs, grid: list[list[float]]) -> Array:
+    rows: list[tuple[float, ...]] = []
+    for pattern in np.unique(signs, axis=0):
+        for sense in (1, -1):
+            rows += product(*(_ends(points, sense * sign) for sign, points in zip(pattern, grid, strict=True)))
+    return np.array(rows)
+
+
+def _ends(points: list[float], sign: int) -> list[float]:
+    """The first point where the effect rises, the last where it falls, all where it has no sign."""
+    return points if sign == 0 else [points[0 if sign > 0 else -1]]
