@@ -8,7 +8,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from types import ModuleType
 
-from alphacut import command_cell, command_envelope, command_modulus
+from alphacut import command_cell, command_envelope, command_modulus, command_run
 from alphacut.options import Parser, split_petsc
 from alphacut.output import rank, ranks, say, standard_output
 from alphacut.problem import BadInput
@@ -16,6 +16,7 @@ from alphacut.provenance import own_version
 from fuzzy import CampaignError
 
 COMMANDS: dict[str, ModuleType] = {
+    "run": command_run,
     "cell": command_cell,
     "modulus": command_modulus,
     "envelope": command_envelope,

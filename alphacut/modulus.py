@@ -132,7 +132,7 @@ def plan_of(case: Case) -> Plan:
 
         if not hasattr(fuzzy, "Signed"):
             raise case.refuse("modulus.plan", "this plan is not available", "general, reduced, extended")
-        return fuzzy.Signed()  # type: ignore[no-any-return]
+        return fuzzy.Signed()
     plans: dict[str, Plan] = {"general": General(), "reduced": Reduced(), "extended": Extended()}
     return plans[name]
 
@@ -207,3 +207,12 @@ def read_number(path: Path | str, option: str = "--modulus") -> FuzzyNumber:
     if len(alpha) == 1:
         return Crisp(float(ends.mean()))
     return PiecewiseLinear(tuple(map(float, alpha)), tuple(map(float, ends[:, 0])), tuple(map(float, ends[:, 1])))
+
+
+def stand_in(case: Case) -> FuzzyNumber | None:
+    """The modulus in Pa that the case gives instead of having it computed; None if it gives none."""
+    if case.has("modulus.value"):
+        return case.fuzzy("modulus.value")
+    if case.has("modulus.file"):
+        return read_number(case.path.parent / case.text("modulus.file"), "modulus.file")
+    return None

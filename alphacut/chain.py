@@ -1,0 +1,160 @@
+"""The chain of a case: fuzzy modulus, then envelopes; each is taken from its file while nothing it depends on has changed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from alphacut import envelope, modulus
+from alphacut.case import Case
+from alphacut.output import say
+from alphacut.progress import progress
+from alphacut.provenance import fingerprint
+from fuzzy import FuzzyNumber
+
+if TYPE_CHECKING:
+    import xarray
+
+    from alphacut.envelope import EnvelopeTask
+
+MODULUS_SECTIONS = ("radius", "cell", "mesh", "modulus")
+
+
+@dataclass(frozen=True)
+class Study:
+    """One envelope of a run.
+
+    Args:
+        name: Its file is envelope_NAME.nc.
+        task: What is computed.
+        figures: Figure of the paper for each output drawn; empty for none.
+        output: The one output drawn; empty for all.
+    """
+
+    name: str
+    task: EnvelopeTask
+    figures: tuple[str, ...] = ()
+    output: str = ""
+
+
+@dataclass(frozen=True)
+class Chain:
+    """How a run is done.
+
+    Args:
+        case: The case.
+        folder: Where results go.
+        workers: Processes that share the samples.
+        fresh: Compute everything anew.
+        quiet: No progress.
+        petsc: PETSc options that override the solver's.
+        strict: Refuse a time step that cannot resolve the fastest mode.
+    """
+
+    case: Case
+    folder: Path
+    workers: int = 1
+    fresh: bool = False
+    quiet: bool = False
+    petsc: Mapping[str, str] = field(default_factory=dict)
+    strict: bool = False
+
+    def file(self, name: str) -> Path:
+        """A file among the results."""
+        return self.folder / name
+
+    def run(self) -> Results:
+        """Compute every stage of the case, or take it from its file."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        cell = self.modulus() if "modulus" in self.case.stages else None
+        handed = modulus.read_number(self.file("modulus.nc")) if cell is not None else modulus.stand_in(self.case)
+        envelopes = {}
+        if "envelope" in self.case.stages:
+            envelopes = {study.name: self.envelope(study, handed) for study in studies(self.case)}
+        return Results(self.case, self.folder, cell, envelopes, handed)
+
+    def modulus(self) -> xarray.Dataset:
+        """The fuzzy modulus, in modulus.nc."""
+        inputs = {key: value for key, value in self.case.values.items() if key.partition(".")[0] in MODULUS_SECTIONS}
+        key = fingerprint({"case": inputs, "petsc": dict(self.petsc)}, ("stochastic", "rve", "fuzzy"))
+
+        def compute(path: Path) -> None:
+            with progress("Fuzzy modulus", quiet=self.quiet) as tick:
+                found = modulus.compute(self.case, petsc=self.petsc, workers=self.workers, progress=tick)
+            modulus.write(found, path, case_text=self.case.text_of_file, key=key)
+
+        return self.stored("modulus.nc", key, compute)
+
+    def envelope(self, study: Study, handed: FuzzyNumber | None) -> xarray.Dataset:
+        """One study's envelope, in envelope_NAME.nc."""
+        inputs = {key: value for key, value in self.case.values.items() if key.startswith("frame.")}
+        key = fingerprint({"case": inputs, "task": study.task, "modulus": handed}, ("fuzzy", "frame"))
+
+        def compute(path: Path) -> None:
+            with progress(f"Envelope {study.name}", quiet=self.quiet) as tick:
+                found = envelope.compute(self.case, study.task, modulus=handed, strict=self.strict, progress=tick)
+            envelope.write(found.to_dataset(), path, case_text=self.case.text_of_file, key=key)
+
+        return self.stored(f"envelope_{study.name}.nc", key, compute)
+
+    def stored(self, name: str, key: str, compute: Callable[[Path], None]) -> xarray.Dataset:
+        """The dataset in a file: as it is if it has the fingerprint `key`, else computed first."""
+        import xarray
+
+        path = self.file(name)
+        if not self.fresh and path.is_file() and fingerprint_of(path) == key:
+            if not self.quiet:
+                say(f"{path} is up to date")
+        else:
+            compute(path)
+        return xarray.load_dataset(path)
+
+
+@dataclass(frozen=True)
+class Results:
+    """What a run has found.
+
+    Args:
+        case: The case.
+        folder: Where the files are.
+        modulus: Dataset of modulus.nc; None where the case computes none.
+        envelopes: Datasets of the studies by name.
+        handed: The modulus handed on to the structure, in Pa; None where the structure took its own.
+    """
+
+    case: Case
+    folder: Path
+    modulus: xarray.Dataset | None
+    envelopes: Mapping[str, xarray.Dataset]
+    handed: FuzzyNumber | None
+
+    @property
+    def studies(self) -> tuple[Study, ...]:
+        """The studies, in the case's order."""
+        return studies(self.case) if self.envelopes else ()
+
+
+def fingerprint_of(path: Path) -> str:
+    """The fingerprint in a NetCDF file; empty if it cannot be read."""
+    import xarray
+
+    try:
+        with xarray.open_dataset(path) as dataset:
+            return str(dataset.attrs.get("fingerprint", ""))
+    except (OSError, ValueError):
+        return ""
+
+
+def studies(case: Case) -> tuple[Study, ...]:
+    """The studies of a case: its [[study]] tables, or one made of [envelope]."""
+    count: Any = case.values.get("study", 0)
+    if not count:
+        return (Study("all", envelope.task_of(case)),)
+    found = []
+    for index in range(count):
+        key = f"study[{index}]"
+        task = envelope.task_of(case, fuzzy=case.names(f"{key}.fuzzy"), duration=case.number(f"{key}.duration"))
+        found.append(Study(case.text(f"{key}.name"), task, case.names(f"{key}.figures"), case.text(f"{key}.output")))
+    return tuple(found)

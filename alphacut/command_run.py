@@ -1,0 +1,49 @@
+"""``alphacut run``: every stage of a case, its files, figures and the table paper / here / difference."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TextIO
+
+from alphacut import figures, summary
+from alphacut.chain import Chain
+from alphacut.loading import load
+from alphacut.options import add_common, add_workers, check_workers
+from alphacut.output import as_json, say, write_text
+
+ABOUT = "run every stage of a case: files, figures, summary, and the comparison with the paper where the case has one"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    add_common(parser)
+    add_workers(parser)
+    parser.add_argument("--out", metavar="FOLDER", help="where results go (default: results/NAME-OF-THE-CASE)")
+    parser.add_argument("--fresh", action="store_true", help="compute everything anew instead of taking what is up to date")
+    parser.add_argument("--strict", action="store_true", help="refuse a time step with ω_max·h above 0.5 instead of warning")
+    parser.add_argument("--no-figures", action="store_true", help="numbers only")
+
+
+def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
+    """Compute, draw, compare."""
+    check_workers(options.workers)
+    case = load(options.case, options.set)
+    folder = Path(options.out or f"results/{case.name}")
+    start = time.perf_counter()
+    chain = Chain(case, folder, options.workers, options.fresh, options.quiet, petsc, options.strict)
+    results = chain.run()
+    drawn = [] if options.no_figures else figures.draw(results, quiet=options.quiet)
+    found: dict[str, Any] = {**summary.summary(results), "figures": drawn, "seconds": time.perf_counter() - start}
+    document = as_json(found, indent=2)
+    write_text(folder / "summary.json", document)
+    if options.json == "-":
+        out.write(as_json(found))
+    elif options.json:
+        write_text(options.json, document)
+    if options.json != "-" and not options.quiet:
+        out.write(summary.table(found["paper"]) if found["paper"] else "")
+        say(f"results are in {folder}, {len(drawn)} figures among them, after {found['seconds']:.0f} s")
+    return 0

@@ -1,0 +1,45 @@
+"""Envelopes over time on every α-cut (Figs. 28 to 35)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import TYPE_CHECKING
+
+from alphacut.chain import Study
+from alphacut.figure_style import INK, alpha_legend, colours, figure
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
+
+WORDS = {"E": "modulus", "m": "masses", "l": "lengths", "d": "dampers", "q0": "initial displacements", "v0": "initial velocities"}
+
+
+def drawings(study: Study, dataset: xarray.Dataset) -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """Name and function of each figure of a study."""
+    outputs = [study.output] if study.output else [str(name) for name in dataset["output"].values]
+    for index, output in enumerate(outputs):
+        number = f"fig{study.figures[index]}-" if index < len(study.figures) else ""
+        yield f"{number}envelope-{study.name}-{output}", partial(envelope, dataset, output, study)
+
+
+def envelope(dataset: xarray.Dataset, output: str, study: Study) -> Figure:
+    """Nested bands between lower and upper envelope, the darker the higher α; the modal trajectory as a line."""
+    drawn, axes = figure(7.2, 3.6)
+    shown = dataset.sel(output=output)
+    alpha, time = dataset["alpha"].values, dataset["time"].values
+    for level, shade in enumerate(colours(alpha)[:-1]):
+        band = shown.isel(alpha=level)
+        axes.fill_between(time, band["lower"], band["upper"], color=shade, lw=0)
+    for side in ("lower", "upper"):
+        axes.plot(time, shown.isel(alpha=-1)[side], color=INK, lw=0.8)
+        axes.plot(time, shown.isel(alpha=0)[side], color=INK, lw=0.3)
+    unit = {"q": "m", "v": "m/s", "s": "N", "d": "m"}.get(output[0], "SI")
+    axes.set_xlabel("time t, s")
+    axes.set_ylabel(f"{output}, {unit}")
+    axes.set_xlim(time[0], time[-1])
+    words = " and ".join(WORDS.get(name, name) for name in study.task.fuzzy)
+    axes.set_title(f"{output}, fuzzy {words}", loc="left", fontsize=10)
+    alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return drawn

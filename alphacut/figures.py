@@ -1,0 +1,48 @@
+"""Every figure of a run, by the name of its file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+from alphacut import figure_envelope, figure_frame, figure_fuzzy, figure_modulus, figure_radius
+from alphacut.chain import Results
+from alphacut.figure_style import save, style
+from alphacut.progress import progress
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Drawing = tuple[str, Callable[[], "Figure"]]
+
+
+def drawings(results: Results) -> Iterator[Drawing]:
+    """Name and function of each figure that the results allow."""
+    if results.case.has("radius.a1"):
+        yield "fig11-radii", lambda: figure_radius.radii(results.case)
+        yield "fig13-p-box", lambda: figure_radius.p_box(results.case)
+        yield "fig14-cone", lambda: figure_radius.cone(results.case)
+    if (modulus := results.modulus) is not None:
+        yield "fig16-stress-curves", lambda: figure_modulus.stress_curves(modulus)
+        yield "fig17-mean-stress", lambda: figure_modulus.mean_stress(modulus)
+        yield "fig18-modulus", lambda: figure_modulus.fuzzy_modulus(modulus, results.case)
+        yield "fig19-membership", lambda: figure_fuzzy.membership(modulus)
+    if results.envelopes:
+        yield "fig20-mapping", lambda: figure_fuzzy.mapping(results)
+        yield "fig26-frame", lambda: figure_frame.frame(results.case)
+        yield "fig27-chain", lambda: figure_frame.chain(results.case)
+    for study in results.studies:
+        yield from figure_envelope.drawings(study, results.envelopes[study.name])
+
+
+def draw(results: Results, *, quiet: bool = False) -> list[str]:
+    """Draw every figure as SVG and PNG into figures/; returns the names of the files."""
+    folder = results.folder / "figures"
+    names: list[str] = []
+    todo = list(drawings(results))
+    with progress("Figures", quiet=quiet) as tick, style():
+        for done, (name, make) in enumerate(todo, start=1):
+            names += [str(path.relative_to(results.folder)) for path in save(make(), folder / name)]
+            if tick:
+                tick(done / len(todo))
+    return names
