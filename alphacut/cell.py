@@ -44,6 +44,7 @@ class CellChoice:
         tolerance: Relative tolerance on E, for method auto.
         exclude: Models that method auto must not take.
         petsc: PETSc options that override the solver's, without their prefix.
+        parallel: Whether all MPI ranks work on one cell together.
     """
 
     method: str = "prism"
@@ -53,6 +54,7 @@ class CellChoice:
     tolerance: float = 1e-4
     exclude: tuple[str, ...] = ()
     petsc: Mapping[str, str] = field(default_factory=dict)
+    parallel: bool = False
 
     def model(self) -> CellModel:
         """The model itself; this is where DOLFINx may be imported."""

@@ -5,17 +5,16 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 
 from alphacut import cell
 from alphacut.loading import load
 from alphacut.options import CELL_OPTIONS, add_common, add_keys, changes
-from alphacut.output import as_json, write_text
+from alphacut.output import as_json, ranks, write_text
 from alphacut.problem import BadInput, Problem
 from alphacut.schema import CELL_METHODS
-
-if TYPE_CHECKING:
-    from rve.result import Homogenised
+from rve.model import cross_check
+from rve.result import Homogenised
 
 ABOUT = "homogenise the cell at crisp values; a fuzzy input takes its modal value"
 
@@ -43,9 +42,13 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     """Solve and report."""
     case = load(options.case, changes(options, CELL_OPTIONS), modal=True)
     choice = cell.cell_choice(case, exclude=named_models("--exclude", options.exclude), petsc=petsc)
+    choice = replace(choice, parallel=ranks() > 1)
     pair = named_models("--cross-check", options.cross_check)
     if pair:
-        result = cross_check([cell.solve(case, replace(choice, method=name).model()) for name in pair], pair, choice.tolerance)
+        first, *others = [cell.solve(case, replace(choice, method=name).model()) for name in pair]
+        for other in others:
+            cross_check([first], [other], tolerance=choice.tolerance)
+        result = first
     else:
         result = cell.solve(case, choice.model())
     document = as_json(cell.document(result), indent=None if options.json == "-" else 2)
@@ -56,17 +59,6 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     if options.json != "-" and not options.quiet:
         out.write(summary(result))
     return 0
-
-
-def cross_check(results: list[Homogenised], names: tuple[str, ...], tolerance: float) -> Homogenised:
-    """The first of the results, if all moduli agree with it."""
-    first, *others = results
-    for name, other in zip(names[1:], others, strict=True):
-        gap = abs(other.modulus - first.modulus) / first.modulus
-        if not gap <= tolerance:
-            message = f"{names[0]} gives E = {first.modulus / cell.GPA:.9g} GPa and {name} {other.modulus / cell.GPA:.9g} GPa"
-            raise RuntimeError(f"{message}: they differ by {gap:.2g}, more than the tolerance of {tolerance:g}")
-    return first
 
 
 def summary(result: Homogenised) -> str:

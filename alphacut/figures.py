@@ -45,4 +45,14 @@ def draw(results: Results, *, quiet: bool = False) -> list[str]:
             names += [str(path.relative_to(results.folder)) for path in save(make(), folder / name)]
             if tick:
                 tick(done / len(todo))
-    return names
+    return names + mesh_picture(results)
+
+
+def mesh_picture(results: Results) -> list[str]:
+    """Fig. 15, where the modulus was computed on prisms."""
+    if results.modulus is None or results.case.text("modulus.method") != "prism":
+        return []
+    from alphacut.figure_mesh import draw_mesh
+
+    name = "figures/fig15-prism-mesh.png"
+    return [name] if draw_mesh(results.case, results.folder / name) else []

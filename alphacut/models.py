@@ -30,6 +30,7 @@ def cell_model(choice: CellChoice) -> CellModel:
         "petsc": dict(choice.petsc),
         "tolerance": choice.tolerance,
         "exclude": choice.exclude,
+        "parallel": choice.parallel,
     }
     try:
         return cast(CellModel, named(choice.method, **{name: value for name, value in offered.items() if name in known}))

@@ -1,0 +1,35 @@
+"""``alphacut mesh``: the prism mesh of a case in a format for other programs."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TextIO
+
+from alphacut.loading import load
+from alphacut.options import CELL_OPTIONS, add_common, add_keys, changes
+from alphacut.output import as_json
+from alphacut.prism_mesh import prism_mesh, write_mesh
+
+ABOUT = "write the prism mesh of the cell at modal values: VTU for ParaView, .msh for Gmsh, .inp for Abaqus and CalculiX, …"
+KEYS = {option: key for option, key in CELL_OPTIONS.items() if key.startswith(("radius.", "mesh."))}
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    add_common(parser)
+    add_keys(parser, KEYS)
+    parser.add_argument("--out", metavar="FILE", required=True, help="the mesh; its ending names the format")
+
+
+def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
+    """Mesh and write."""
+    mesh = prism_mesh(load(options.case, changes(options, KEYS), modal=True))
+    write_mesh(mesh, Path(options.out))
+    counts = {"nodes": len(mesh.points), "wedges": len(mesh.cells[0].data), "file": options.out}
+    if options.json == "-":
+        out.write(as_json(counts))
+    elif not options.quiet:
+        out.write(f"{counts['nodes']} nodes and {counts['wedges']} quadratic wedges in {options.out}\n")
+    return 0
