@@ -1,0 +1,132 @@
+"""The planar cell problem in DOLFINx: one radius, one mesh, any number of materials and the three loads at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from time import perf_counter
+from typing import Any
+
+import basix.ufl
+import dolfinx
+import numpy as np
+import scipy.sparse as sp
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from rve.cell import Phase
+from rve.planar_mesh import PlanarMesh, curved_nodes
+from rve.planar_system import Cholesky, PeriodicPattern
+from rve.triangulation import Integers
+from stochastic.truncated_normal import Array
+
+AREA = 4.0
+
+
+@dataclass
+class PlanarCell:
+    """Lagrange triangles of `order`, isoparametric, periodic by elimination.
+
+    Args:
+        mesh: Triangles of the cell.
+        order: Polynomial degree of field and geometry, 1 to 4.
+
+    Raises:
+        ValueError: `order` out of range.
+    """
+
+    mesh: PlanarMesh
+    order: int
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.order <= 4:
+            raise ValueError(f"the order of the planar elements is {self.order}; it must be 1, 2, 3 or 4")
+        started = perf_counter()
+        points, cells = curved_nodes(self.mesh, self.order)
+        element = basix.ufl.element("Lagrange", "triangle", self.order, shape=(2,))
+        self.domain = dolfinx.mesh.create_mesh(MPI.COMM_SELF, cells=cells, x=points, e=element)
+        self.space = fem.functionspace(self.domain, element)
+        self.seconds["mesh"] = perf_counter() - started
+        self._compile()
+
+    @cached_property
+    def tags(self) -> Any:
+        """Cell tags: 0 in the matrix, 1 in the particle."""
+        inside = self.mesh.inside[self.domain.topology.original_cell_index].astype(np.int32)
+        return dolfinx.mesh.meshtags(self.domain, 2, np.arange(inside.size, dtype=np.int32), inside)
+
+    def _compile(self) -> None:
+        """The stiffness form of each phase, Lamé's constants left open."""
+        started = perf_counter()
+        trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
+        self._lame = [fem.Constant(self.domain, np.float64(1)) for _ in range(2)]
+        degree = 2 * self.order if self.order > 1 else 1
+        dx = ufl.Measure("dx", domain=self.domain, subdomain_data=self.tags, metadata={"quadrature_degree": degree})
+        density = self._lame[0] * ufl.div(trial) * ufl.div(test)
+        density += 2 * self._lame[1] * ufl.inner(ufl.sym(ufl.grad(trial)), ufl.sym(ufl.grad(test)))  # eq. 7
+        self._forms = [fem.form(density * dx(tag)) for tag in (0, 1)]
+        self.seconds["jit"] = perf_counter() - started
+
+    def _stiffness_of(self, tag: int, poisson: float) -> sp.csr_matrix:
+        """Unreduced stiffness of one phase for a modulus of 1 Pa."""
+        unit = Phase(1.0, poisson).stiffness
+        self._lame[0].value, self._lame[1].value = unit[0, 1], unit[2, 2]
+        return fem.assemble_matrix(self._forms[tag]).to_scipy().tocsr()
+
+    @cached_property
+    def coordinates(self) -> Array:
+        """Positions of the nodes, shape (n, 2)."""
+        return np.asarray(self.space.tabulate_dof_coordinates()[:, :2])
+
+    @cached_property
+    def periodic(self) -> sp.csr_matrix:
+        """P of K_per = Pᵀ K P: nodes on x = 1 and y = 1 follow those at −1, and the first node is fixed."""
+        node = self.periodic_nodes
+        target = (2 * node[:, None] + np.arange(2)).ravel() - 2
+        free = np.flatnonzero(target >= 0)
+        return sp.csr_matrix((np.ones(free.size), (free, target[free])), shape=(target.size, 2 * int(node.max())))
+
+    @cached_property
+    def periodic_nodes(self) -> Integers:
+        """Number of each node in the periodic cell, shape (n,); equal for partners on opposite sides."""
+        wrapped = np.where(self.coordinates > 1 - 1e-9, -1.0, self.coordinates)
+        _, node = np.unique(np.round(wrapped * 1e8).astype(np.int64), axis=0, return_inverse=True)
+        return node.ravel()
+
+    @cached_property
+    def affine(self) -> Array:
+        """Displacements of the three unit strains (11, 22, 12 with 2 ε12 = 1), shape (2n, 3)."""
+        x, y = self.coordinates.T
+        zero = np.zeros_like(x)
+        return np.stack([np.stack([x, zero, y / 2], axis=-1), np.stack([zero, y, x / 2], axis=-1)], axis=1).reshape(-1, 3)
+
+    def solve(self, matrix: Phase, inclusions: Sequence[Phase]) -> tuple[Array, Array]:
+        """Homogenised stiffness (m, 3, 3) in Pa and displacements under the three unit strains (m, 2n, 3), m inclusions.
+
+        Inclusions of one Poisson's ratio share their assembly, and all share the symbolic factorisation.
+        """
+        started = perf_counter()
+        outer = self._stiffness_of(0, matrix.poisson)
+        inner = {nu: self._stiffness_of(1, nu) for nu in dict.fromkeys(p.poisson for p in inclusions)}
+        self.seconds["assemble"] = perf_counter() - started
+        started = perf_counter()
+        reduce = PeriodicPattern(self.periodic_nodes, [outer, next(iter(inner.values()))])
+        reduced_outer, reduced_inner = reduce(0, outer), {nu: reduce(1, k) for nu, k in inner.items()}
+        factor = Cholesky(reduce.rows, reduce.columns)
+        stiffness, fields = [], []
+        for phase in inclusions:
+            force = matrix.modulus * (outer @ self.affine) + phase.modulus * (inner[phase.poisson] @ self.affine)
+            load = self.periodic.T @ force
+            correction = factor.solve(matrix.modulus * reduced_outer + phase.modulus * reduced_inner[phase.poisson], load)
+            stiffness.append((self.affine.T @ force - load.T @ correction) / AREA)  # ⟨σ⟩ by Hill–Mandel
+            fields.append(self.affine - self.periodic @ correction)
+        self.seconds["solve"] = perf_counter() - started
+        return np.array(stiffness), np.array(fields)
+
+    @property
+    def unknowns(self) -> int:
+        """Unknowns after elimination."""
+        return int(self.periodic.shape[1])
