@@ -110,7 +110,10 @@ def _next_crossing(a: Array, b: Array, c: Array, phi: Array) -> tuple[Array, Arr
     cos, sin = np.cos(phi)[:, None], np.sin(phi)[:, None]
     wave = a * cos + b * sin
     slope = b * cos - a * sin
-    current = np.argmax(wave + c, axis=1)
+    value, scale = wave + c, np.abs(a) + np.abs(b)
+    top = np.argmax(value, axis=1)
+    level = value >= value[row, top][:, None] - 2e-15 * (scale + scale[row, top][:, None])
+    current = np.argmax(np.where(level, slope, -np.inf), axis=1)  # of those that are uppermost but for round-off, the one that rises
     wave -= wave[row, current][:, None]
     slope -= slope[row, current][:, None]
     constant = c - c[row, current][:, None]
@@ -121,5 +124,6 @@ def _next_crossing(a: Array, b: Array, c: Array, phi: Array) -> tuple[Array, Arr
         cotangent = np.where(slope >= 0, (slope + root) / below, bend / (root - slope))
     tangent = (below == 0) & (slope == 0)
     cotangent[tangent] = np.where(bend[tangent] > 0, np.inf, -np.inf)
-    cotangent[np.isnan(cotangent)] = -np.inf
+    same = np.abs(bend) + np.abs(slope) + below <= 1e-14 * scale  # one function twice, but for round-off
+    cotangent[np.isnan(cotangent) | same] = -np.inf
     return current, 2 * np.arctan2(1.0, cotangent.max(axis=1))
