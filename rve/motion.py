@@ -1,0 +1,30 @@
+"""Moving a planar mesh from its reference radius to any other: same topology, the interface on the circle of radius r."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rve.triangulation import Triangulation
+from stochastic.truncated_normal import Array
+
+
+def moved(mesh: Triangulation, radius: float) -> Array:
+    """Positions of all nodes, shape (n, 2), with the interface at `radius`, curved edges on the circle.
+
+    Vertices slide along rays from the centre: inside the particle in proportion, outside between the circle and the side of the
+    square. Edge midpoints stay in the middle of their straight edge, which keeps the elements affine away from the interface.
+    """
+    vertices = _slide(mesh.points[: mesh.vertices], mesh.radius, radius)
+    points = np.concatenate([vertices, vertices[mesh.ends].mean(axis=1)])
+    points[mesh.arc] *= radius / np.linalg.norm(points[mesh.arc], axis=1, keepdims=True)  # z = 0 of eq. 14
+    return points
+
+
+def _slide(points: Array, old: float, new: float) -> Array:
+    """Move along rays, shape (n, 2): the circle of radius `old` goes to `new`, the sides of the square stay."""
+    reach = abs(points).max(axis=1)  # 1 on the square's sides
+    distance = np.linalg.norm(points, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        side = distance / reach  # distance of the square's side along the ray
+        outer = (new + (distance - old) * (side - new) / (side - old)) / distance
+    return points * np.where(distance <= old * (1 + 1e-9), new / old, outer)[:, None]

@@ -1,0 +1,60 @@
+"""Periodicity by elimination: opposite nodes of the cell share one unknown, the corner has none (paper, section 4.2).
+
+The four corners are one periodic node; its fluctuation is fixed on the whole line over θ, because a translation u = c(θ) costs no
+energy at any θ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from rve.triangulation import Integers, Triangulation
+
+
+@dataclass(frozen=True)
+class Periodicity:
+    """Unknowns of a planar mesh after identification, vertices before edge midpoints.
+
+    Args:
+        unknown: Unknown of each planar node, −1 at the corners, shape (n,).
+        vertices: Number of unknowns on vertices.
+        count: Number of unknowns in all.
+    """
+
+    unknown: Integers
+    vertices: int
+    count: int
+
+    def linear_injection(self, plane: Triangulation) -> sp.csr_matrix:
+        """Matrix that carries values on vertices to all nodes (a linear field is quadratic too), shape (count, vertices)."""
+        rows, columns, values = [np.arange(self.vertices)], [np.arange(self.vertices)], [np.ones(self.vertices)]
+        midpoint, first = np.unique(self.unknown[plane.vertices :], return_index=True)
+        for end in self.unknown[plane.ends[first]].T:
+            kept = end >= 0
+            rows, columns, values = [*rows, midpoint[kept]], [*columns, end[kept]], [*values, np.full(kept.sum(), 0.5)]
+        triplet = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
+        return sp.csr_matrix(triplet, shape=(self.count, self.vertices))
+
+
+def identify(plane: Triangulation) -> Periodicity:
+    """Pair the nodes on opposite sides of the cell.
+
+    Raises:
+        RuntimeError: A node on one side has no partner on the other.
+    """
+    keys = np.round(plane.points * 1e7).astype(np.int64)
+    folded = np.where(keys == 10**7, -(10**7), keys)
+    _, first, label = np.unique(folded, axis=0, return_index=True, return_inverse=True)
+    label = label.ravel()
+    partners = np.bincount(label)
+    sides = (abs(keys) == 10**7).sum(axis=1)
+    if (partners[label] != 2**sides).any():
+        raise RuntimeError("the mesh is not periodic: a node on one side of the cell has no partner on the opposite side")
+    order = np.argsort(np.where((abs(keys[first]) == 10**7).all(axis=1), -1, first))  # the corner first, then as numbered
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order)) - 1
+    unknown = rank[label]
+    return Periodicity(unknown, int(unknown[: plane.vertices].max()) + 1, len(order) - 1)

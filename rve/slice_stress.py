@@ -1,0 +1,82 @@
+"""Stress in the slices of the product space: a slice at fixed θ is a planar cell, cut out of the wedges at their Gauss points.
+
+θ depends on the wedge's third coordinate alone, so derivatives at fixed θ need the planar part of the Jacobian only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from rve.prism_grid import PrismGrid
+from rve.wedge import NODES, tabulate
+from stochastic.truncated_normal import Array
+
+CELL_AREA = 4.0
+
+
+@dataclass(frozen=True)
+class LayerStress:
+    """Stresses at the quadrature points of one layer.
+
+    Args:
+        stress: (σ11, σ22, σ12) for each load, shape (triangles, slices, points, 3, loads), in Pa.
+        strain: (ε11, ε22, 2 ε12), same shape.
+        area: Planar quadrature weights, shape (triangles, slices, points); they sum to 4 in each slice.
+    """
+
+    stress: Array
+    strain: Array
+    area: Array
+
+    @property
+    def mean(self) -> Array:
+        """Homogenised stress of each slice, shape (slices, 3, loads)."""
+        return np.einsum("msp,mspvl->svl", self.area, self.stress) / CELL_AREA
+
+
+@dataclass(frozen=True)
+class SliceStress:
+    """Evaluates stresses from displacements on one grid with given positions.
+
+    Args:
+        grid: Topology.
+        positions: (x1, x2, θ) of the nodes, shape (nodes, 3).
+        points: Quadrature points of the reference prism, ordered by ζ first, shape (q, 3).
+        weights: Their weights, shape (q,).
+        slices: Number of distinct ζ among the points.
+    """
+
+    grid: PrismGrid
+    positions: Array
+    points: Array
+    weights: Array
+    slices: int = 3
+
+    def layers(self, displacement: Array, stiffness: Array) -> Iterator[LayerStress]:
+        """Layer by layer.
+
+        Args:
+            displacement: Total displacement of the nodes for each load, shape (nodes, 2, loads).
+            stiffness: Voigt stiffness at the quadrature points, shape (cells, q or 1, 3, 3).
+        """
+        triangles = len(self.grid.plane.triangles)
+        for first in range(0, len(self.grid.cells), triangles):
+            part = slice(first, first + triangles)
+            yield self._layer(self.grid.cells[part], displacement, stiffness[part])
+
+    def _layer(self, cells: Array, displacement: Array, stiffness: Array) -> LayerStress:
+        table = tabulate(self.points, derivatives=True)[:2].transpose(1, 0, 2)  # (q, 2, 15)
+        jacobian = table @ self.positions[cells, :2].reshape(len(cells), 1, NODES, 2)
+        a, b, c, d = (jacobian[..., i, j] for i in (0, 1) for j in (0, 1))
+        determinant = a * d - b * c
+        inverse = np.stack([d, -b, -c, a], axis=-1).reshape(*a.shape, 2, 2) / determinant[..., None, None]
+        values = displacement[cells].reshape(len(cells), 1, NODES, -1)
+        gradient = (inverse @ table @ values).reshape(*a.shape, 2, 2, -1)  # (m, q, ∂, component, load)
+        strain = np.stack([gradient[..., 0, 0, :], gradient[..., 1, 1, :], gradient[..., 0, 1, :] + gradient[..., 1, 0, :]], axis=-2)
+        in_slices = (len(cells), self.slices, len(self.points) // self.slices)
+        weight = self.weights.reshape(self.slices, -1)
+        area = determinant * (weight / weight.sum(axis=1, keepdims=True) / 2).ravel()
+        return LayerStress((stiffness @ strain).reshape(*in_slices, 3, -1), strain.reshape(*in_slices, 3, -1), area.reshape(in_slices))
