@@ -10,6 +10,7 @@ from fuzzy.propagation import propagate
 from fuzzy.response_surface import ResponseSurface
 from fuzzy.result import FuzzyResult, Nature
 from fuzzy.signed import Signed
+from fuzzy.store import Store, StoreError
 from fuzzy.transformation import Extended, General, Reduced
 
 __all__ = [
@@ -29,6 +30,8 @@ __all__ = [
     "Reduced",
     "ResponseSurface",
     "Signed",
+    "Store",
+    "StoreError",
     "Trapezoidal",
     "Triangular",
     "Verification",

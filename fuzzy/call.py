@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,16 +17,18 @@ _BATCH = 1024  # points per call of a vectorised function
 
 
 class Sample(NamedTuple):
-    """Outputs at one point."""
+    """Outputs at one point, and the wall time that it took."""
 
     layout: Layout
     row: Array
+    seconds: float = 0.0
 
 
 class Failure(NamedTuple):
-    """Why a point has no outputs."""
+    """Why a point has no outputs, and the wall time that it took to find out."""
 
     error: str
+    seconds: float = 0.0
 
 
 Outcome = Sample | Failure
@@ -58,26 +61,30 @@ class Call:
         if unknown:
             raise ValueError(f"the shared inputs name {', '.join(unknown)}; there are {', '.join(self.names)}")
 
-    def tasks(self, points: Array) -> list[list[int]]:
+    def tasks(self, points: Array) -> Iterator[list[int]]:
         """Rows of the points that go into one call each; the same whatever the workers."""
-        if self.vectorised:
-            return [list(range(start, min(start + _BATCH, len(points)))) for start in range(0, len(points), _BATCH)]
-        if not self.shared:
-            return [[row] for row in range(len(points))]
-        columns = [self.names.index(name) for name in self.shared]
-        groups: dict[bytes, list[int]] = {}
-        for row in range(len(points)):
-            groups.setdefault(points[row, columns].tobytes(), []).append(row)
-        return list(groups.values())
+        if self.shared:
+            columns = [self.names.index(name) for name in self.shared]
+            groups: dict[bytes, list[int]] = {}
+            for row in range(len(points)):
+                groups.setdefault(points[row, columns].tobytes(), []).append(row)
+            yield from groups.values()
+            return
+        size = _BATCH if self.vectorised else 1
+        for start in range(0, len(points), size):
+            yield list(range(start, min(start + size, len(points))))
 
     def __call__(self, points: Array) -> list[Outcome]:
         """Outputs of one task; if it fails as a whole, each point is tried alone, so one bad point spoils no other."""
+        start = perf_counter()
         try:
-            return self._outcomes(points)
+            outcomes = self._outcomes(points)
         except Exception as error:
-            if len(points) == 1:
-                return [Failure(f"{type(error).__name__}: {error}")]
-            return [self(point[None])[0] for point in points]
+            if len(points) > 1:
+                return [self(point[None])[0] for point in points]
+            outcomes = [Failure(f"{type(error).__name__}: {error}")]
+        seconds = (perf_counter() - start) / len(points)
+        return [outcome._replace(seconds=seconds) for outcome in outcomes]
 
     def _outcomes(self, points: Array) -> list[Outcome]:
         outputs = self._outputs(points)

@@ -1,21 +1,25 @@
-"""A campaign: the samples of a plan, grouped into calls, run by workers, gathered in the order of the points."""
+"""A campaign: the samples of a plan, grouped into calls, run by workers, kept in a store, gathered in the order of the points."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
+from time import sleep
 
 import numpy as np
 
-from fuzzy.call import Call, Failure, named_point
+from fuzzy.call import Call, Failure, Outcome, Sample, named_point
 from fuzzy.known import Known
+from fuzzy.memory import require
 from fuzzy.model import Layout, Values
 from fuzzy.numbers import Array
-from fuzzy.workers import completed
+from fuzzy.store import Shelf
+from fuzzy.workers import Task, completed
 
 Progress = Callable[[float], None]
 _SHOWN = 5  # failed samples that a message quotes
+_POLL = 0.1  # seconds between two looks at what another campaign is running
 
 
 class CampaignError(RuntimeError):
@@ -47,7 +51,9 @@ class Campaign:
         executor: Any `concurrent.futures` executor; None runs in this process.
         progress: Called with the share done, 0 … 1, of each batch of points.
         known: What the caller knows about the model.
+        shelf: Where samples are kept; None keeps none.
         runs: Samples run so far.
+        reused: Samples taken from the store so far.
         calls: Calls of the function so far.
     """
 
@@ -55,39 +61,96 @@ class Campaign:
     executor: Executor | None = None
     progress: Progress | None = None
     known: Known = field(default_factory=Known)
+    shelf: Shelf | None = None
     runs: int = 0
+    reused: int = 0
     calls: int = 0
-    _layout: Layout | None = field(default=None, repr=False)
 
     def __call__(self, points: Array) -> Values:
         """Outputs at the points, shape (n, inputs), in their order.
 
         Raises:
             CampaignError: Samples failed; raised after all others have run.
+            TooLargeError: The samples do not fit into memory.
+            StoreError: The store cannot be written.
         """
-        rows: list[Array | None] = [None] * len(points)
-        failures: dict[int, str] = {}
-        done = 0
-        tasks = ((task, points[task]) for task in self.call.tasks(points))
-        for task, outcomes in completed(self.call, tasks, self.executor):
-            self.calls += 1
-            for row, outcome in zip(task, outcomes, strict=True):
-                if isinstance(outcome, Failure):
-                    failures[row] = outcome.error
-                else:
-                    self._require_layout(outcome.layout)
-                    rows[row] = outcome.row
-            done += len(task)
-            if self.progress:
-                self.progress(done / len(points))
-        self.runs += done
-        if failures:
-            named = [(named_point(self.call.names, points[row]), failures[row]) for row in sorted(failures)]
-            raise CampaignError(named, len(points))
-        return Values(self._layout or (), np.array(rows))
+        batch = _Batch(self, points)
+        batch.run()
+        if batch.failures:
+            failed = [(named_point(self.call.names, points[row]), batch.failures[row]) for row in sorted(batch.failures)]
+            raise CampaignError(failed, len(points))
+        return Values(batch.layout, batch.array)
 
-    def _require_layout(self, layout: Layout) -> None:
-        if self._layout is None:
-            self._layout = layout
-        if layout != self._layout:
-            raise ValueError(f"a sample has the outputs {layout} where others have {self._layout}; all must have the same names and shapes")
+
+class _Batch:
+    """One batch of points on its way through the workers and the store."""
+
+    def __init__(self, campaign: Campaign, points: Array) -> None:
+        require(len(points), points.shape[1] + 1)
+        self.campaign, self.points = campaign, points
+        self.layout: Layout = ()
+        self.array: Array = np.empty((len(points), 0))
+        self.failures: dict[int, str] = {}
+        self._open = np.ones(len(points), bool)
+
+    def run(self) -> None:
+        """Take what is stored, run the rest, wait for what other campaigns run."""
+        while self._open.any():
+            before = self._open.sum()
+            for rows, outcomes in completed(self.campaign.call, self._tasks(), self.campaign.executor):
+                self._record(rows, outcomes)
+            if self.campaign.shelf:
+                self.campaign.shelf.write()
+            if self._open.sum() == before:
+                sleep(_POLL)
+
+    def _tasks(self) -> Iterator[Task]:
+        """Calls to be made: without samples that are stored or that another campaign is running, looked up just before each call."""
+        for group in self.campaign.call.tasks(self.points):
+            if rows := self._mine([row for row in group if self._open[row]]):
+                yield rows, self.points[rows]
+
+    def _mine(self, rows: list[int]) -> list[int]:
+        """The rows that this campaign is to run; those that are stored are taken."""
+        shelf = self.campaign.shelf
+        if shelf is None or not rows:
+            return rows
+        keys = {shelf.key(self.points[row]): row for row in rows}
+        mine, stored = shelf.claim(list(keys))
+        for key, sample in stored.items():
+            self._keep(keys[key], sample)
+            self.campaign.reused += 1
+        if stored:
+            self._tell()
+        return [row for key, row in keys.items() if key in mine]
+
+    def _record(self, rows: list[int], outcomes: list[Outcome]) -> None:
+        self.campaign.calls += 1
+        self.campaign.runs += len(rows)
+        shelf = self.campaign.shelf
+        for row, outcome in zip(rows, outcomes, strict=True):
+            if shelf:
+                shelf.gather(shelf.key(self.points[row]), outcome)
+            if isinstance(outcome, Failure):
+                self.failures[row] = outcome.error
+                self._open[row] = False
+            else:
+                self._keep(row, outcome)
+        if shelf:
+            shelf.write()
+        self._tell()
+
+    def _keep(self, row: int, sample: Sample) -> None:
+        if not self.array.shape[1]:
+            self.layout = sample.layout
+            require(len(self.points), self.points.shape[1] + len(sample.row))
+            self.array = np.empty((len(self.points), len(sample.row)))
+        if sample.layout != self.layout:
+            got = f"a sample has the outputs {sample.layout} where others have {self.layout}"
+            raise ValueError(f"{got}; all must have the same names and shapes")
+        self.array[row] = sample.row
+        self._open[row] = False
+
+    def _tell(self) -> None:
+        if self.campaign.progress:
+            self.campaign.progress(1 - self._open.sum() / len(self.points))

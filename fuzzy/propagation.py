@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import nullcontext
+from pathlib import Path
 from time import perf_counter
 
 from fuzzy.call import Call, Function
@@ -14,6 +15,7 @@ from fuzzy.known import Known
 from fuzzy.numbers import FuzzyNumber
 from fuzzy.plan import Plan
 from fuzzy.result import FuzzyResult
+from fuzzy.store import Identity, Store, shelf
 from fuzzy.transformation import General
 from fuzzy.workers import pool
 
@@ -29,6 +31,8 @@ def propagate(
     workers: int = 1,
     executor: Executor | None = None,
     known: Known | None = None,
+    store: Store | str | Path | None = None,
+    identity: Identity | None = None,
     progress: Progress | None = None,
 ) -> FuzzyResult:
     """Fuzzy outputs of a function of fuzzy inputs.
@@ -45,18 +49,21 @@ def propagate(
         workers: Processes of this machine; the result is the same for any number. The function must be importable by them.
         executor: Any `concurrent.futures` executor, instead of `workers`.
         known: Facts about the function, such as the signs of its effects, on which guaranteed bounds rest.
+        store: Where samples are kept (or its path): a campaign that was stopped, however, resumes from it.
+        identity: What a sample depends on besides its inputs (case, options, versions), as JSON can say it; a store needs it.
         progress: Called with the share done, 0 … 1.
 
     Raises:
         ValueError: An argument is wrong.
         CampaignError: Samples failed; the others were run first.
+        StoreError: The store cannot be written.
     """
     domain = Domain(inputs, levels(4) if alpha is None else alpha)
     known = known or Known()
     known.check(domain.names)
     call = Call(function, domain.names, tuple(shared), vectorised)
     start = perf_counter()
-    with nullcontext(executor) if executor else pool(workers) as running:
-        campaign = Campaign(call, running, progress, known)
+    with nullcontext(executor) if executor else pool(workers) as running, shelf(store, identity, domain.names) as samples:
+        campaign = Campaign(call, running, progress, known, samples)
         result = (plan or General()).run(campaign, domain)
-    return result.charged(calls=campaign.calls, seconds=perf_counter() - start)
+    return result.charged(calls=campaign.calls, reused=campaign.reused, seconds=perf_counter() - start)

@@ -49,6 +49,7 @@ class FuzzyResult:
         points: Samples of the model, shape (n, inputs).
         values: Outputs at `points`.
         calls: Calls of the model, each for the samples that share a set-up.
+        reused: Samples taken from a store instead of being run.
         seconds: Wall time of the whole propagation.
     """
 
@@ -69,6 +70,7 @@ class FuzzyResult:
     points: Array = field(default_factory=lambda: np.zeros((0, 0)))
     values: Values = field(default_factory=lambda: Values((), np.zeros((0, 0))))
     calls: int = 0
+    reused: int = 0
     seconds: float = 0.0
 
     @classmethod
@@ -166,9 +168,9 @@ class FuzzyResult:
         """Response surface of one output through the samples of the model."""
         return ResponseSurface.fit(self.points, self.values.array[:, [self.column(output)]])
 
-    def charged(self, *, calls: int, seconds: float) -> FuzzyResult:
+    def charged(self, *, calls: int, reused: int, seconds: float) -> FuzzyResult:
         """The same result with what it cost."""
-        return replace(self, calls=calls, seconds=seconds)
+        return replace(self, calls=calls, reused=reused, seconds=seconds)
 
     def to_dataset(self) -> xarray.Dataset:
         """Bounds over (alpha, output), where they are reached over (alpha, output, parameter)."""
