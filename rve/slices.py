@@ -62,7 +62,9 @@ class SlicesModel:
         radii = np.unique(np.concatenate([at_nodes, np.round(extreme_radii(radius_map), DIGITS)]))
         slices = []
         for radius in radii:
-            slices.append(solve_slice(radius, matrix, inclusions, order=self.order, mesh_size=self.mesh_size, centre=self.centre))
+            slices.append(
+                solve_slice(radius, matrix, inclusions, orders=(self.order - 1, self.order), mesh_size=self.mesh_size, centre=self.centre)
+            )
             if self.progress:
                 self.progress(len(slices) / radii.size)
         seconds = {stage: sum(s.seconds[stage] for s in slices) for stage in slices[0].seconds}
@@ -70,7 +72,7 @@ class SlicesModel:
         nodes = np.searchsorted(radii, at_nodes)
         results = []
         for m in range(len(inclusions)):
-            stiffness, gap = np.array([s.stiffness[m] for s in slices]), np.array([s.gap[m] for s in slices])
+            stiffness, gap = np.array([s.stiffness[m] for s in slices]), np.array([s.gaps[-1, m] for s in slices])
             curve = curve_of(rule, stiffness[nodes])
             error = {
                 "space": space_error(curve, gap[nodes]),
@@ -83,21 +85,30 @@ class SlicesModel:
 
 @dataclass(frozen=True)
 class Slice:
-    """A planar cell solved for m inclusions.
+    """A planar cell solved for m inclusions by elements of several orders on one mesh.
 
     Args:
-        stiffness: Shape (m, 3, 3), in Pa.
-        gap: What one order more changed, relative, in C11 + C12 and in C33, shape (m, 2).
-        unknowns: Of one linear system.
+        by_order: Stiffness by order, in Pa, shape (orders, m, 3, 3).
+        unknowns: Of the largest linear system.
         solver: Its solver.
         seconds: Wall time: mesh, jit, assemble, solve.
     """
 
-    stiffness: Array
-    gap: Array
+    by_order: Array
     unknowns: int
     solver: str
     seconds: dict[str, float]
+
+    @property
+    def stiffness(self) -> Array:
+        """By the highest order, shape (m, 3, 3), in Pa."""
+        return np.asarray(self.by_order[-1])
+
+    @property
+    def gaps(self) -> Array:
+        """Relative change of C11 + C12 and C33 by each rise of the order, shape (orders − 1, m, 2)."""
+        moduli = np.stack([self.by_order[..., 0, 0] + self.by_order[..., 0, 1], self.by_order[..., 2, 2]], axis=-1)
+        return np.asarray(np.abs(moduli[:-1] / moduli[1:] - 1))
 
 
 def solve_slice(
@@ -105,11 +116,11 @@ def solve_slice(
     matrix: Phase,
     inclusions: Sequence[Phase],
     *,
-    order: int,
+    orders: Sequence[int],
     mesh_size: float,
     centre: tuple[float, float] = (0.0, 0.0),
 ) -> Slice:
-    """Solve one planar cell at `order` and, for the error, at one order less on the same mesh."""
+    """Solve one planar cell by each of `orders`, rising, on one mesh."""
     from rve.planar import PlanarCell
     from rve.planar_mesh import planar_mesh
     from rve.planar_system import SOLVER
@@ -117,12 +128,11 @@ def solve_slice(
     started = perf_counter()
     mesh = planar_mesh(radius, size=mesh_size, centre=centre)
     seconds = {"mesh": perf_counter() - started}
-    cells = [PlanarCell(mesh, order - 1), PlanarCell(mesh, order)]
-    lower, upper = (cell.solve(matrix, inclusions)[0] for cell in cells)
+    cells = [PlanarCell(mesh, order) for order in orders]
+    stiffness = np.array([cell.solve(matrix, inclusions)[0] for cell in cells])
     for name in ("mesh", "jit", "assemble", "solve"):
         seconds[name] = seconds.get(name, 0.0) + sum(cell.seconds[name] for cell in cells)
-    gap = np.stack([(s[:, 0, 0] + s[:, 0, 1], s[:, 2, 2]) for s in (lower, upper)])
-    return Slice(upper, np.abs(gap[0] / gap[1] - 1).T, cells[1].unknowns, SOLVER, seconds)
+    return Slice(stiffness, cells[-1].unknowns, SOLVER, seconds)
 
 
 def stresses(stiffness: Array) -> tuple[Array, Array]:

@@ -153,7 +153,7 @@ def test_a_map_that_jumps_is_cut_at_its_jump():
     assert rule.weights @ (rule.nodes < 0.3) == pytest.approx(float(radius_map.distribution.cdf(0.3)), rel=1e-13)
 
 
-@pytest.mark.parametrize(("options", "message"), [({"points": 1}, "at least 2"), ({"tolerance": 1e-15}, "must lie in")])
+@pytest.mark.parametrize(("options", "message"), [({"points": 1}, "at least 2"), ({"accuracy": 1e-15}, "must lie in")])
 def test_options_out_of_range(options, message):
     with pytest.raises(ValueError, match=message):
         SeriesModel(**options)
