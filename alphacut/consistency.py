@@ -10,7 +10,7 @@ from pathlib import Path
 from alphacut.case import Case
 from alphacut.problem import Problem
 from alphacut.reading import nearest
-from alphacut.schema import NEEDED
+from alphacut.schema import NEEDED, STAGES
 from stochastic import HermiteMap, TruncatedNormal
 
 SLOPES = ("a1", "a2", "a3", "a4")
@@ -19,6 +19,7 @@ GROUPS = ("E", "I", "m", "l", "d", "q0", "v0")
 
 def inconsistencies(case: Case, *, modal: bool = False) -> Iterator[Problem]:
     """Every problem of a case whose single values are all right."""
+    yield from order_of_stages(case)
     yield from missing_sections(case)
     yield from files(case)
     if case.has("radius.a1"):
@@ -30,6 +31,23 @@ def inconsistencies(case: Case, *, modal: bool = False) -> Iterator[Problem]:
         yield from floors(case)
     if case.has("envelope.step"):
         yield from times(case)
+
+
+def order_of_stages(case: Case) -> Iterator[Problem]:
+    """Each stage hands on to the next, so they stand in this order; and no two studies write the same file."""
+    if list(case.stages) != sorted(case.stages, key=STAGES.index):
+        yield Problem("stages", "the stages are not in their order", str(list(case.stages)), ", ".join(STAGES))
+    names = [case.text(f"study[{i}].name") for i in range(study_count(case))]
+    for index, name in enumerate(names):
+        if not re.fullmatch(r"[\w.+-]+", name):
+            yield Problem(f"study[{index}].name", "a file will be called so", name, "letters, digits and . _ + -")
+        if name in names[:index]:
+            yield Problem(f"study[{index}].name", "another study has this name", name)
+
+
+def study_count(case: Case) -> int:
+    """Number of [[study]] tables."""
+    return int(str(case.values.get("study", 0)))
 
 
 def missing_sections(case: Case) -> Iterator[Problem]:
@@ -97,7 +115,7 @@ def floors(case: Case) -> Iterator[Problem]:
         found = len(case.fuzzies(f"frame.{name}"))
         if found not in (1, count):
             yield Problem(f"frame.{name}", f"got {found} values for {count} floors", allowed=f"{count} values, or one for all floors")
-    for key in ("envelope.fuzzy", *(f"study[{i}].fuzzy" for i in range(int(str(case.values.get("study", 0)))))):
+    for key in ("envelope.fuzzy", *(f"study[{i}].fuzzy" for i in range(study_count(case)))):
         for name in case.names(key) if case.has(key) else ():
             yield from known_input(key, name, count)
 
@@ -114,7 +132,7 @@ def known_input(key: str, name: str, count: int) -> Iterator[Problem]:
 def times(case: Case) -> Iterator[Problem]:
     """Every duration is a whole number of steps."""
     step = case.number("envelope.step")
-    for key in ("envelope.duration", *(f"study[{i}].duration" for i in range(int(str(case.values.get("study", 0)))))):
+    for key in ("envelope.duration", *(f"study[{i}].duration" for i in range(study_count(case)))):
         if not case.has(key):
             continue
         duration = case.number(key)

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from types import ModuleType
 
-from alphacut import command_cell, command_envelope, command_mesh, command_modulus, command_run
+from alphacut import command_cell, command_check, command_cite, command_envelope, command_mesh, command_modulus, command_run
 from alphacut.options import Parser, split_petsc
 from alphacut.output import rank, ranks, say, standard_output
 from alphacut.problem import BadInput
@@ -17,10 +17,12 @@ from fuzzy import CampaignError
 
 COMMANDS: dict[str, ModuleType] = {
     "run": command_run,
+    "check": command_check,
     "cell": command_cell,
     "mesh": command_mesh,
     "modulus": command_modulus,
     "envelope": command_envelope,
+    "cite": command_cite,
 }
 STATUSES = """\
 exit status:

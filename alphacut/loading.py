@@ -16,6 +16,7 @@ from alphacut.reading import Unfit, allowed, nearest, read
 from alphacut.schema import SECTIONS, Key, Section, dotted, every_key
 
 Raw = dict[str, Any]
+ARRAYS = ("fuzzy list", "numbers", "choices")  # kinds of keys that hold arrays
 
 
 def load(path: Path | str, changes: Sequence[str] = (), *, modal: bool = False) -> Case:
@@ -72,9 +73,17 @@ def parsed(path: Path, text: str) -> Raw:
         line = int(where[1]) if where else max(1, len(text.splitlines()))
         reason = re.sub(r"\s*\(at .*\)$", "", str(error)).rstrip(".")
         shown = text.splitlines()[line - 1].strip() if text.splitlines() else ""
-        key, _ = key_at(text, line)
+        key = broken_key(text, line)
         problem = Problem(key, f"this is not TOML: {reason[:1].lower()}{reason[1:]}, at '{shown}'", file=str(path), line=line)
         raise BadInput(problem) from None
+
+
+def broken_key(text: str, line: int) -> str:
+    """The key on a broken line: what stands before the = or, without one, the first word; else the key the line belongs to."""
+    key, at = key_at(text, line)
+    broken = text.splitlines()[line - 1] if text else ""
+    word = re.match(r"\s*([A-Za-z_][\w\-]*)\s*$", broken)
+    return word[1] if word and at != line else key
 
 
 def apply_change(raw: Raw, change: str) -> str:
@@ -93,16 +102,19 @@ def apply_change(raw: Raw, change: str) -> str:
     section, _, key = present[0].rpartition(".")
     table = raw.setdefault(section, {}) if section else raw
     if isinstance(table, dict):
-        table[key] = toml_or_text(value.strip())
+        table[key] = toml_or_text(value.strip(), known[present[0]])
     return present[0]
 
 
-def toml_or_text(value: str) -> object:
-    """A value from a command line: TOML where it is TOML, such as an array in quotes and brackets, else text."""
+def toml_or_text(value: str, key: Key) -> object:
+    """A value from a command line: TOML where it is TOML, else text; where an array is wanted, ``E,m`` is one."""
     try:
-        return tomllib.loads(f"x = {value}")["x"]
+        found = tomllib.loads(f"x = {value}")["x"]
     except tomllib.TOMLDecodeError:
-        return value
+        found = value
+    if key.kind in ARRAYS and not isinstance(found, list):
+        return [item.strip() for item in value.strip("[] ").split(",") if item.strip()]
+    return str(found) if key.kind == "text" else found
 
 
 def checked(raw: Raw, values: dict[str, object], written: dict[str, object]) -> Iterator[Problem]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable
 
 from alphacut import quantity
@@ -52,8 +53,15 @@ def in_range(values: Iterable[float], key: Key) -> None:
             raise Unfit(f"{value:g}{unit} is out of range", allowed(key))
 
 
+def not_quoted(value: object, key: Key) -> None:
+    """Refuse a plain number in quotes: it is text."""
+    if isinstance(value, str) and not key.unit and re.fullmatch(quantity.NUMBER, value.strip()):
+        raise Unfit("this number stands in quotes", allowed(key))
+
+
 def read_fuzzy(value: object, key: Key) -> FuzzyNumber:
     """A crisp or fuzzy quantity whose whole support lies in the key's range."""
+    not_quoted(value, key)
     number = quantity.fuzzy(value, key.unit)
     in_range([*number.cut(0.0), number.modal], key)
     return number
@@ -61,6 +69,7 @@ def read_fuzzy(value: object, key: Key) -> FuzzyNumber:
 
 def read_number(value: object, key: Key) -> float:
     """A crisp quantity in the key's range."""
+    not_quoted(value, key)
     number = quantity.number(value, key.unit)
     in_range([number], key)
     return number
@@ -68,8 +77,6 @@ def read_number(value: object, key: Key) -> float:
 
 def read_integer(value: object, key: Key) -> int:
     """A whole number in the key's range."""
-    if isinstance(value, str) and value.strip().lstrip("+-").isdigit():  # from the command line
-        value = int(value)
     if isinstance(value, bool) or not isinstance(value, int):
         raise Unfit("this is not a whole number", allowed(key))
     in_range([value], key)
@@ -77,15 +84,10 @@ def read_integer(value: object, key: Key) -> int:
 
 
 def array(value: object, key: Key) -> list[object]:
-    """A TOML array, or its text on a command line: "[0, 0.5, 1]", "E,m"."""
-    if isinstance(value, list):
-        return value
-    if not isinstance(value, str):
+    """A TOML array."""
+    if not isinstance(value, list):
         raise Unfit("this is not an array", allowed(key))
-    match = quantity.LIST.fullmatch(value.strip())
-    items = [item.strip().strip("\"'") for item in (match[1] if match else value).split(",")]
-    unit = f" {match[2]}" if match and match[2] else ""  # "[0, 30] s"
-    return [item + unit for item in items if item]
+    return value
 
 
 def read_array(value: object, key: Key) -> tuple[object, ...]:
@@ -110,12 +112,16 @@ def read_name(value: object, key: Key) -> str:
 
 def read_names(value: object, key: Key) -> tuple[str, ...]:
     """An array of names, each one of the choices if there are any."""
-    return tuple(read_name(item, key) for item in array(value, key))
+    names = tuple(read_name(item, key) for item in array(value, key))
+    if len(set(names)) < len(names):
+        raise Unfit("a name stands there twice", allowed(key))
+    if key.required and not names:
+        raise Unfit("the array is empty", allowed(key))
+    return names
 
 
 def read_flag(value: object, key: Key) -> bool:
     """True or false."""
-    value = {"true": True, "false": False}.get(value, value) if isinstance(value, str) else value
     if not isinstance(value, bool):
         raise Unfit("this is neither true nor false", allowed(key))
     return value

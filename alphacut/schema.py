@@ -38,7 +38,8 @@ POISSON = Range("inside (-1, 0.5)", lower=-1.0, upper=0.5)
 UNIT = Range("inside (0, 1)", lower=0.0, upper=1.0)
 MEMBERSHIP = Range("from 0 to 1", lower=0.0, upper=1.0, closed=True)
 KNOWN_VERSION = Range(f"equal to {VERSION}", lower=VERSION, upper=VERSION, closed=True)
-COUNT = Range("1 or more", lower=1.0, closed=True)
+COUNT = Range("from 1 to 10000", lower=1.0, upper=1e4, closed=True)
+DEVIATIONS = Range("from -10 to 10", lower=-10.0, upper=10.0, closed=True)
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ TOP = Section(
 RADIUS = Section(
     "Random radius of the particle over half the cell's side: cubic Hermite map of the truncated normal θ (eq. 12).",
     {
-        "theta": Key("support of θ in standard deviations", "numbers", default=(-3.0, 3.0)),
+        "theta": Key("support of θ in standard deviations", "numbers", default=(-3.0, 3.0), allowed=DEVIATIONS),
         "a1": Key("radius at the lower end of θ", required=True, allowed=UNIT),
         "a2": Key("slope dr/dξ at the lower end", required=True),
         "a3": Key("radius at the upper end of θ", required=True, allowed=UNIT),

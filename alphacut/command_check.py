@@ -1,0 +1,41 @@
+"""``alphacut check``: everything that is wrong with a case, at once."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import TextIO
+
+from alphacut.loading import load
+from alphacut.options import add_common
+from alphacut.output import as_json, write_text
+from alphacut.problem import BadInput
+
+ABOUT = "check a case without computing anything: one line for each problem, with line, key, value, what is allowed, the nearest key"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    add_common(parser)
+
+
+def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
+    """Check and report; with ``--json`` the problems as data."""
+    try:
+        case = load(options.case, options.set)
+    except BadInput as error:
+        answer(options, {"case": options.case, "ok": False, "problems": [asdict(problem) for problem in error.problems]}, out)
+        raise
+    answer(options, {"case": options.case, "ok": True, "problems": [], "stages": list(case.stages)}, out)
+    if options.json != "-" and not options.quiet:
+        out.write(f"{options.case}: no problems; stages {', '.join(case.stages)}; {case.text('title')}\n")
+    return 0
+
+
+def answer(options: argparse.Namespace, document: Mapping[str, object], out: TextIO) -> None:
+    """Write the JSON answer where it is wanted."""
+    if options.json == "-":
+        out.write(as_json(document))
+    elif options.json:
+        write_text(options.json, as_json(document, indent=2))

@@ -1,0 +1,166 @@
+"""A generator breaks the paper's case in known ways; each time the broken key is named, and harmless changes change nothing."""
+
+import random
+import re
+from pathlib import Path
+
+import pytest
+
+from alphacut.entry import main
+from alphacut.loading import load
+from alphacut.position import lines_of_keys
+from alphacut.schema import every_key
+
+PAPER = (Path(__file__).parent.parent / "cases" / "paper.toml").read_text(encoding="utf-8")
+LINES = PAPER.splitlines()
+KEYS = {key: line for key, line in lines_of_keys(PAPER).items() if "." in key and "=" in LINES[line - 1]}
+SCHEMA = every_key()
+OUT_OF_RANGE = {"text": '""', "choice": '"nothing"', "choices": "[]", "integer": "-1"}
+
+
+def entry(key):
+    """The schema's entry of a key of the case."""
+    return SCHEMA[re.sub(r"\[\d+\]", "", key)]
+
+
+def with_line(key, change):
+    """The case with the line of `key` changed; the comment behind it is dropped."""
+    lines = list(LINES)
+    name, _, value = lines[KEYS[key] - 1].partition("=")
+    value = re.sub(r"\s+#.*$", "", value).strip()
+    lines[KEYS[key] - 1] = change(name.strip(), value)
+    return "\n".join(lines) + "\n"
+
+
+def break_unit(generator):
+    key = generator.choice([key for key in KEYS if entry(key).unit and '"' in LINES[KEYS[key] - 1]])
+    wrong = generator.choice([" apples", " K", ""])
+    return key, with_line(key, lambda name, value: f"{name} = " + re.sub(r'([\d\]])\s*[A-Za-z][^"]*"', rf'\1{wrong}"', value))
+
+
+def break_key(generator):
+    key = generator.choice(list(KEYS))
+    bare = key.rpartition(".")[2]
+    at = generator.randrange(len(bare))
+    wrong = bare[:at] + generator.choice("xyz_") + bare[at + 1 :] + "q"
+    return f"{key.rpartition('.')[0]}.{wrong}", with_line(key, lambda name, value: f"{wrong} = {value}")
+
+
+def break_type(generator):
+    key = generator.choice(list(KEYS))
+    wrong = generator.choice(["true", "{ a = 1 }", "1979-05-27"])
+    return key, with_line(key, lambda name, value: f"{name} = {wrong}")
+
+
+def break_order(generator):
+    key = generator.choice(
+        ["radius.a2", "radius.a4", "cell.inclusion_modulus", "frame.modulus", "modulus.alpha", "envelope.alpha", "radius.theta"]
+    )
+    swap = re.compile(r"\[([^\],]+),(.*),\s*([^\],]+)\]|\[([^\],]+),\s*([^\],]+)\]")
+
+    def change(name, value):
+        return f"{name} = " + swap.sub(lambda m: f"[{m[3]},{m[2]}, {m[1]}]" if m[1] else f"[{m[5]}, {m[4]}]", value)
+
+    return key, with_line(key, change)
+
+
+def break_range(generator):
+    key = generator.choice([key for key in KEYS if entry(key).allowed or entry(key).choices])
+    kind = entry(key).kind
+    if kind in OUT_OF_RANGE:
+        return key, with_line(key, lambda name, value: f"{name} = {OUT_OF_RANGE[kind]}")
+    return key, with_line(key, lambda name, value: f"{name} = " + re.sub(r"(?<![\w.])(\d[\d.]*)(?=[^\d.]*$)", r"-77.7", value))
+
+
+def break_encoding(generator):
+    key = generator.choice(list(KEYS))
+    marked = with_line(key, lambda name, value: f"{name} = {value} # \ue000")
+    return key, marked.encode().replace("\ue000".encode(), generator.choice([b"\xff", b"\xe4", b"\xc3("]))
+
+
+def break_by_truncation(generator):
+    key = generator.choice([key for key in KEYS if key.startswith(("radius.", "cell.", "mesh.", "frame.")) and entry(key).required])
+    text = "\n".join(LINES[: KEYS[key]])
+    end = text.rindex("=") + 1
+    return key, text[: end + generator.choice([0, 1])]
+
+
+WAYS = [break_unit, break_key, break_type, break_order, break_range, break_encoding, break_by_truncation]
+
+
+@pytest.mark.parametrize("seed", range(105))
+def test_a_broken_case_exits_2_and_names_the_broken_key(seed, tmp_path, capfd):
+    way = WAYS[seed % len(WAYS)]
+    key, text = way(random.Random(seed))
+    path = tmp_path / "case.toml"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    status = main(["run", str(path), "--out", str(tmp_path / "results"), "--json", "-"])
+    out, err = capfd.readouterr()
+    assert (status, out) == (2, ""), f"{way.__name__} of {key} went through"
+    assert "Traceback" not in err
+    lines = err.splitlines()
+    assert all(re.match(r"alphacut: \S+case\.toml(:\d+)?: \S", line) for line in lines), err
+    assert any(re.search(rf": {re.escape(key)}\b", line) for line in lines), f"{way.__name__} of {key}:\n{err}"
+    assert [file.name for file in tmp_path.iterdir()] == ["case.toml"]
+
+
+def shuffled_keys(generator):
+    blocks = re.split(r"(?m)^(?=\[)", PAPER)
+    shuffled = []
+    for block in blocks:
+        head, *rest = [line for line in block.splitlines() if not line.lstrip().startswith("#")]
+        if '"""' in block or not block.startswith("["):
+            shuffled.append(block)
+            continue
+        rest = [line for line in rest if line.strip()]
+        generator.shuffle(rest)
+        shuffled.append("\n".join([head, *rest]) + "\n")
+    return "".join(shuffled)
+
+
+def shuffled_sections(generator):
+    head, *blocks = re.split(r"(?m)^(?=\[\w)", PAPER)
+    studies = [i for i, block in enumerate(re.split(r"(?m)^(?=\[)", PAPER)) if block.startswith("[[study]]")]
+    assert studies
+    head, *blocks = re.split(r"(?m)^(?=\[(?!\[))", PAPER)
+    generator.shuffle(blocks)
+    return head + "".join(block if block.endswith("\n") else block + "\n" for block in blocks)
+
+
+HARMLESS = {
+    "keys in another order 1": shuffled_keys(random.Random(1)),
+    "keys in another order 2": shuffled_keys(random.Random(2)),
+    "keys in another order 3": shuffled_keys(random.Random(3)),
+    "sections in another order 1": shuffled_sections(random.Random(1)),
+    "sections in another order 2": shuffled_sections(random.Random(2)),
+    "sections in another order 3": shuffled_sections(random.Random(3)),
+    "no comments": re.sub(r"(?m)\s+# .*$|^#.*$", "", PAPER),
+    "more comments": PAPER.partition("[radius]")[0] + re.sub(r"(?m)$", "  # a comment", "[radius]" + PAPER.partition("[radius]")[2]),
+    "other line ends": PAPER.replace("\n", "\r\n"),
+    "byte order mark": "\ufeff" + PAPER,
+    "MPa": PAPER.replace('"20 GPa"', '"20000 MPa"'),
+    "Pa": PAPER.replace('"20 GPa"', '"2e10 Pa"'),
+    "MPa in a triangle": PAPER.replace('"[75, 80, 85] GPa"', '"[75000, 80000, 85000] MPa"'),
+    "a unit for each": PAPER.replace('"[75, 80, 85] GPa"', '"[75 GPa, 80000 MPa, 8.5e10 Pa]"'),
+    "a spread in percent": PAPER.replace('"[19, 20, 21] t"', '"20 t ± 5 %"'),
+    "a spread in plain letters": PAPER.replace('"[19, 20, 21] t"', '"20 +- 1 t"'),
+    "kg": PAPER.replace('"[9.5, 10, 10.5] t"', '"[9500, 10000, 10500] kg"'),
+    "cm": PAPER.replace('"2.5 m"', '"250 cm"'),
+    "ms": PAPER.replace('"0.01 s"', '"10 ms"'),
+    "km/h": PAPER.replace('"-0.5 m/s"', '"-1.8 km/h"'),
+    "one for all floors": PAPER.replace('["50 N s/m", "50 N s/m", "50 N s/m"]', '["0.05 kN s/m"]'),
+    "single quotes": PAPER.replace('"20 GPa"', "'20 GPa'"),
+    "exponent": PAPER.replace("a1 = 0.1337", "a1 = 1337e-4"),
+}
+
+
+@pytest.mark.parametrize("name", HARMLESS)
+def test_a_harmless_change_changes_no_value(name, tmp_path):
+    assert HARMLESS[name] != PAPER
+    changed, plain = tmp_path / "changed.toml", tmp_path / "plain.toml"
+    changed.write_text(HARMLESS[name], encoding="utf-8", newline="")
+    plain.write_text(PAPER, encoding="utf-8")
+    ours, theirs = load(changed).values, load(plain).values
+    if name == "one for all floors":
+        ours, theirs = ({k: v[0] if k == "frame.dampers" else v for k, v in values.items()} for values in (ours, theirs))
+    assert ours == theirs
