@@ -11,6 +11,7 @@ overlapping, hidden and cocircular discs need no special case.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,7 @@ import numpy as np
 from stochastic.discs import Discs
 from stochastic.envelope import Arcs, upper_envelopes
 from stochastic.hyperbola import anomaly, sector_area
-from stochastic.reach import Pairs, nearest_in_each_class, within_reach
+from stochastic.reach import Pairs, nearest_in_each_class, size_classes, within_reach
 from stochastic.truncated_normal import Array
 
 
@@ -79,11 +80,29 @@ def apollonius(discs: Discs) -> Apollonius:
     Args:
         discs: Periodic box or open window.
     """
-    few = _Walls.towards(discs, nearest_in_each_class(discs, 6))
-    walls = _Walls.towards(discs, within_reach(discs, 2 * few.largest_radius() - discs.radii), hidden=few.hidden)
+    largest, hidden = _first_bound(discs)
+    everyone = np.arange(len(discs))
+    walls = _Walls.towards(discs, within_reach(discs, 2 * largest - discs.radii), of=everyone, hidden=hidden)
     arcs, pairs = walls.arcs, walls.pairs
     second, apart = pairs.second[arcs.function], pairs.apart[arcs.function]
     return Apollonius(discs, walls.areas(), walls.hidden, arcs.owner, second, apart, arcs.start, arcs.end)
+
+
+def _first_bound(discs: Discs) -> tuple[Array, Array]:
+    """Upper bound of each cell's largest radius from few neighbours, from more where few leave it wide; and discs found hidden."""
+    largest: Array = np.zeros(len(discs))
+    hidden: Array = np.zeros(len(discs), bool)
+    of: Array = np.arange(len(discs))
+    number = math.ceil(24 / sum(1 for _ in size_classes(discs.radii)))
+    for _ in range(3):
+        few = _Walls.towards(discs, nearest_in_each_class(discs, number, of), of=of, hidden=hidden)
+        hidden = few.hidden
+        largest[of] = few.largest_radius()[of]
+        of = np.flatnonzero(largest - discs.radii > 3 * np.sqrt(discs.area / len(discs)))
+        number *= 4
+        if not len(of) or number > 4 * len(discs):
+            break
+    return largest, hidden
 
 
 def _near_far(radii: Array, first: Array, second: Array, apart: Array) -> tuple[Array, Array]:
@@ -103,18 +122,18 @@ class _Walls:
     arcs: Arcs
 
     @classmethod
-    def towards(cls, discs: Discs, others: Pairs, *, hidden: Array | None = None) -> _Walls:
-        """Cells of `discs` if only the `others` (and their own images, or the edges of the window) were their neighbours.
+    def towards(cls, discs: Discs, others: Pairs, *, of: Array, hidden: Array) -> _Walls:
+        """Cells of the discs `of` if only the `others` (and their own images, or the edges of the window) were their neighbours.
 
         A disc counts as hidden when it lies inside another one to round-off; its cell would be a line. It is then nobody's neighbour.
         """
         round_off = 16 * np.finfo(float).eps * discs.size.max()
         near, far = _near_far(discs.radii, others.first, others.second, others.apart)
         inside = (near <= round_off) & ((far > round_off) | (others.second < others.first))  # of two discs in one place the first stays
-        hidden = np.zeros(len(discs), bool) if hidden is None else hidden.copy()
+        hidden = hidden.copy()
         hidden[others.first[inside]] = True
         seen = (near > round_off) & (far > round_off) & ~hidden[others.first] & ~hidden[others.second]
-        pairs = Pairs.join([others.where(seen), _bounds(discs, np.flatnonzero(~hidden))])
+        pairs = Pairs.join([others.where(seen), _bounds(discs, of[~hidden[of]])])
         near, far = _near_far(discs.radii, pairs.first, pairs.second, pairs.apart)
         direction = pairs.apart / np.hypot(pairs.apart[:, 0], pairs.apart[:, 1])[:, None]
         amplitude = 1 / near + 1 / far

@@ -46,16 +46,16 @@ def size_classes(radii: Array) -> Iterator[Array]:
         yield np.flatnonzero(level == value)
 
 
-def nearest_in_each_class(discs: Discs, number: int) -> Pairs:
-    """For each disc the `number` nearest centres of each size class (nearest images only), itself left out."""
+def nearest_in_each_class(discs: Discs, number: int, of: Array) -> Pairs:
+    """For each of the discs `of` the `number` nearest centres of each size class (nearest images only), itself left out."""
     from scipy.spatial import KDTree
 
     parts = []
     for members in size_classes(discs.radii):
         tree = KDTree(discs.centres[members], boxsize=discs.size if discs.periodic else None)
         wanted = min(number + 1, len(members))
-        _, found = tree.query(discs.centres, k=np.arange(1, wanted + 1))
-        first, second = np.repeat(np.arange(len(discs)), wanted), members[found.ravel()]
+        _, found = tree.query(discs.centres[of], k=np.arange(1, wanted + 1))
+        first, second = np.repeat(of, wanted), members[found.ravel()]
         apart = first != second
         first, second = first[apart], second[apart]
         parts.append(Pairs(first, second, discs.separation(first, second)))

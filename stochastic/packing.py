@@ -1,0 +1,122 @@
+"""Periodic packings of non-overlapping discs, tested before they are handed out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+import numpy as np
+
+from stochastic.contacts import smallest_gap
+from stochastic.discs import Discs
+from stochastic.log_normal import LogNormalRadii
+from stochastic.refused import RefusedError
+from stochastic.relaxed import relaxed
+from stochastic.sequential import random_sequential
+from stochastic.truncated_normal import Array
+
+METHODS = ("auto", "sequential", "relaxed")
+SEQUENTIAL_LIMIT = 0.45  # area fraction, half the gap counted to each radius, up to which sequential addition is quick
+LEVEL = 1e-4  # a packing of the right law is refused with this probability
+
+
+@dataclass(frozen=True)
+class Packing:
+    """A wish for a packing.
+
+    Args:
+        discs: Number of discs, at least 1.
+        area_fraction: Share of the square that they cover, in (0, 0.84).
+        radii: Law of the radii.
+        gap: Least distance between surfaces, in m, not negative.
+        method: "sequential" (random sequential addition), "relaxed" (for dense packings), or "auto" (the first where it can).
+
+    Raises:
+        ValueError: A value lies outside its range.
+    """
+
+    discs: int
+    area_fraction: float
+    radii: LogNormalRadii
+    gap: float = 0.0
+    method: str = "auto"
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.discs, int | np.integer) and self.discs >= 1):
+            raise ValueError(f"a packing of {self.discs} discs was asked for; it needs a whole number, at least 1")
+        if not 0 < self.area_fraction < 0.84:
+            raise ValueError(f"the area fraction is {self.area_fraction:g}; it must lie in (0, 0.84), below random close packing")
+        if not 0 <= self.gap < np.inf:
+            raise ValueError(f"the gap is {self.gap:g} m; it must be finite and not negative")
+        if self.method not in METHODS:
+            raise ValueError(f"the packing method is {self.method!r}; take one of {', '.join(METHODS)}")
+
+    def make(self, generator: np.random.Generator) -> Discs:
+        """One packing. The square is as large as the discs and the area fraction make it.
+
+        Raises:
+            RefusedError: The discs find no place, or the packing fails `check`.
+        """
+        radii = self.radii.sample(self.discs, generator)
+        side = float(np.sqrt(np.pi * (radii**2).sum() / self.area_fraction))
+        if 2 * radii.max() + self.gap > side:
+            raise RefusedError(
+                f"a disc of radius {radii.max():g} m does not fit into its periodic square of {side:g} m: ask for more discs"
+            )
+        packing = Discs(self._place(radii, side, generator), radii, np.array([side, side]))
+        self.check(packing)
+        return packing
+
+    def _place(self, radii: Array, side: float, generator: np.random.Generator) -> Array:
+        grown = np.pi * ((radii + self.gap / 2) ** 2).sum() / side**2
+        place: Callable[..., Array] = relaxed if self.method == "relaxed" else random_sequential
+        if self.method == "auto" and grown > SEQUENTIAL_LIMIT:
+            place = relaxed
+        try:
+            return place(radii, side, gap=self.gap, generator=generator)
+        except RefusedError:
+            if self.method != "auto" or place is relaxed:
+                raise
+            return relaxed(radii, side, gap=self.gap, generator=generator)
+
+    def check(self, packing: Discs) -> None:
+        """Compare number, area fraction, gaps and the law of the radii (Kolmogorov–Smirnov at `LEVEL`) with the wish.
+
+        Raises:
+            RefusedError: One of them differs; the message gives both numbers.
+        """
+        if len(packing) != self.discs:
+            raise RefusedError(f"the packing has {len(packing)} discs where {self.discs} were asked for")
+        if abs(packing.area_fraction - self.area_fraction) > 1e-9:
+            raise RefusedError(f"the packing has area fraction {packing.area_fraction:.6g} where {self.area_fraction:g} was asked for")
+        gap, round_off = smallest_gap(packing), 1e-12 * float(packing.size.max())
+        if gap < self.gap - round_off:
+            raise RefusedError(f"the packing has a gap of {gap:.3g} m where {self.gap:g} m or more was asked for")
+        distance, probability = _law_test(packing.radii, self.radii)
+        if probability < LEVEL:
+            raise RefusedError(
+                f"the radii differ from their law by {distance:.3g} in the distribution function; for {self.discs} discs this happens with "
+                f"probability {probability:.1e}, less than {LEVEL:g}: take another seed, or more discs"
+            )
+
+
+def packings(wish: Packing, number: int, *, seed: int, executor: Executor | None = None) -> Iterator[Discs]:
+    """`number` independent packings; the k-th depends on `seed` and k only, not on order, number or workers."""
+    seeds = np.random.SeedSequence(seed).spawn(number)
+    return (executor.map if executor else map)(_one, [wish] * number, seeds)
+
+
+def _one(wish: Packing, seed: np.random.SeedSequence) -> Discs:
+    return wish.make(np.random.default_rng(seed))
+
+
+def _law_test(radii: Array, law: LogNormalRadii) -> tuple[float, float]:
+    """Kolmogorov–Smirnov distance and the probability of a greater one."""
+    from scipy.stats import kstest
+
+    if law.sigma == 0:
+        same = bool((np.abs(radii - law.smallest) <= 1e-12 * law.smallest).all())
+        return float(not same), float(same)
+    result = kstest(radii, law.cdf)
+    return float(result.statistic), float(result.pvalue)
