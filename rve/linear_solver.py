@@ -59,8 +59,8 @@ class LinearSolver:
             for name in options:
                 database.delValue(name)
 
-    def solve(self, load: PETSc.Vec) -> tuple[Array, int]:
-        """The whole solution vector, on every rank, and the number of iterations.
+    def solve(self, load: PETSc.Vec) -> tuple[Array, int, float]:
+        """The whole solution vector, on every rank, the number of iterations, and the relative residual as it truly is.
 
         Raises:
             ConvergenceError: The tolerance was not reached, or the result is not finite.
@@ -74,4 +74,5 @@ class LinearSolver:
                 f"its tolerance (PETSc reason {reason}): raise -{PREFIX}ksp_max_it or take another solver"
             )
         parts = x.comm.tompi4py().allgather(x.array_r.copy())
-        return np.concatenate(parts), iterations
+        residual = self.krylov.getOperators()[0] * x - load
+        return np.concatenate(parts), iterations, residual.norm() / load.norm()

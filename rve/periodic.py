@@ -12,6 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from rve.triangulation import Integers, Triangulation
+from stochastic.truncated_normal import Array
 
 
 @dataclass(frozen=True)
@@ -58,3 +59,28 @@ def identify(plane: Triangulation) -> Periodicity:
     rank[order] = np.arange(len(order)) - 1
     unknown = rank[label]
     return Periodicity(unknown, int(unknown[: plane.vertices].max()) + 1, len(order) - 1)
+
+
+def mismatch(positions: Array, fluctuation: Array) -> float:
+    """Largest difference of the fluctuation between opposite nodes, relative to its largest value.
+
+    It pairs the nodes by position on its own, so that it can find a wrong identification.
+
+    Args:
+        positions: Nodes (x1, x2, θ) of the cell, shape (n, 3).
+        fluctuation: Displacements less ε̄x, shape (n, 2, loads).
+    """
+    worst = 0.0
+    for axis in (0, 1):
+        order = [_along_side(positions, axis, end) for end in (-1.0, 1.0)]
+        if len(order[0]) != len(order[1]):
+            return float("inf")
+        worst = max(worst, float(abs(fluctuation[order[0]] - fluctuation[order[1]]).max()))
+    return worst / max(float(abs(fluctuation).max()), np.finfo(float).tiny)
+
+
+def _along_side(positions: Array, axis: int, end: float) -> Integers:
+    """Nodes of one side, in the order of their other coordinates."""
+    side = np.flatnonzero(abs(positions[:, axis] - end) < 1e-9)
+    other = np.round(positions[side][:, [1 - axis, 2]], 7)
+    return np.asarray(side[np.lexsort(other.T)])

@@ -1,58 +1,39 @@
-"""One product-space system: its mesh, constraints, matrices, and the solves for several inclusions."""
+"""One product-space system: its mesh, its constraints, and what follows from displacements on it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from time import perf_counter
+from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rve.cell import LOADS, Phase
-from rve.level_blocks import LevelBlocks
-from rve.linear_solver import LinearSolver, Preconditioner
+from rve.cell import Phase
 from rve.periodic import identify
 from rve.prism_form import PrismForm
 from rve.prism_grid import PrismGrid
 from rve.reduction import LevelNumbering
-from rve.result import Homogenised, StressCurve
-from rve.slice_stress import SliceStress
-from rve.solver_options import describe
+from rve.slice_stress import CELL_AREA, SliceStress
 from rve.theta_preconditioner import ThetaPreconditioner
-from stochastic import RadiusMap, layered_rule
+from stochastic import RadiusMap, ThetaRule, layered_rule
 from stochastic.truncated_normal import Array
 
-NO_LOAD = 1e-12  # relative size of a load that is nothing but round-off
-STAGES = ("mesh", "assemble", "setup", "solve", "total", "jit")
 
+@dataclass(frozen=True)
+class SliceMeans:
+    """Means over the slices at the Gauss points of the layers.
 
-class Stopwatch:
-    """Wall time by stage."""
+    Args:
+        rule: θ of the slices and their weights, sum 1, n of them.
+        stress: Homogenised (σ11, σ22, σ12) for each load, shape (n, 3, loads), in Pa.
+        fraction: Area fraction of the particle, shape (n,).
+        energy: Mean of σ_a : ε_b over cell and θ for loads a and b, shape (loads, loads), in Pa.
+    """
 
-    def __init__(self) -> None:
-        self.seconds = dict.fromkeys(STAGES, 0.0)
-
-    @contextmanager
-    def __call__(self, stage: str) -> Iterator[None]:
-        """Add the time of the block to `stage`."""
-        started = perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[stage] += perf_counter() - started
-
-    def shift(self, source: str, target: str, seconds: float) -> None:
-        """Book `seconds` under another stage."""
-        self.seconds[source] -= seconds
-        self.seconds[target] += seconds
-
-    def report(self) -> dict[str, float]:
-        """Seconds by stage; the total leaves just-in-time compilation out. What is shared is booked once, to the first to ask."""
-        self.seconds["total"] = sum(self.seconds[s] for s in ("mesh", "assemble", "setup", "solve"))
-        report, self.seconds = self.seconds, dict.fromkeys(STAGES, 0.0)
-        return report
+    rule: ThetaRule
+    stress: Array
+    fraction: Array
+    energy: Array
 
 
 class PrismSystem:
@@ -92,39 +73,32 @@ class PrismSystem:
         x = np.einsum("qn,cnd->cqd", self.form.shapes, self.positions[self.grid.cells])
         return (np.hypot(x[..., 0], x[..., 1]) < self.map(x[..., 2])).astype(float)  # z < 0 in eq. 14
 
-    def homogenise(
-        self, matrix: Phase, inclusions: Sequence[Phase], *, options: Mapping[str, str], watch: Stopwatch, name: str, loads: Array = LOADS
-    ) -> list[Homogenised]:
-        """Solve for every inclusion in turn; K = E_m K_m + E_i K_i is assembled once for each Poisson's ratio."""
-        results: list[Homogenised] = []
-        assembled: tuple[float, _Assembled] | None = None
-        for inclusion in inclusions:
-            if assembled is None or assembled[0] != inclusion.poisson:
-                with watch("assemble"):
-                    assembled = inclusion.poisson, _Assembled(self, (matrix, inclusion), loads, name)
-            displacement, iterations = assembled[1].solve(matrix, inclusion, options, watch)
-            with watch("solve"):
-                curve = self.curve(displacement, (matrix, inclusion))
-            results.append(
-                Homogenised(
-                    curve=curve,
-                    method="prism",
-                    solver=describe(name, options),
-                    unknowns=self.numbering.size,
-                    iterations=iterations,
-                    seconds=watch.report(),
-                )
-            )
-        return results
+    def stiffness(self, phase: int) -> PETSc.Mat:
+        """Reduced K_m (phase 0) or K_i (phase 1) for a unit modulus."""
+        matrix = self.pattern.duplicate(copy=False)
+        matrix.setLGMap(self.local_map, self.local_map)
+        self.form.add_stiffness(phase, matrix)
+        matrix.assemble()
+        return matrix
 
-    def curve(self, displacement: Array, phases: tuple[Phase, Phase]) -> StressCurve:
-        """Homogenised stress at the Gauss points of the layers from total displacements, shape (nodes, 2, loads)."""
+    def load(self, phase: int, strain: Array) -> PETSc.Vec:
+        """Reduced load of one phase for a unit modulus under a macroscopic strain (ε11, ε22, 2 ε12)."""
+        return self.numbering.vector(self.local_map, self.form.load(phase, strain), self.comm)
+
+    def means(self, displacement: Array, phases: tuple[Phase, Phase]) -> SliceMeans:
+        """Homogenised stress of the slices and the mean energy from total displacements, shape (nodes, 2, loads)."""
         slices = SliceStress(self.grid, self.positions, self.form.points, self.form.weights)
         share = self.share[:, :, None, None]
         stiffness = (1 - share) * phases[0].stiffness + share * phases[1].stiffness
-        mean = np.concatenate([layer.mean for layer in slices.layers(displacement, stiffness)])
         rule = layered_rule(self.map.distribution, layers=self.grid.layers, points=slices.slices)
-        return StressCurve(rule.nodes, rule.weights / rule.weights.sum(), mean[:, 0, 0], mean[:, 2, 1])
+        weights = rule.weights / rule.weights.sum()
+        shares = np.broadcast_to(self.share, (len(self.share), len(self.form.points))).reshape(self.grid.layers, -1, slices.slices, 6)
+        stress, fraction, energy = [], [], 0.0
+        for k, layer in enumerate(slices.layers(displacement, stiffness)):
+            stress.append(layer.mean)
+            fraction.append(np.einsum("msp,msp->s", layer.area, shares[k]) / CELL_AREA)
+            energy += np.tensordot(weights[k * slices.slices : (k + 1) * slices.slices], layer.energy, axes=1)
+        return SliceMeans(ThetaRule(rule.nodes, weights), np.concatenate(stress), np.concatenate(fraction), np.asarray(energy))
 
     def affine(self, loads: Array) -> Array:
         """Displacements ε̄·x of the nodes, shape (nodes, 2, loads)."""
@@ -148,55 +122,3 @@ class PrismSystem:
             centre = plane[:, self.grid.plane.triangles[:, :3]].mean(axis=2)
             inside = np.linalg.norm(centre, axis=-1) < self.map(theta)[:, None]
         return np.where(inside[..., None, None], phases[1].stiffness, phases[0].stiffness)
-
-
-class _Assembled:
-    """Reduced matrices and loads of one map for one pair of Poisson's ratios, for unit Young's moduli."""
-
-    def __init__(self, system: PrismSystem, phases: tuple[Phase, Phase], loads: Array, name: str) -> None:
-        self.system, self.name, self.affine = system, name, system.affine(loads)
-        system.form.set_poisson(phases)
-        self.matrices = [self._matrix(k) for k in range(2)]
-        self.loads = [[system.numbering.vector(system.local_map, system.form.load(k, e), system.comm) for e in loads] for k in range(2)]
-        self.theta: tuple[float, ThetaPreconditioner] | None = None
-
-    def _matrix(self, phase: int) -> PETSc.Mat:
-        matrix = self.system.pattern.duplicate(copy=False)
-        matrix.setLGMap(self.system.local_map, self.system.local_map)
-        self.system.form.add_stiffness(phase, matrix)
-        matrix.assemble()
-        return matrix
-
-    def solve(self, matrix: Phase, inclusion: Phase, options: Mapping[str, str], watch: Stopwatch) -> tuple[Array, tuple[int, ...]]:
-        """Total displacements of the nodes, shape (nodes, 2, loads), and iterations for each load."""
-        with watch("setup"):
-            operator = self.matrices[0].copy()
-            operator.scale(matrix.modulus)
-            operator.axpy(inclusion.modulus, self.matrices[1], PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-            solver = LinearSolver(operator, options, self._context(operator, matrix, inclusion, options))
-        total, iterations = self.affine.copy(), []
-        with watch("solve"):
-            for n, (soft, hard) in enumerate(zip(*self.loads, strict=True)):
-                size = matrix.modulus * soft.norm() + inclusion.modulus * hard.norm()
-                load = soft.copy()
-                load.scale(matrix.modulus)
-                load.axpy(inclusion.modulus, hard)
-                if load.norm() <= NO_LOAD * size:  # equal phases: the affine field is the solution
-                    iterations.append(0)
-                    continue
-                solution, count = solver.solve(load)
-                total[:, :, n] += self.system.numbering.to_nodes(solution)
-                iterations.append(count)
-        return total, tuple(iterations)
-
-    def _context(self, operator: PETSc.Mat, matrix: Phase, inclusion: Phase, options: Mapping[str, str]) -> Preconditioner | None:
-        if options["pc_type"] != "python":
-            return None
-        return LevelBlocks(self.system.numbering, operator) if self.name == "blocks" else self._theta(matrix, inclusion)
-
-    def _theta(self, matrix: Phase, inclusion: Phase) -> ThetaPreconditioner:
-        """Made once and kept while the contrast stays within a factor 1.25."""
-        contrast = inclusion.modulus / matrix.modulus
-        if self.theta is None or not 0.8 <= contrast / self.theta[0] <= 1.25:
-            self.theta = contrast, self.system.preconditioner((matrix, inclusion))
-        return self.theta[1]

@@ -36,6 +36,11 @@ class LayerStress:
         """Homogenised stress of each slice, shape (slices, 3, loads)."""
         return np.einsum("msp,mspvl->svl", self.area, self.stress) / CELL_AREA
 
+    @property
+    def energy(self) -> Array:
+        """Mean of σ_a : ε_b over each slice, shape (slices, loads, loads)."""
+        return np.einsum("msp,mspva,mspvb->sab", self.area, self.stress, self.strain, optimize=True) / CELL_AREA
+
 
 @dataclass(frozen=True)
 class SliceStress:

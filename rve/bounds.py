@@ -1,0 +1,43 @@
+"""What no effective stiffness can leave: Reuss and Voigt as matrices, Hashin–Shtrikman for the in-plane bulk modulus.
+
+The in-plane bulk modulus of a square array is isotropic enough for Hashin–Shtrikman; its shear modulus G12 is not and lies below the
+isotropic lower bound, so it is not tested against that.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rve.cell import Phase
+from stochastic.truncated_normal import Array
+
+
+def voigt(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
+    """Stiffness at uniform strain, shape (…, 3, 3) for area fractions of the inclusion of shape (…), in Pa."""
+    share = np.asarray(fraction)[..., None, None]
+    return np.asarray((1 - share) * matrix.stiffness + share * inclusion.stiffness)
+
+
+def reuss(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
+    """Stiffness at uniform in-plane stress, shape (…, 3, 3), in Pa."""
+    share = np.asarray(fraction)[..., None, None]
+    return np.asarray(np.linalg.inv((1 - share) * np.linalg.inv(matrix.stiffness) + share * np.linalg.inv(inclusion.stiffness)))
+
+
+def bulk_modulus(stiffness: Array) -> Array:
+    """In-plane bulk modulus of stiffnesses of shape (…, 3, 3), in Pa."""
+    return np.asarray((stiffness[..., 0, 0] + stiffness[..., 1, 1] + 2 * stiffness[..., 0, 1]) / 4)
+
+
+def hashin_shtrikman_bulk(fraction: Array, matrix: Phase, inclusion: Phase) -> tuple[Array, Array]:
+    """Lower and upper bound of the in-plane bulk modulus, in Pa (Hashin & Rosen 1964; Hashin 1965)."""
+    bulk = [float(bulk_modulus(phase.stiffness)) for phase in (matrix, inclusion)]
+    shear = [float(phase.stiffness[2, 2]) for phase in (matrix, inclusion)]
+    share = np.asarray(fraction)
+
+    def around(k: int, other_share: Array) -> Array:
+        gap = 1.0 / (bulk[1 - k] - bulk[k]) if bulk[1 - k] != bulk[k] else np.inf
+        return np.asarray(bulk[k] + other_share / (gap + (1 - other_share) / (bulk[k] + shear[k])))
+
+    ends = around(0, share), around(1, 1 - share)
+    return np.minimum(*ends), np.maximum(*ends)

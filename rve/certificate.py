@@ -1,0 +1,101 @@
+"""The certificate of a result: properties every right one has, measured, kept with it, and an error where one is violated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from rve.bounds import bulk_modulus, hashin_shtrikman_bulk, reuss, voigt
+from rve.cell import Phase
+from stochastic.truncated_normal import Array
+
+ROUND_OFF = 1e-9
+
+
+class CertificateError(RuntimeError):
+    """A result lacks a property that every right one has."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How much violation of each kind is round-off or declared error, relative.
+
+    Args:
+        algebraic: For what holds exactly in exact arithmetic: residual, Hill–Mandel, symmetry, periodicity.
+        discretisation: Declared error of the stiffness, for the bounds.
+    """
+
+    algebraic: float = 1e-7
+    discretisation: float = ROUND_OFF
+
+
+WHAT = {
+    "residual": "the linear system is not solved",
+    "hill_mandel": "mean stress times mean strain is not the mean of their product (Hill–Mandel)",
+    "symmetry": "the effective stiffness is not symmetric",
+    "periodicity": "the displacement fluctuation differs on opposite sides of the cell",
+    "reuss": "the effective stiffness is below the Reuss bound",
+    "voigt": "the effective stiffness is above the Voigt bound",
+    "hashin_shtrikman": "the in-plane bulk modulus is outside the Hashin–Shtrikman bounds",
+}
+BOUNDS = ("reuss", "voigt", "hashin_shtrikman")
+
+
+def require(checks: Mapping[str, float], limits: Limits) -> dict[str, float]:
+    """The checks as they are, if all are within their limits.
+
+    Raises:
+        CertificateError: One is not; the message names it with its value and its limit.
+    """
+    for name, value in checks.items():
+        limit = limits.discretisation if name in BOUNDS else limits.algebraic
+        if not value <= limit:
+            raise CertificateError(f"{WHAT[name]}: relative violation {value:.2e}, {limit:.2e} is allowed; do not use this result")
+    return dict(checks)
+
+
+def stiffness_checks(stiffness: Array, fraction: Array, weights: Array, phases: tuple[Phase, Phase]) -> dict[str, float]:
+    """Symmetry and bounds of the mean stiffness.
+
+    Args:
+        stiffness: At the nodes of θ, Voigt order, shape (n, 3, 3), in Pa.
+        fraction: Area fraction of the particle at the nodes, shape (n,).
+        weights: Weights of the nodes, shape (n,).
+        phases: Matrix and inclusion.
+    """
+    mean = np.tensordot(weights, stiffness, axes=1)
+    low, high = (np.tensordot(weights, bound(fraction, *phases), axes=1) for bound in (reuss, voigt))
+    least, greatest = (weights @ bound for bound in hashin_shtrikman_bulk(fraction, *phases))
+    bulk = float(bulk_modulus(mean))
+    return {
+        "symmetry": float(abs(mean - mean.T).max() / abs(mean).max()),
+        "reuss": _below(mean - low, mean),
+        "voigt": _below(high - mean, mean),
+        "hashin_shtrikman": max(0.0, float(least) - bulk, bulk - float(greatest)) / bulk,
+    }
+
+
+def load_checks(stress: Array, loads: Array, fraction: Array, weights: Array, phases: tuple[Phase, Phase]) -> dict[str, float]:
+    """The same from fewer than three loads: symmetry and bounds of the energies that they see.
+
+    Args:
+        stress: Homogenised (σ11, σ22, σ12) at the nodes of θ for each load, shape (n, 3, loads), in Pa.
+        loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3).
+        fraction: Area fraction of the particle at the nodes, shape (n,).
+        weights: Weights of the nodes, shape (n,).
+        phases: Matrix and inclusion.
+    """
+    energy = loads @ np.tensordot(weights, stress, axes=1)
+    low, high = (loads @ np.tensordot(weights, bound(fraction, *phases), axes=1) @ loads.T for bound in (reuss, voigt))
+    return {
+        "symmetry": float(abs(energy - energy.T).max() / abs(energy).max()),
+        "reuss": _below(energy - low, energy),
+        "voigt": _below(high - energy, energy),
+    }
+
+
+def _below(difference: Array, scale: Array) -> float:
+    """How far the least eigenvalue is below zero, relative to the size of `scale`."""
+    return max(0.0, -float(np.linalg.eigvalsh((difference + difference.T) / 2)[0])) / float(abs(scale).max())

@@ -1,0 +1,108 @@
+"""One task: a map with its moduli in a fixed order. Mesh, matrices and preconditioner are made once and serve all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from petsc4py import PETSc
+
+from rve.cell import Phase
+from rve.level_blocks import LevelBlocks
+from rve.linear_solver import LinearSolver, Preconditioner
+from rve.prism_system import PrismSystem
+from rve.stopwatch import Stopwatch
+from rve.theta_preconditioner import ThetaPreconditioner
+from stochastic.truncated_normal import Array
+
+NO_LOAD = 1e-12  # relative size of a load that is nothing but round-off
+
+
+@dataclass(frozen=True)
+class Displacements:
+    """Solution of the cell for all loads.
+
+    Args:
+        total: Displacements of the nodes, ε̄x and fluctuation, shape (nodes, 2, loads).
+        affine: ε̄x alone, same shape.
+        iterations: Of the linear solver, for each load.
+        residual: Largest relative residual.
+    """
+
+    total: Array
+    affine: Array
+    iterations: tuple[int, ...]
+    residual: float
+
+
+class PrismTask:
+    """Reduced matrices and loads of one map; K = E_m K_m + E_i K_i is assembled once for each pair of Poisson's ratios.
+
+    Args:
+        system: Mesh and forms, already moved to the map.
+        solver: Name in `rve.solver_options.SOLVERS`.
+        options: PETSc options without prefix.
+        loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3).
+        watch: Takes the times.
+    """
+
+    def __init__(self, system: PrismSystem, solver: str, options: Mapping[str, str], loads: Array, watch: Stopwatch) -> None:
+        self.system, self.solver, self.options, self.strains, self.watch = system, solver, options, loads, watch
+        self.affine = system.affine(loads)
+        self.poissons: tuple[float, float] | None = None
+
+    def solve(self, matrix: Phase, inclusions: Sequence[Phase]) -> Iterator[Displacements]:
+        """One solution after another, in the order of `inclusions`."""
+        for inclusion in inclusions:
+            with self.watch("assemble"):
+                self._assemble((matrix, inclusion))
+            with self.watch("setup"):
+                operator = self._combined(self.matrices[0].copy(), self.matrices[1], (matrix, inclusion))
+                solver = LinearSolver(operator, self.options, self._context(operator, (matrix, inclusion)))
+            with self.watch("solve"):
+                solution = self._solve_loads(solver, (matrix, inclusion))
+            yield solution
+
+    def _assemble(self, phases: tuple[Phase, Phase]) -> None:
+        poissons = phases[0].poisson, phases[1].poisson
+        if poissons == self.poissons:
+            return
+        system, self.poissons = self.system, poissons
+        system.form.set_poisson(phases)
+        self.matrices = [system.stiffness(k) for k in range(2)]
+        self.loads = [[system.load(k, strain) for strain in self.strains] for k in range(2)]
+        self.theta: tuple[float, ThetaPreconditioner] | None = None
+
+    @staticmethod
+    def _combined(soft: PETSc.Object, hard: PETSc.Object, phases: tuple[Phase, Phase]) -> PETSc.Object:
+        """`soft` turned into E_m soft + E_i hard; matrices of one pattern, or vectors."""
+        soft.scale(phases[0].modulus)
+        structure = (PETSc.Mat.Structure.SAME_NONZERO_PATTERN,) if isinstance(soft, PETSc.Mat) else ()
+        soft.axpy(phases[1].modulus, hard, *structure)
+        return soft
+
+    def _solve_loads(self, solver: LinearSolver, phases: tuple[Phase, Phase]) -> Displacements:
+        total, iterations, residuals = self.affine.copy(), [], [0.0]
+        for n, (soft, hard) in enumerate(zip(*self.loads, strict=True)):
+            size = phases[0].modulus * soft.norm() + phases[1].modulus * hard.norm()
+            load = self._combined(soft.copy(), hard, phases)
+            if load.norm() <= NO_LOAD * size:  # equal phases: the affine field is the solution
+                iterations.append(0)
+                continue
+            solution, count, residual = solver.solve(load)
+            total[:, :, n] += self.system.numbering.to_nodes(solution)
+            iterations.append(count)
+            residuals.append(residual)
+        return Displacements(total, self.affine, tuple(iterations), max(residuals))
+
+    def _context(self, operator: PETSc.Mat, phases: tuple[Phase, Phase]) -> Preconditioner | None:
+        if self.options["pc_type"] != "python":
+            return None
+        return LevelBlocks(self.system.numbering, operator) if self.solver == "blocks" else self._theta(phases)
+
+    def _theta(self, phases: tuple[Phase, Phase]) -> ThetaPreconditioner:
+        """Made once and kept while the contrast stays within a factor 1.25."""
+        contrast = phases[1].modulus / phases[0].modulus
+        if self.theta is None or not 0.8 <= contrast / self.theta[0] <= 1.25:
+            self.theta = contrast, self.system.preconditioner(phases)
+        return self.theta[1]
