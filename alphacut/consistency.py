@@ -115,9 +115,19 @@ def floors(case: Case) -> Iterator[Problem]:
         found = len(case.fuzzies(f"frame.{name}"))
         if found not in (1, count):
             yield Problem(f"frame.{name}", f"got {found} values for {count} floors", allowed=f"{count} values, or one for all floors")
+    yield from known_output(case, count)
     for key in ("envelope.fuzzy", *(f"study[{i}].fuzzy" for i in range(study_count(case)))):
         for name in case.names(key) if case.has(key) else ():
             yield from known_input(key, name, count)
+
+
+def known_output(case: Case, floors: int) -> Iterator[Problem]:
+    """The output that a study draws."""
+    outputs = [f"q{floor + 1}" for floor in range(floors)]
+    for index in range(study_count(case)):
+        name = case.values.get(f"study[{index}].output")
+        if name and name not in outputs:
+            yield Problem(f"study[{index}].output", f"there is no output {name}", str(name), ", ".join(outputs))
 
 
 def known_input(key: str, name: str, count: int) -> Iterator[Problem]:

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from types import ModuleType
 
-from alphacut import command_cell, command_check, command_cite, command_envelope, command_mesh, command_modulus, command_run
+from alphacut import command_cell, command_check, command_cite, command_envelope, command_mesh, command_modulus, command_report, command_run
 from alphacut.options import Parser, split_petsc
 from alphacut.output import rank, ranks, say, standard_output
 from alphacut.problem import BadInput
@@ -22,6 +22,7 @@ COMMANDS: dict[str, ModuleType] = {
     "mesh": command_mesh,
     "modulus": command_modulus,
     "envelope": command_envelope,
+    "report": command_report,
     "cite": command_cite,
 }
 STATUSES = """\
@@ -86,7 +87,7 @@ def main(arguments: Sequence[str] | None = None, *, program: str = "alphacut", n
     except CampaignError as error:
         say(str(error))
         return 3
-    except (RuntimeError, ValueError, ArithmeticError, OSError, MemoryError) as error:
+    except (RuntimeError, ValueError, ArithmeticError, OSError, MemoryError, ImportError) as error:
         return failed(error)
 
 

@@ -41,10 +41,10 @@ def stress_curves(dataset: xarray.Dataset) -> Figure:
     theta, curves = dataset["theta"].values, dataset["curve11"].values / GPA
     for sample in np.argsort(membership, kind="stable"):
         top = membership[sample] == alpha[-1]
-        axes.plot(theta[sample], curves[sample], color=INK if top else shades[membership[sample]], lw=1.2 if top else 0.7)
+        axes.plot(theta, curves[sample], color=INK if top else shades[membership[sample]], lw=1.2 if top else 0.7)
     axes.set_xlabel("θ, standard deviations")
     axes.set_ylabel("homogenised σ$_{11}$(ε$^{(1)}$), GPa")
-    axes.set_title(f"{len(theta)} samples", loc="left", fontsize=10)
+    axes.set_title(f"{len(curves)} samples", loc="left", fontsize=10)
     alpha_legend(axes, alpha, loc="upper left")
     return drawn
 

@@ -146,13 +146,13 @@ def checked_section(
     name: str, section: Section, table: Mapping[str, object], values: dict[str, object], written: dict[str, object]
 ) -> Iterator[Problem]:
     """Check the keys of one table, and that none is missing."""
-    for key, value in table.items():
-        if key not in section.keys:
-            yield unknown(key, name, value)
+    strangers = [unknown(key, name, value) for key, value in table.items() if key not in section.keys]
+    yield from strangers
+    meant = {problem.nearest for problem in strangers}  # a misspelt key is one problem, not a missing one besides
     for key, entry in section.keys.items():
         full = dotted(name, key)
         if key not in table:
-            if entry.required:
+            if entry.required and key not in meant:
                 yield Problem(full, f"missing: {entry.about}", allowed=allowed(entry))
             values[full] = entry.default
             continue

@@ -26,6 +26,13 @@ if TYPE_CHECKING:
 QUANTITIES = {"E": ("Pa", "effective Young's modulus, eq. 16"), "nu": ("1", "effective Poisson's ratio, eq. 16")}
 STRESSES = {"s11": ("Pa", "mean homogenised stress 11 under load 1"), "s12": ("Pa", "mean homogenised stress 12 under load 2")}
 BOUNDS = QUANTITIES | STRESSES
+SOURCES = ("space", "theta", "table")  # of error, see rve.result.Homogenised
+SHOWN = 61  # points of a stored stress curve
+
+
+def theta_shown(theta: tuple[float, ...]) -> Array:
+    """The θ at which stress curves are stored, shape (SHOWN,)."""
+    return np.linspace(theta[0], theta[1], SHOWN)
 
 
 @dataclass(frozen=True)
@@ -43,7 +50,7 @@ class CellTask:
     theta: tuple[float, ...]
 
     def __call__(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float | Array]]:
-        """Outputs of each point: E, nu, mean stresses, the stress curves over theta, and the linear systems solved."""
+        """Outputs of each point: E, nu, mean stresses, stress curves, linear systems solved, errors by source, certificate."""
         values = [{**self.crisp, **point} for point in points]
         radius, matrix, _ = parts(values[0], self.theta)
         inclusions = [parts(value, self.theta)[2] for value in values]
@@ -51,10 +58,20 @@ class CellTask:
         outputs: list[dict[str, float | Array]] = []
         for result in results:
             s11, s12 = result.curve.mean
-            curve = {"theta": result.curve.theta, "curve11": result.curve.s11, "curve12": result.curve.s12}
-            means = {"E": result.modulus, "nu": result.poisson, "s11": s11, "s12": s12}
-            outputs.append({**means, "systems": len(result.iterations), **curve})
+            means = {"E": result.modulus, "nu": result.poisson, "s11": s11, "s12": s12, "systems": len(result.iterations)}
+            curves = {
+                name: self.resampled(result.curve.theta, stress)
+                for name, stress in (("curve11", result.curve.s11), ("curve12", result.curve.s12))
+            }
+            errors = {f"error:{source}": result.error.get(source, 0.0) for source in SOURCES}
+            outputs.append({**means, **curves, **errors, **{f"check:{name}": value for name, value in result.checks.items()}})
         return outputs
+
+    def resampled(self, nodes: Array, stress: Array) -> Array:
+        """A stress curve at `SHOWN` points over θ, for pictures: models choose their own nodes, and not the same for every sample."""
+        from scipy.interpolate import PchipInterpolator
+
+        return np.asarray(PchipInterpolator(nodes, stress)(theta_shown(self.theta)))
 
 
 @dataclass(frozen=True)
@@ -64,10 +81,12 @@ class FuzzyModulus:
     Args:
         result: Bounds of every output over the levels, with all samples.
         choice: Model of the cell that was used.
+        theta: Support of θ.
     """
 
     result: FuzzyResult
     choice: CellChoice
+    theta: tuple[float, ...] = (-3.0, 3.0)
 
     @property
     def number(self) -> PiecewiseLinear:
@@ -78,6 +97,12 @@ class FuzzyModulus:
     def solves(self) -> int:
         """Linear systems solved."""
         return int(self.result.values.output("systems").sum())
+
+    def largest(self, kind: str) -> dict[str, float]:
+        """The largest of each error ("error") or each property of the certificate ("check") over all samples."""
+        values = self.result.values
+        found = {name.partition(":")[2]: float(values.output(name).max()) for name, _ in values.layout if name.startswith(f"{kind}:")}
+        return {name: value for name, value in found.items() if value or kind == "check"}
 
     def document(self) -> dict[str, Any]:
         """The result as it is printed with ``--json``; moduli and stresses in GPa."""
@@ -95,6 +120,8 @@ class FuzzyModulus:
             "notes": list(self.result.notes),
             "plan": self.result.plan,
             "method": self.choice.method,
+            "error": self.largest("error"),
+            "checks": self.largest("check"),
             "versions": versions(),
         }
 
@@ -116,10 +143,18 @@ class FuzzyModulus:
             )
             variables[f"{name}_sample"] = (("sample",), result.values.output(name), {"units": unit, "long_name": about})
         variables["point"] = (("sample", "parameter"), result.points, {"long_name": "inputs of each sample, in SI"})
-        curves = {"theta": ("theta", "1"), "curve11": ("stress 11 under load 1", "Pa"), "curve12": ("stress 12 under load 2", "Pa")}
-        for name, (about, unit) in curves.items():
-            variables[name] = (("sample", "node"), result.values.output(name), {"units": unit, "long_name": about})
-        coordinates = {"alpha": result.alpha, "bound": ["lower", "upper"], "parameter": list(result.inputs)}
+        for name, about in (("curve11", "stress 11 under load 1"), ("curve12", "stress 12 under load 2")):
+            variables[name] = (("sample", "theta"), result.values.output(name), {"units": "Pa", "long_name": f"homogenised {about}"})
+        for kind in ("error", "check"):
+            largest = self.largest(kind)
+            variables[kind] = ((f"{kind}_name",), list(largest.values()), {"long_name": f"largest {kind} of all samples"})
+        names = {f"{kind}_name": list(self.largest(kind)) for kind in ("error", "check")}
+        coordinates = names | {
+            "theta": theta_shown(self.theta),
+            "alpha": result.alpha,
+            "bound": ["lower", "upper"],
+            "parameter": list(result.inputs),
+        }
         numbers = {"samples": result.runs, "solves": self.solves, "seconds": result.seconds, "nature": str(result.nature)}
         return xarray.Dataset(variables, coordinates, {"method": self.choice.method, "plan": result.plan, **numbers})
 
@@ -177,7 +212,7 @@ def compute(
         executor=executor,
         progress=progress,
     )
-    return FuzzyModulus(result, choice)
+    return FuzzyModulus(result, choice, case.numbers("radius.theta"))
 
 
 def write(modulus: FuzzyModulus, path: Path | str, *, case_text: str, key: str) -> None:

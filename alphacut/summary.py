@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -23,14 +24,16 @@ Row = dict[str, Any]
 def summary(results: Results) -> dict[str, Any]:
     """Everything in numbers: inputs that follow, the fuzzy modulus, the extremes of each study, the comparison."""
     case = results.case
-    found: dict[str, Any] = {"format_version": FORMAT, "case": case.name, "title": case.text("title"), "versions": versions()}
+    words = {"case": case.name, "title": case.text("title"), "about": case.text("about"), "case_text": case.text_of_file}
+    found: dict[str, Any] = {"format_version": FORMAT, **words, "command": " ".join(sys.argv), "versions": versions()}
     if case.has("radius.a1"):
         found["area_fraction"] = area_fraction(results)
     if results.modulus is not None:
         found["modulus"] = modulus_numbers(results.modulus)
     if results.envelopes:
         found["structure"] = structure_numbers(results)
-        found["envelopes"] = {name: envelope_numbers(dataset) for name, dataset in results.envelopes.items()}
+        fuzzy = {study.name: study.task.fuzzy for study in results.studies}
+        found["envelopes"] = {name: {"fuzzy": fuzzy[name], **envelope_numbers(dataset)} for name, dataset in results.envelopes.items()}
     quoted = case.path.with_suffix(".quoted.toml")
     found["paper"] = comparison(quoted, found) if quoted.is_file() else []
     return found
@@ -53,7 +56,15 @@ def modulus_numbers(dataset: xarray.Dataset) -> dict[str, Any]:
     cuts = {"alpha": dataset["alpha"].values, "E_GPa": {"lower": ends[:, 0], "upper": ends[:, 1]}}
     support = {"modal_GPa": ends[-1].mean(), "lower_GPa": ends[0, 0], "upper_GPa": ends[0, 1], "nu": dataset["nu"].values[-1].mean()}
     cost = {name: dataset.attrs[name] for name in ("samples", "solves", "seconds", "method", "plan", "nature")}
-    return {**cuts, **support, **cost}
+    budget = {"error": listed(dataset, "error"), "checks": listed(dataset, "check")}
+    return {**cuts, **support, **cost, **budget}
+
+
+def listed(dataset: xarray.Dataset, kind: str) -> dict[str, float]:
+    """Named numbers of a dataset, such as errors by source."""
+    if kind not in dataset:
+        return {}
+    return {str(name): float(value) for name, value in zip(dataset[f"{kind}_name"].values, dataset[kind].values, strict=True)}
 
 
 def structure_numbers(results: Results) -> dict[str, Any]:

@@ -103,11 +103,11 @@ def test_a_bad_command_line_is_one_line_and_status_2(arguments, pattern, capfd):
 def test_every_problem_of_a_case_is_named_at_once(tmp_path, capfd):
     path = tmp_path / "case.toml"
     text = PAPER.read_text(encoding="utf-8")
-    path.write_text(text.replace("20 GPa", "20 m").replace("layers = 12", "layers = 0").replace("a1 =", "a9 ="), encoding="utf-8")
+    path.write_text(text.replace("20 GPa", "20 m").replace("layers = 12", "layers = 0").replace("a1 =", "radius_below ="), encoding="utf-8")
     assert main(["cell", str(path)]) == 2
     err = capfd.readouterr().err
-    assert [key for key in ("radius.a9", "radius.a1", "cell.matrix_modulus", "mesh.layers") if key in err] == [
-        "radius.a9",
+    assert [key for key in ("radius.radius_below", "radius.a1", "cell.matrix_modulus", "mesh.layers") if key in err] == [
+        "radius.radius_below",
         "radius.a1",
         "cell.matrix_modulus",
         "mesh.layers",

@@ -1,0 +1,82 @@
+"""The report of a run as one HTML page that needs nothing else: no network, no other file."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from string import Template
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from alphacut.problem import BadInput, Problem
+from alphacut.report_sections import sections
+
+if TYPE_CHECKING:
+    import xarray
+
+HERE = Path(__file__).parent
+
+
+def report(folder: Path) -> str:
+    """The page for the results in a folder.
+
+    Raises:
+        BadInput: The folder holds no results of a run.
+    """
+    file = folder / "summary.json"
+    if not file.is_file():
+        raise BadInput(
+            Problem(str(folder), "there are no results here: summary.json is missing", allowed="a folder that alphacut run has written")
+        )
+    summary: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    text = {name: (HERE / f"report.{name}").read_text(encoding="utf-8") for name in ("html", "css", "js")}
+    return Template(text["html"]).substitute(
+        title=html.escape(summary["title"]),
+        name=html.escape(summary["case"]),
+        about=html.escape(" ".join(summary.get("about", "").split())),
+        css=text["css"],
+        js=text["js"],
+        sections="\n".join(sections(summary, folder)),
+        envelopes=embedded(plots(summary, folder)),
+    )
+
+
+def embedded(document: object) -> str:
+    """JSON that may stand inside a script element."""
+    return json.dumps(document, ensure_ascii=False).replace("<", "\\u003c")
+
+
+def plots(summary: Mapping[str, Any], folder: Path) -> list[dict[str, Any]]:
+    """The data of the interactive plot: every study's bounds as 32-bit floats."""
+    import xarray
+
+    found = []
+    for name, study in summary.get("envelopes", {}).items():
+        with xarray.open_dataset(folder / f"envelope_{name}.nc") as dataset:
+            found.append(plot(name, study, dataset))
+    return found
+
+
+def plot(name: str, study: Mapping[str, Any], dataset: xarray.Dataset) -> dict[str, Any]:
+    """One study: lower and upper bounds by level and output, in base64."""
+    time = dataset["time"].values
+    bounds = {side: dataset[side].transpose("alpha", "output", "time").values for side in ("lower", "upper")}
+    return {
+        "name": name,
+        "title": f"{name}: fuzzy {', '.join(study['fuzzy'])}",
+        "fuzzy": len(dataset["parameter"]),
+        "alpha": dataset["alpha"].values.tolist(),
+        "outputs": [str(output) for output in dataset["output"].values],
+        "unit": str(dataset["lower"].attrs.get("units", "SI")),
+        "step": float(time[1] - time[0]),
+        **{side: [[packed(row) for row in level] for level in values] for side, values in bounds.items()},
+    }
+
+
+def packed(row: np.ndarray[Any, Any]) -> str:
+    """Numbers as little-endian 32-bit floats in base64."""
+    return base64.b64encode(np.ascontiguousarray(row, "<f4").tobytes()).decode()

@@ -1,0 +1,182 @@
+"""The sections of the report, each a piece of HTML."""
+
+from __future__ import annotations
+
+import base64
+import html
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from alphacut.command_cite import citation
+from alphacut.differences import differences
+
+SVG_LIMIT = 200_000  # bytes; a heavier figure goes into the page as PNG
+
+
+def sections(summary: Mapping[str, Any], folder: Path) -> Iterator[str]:
+    """All sections that the results allow, in reading order."""
+    if "modulus" in summary:
+        yield modulus(summary["modulus"], folder)
+    if summary.get("envelopes"):
+        yield envelopes(summary)
+    if summary.get("shares"):
+        yield shares(summary["shares"])
+    if summary.get("paper"):
+        yield comparison(summary["paper"])
+    yield methods(summary)
+    yield gallery(summary, folder)
+    yield case_text(summary)
+    yield differing()
+    yield versions(summary)
+
+
+def section(title: str, *content: str) -> str:
+    """A section with its heading."""
+    return f"<section>\n<h2>{html.escape(title)}</h2>\n" + "\n".join(content) + "\n</section>"
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[object]], *, numbers: int | None = None) -> str:
+    """A table; from column `numbers` on everything is a number, aligned to the right."""
+    first = 1 if numbers is None else numbers
+
+    def cell(tag: str, column: int, content: object) -> str:
+        mark = ' class="number"' if column >= first else ""
+        return f"<{tag}{mark}>{html.escape(str(content))}</{tag}>"
+
+    top = "".join(cell("th", column, name) for column, name in enumerate(head))
+    body = "".join("<tr>" + "".join(cell("td", column, entry) for column, entry in enumerate(row)) + "</tr>\n" for row in rows)
+    return f"<table><thead><tr>{top}</tr></thead><tbody>\n{body}</tbody></table>"
+
+
+def modulus(found: Mapping[str, Any], folder: Path) -> str:
+    """The fuzzy modulus with its α-cuts, error budget and certificate."""
+    cuts = zip(found["alpha"], found["E_GPa"]["lower"], found["E_GPa"]["upper"], strict=True)
+    rows = [(f"{alpha:g}", f"{low:.4f}", f"{high:.4f}") for alpha, low, high in cuts]
+    words = (
+        f"<p>Modal value <strong>{found['modal_GPa']:.4f} GPa</strong>, support [{found['lower_GPa']:.4f}, {found['upper_GPa']:.4f}] GPa; "
+        f"Poisson's ratio {found['nu']:.4f}. E is the modulus of eq. 16, the paper's convention: a square array is not isotropic. "
+        f"{found['samples']} samples, {found['solves']} linear systems, {found['seconds']:.1f} s.</p>"
+    )
+    budget = [(name, f"{value:.2g}") for name, value in found.get("error", {}).items()]
+    checks = [(name, f"{value:.2g}") for name, value in found.get("checks", {}).items()]
+    return section(
+        "Fuzzy modulus",
+        words,
+        picture(folder / "figures" / "fig18-modulus.svg", "Fuzzy effective modulus (counterpart of Fig. 18)."),
+        table(("α", "lower E, GPa", "upper E, GPa"), rows),
+        "<h3>Error budget</h3>" + table(("source", "estimated relative error of E, largest of all samples"), budget) if budget else "",
+        "<h3>Certificate</h3>" + table(("property", "measured violation, largest of all samples"), checks) if checks else "",
+    )
+
+
+def envelopes(summary: Mapping[str, Any]) -> str:
+    """The interactive plot and the extremes."""
+    controls = (
+        '<div class="controls"><label>study <select id="study"></select></label><label>output <select id="output"></select></label>'
+        '<label>α <input type="range" id="alpha" min="0" max="1" step="0.01" value="0.5"><output id="alpha-shown">0.50</output></label>'
+        '<button type="button" id="reset">whole range</button></div>'
+    )
+    hint = (
+        '<p class="hint">The shaded bands are the computed α-cuts, the darker the higher α; the orange line is the cut at the slider\'s α, '
+        "between computed levels by linear interpolation. Drag or turn the wheel to zoom, double click to see everything.</p>"
+    )
+    rows = []
+    for name, study in summary["envelopes"].items():
+        rows += [(name, output, f"{study['min'][output]:.4f}", f"{study['max'][output]:.4f}") for output in study["min"]]
+    svg = '<svg id="plot" role="img" aria-label="Envelopes over time"></svg><div id="readout"></div>'
+    extremes = table(("study", "output", "least at α = 0", "greatest at α = 0"), rows, numbers=2)
+    return section("Envelopes", controls, svg, hint, extremes)
+
+
+def shares(found: Mapping[str, Any]) -> str:
+    """What drives the width."""
+    rows = [(quantity, name, f"{share:.1%}") for quantity, entry in found.items() for name, share in entry.items()]
+    words = "<p>Share of the width at α = 0 that is lost when an input is fixed at its modal value and all others are kept.</p>"
+    return section("What drives the width", words, table(("quantity", "input", "share"), rows, numbers=2))
+
+
+def comparison(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Paper, here, difference."""
+    from alphacut.summary import cells
+
+    return section(
+        "Paper and here", table(("quantity", "place", "paper", "here", "difference", ""), [cells(dict(row)) for row in rows], numbers=2)
+    )
+
+
+def methods(summary: Mapping[str, Any]) -> str:
+    """Which method was used for each stage and what it cost."""
+    rows: list[tuple[object, ...]] = []
+    if cell := summary.get("modulus"):
+        rows.append(
+            (
+                "fuzzy modulus",
+                f"{cell['method']}, plan {cell['plan']}",
+                cell["nature"],
+                f"{cell['samples']} samples",
+                f"{cell['seconds']:.1f}",
+            )
+        )
+    for name, study in summary.get("envelopes", {}).items():
+        rows.append(
+            (f"envelope {name}", study["method"], study["nature"], f"{study['trajectories']} trajectories", f"{study['seconds']:.1f}")
+        )
+    words = "<p>Inner bounds are attained by the parameters stored with them; the true range may be wider, never narrower.</p>"
+    return section("Methods and cost", table(("stage", "method", "nature of the bounds", "cost", "seconds"), rows, numbers=3), words)
+
+
+def gallery(summary: Mapping[str, Any], folder: Path) -> str:
+    """Every figure of the run."""
+    names = [name for name in summary.get("figures", []) if name.endswith(".png")]
+    figures = [picture((folder / name).with_suffix(".svg"), caption(Path(name).stem)) for name in names]
+    return section("Figures", '<div class="gallery">' + "\n".join(figures) + "</div>") if figures else ""
+
+
+def caption(stem: str) -> str:
+    """Words for the name of a figure's file: fig13-p-box becomes Fig. 13: p-box."""
+    number, _, words = stem.partition("-")
+    found = re.fullmatch(r"fig(\d+)", number)
+    return f"Fig. {found[1]}: {words.replace('-', ' ')}" if found else stem.replace("-", " ")
+
+
+def picture(svg: Path, caption: str) -> str:
+    """A figure: as SVG where that is light, else as PNG; empty where there is none."""
+    png = svg.with_suffix(".png")
+    if svg.is_file() and svg.stat().st_size < SVG_LIMIT:
+        text = re.sub(r"^.*?(?=<svg)", "", svg.read_text(encoding="utf-8"), flags=re.DOTALL)
+        content = unique_ids(re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL), svg.stem + "-")
+    elif png.is_file():
+        content = f'<img alt="{html.escape(caption)}" src="data:image/png;base64,{base64.b64encode(png.read_bytes()).decode()}">'
+    else:
+        return ""
+    return f"<figure>{content}<figcaption>{html.escape(caption)}</figcaption></figure>"
+
+
+def unique_ids(svg: str, prefix: str) -> str:
+    """An SVG whose ids do not clash with another's on the same page."""
+    svg = re.sub(r'\bid="([^"]+)"', rf'id="{prefix}\1"', svg)
+    svg = re.sub(r"url\(#([^)]+)\)", rf"url(#{prefix}\1)", svg)
+    return re.sub(r'href="#([^"]+)"', rf'href="#{prefix}\1"', svg)
+
+
+def case_text(summary: Mapping[str, Any]) -> str:
+    """The case file as it was."""
+    return section(
+        "The case",
+        f"<details><summary>{html.escape(summary['case'])}.toml</summary><pre>{html.escape(summary['case_text'])}</pre></details>",
+    )
+
+
+def differing() -> str:
+    """What the program does otherwise than the paper, from the heads of its modules."""
+    rows = "".join(f"<li><strong>{html.escape(subject)}</strong>: {html.escape(text)}</li>" for subject, text in differences())
+    return section("Differences from the paper", f"<ul>{rows}</ul>")
+
+
+def versions(summary: Mapping[str, Any]) -> str:
+    """Versions, command, and how to cite."""
+    found = ", ".join(f"{name} {version}" for name, version in summary["versions"].items())
+    command = f"<p>Made by <code>{html.escape(summary['command'])}</code> in {summary['seconds']:.0f} s.</p>"
+    return section("Versions and citation", command, f"<p>{html.escape(found)}</p>", f"<pre>{html.escape(citation())}</pre>")
