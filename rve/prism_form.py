@@ -5,6 +5,7 @@ The form has no derivative along θ: div and D act on x alone, while the mesh is
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -83,7 +84,9 @@ class PrismForm:
 
     @staticmethod
     def _jit(form: ufl.Form) -> fem.Form:
-        return fem.form(form, jit_options=JIT)
+        with warnings.catch_warnings():  # UFL signs a form by the printed quadrature points; they print in full
+            warnings.filterwarnings("ignore", message="Applying str")
+            return fem.form(form, jit_options=JIT)
 
     def _point_function(self) -> fem.Function:
         """A function with one value at every quadrature point: 1 in the particle, 0 in the matrix."""

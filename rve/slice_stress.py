@@ -34,12 +34,15 @@ class LayerStress:
     @property
     def mean(self) -> Array:
         """Homogenised stress of each slice, shape (slices, 3, loads)."""
-        return np.einsum("msp,mspvl->svl", self.area, self.stress) / CELL_AREA
+        return (self.area[..., None, None] * self.stress).sum(axis=(0, 2)) / CELL_AREA
 
     @property
     def energy(self) -> Array:
         """Mean of σ_a : ε_b over each slice, shape (slices, loads, loads)."""
-        return np.einsum("msp,mspva,mspvb->sab", self.area, self.stress, self.strain, optimize=True) / CELL_AREA
+        slices, loads = self.area.shape[1], self.stress.shape[-1]
+        weighted = self.area[..., None, None] * self.stress
+        left, right = (field.swapaxes(0, 1).reshape(slices, -1, loads) for field in (weighted, self.strain))
+        return left.swapaxes(1, 2) @ right / CELL_AREA
 
 
 @dataclass(frozen=True)

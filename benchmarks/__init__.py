@@ -1,0 +1,1 @@
+"""Programs that measure what the methods cost; each writes to benchmarks/results/."""
