@@ -14,7 +14,8 @@ FACES_UP_TO = 6
 
 def gain(g: Array, H: Array, x: Array) -> Array:
     """g·x + x·H·x/2 for g (N, d), H (N, d, d) and x (N, …, d)."""
-    total: Array = np.einsum("ni,n...i->n...", g, x) + 0.5 * np.einsum("n...i,nij,n...j->n...", x, H, x, optimize=True)
+    slope = g + 0.5 * np.matmul(H, x[..., None])[..., 0] if x.ndim == 2 else g[:, None] + 0.5 * np.matmul(x, H)
+    total: Array = (slope * x).sum(-1)
     return total
 
 
@@ -23,7 +24,7 @@ def linear_maximum(g: Array, lower: Array, upper: Array) -> Array:
     return np.where(g > 0, upper, lower)
 
 
-def local_maximum(g: Array, H: Array, lower: Array, upper: Array, start: Array | None = None) -> Array:
+def local_maximum(g: Array, H: Array, lower: Array, upper: Array, start: Array | None = None, *, rounds: int = 6) -> Array:
     """A local maximum uphill from `start` (or 0), shape (N, d): exact steps along each axis, then Newton on the free axes.
 
     Args:
@@ -32,13 +33,19 @@ def local_maximum(g: Array, H: Array, lower: Array, upper: Array, start: Array |
         lower: Lower ends of the boxes, shape (N, d).
         upper: Upper ends.
         start: Where to start, inside the boxes.
+        rounds: Most repetitions.
     """
     x = np.zeros_like(g) if start is None else start.copy()
-    for _ in range(6):
-        before = gain(g, H, x)
-        _axes_ascent(g, H, lower, upper, x)
-        x = _newton(g, H, lower, upper, x)
-        if (gain(g, H, x) - before <= 1e-12 * (1 + np.abs(before))).all():
+    todo: Array = np.arange(len(g))
+    for _ in range(rounds):
+        part = (g[todo], H[todo], lower[todo], upper[todo])
+        before = gain(*part[:2], x[todo])
+        moved = x[todo]
+        _axes_ascent(*part, moved)
+        x[todo] = _newton(*part, _newton(*part, moved))
+        grown = gain(*part[:2], x[todo]) - before
+        todo = todo[grown > 1e-10 * (1e-6 + np.abs(before))]
+        if not len(todo):
             break
     return x
 
@@ -54,14 +61,18 @@ def _axes_ascent(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> No
 
 
 def _newton(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> Array:
-    """One Newton step on the axes strictly inside, cut at the box, kept where it gains."""
-    inside = (x > lower) & (x < upper)
-    slope = np.where(inside, g + np.einsum("nij,nj->ni", H, x), 0.0)
+    """A projected Newton step on the axes that may move, halved at most twice, kept where it gains."""
+    slope = g + np.einsum("nij,nj->ni", H, x)
+    free = ~(((x <= lower) & (slope <= 0)) | ((x >= upper) & (slope >= 0)))
     eye = np.eye(g.shape[1])
-    reduced = np.where(inside[:, :, None] & inside[:, None, :], H, -eye) - 1e-13 * np.abs(H).max(initial=0.0) * eye
-    trial = np.clip(x - np.linalg.solve(reduced, slope[..., None])[..., 0], lower, upper)
-    better = gain(g, H, trial) > gain(g, H, x)
-    return np.where(better[:, None], trial, x)
+    reduced = np.where(free[:, :, None] & free[:, None, :], H, -eye) - 1e-13 * np.abs(H).max(initial=0.0) * eye
+    step = -np.linalg.solve(reduced, np.where(free, slope, 0.0)[..., None])[..., 0]
+    best, top = x, gain(g, H, x)
+    for length in (1.0, 0.5, 0.25):
+        trial = np.clip(x + length * step, lower, upper)
+        value = gain(g, H, trial)
+        best, top = np.where((value > top)[:, None], trial, best), np.maximum(value, top)
+    return best
 
 
 def global_maximum(g: Array, H: Array, lower: Array, upper: Array) -> Array:

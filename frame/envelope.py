@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -13,7 +13,25 @@ from frame.jet import Array
 if TYPE_CHECKING:
     import xarray
 
+    from frame.box import Boxes
+
 NATURES = ("inner", "estimated", "verified by sampling", "guaranteed")
+
+
+class Trajectories(Protocol):
+    """What an envelope needs to know of the trajectories behind it."""
+
+    @property
+    def boxes(self) -> Boxes:
+        """The parameters' boxes."""
+
+    @property
+    def time(self) -> Array:
+        """Nodes, shape (T,), in s."""
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the observed quantities."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +110,15 @@ class Envelope:
         for name in ("lower_at", "upper_at"):
             dataset[name].attrs["units"] = "SI, by parameter"
         return dataset
+
+
+def signed_envelope(flow: Trajectories, bounds: Array, at: Array, **rest: Any) -> Envelope:
+    """An envelope from upper bounds of (−output, output), shape (A, T, m, 2), and their unit coordinates (A, T, m, 2, d)."""
+    cuts = flow.boxes
+    where = cuts.to_physical(at)
+    return Envelope(
+        cuts.alpha, flow.time, flow.outputs, cuts.names, -bounds[..., 0], bounds[..., 1], where[..., 0, :], where[..., 1, :], **rest
+    )
 
 
 def output_unit(name: str) -> str:

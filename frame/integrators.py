@@ -30,6 +30,9 @@ class StepMap:
     load: Jet
 
 
+Rational = tuple[tuple[float, ...], tuple[float, ...]]
+
+
 class Integrator(Protocol):
     """A one-step method for linear structures."""
 
@@ -44,6 +47,13 @@ class Integrator(Protocol):
     @property
     def stability_limit(self) -> float:
         """Largest stable ω h of an undamped oscillation; infinite when unconditional."""
+
+    @property
+    def amplification(self) -> Rational | None:
+        """R(z) with R(hλ) the factor of a step on a mode exp(λt), as numerator and denominator by rising powers; None: no such R.
+
+        Both empty mean R = exp.
+        """
 
     def step_map(self, matrices: Matrices, step: float) -> StepMap:
         """The map of one step of length `step` in s; the load is linear within the step."""
@@ -60,6 +70,7 @@ class Midpoint:
     name: ClassVar[str] = "midpoint"
     order: ClassVar[float] = 2
     stability_limit: ClassVar[float] = inf
+    amplification: ClassVar[Rational | None] = ((1.0, 0.5), (1.0, -0.5))
 
     def step_map(self, matrices: Matrices, step: float) -> StepMap:
         """The map of one step; its velocity is M⁻¹ times the discrete momentum."""
@@ -104,10 +115,15 @@ class Newmark:
         """Infinite for 2 beta >= gamma."""
         return inf if 2 * self.beta >= self.gamma else (self.gamma / 2 - self.beta) ** -0.5
 
+    @property
+    def amplification(self) -> Rational | None:
+        """That of the midpoint rule for beta = 1/4, gamma = 1/2; else damping couples the modes of a step."""
+        return Midpoint.amplification if (self.beta, self.gamma) == (0.25, 0.5) else None
+
     def step_map(self, matrices: Matrices, step: float) -> StepMap:
         """The map of one step, acceleration eliminated."""
         n, h = matrices.mass.value.shape[-1], step
-        flow = _state_matrix(matrices)
+        flow = state_matrix(matrices)
         acceleration = flow[..., n:, :]  # q̈ as rows acting on [q; v]
         eye, zero = np.eye(n), np.zeros((n, n))
         new, old = (
@@ -128,6 +144,7 @@ class RungeKutta4:
     name: ClassVar[str] = "rk4"
     order: ClassVar[float] = 4
     stability_limit: ClassVar[float] = 2 * 2**0.5
+    amplification: ClassVar[Rational | None] = ((1.0, 1.0, 1 / 2, 1 / 6, 1 / 24), (1.0,))
 
     def step_map(self, matrices: Matrices, step: float) -> StepMap:
         """The map of one step: the exponential series up to h⁴."""
@@ -143,6 +160,7 @@ class Gauss4:
     name: ClassVar[str] = "gauss4"
     order: ClassVar[float] = 4
     stability_limit: ClassVar[float] = inf
+    amplification: ClassVar[Rational | None] = ((1.0, 1 / 2, 1 / 12), (1.0, -1 / 2, 1 / 12))
 
     def step_map(self, matrices: Matrices, step: float) -> StepMap:
         """The map of one step."""
@@ -158,6 +176,7 @@ class Exact:
     name: ClassVar[str] = "exact"
     order: ClassVar[float] = inf
     stability_limit: ClassVar[float] = inf
+    amplification: ClassVar[Rational | None] = ((), ())
 
     def step_map(self, matrices: Matrices, step: float) -> StepMap:
         """The map of one step."""
@@ -179,7 +198,7 @@ def exponential(z: Jet) -> Jet:
     return series
 
 
-def _state_matrix(m: Matrices) -> Jet:
+def state_matrix(m: Matrices) -> Jet:
     """A with [q; v]˙ = A [q; v], shape (S, 2n, 2n) (eq. 23)."""
     light = inverse(m.mass)
     lower = concatenate([-(light @ m.stiffness), -(light @ m.damping)], -1)
@@ -190,7 +209,7 @@ def _state_matrix(m: Matrices) -> Jet:
 
 def _loaded_flow(m: Matrices, step: float) -> Jet:
     """The state matrix extended by the ground's acceleration a and its increment over a step, shape (S, 2n + 2, 2n + 2)."""
-    flow = _state_matrix(m)
+    flow = state_matrix(m)
     n = m.mass.value.shape[-1]
     size = 2 * n + 2
     out = Jet.constant(np.zeros((len(flow.value), size, size)), flow.directions)

@@ -1,0 +1,212 @@
+"""Modal intervening variables (paper, section 7): λ_k(p) and C_k(p) as low-degree polynomials, from few eigen-analyses.
+
+Displacements oscillate in the parameters, the more the later; λ_k and C_k do not. With them as polynomials every trajectory,
+derivative and envelope follows without solving the equations of motion again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import ceil
+
+import numpy as np
+
+from frame.box import Boxes
+from frame.flow import LinearFlow
+from frame.jet import Array, Jet
+from frame.linear import evaluate
+from frame.modal_load import LoadTable
+from frame.modes import ModalError, Modes, modes
+from frame.polynomial import Polynomial, fit, terms
+
+
+@dataclass(frozen=True, eq=False)
+class ModalModel:
+    """Trajectories over the unit box from polynomials in the parameters.
+
+    Args:
+        flow: The trajectories that it stands for.
+        boxes: The parameters' boxes.
+        eigenvalue: λ_k, n polynomials, in 1/s.
+        coefficient: C_k, n m polynomials.
+        load: Response to the ground's motion, or None.
+        error: Largest deviation of held-out trajectories, shape (T, m).
+        analyses: Eigen-analyses made.
+    """
+
+    flow: LinearFlow
+    boxes: Boxes
+    eigenvalue: Polynomial
+    coefficient: Polynomial
+    load: LoadTable | None
+    error: Array
+    analyses: int
+
+    @property
+    def time(self) -> Array:
+        """Nodes, shape (T,), in s."""
+        return self.flow.time
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the observed quantities."""
+        return self.flow.outputs
+
+    @cached_property
+    def count(self) -> int:
+        """Number of modes n."""
+        return self.eigenvalue.coefficients.shape[1]
+
+    @cached_property
+    def together(self) -> Polynomial:
+        """λ_k and then C_k as one vector of polynomials, n + n m of them."""
+        return Polynomial(self.eigenvalue.index, np.hstack([self.eigenvalue.coefficients, self.coefficient.coefficients]))
+
+    def values(self, unit: Array) -> Array:
+        """Trajectories at unit coordinates (S, d), shape (S, T, m)."""
+        rate, share = self.eigenvalue(unit), self.coefficient(unit).reshape(len(unit), self.count, -1)
+        m = share.shape[-1]
+        step, total = self.flow.step, len(self.time)
+        size = ceil(total**0.5)
+        blocks = ceil(total / size)
+        fast = np.exp(rate[:, None, :] * (np.arange(size) * step)[None, :, None])
+        slow = np.exp(rate[:, None, :] * (np.arange(blocks) * size * step)[None, :, None])
+        right = (fast[:, :, :, None] * share[:, None]).transpose(0, 2, 1, 3).reshape(len(unit), self.count, size * m)
+        out = 2 * (slow.real @ right.real - slow.imag @ right.imag)
+        values: Array = out.reshape(len(unit), blocks * size, m)[:, :total]
+        return values if self.load is None else values + self.load.values(unit, rate)
+
+    def at(self, unit: Array, node: Array, output: Array) -> tuple[Array, Array, Array]:
+        """Values (N,), gradients (N, d) and Hessians (N, d, d) of one output at one node per point (N, d)."""
+        both, n = self.together.jet(unit), self.count
+        rate, share = both[..., :n], picked(both[..., n:], n, output)
+        t = self.time[node][:, None]
+        wave = np.exp(rate.value * t)
+        f, g, H = composed(rate, share, (wave, t * wave, t * t * wave))
+        if self.load is not None:
+            more = composed(rate, picked(self.load.share.jet(unit), self.count, output), self.load.response(rate.value, node))
+            f, g, H = f + more[0], g + more[1], H + more[2]
+        return f, g, H
+
+    def value_at(self, unit: Array, node: Array, output: Array) -> Array:
+        """Values (N,) of one output at one node per point (N, d)."""
+        both, rows = self.together(unit), np.arange(len(unit))
+        rate, share = both[:, : self.count], both[:, self.count :].reshape(len(unit), self.count, -1)[rows, :, output]
+        total = share * np.exp(rate * self.time[node][:, None])
+        if self.load is not None:
+            pushed = self.load.share(unit).reshape(len(unit), self.count, -1)[rows, :, output]
+            total = total + pushed * self.load.response(rate, node)[0]
+        values: Array = 2 * total.real.sum(1)
+        return values
+
+
+def picked(jet: Jet, count: int, output: Array) -> Jet:
+    """One output per point from V = (N, n m), giving V = (N, n)."""
+    m = jet.value.shape[-1] // count
+    column = np.arange(count) * m + output[:, None]
+    return jet.map(lambda x: np.take_along_axis(x, np.broadcast_to(column, (*x.shape[:-1], count)), -1))
+
+
+def composed(rate: Jet, share: Jet, wave: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+    """2 Re Σ_k C_k w(λ_k) with gradient and Hessian; `wave` holds w, w', w'' by λ, shape (N, n); rate and share have V = (N, n)."""
+    w, dw, ddw = wave
+    value = 2 * (share.value * w).real.sum(-1)
+    inner = share.value * dw
+    g = 2 * (share.first * w + inner * rate.first).real.sum(-1)
+    mixed = share.first[:, None] * (dw * rate.first)[None, :]
+    outer = (share.value * ddw * rate.first)[:, None] * rate.first[None, :]
+    H = 2 * (share.second * w + inner * rate.second + mixed + mixed.swapaxes(0, 1) + outer).real.sum(-1)
+    return value, np.moveaxis(g, 0, -1), np.moveaxis(H, (0, 1), (-2, -1))
+
+
+def analyse(flow: LinearFlow, boxes: Boxes, unit: Array) -> Modes:
+    """Eigen-analyses at unit coordinates (S, d), with derivatives by these; eigenvalues are those of the flow's integrator.
+
+    Raises:
+        ModalError: The structure has no such modes, or the integrator mixes them.
+    """
+    matrices, rows = evaluate(flow.system, flow.names, boxes.to_physical(unit), derivatives=True)
+    found = modes(matrices, rows)
+    rate = _discrete(found.eigenvalue, flow)
+    return Modes(*(_scaled(jet, boxes.radius) for jet in (rate, found.coefficient, found.load)))
+
+
+def _discrete(rate: Jet, flow: LinearFlow) -> Jet:
+    """Log R(hλ)/h: the rate at which the integrator's modes advance."""
+    rational = flow.integrator.amplification
+    if rational is None or (flow.system.ground is not None and rational[0]):
+        raise ModalError(f"modal: the integrator '{flow.integrator.name}' keeps no modes here; take exact, or the method graph-follower")
+    if not rational[0]:
+        return rate
+    h, z = flow.step, flow.step * rate.value
+    parts = []
+    for coefficients in rational:
+        p = np.polynomial.Polynomial(coefficients)
+        value, slope, curve = p(z), p.deriv(1)(z), p.deriv(2)(z)
+        parts.append((np.log(value), slope / value, curve / value - (slope / value) ** 2))
+    f, df, ddf = (a - b for a, b in zip(*parts, strict=True))
+    return rate.chain(f / h, df, ddf * h)
+
+
+def _scaled(jet: Jet, radius: Array) -> Jet:
+    shape = (1,) * jet.value.ndim
+    first = jet.first * radius.reshape(-1, *shape)
+    return Jet(jet.value, first, jet.second * (radius[:, None] * radius).reshape(*2 * (len(radius),), *shape))
+
+
+def fit_modes(flow: LinearFlow, boxes: Boxes, *, tolerance: float = 1e-6, budget: int = 280) -> ModalModel:
+    """Fits polynomials of rising degree until held-out trajectories deviate by less than `tolerance`, or the budget is spent.
+
+    Args:
+        flow: The trajectories to stand for.
+        boxes: The parameters' boxes.
+        tolerance: Wanted deviation, in units of the outputs.
+        budget: Most eigen-analyses.
+
+    Raises:
+        ModalError: No oscillating modes, or modes that cross or veer so that polynomials do not converge.
+    """
+    d = len(flow.names)
+    held = _held_out(d)
+    truth = flow.values(boxes.to_physical(held))
+    used, best = len(held), None
+    data_per_analysis = 1 + d + d * (d + 1) // 2
+    for degree in range(2, 13):
+        needed = ceil(2.5 * terms(d, degree) / data_per_analysis) + 1
+        if used + needed > budget or terms(d, degree) > 2500:
+            break
+        model = _fitted(flow, boxes, _chebyshev_points(d, needed), degree, used + needed)
+        error = np.abs(model.values(held) - truth).max(0)
+        if best is None or error.max() < best.error.max():
+            best = replace(model, error=error)
+        if error.max() <= tolerance:
+            break
+    if best is None:
+        raise ModalError(f"modal: {d} parameters need more than {budget} eigen-analyses; raise the budget, or use graph-follower")
+    return best
+
+
+def _fitted(flow: LinearFlow, boxes: Boxes, points: Array, degree: int, analyses: int) -> ModalModel:
+    found = analyse(flow, boxes, points)
+    flat = [jet.map(lambda x: x.reshape((*x.shape[:-2], -1))) for jet in (found.coefficient, found.load)]
+    rate = fit(points, found.eigenvalue, degree)
+    ground = flow.system.ground
+    load = None if ground is None else LoadTable.build(ground, flow.time, rate, fit(points, flat[1], degree))
+    return ModalModel(flow, boxes, rate, fit(points, flat[0], degree), load, np.zeros((len(flow.time), len(flow.outputs))), analyses)
+
+
+def _chebyshev_points(d: int, count: int) -> Array:
+    """The middle and points of Chebyshev density, shape (count, d), by a fixed Halton sequence."""
+    from scipy.stats import qmc
+
+    spread: Array = -np.cos(np.pi * qmc.Halton(d, scramble=False).random(count)[1:])
+    return np.vstack([np.zeros((1, d)), spread])
+
+
+def _held_out(d: int) -> Array:
+    """Corners and inner points that no fit uses, shape (≤ 24, d)."""
+    rng = np.random.default_rng(20)
+    corners = np.sign(rng.uniform(-1, 1, (12, d)))
+    points: Array = np.unique(np.vstack([corners, np.ones((1, d)), -np.ones((1, d)), rng.uniform(-1, 1, (8, d))]), axis=0)
+    return points
