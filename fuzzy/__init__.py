@@ -1,32 +1,42 @@
 """Fuzzy inputs through any model: α-cuts, plans of samples, fuzzy results."""
 
 from fuzzy.campaign import CampaignError
+from fuzzy.chebyshev import Chebyshev
 from fuzzy.domain import Domain, levels
+from fuzzy.interaction import Ellipsoidal, Linear
 from fuzzy.known import Known
 from fuzzy.monotone import Verification
 from fuzzy.numbers import Crisp, Cut, FuzzyNumber, Interval, PiecewiseLinear, Trapezoidal, Triangular
+from fuzzy.optimisation import Optimisation
 from fuzzy.plan import Plan
 from fuzzy.propagation import propagate
 from fuzzy.response_surface import ResponseSurface
 from fuzzy.result import FuzzyResult, Nature
+from fuzzy.sampling import MonteCarlo, QuasiMonteCarlo
 from fuzzy.signed import Signed
 from fuzzy.store import Store, StoreError
-from fuzzy.transformation import Extended, General, Reduced
+from fuzzy.transformation import Extended, General, Reduced, Vertex
 
 __all__ = [
     "CampaignError",
+    "Chebyshev",
     "Crisp",
     "Cut",
     "Domain",
+    "Ellipsoidal",
     "Extended",
     "FuzzyNumber",
     "FuzzyResult",
     "General",
     "Interval",
     "Known",
+    "Linear",
+    "MonteCarlo",
     "Nature",
+    "Optimisation",
     "PiecewiseLinear",
     "Plan",
+    "QuasiMonteCarlo",
     "Reduced",
     "ResponseSurface",
     "Signed",
@@ -35,6 +45,7 @@ __all__ = [
     "Trapezoidal",
     "Triangular",
     "Verification",
+    "Vertex",
     "levels",
     "propagate",
 ]

@@ -12,8 +12,6 @@ from fuzzy.model import Values
 from fuzzy.numbers import Array, Mask, Rows
 from fuzzy.result import FuzzyResult
 
-_ROUND_OFF = 1e-12  # of the support: points this close to a box lie in it
-
 
 @dataclass(frozen=True)
 class Design:
@@ -38,11 +36,12 @@ class Design:
 
     @classmethod
     def from_samples(cls, domain: Domain, points: Array) -> Design:
-        """Let every level use all points, shape (n, inputs), that lie in its box."""
-        lower, upper = domain.boxes
-        slack = _ROUND_OFF * (upper[0] - lower[0])
-        inside = [((points >= a - slack) & (points <= b + slack)).all(axis=1) for a, b in zip(list(lower), list(upper), strict=True)]
-        return cls(domain, points, tuple(np.flatnonzero(rows) for rows in inside))
+        """Let every level use all points, shape (n, inputs), that lie in its cut."""
+        rows = tuple(np.flatnonzero(inside) for inside in domain.inside(points))
+        empty = [alpha for alpha, own in zip(domain.alpha, rows, strict=True) if not len(own)]
+        if empty:
+            raise ValueError(f"no sample lies in the cut at α = {empty[0]:g}: its interactions leave too little room, or none")
+        return cls(domain, points, rows)
 
     def bounds(self, values: Values, *, plan: str) -> FuzzyResult:
         """Retransformation: the extremes of each level's samples and of every level above, so cuts are nested by construction.

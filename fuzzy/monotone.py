@@ -35,7 +35,7 @@ class Verification:
     """
 
     probes: int = 4
-    margin: float = 0.2
+    margin: float = 0.05
     step: float = 1e-3
 
     def __post_init__(self) -> None:
@@ -191,3 +191,14 @@ def verified(result: FuzzyResult, memo: Memo, effects: Effects) -> FuzzyResult:
     proved = effects.table(result, effects.proved) & ~refuted
     spent = len(memo) - result.runs
     return replace(every, proved=proved, runs=result.runs, verification_runs=spent, notes=(*effects.notes(result.domain), *notes))
+
+
+def require_few(size: int, limit: int, notes: Sequence[str]) -> None:
+    """Refuse a fall-back that would take more samples than the caller allows.
+
+    Raises:
+        ValueError: As said.
+    """
+    if size > limit:
+        cure = f"state the signs that you know, raise the limit of {limit:,}, or take Optimisation or Chebyshev"
+        raise ValueError(f"the plan would take {size:,} samples since {notes[0]} (and {len(notes) - 1} more); {cure}")

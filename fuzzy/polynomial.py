@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -11,6 +13,7 @@ from numpy.typing import NDArray
 
 from fuzzy.numbers import Array
 
+Slack = Callable[[Array], Array]
 _SCAN = 10  # the search for an extreme first looks at 2**10 points and the corners of the box
 _STARTS = 3  # and then descends from the best few
 _CORNERS = 10  # inputs up to which all corners are looked at
@@ -46,30 +49,27 @@ class Polynomial:
         columns = [basis(x, self.degrees, derivative=i) @ self.coefficients[:, output] * scale[i] for i in range(x.shape[1])]
         return np.stack(columns, axis=1)
 
-    def minimum(self, lower: Array, upper: Array, *, output: int, sign: float = 1.0) -> tuple[Array, float]:
+    def minimum(self, lower: Array, upper: Array, *, output: int, sign: float = 1.0, slack: Slack | None = None) -> tuple[Array, float]:
         """The least value of sign · output over a box, by a scan and descents from its best points.
+
+        Args:
+            lower: Lower corner of the box, shape (inputs,).
+            upper: Upper corner of the box, shape (inputs,).
+            output: Index of the output.
+            sign: 1 for the least, −1 for the greatest value.
+            slack: Function of points (n, inputs), not negative where they are allowed; everywhere if not given.
 
         Returns:
             The place, shape (inputs,), and the output there.
         """
         scan = box_scan(lower, upper)
+        if slack is not None:
+            scan = np.concatenate([scan[slack(scan) >= 0], (lower + upper)[None] / 2])
         values = sign * (self.basis(scan) @ self.coefficients[:, output])
         starts = scan[np.argsort(values)[:_STARTS]]
-        place, least = min((self._descent(start, lower, upper, output=output, sign=sign) for start in starts), key=lambda found: found[1])
+        search = _Search(self, lower, upper, output=output, sign=sign, slack=slack)
+        place, least = min((search.descend(start) for start in starts), key=lambda found: found[1])
         return place, sign * least
-
-    def _descent(self, start: Array, lower: Array, upper: Array, *, output: int, sign: float) -> tuple[Array, float]:
-        from scipy.optimize import minimize
-
-        span = np.where(upper > lower, upper - lower, 1.0)
-
-        def objective(unit: Array) -> tuple[float, Array]:
-            point = (lower + unit * span)[None]
-            return sign * float(self(point)[0, output]), sign * self.gradient(point, output)[0] * span
-
-        ends = [(0.0, 1.0 if b > a else 0.0) for a, b in zip(lower, upper, strict=True)]
-        found = minimize(objective, (start - lower) / span, jac=True, bounds=ends, method="L-BFGS-B")
-        return np.clip(lower + found.x * span, lower, upper), float(found.fun)
 
     def _scale(self) -> Array:
         width = self.upper - self.lower
@@ -77,6 +77,43 @@ class Polynomial:
 
     def _scaled(self, points: Array) -> Array:
         return (points - (self.lower + self.upper) / 2) * self._scale()
+
+
+@dataclass(frozen=True)
+class _Search:
+    """A descent over a box in coordinates of the unit cube."""
+
+    polynomial: Polynomial
+    lower: Array
+    upper: Array
+    output: int
+    sign: float
+    slack: Slack | None
+
+    def descend(self, start: Array) -> tuple[Array, float]:
+        """The place of a local minimum near the start and sign · output there."""
+        from scipy.optimize import minimize
+
+        bounds = [(0.0, 1.0 if b > a else 0.0) for a, b in zip(self.lower, self.upper, strict=True)]
+        unit = np.clip((start - self.lower) / self._span(), 0, 1)
+        room = {"type": "ineq", "fun": self._room}
+        options: dict[str, Any] = {"method": "SLSQP", "constraints": [room]} if self.slack else {"method": "L-BFGS-B"}
+        found = minimize(self._objective, unit, jac=True, bounds=bounds, **options)
+        return self._point(found.x)[0], float(found.fun)
+
+    def _objective(self, unit: Array) -> tuple[float, Array]:
+        point = self._point(unit)
+        gradient = self.polynomial.gradient(point, self.output)[0] * self._span()
+        return self.sign * float(self.polynomial(point)[0, self.output]), self.sign * gradient
+
+    def _room(self, unit: Array) -> float:
+        return float(self.slack(self._point(unit))[0]) if self.slack else 0.0
+
+    def _point(self, unit: Array) -> Array:
+        return np.clip(self.lower + unit * self._span(), self.lower, self.upper)[None]
+
+    def _span(self) -> Array:
+        return np.where(self.upper > self.lower, self.upper - self.lower, 1.0)
 
 
 def basis(x: Array, degrees: NDArray[np.intp], *, derivative: int | None = None) -> Array:
@@ -91,12 +128,17 @@ def basis(x: Array, degrees: NDArray[np.intp], *, derivative: int | None = None)
     return terms
 
 
+def corners(inputs: int) -> Array:
+    """Corners of the unit cube, shape (2**inputs, inputs)."""
+    return np.array(list(product((0.0, 1.0), repeat=inputs)))
+
+
 def box_scan(lower: Array, upper: Array) -> Array:
     """Corners of a box (up to 10 inputs) and 1,024 evenly spread points inside, shape (n, inputs)."""
     from scipy.stats import qmc
 
     inputs = len(lower)
     spread: Array = qmc.Sobol(inputs, scramble=False).random_base2(_SCAN)
-    corners = np.array(list(product((0.0, 1.0), repeat=inputs))) if inputs <= _CORNERS else np.array([[0.0] * inputs, [1.0] * inputs])
-    scan: Array = np.clip(lower + np.concatenate([corners, spread]) * (upper - lower), lower, upper)
+    unit = np.concatenate([corners(inputs), spread]) if inputs <= _CORNERS else spread
+    scan: Array = np.clip(lower + unit * (upper - lower), lower, upper)
     return scan

@@ -11,6 +11,7 @@ from time import perf_counter
 from fuzzy.call import Call, Function
 from fuzzy.campaign import Campaign, Progress
 from fuzzy.domain import Domain, levels
+from fuzzy.interaction import Interaction
 from fuzzy.known import Known
 from fuzzy.numbers import FuzzyNumber
 from fuzzy.plan import Plan
@@ -26,6 +27,7 @@ def propagate(
     plan: Plan | None = None,
     *,
     alpha: Sequence[float] | None = None,
+    interactions: Sequence[Interaction] = (),
     shared: Sequence[str] = (),
     vectorised: bool = False,
     workers: int = 1,
@@ -44,6 +46,7 @@ def propagate(
         inputs: Fuzzy number of each input.
         plan: How the boxes of the inputs are searched; the general transformation method if not given.
         alpha: Rising levels; 0, ¼, ½, ¾, 1 if not given.
+        interactions: Constraints between the inputs; plans that cannot respect them refuse.
         shared: Inputs whose equality lets samples share one call.
         vectorised: Whether the function takes arrays.
         workers: Processes of this machine; the result is the same for any number. The function must be importable by them.
@@ -58,7 +61,7 @@ def propagate(
         CampaignError: Samples failed; the others were run first.
         StoreError: The store cannot be written.
     """
-    domain = Domain(inputs, levels(4) if alpha is None else alpha)
+    domain = Domain(inputs, levels(4) if alpha is None else alpha, interactions)
     known = known or Known()
     known.check(domain.names)
     call = Call(function, domain.names, tuple(shared), vectorised)

@@ -12,7 +12,7 @@ from fuzzy.domain import Domain
 from fuzzy.known import Signs
 from fuzzy.memo import Memo
 from fuzzy.model import Model
-from fuzzy.monotone import Effects, Verification, verified, verify
+from fuzzy.monotone import Effects, Verification, require_few, verified, verify
 from fuzzy.numbers import Array
 from fuzzy.result import FuzzyResult
 from fuzzy.transformation import General
@@ -28,15 +28,19 @@ class Signed:
     Args:
         outputs: Outputs whose bounds matter; all if none is named. The others get what the same samples give.
         verification: How signs are looked for where they are not stated.
+        limit: Samples that the plan may take where signs are missing.
     """
 
     outputs: tuple[str, ...] = ()
     verification: Verification = field(default_factory=Verification)
+    limit: int = 10_000
 
     def run(self, model: Model, domain: Domain) -> FuzzyResult:
         """Verify the signs, run the corners, rearrange them into α-cuts."""
+        domain.require_free("Signed")
         memo = Memo(model)
         effects = verify(memo, domain, self.verification, outputs=self.outputs)
+        require_few(_size(effects, domain), self.limit, effects.notes(domain))
         design = Design.from_levels(domain, self._points(effects, domain))
         result = design.bounds(memo(design.points), plan="signed")
         return verified(result, memo, effects)
@@ -45,6 +49,15 @@ class Signed:
         """For each level, the corners that the signs name, times the general method's points of the inputs without a sign."""
         grids = General().grids(domain)
         return [_level_points(np.unique(signs, axis=0), grid) for signs, grid in zip(effects.signs, grids, strict=True)]
+
+
+def _size(effects: Effects, domain: Domain) -> int:
+    """Samples of the plan, counted without listing them; points that two patterns of signs share count twice."""
+    total = 0.0
+    for signs, grid in zip(effects.signs, General().grids(domain), strict=True):
+        counts = np.array([len(points) for points in grid])
+        total += 2 * np.where(np.unique(signs == 0, axis=0), counts, 1).prod(axis=1, dtype=float).sum()
+    return int(total)
 
 
 def _level_points(signs: Signs, grid: list[list[float]]) -> Array:

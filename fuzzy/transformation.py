@@ -18,8 +18,9 @@ from fuzzy.design import Design
 from fuzzy.domain import Domain
 from fuzzy.known import Known
 from fuzzy.memo import Memo
+from fuzzy.memory import require
 from fuzzy.model import Model
-from fuzzy.monotone import Verification, verified, verify
+from fuzzy.monotone import Verification, require_few, verified, verify
 from fuzzy.numbers import FuzzyNumber, Mask
 from fuzzy.result import FuzzyResult
 
@@ -78,10 +79,12 @@ class _Transformation:
 
     def points(self, domain: Domain) -> Design:
         """The samples of every level, each distinct one listed once."""
+        require(self.size(domain), len(domain.names))
         return Design.from_levels(domain, [np.array(list(product(*grid))) for grid in self.grids(domain)])
 
     def run(self, model: Model, domain: Domain) -> FuzzyResult:
         """Evaluate the samples and rearrange them into α-cuts."""
+        domain.require_free(type(self).__name__)
         design = self.points(domain)
         result = design.bounds(model(design.points), plan=type(self).__name__.lower())
         return result.proving(lambda bounds: corners_suffice(bounds, model.known))
@@ -112,6 +115,11 @@ class Reduced(_Transformation):
 
 
 @dataclass(frozen=True)
+class Vertex(Reduced):
+    """The vertex method (Dong and Shah, Fuzzy Sets and Systems 24, 1987): the same samples and bounds as the reduced method."""
+
+
+@dataclass(frozen=True)
 class Extended(_Transformation):
     """The extended transformation method: ends only of the monotone inputs, all points of the others.
 
@@ -119,10 +127,14 @@ class Extended(_Transformation):
         monotone: Inputs in which the model rises or falls throughout. If not given, what the caller knows of the model, and for the other
             inputs a verification at probes.
         verification: How monotonicity is looked for.
+        outputs: Outputs whose bounds matter; all if none is named.
+        limit: Samples that the plan may take where monotonicity is not found in enough inputs.
     """
 
     monotone: tuple[str, ...] | None = None
     verification: Verification = field(default_factory=Verification)
+    outputs: tuple[str, ...] = ()
+    limit: int = 10_000
 
     def _refined(self, names: Sequence[str]) -> set[str]:
         unknown = set(self.monotone or ()) - set(names)
@@ -136,8 +148,9 @@ class Extended(_Transformation):
             known = replace(model.known, monotone=(*model.known.monotone, *self.monotone))
             return super().run(model, domain).proving(lambda bounds: corners_suffice(bounds, known))
         memo = Memo(model)
-        effects = verify(memo, domain, self.verification)
+        effects = verify(memo, domain, self.verification, outputs=self.outputs)
         widest = effects.signs[0] != 0
         classes = (widest | model.known.monotone_in(domain.names, effects.outputs)).all(axis=0)
         chosen = replace(self, monotone=tuple(name for name, holds in zip(domain.names, classes, strict=True) if holds))
+        require_few(chosen.size(domain), self.limit, effects.notes(domain))
         return verified(super(Extended, chosen).run(memo, domain), memo, effects)
