@@ -3,6 +3,7 @@
 from fuzzy.campaign import CampaignError
 from fuzzy.chebyshev import Chebyshev
 from fuzzy.domain import Domain, levels
+from fuzzy.explain import Explanation, explain
 from fuzzy.interaction import Ellipsoidal, Linear
 from fuzzy.known import Known
 from fuzzy.monotone import Verification
@@ -24,6 +25,7 @@ __all__ = [
     "Cut",
     "Domain",
     "Ellipsoidal",
+    "Explanation",
     "Extended",
     "FuzzyNumber",
     "FuzzyResult",
@@ -46,6 +48,7 @@ __all__ = [
     "Triangular",
     "Verification",
     "Vertex",
+    "explain",
     "levels",
     "propagate",
 ]

@@ -7,6 +7,7 @@ from pathlib import Path
 
 _NUMBER = 8  # bytes
 _COPIES = 3  # a plan holds its samples, their sorted copy and the result's
+_SMALL = 50_000_000  # bytes not worth a look
 _SHARE = 0.9  # of what is free
 
 
@@ -49,7 +50,10 @@ def require(samples: int, columns: int) -> None:
     Raises:
         TooLargeError: It does not fit.
     """
-    need, free = needed(samples, columns), available()
+    need = needed(samples, columns)
+    if need < _SMALL:
+        return
+    free = available()
     if need > _SHARE * free:
         size = f"{samples:,} samples of {columns} inputs and outputs need {need / 1e9:.3g} GB of memory and {free / 1e9:.3g} GB are free"
         raise TooLargeError(f"{size}; take fewer levels, a plan with fewer samples (reduced, signed), or fewer outputs")

@@ -57,7 +57,8 @@ class Optimisation:
             domain.require_free(self.method)
         memo = Memo(model)
         modal = np.array([[number.modal for number in domain.inputs.values()]], float)
-        names = self.outputs or primary(memo(modal).columns, model.known)
+        columns = memo(modal).columns
+        names = self.outputs or primary(columns, model.known)
         for level in reversed(range(len(domain.alpha))):
             cut = _Cut(memo, domain, level)
             if not (cut.upper > cut.lower).any():

@@ -205,6 +205,16 @@ class Shelf:
         with self._store.reported():
             return {key: error for key, error in self._rows("error", keys, "error IS NOT NULL")}
 
+    def points(self) -> list[dict[str, float]]:
+        """Inputs of all samples of this model, by name."""
+        query = "SELECT point FROM sample WHERE model = ? AND outputs IS NOT NULL"
+        with self._store.reported():
+            return [json.loads(point) for (point,) in self._store.database.execute(query, (self._model,))]
+
+    def models(self) -> list[Stored]:
+        """All models of the store."""
+        return self._store.models()
+
     def claim(self, keys: Sequence[str]) -> tuple[set[str], dict[str, Sample]]:
         """Claim samples that are not stored.
 

@@ -3,40 +3,86 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import contextmanager
 from itertools import islice
+from typing import Any
 
-from fuzzy.call import Call, Outcome
+from fuzzy.call import Call, Failure, Outcome
 from fuzzy.numbers import Array
 
 Task = tuple[list[int], Array]  # rows of the design, and their points
 Done = tuple[list[int], list[Outcome]]
 
 
+class ProcessPool(Executor):
+    """Processes of this machine that start afresh, end with this process even when it is killed, and are replaced when they die.
+
+    Args:
+        workers: How many.
+    """
+
+    def __init__(self, workers: int) -> None:
+        self._max_workers = workers
+        self._inner = _processes(workers)
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Run a call in one of the processes, new ones if one of them has died."""
+        try:
+            return self._inner.submit(fn, *args, **kwargs)
+        except BrokenExecutor:
+            self._inner.shutdown(wait=False, cancel_futures=True)
+            self._inner = _processes(self._max_workers)
+            return self._inner.submit(fn, *args, **kwargs)
+
+    def alone(self, call: Call, points: Array) -> list[Outcome]:
+        """Run one call in a process of its own, which may die."""
+        with _processes(1) as executor:
+            try:
+                return executor.submit(call, points).result()
+            except BrokenExecutor:
+                if len(points) == 1:
+                    return [Failure("the process that ran it died: out of memory, or a crash in compiled code")]
+        return [self.alone(call, point[None])[0] for point in points]
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the processes."""
+        self._inner.shutdown(wait, cancel_futures=cancel_futures)
+
+
+def _processes(workers: int) -> Executor:
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    return ProcessPoolExecutor(workers, mp_context=get_context("forkserver"), initializer=_end_with_parent)
+
+
 @contextmanager
 def pool(workers: int) -> Iterator[Executor | None]:
     """A pool of `workers` processes, or None where one process does everything.
 
-    The processes start afresh (no copy of this process's MPI or threads) and end with it, even when it is killed.
+    Under `python -m mpi4py.futures` it is the pool of all MPI processes instead, whatever `workers` says.
 
     Raises:
         ValueError: `workers` is below 1.
     """
     if workers < 1:
         raise ValueError(f"the number of workers is {workers}; it must be 1 or more")
-    if workers == 1:
-        yield None
-        return
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
+    if {"mpi4py.run", "mpi4py.futures"} <= sys.modules.keys():
+        from mpi4py.futures import MPIPoolExecutor
 
-    executor = ProcessPoolExecutor(workers, mp_context=get_context("forkserver"), initializer=_end_with_parent)
-    try:
-        yield executor
-    finally:
-        executor.shutdown(wait=True, cancel_futures=True)
+        with MPIPoolExecutor() as executor:
+            yield executor
+    elif workers == 1:
+        yield None
+    else:
+        processes = ProcessPool(workers)
+        try:
+            yield processes
+        finally:
+            processes.shutdown(wait=True, cancel_futures=True)
 
 
 def _end_with_parent() -> None:
@@ -68,19 +114,30 @@ def completed(call: Call, tasks: Iterable[Task], executor: Executor | None) -> I
             yield rows, call(points)
         return
     queue = iter(tasks)
-    waiting: dict[Future[list[Outcome]], list[int]] = {}
+    waiting: dict[Future[list[Outcome]], Task] = {}
     room = 2 * _width(executor)
     try:
         while True:
             for rows, points in islice(queue, room - len(waiting)):
-                waiting[executor.submit(call, points)] = rows
+                waiting[executor.submit(call, points)] = rows, points
             if not waiting:
                 return
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
-                yield waiting.pop(future), future.result()
+                rows, points = waiting.pop(future)
+                yield rows, _outcomes(future, executor, call, points)
     finally:
         for future in waiting:
             future.cancel()
+
+
+def _outcomes(future: Future[list[Outcome]], executor: Executor, call: Call, points: Array) -> list[Outcome]:
+    """What a call returned; if its process died, or another's beside it, it is run again by itself to see which."""
+    try:
+        return future.result()
+    except BrokenExecutor:
+        if isinstance(executor, ProcessPool):
+            return executor.alone(call, points)
+        raise
 
 
 def _width(executor: Executor) -> int:

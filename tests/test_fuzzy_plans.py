@@ -202,6 +202,16 @@ def test_error_of_the_surface_covers_what_it_misses(truth):
     assert rough.error.max() > 0.01
 
 
+def test_named_outputs_are_searched_and_the_others_get_what_is_there():
+    def model(x):
+        return {"f": (x - 0.3) ** 2, "g": -((x - 0.8) ** 2)}
+
+    for plan in (Optimisation(outputs=("f",)), Chebyshev(outputs=("f",))):
+        result = propagate(model, {"x": Triangular(0.0, 0.5, 1.0)}, plan)
+        assert result.bounds("f")[0][0] == pytest.approx(0, abs=1e-9)
+        assert result.outputs == ("f", "g")
+
+
 def test_samples_depend_on_the_seed_only():
     function, inputs = PROBLEMS["branin"]
     for plan in (MonteCarlo(50, seed=3), QuasiMonteCarlo(64, seed=3)):

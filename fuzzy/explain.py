@@ -1,0 +1,175 @@
+"""What a campaign would run, and why: the plan is followed through the store up to the first sample that is not there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fuzzy.call import Call, named_point
+from fuzzy.domain import Domain
+from fuzzy.known import Known
+from fuzzy.memory import needed
+from fuzzy.model import Values
+from fuzzy.numbers import Array
+from fuzzy.plan import Plan
+from fuzzy.store import Identity, Shelf, Store, Stored, shelf
+
+_SHOWN = 5
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What a campaign would run.
+
+    Args:
+        samples: Samples that the plan asks for first; all of them unless it goes on from their values.
+        stored: How many of them are stored.
+        missing: Inputs of those that would run, by name.
+        calls: Calls that they take.
+        seconds: Time that they would take one after the other, from the mean of those stored; None where nothing tells.
+        memory: Bytes that the samples' numbers take.
+        reasons: Why they are not there, one sentence each.
+    """
+
+    samples: int
+    stored: int
+    missing: tuple[dict[str, float], ...]
+    calls: int
+    seconds: float | None
+    memory: int
+    reasons: tuple[str, ...]
+
+    def __str__(self) -> str:
+        head = f"{self.samples} samples: {self.stored} stored, {len(self.missing)} to run in {self.calls} calls"
+        time = "" if self.seconds is None else f", about {self.seconds:.3g} s of work"
+        first = [", ".join(f"{name} = {value:.6g}" for name, value in point.items()) for point in self.missing[:_SHOWN]]
+        more = [f"… and {len(self.missing) - _SHOWN} more"] if len(self.missing) > _SHOWN else []
+        return "\n".join(
+            [f"{head}{time}; {self.memory / 1e6:.3g} MB of memory", *self.reasons, *(f"  would run {row}" for row in first), *more]
+        )
+
+
+class _MissingError(Exception):
+    """The first samples that are not stored."""
+
+    def __init__(self, points: Array, missing: Array) -> None:
+        super().__init__()
+        self.points, self.missing = points, missing
+
+
+@dataclass
+class _Rehearsal:
+    """A model that only knows what is stored."""
+
+    samples: Shelf | None
+    known: Known
+    seen: int = 0
+    columns: int = 1
+    seconds: float = 0.0
+
+    def __call__(self, points: Array) -> Values:
+        keys = [self.samples.key(points[row]) for row in range(len(points))] if self.samples else []
+        stored = self.samples.stored(keys) if self.samples else {}
+        rows = [stored.get(key) for key in keys] or [None] * len(points)
+        found = [row for row in rows if row is not None]
+        self.seen += len(found)
+        self.seconds += sum(row.seconds for row in found)
+        self.columns = len(found[0].row) if found else self.columns
+        if len(found) < len(points):
+            raise _MissingError(points, points[[row is None for row in rows]])
+        return Values(found[0].layout, np.array([row.row for row in found]))
+
+
+def explain(
+    inputs: Mapping[str, Any],
+    plan: Plan,
+    *,
+    alpha: Sequence[float],
+    shared: Sequence[str] = (),
+    known: Known | None = None,
+    store: Store | str | Path | None = None,
+    identity: Identity | None = None,
+) -> Explanation:
+    """What `propagate` with the same arguments would run, and why. Nothing is run and no store is made.
+
+    Args:
+        inputs: Fuzzy number of each input.
+        plan: How the boxes of the inputs are searched.
+        alpha: Rising levels.
+        shared: Inputs whose equality lets samples share one call.
+        known: Facts about the model.
+        store: Where samples are kept, if there.
+        identity: What a sample depends on besides its inputs.
+    """
+    domain = Domain(inputs, alpha)
+    missing: Array
+    there = store if isinstance(store, Store) or (store is not None and Path(store).exists()) else None
+    with shelf(there, identity, domain.names) as samples:
+        rehearsal = _Rehearsal(samples, known or Known())
+        try:
+            result = plan.run(rehearsal, domain)
+            points, missing = result.points, np.empty((0, len(domain.names)))
+        except _MissingError as stop:
+            points, missing = stop.points, stop.missing
+        reasons = _reasons(samples, identity or {}, domain, missing) if len(missing) else ("everything is stored: nothing would run",)
+    tasks = list(Call(_never, domain.names, tuple(shared)).tasks(missing))
+    return Explanation(
+        samples=len(points),
+        stored=len(points) - len(missing),
+        missing=tuple(named_point(domain.names, missing[row]) for row in range(len(missing))),
+        calls=len(tasks),
+        seconds=rehearsal.seconds / rehearsal.seen * len(missing) if rehearsal.seen else None,
+        memory=needed(len(points), len(domain.names) + rehearsal.columns),
+        reasons=reasons,
+    )
+
+
+def _never(**_: float) -> float:
+    raise AssertionError("an explanation runs nothing")
+
+
+def _reasons(samples: Shelf | None, identity: Identity, domain: Domain, missing: Array) -> tuple[str, ...]:
+    if samples is None:
+        return ("there is no store yet: every sample is new",)
+    keys = [samples.key(missing[row]) for row in range(len(missing))]
+    failed = samples.failed(keys)
+    reasons = [f"{len(failed)} failed before and would be tried again, the first with: {next(iter(failed.values()))}"] if failed else []
+    own = [model for model in samples.models() if model.identity == dict(identity)]
+    if own and own[0].samples:
+        reasons += _new_values(samples, domain, missing)
+    else:
+        reasons += _nearest([model for model in samples.models() if model.samples], identity)
+    return tuple(reasons)
+
+
+def _new_values(samples: Shelf, domain: Domain, missing: Array) -> list[str]:
+    """Which inputs take values that no stored sample of this model has."""
+    stored = samples.points()
+    found = []
+    for column, name in enumerate(domain.names):
+        fresh = {float(value) for value in missing[:, column]} - {point[name] for point in stored}
+        if fresh:
+            found.append(f"{name} takes {len(fresh)} values that no stored sample has, the first {min(fresh):.6g}")
+    return found or ["the inputs take stored values in new combinations"]
+
+
+def _nearest(models: list[Stored], identity: Identity) -> list[str]:
+    """How the model differs from the nearest one that has samples."""
+    if not models:
+        return ["the store is empty: every sample is new"]
+    differences = [_differences(model.identity, identity) for model in models]
+    nearest = min(range(len(models)), key=lambda i: len(differences[i]))
+    what = "; ".join(differences[nearest])
+    return [f"no sample of this model is stored; the nearest model, with {models[nearest].samples} samples, differs: {what}"]
+
+
+def _differences(stored: Any, asked: Any, path: str = "") -> list[str]:
+    """Where two identities differ, each as `key: stored → asked`."""
+    if isinstance(stored, Mapping) and isinstance(asked, Mapping):
+        keys = sorted({*stored, *asked})
+        return [line for key in keys for line in _differences(stored.get(key), asked.get(key), f"{path}.{key}" if path else str(key))]
+    return [] if stored == asked else [f"{path}: {stored} → {asked}"]
