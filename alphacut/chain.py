@@ -81,8 +81,12 @@ class Chain:
         key = fingerprint({"case": inputs, "petsc": dict(self.petsc)}, ("stochastic", "rve", "fuzzy"))
 
         def compute(path: Path) -> None:
+            store = self.file("samples.db")
+            if self.fresh:
+                for old in self.folder.glob("samples.db*"):
+                    old.unlink()
             with progress("Fuzzy modulus", quiet=self.quiet) as tick:
-                found = modulus.compute(self.case, petsc=self.petsc, workers=self.workers, progress=tick)
+                found = modulus.compute(self.case, petsc=self.petsc, workers=self.workers, progress=tick, store=store)
             modulus.write(found, path, case_text=self.case.text_of_file, key=key)
 
         return self.stored("modulus.nc", key, compute)

@@ -6,9 +6,11 @@ import argparse
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from alphacut import modulus
+from alphacut.case import Case
 from alphacut.cell import GPA
 from alphacut.command_cell import named_models
 from alphacut.loading import load
@@ -30,6 +32,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     add_keys(parser, KEYS)
     add_workers(parser)
     parser.add_argument("--out", metavar="FILE.nc", help="write the α-cuts and all samples as NetCDF")
+    parser.add_argument("--store", metavar="FILE", help="keep every sample here; the same command then goes on where it was stopped")
+    parser.add_argument("--resume", action="store_true", help="keep and take samples in results/NAME-OF-THE-CASE/samples.db")
     parser.add_argument("--exclude", metavar="NAMES", default="", help="models that method auto must not take, separated by commas")
 
 
@@ -38,8 +42,9 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     check_workers(options.workers)
     case = load(options.case, changes(options, KEYS))
     exclude = named_models("--exclude", options.exclude)
+    store = store_of(options, case)
     with progress("Fuzzy modulus", quiet=options.quiet) as tick, cluster() as executor:
-        found = modulus.compute(case, petsc=petsc, workers=options.workers, executor=executor, progress=tick, exclude=exclude)
+        found = modulus.compute(case, petsc=petsc, workers=options.workers, executor=executor, progress=tick, exclude=exclude, store=store)
     if options.out:
         key = fingerprint(case.values, ("stochastic", "rve", "fuzzy"))
         modulus.write(found, options.out, case_text=case.text_of_file, key=key)
@@ -51,6 +56,15 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     if options.json != "-" and not options.quiet:
         out.write(summary(found))
     return 0
+
+
+def store_of(options: argparse.Namespace, case: Case) -> Path | None:
+    """The file that keeps the samples, if one is wanted."""
+    if not (options.store or options.resume):
+        return None
+    path = Path(options.store or f"results/{case.name}/samples.db")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return path
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from alphacut.chain import Chain
 from alphacut.loading import load
 from alphacut.options import add_common, add_workers, check_workers
 from alphacut.output import as_json, say, write_text
+from alphacut.quick import quick
 
 ABOUT = "run every stage of a case: files, figures, summary, and the comparison with the paper where the case has one"
 
@@ -24,6 +25,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="FOLDER", help="where results go (default: results/NAME-OF-THE-CASE)")
     parser.add_argument("--fresh", action="store_true", help="compute everything anew instead of taking what is up to date")
     parser.add_argument("--strict", action="store_true", help="refuse a time step with ω_max·h above 0.5 instead of warning")
+    parser.add_argument(
+        "--quick", action="store_true", help="the quick form: same stages in seconds on coarse meshes; numbers mean nothing"
+    )
     parser.add_argument("--no-figures", action="store_true", help="numbers only")
 
 
@@ -31,7 +35,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     """Compute, draw, compare."""
     check_workers(options.workers)
     case = load(options.case, options.set)
-    folder = Path(options.out or f"results/{case.name}")
+    case = quick(case) if options.quick else case
+    folder = Path(options.out or f"results/{case.name}{'-quick' if options.quick else ''}")
     start = time.perf_counter()
     chain = Chain(case, folder, options.workers, options.fresh, options.quiet, petsc, options.strict)
     results = chain.run()

@@ -14,7 +14,8 @@ from alphacut.schema import NEEDED, STAGES
 from stochastic import HermiteMap, TruncatedNormal
 
 SLOPES = ("a1", "a2", "a3", "a4")
-GROUPS = ("E", "I", "m", "l", "d", "q0", "v0")
+GROUPS = ("E", "I", "m", "l", "d", "q0", "v0", "rayleigh_mass", "rayleigh_stiffness")
+FILES = ("modulus.file", "modulus.measured", "frame.accelerogram")
 
 
 def inconsistencies(case: Case, *, modal: bool = False) -> Iterator[Problem]:
@@ -61,7 +62,7 @@ def missing_sections(case: Case) -> Iterator[Problem]:
 
 def files(case: Case) -> Iterator[Problem]:
     """Files that the case names must be there."""
-    for key in ("modulus.file", "modulus.measured"):
+    for key in FILES:
         if case.has(key) and not beside(case, case.text(key)).is_file():
             yield Problem(key, "there is no such file", case.text(key), f"a path from the case's folder, {case.path.parent}")
 
@@ -122,12 +123,22 @@ def floors(case: Case) -> Iterator[Problem]:
 
 
 def known_output(case: Case, floors: int) -> Iterator[Problem]:
-    """The output that a study draws."""
-    outputs = [f"q{floor + 1}" for floor in range(floors)]
+    """The observed quantities, and the one that a study draws."""
+    kinds = ("q", "v", "drift", "shear")
+    possible = [f"{kind}{floor + 1}" for kind in kinds for floor in range(floors)] + ["base_shear"]
+    for name in case.names("frame.outputs"):
+        if name not in possible:
+            yield Problem(
+                "frame.outputs",
+                f"there is no output {name}",
+                name,
+                f"q, v, drift or shear with a floor, base_shear: {', '.join(possible[:floors])} …",
+            )
+    outputs = case.names("frame.outputs") or tuple(possible[:floors])
     for index in range(study_count(case)):
-        name = case.values.get(f"study[{index}].output")
-        if name and name not in outputs:
-            yield Problem(f"study[{index}].output", f"there is no output {name}", str(name), ", ".join(outputs))
+        drawn = str(case.values.get(f"study[{index}].output", ""))
+        if drawn and drawn not in outputs:
+            yield Problem(f"study[{index}].output", f"there is no output {drawn}", drawn, ", ".join(outputs))
 
 
 def known_input(key: str, name: str, count: int) -> Iterator[Problem]:

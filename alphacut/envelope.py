@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
+from alphacut.accelerogram import accelerogram
 from alphacut.case import Case
+from alphacut.consistency import beside
 from alphacut.output import say, whole_file
 from alphacut.problem import BadInput, Problem
 from alphacut.progress import Tick
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from frame import Envelope, StoreyFrame
 
 LISTS = {"m": "masses", "l": "lengths", "d": "dampers"}
+RAYLEIGH = ("rayleigh_mass", "rayleigh_stiffness")
 STARTS = {"q": "displacements", "v": "velocities"}
 
 
@@ -33,7 +36,7 @@ class EnvelopeTask:
         step: Time step, in s.
         alpha: Levels, rising.
         method: How the envelope is found.
-        integrator: Time stepping.
+        integrator: Time stepping; None leaves it to the method.
         order: Order κ of the Taylor models.
         tolerance: Gain that is worth a new trajectory, in m.
     """
@@ -43,7 +46,7 @@ class EnvelopeTask:
     step: float
     alpha: tuple[float, ...]
     method: str
-    integrator: str
+    integrator: str | None
     order: int
     tolerance: float
 
@@ -56,7 +59,7 @@ def task_of(case: Case, *, fuzzy: Sequence[str] | None = None, duration: float |
         case.number("envelope.step"),
         case.numbers("envelope.alpha"),
         case.text("envelope.method"),
-        case.text("envelope.integrator"),
+        case.text("envelope.integrator") if case.has("envelope.integrator") else None,
         case.integer("envelope.order"),
         case.number("envelope.tolerance"),
     )
@@ -71,6 +74,7 @@ def per_floor(case: Case, key: str) -> tuple[FuzzyNumber, ...]:
 def numbers(case: Case, modulus: FuzzyNumber) -> dict[str, FuzzyNumber]:
     """Every parameter of the frame by the name that `frame` gives it, in SI."""
     found = {"E": modulus, "I": case.fuzzy("frame.second_moment")}
+    found |= {name: case.fuzzy(f"frame.{name}") for name in RAYLEIGH}
     for letter, key in LISTS.items():
         found |= {f"{letter}{floor}": value for floor, value in enumerate(per_floor(case, f"frame.{key}"), start=1)}
     for letter, key in STARTS.items():
@@ -92,6 +96,9 @@ def structure(case: Case, modulus: FuzzyNumber) -> StoreyFrame:
         damper_placement=cast(Literal["ground", "storey"], case.text("frame.damper_placement")),
         q0=modal["displacements"],
         v0=modal["velocities"],
+        outputs=case.names("frame.outputs"),
+        rayleigh=(case.fuzzy("frame.rayleigh_mass").modal, case.fuzzy("frame.rayleigh_stiffness").modal),
+        ground=accelerogram(beside(case, case.text("frame.accelerogram"))) if case.has("frame.accelerogram") else None,
     )
 
 
@@ -134,6 +141,8 @@ def guard_step(model: StoreyFrame, task: EnvelopeTask, *, strict: bool) -> None:
     """
     from frame import guard
 
+    if task.integrator == "exact" or (task.integrator is None and task.method == "modal"):
+        return
     found = guard(model, task.step, task.duration)
     if not found.ok and strict:
         raise BadInput(Problem("envelope.step", found.message.removeprefix("step: ")))
@@ -176,8 +185,15 @@ def compute(
 
 
 def method_options(task: EnvelopeTask) -> dict[str, float]:
-    """The options that the task's method has."""
-    return {"order": task.order, "tolerance": task.tolerance} if task.method == "graph-follower" else {}
+    """Those of the task's options that its method has."""
+    import inspect
+
+    from frame import METHODS, GraphFollower
+
+    taken = set(inspect.signature(METHODS[task.method]).parameters)
+    if task.method == "graph-follower":
+        taken |= {field.name for field in fields(GraphFollower)}
+    return {name: value for name, value in (("order", task.order), ("tolerance", task.tolerance)) if name in taken}
 
 
 def document(found: Envelope) -> dict[str, Any]:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WORDS = {"E": "modulus", "m": "masses", "l": "lengths", "d": "dampers", "q0": "initial displacements", "v0": "initial velocities"}
+WORDS |= {"rayleigh_mass": "mass damping", "rayleigh_stiffness": "stiffness damping", "I": "second moment"}
 
 
 def drawings(study: Study, dataset: xarray.Dataset) -> Iterator[tuple[str, Callable[[], Figure]]]:
@@ -26,6 +27,8 @@ def drawings(study: Study, dataset: xarray.Dataset) -> Iterator[tuple[str, Calla
 
 def envelope(dataset: xarray.Dataset, output: str, study: Study) -> Figure:
     """Nested bands between lower and upper envelope, the darker the higher α; the modal trajectory as a line."""
+    from frame.envelope import output_unit
+
     drawn, axes = figure(7.2, 3.6)
     shown = dataset.sel(output=output)
     alpha, time = dataset["alpha"].values, dataset["time"].values
@@ -35,11 +38,10 @@ def envelope(dataset: xarray.Dataset, output: str, study: Study) -> Figure:
     for side in ("lower", "upper"):
         axes.plot(time, shown.isel(alpha=-1)[side], color=INK, lw=0.8)
         axes.plot(time, shown.isel(alpha=0)[side], color=INK, lw=0.3)
-    unit = {"q": "m", "v": "m/s", "s": "N", "d": "m"}.get(output[0], "SI")
     axes.set_xlabel("time t, s")
-    axes.set_ylabel(f"{output}, {unit}")
+    axes.set_ylabel(f"{output}, {output_unit(output)}")
     axes.set_xlim(time[0], time[-1])
-    words = " and ".join(WORDS.get(name, name) for name in study.task.fuzzy)
+    words = ", ".join(WORDS.get(name, name) for name in study.task.fuzzy)
     axes.set_title(f"{output}, fuzzy {words}", loc="left", fontsize=10)
     alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return drawn

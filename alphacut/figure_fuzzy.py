@@ -37,10 +37,11 @@ def membership(dataset: xarray.Dataset) -> Figure:
 def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figure:
     """Fig. 20: trajectories for parameters inside an α-cut, and the envelope that encloses them."""
     from frame import LinearFlow
+    from frame.envelope import output_unit
 
     study = next((s for s in results.studies if len(s.task.fuzzy) > 1), results.studies[0])
     dataset = results.envelopes[study.name].isel(alpha=0)
-    output = str(dataset["output"].values[-1])
+    output = str(dataset["output"].values[-1 if "q" in str(dataset["output"].values[-1]) else 0])
     young = envelope.modulus_of(results.case, results.handed)
     model = envelope.structure(results.case, young)
     inputs = envelope.fuzzy_inputs(model, study.task.fuzzy, envelope.numbers(results.case, young))
@@ -57,7 +58,7 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
     for side in ("lower", "upper"):
         axes.plot(flow.time, shown[side], color=INK, lw=1.3, label="envelope" if side == "lower" else None)
     axes.set_xlabel("time t, s")
-    axes.set_ylabel(f"{output}, m")
+    axes.set_ylabel(f"{output}, {output_unit(output)}")
     axes.set_title(f"Fuzzy mapping of {output} at α = {float(dataset['alpha']):g}", loc="left", fontsize=10)
     axes.legend(loc="lower right")
     return drawn

@@ -45,7 +45,7 @@ def stress_curves(dataset: xarray.Dataset) -> Figure:
     axes.set_xlabel("θ, standard deviations")
     axes.set_ylabel("homogenised σ$_{11}$(ε$^{(1)}$), GPa")
     axes.set_title(f"{len(curves)} samples", loc="left", fontsize=10)
-    alpha_legend(axes, alpha, loc="upper left")
+    alpha_legend(axes, alpha, loc="upper left" if curves[0, -1] > curves[0, 0] else "lower left")
     return drawn
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
-from alphacut import figure_envelope, figure_frame, figure_fuzzy, figure_modulus, figure_radius
+from alphacut import figure_envelope, figure_follower, figure_frame, figure_fuzzy, figure_modulus, figure_radius
 from alphacut.chain import Results
 from alphacut.figure_style import save, style
 from alphacut.progress import progress
@@ -31,6 +31,9 @@ def drawings(results: Results) -> Iterator[Drawing]:
         yield "fig20-mapping", lambda: figure_fuzzy.mapping(results)
         yield "fig26-frame", lambda: figure_frame.frame(results.case)
         yield "fig27-chain", lambda: figure_frame.chain(results.case)
+    if results.case.has("envelope.method") and results.case.text("envelope.method") == "graph-follower" and results.envelopes:
+        richest = max(results.studies, key=lambda study: len(study.task.fuzzy))
+        yield "fig21-25-graph-follower", lambda: figure_follower.follower(results, richest)
     for study in results.studies:
         yield from figure_envelope.drawings(study, results.envelopes[study.name])
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +14,8 @@ from alphacut.cell import GPA, INPUTS, SHARED, CellChoice, cell_choice, key_of, 
 from alphacut.output import whole_file
 from alphacut.problem import BadInput, Problem
 from alphacut.progress import Tick
-from alphacut.provenance import attributes, versions
-from fuzzy import Crisp, Extended, FuzzyNumber, FuzzyResult, General, PiecewiseLinear, Plan, Reduced, propagate
+from alphacut.provenance import attributes, source_digest, versions
+from fuzzy import Crisp, Extended, FuzzyNumber, FuzzyResult, General, PiecewiseLinear, Plan, Reduced, Signed, propagate
 from stochastic.truncated_normal import Array
 
 if TYPE_CHECKING:
@@ -115,6 +115,7 @@ class FuzzyModulus:
             "solves": self.solves,
             "verification_samples": self.result.verification_runs,
             "calls": self.result.calls,
+            "reused": self.result.reused,
             "seconds": self.result.seconds,
             "nature": str(self.result.nature),
             "notes": list(self.result.notes),
@@ -161,15 +162,13 @@ class FuzzyModulus:
 
 def plan_of(case: Case) -> Plan:
     """The plan that a case asks for."""
-    name = case.text("modulus.plan")
-    if name == "signed":
-        import fuzzy
-
-        if not hasattr(fuzzy, "Signed"):
-            raise case.refuse("modulus.plan", "this plan is not available", "general, reduced, extended")
-        return fuzzy.Signed()
-    plans: dict[str, Plan] = {"general": General(), "reduced": Reduced(), "extended": Extended()}
-    return plans[name]
+    plans: dict[str, Plan] = {
+        "general": General(),
+        "reduced": Reduced(),
+        "extended": Extended(outputs=("E",)),
+        "signed": Signed(outputs=("E",)),
+    }
+    return plans[case.text("modulus.plan")]
 
 
 def fuzzy_inputs(case: Case) -> dict[str, FuzzyNumber]:
@@ -187,6 +186,7 @@ def compute(
     executor: Executor | None = None,
     progress: Tick | None = None,
     exclude: tuple[str, ...] = (),
+    store: Path | None = None,
 ) -> FuzzyModulus:
     """Run the campaign of a case.
 
@@ -197,6 +197,7 @@ def compute(
         executor: Any `concurrent.futures` executor instead.
         progress: Told the share done.
         exclude: Models that method auto must not take.
+        store: File that keeps every sample; a campaign that was stopped goes on from there.
     """
     inputs = fuzzy_inputs(case)
     crisp = {name: case.fuzzy(key_of(name)).modal for name in INPUTS if name not in inputs}
@@ -211,8 +212,16 @@ def compute(
         workers=workers,
         executor=executor,
         progress=progress,
+        store=store,
+        identity=identity(choice, crisp, case.numbers("radius.theta")) if store else None,
     )
     return FuzzyModulus(result, choice, case.numbers("radius.theta"))
+
+
+def identity(choice: CellChoice, crisp: Mapping[str, float], theta: tuple[float, ...]) -> dict[str, Any]:
+    """What a sample depends on besides its fuzzy inputs: model, resolution, crisp inputs, the program and its libraries."""
+    source = source_digest(("stochastic", "rve"))
+    return {"choice": asdict(choice), "crisp": dict(crisp), "theta": list(theta), "source": source, "versions": versions()}
 
 
 def write(modulus: FuzzyModulus, path: Path | str, *, case_text: str, key: str) -> None:

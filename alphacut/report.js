@@ -81,7 +81,7 @@
     }
     element("text", { x: (margin.left + width - margin.right) / 2, y: height - 8, "text-anchor": "middle" }, svg).textContent = "time t, s";
     const label = element("text", { x: 0, y: 0, "text-anchor": "middle", transform: `translate(16 ${(height - margin.bottom) / 2}) rotate(-90)` }, svg);
-    label.textContent = `${output.value}, ${entry.unit}`;
+    label.textContent = `${output.value}, ${entry.units[entry.outputs.indexOf(output.value)]}`;
   }
   function draw() {
     const entry = chosen();
@@ -155,7 +155,7 @@
     const k = Math.round(time(at.x) / entry.step);
     if (k < 0 || k >= entry.lower[0][index].length) return;
     const [low, high] = ["lower", "upper"].map((side) => cut(entry, side, index, +slider.value)[k]);
-    readout.textContent = `t = ${(k * entry.step).toFixed(2)} s: ${low.toPrecision(4)} … ${high.toPrecision(4)} ${entry.unit} at α = ${(+slider.value).toFixed(2)}`;
+    readout.textContent = `t = ${(k * entry.step).toFixed(2)} s: ${low.toPrecision(4)} … ${high.toPrecision(4)} ${entry.units[index]} at α = ${(+slider.value).toFixed(2)}`;
   });
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
   fillOutputs();

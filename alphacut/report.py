@@ -63,6 +63,8 @@ def plots(summary: Mapping[str, Any], folder: Path) -> list[dict[str, Any]]:
 
 def plot(name: str, study: Mapping[str, Any], dataset: xarray.Dataset) -> dict[str, Any]:
     """One study: lower and upper bounds by level and output, in base64."""
+    from frame.envelope import output_unit
+
     time = dataset["time"].values
     bounds = {side: dataset[side].transpose("alpha", "output", "time").values for side in ("lower", "upper")}
     return {
@@ -71,7 +73,7 @@ def plot(name: str, study: Mapping[str, Any], dataset: xarray.Dataset) -> dict[s
         "fuzzy": len(dataset["parameter"]),
         "alpha": dataset["alpha"].values.tolist(),
         "outputs": [str(output) for output in dataset["output"].values],
-        "unit": str(dataset["lower"].attrs.get("units", "SI")),
+        "units": [output_unit(str(output)) for output in dataset["output"].values],
         "step": float(time[1] - time[0]),
         **{side: [[packed(row) for row in level] for level in values] for side, values in bounds.items()},
     }

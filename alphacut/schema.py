@@ -9,9 +9,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from fuzzy import Crisp
+
 VERSION = 1
 STAGES = ("microstructure", "modulus", "envelope")
-ENVELOPE_METHODS = ("graph-follower", "vertex", "monte-carlo", "quasi-monte-carlo")
+ENVELOPE_METHODS = ("modal", "graph-follower", "vertex", "monte-carlo", "quasi-monte-carlo")
 INTEGRATORS = ("midpoint", "newmark", "rk4", "gauss4", "exact")
 PLANS = ("general", "reduced", "extended", "signed")
 CELL_METHODS = ("prism", "slices", "table", "series", "auto")
@@ -141,6 +143,10 @@ FRAME = Section(
         "damper_placement": Key("to the ground, or between storeys", "choice", required=True, choices=("ground", "storey")),
         "displacements": Key("displacement of each floor at the start", "fuzzy list", "m", required=True),
         "velocities": Key("velocity of each floor at the start", "fuzzy list", "m/s", required=True),
+        "rayleigh_mass": Key("factor a of Rayleigh damping a M + b K", unit="1/s", default=Crisp(0.0), allowed=NOT_NEGATIVE),
+        "rayleigh_stiffness": Key("factor b of Rayleigh damping a M + b K", unit="s", default=Crisp(0.0), allowed=NOT_NEGATIVE),
+        "accelerogram": Key("CSV file of the ground's acceleration; displacements are then relative to the ground", "text"),
+        "outputs": Key("observed quantities: q1, v1, drift1, shear1 …, base_shear; all displacements if left out", "choices", default=()),
     },
 )
 
@@ -159,10 +165,10 @@ STUDY = Section(
 ENVELOPE = Section(
     "Fuzzy forward dynamics.",
     {
-        "fuzzy": Key("inputs that are fuzzy: E, m or m1, m2 …, l, I, d, q0, v0", "choices", required=True),
+        "fuzzy": Key("inputs that are fuzzy: E, I, m or m1 …, l, d, q0, v0, rayleigh_mass, rayleigh_stiffness", "choices", required=True),
         "alpha": Key("α-levels", "numbers", default=ALPHA, allowed=MEMBERSHIP),
         "method": Key("how the envelope is found", "choice", default="graph-follower", choices=ENVELOPE_METHODS),
-        "integrator": Key("time stepping", "choice", default="midpoint", choices=INTEGRATORS),
+        "integrator": Key("time stepping; by the method if left out: exact for modal, else midpoint", "choice", choices=INTEGRATORS),
         "order": Key("order κ of the Taylor models", "integer", default=2, allowed=Range("1 or 2", 1, 2, closed=True)),
         "tolerance": Key("gain that is worth a new trajectory", "number", "m", required=True, allowed=POSITIVE),
         "duration": Key("length of the simulation", "number", "s", required=True, allowed=POSITIVE),

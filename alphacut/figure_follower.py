@@ -1,0 +1,83 @@
+"""The Graph Follower step by step on the case's own structure (counterparts of Figs. 21 to 25)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from alphacut import envelope
+from alphacut.chain import Results, Study
+from alphacut.figure_style import BLUE, GREY, INK, ORANGE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from frame.record import FollowerRecord
+
+DURATION = 5.0  # s
+TITLES = (
+    "Fig. 21: initial guess, the modal graph",
+    "Fig. 22: optimum of the Taylor model, new graphs",
+    "Fig. 23: at a later node the best stored graph is the guess",
+    "Fig. 24: bounds left by the sweep, and the best of all graphs",
+    "Fig. 25: the discrete fuzzy mapping",
+)
+
+
+def follower(results: Results, study: Study) -> Figure:
+    """Five panels: from the first guess to the envelope, for one output at the lowest level."""
+    import matplotlib.pyplot as plt
+
+    from frame.envelope import output_unit
+
+    found, output = recorded(results, study)
+    drawn, grid = plt.subplots(3, 2, figsize=(9.6, 9.0), sharex=True, sharey=True)
+    panels = list(grid.ravel())
+    panels[-1].axis("off")
+    new = [step for step in found.steps if step.found >= 0]
+    first = [step for step in new if step.node == new[0].node]
+    later = next((step for step in new if step.node > 0.5 * len(found.time) and step.guess > 0), new[-1])
+    base(panels[0], found, [0], node=first[0].node, last=0)
+    panels[0].plot(found.time, found.graphs[0], color=BLUE, lw=1.3)
+    base(panels[1], found, [0, *(step.found for step in first)], node=first[0].node, last=len(first))
+    base(panels[2], found, range(later.found + 1), node=later.node, last=1)
+    panels[2].plot(found.time, found.graphs[later.guess], color=BLUE, lw=1.3, label="guess")
+    panels[2].legend(loc="lower right", fontsize=8)
+    base(panels[3], found, range(len(found.graphs)), node=None, last=0)
+    for local, final in ((found.local_lower, found.lower), (found.local_upper, found.upper)):
+        panels[3].plot(found.time, local, color=BLUE, lw=1.0)
+        panels[3].plot(found.time, final, color=INK, lw=1.3)
+    panels[4].fill_between(found.time, found.lower, found.upper, color=BLUE, alpha=0.2, lw=0)
+    for final in (found.lower, found.upper):
+        panels[4].plot(found.time, final, color=INK, lw=1.3)
+    for panel, title in zip(panels, TITLES, strict=False):
+        panel.set_title(title, loc="left", fontsize=9)
+    for panel in (panels[4], panels[3]):
+        panel.set_xlabel("time t, s")
+        panel.tick_params(labelbottom=True)
+    for row in range(3):
+        grid[row, 0].set_ylabel(f"{output}, {output_unit(output)}")
+    return drawn
+
+
+def base(panel: Axes, found: FollowerRecord, graphs: range | list[int], *, node: int | None, last: int) -> None:
+    """Stored graphs in grey, the newest `last` of them in orange, and the node under treatment."""
+    shown = list(graphs)
+    for index, graph in enumerate(shown):
+        fresh = index >= len(shown) - last
+        panel.plot(found.time, found.graphs[graph], color=ORANGE if fresh else GREY, lw=1.3 if fresh else 0.4)
+    if node is not None:
+        panel.axvline(found.time[node], color=INK, lw=0.8, ls=":")
+
+
+def recorded(results: Results, study: Study) -> tuple[FollowerRecord, str]:
+    """A run of the Graph Follower that keeps every step, and the output it followed."""
+    from frame.record import record
+
+    young = envelope.modulus_of(results.case, results.handed)
+    model = envelope.structure(results.case, young)
+    inputs = envelope.fuzzy_inputs(model, study.task.fuzzy, envelope.numbers(results.case, young))
+    steps = max(1, min(round(DURATION / study.task.step), round(study.task.duration / study.task.step)))
+    output = len([name for name in model.outputs if name.startswith("q")]) - 1
+    found = record(model, inputs, duration=steps * study.task.step, step=study.task.step, output=max(output, 0))
+    return found, model.outputs[max(output, 0)]

@@ -1,0 +1,87 @@
+"""The report is one file that asks for nothing else, and its α slider moves the drawn band."""
+
+import html
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from alphacut.entry import main
+
+PAPER = Path(__file__).parent.parent / "cases" / "paper.toml"
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+PROBE = """
+<script>
+const seen = { errors: [], resources: 0, before: "", after: "", zoomed: "", tick: "" };
+window.addEventListener("error", (event) => seen.errors.push(String(event.message)));
+window.addEventListener("securitypolicyviolation", (event) => seen.errors.push(event.blockedURI));
+window.addEventListener("load", () => {
+  const band = () => document.getElementById("band").getAttribute("d");
+  const slider = document.getElementById("alpha");
+  slider.value = 0; slider.dispatchEvent(new Event("input")); seen.before = band();
+  slider.value = 0.5; slider.dispatchEvent(new Event("input")); seen.after = band();
+  const plot = document.getElementById("plot");
+  const box = plot.getBoundingClientRect();
+  plot.dispatchEvent(new WheelEvent("wheel", { deltaY: -1, clientX: box.left + box.width / 2, clientY: box.top + 50, cancelable: true }));
+  seen.zoomed = band();
+  seen.resources = performance.getEntriesByType("resource").length;
+  document.body.dataset.seen = JSON.stringify(seen);
+});
+</script>
+"""
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("results")
+    arguments = ["run", str(PAPER), "--quick", "--set", "modulus.method=series", "--out", str(folder), "--quiet"]
+    assert main(arguments) == 0
+    assert main(["report", str(folder), "--quiet"]) == 0
+    return folder
+
+
+def test_the_page_asks_for_nothing_outside(results):
+    page = (results / "report.html").read_text(encoding="utf-8")
+    links = re.findall(r'(?:src|href)="([^"]*)"', page)
+    assert all(link.startswith(("data:", "#")) for link in links), [link[:60] for link in links]
+    assert "default-src 'none'" in page
+
+
+def test_the_page_holds_what_a_colleague_asks_for(results):
+    page = (results / "report.html").read_text(encoding="utf-8")
+    for title in (
+        "Fuzzy modulus",
+        "Envelopes",
+        "Paper and here",
+        "Methods and cost",
+        "The case",
+        "Differences from the paper",
+        "Versions and citation",
+    ):
+        assert f"<h2>{title}</h2>" in page
+    summary = json.loads((results / "summary.json").read_text(encoding="utf-8"))
+    assert f"{summary['modulus']['modal_GPa']:.4f} GPa" in page
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
+def test_the_slider_moves_the_band_in_a_browser(results, tmp_path):
+    page = (results / "report.html").read_text(encoding="utf-8")
+    probed = tmp_path / "probed.html"
+    probed.write_text(page.replace("<style>", PROBE + "<style>", 1), encoding="utf-8")
+    flags = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", f"--user-data-dir={tmp_path / 'profile'}"]
+    command = [CHROMIUM, *flags, "--virtual-time-budget=5000", "--dump-dom", probed.as_uri()]
+    dom = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+    seen = json.loads(html.unescape(re.search(r'data-seen="([^"]*)"', dom)[1]))
+    assert seen["errors"] == []
+    assert seen["resources"] == 0
+    assert seen["before"].startswith("M")
+    assert len({seen["before"], seen["after"], seen["zoomed"]}) == 3
+
+
+def test_a_folder_without_results_is_named(tmp_path, capfd):
+    assert main(["report", str(tmp_path)]) == 2
+    assert "summary.json is missing" in capfd.readouterr().err
+    assert not list(tmp_path.iterdir())
