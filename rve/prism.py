@@ -16,6 +16,7 @@ from mpi4py import MPI
 
 from rve.cell import LOADS, THREE_LOADS, Phase
 from rve.certificate import Limits, load_checks, require, stiffness_checks
+from rve.local_stress import LocalStress, local_stress
 from rve.periodic import mismatch
 from rve.prism_grid import PrismGrid
 from rve.prism_system import PrismSystem, SliceMeans
@@ -73,21 +74,39 @@ class PrismModel:
             RuntimeError: An element is inverted.
         """
         watch = Stopwatch()
+        system = self._moved(radius_map, watch)
+        results = []
+        for inclusion, displacements in zip(inclusions, self._task(system, watch).solve(matrix, inclusions), strict=True):
+            with watch("solve"):
+                result = self._result(system, displacements, (matrix, inclusion))
+            results.append(replace(result, seconds=watch.report()))
+        return results
+
+    def local_stress(self, radius_map: RadiusMap, matrix: Phase, inclusion: Phase) -> LocalStress:
+        """Spread of the stresses over cell and θ, and the tractions on the interface, for the loads of eq. 15."""
+        watch = Stopwatch()
+        system = self._moved(radius_map, watch)
+        (displacements,) = self._task(system, watch).solve(matrix, [inclusion])
+        self._result(system, displacements, (matrix, inclusion))  # its certificate
+        return local_stress(system, displacements.total, (matrix, inclusion))
+
+    def _moved(self, radius_map: RadiusMap, watch: Stopwatch) -> PrismSystem:
         with watch("mesh"):
             radius = reference_radius(radius_map) if self.interface == "conforming" else 0.0
             system = _system(self.mesh_size, self.layers, radius, self.parallel)
             system.move(radius_map)
         watch.shift("mesh", "jit", system.take_jit_seconds())
-        loads = THREE_LOADS if self.stiffness else LOADS
-        task = PrismTask(system, self.solver, {**SOLVERS[self.solver], **self.petsc}, loads, watch)
-        results = []
-        for inclusion, displacements in zip(inclusions, task.solve(matrix, inclusions), strict=True):
-            with watch("solve"):
-                result = self._result(system, displacements, (matrix, inclusion), loads)
-            results.append(replace(result, seconds=watch.report()))
-        return results
+        return system
 
-    def _result(self, system: PrismSystem, displacements: Displacements, phases: tuple[Phase, Phase], loads: Array) -> Homogenised:
+    @property
+    def _loads(self) -> Array:
+        return THREE_LOADS if self.stiffness else LOADS
+
+    def _task(self, system: PrismSystem, watch: Stopwatch) -> PrismTask:
+        return PrismTask(system, self.solver, {**SOLVERS[self.solver], **self.petsc}, self._loads, watch)
+
+    def _result(self, system: PrismSystem, displacements: Displacements, phases: tuple[Phase, Phase]) -> Homogenised:
+        loads = self._loads
         means = system.means(displacements.total, phases)
         stress = means.stress
         stiffness = stress @ np.linalg.inv(loads).T if len(loads) == 3 else None

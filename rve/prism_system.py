@@ -85,11 +85,19 @@ class PrismSystem:
         """Reduced load of one phase for a unit modulus under a macroscopic strain (ε11, ε22, 2 ε12)."""
         return self.numbering.vector(self.local_map, self.form.load(phase, strain), self.comm)
 
+    @property
+    def slice_stress(self) -> SliceStress:
+        """Evaluates stresses at the present positions."""
+        return SliceStress(self.grid, self.positions, self.form.points, self.form.weights)
+
+    def stiffness_at_points(self, phases: tuple[Phase, Phase]) -> Array:
+        """Voigt stiffness, shape (cells, points or 1, 3, 3), in Pa."""
+        share = self.share[:, :, None, None]
+        return np.asarray((1 - share) * phases[0].stiffness + share * phases[1].stiffness)
+
     def means(self, displacement: Array, phases: tuple[Phase, Phase]) -> SliceMeans:
         """Homogenised stress of the slices and the mean energy from total displacements, shape (nodes, 2, loads)."""
-        slices = SliceStress(self.grid, self.positions, self.form.points, self.form.weights)
-        share = self.share[:, :, None, None]
-        stiffness = (1 - share) * phases[0].stiffness + share * phases[1].stiffness
+        slices, stiffness = self.slice_stress, self.stiffness_at_points(phases)
         rule = layered_rule(self.map.distribution, layers=self.grid.layers, points=slices.slices)
         weights = rule.weights / rule.weights.sum()
         shares = np.broadcast_to(self.share, (len(self.share), len(self.form.points))).reshape(self.grid.layers, -1, slices.slices, 6)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rve.prism_grid import PrismGrid
+from rve.triangulation import Integers
 from rve.wedge import NODES, tabulate
 from stochastic.truncated_normal import Array
 
@@ -75,16 +76,30 @@ class SliceStress:
             part = slice(first, first + triangles)
             yield self._layer(self.grid.cells[part], displacement, stiffness[part])
 
-    def _layer(self, cells: Array, displacement: Array, stiffness: Array) -> LayerStress:
-        table = tabulate(self.points, derivatives=True)[:2].transpose(1, 0, 2)  # (q, 2, 15)
+    def _layer(self, cells: Integers, displacement: Array, stiffness: Array) -> LayerStress:
+        strain, determinant = self.strain(cells, displacement, self.points)
+        in_slices = (len(cells), self.slices, len(self.points) // self.slices)
+        weight = self.weights.reshape(self.slices, -1)
+        area = determinant * (weight / weight.sum(axis=1, keepdims=True) / 2).ravel()
+        return LayerStress((stiffness @ strain).reshape(*in_slices, 3, -1), strain.reshape(*in_slices, 3, -1), area.reshape(in_slices))
+
+    def strain(self, cells: Integers, displacement: Array, points: Array) -> tuple[Array, Array]:
+        """In-plane strain at fixed θ and the planar Jacobian's determinant.
+
+        Args:
+            cells: Nodes of the wedges to look at, shape (m, 15).
+            displacement: Of all nodes for each load, shape (nodes, 2, loads).
+            points: On the reference prism, shape (q, 3).
+
+        Returns:
+            (ε11, ε22, 2 ε12) for each load, shape (m, q, 3, loads), and determinants, shape (m, q).
+        """
+        table = tabulate(points, derivatives=True)[:2].transpose(1, 0, 2)  # (q, 2, 15)
         jacobian = table @ self.positions[cells, :2].reshape(len(cells), 1, NODES, 2)
         a, b, c, d = (jacobian[..., i, j] for i in (0, 1) for j in (0, 1))
         determinant = a * d - b * c
         inverse = np.stack([d, -b, -c, a], axis=-1).reshape(*a.shape, 2, 2) / determinant[..., None, None]
         values = displacement[cells].reshape(len(cells), 1, NODES, -1)
         gradient = (inverse @ table @ values).reshape(*a.shape, 2, 2, -1)  # (m, q, ∂, component, load)
-        strain = np.stack([gradient[..., 0, 0, :], gradient[..., 1, 1, :], gradient[..., 0, 1, :] + gradient[..., 1, 0, :]], axis=-2)
-        in_slices = (len(cells), self.slices, len(self.points) // self.slices)
-        weight = self.weights.reshape(self.slices, -1)
-        area = determinant * (weight / weight.sum(axis=1, keepdims=True) / 2).ravel()
-        return LayerStress((stiffness @ strain).reshape(*in_slices, 3, -1), strain.reshape(*in_slices, 3, -1), area.reshape(in_slices))
+        shear = gradient[..., 0, 1, :] + gradient[..., 1, 0, :]
+        return np.stack([gradient[..., 0, 0, :], gradient[..., 1, 1, :], shear], axis=-2), determinant

@@ -30,7 +30,6 @@ from rve.theta_mass import theta_mass
 from rve.triangulation import Integers
 from stochastic.truncated_normal import Array, TruncatedNormal
 
-
 _LINEAR = np.kron(np.vstack([np.eye(3), [[0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5]]]), np.eye(2))  # a linear field on six nodes
 
 
