@@ -14,6 +14,7 @@ import numpy as np
 
 from frame.box import Boxes
 from frame.flow import LinearFlow
+from frame.halton import chebyshev_points
 from frame.jet import Array, Jet
 from frame.linear import evaluate
 from frame.modal_load import LoadTable
@@ -176,7 +177,7 @@ def fit_modes(flow: LinearFlow, boxes: Boxes, *, tolerance: float = 1e-6, budget
         needed = ceil(2.5 * terms(d, degree) / data_per_analysis) + 1
         if used + needed > budget or terms(d, degree) > 2500:
             break
-        model = _fitted(flow, boxes, _chebyshev_points(d, needed), degree, used + needed)
+        model = _fitted(flow, boxes, np.vstack([np.zeros((1, d)), chebyshev_points(d, needed - 1)]), degree, used + needed)
         error = np.abs(model.values(held) - truth).max(0)
         if best is None or error.max() < best.error.max():
             best = replace(model, error=error)
@@ -194,14 +195,6 @@ def _fitted(flow: LinearFlow, boxes: Boxes, points: Array, degree: int, analyses
     ground = flow.system.ground
     load = None if ground is None else LoadTable.build(ground, flow.time, rate, fit(points, flat[1], degree))
     return ModalModel(flow, boxes, rate, fit(points, flat[0], degree), load, np.zeros((len(flow.time), len(flow.outputs))), analyses)
-
-
-def _chebyshev_points(d: int, count: int) -> Array:
-    """The middle and points of Chebyshev density, shape (count, d), by a fixed Halton sequence."""
-    from scipy.stats import qmc
-
-    spread: Array = -np.cos(np.pi * qmc.Halton(d, scramble=False).random(count)[1:])
-    return np.vstack([np.zeros((1, d)), spread])
 
 
 def _held_out(d: int) -> Array:

@@ -4,28 +4,61 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from frame.box import UnitFlow
+from frame.certificate import certify
 from frame.envelope import Envelope, signed_envelope
 from frame.flow import LinearFlow
 from frame.jet import Array
 from frame.modal import ModalModel, fit_modes
 from frame.modal_search import ModalSearch
 
+Progress = Callable[[float], None]
+SAFETY = 3.0
+"""Factor on the model error sampled at held-out points."""
 
-def modal(
-    flow: UnitFlow, progress: Callable[[float], None] | None = None, *, tolerance: float = 1e-6, budget: int = 280, seed: int = 0
-) -> Envelope:
+
+@dataclass(frozen=True)
+class Modal:
+    """The method and its options.
+
+    Args:
+        tolerance: Wanted error of the modal model, in units of the outputs.
+        budget: Most eigen-analyses.
+        seed: Of the samples that find the basins.
+        certify: Wanted gap between attained and proved bounds, in units of the outputs; None for no certificate.
+        boxes: Most boxes of the branch and bound per bound, on average.
+        workers: Processes of the branch and bound.
+
+    Raises:
+        ValueError: A value is out of its range.
+    """
+
+    tolerance: float = 1e-6
+    budget: int = 280
+    seed: int = 0
+    certify: float | None = None
+    boxes: float = 4000
+    workers: int = 1
+
+    def __post_init__(self) -> None:
+        if not self.tolerance > 0 or self.budget < 1 or self.workers < 1 or self.boxes <= 0:
+            raise ValueError(f"tolerance {self.tolerance:g}, budget {self.budget}, workers {self.workers}: each must be positive")
+        if self.certify is not None and not self.certify > 0:
+            raise ValueError(f"certify: {self.certify:g} is not allowed; the gap must be positive")
+
+
+def modal(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> Envelope:
     """Envelope of a linear structure from a polynomial modal model over the widest box.
 
     Args:
         flow: Trajectories of a `LinearFlow`.
         progress: Called with the fraction done.
-        tolerance: Wanted error of the modal model, in units of the outputs.
-        budget: Most eigen-analyses.
-        seed: Of the samples that find the basins.
+        options: Fields of `Modal`.
 
     Raises:
         ModalError: The structure has no smooth oscillating modes over the box.
@@ -33,20 +66,44 @@ def modal(
     """
     if not isinstance(flow.flow, LinearFlow):
         raise ValueError("method: 'modal' needs a linear structure; take graph-follower")
-    begun = time.perf_counter()
-    model = fit_modes(flow.flow, flow.boxes, tolerance=tolerance, budget=budget)
-    bounds, at = search_levels(model, ModalSearch(seed=seed), progress)
-    return signed_envelope(
+    method, begun = Modal(**options), time.perf_counter()
+    tolerance = method.tolerance if method.certify is None else min(method.tolerance, method.certify / 30)
+    model = fit_modes(flow.flow, flow.boxes, tolerance=tolerance, budget=method.budget)
+    bounds, at = search_levels(model, ModalSearch(seed=method.seed), progress if method.certify is None else None)
+    facts: dict[str, float | str] = {"model_error": float(model.error.max()), "degree": int(model.eigenvalue.index.sum(1).max())}
+    if method.certify is not None:
+        return _certified(flow, model, method, (bounds, at), facts, begun, progress)
+    error = np.broadcast_to(2 * model.error, bounds.shape[:-1]).copy()
+    cost = {"trajectories": model.analyses, "seconds": time.perf_counter() - begun}
+    return signed_envelope(flow, bounds, at, method="modal", nature="estimated", error=error, facts=facts, **cost)
+
+
+def _certified(
+    flow: UnitFlow,
+    model: ModalModel,
+    method: Modal,
+    found: tuple[Array, Array],
+    facts: dict[str, float | str],
+    begun: float,
+    progress: Progress | None,
+) -> Envelope:
+    assert method.certify is not None
+    error = SAFETY * model.error
+    proof = certify(model, *found, gap=method.certify, model_error=error, workers=method.workers, budget=method.boxes, progress=progress)
+    facts |= {"gap": proof.gap, "between_nodes": proof.between, "boxes": proof.boxes}
+    facts["proof"] = "the branch and bound is rigorous for the modal model; the error of its polynomials is verified by sampling"
+    envelope = signed_envelope(
         flow,
-        bounds,
-        at,
+        proof.bounds,
+        proof.at,
         method="modal",
-        nature="estimated",
+        nature="verified by sampling",
+        error=(proof.outer - proof.bounds).max(-1),
         trajectories=model.analyses,
         seconds=time.perf_counter() - begun,
-        error=np.broadcast_to(2 * model.error, bounds.shape[:-1]).copy(),
-        facts={"model_error": float(model.error.max()), "degree": int(model.eigenvalue.index.sum(1).max())},
+        facts=facts,
     )
+    return replace(envelope, outer_lower=-proof.outer[..., 0], outer_upper=proof.outer[..., 1])
 
 
 def search_levels(model: ModalModel, search: ModalSearch, progress: Callable[[float], None] | None) -> tuple[Array, Array]:

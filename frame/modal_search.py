@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from frame.box_quadratic import gain, local_maximum
+from frame.halton import chebyshev_points
 from frame.jet import Array
 from frame.modal import ModalModel
 
@@ -39,6 +40,10 @@ class Optima:
     side: Array
     point: Array
     value: Array
+
+    def take(self, which: Array) -> Optima:
+        """A copy of the problems `which`."""
+        return Optima(*(getattr(self, name)[which].copy() for name in ("node", "output", "side", "point", "value")))
 
     def offer(self, model: ModalModel, points: Array, which: Array) -> Array:
         """Tries `points` (W, d) on problems `which` (W,), keeps what is better and returns those problems."""
@@ -96,7 +101,7 @@ class ModalSearch:
         nodes = np.unique(np.append(np.arange(0, len(model.time), stride), len(model.time) - 1))
         best = _best_of_pool(*pool, nodes, self.starts)
         for optima in best:
-            _polish(model, optima, np.arange(len(optima.value)), lower, upper, self.iterations)
+            refine(model, optima, np.arange(len(optima.value)), lower, upper, self.iterations)
         found = replace(best[0], point=best[0].point.copy(), value=best[0].value.copy())
         for other in best[1:]:
             better = other.value > found.value
@@ -117,7 +122,7 @@ class ModalSearch:
             again = np.unique(np.concatenate(changed)) if changed else np.zeros(0, int)
             if not len(again):
                 return
-            _polish(model, found, again, lower, upper, self.iterations)
+            refine(model, found, again, lower, upper, self.iterations)
 
     def _spread(
         self, model: ModalModel, coarse: list[Optima], lower: Array, upper: Array, pool: tuple[Array, Array]
@@ -130,27 +135,25 @@ class ModalSearch:
         every = np.arange(2 * m * total)
 
         def carried(optima: Optima) -> Optima:
-            out, points = _problems(np.arange(total), m, d), optima.point.reshape(len(nodes), 2 * m, d)
+            out, points = problems(np.arange(total), m, d), optima.point.reshape(len(nodes), 2 * m, d)
             for near in neighbours:
                 out.offer(model, points[near].reshape(-1, d), every)
             return out
 
         found = carried(coarse[0])
-        _polish(model, found, every, lower, upper, self.iterations)
+        refine(model, found, every, lower, upper, self.iterations)
         margin = RIVAL * np.abs(found.value).max()
         for rival in [*(carried(other) for other in coarse[1:]), _best_of_pool(*pool, np.arange(total), 1)[0]]:
             apart = np.abs(rival.point - found.point).max(1) > 0.1 * (upper - lower).max()
             which = np.flatnonzero(apart & (rival.value > found.value - margin))
-            _polish(model, rival, which, lower, upper, self.iterations)
+            refine(model, rival, which, lower, upper, self.iterations)
             found.offer(model, rival.point[which], which)
         return found.value.reshape(total, m, 2), found.point.reshape(total, m, 2, d)
 
     def _samples(self, lower: Array, upper: Array) -> Array:
-        from scipy.stats import qmc
-
         d = len(lower)
         count = 2 ** round(np.log2(max(64, self.samples * ((upper - lower) / 2).max())))  # narrow boxes hold fewer basins
-        unit = -np.cos(np.pi * qmc.Sobol(d, rng=np.random.default_rng(self.seed)).random(count))
+        unit = chebyshev_points(d, count, skip=1 + 7919 * self.seed)
         points = np.vstack([unit, tensor_points(d, count)])
         scaled: Array = (lower + upper) / 2 + (upper - lower) / 2 * points
         return scaled
@@ -165,7 +168,7 @@ def tensor_points(d: int, most: int) -> Array:
     return np.array(np.meshgrid(*[axis] * d, indexing="ij")).reshape(d, -1).T
 
 
-def _problems(nodes: Array, outputs: int, d: int) -> Optima:
+def problems(nodes: Array, outputs: int, d: int) -> Optima:
     """All outputs and sides at `nodes`, node by node; the sides of an output are (−1, +1)."""
     count = 2 * outputs
     node = np.repeat(nodes, count)
@@ -177,19 +180,21 @@ def _best_of_pool(pool: Array, values: Array, nodes: Array, starts: int) -> list
     """The best points of the pool (P, d) for every problem, and the next best ones elsewhere in the box; `values` is (P, T, m)."""
     m = values.shape[-1]
     chosen = (values if len(nodes) == values.shape[1] else values[:, nodes]).reshape(len(pool), -1)
-    near = np.abs(pool[:, None] - pool[None]).max(-1) < 0.25 * np.ptp(pool, axis=0).max()  # taken out together with the best
-    out = [_problems(nodes, m, pool.shape[1]) for _ in range(starts)]
+    reach = 0.25 * np.ptp(pool, axis=0).max()  # points this near the best are taken out together with it
+    out = [problems(nodes, m, pool.shape[1]) for _ in range(starts)]
     for column, sign in enumerate((-1.0, 1.0)):
         left: Array = chosen
         for optima in out:
             best = left.argmin(0) if sign < 0 else left.argmax(0)
             optima.point[column::2], optima.value[column::2] = pool[best], sign * chosen[best, np.arange(len(best))]
-            if starts > 1:
-                left = np.where(near[best].T, -sign * np.inf, left)
+            if optima is not out[-1]:
+                unique, index = np.unique(best, return_inverse=True)
+                near = np.stack([np.abs(pool - pool[k]).max(1) < reach for k in unique], 1)
+                left = np.where(near[:, index], -sign * np.inf, left)
     return out
 
 
-def _polish(model: ModalModel, optima: Optima, which: Array, lower: Array, upper: Array, iterations: int) -> None:
+def refine(model: ModalModel, optima: Optima, which: Array, lower: Array, upper: Array, iterations: int = 10) -> None:
     """Newton's method with a trust region in the box on problems `which`, in pieces that stay in the cache."""
     for piece in np.array_split(which, -(-len(which) // PIECE) or 1):
         _newton(model, optima, piece, lower, upper, iterations)

@@ -1,0 +1,97 @@
+"""Certified envelopes: for every node, level and output an attained bound and a proved one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from frame.branch_and_bound import BranchAndBound
+from frame.jet import Array
+from frame.modal import ModalModel
+from frame.modal_search import problems
+from frame.remainder import largest_growth, suprema
+
+ROUNDING = 1e-11
+"""Margin for floating point, as a share of the largest output."""
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """Enclosure of an envelope.
+
+    Args:
+        bounds: Attained upper bounds of (−output, output), less the model error, shape (A, T, m, 2).
+        at: Their unit coordinates, shape (A, T, m, 2, d).
+        outer: Proved upper bounds, shape (A, T, m, 2).
+        between: Bound of what the outputs do between nodes beyond a straight line, in units of the outputs.
+        boxes: Boxes of parameters looked at.
+    """
+
+    bounds: Array
+    at: Array
+    outer: Array
+    between: float
+    boxes: int
+
+    @property
+    def gap(self) -> float:
+        """Largest difference between proved and attained bound."""
+        return float((self.outer - self.bounds).max())
+
+
+def certify(
+    model: ModalModel,
+    bounds: Array,
+    at: Array,
+    *,
+    gap: float,
+    model_error: Array,
+    workers: int = 1,
+    budget: float = 4000,
+    progress: Callable[[float], None] | None = None,
+) -> Certificate:
+    """Encloses all bounds found by a search.
+
+    Args:
+        model: The modal model.
+        bounds: Upper bounds of (−output, output), shape (A, T, m, 2).
+        at: Their unit coordinates, shape (A, T, m, 2, d).
+        gap: Wanted difference between proved and attained bound, in units of the outputs.
+        model_error: Bound of the difference between the modal model and the trajectories, shape (T, m).
+        workers: Processes.
+        budget: Most boxes per bound on average.
+        progress: Called with the fraction done.
+
+    Raises:
+        ValueError: The model error alone exceeds the gap.
+    """
+    margin = model_error + ROUNDING * np.abs(bounds).max()
+    slack = gap - 2 * float(margin.max())
+    if slack <= 0:
+        limit = 2 * float(margin.max())
+        raise ValueError(
+            f"certify: the gap {gap:g} is not above twice the model error, {limit:.2g}; ask for a wider gap or a lower tolerance"
+        )
+    inner, points, outer, boxes = bounds.copy(), at.copy(), np.empty_like(bounds), 0
+    levels = len(bounds)
+    for done, level in enumerate(reversed(range(levels))):
+        lower, upper = model.boxes.unit(level)
+        optima = problems(np.arange(len(model.time)), len(model.outputs), len(lower))
+        optima.point[:], optima.value[:] = at[level].reshape(optima.point.shape), bounds[level].ravel()
+        share = None if progress is None else (lambda x, done=done: progress((done + x) / levels))
+        found = BranchAndBound(slack, budget).run(model, lower, upper, optima, workers=workers, progress=share)
+        inner[level], points[level] = found.value.reshape(inner[level].shape), found.point.reshape(points[level].shape)
+        outer[level], boxes = found.proved.reshape(outer[level].shape), boxes + found.boxes
+    wide = margin[None, :, :, None]
+    return Certificate(inner - wide, points, outer + wide, _between(model), boxes)
+
+
+def _between(model: ModalModel) -> float:
+    """h²/8 times a bound of the second time derivative: how far an output strays from a straight line between nodes."""
+    reach = np.ones(len(model.boxes.names))
+    rate, share = suprema(model.eigenvalue, reach)[0], suprema(model.coefficient, reach)[0].reshape(model.count, -1)
+    growth = np.exp(np.outer(model.time, largest_growth(model.eigenvalue, reach))).max(0)
+    acceleration = 2 * (growth * rate**2) @ share
+    return float(acceleration.max() * model.flow.step**2 / 8)
