@@ -1,0 +1,8 @@
+"""``python -m stochastic microstructure CASE``: from particles to the radius map; the same as ``alphacut microstructure``."""
+
+import sys
+
+from alphacut.entry import main
+
+if __name__ == "__main__":
+    sys.exit(main(program="python -m stochastic", names={"microstructure": "microstructure"}))

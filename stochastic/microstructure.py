@@ -1,0 +1,176 @@
+"""From particles to the fuzzy radius map: sections 4.1 and 4.2 of the paper, on simulated or measured discs.
+
+This differs from the paper in: 1. The supports of a2 and a4 are derived: they span the p-box of least area that contains the
+sample's distribution save for its own bootstrap band. 2. The bound of r_n for non-overlapping discs is √(4/π) for any cell and 1
+for the square one, not √(π/4). 3. a1 and a3 are the limits themselves, not the middles of the outer two of 100 bins between them
+(0.13 + 0.0037 and 0.87 − 0.0037 in the paper).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from stochastic.area_weighted import AreaWeighted
+from stochastic.hermite_fit import HermiteFit
+from stochastic.neighbours import Neighbours, cell_correlation, neighbours
+from stochastic.pbox import PBox, least_pbox
+from stochastic.refused import RefusedError
+from stochastic.sections import Measured, Section, Simulated, reduced_radii
+from stochastic.slope_band import SlopeBand, slope_band
+from stochastic.truncated_normal import TruncatedNormal
+
+if TYPE_CHECKING:
+    import xarray
+
+
+@dataclass(frozen=True)
+class Study:
+    """How a microstructure is turned into a radius map.
+
+    Args:
+        source: Where the discs come from.
+        limits: Lower and upper limit of r_n; None for those that keep `share`.
+        share: Share of area to keep, with equal shares cut off at both ends; used without `limits`.
+        seed: Seed of everything that is left to chance.
+        confidence: Level of the simultaneous bootstrap band, in (0, 1).
+        bootstrap: Number of resamples, at least 100.
+        band: Half width, in probability, by which the distribution may leave the p-box; None for that bootstrap band.
+        distribution: Law of θ.
+
+    Raises:
+        ValueError: A value lies outside its range.
+    """
+
+    source: Simulated | Measured
+    limits: tuple[float, float] | None = None
+    share: float = 0.9927
+    seed: int = 0
+    confidence: float = 0.99
+    bootstrap: int = 500
+    band: float | None = None
+    distribution: TruncatedNormal = field(default_factory=TruncatedNormal)
+
+    def __post_init__(self) -> None:
+        if self.limits is not None and not 0 < self.limits[0] < self.limits[1] < 1:
+            raise ValueError(f"the limits of r_n are {self.limits[0]:g} and {self.limits[1]:g}; they need 0 < lower < upper < 1")
+        if not 0 < self.share < 1:
+            raise ValueError(f"the share of area to keep is {self.share:g}; it must lie in (0, 1)")
+        if not 0 < self.confidence < 1:
+            raise ValueError(f"the confidence is {self.confidence:g}; it must lie in (0, 1)")
+        if self.bootstrap < 100:
+            raise ValueError(f"{self.bootstrap} resamples were asked for; the band needs 100 or more")
+        if self.band is not None and not 0 <= self.band < 1:
+            raise ValueError(f"the band is {self.band:g}; it must lie in [0, 1)")
+        if self.seed < 0:
+            raise ValueError(f"the seed is {self.seed}; it must be a whole number, 0 or greater")
+
+
+@dataclass(frozen=True, eq=False)
+class Microstructure:
+    """What the particles tell.
+
+    Args:
+        study: How it was found.
+        sections: Discs and cells.
+        sample: Area-weighted r_n of all whole cells.
+        kept: The part of it within the limits.
+        pbox: Fuzzy radius map.
+        slopes: Bootstrap band of the fitted slopes.
+        band: Half width of the simultaneous bootstrap band of the distribution function, in probability.
+        allowed: Half width by which the distribution may leave the p-box: that band, or the one asked for.
+        direct: Delaunay neighbours of each section.
+        seconds: Wall time by stage: pack, fit, neighbours, total.
+    """
+
+    study: Study
+    sections: list[Section]
+    sample: AreaWeighted
+    kept: AreaWeighted
+    pbox: PBox
+    slopes: SlopeBand
+    band: float
+    allowed: float
+    direct: list[Neighbours]
+    seconds: dict[str, float]
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Limits of r_n, which are a1 and a3."""
+        return self.pbox.fit.a1, self.pbox.fit.a3
+
+    @property
+    def share_kept(self) -> float:
+        """Share of area within the limits."""
+        return self.sample.share_within(*self.limits)
+
+    def summary(self) -> dict[str, Any]:
+        """Every number found, lengths in m, ready for JSON."""
+        from stochastic.microstructure_summary import summary
+
+        return summary(self)
+
+    def fragment(self) -> str:
+        """The section [radius] of a case file."""
+        from stochastic.microstructure_summary import fragment
+
+        return fragment(self)
+
+    def to_dataset(self) -> xarray.Dataset:
+        """Distribution, band and p-box of r_n over a grid, with the map as attributes."""
+        from stochastic.microstructure_summary import to_dataset
+
+        return to_dataset(self)
+
+    def draw(self, folder: Path) -> dict[str, list[Path]]:
+        """Draw every figure into `folder` as SVG and PNG; name of each figure to its files."""
+        from stochastic.figures import draw
+
+        return draw(self, folder)
+
+
+def study(case: Study, *, executor: Executor | None = None, progress: Callable[[float], None] | None = None) -> Microstructure:
+    """Do all of it: discs, cells, distribution, limits, fit, p-box, neighbours.
+
+    Args:
+        case: What to do.
+        executor: Runs the packings; one after the other if None. The result is the same.
+        progress: Told the share done, 0 to 1.
+
+    Raises:
+        ValueError: Measured data make no sense.
+        RefusedError: A packing fails its test, or no p-box contains the sample.
+    """
+    begin = perf_counter()
+    tell = progress or (lambda share: None)
+    streams = np.random.SeedSequence(case.seed, spawn_key=(1,)).spawn(2)
+    sections = case.source.sections(case.seed, executor=executor, progress=lambda share: tell(0.7 * share))
+    packed = perf_counter()
+    sample = reduced_radii(sections)
+    lower, upper = case.limits or sample.limits(case.share)
+    if not upper < 1:
+        raise RefusedError(f"a share of {case.share:g} of the area reaches up to r_n = {upper:.4g}; the square cell takes less than 1")
+    kept, fit = sample.truncated(lower, upper), HermiteFit(lower, upper, case.distribution)
+    band = kept.band(case.confidence, case.bootstrap, np.random.default_rng(streams[0]))
+    tell(0.8)
+    allowed = band if case.band is None else case.band
+    pbox = least_pbox(fit, kept, allowed)
+    slopes = slope_band(fit, kept, level=case.confidence, resamples=case.bootstrap, generator=np.random.default_rng(streams[1]))
+    tell(0.9)
+    fitted = perf_counter()
+    direct = [neighbours(section.discs) for section in sections]
+    tell(1.0)
+    end = perf_counter()
+    seconds = {"pack": packed - begin, "fit": fitted - packed, "neighbours": end - fitted, "total": end - begin}
+    return Microstructure(case, sections, sample, kept, pbox, slopes, band, allowed, direct, seconds)
+
+
+def mean_correlation(sections: list[Section]) -> float:
+    """Mean correlation of r_n between cells that share a wall."""
+    return float(np.mean([cell_correlation(section.diagram, section.diagram.reduced_radii) for section in sections]))

@@ -1,0 +1,121 @@
+"""Where discs come from: simulated packings, a list of circles, or an image."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from stochastic.apollonius import Apollonius, apollonius
+from stochastic.area_weighted import AreaWeighted
+from stochastic.circle_file import CircleFile
+from stochastic.discs import Discs
+from stochastic.open_window import WholeCells, whole_cells
+from stochastic.packing import Packing, packings
+from stochastic.refused import RefusedError
+from stochastic.section_image import SectionImage
+
+Progress = Callable[[float], None]
+PATCHES = 5  # a single section is cut into 5 × 5 patches, drawn as wholes in the bootstrap
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """Discs of one section with their cells.
+
+    Args:
+        diagram: Apollonius cells.
+        whole: Cells that count, and their weights.
+        rejected: What was left out of measured data: row or label to reason.
+    """
+
+    diagram: Apollonius
+    whole: WholeCells
+    rejected: dict[int, str] = field(default_factory=dict)
+
+    @property
+    def discs(self) -> Discs:
+        """The discs."""
+        return self.diagram.discs
+
+
+class Source(Protocol):
+    """A supply of sections."""
+
+    def sections(self, seed: int, *, executor: Executor | None = None, progress: Progress | None = None) -> list[Section]:
+        """All sections, the same for one seed whatever the workers."""
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """Independent packings of one kind.
+
+    Args:
+        packing: What each one is to be.
+        packings: How many, at least 5 (the bootstrap draws them as wholes).
+
+    Raises:
+        ValueError: Fewer than five packings.
+    """
+
+    packing: Packing
+    packings: int = 20
+
+    def __post_init__(self) -> None:
+        if self.packings < 5:
+            raise ValueError(f"{self.packings} packings were asked for; the bootstrap draws whole packings and needs 5 or more")
+
+    def sections(self, seed: int, *, executor: Executor | None = None, progress: Progress | None = None) -> list[Section]:
+        """Every packing with its cells."""
+        made = []
+        for discs in packings(self.packing, self.packings, seed=seed, executor=executor):
+            made.append(_section(discs))
+            if progress:
+                progress(len(made) / self.packings)
+        return made
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One section read from a file of circles or an image.
+
+    Args:
+        file: The file.
+    """
+
+    file: CircleFile | SectionImage
+
+    def sections(self, seed: int, *, executor: Executor | None = None, progress: Progress | None = None) -> list[Section]:
+        """The section with its cells; `seed` and `executor` do nothing here."""
+        circles = self.file.read()
+        section = _section(circles.discs, circles.rejected)
+        if progress:
+            progress(1.0)
+        return [section]
+
+
+def reduced_radii(sections: list[Section]) -> AreaWeighted:
+    """Area-weighted r_n of all whole cells; groups are the sections, or the patches of a single one.
+
+    Raises:
+        RefusedError: A cell is smaller than its disc, so that discs overlap.
+    """
+    values, weights, groups = [], [], []
+    for number, section in enumerate(sections):
+        disc, discs = section.whole.disc, section.discs
+        values.append(section.diagram.reduced_radii[disc])
+        weights.append(section.diagram.areas[disc] * section.whole.weight)
+        patch = np.minimum((PATCHES * discs.centres[disc] / discs.size).astype(int), PATCHES - 1) @ (PATCHES, 1)
+        groups.append(np.full(len(disc), number) if len(sections) > 1 else patch)
+    sample = AreaWeighted.of(np.concatenate(values), np.concatenate(weights), np.concatenate(groups))
+    if sample.values[-1] > np.sqrt(4 / np.pi):
+        raise RefusedError(f"a cell has r_n = {sample.values[-1]:.4g}, more area of disc than of cell: discs overlap; mend the data")
+    return sample
+
+
+def _section(discs: Discs, rejected: dict[int, str] | None = None) -> Section:
+    diagram = apollonius(discs)
+    return Section(diagram, whole_cells(diagram), rejected or {})
