@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -36,6 +37,10 @@ class Case:
     def text_of_file(self) -> str:
         """The file as it stands."""
         return self.path.read_text(encoding="utf-8-sig")
+
+    def digest(self, key: str) -> str:
+        """Digest of a file that the case names: results depend on its content."""
+        return hashlib.sha256((self.path.parent / self.text(key)).read_bytes()).hexdigest()
 
     @property
     def stages(self) -> tuple[str, ...]:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from alphacut import envelope, modulus
+from alphacut import envelope, microstructure, modulus
+from alphacut.campaign import campaign
 from alphacut.case import Case
+from alphacut.command_microstructure import write as write_microstructure
+from alphacut.consistency import FILES
 from alphacut.output import say
 from alphacut.progress import progress
-from alphacut.provenance import fingerprint
+from alphacut.provenance import attributes, fingerprint
 from fuzzy import FuzzyNumber
 
 if TYPE_CHECKING:
@@ -68,12 +71,32 @@ class Chain:
     def run(self) -> Results:
         """Compute every stage of the case, or take it from its file."""
         self.folder.mkdir(parents=True, exist_ok=True)
+        if "microstructure" in self.case.stages:
+            return replace(self, case=self.with_particles()).after_particles()
+        return self.after_particles()
+
+    def after_particles(self) -> Results:
+        """The stages from the radius map on."""
         cell = self.modulus() if "modulus" in self.case.stages else None
         handed = modulus.read_number(self.file("modulus.nc")) if cell is not None else modulus.stand_in(self.case)
         envelopes = {}
         if "envelope" in self.case.stages:
             envelopes = {study.name: self.envelope(study, handed) for study in studies(self.case)}
         return Results(self.case, self.folder, cell, envelopes, handed)
+
+    def with_particles(self) -> Case:
+        """The case with the radius map of its particles; microstructure.nc, radius.toml and the stage's figures are stored."""
+        inputs = {key: value for key, value in self.case.values.items() if key.startswith("microstructure")}
+        files = [self.case.digest(key) for key in FILES if key.startswith("microstructure") and self.case.has(key)]
+        key = fingerprint({"case": inputs, "files": files}, ("stochastic",))
+
+        def compute(path: Path) -> None:
+            with progress("Microstructure", quiet=self.quiet) as tick:
+                found = microstructure.compute(self.case, workers=self.workers, progress=tick)
+            write_microstructure(found, path.parent, attributes(self.case.text_of_file, key))
+
+        self.stored("microstructure.nc", key, compute)
+        return microstructure.with_radius(self.case, microstructure.read_fragment(self.file("radius.toml")))
 
     def modulus(self) -> xarray.Dataset:
         """The fuzzy modulus, in modulus.nc."""
@@ -86,7 +109,8 @@ class Chain:
                 for old in self.folder.glob("samples.db*"):
                     old.unlink()
             with progress("Fuzzy modulus", quiet=self.quiet) as tick:
-                found = modulus.compute(self.case, petsc=self.petsc, workers=self.workers, progress=tick, store=store)
+                wanted = campaign(self.case, petsc=self.petsc, store=store)
+                found = modulus.compute(wanted, workers=self.workers, progress=tick)
             modulus.write(found, path, case_text=self.case.text_of_file, key=key)
 
         return self.stored("modulus.nc", key, compute)
@@ -94,7 +118,8 @@ class Chain:
     def envelope(self, study: Study, handed: FuzzyNumber | None) -> xarray.Dataset:
         """One study's envelope, in envelope_NAME.nc."""
         inputs = {key: value for key, value in self.case.values.items() if key.startswith("frame.")}
-        key = fingerprint({"case": inputs, "task": study.task, "modulus": handed}, ("fuzzy", "frame"))
+        record = self.case.digest("frame.accelerogram") if self.case.has("frame.accelerogram") else ""
+        key = fingerprint({"case": inputs, "record": record, "task": study.task, "modulus": handed}, ("fuzzy", "frame"))
 
         def compute(path: Path) -> None:
             with progress(f"Envelope {study.name}", quiet=self.quiet) as tick:

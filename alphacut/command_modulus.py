@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 
 from alphacut import modulus
+from alphacut.campaign import campaign
 from alphacut.case import Case
 from alphacut.cell import GPA
 from alphacut.command_cell import named_models
@@ -18,9 +17,7 @@ from alphacut.options import CELL_OPTIONS, add_common, add_keys, add_workers, ch
 from alphacut.output import as_json, write_text
 from alphacut.progress import progress
 from alphacut.provenance import fingerprint
-
-if TYPE_CHECKING:
-    from concurrent.futures import Executor
+from fuzzy import Explanation
 
 ABOUT = "fuzzy effective modulus by the transformation method over all fuzzy inputs of the cell"
 KEYS = {**CELL_OPTIONS, "--plan": "modulus.plan", "--alpha": "modulus.alpha"}
@@ -34,6 +31,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="FILE.nc", help="write the α-cuts and all samples as NetCDF")
     parser.add_argument("--store", metavar="FILE", help="keep every sample here; the same command then goes on where it was stopped")
     parser.add_argument("--resume", action="store_true", help="keep and take samples in results/NAME-OF-THE-CASE/samples.db")
+    parser.add_argument("--explain", action="store_true", help="say what would be run and why, and run nothing")
     parser.add_argument("--exclude", metavar="NAMES", default="", help="models that method auto must not take, separated by commas")
 
 
@@ -42,9 +40,12 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     check_workers(options.workers)
     case = load(options.case, changes(options, KEYS))
     exclude = named_models("--exclude", options.exclude)
-    store = store_of(options, case)
-    with progress("Fuzzy modulus", quiet=options.quiet) as tick, cluster() as executor:
-        found = modulus.compute(case, petsc=petsc, workers=options.workers, executor=executor, progress=tick, exclude=exclude, store=store)
+    wanted = campaign(case, petsc=petsc, exclude=exclude, store=store_of(options, case))
+    if options.explain:
+        explain(modulus.explain(wanted), options, out)
+        return 0
+    with progress("Fuzzy modulus", quiet=options.quiet) as tick:
+        found = modulus.compute(wanted, workers=options.workers, progress=tick)
     if options.out:
         key = fingerprint(case.values, ("stochastic", "rve", "fuzzy"))
         modulus.write(found, options.out, case_text=case.text_of_file, key=key)
@@ -67,16 +68,9 @@ def store_of(options: argparse.Namespace, case: Case) -> Path | None:
     return path
 
 
-@contextmanager
-def cluster() -> Iterator[Executor | None]:
-    """The other MPI processes when started by ``mpirun -n N python -m mpi4py.futures -m fuzzy …``, else None."""
-    if "mpi4py.futures" not in sys.modules:
-        yield None
-        return
-    from mpi4py.futures import MPIPoolExecutor
-
-    with MPIPoolExecutor() as executor:
-        yield executor if executor.num_workers else None
+def explain(explanation: Explanation, options: argparse.Namespace, out: TextIO) -> None:
+    """Print what would be run."""
+    out.write(as_json({"explanation": str(explanation)}) if options.json == "-" else f"{explanation}\n")
 
 
 def summary(found: modulus.FuzzyModulus) -> str:

@@ -15,7 +15,7 @@ from stochastic import HermiteMap, TruncatedNormal
 
 SLOPES = ("a1", "a2", "a3", "a4")
 GROUPS = ("E", "I", "m", "l", "d", "q0", "v0", "rayleigh_mass", "rayleigh_stiffness")
-FILES = ("modulus.file", "modulus.measured", "frame.accelerogram")
+FILES = ("microstructure.circles.file", "microstructure.image.file", "modulus.file", "modulus.measured", "frame.accelerogram")
 
 
 def inconsistencies(case: Case, *, modal: bool = False) -> Iterator[Problem]:
@@ -23,6 +23,8 @@ def inconsistencies(case: Case, *, modal: bool = False) -> Iterator[Problem]:
     yield from order_of_stages(case)
     yield from missing_sections(case)
     yield from files(case)
+    if case.has("microstructure.seed"):
+        yield from particles(case)
     if case.has("radius.a1"):
         yield from radius(case, 1.0 if modal else 0.0)
     for section in ("modulus", "envelope"):
@@ -56,6 +58,8 @@ def missing_sections(case: Case) -> Iterator[Problem]:
     replaced = any(case.has(f"modulus.{key}") for key in ("value", "file", "measured"))
     for stage in case.stages:
         for section in NEEDED.get(stage, ()):
+            if section == "radius" and "microstructure" in case.stages:
+                continue
             if not any(key.startswith(f"{section}.") for key in case.values) and not (stage == "modulus" and replaced):
                 yield Problem(section, f"section [{section}] is missing; stage {stage} needs it")
 
@@ -70,6 +74,27 @@ def files(case: Case) -> Iterator[Problem]:
 def beside(case: Case, name: str) -> Path:
     """A file that the case names, looked for from the case's folder."""
     return case.path.parent / name
+
+
+def particles(case: Case) -> Iterator[Problem]:
+    """Exactly one source of particles, and numbers in it that fit together."""
+    sources = [name for name in ("packing", "circles", "image") if any(key.startswith(f"microstructure.{name}.") for key in case.values)]
+    if len(sources) != 1:
+        allowed = "one of [microstructure.packing], [microstructure.circles], [microstructure.image]"
+        yield Problem("microstructure", f"got {len(sources)} sources of particles", ", ".join(sources), allowed)
+    if case.has("microstructure.limits"):
+        limits = case.numbers("microstructure.limits")
+        if len(limits) != 2 or not limits[0] < limits[1]:
+            yield Problem(
+                "microstructure.limits", "the limits need two values in rising order", str(list(limits)), "for example [0.13, 0.87]"
+            )
+    low, high = (f"microstructure.packing.{end}_radius" for end in ("smallest", "largest"))
+    if case.has(low) and case.number(low) > case.number(high):
+        yield Problem(low, "the smallest radius is greater than the largest", str(case.written[low]))
+    for name in ("size", "origin"):
+        key = f"microstructure.circles.{name}"
+        if case.has(key) and len(case.numbers(key)) != 2:
+            yield Problem(key, f"got {len(case.numbers(key))} values", allowed="two: across and up")
 
 
 def radius(case: Case, alpha: float) -> Iterator[Problem]:

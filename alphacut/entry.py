@@ -8,16 +8,28 @@ import sys
 from collections.abc import Mapping, Sequence
 from types import ModuleType
 
-from alphacut import command_cell, command_check, command_cite, command_envelope, command_mesh, command_modulus, command_report, command_run
+from alphacut import (
+    command_cell,
+    command_check,
+    command_cite,
+    command_envelope,
+    command_mesh,
+    command_microstructure,
+    command_modulus,
+    command_report,
+    command_run,
+)
 from alphacut.options import Parser, split_petsc
 from alphacut.output import rank, ranks, say, standard_output
 from alphacut.problem import BadInput
 from alphacut.provenance import own_version
 from fuzzy import CampaignError
+from rve.solver_options import OptionError
 
 COMMANDS: dict[str, ModuleType] = {
     "run": command_run,
     "check": command_check,
+    "microstructure": command_microstructure,
     "cell": command_cell,
     "mesh": command_mesh,
     "modulus": command_modulus,
@@ -77,6 +89,9 @@ def main(arguments: Sequence[str] | None = None, *, program: str = "alphacut", n
     except BadInput as error:
         for problem in error.problems:
             say(str(problem))
+        return 2
+    except OptionError as error:
+        say(str(error))
         return 2
     except KeyboardInterrupt:
         say("interrupted; what was finished is kept, and the same command goes on from there")

@@ -111,7 +111,7 @@ def toml_or_text(value: str, key: Key) -> object:
     try:
         found = tomllib.loads(f"x = {value}")["x"]
     except tomllib.TOMLDecodeError:
-        found = value
+        found = float(value) if re.fullmatch(r"[+-]?(\d+\.|\.\d+)([eE][+-]?\d+)?", value) else value  # .3 and 3. are no TOML
     if key.kind in ARRAYS and not isinstance(found, list):
         return [item.strip() for item in value.strip("[] ").split(",") if item.strip()]
     return str(found) if key.kind == "text" else found
@@ -122,11 +122,24 @@ def checked(raw: Raw, values: dict[str, object], written: dict[str, object]) -> 
     for name in raw:
         if name not in SECTIONS and name not in SECTIONS[""].keys:
             yield unknown(name, "", raw[name])
+    raw = flattened(raw)
     top = {key: value for key, value in raw.items() if key in SECTIONS[""].keys}
     yield from checked_section("", SECTIONS[""], top, values, written)
     for name, section in SECTIONS.items():
         if name and name in raw:
             yield from checked_table(name, section, raw[name], values, written)
+
+
+def flattened(raw: Raw) -> Raw:
+    """The tree with nested sections such as ``[microstructure.packing]`` beside the one they stand in."""
+    flat = dict(raw)
+    for name in SECTIONS:
+        outer, _, inner = name.rpartition(".")
+        table = flat.get(outer)
+        if outer and isinstance(table, dict) and inner in table:
+            flat[name] = table[inner]
+            flat[outer] = {key: value for key, value in table.items() if key != inner}
+    return flat
 
 
 def checked_table(name: str, section: Section, table: object, values: dict[str, object], written: dict[str, object]) -> Iterator[Problem]:

@@ -2,76 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from alphacut.campaign import Campaign, theta_shown
 from alphacut.case import Case
-from alphacut.cell import GPA, INPUTS, SHARED, CellChoice, cell_choice, key_of, parts
+from alphacut.cell import GPA, CellChoice
 from alphacut.output import whole_file
 from alphacut.problem import BadInput, Problem
 from alphacut.progress import Tick
-from alphacut.provenance import attributes, source_digest, versions
-from fuzzy import Crisp, Extended, FuzzyNumber, FuzzyResult, General, PiecewiseLinear, Plan, Reduced, Signed, propagate
-from stochastic.truncated_normal import Array
+from alphacut.provenance import attributes, versions
+from fuzzy import Crisp, Explanation, FuzzyNumber, FuzzyResult, PiecewiseLinear, propagate
+from fuzzy import explain as fuzzy_explain
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor
-
     import xarray
 
 QUANTITIES = {"E": ("Pa", "effective Young's modulus, eq. 16"), "nu": ("1", "effective Poisson's ratio, eq. 16")}
 STRESSES = {"s11": ("Pa", "mean homogenised stress 11 under load 1"), "s12": ("Pa", "mean homogenised stress 12 under load 2")}
 BOUNDS = QUANTITIES | STRESSES
-SOURCES = ("space", "theta", "table")  # of error, see rve.result.Homogenised
-SHOWN = 61  # points of a stored stress curve
-
-
-def theta_shown(theta: tuple[float, ...]) -> Array:
-    """The θ at which stress curves are stored, shape (SHOWN,)."""
-    return np.linspace(theta[0], theta[1], SHOWN)
-
-
-@dataclass(frozen=True)
-class CellTask:
-    """One task of the campaign: samples that share everything but the inclusion's modulus. Runs in any process.
-
-    Args:
-        choice: Model of the cell.
-        crisp: Inputs that are not fuzzy, by name, in SI.
-        theta: Support of θ.
-    """
-
-    choice: CellChoice
-    crisp: Mapping[str, float]
-    theta: tuple[float, ...]
-
-    def __call__(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float | Array]]:
-        """Outputs of each point: E, nu, mean stresses, stress curves, linear systems solved, errors by source, certificate."""
-        values = [{**self.crisp, **point} for point in points]
-        radius, matrix, _ = parts(values[0], self.theta)
-        inclusions = [parts(value, self.theta)[2] for value in values]
-        results = self.choice.model().solve(radius, matrix, inclusions)
-        outputs: list[dict[str, float | Array]] = []
-        for result in results:
-            s11, s12 = result.curve.mean
-            means = {"E": result.modulus, "nu": result.poisson, "s11": s11, "s12": s12, "systems": len(result.iterations)}
-            curves = {
-                name: self.resampled(result.curve.theta, stress)
-                for name, stress in (("curve11", result.curve.s11), ("curve12", result.curve.s12))
-            }
-            errors = {f"error:{source}": result.error.get(source, 0.0) for source in SOURCES}
-            outputs.append({**means, **curves, **errors, **{f"check:{name}": value for name, value in result.checks.items()}})
-        return outputs
-
-    def resampled(self, nodes: Array, stress: Array) -> Array:
-        """A stress curve at `SHOWN` points over θ, for pictures: models choose their own nodes, and not the same for every sample."""
-        from scipy.interpolate import PchipInterpolator
-
-        return np.asarray(PchipInterpolator(nodes, stress)(theta_shown(self.theta)))
 
 
 @dataclass(frozen=True)
@@ -160,68 +112,31 @@ class FuzzyModulus:
         return xarray.Dataset(variables, coordinates, {"method": self.choice.method, "plan": result.plan, **numbers})
 
 
-def plan_of(case: Case) -> Plan:
-    """The plan that a case asks for."""
-    plans: dict[str, Plan] = {
-        "general": General(),
-        "reduced": Reduced(),
-        "extended": Extended(outputs=("E",)),
-        "signed": Signed(outputs=("E",)),
-    }
-    return plans[case.text("modulus.plan")]
-
-
-def fuzzy_inputs(case: Case) -> dict[str, FuzzyNumber]:
-    """The inputs of the cell that are fuzzy, by name, in SI."""
-    numbers = {name: case.fuzzy(key_of(name)) for name in INPUTS}
-    found = {name: number for name, number in numbers.items() if number.support.width > 0}
-    return found or {"inclusion_modulus": numbers["inclusion_modulus"]}
-
-
-def compute(
-    case: Case,
-    *,
-    petsc: Mapping[str, str] | None = None,
-    workers: int = 1,
-    executor: Executor | None = None,
-    progress: Tick | None = None,
-    exclude: tuple[str, ...] = (),
-    store: Path | None = None,
-) -> FuzzyModulus:
-    """Run the campaign of a case.
+def compute(wanted: Campaign, *, workers: int = 1, progress: Tick | None = None) -> FuzzyModulus:
+    """Run a campaign.
 
     Args:
-        case: With the sections radius, cell, mesh and modulus.
-        petsc: PETSc options that override the solver's.
-        workers: Processes; the result is the same for any number.
-        executor: Any `concurrent.futures` executor instead.
+        wanted: What is to be run.
+        workers: Processes; the result is the same for any number. Under ``mpirun … -m mpi4py.futures`` all of those are used.
         progress: Told the share done.
-        exclude: Models that method auto must not take.
-        store: File that keeps every sample; a campaign that was stopped goes on from there.
     """
-    inputs = fuzzy_inputs(case)
-    crisp = {name: case.fuzzy(key_of(name)).modal for name in INPUTS if name not in inputs}
-    choice = cell_choice(case, exclude=exclude, petsc=petsc)
-    shared = tuple(name for name in inputs if name in SHARED)
     result = propagate(
-        CellTask(choice, crisp, case.numbers("radius.theta")),
-        inputs,
-        plan_of(case),
-        alpha=case.numbers("modulus.alpha"),
-        shared=shared or ("inclusion_modulus",),
+        wanted.task,
+        wanted.inputs,
+        wanted.plan,
+        alpha=wanted.alpha,
+        shared=wanted.shared,
         workers=workers,
-        executor=executor,
         progress=progress,
-        store=store,
-        identity=identity(choice, crisp, case.numbers("radius.theta")) if store else None,
+        store=wanted.store,
+        identity=wanted.identity,
     )
-    return FuzzyModulus(result, choice, case.numbers("radius.theta"))
+    return FuzzyModulus(result, wanted.task.choice, wanted.task.theta)
 
 
-def identity(choice: CellChoice, crisp: Mapping[str, float], theta: tuple[float, ...]) -> dict[str, Any]:
-    """What a sample depends on besides its fuzzy inputs: model, resolution, crisp inputs, the program and its libraries."""
-    source = source_digest(("stochastic", "rve"))
-    return {"choice": asdict(choice), "crisp": dict(crisp), "theta": list(theta), "source": source, "versions": versions()}
+def explain(wanted: Campaign) -> Explanation:
+    """What `compute` would run and why."""
+    return fuzzy_explain(wanted.inputs, wanted.plan, alpha=wanted.alpha, shared=wanted.shared, store=wanted.store, identity=wanted.identity)
 
 
 def write(modulus: FuzzyModulus, path: Path | str, *, case_text: str, key: str) -> None:

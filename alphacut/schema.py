@@ -87,6 +87,52 @@ TOP = Section(
     },
 )
 
+MICROSTRUCTURE = Section(
+    "From particles to the random radius: exactly one of the sections packing, circles, image below it.",
+    {
+        "seed": Key("seed of everything left to chance", "integer", required=True, allowed=Range("0 or more", 0.0, closed=True)),
+        "limits": Key("lower and upper limit of r_n = r/a; share decides if left out", "numbers", allowed=UNIT),
+        "share": Key("share of area that the limits keep", "number", default=0.9927, allowed=UNIT),
+        "confidence": Key("level of the empirical distribution's bootstrap band", "number", default=0.99, allowed=UNIT),
+        "bootstrap": Key("resamples", "integer", default=500, allowed=Range("100 or more", 100.0, closed=True)),
+    },
+)
+
+PACKING = Section(
+    "Discs packed at random in a periodic box, equal or truncated log-normal (eq. 11).",
+    {
+        "packings": Key("independent packings", "integer", default=20, allowed=Range("5 or more", 5.0, closed=True)),
+        "discs": Key("discs in each packing", "integer", required=True, allowed=Range("10 or more", 10.0, closed=True)),
+        "area_fraction": Key("share of the area that discs cover", "number", required=True, allowed=Range("inside (0, 0.85)", 0.0, 0.85)),
+        "smallest_radius": Key("smallest radius", "number", "m", required=True, allowed=POSITIVE),
+        "largest_radius": Key("largest radius", "number", "m", required=True, allowed=POSITIVE),
+        "gap": Key("least gap between surfaces", "number", "m", default=0.0, allowed=NOT_NEGATIVE),
+        "method": Key("how they are packed", "choice", default="auto", choices=("auto", "sequential", "relaxed")),
+    },
+)
+
+CIRCLES = Section(
+    "Measured circles from a CSV file with the columns x, y, r.",
+    {
+        "file": Key("CSV file, its units in the header: x [mm], y [mm], r [mm]", "text", required=True),
+        "size": Key("width and height of the section", "numbers", "m", required=True, allowed=POSITIVE),
+        "origin": Key("lower left corner of the section in the file's coordinates", "numbers", "m", default=(0.0, 0.0)),
+        "periodic": Key("whether the section repeats itself; otherwise it is an open window", "flag", default=False),
+        "unit": Key("unit of columns whose header names none", "text", default=""),
+        "drop": Key("leave out rows that make no sense instead of refusing the file", "flag", default=False),
+        "overlap": Key("overlap that counts as error of measurement, over the smaller radius", "number", default=0.0, allowed=MEMBERSHIP),
+    },
+)
+
+IMAGE = Section(
+    "Circles segmented from the image of a section.",
+    {
+        "file": Key("image file", "text", required=True),
+        "pixel": Key("side of a pixel", "number", "m", required=True, allowed=POSITIVE),
+        "particles": Key("bright or dark against the matrix", "choice", default="auto", choices=("auto", "bright", "dark")),
+    },
+)
+
 RADIUS = Section(
     "Random radius of the particle over half the cell's side: cubic Hermite map of the truncated normal θ (eq. 12).",
     {
@@ -178,6 +224,10 @@ ENVELOPE = Section(
 
 SECTIONS: dict[str, Section] = {
     "": TOP,
+    "microstructure": MICROSTRUCTURE,
+    "microstructure.packing": PACKING,
+    "microstructure.circles": CIRCLES,
+    "microstructure.image": IMAGE,
     "radius": RADIUS,
     "cell": CELL,
     "mesh": MESH,
@@ -186,7 +236,11 @@ SECTIONS: dict[str, Section] = {
     "study": STUDY,
     "envelope": ENVELOPE,
 }
-NEEDED = {"modulus": ("radius", "cell", "mesh"), "envelope": ("frame", "envelope")}  # sections that a stage cannot do without
+NEEDED = {
+    "microstructure": ("microstructure",),
+    "modulus": ("radius", "cell", "mesh"),
+    "envelope": ("frame", "envelope"),
+}  # sections that a stage cannot do without
 
 
 def dotted(section: str, key: str) -> str:

@@ -1,0 +1,129 @@
+"""The campaign of a case: the cell as a function that any process can call, its fuzzy inputs, the plan of samples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from alphacut.case import Case
+from alphacut.cell import INPUTS, SHARED, CellChoice, cell_choice, key_of, parts
+from alphacut.provenance import source_digest, versions
+from fuzzy import Extended, FuzzyNumber, General, Plan, Reduced, Signed
+from stochastic.truncated_normal import Array
+
+SOURCES = ("space", "theta", "table")  # of error, see rve.result.Homogenised
+SHOWN = 61  # points of a stored stress curve
+
+
+def theta_shown(theta: tuple[float, ...]) -> Array:
+    """The θ at which stress curves are stored, shape (SHOWN,)."""
+    return np.linspace(theta[0], theta[1], SHOWN)
+
+
+@dataclass(frozen=True)
+class CellTask:
+    """One task of the campaign: samples that share everything but the inclusion's modulus. Runs in any process.
+
+    Args:
+        choice: Model of the cell.
+        crisp: Inputs that are not fuzzy, by name, in SI.
+        theta: Support of θ.
+    """
+
+    choice: CellChoice
+    crisp: Mapping[str, float]
+    theta: tuple[float, ...]
+
+    def __call__(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float | Array]]:
+        """Outputs of each point: E, nu, mean stresses, stress curves, linear systems solved, errors by source, certificate."""
+        values = [{**self.crisp, **point} for point in points]
+        radius, matrix, _ = parts(values[0], self.theta)
+        inclusions = [parts(value, self.theta)[2] for value in values]
+        results = self.choice.model().solve(radius, matrix, inclusions)
+        outputs: list[dict[str, float | Array]] = []
+        for result in results:
+            s11, s12 = result.curve.mean
+            means = {"E": result.modulus, "nu": result.poisson, "s11": s11, "s12": s12, "systems": len(result.iterations)}
+            curves = {
+                name: self.resampled(result.curve.theta, stress)
+                for name, stress in (("curve11", result.curve.s11), ("curve12", result.curve.s12))
+            }
+            errors = {f"error:{source}": result.error.get(source, 0.0) for source in SOURCES}
+            outputs.append({**means, **curves, **errors, **{f"check:{name}": value for name, value in result.checks.items()}})
+        return outputs
+
+    def resampled(self, nodes: Array, stress: Array) -> Array:
+        """A stress curve at `SHOWN` points over θ, for pictures: models choose their own nodes, and not the same for every sample."""
+        from scipy.interpolate import PchipInterpolator
+
+        return np.asarray(PchipInterpolator(nodes, stress)(theta_shown(self.theta)))
+
+
+def plan_of(case: Case) -> Plan:
+    """The plan that a case asks for."""
+    plans: dict[str, Plan] = {
+        "general": General(),
+        "reduced": Reduced(),
+        "extended": Extended(outputs=("E",)),
+        "signed": Signed(outputs=("E",)),
+    }
+    return plans[case.text("modulus.plan")]
+
+
+def fuzzy_inputs(case: Case) -> dict[str, FuzzyNumber]:
+    """The inputs of the cell that are fuzzy, by name, in SI."""
+    numbers = {name: case.fuzzy(key_of(name)) for name in INPUTS}
+    found = {name: number for name, number in numbers.items() if number.support.width > 0}
+    return found or {"inclusion_modulus": numbers["inclusion_modulus"]}
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What is to be run: the cell's task, its fuzzy inputs, the plan.
+
+    Args:
+        task: The function, for any process.
+        inputs: Fuzzy inputs by name, in SI.
+        plan: How their boxes are searched.
+        alpha: Levels, rising.
+        shared: Inputs whose equality lets samples share a mesh and its assembly.
+        store: File that keeps every sample; a campaign that was stopped goes on from there.
+    """
+
+    task: CellTask
+    inputs: Mapping[str, FuzzyNumber]
+    plan: Plan
+    alpha: tuple[float, ...]
+    shared: tuple[str, ...]
+    store: Path | None = None
+
+    @property
+    def identity(self) -> dict[str, Any] | None:
+        """What a sample depends on besides its fuzzy inputs; None without a store."""
+        return identity(self.task.choice, self.task.crisp, self.task.theta) if self.store else None
+
+
+def campaign(case: Case, *, petsc: Mapping[str, str] | None = None, exclude: tuple[str, ...] = (), store: Path | None = None) -> Campaign:
+    """The campaign that a case asks for.
+
+    Args:
+        case: With the sections radius, cell, mesh and modulus.
+        petsc: PETSc options that override the solver's.
+        exclude: Models that method auto must not take.
+        store: File that keeps every sample.
+    """
+    inputs = fuzzy_inputs(case)
+    crisp = {name: case.fuzzy(key_of(name)).modal for name in INPUTS if name not in inputs}
+    task = CellTask(cell_choice(case, exclude=exclude, petsc=petsc), crisp, case.numbers("radius.theta"))
+    shared = tuple(name for name in inputs if name in SHARED) or ("inclusion_modulus",)
+    return Campaign(task, inputs, plan_of(case), case.numbers("modulus.alpha"), shared, store)
+
+
+def identity(choice: CellChoice, crisp: Mapping[str, float], theta: tuple[float, ...]) -> dict[str, Any]:
+    """What a sample depends on besides its fuzzy inputs: model, resolution, crisp inputs, the program and its libraries."""
+    source = source_digest(("stochastic", "rve"))
+    return {"choice": asdict(choice), "crisp": dict(crisp), "theta": list(theta), "source": source, "versions": versions()}

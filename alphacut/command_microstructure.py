@@ -1,0 +1,59 @@
+"""``alphacut microstructure``, also ``python -m stochastic microstructure``: from particles to the fuzzy radius map."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+from alphacut import microstructure
+from alphacut.loading import load
+from alphacut.options import add_common, add_workers, check_workers
+from alphacut.output import as_json, whole_file, write_text
+from alphacut.progress import progress
+from alphacut.provenance import attributes, fingerprint, versions
+
+if TYPE_CHECKING:
+    from stochastic.microstructure import Microstructure
+
+ABOUT = "from particles, packed or measured, to the random radius and its fuzzy map"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    add_common(parser)
+    add_workers(parser)
+    parser.add_argument("--out", metavar="FOLDER", help="write radius.toml (a case fragment), microstructure.nc and figures here")
+    parser.add_argument("--no-figures", action="store_true", help="numbers only")
+
+
+def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
+    """Compute, write, report."""
+    check_workers(options.workers)
+    case = load(options.case, options.set)
+    case.need("microstructure.seed")
+    with progress("Microstructure", quiet=options.quiet) as tick:
+        found = microstructure.compute(case, workers=options.workers, progress=tick)
+    written: list[str] = []
+    if options.out:
+        key = fingerprint(case.values, ("stochastic",))
+        written = write(found, Path(options.out), attributes(case.text_of_file, key), figures=not options.no_figures)
+    document = {**found.summary(), "fragment": found.fragment(), "files": written, "versions": versions()}
+    if options.json == "-":
+        out.write(as_json(document))
+    elif options.json:
+        write_text(options.json, as_json(document, indent=2))
+    if options.json != "-" and not options.quiet:
+        out.write(found.fragment())
+    return 0
+
+
+def write(found: Microstructure, folder: Path, said: Mapping[str, str | int], *, figures: bool = True) -> list[str]:
+    """Write dataset and figures and, last of all, the fragment; returns the paths from `folder`."""
+    with whole_file(folder / "microstructure.nc") as partial:
+        found.to_dataset().assign_attrs(said).to_netcdf(partial)
+    drawn = found.draw(folder / "figures") if figures else {}
+    write_text(folder / "radius.toml", found.fragment())
+    files = [folder / "microstructure.nc", folder / "radius.toml", *(path for paths in drawn.values() for path in paths)]
+    return [str(path.relative_to(folder)) for path in files]

@@ -1,0 +1,99 @@
+"""The microstructure of a case: from particles, packed or measured, to the fuzzy radius map that the cell takes."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from alphacut.case import Case
+from alphacut.consistency import beside
+from alphacut.problem import BadInput, Problem
+from alphacut.progress import Tick
+from alphacut.reading import read
+from alphacut.schema import RADIUS
+
+if TYPE_CHECKING:
+    from stochastic.microstructure import Microstructure, Study
+    from stochastic.sections import Measured, Simulated
+
+SOURCES = ("packing", "circles", "image")
+
+
+def source(case: Case) -> Simulated | Measured:
+    """Where the discs come from."""
+    from stochastic.circle_file import CircleFile
+    from stochastic.log_normal import LogNormalRadii
+    from stochastic.packing import Packing
+    from stochastic.section_image import SectionImage
+    from stochastic.sections import Measured, Simulated
+
+    key = "microstructure"
+    if case.has(f"{key}.packing.discs"):
+        key += ".packing"
+        smallest, largest = case.number(f"{key}.smallest_radius"), case.number(f"{key}.largest_radius")
+        radii, fraction = LogNormalRadii(smallest, largest), case.number(f"{key}.area_fraction")
+        gap, method = case.number(f"{key}.gap"), case.text(f"{key}.method")
+        packing = Packing(case.integer(f"{key}.discs"), fraction, radii, gap=gap, method=method)
+        return Simulated(packing, case.integer(f"{key}.packings"))
+    if case.has(f"{key}.circles.file"):
+        key += ".circles"
+        width, height = case.numbers(f"{key}.size")
+        x, y = case.numbers(f"{key}.origin")
+        words = {"periodic": case.values[f"{key}.periodic"] is True, "drop": case.values[f"{key}.drop"] is True}
+        path = beside(case, case.text(f"{key}.file"))
+        return Measured(
+            CircleFile(path, (width, height), (x, y), unit=case.text(f"{key}.unit"), overlap=case.number(f"{key}.overlap"), **words)
+        )
+    key += ".image"
+    return Measured(SectionImage(beside(case, case.text(f"{key}.file")), case.number(f"{key}.pixel"), case.text(f"{key}.particles")))
+
+
+def study_of(case: Case) -> Study:
+    """What the case asks for.
+
+    Raises:
+        BadInput: A value lies outside its range.
+    """
+    from stochastic.microstructure import Study
+
+    limits = case.numbers("microstructure.limits") if case.has("microstructure.limits") else None
+    try:
+        return Study(
+            source(case),
+            (limits[0], limits[1]) if limits else None,
+            case.number("microstructure.share"),
+            case.integer("microstructure.seed"),
+            case.number("microstructure.confidence"),
+            case.integer("microstructure.bootstrap"),
+        )
+    except ValueError as error:
+        raise BadInput(Problem("microstructure", str(error), file=str(case.path))) from None
+
+
+def compute(case: Case, *, workers: int = 1, progress: Tick | None = None) -> Microstructure:
+    """From particles to the fuzzy radius map; the same for any number of workers.
+
+    Raises:
+        BadInput: Measured data make no sense.
+    """
+    from fuzzy.workers import pool
+    from stochastic.microstructure import study
+
+    wanted = study_of(case)
+    with pool(workers) as executor:
+        try:
+            return study(wanted, executor=executor, progress=progress)
+        except ValueError as error:
+            raise BadInput(Problem("microstructure", str(error), file=str(case.path))) from None
+
+
+def with_radius(case: Case, fragment: str) -> Case:
+    """The case with the section [radius] of a fragment."""
+    table = tomllib.loads(fragment)["radius"]
+    return case.with_values(radius={name: read(value, RADIUS.keys[name]) for name, value in table.items()})
+
+
+def read_fragment(path: Path) -> str:
+    """The fragment that a run has stored."""
+    return path.read_text(encoding="utf-8")
