@@ -103,8 +103,12 @@ class Packing:
 
 def packings(wish: Packing, number: int, *, seed: int, executor: Executor | None = None) -> Iterator[Discs]:
     """`number` independent packings; the k-th depends on `seed` and k only, not on order, number or workers."""
-    seeds = np.random.SeedSequence(seed).spawn(number)
-    return (executor.map if executor else map)(_one, [wish] * number, seeds)
+    return (executor.map if executor else map)(_one, [wish] * number, packing_seeds(seed, number))
+
+
+def packing_seeds(seed: int, number: int) -> list[np.random.SeedSequence]:
+    """Independent streams of chance for `number` packings; the k-th depends on `seed` and k only."""
+    return np.random.SeedSequence(seed).spawn(number)
 
 
 def _one(wish: Packing, seed: np.random.SeedSequence) -> Discs:

@@ -14,7 +14,7 @@ from stochastic.area_weighted import AreaWeighted
 from stochastic.circle_file import CircleFile
 from stochastic.discs import Discs
 from stochastic.open_window import WholeCells, whole_cells
-from stochastic.packing import Packing, packings
+from stochastic.packing import Packing, packing_seeds
 from stochastic.refused import RefusedError
 from stochastic.section_image import SectionImage
 
@@ -70,9 +70,10 @@ class Simulated:
 
     def sections(self, seed: int, *, executor: Executor | None = None, progress: Progress | None = None) -> list[Section]:
         """Every packing with its cells."""
-        made = []
-        for discs in packings(self.packing, self.packings, seed=seed, executor=executor):
-            made.append(_section(discs))
+        made: list[Section] = []
+        seeds = packing_seeds(seed, self.packings)
+        for section in (executor.map if executor else map)(_packed, [self.packing] * self.packings, seeds):
+            made.append(section)
             if progress:
                 progress(len(made) / self.packings)
         return made
@@ -114,6 +115,10 @@ def reduced_radii(sections: list[Section]) -> AreaWeighted:
     if sample.values[-1] > np.sqrt(4 / np.pi):
         raise RefusedError(f"a cell has r_n = {sample.values[-1]:.4g}, more area of disc than of cell: discs overlap; mend the data")
     return sample
+
+
+def _packed(packing: Packing, seed: np.random.SeedSequence) -> Section:
+    return _section(packing.make(np.random.default_rng(seed)))
 
 
 def _section(discs: Discs, rejected: dict[int, str] | None = None) -> Section:
