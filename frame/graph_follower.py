@@ -20,6 +20,11 @@ from frame.jet import Array
 from frame.storage import Storage
 
 
+Index = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
+APART = 0.5
+"""Distance in unit coordinates from which graphs count as distinct."""
+
+
 class FollowerStep(NamedTuple):
     """What happened at one node for one bound (Figs. 21 to 23).
 
@@ -56,7 +61,7 @@ class Followed:
     """
 
     bounds: Array
-    best: np.ndarray[tuple[int, ...], np.dtype[np.int64]]
+    best: Index
     correction: Array
     storage: Storage
     steps: list[FollowerStep] = field(default_factory=list)
@@ -138,7 +143,7 @@ class GraphFollower:
         storage = out.storage
         signed = _signed(storage.values[node])  # (m, 2, G)
         attained = signed.max(-1).ravel()
-        guesses = self._guesses(signed.reshape(-1, signed.shape[-1]))
+        guesses = self._guesses(signed.reshape(-1, signed.shape[-1]), storage.points)
         new: list[Array] = []
         tried: list[tuple[int, int, int, float]] = []
         for guess in guesses.T:
@@ -155,20 +160,19 @@ class GraphFollower:
         if self.record:
             self._note(out, level, node, guesses[:, 0], tried)
 
-    def _guesses(self, signed: Array) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
-        """Indices of the best stored graphs per bound, best first, shape (2m, models)."""
-        count = min(self.models, signed.shape[1])
-        if count == 1:
-            best: np.ndarray[tuple[int, ...], np.dtype[np.int64]] = signed.argmax(1)[:, None]
-            return best
-        top = np.argpartition(-signed, count - 1, axis=1)[:, :count]
-        order = np.take_along_axis(-signed, top, 1).argsort(1)
-        ranked: np.ndarray[tuple[int, ...], np.dtype[np.int64]] = np.take_along_axis(top, order, 1)
-        return ranked
+    def _guesses(self, signed: Array, points: Array) -> Index:
+        """Indices of the best stored graphs per bound, best first and each apart from those before, shape (2m, models)."""
+        left = signed
+        out: list[Index] = []
+        for _ in range(min(self.models, signed.shape[1])):
+            best = left.argmax(1)
+            out.append(best)
+            if len(out) < self.models:
+                near = np.abs(points[best][:, None] - points[None]).max(-1) < APART
+                left = np.where(near, -np.inf, left)
+        return np.stack(out, 1)
 
-    def _optima(
-        self, storage: Storage, node: int, guess: np.ndarray[tuple[int, ...], np.dtype[np.int64]], box: tuple[Array, Array]
-    ) -> tuple[Array, Array, Array]:
+    def _optima(self, storage: Storage, node: int, guess: Index, box: tuple[Array, Array]) -> tuple[Array, Array, Array]:
         """Values of the guesses, steps to the optima of their Taylor models over the box (eq. 22), and the gains these promise."""
         m = len(guess) // 2
         side = np.tile([-1.0, 1.0], m)
@@ -198,7 +202,7 @@ class GraphFollower:
         out: Followed,
         level: int,
         node: int,
-        guesses: np.ndarray[tuple[int, ...], np.dtype[np.int64]],
+        guesses: Index,
         tried: list[tuple[int, int, int, float]],
     ) -> None:
         found = {k: (guess, graph, value) for k, guess, graph, value in reversed(tried)}

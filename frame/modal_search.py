@@ -68,8 +68,8 @@ class ModalSearch:
         seed: Of the samples.
     """
 
-    samples: int = 1024
-    starts: int = 3
+    samples: int = 512
+    starts: int = 2
     iterations: int = 10
     resolution: float = 0.25
     seed: int = 0
@@ -148,7 +148,27 @@ class ModalSearch:
             which = np.flatnonzero(apart & (rival.value > found.value - margin))
             refine(model, rival, which, lower, upper, self.iterations)
             found.offer(model, rival.point[which], which)
+        self._contest(model, found, lower, upper)
         return found.value.reshape(total, m, 2), found.point.reshape(total, m, 2, d)
+
+    def _contest(self, model: ModalModel, found: Optima, lower: Array, upper: Array) -> None:
+        """Where the optimum jumps between neighbouring nodes, refines either optimum at the other node, until no jump moves."""
+        grid = np.arange(len(found.value)).reshape(-1, 2 * len(model.outputs))
+        open_ = np.ones(len(found.value), bool)
+        for _ in range(20):
+            moved: list[Array] = []
+            for here, there in ((grid[1:].ravel(), grid[:-1].ravel()), (grid[:-1].ravel(), grid[1:].ravel())):
+                jump = np.abs(found.point[here] - found.point[there]).max(1) > 0.05 * (upper - lower).max()
+                jump &= open_[here] | open_[there]
+                rival = found.take(here[jump])
+                rival.point[:] = found.point[there[jump]]
+                rival.value[:] = rival.side * model.value_at(rival.point, rival.node, rival.output) if jump.any() else 0.0
+                refine(model, rival, np.arange(len(rival.value)), lower, upper, self.iterations)
+                moved.append(found.offer(model, rival.point, here[jump]))
+            open_[:] = False
+            open_[np.concatenate(moved)] = True
+            if not open_.any():
+                return
 
     def _samples(self, lower: Array, upper: Array) -> Array:
         d = len(lower)
