@@ -96,14 +96,26 @@ def apply_change(raw: Raw, change: str) -> str:
         raise BadInput(Problem("--set", "there is no = in it", change, "KEY=VALUE, for example cell.matrix_modulus='20 GPa'"))
     if not full:
         raise BadInput(Problem("--set", f"there is no key {name}", change, "any key of the case", nearest(name, known)))
-    present = [key for key in full if key.rpartition(".")[2] in raw.get(key.rpartition(".")[0], {})] if len(full) > 1 else full
+    present = [key for key in full if key.rpartition(".")[2] in (table_of(raw, key.rpartition(".")[0]) or {})] if len(full) > 1 else full
     if len(present) != 1 or present[0].startswith("study."):
         raise BadInput(Problem("--set", f"the key {name} is not clear", change, "one of " + ", ".join(full)))
     section, _, key = present[0].rpartition(".")
-    table = raw.setdefault(section, {}) if section else raw
-    if isinstance(table, dict):
+    table = table_of(raw, section, make=True)
+    if table is not None:
         table[key] = toml_or_text(value.strip(), known[present[0]])
     return present[0]
+
+
+def table_of(raw: Raw, section: str, *, make: bool = False) -> Raw | None:
+    """The table of a section, ``microstructure.packing`` for one inside another; None where there is none."""
+    table: Any = raw
+    for name in section.split(".") if section else ():
+        if name not in table and make:
+            table[name] = {}
+        table = table.get(name)
+        if not isinstance(table, dict):
+            return None
+    return table  # type: ignore[no-any-return]
 
 
 def toml_or_text(value: str, key: Key) -> object:

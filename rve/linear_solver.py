@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
 from petsc4py import PETSc
 
-from rve.solver_options import PREFIX
+from rve.petsc_options import in_database
+from rve.solver_options import PREFIX, SolverOptions
 from stochastic.truncated_normal import Array
 
 
@@ -28,36 +28,23 @@ class LinearSolver:
 
     Args:
         matrix: The reduced stiffness, symmetric positive definite.
-        options: PETSc options without their prefix `rve_`.
+        options: PETSc options.
         context: What `pc_type python` stands for.
 
     Raises:
-        ValueError: PETSc does not know an option or its value.
+        OptionError: PETSc does not know an option or its value.
     """
 
-    def __init__(self, matrix: PETSc.Mat, options: Mapping[str, str], context: Preconditioner | None) -> None:
+    def __init__(self, matrix: PETSc.Mat, options: SolverOptions, context: Preconditioner | None) -> None:
         matrix.setOption(PETSc.Mat.Option.SPD, True)
         self.krylov = PETSc.KSP().create(matrix.comm)
         self.krylov.setOptionsPrefix(PREFIX)
         self.krylov.setOperators(matrix)
-        self._configure(options, context)
-
-    def _configure(self, options: Mapping[str, str], context: Preconditioner | None) -> None:
-        database = PETSc.Options(PREFIX)
-        for name, value in options.items():
-            database[name] = value
-        try:
+        with in_database(options.all, wanted=options.given):
             self.krylov.setFromOptions()
             if self.krylov.pc.getType() == "python":
                 self.krylov.pc.setPythonContext(context)
             self.krylov.setUp()
-        except PETSc.Error as failure:
-            raise ValueError(
-                f"PETSc refuses the options {' '.join(f'-{PREFIX}{k} {v}' for k, v in options.items())}: {failure}"
-            ) from failure
-        finally:
-            for name in options:
-                database.delValue(name)
 
     def solve(self, load: PETSc.Vec) -> tuple[Array, int, float]:
         """The whole solution vector, on every rank, the number of iterations, and the relative residual as it truly is.

@@ -22,7 +22,7 @@ from rve.prism_grid import PrismGrid
 from rve.prism_system import PrismSystem, SliceMeans
 from rve.prism_task import Displacements, PrismTask
 from rve.result import Homogenised, StressCurve
-from rve.solver_options import SOLVERS, describe
+from rve.solver_options import SolverOptions
 from rve.stopwatch import Stopwatch
 from rve.triangulation import triangulate
 from stochastic import RadiusMap
@@ -62,9 +62,9 @@ class PrismModel:
             raise ValueError(f"the mesh size is {self.mesh_size:g}; it must lie in (0, 1], in halves of the cell's side")
         if self.layers < 1:
             raise ValueError(f"the number of layers is {self.layers}; at least 1 is needed")
-        for what, value, known in (("interface", self.interface, INTERFACES), ("solver", self.solver, SOLVERS)):
-            if value not in known:
-                raise ValueError(f"the {what} is {value!r}; known are {', '.join(known)}")
+        if self.interface not in INTERFACES:
+            raise ValueError(f"the interface is {self.interface!r}; known are {', '.join(INTERFACES)}")
+        SolverOptions(self.solver)
 
     def solve(self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]) -> list[Homogenised]:
         """One result for each of `inclusions`, in their order: mesh and assembly once, one solve for each load.
@@ -103,7 +103,12 @@ class PrismModel:
         return THREE_LOADS if self.stiffness else LOADS
 
     def _task(self, system: PrismSystem, watch: Stopwatch) -> PrismTask:
-        return PrismTask(system, self.solver, {**SOLVERS[self.solver], **self.petsc}, self._loads, watch)
+        return PrismTask(system, self.options, self._loads, watch)
+
+    @property
+    def options(self) -> SolverOptions:
+        """The linear solver with what overrides it."""
+        return SolverOptions(self.solver, self.petsc)
 
     def _result(self, system: PrismSystem, displacements: Displacements, phases: tuple[Phase, Phase]) -> Homogenised:
         loads = self._loads
@@ -114,7 +119,7 @@ class PrismModel:
         return Homogenised(
             curve=curve,
             method="prism",
-            solver=describe(self.solver, {**SOLVERS[self.solver], **self.petsc}),
+            solver=str(self.options),
             unknowns=system.numbering.size,
             iterations=displacements.iterations,
             checks=require(certify(system, displacements, means, phases, loads), self.limits),
@@ -124,7 +129,7 @@ class PrismModel:
     def limits(self) -> Limits:
         """What the certificate allows: round-off, and for the bounds the stiffness that the mesh adds, of third order in h."""
         order = 3 if self.interface == "conforming" else 1
-        return Limits(discretisation=0.1 * min(self.mesh_size, 1.0) ** order)
+        return Limits(algebraic=self.options.residual_limit, discretisation=0.1 * min(self.mesh_size, 1.0) ** order)
 
 
 def certify(

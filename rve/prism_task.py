@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from petsc4py import PETSc
@@ -11,6 +11,7 @@ from rve.cell import Phase
 from rve.level_blocks import LevelBlocks
 from rve.linear_solver import LinearSolver, Preconditioner
 from rve.prism_system import PrismSystem
+from rve.solver_options import SolverOptions
 from rve.stopwatch import Stopwatch
 from rve.theta_preconditioner import ThetaPreconditioner
 from stochastic.truncated_normal import Array
@@ -40,14 +41,13 @@ class PrismTask:
 
     Args:
         system: Mesh and forms, already moved to the map.
-        solver: Name in `rve.solver_options.SOLVERS`.
-        options: PETSc options without prefix.
+        options: Linear solver.
         loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3).
         watch: Takes the times.
     """
 
-    def __init__(self, system: PrismSystem, solver: str, options: Mapping[str, str], loads: Array, watch: Stopwatch) -> None:
-        self.system, self.solver, self.options, self.strains, self.watch = system, solver, options, loads, watch
+    def __init__(self, system: PrismSystem, options: SolverOptions, loads: Array, watch: Stopwatch) -> None:
+        self.system, self.options, self.strains, self.watch = system, options, loads, watch
         self.affine = system.affine(loads)
         self.poissons: tuple[float, float] | None = None
 
@@ -96,9 +96,9 @@ class PrismTask:
         return Displacements(total, self.affine, tuple(iterations), max(residuals))
 
     def _context(self, operator: PETSc.Mat, phases: tuple[Phase, Phase]) -> Preconditioner | None:
-        if self.options["pc_type"] != "python":
+        if self.options.all["pc_type"] != "python":
             return None
-        return LevelBlocks(self.system.numbering, operator) if self.solver == "blocks" else self._theta(phases)
+        return LevelBlocks(self.system.numbering, operator) if self.options.solver == "blocks" else self._theta(phases)
 
     def _theta(self, phases: tuple[Phase, Phase]) -> ThetaPreconditioner:
         """Made once and kept while the contrast stays within a factor 1.25."""

@@ -85,7 +85,7 @@ def test_a_solver_that_stops_early_is_an_error():
 
 
 def test_a_wrong_petsc_option_is_named():
-    with pytest.raises(ValueError, match=r"PETSc refuses .*-rve_ksp_type nonsense"):
+    with pytest.raises(ValueError, match=r"PETSc refuses the options -rve_ksp_type nonsense: .*nonsense"):
         solve(mesh_size=0.3, layers=4, petsc={"ksp_type": "nonsense"})
 
 
@@ -101,3 +101,8 @@ def test_a_wrong_petsc_option_is_named():
 def test_an_option_out_of_range_is_refused(options, message):
     with pytest.raises(ValueError, match=message):
         PrismModel(**options)
+
+
+def test_a_misspelt_petsc_option_is_not_passed_over():
+    with pytest.raises(ValueError, match="PETSc has no use for -rve_ksp_tipe cg: check its spelling"):
+        solve(mesh_size=0.3, layers=4, petsc={"ksp_tipe": "cg"})
