@@ -18,11 +18,9 @@ from mpi4py import MPI
 
 from rve.cell import Phase
 from rve.planar_mesh import PlanarMesh, curved_nodes
-from rve.planar_system import Cholesky, PeriodicPattern
+from rve.planar_system import ModulusBasis, Pencil
 from rve.triangulation import Integers
 from stochastic.truncated_normal import Array
-
-AREA = 4.0
 
 
 @dataclass
@@ -40,6 +38,7 @@ class PlanarCell:
     mesh: PlanarMesh
     order: int
     seconds: dict[str, float] = field(default_factory=dict)
+    factorisations: int = 0
 
     def __post_init__(self) -> None:
         if not 1 <= self.order <= 4:
@@ -103,28 +102,30 @@ class PlanarCell:
         zero = np.zeros_like(x)
         return np.stack([np.stack([x, zero, y / 2], axis=-1), np.stack([zero, y, x / 2], axis=-1)], axis=1).reshape(-1, 3)
 
-    def solve(self, matrix: Phase, inclusions: Sequence[Phase]) -> tuple[Array, Array]:
-        """Homogenised stiffness (m, 3, 3) in Pa and displacements under the three unit strains (m, 2n, 3), m inclusions.
+    def stiffness(self, matrix: Phase, inclusions: Sequence[Phase]) -> Array:
+        """Homogenised stiffness of m inclusions in Pa, shape (m, 3, 3).
 
-        Inclusions of one Poisson's ratio share their assembly, and all share the symbolic factorisation.
+        Inclusions of one Poisson's ratio share assembly, ordering and, where they are many, a few full solutions (`ModulusBasis`).
         """
+        found = np.empty((len(inclusions), 3, 3))
+        for poisson in dict.fromkeys(p.poisson for p in inclusions):
+            places = [k for k, p in enumerate(inclusions) if p.poisson == poisson]
+            basis = ModulusBasis(self._pencil(matrix, poisson))
+            found[places] = basis.stiffness(np.array([inclusions[k].modulus for k in places]))
+            self.factorisations += basis.size
+        return found
+
+    def displacement(self, matrix: Phase, inclusion: Phase) -> Array:
+        """Displacements under the three unit strains at the nodes, shape (2n, 3), one node fixed in its fluctuation."""
+        pencil = self._pencil(matrix, inclusion.poisson)
+        return np.asarray(self.affine - self.periodic @ pencil.solve(inclusion.modulus)[0])
+
+    def _pencil(self, matrix: Phase, poisson: float) -> Pencil:
+        """The cell's stiffness as an affine function of the particle's modulus."""
         started = perf_counter()
-        outer = self._stiffness_of(0, matrix.poisson)
-        inner = {nu: self._stiffness_of(1, nu) for nu in dict.fromkeys(p.poisson for p in inclusions)}
-        self.seconds["assemble"] = perf_counter() - started
-        started = perf_counter()
-        reduce = PeriodicPattern(self.periodic_nodes, [outer, next(iter(inner.values()))])
-        reduced_outer, reduced_inner = reduce(0, outer), {nu: reduce(1, k) for nu, k in inner.items()}
-        factor = Cholesky(reduce.rows, reduce.columns)
-        stiffness, fields = [], []
-        for phase in inclusions:
-            force = matrix.modulus * (outer @ self.affine) + phase.modulus * (inner[phase.poisson] @ self.affine)
-            load = self.periodic.T @ force
-            correction = factor.solve(matrix.modulus * reduced_outer + phase.modulus * reduced_inner[phase.poisson], load)
-            stiffness.append((self.affine.T @ force - load.T @ correction) / AREA)  # ⟨σ⟩ by Hill–Mandel
-            fields.append(self.affine - self.periodic @ correction)
-        self.seconds["solve"] = perf_counter() - started
-        return np.array(stiffness), np.array(fields)
+        fixed, unit = matrix.modulus * self._stiffness_of(0, matrix.poisson), self._stiffness_of(1, poisson)
+        self.seconds["assemble"] = self.seconds.get("assemble", 0.0) + perf_counter() - started
+        return Pencil(fixed, unit, self.periodic_nodes, self.periodic, self.affine)
 
     @property
     def unknowns(self) -> int:

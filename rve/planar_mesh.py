@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import hypot
 
 import basix
 import gmsh
@@ -77,11 +78,15 @@ def _refuse_touching_side(radius: float, centre: tuple[float, float]) -> None:
 
 
 def _grading(x: float, y: float, radius: float) -> float:
-    """Local edge length over the wanted one: less near a small particle, and in the gap between a particle and its images."""
+    """Local edge length over the wanted one: less near the particle, and in the gap between a particle and its images.
+
+    The factors spread the error evenly over radii from 0.1 to 0.98. Gmsh calls this for every point, hence no NumPy.
+    """
     x, y = abs((x + 1) % 2 - 1), abs((y + 1) % 2 - 1)
-    reach = 2 * max(np.hypot(x, y), radius)
-    gap = min(1 - radius + y * y / (2 * radius) + max(0.0, radius - x), 1 - radius + x * x / (2 * radius) + max(0.0, radius - y))
-    return float(min(1.0, reach, 3 * gap))
+    reach = 1.4 * max(hypot(x, y), radius)
+    beside = 1 - radius + y * y / (2 * radius) + max(0.0, radius - x)
+    above = 1 - radius + x * x / (2 * radius) + max(0.0, radius - y)
+    return min(1.0, reach, 4 * beside, 4 * above)
 
 
 def _geometry(radius: float, centre: tuple[float, float]) -> set[int]:

@@ -12,6 +12,8 @@ from rve.triangulation import Integers
 from stochastic.truncated_normal import Array
 
 SOLVER = "MUMPS Cholesky"
+AREA = 4.0
+_BASIS_TOLERANCE = 1e-11  # relative change of the stiffness by one more solution in the basis
 
 
 class PlanarError(RuntimeError):
@@ -85,3 +87,87 @@ class Cholesky:
         if not residual < 1e-8:  # also catches nan
             raise PlanarError(f"the Cholesky factorisation leaves a relative residual of {residual:.1e}; 1e-8 is allowed: check the moduli")
         return solutions
+
+
+class Pencil:
+    """One cell's system for any modulus E of the particle: (fixed + E · unit), periodic, under the three unit strains.
+
+    Args:
+        fixed: Unreduced stiffness of the matrix.
+        unit: Unreduced stiffness of the particle for a modulus of 1 Pa.
+        nodes: Periodic number of each node.
+        periodic: P, shape (2n, unknowns).
+        affine: Displacements of the three unit strains, shape (2n, 3).
+    """
+
+    def __init__(self, fixed: sp.csr_matrix, unit: sp.csr_matrix, nodes: Integers, periodic: sp.csr_matrix, affine: Array) -> None:
+        pattern = PeriodicPattern(nodes, [fixed, unit])
+        self._values = pattern(0, fixed), pattern(1, unit)
+        self._shape = pattern.columns, pattern.rows
+        self._factor = Cholesky(pattern.rows, pattern.columns)
+        forces = fixed @ affine, unit @ affine
+        self.loads = tuple(np.asarray(periodic.T @ force) for force in forces)
+        self.uniform = tuple(np.asarray(affine.T @ force) for force in forces)  # 3 × 3: energy without fluctuation
+
+    def solve(self, modulus: float) -> tuple[Array, Array]:
+        """Fluctuations less their sign, shape (unknowns, 3), and the stiffness in Pa, shape (3, 3), for the particle's modulus in Pa."""
+        load = self.loads[0] + modulus * self.loads[1]
+        correction = self._factor.solve(self._values[0] + modulus * self._values[1], load)
+        uniform = self.uniform[0] + modulus * self.uniform[1]
+        return correction, (uniform - load.T @ correction) / AREA  # ⟨σ⟩ by Hill–Mandel
+
+    def project(self, basis: Array) -> tuple[Array, Array]:
+        """Vᵀ K V of both parts for a basis V, shape (unknowns, k)."""
+        parts = [basis.T @ (sp.csr_matrix((values, *self._shape)) @ basis) for values in self._values]
+        return parts[0], parts[1]
+
+
+class ModulusBasis:
+    """Galerkin on the solutions at a few moduli of the particle.
+
+    The energy is stationary, so each solution matches value and slope of the stiffness there, and the error falls like that of a
+    rational interpolant of twice as many nodes. Solutions are added where the last one changed most, until it changed nothing.
+
+    Args:
+        pencil: The system.
+    """
+
+    def __init__(self, pencil: Pencil) -> None:
+        self._pencil, self.size = pencil, 0
+        self._vectors = np.empty((pencil.loads[0].shape[0], 0))
+
+    def stiffness(self, moduli: Array) -> Array:
+        """Stiffness for every one of `moduli` in Pa, shape (m, 3, 3)."""
+        if moduli.size <= 2:
+            self.size = moduli.size
+            return np.array([self._pencil.solve(float(e))[1] for e in moduli])
+        self._add(float(moduli.min()))
+        self._add(float(moduli.max()))
+        found, taken = self._galerkin(moduli), {float(moduli.min()), float(moduli.max())}
+        change = np.array([0.0 if float(e) in taken else np.inf for e in moduli])
+        middle = np.sqrt(moduli.min() * moduli.max())
+        while change.max() > _BASIS_TOLERANCE:
+            candidates = np.flatnonzero(change == change.max())
+            worst = float(moduli[candidates[np.argmin(np.abs(np.log(moduli[candidates] / middle)))]])
+            self._add(worst)
+            taken.add(worst)
+            better = self._galerkin(moduli)
+            change = np.abs(better - found).max(axis=(1, 2)) / np.abs(better).max(axis=(1, 2))
+            change[[float(e) in taken for e in moduli]] = 0.0
+            found = better
+        return found
+
+    def _add(self, modulus: float) -> None:
+        solution = self._pencil.solve(modulus)[0]
+        self._vectors = np.linalg.qr(np.hstack([self._vectors, solution / np.linalg.norm(solution, axis=0)]))[0]
+        self.size += 1
+
+    def _galerkin(self, moduli: Array) -> Array:
+        fixed, unit = self._pencil.project(self._vectors)
+        loads = [self._vectors.T @ load for load in self._pencil.loads]
+        stiffness = []
+        for modulus in moduli:
+            load = loads[0] + modulus * loads[1]
+            uniform = self._pencil.uniform[0] + modulus * self._pencil.uniform[1]
+            stiffness.append((uniform - load.T @ np.linalg.solve(fixed + modulus * unit, load)) / AREA)
+        return np.array(stiffness)

@@ -9,14 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
-from rve.cell import STRAIN, Phase
-from rve.result import Homogenised, StressCurve, effective_modulus
+from rve.cell import Phase
+from rve.result import Homogenised, StressCurve
 from rve.series_stiffness import square_stiffness
-from rve.slices_rule import theta_rule
+from rve.slices import curve_of
+from rve.slices_rule import settle_rule
 from stochastic import RadiusMap, ThetaRule
 from stochastic.truncated_normal import Array
-
-_MOST_POINTS = 512
 
 
 @dataclass(frozen=True)
@@ -45,42 +44,28 @@ class SeriesModel:
         """One result for each of `inclusions`, in their order.
 
         Raises:
-            SeriesError: Particles nearly touch, or the rule in θ is out of nodes (a map that is not smooth).
+            SeriesError: Particles nearly touch.
+            RuleError: No rule in θ settles (a map that is not smooth).
         """
         start = perf_counter()
-        points = self.points or 16
-        coarse = self._curves(theta_rule(radius_map, points=-(-3 * points // 4)), radius_map, matrix, inclusions)
-        while True:
-            fine = self._curves(theta_rule(radius_map, points=points), radius_map, matrix, inclusions)
-            gaps = [_gap(a, b) for a, b in zip(coarse[0], fine[0], strict=True)]
-            if self.points or max(gaps) <= self.accuracy or points >= _MOST_POINTS:
-                break
-            coarse, points = fine, 2 * points
+        used: list[tuple[Array, Array]] = []
+
+        def curves_at(rule: ThetaRule) -> list[StressCurve]:
+            cells = square_stiffness(radius_map(rule.nodes), matrix, inclusions, tolerance=self.accuracy)
+            used.append((rule.mean(cells.error), cells.harmonics.max(axis=0)))
+            return [curve_of(rule, cells.matrix[:, k]) for k in range(len(inclusions))]
+
+        curves, gaps = settle_rule(radius_map, curves_at, points=self.points, accuracy=self.accuracy)
+        error, harmonics = used[-1]
         seconds = {"solve": perf_counter() - start, "total": perf_counter() - start}
-        curves, error, harmonics = fine
         return [
             Homogenised(
                 curve=curve,
                 method=self.name,
                 unknowns=int(harmonics[k]),
                 seconds=seconds,
-                error={"space": float(error[k]), "theta": gap},
+                error={"space": float(error[k]), "theta": gaps[k]},
                 reason=f"{curve.theta.size} nodes in θ, {harmonics[k]} harmonics",
             )
-            for k, (curve, gap) in enumerate(zip(curves, gaps, strict=True))
+            for k, curve in enumerate(curves)
         ]
-
-    def _curves(
-        self, rule: ThetaRule, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
-    ) -> tuple[list[StressCurve], Array, Array]:
-        """Curve, truncation error and harmonics of each inclusion."""
-        cells = square_stiffness(radius_map(rule.nodes), matrix, inclusions, tolerance=self.accuracy)
-        s11, s12 = STRAIN * cells.bulk, 2 * STRAIN * cells.shear  # eq. 15
-        curves = [StressCurve(rule.nodes, rule.weights, s11[:, k], s12[:, k], stiffness=cells.matrix[:, k]) for k in range(len(inclusions))]
-        return curves, rule.mean(cells.error), cells.harmonics.max(axis=0)
-
-
-def _gap(coarse: StressCurve, fine: StressCurve) -> float:
-    """Relative difference in E of eq. 16 between two rules."""
-    a, b = (effective_modulus(*curve.mean)[0] for curve in (coarse, fine))
-    return abs(a - b) / abs(b)

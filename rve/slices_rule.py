@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from rve.result import effective_modulus
+from rve.result import StressCurve, effective_modulus
 from stochastic import RadiusMap, ThetaRule, gauss_rule
 from stochastic.truncated_normal import Array
 
 _SAMPLES = 2049
 _LEAST_JUMP = 1e-3  # in radii
 _FINE = 128
+_MOST_POINTS = 800
 DIGITS = 12  # radii equal to so many decimals are one slice
+
+
+class RuleError(RuntimeError):
+    """No rule in θ reaches the wanted accuracy."""
 
 
 def jumps(radius_map: RadiusMap) -> Array:
@@ -53,6 +60,35 @@ def theta_rule(radius_map: RadiusMap, *, points: int) -> ThetaRule:
     nodes = (edges[:-1, None] + half * (1 + x)).ravel()
     weights = (half * w).ravel() * law.pdf(nodes)
     return ThetaRule(nodes, weights / weights.sum())
+
+
+def settle_rule(
+    radius_map: RadiusMap, curves_at: Callable[[ThetaRule], list[StressCurve]], *, points: int | None, accuracy: float
+) -> tuple[list[StressCurve], list[float]]:
+    """Curves by a rule whose nodes are doubled until E of all of them settles within `accuracy`, and the last change of each.
+
+    Args:
+        radius_map: The map.
+        curves_at: Stress curves at the nodes of a rule; cheap.
+        points: Nodes, or None to have them found.
+        accuracy: Relative change of E that counts as settled.
+
+    Raises:
+        RuleError: No rule in reach settles.
+    """
+    count = points or 12
+    coarse, coarse_count = curves_at(theta_rule(radius_map, points=-(-3 * count // 4))), -(-3 * count // 4)
+    while True:
+        fine = curves_at(theta_rule(radius_map, points=count))
+        gaps = [abs(effective_modulus(*a.mean)[0] / effective_modulus(*b.mean)[0] - 1) for a, b in zip(coarse, fine, strict=True)]
+        if points or max(gaps) <= accuracy:
+            return fine, gaps
+        if count >= _MOST_POINTS:
+            raise RuleError(
+                f"rules of {coarse_count} and {count} nodes in θ leave E {max(gaps):.1e} apart and {accuracy:.1e} is wanted: "
+                f"the radius map is not smooth; allow a larger error, or give the number of nodes"
+            )
+        coarse, coarse_count, count = fine, count, 2 * count
 
 
 def extreme_radii(radius_map: RadiusMap) -> Array:

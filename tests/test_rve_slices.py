@@ -23,7 +23,7 @@ def largest_error(stiffness, radius, matrix, inclusions):
 
 def planar_stiffness(radius, order, *, size, matrix=MATRIX, inclusions=(INCLUSION,), centre=(0.0, 0.0)):
     mesh = planar_mesh.planar_mesh(radius, size=size, centre=centre)
-    return planar.PlanarCell(mesh, order).solve(matrix, inclusions)[0]
+    return planar.PlanarCell(mesh, order).stiffness(matrix, inclusions)
 
 
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
@@ -54,8 +54,20 @@ def test_rate_of_the_stiffness(order, low, high):
 def test_full_stiffness_is_exact_for_other_poissons_ratios():
     inclusions = [Phase(300e9, 0.1), Phase(1e9, 0.45)]
     stiffness = planar_stiffness(0.8, 4, size=0.2, matrix=Phase(20e9, 0.2), inclusions=inclusions)
-    assert largest_error(stiffness, 0.8, Phase(20e9, 0.2), inclusions) < 1e-6
+    assert largest_error(stiffness, 0.8, Phase(20e9, 0.2), inclusions) < 5e-6
     np.testing.assert_allclose(stiffness, np.swapaxes(stiffness, 1, 2), rtol=0, atol=1e-9 * stiffness.max())
+
+
+def test_many_moduli_share_a_few_solutions():
+    cell = planar.PlanarCell(planar_mesh.planar_mesh(0.7, size=0.4), 3)
+    inclusions = [Phase(e) for e in np.geomspace(2e6, 2e14, 15)]
+    shared = cell.stiffness(MATRIX, inclusions)
+    assert cell.factorisations < 15
+    alone = np.array([cell.stiffness(MATRIX, [phase])[0] for phase in inclusions])
+    np.testing.assert_allclose(shared, alone, rtol=1e-10, atol=1e-10 * MATRIX.modulus)
+    cell.factorisations = 0
+    cell.stiffness(MATRIX, [Phase(e) for e in np.linspace(75e9, 85e9, 9)])
+    assert cell.factorisations <= 4
 
 
 @pytest.mark.slow
@@ -110,19 +122,19 @@ def test_order_4_cures_the_locking_of_order_2(poissons):
 @pytest.mark.parametrize("contrast", [1e-6, 1e6])
 def test_error_of_a_slice_is_declared_at_the_edges(radius, contrast):
     inclusion = Phase(20e9 * contrast, 0.2)
-    solved = solve_slice(radius, MATRIX, [inclusion], orders=(2, 3), mesh_size=0.4)
+    solved = solve_slice(radius, MATRIX, [inclusion], orders=(2, 3, 4), mesh_size=0.5)
     exact = square_stiffness(np.array([radius]), MATRIX, [inclusion])
-    for k, (value, modulus) in enumerate(
-        ((solved.stiffness[0, 0, 0] + solved.stiffness[0, 0, 1], exact.bulk), (solved.stiffness[0, 2, 2], exact.shear))
-    ):
-        true = abs(value / modulus[0, 0] - 1)
-        assert true < solved.gaps[-1, 0, k] / 4 < 40 * true + 1e-9
+    true = max(
+        abs((solved.stiffness[0, 0, 0] + solved.stiffness[0, 0, 1]) / exact.bulk[0, 0] - 1),
+        abs(solved.stiffness[0, 2, 2] / exact.shear[0, 0] - 1),
+    )
+    assert true < solved.error[0] < 10 * true
 
 
 def test_model_declares_its_error():
     radius_map, inclusions = HermiteMap(0.1337, 0.1, 0.8663, 0.1692), [Phase(75e9), Phase(80e9)]
     progress = []
-    results = SlicesModel(order=3, mesh_size=0.4, points=6, progress=progress.append).solve(radius_map, MATRIX, inclusions)
+    results = SlicesModel(order=4, mesh_size=0.5, points=6, progress=progress.append).solve(radius_map, MATRIX, inclusions)
     exact = SeriesModel().solve(radius_map, MATRIX, inclusions)
     for result, truth in zip(results, exact, strict=True):
         true = abs(result.modulus / truth.modulus - 1)
