@@ -1,5 +1,6 @@
 """Fuzzy inputs through any model: α-cuts, plans of samples, fuzzy results."""
 
+from fuzzy.arithmetic import DependencyError, apply
 from fuzzy.campaign import CampaignError
 from fuzzy.chebyshev import Chebyshev
 from fuzzy.domain import Domain, levels
@@ -14,6 +15,8 @@ from fuzzy.propagation import propagate
 from fuzzy.response_surface import ResponseSurface
 from fuzzy.result import FuzzyResult, Nature
 from fuzzy.sampling import MonteCarlo, QuasiMonteCarlo
+from fuzzy.sets import FuzzySet, from_data
+from fuzzy.shares import Shares, width_shares
 from fuzzy.signed import Signed
 from fuzzy.store import Store, StoreError
 from fuzzy.transformation import Extended, General, Reduced, Vertex
@@ -23,12 +26,14 @@ __all__ = [
     "Chebyshev",
     "Crisp",
     "Cut",
+    "DependencyError",
     "Domain",
     "Ellipsoidal",
     "Explanation",
     "Extended",
     "FuzzyNumber",
     "FuzzyResult",
+    "FuzzySet",
     "General",
     "Interval",
     "Known",
@@ -41,6 +46,7 @@ __all__ = [
     "QuasiMonteCarlo",
     "Reduced",
     "ResponseSurface",
+    "Shares",
     "Signed",
     "Store",
     "StoreError",
@@ -48,7 +54,10 @@ __all__ = [
     "Triangular",
     "Verification",
     "Vertex",
+    "apply",
     "explain",
+    "from_data",
     "levels",
     "propagate",
+    "width_shares",
 ]

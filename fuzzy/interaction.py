@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 
 from fuzzy.numbers import Array, FuzzyNumber
+
+_HALVINGS = 50
 
 
 class Interaction(Protocol):
@@ -95,6 +97,26 @@ class Ellipsoidal:
             i, j = names.index(one), names.index(other)
             matrix[i, j] = matrix[j, i] = value
         return matrix
+
+
+def pulled(point: Array, anchor: Array, slack: Callable[[Array], Array]) -> Array:
+    """The point, moved towards an allowed anchor just so far that it is allowed itself; an optimiser may leave it a little outside.
+
+    Args:
+        point: Shape (inputs,).
+        anchor: An allowed point, shape (inputs,).
+        slack: Room at points (n, inputs), shape (n,).
+    """
+    outside, inside = 0.0, 1.0
+    if slack(point[None])[0] >= 0:
+        return point
+    for _ in range(_HALVINGS):
+        middle = (outside + inside) / 2
+        if slack((point + middle * (anchor - point))[None])[0] >= 0:
+            inside = middle
+        else:
+            outside = middle
+    return point + inside * (anchor - point)
 
 
 def _signed_distance(number: FuzzyNumber, x: Array) -> Array:

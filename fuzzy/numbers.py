@@ -74,6 +74,44 @@ class FuzzyNumber(ABC):
         x = np.asarray(x, float)
         return np.minimum(_highest_level(x, levels, lower), _highest_level(-x, levels, -upper))
 
+    def __add__(self, other: FuzzyNumber | float) -> FuzzyNumber:
+        return _combine("+", self, other)
+
+    def __radd__(self, other: float) -> FuzzyNumber:
+        return _combine("+", other, self)
+
+    def __sub__(self, other: FuzzyNumber | float) -> FuzzyNumber:
+        return _combine("-", self, other)
+
+    def __rsub__(self, other: float) -> FuzzyNumber:
+        return _combine("-", other, self)
+
+    def __mul__(self, other: FuzzyNumber | float) -> FuzzyNumber:
+        return _combine("*", self, other)
+
+    def __rmul__(self, other: float) -> FuzzyNumber:
+        return _combine("*", other, self)
+
+    def __truediv__(self, other: FuzzyNumber | float) -> FuzzyNumber:
+        return _combine("/", self, other)
+
+    def __rtruediv__(self, other: float) -> FuzzyNumber:
+        return _combine("/", other, self)
+
+    def __neg__(self) -> FuzzyNumber:
+        return _combine("-", 0.0, self)
+
+    def __pow__(self, exponent: int) -> FuzzyNumber:
+        from fuzzy.arithmetic import power
+
+        return power(self, exponent)
+
+
+def _combine(sign: str, left: FuzzyNumber | float, right: FuzzyNumber | float) -> FuzzyNumber:
+    from fuzzy.arithmetic import combine
+
+    return combine(sign, left, right)
+
 
 def _interpolate(alpha: float, levels: Sequence[float], ends: Sequence[float]) -> float:
     """The end of the cut at `alpha`, exact at the given levels."""

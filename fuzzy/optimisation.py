@@ -9,6 +9,7 @@ import numpy as np
 
 from fuzzy.design import Design
 from fuzzy.domain import Domain
+from fuzzy.interaction import pulled
 from fuzzy.memo import Memo
 from fuzzy.model import Model
 from fuzzy.monotone import primary
@@ -145,7 +146,9 @@ class _Cut:
         bounds = [(0.0, 1.0)] * len(start)
         if self.domain.interactions:
             alpha = self.domain.alpha[self.level]
-            room = {"type": "ineq", "fun": lambda unit: float(self.domain.slack(self.points(unit[None]), alpha)[0]) - 1e-9}
-            minimize(objective, start, jac=True, bounds=bounds, constraints=[room], method="SLSQP")
+            room = {"type": "ineq", "fun": lambda unit: float(self.domain.slack(self.points(unit[None]), alpha)[0])}
+            found = minimize(objective, start, jac=True, bounds=bounds, constraints=[room], method="SLSQP")
+            place, anchor = self.points(np.clip([found.x, start], 0, 1))
+            self.memo(pulled(place, anchor, lambda points: self.domain.slack(points, alpha))[None])
         else:
             minimize(objective, start, jac=True, bounds=bounds, method="L-BFGS-B", options={"maxiter": 50})

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
+from fuzzy.interaction import pulled
 from fuzzy.numbers import Array
 
 Slack = Callable[[Array], Array]
@@ -61,10 +62,16 @@ class Polynomial:
 
         Returns:
             The place, shape (inputs,), and the output there.
+
+        Raises:
+            ValueError: No point seems allowed.
         """
         scan = box_scan(lower, upper)
         if slack is not None:
-            scan = np.concatenate([scan[slack(scan) >= 0], (lower + upper)[None] / 2])
+            allowed = scan[slack(scan) >= 0]
+            if not len(allowed):
+                raise ValueError("no point of a cut fulfils its interactions: they leave too little room, or none")
+            scan = allowed
         values = sign * (self.basis(scan) @ self.coefficients[:, output])
         starts = scan[np.argsort(values)[:_STARTS]]
         search = _Search(self, lower, upper, output=output, sign=sign, slack=slack)
@@ -99,7 +106,10 @@ class _Search:
         room = {"type": "ineq", "fun": self._room}
         options: dict[str, Any] = {"method": "SLSQP", "constraints": [room]} if self.slack else {"method": "L-BFGS-B"}
         found = minimize(self._objective, unit, jac=True, bounds=bounds, **options)
-        return self._point(found.x)[0], float(found.fun)
+        place = self._point(found.x)[0]
+        if self.slack:
+            place = pulled(place, start, self.slack)
+        return place, self.sign * float(self.polynomial(place[None])[0, self.output])
 
     def _objective(self, unit: Array) -> tuple[float, Array]:
         point = self._point(unit)
