@@ -21,6 +21,10 @@ test-slow:
 bench-solver:
 	$(IN) python -m benchmarks.cell_solvers
 
+lint:
+	ruff check . && ruff format --check .
+	$(IN) mypy --strict alphacut stochastic rve fuzzy frame
+
 charts:
 	$(IN) python -m benchmarks.cell_charts
 

@@ -45,7 +45,7 @@ def element_stiffness(positions: Array, stiffness: Array) -> Array:
     strain[..., 1, 1::2] = strain[..., 2, 0::2] = slope[..., 1, :]
     stress = (stiffness[:, None] * determinant[..., None, None] / 6) @ strain
     columns = strain.shape[-1]
-    return strain.reshape(len(strain), -1, columns).transpose(0, 2, 1) @ stress.reshape(len(strain), -1, columns)
+    return np.asarray(strain.reshape(len(strain), -1, columns).transpose(0, 2, 1) @ stress.reshape(len(strain), -1, columns))
 
 
 @dataclass(frozen=True)

@@ -114,7 +114,8 @@ def _side(system: PrismSystem, displacement: Array, stiffness: Array, *, inside:
             shears.append(shear)
     angle, normal, shear = (np.concatenate(parts, axis=1) for parts in (angles, normals, shears))
     order = np.argsort(angle, axis=1)
-    return np.take_along_axis(angle, order, 1), *(np.take_along_axis(t, order[..., None], 1) for t in (normal, shear))
+    normal, shear = (np.take_along_axis(field, order[..., None], 1) for field in (normal, shear))
+    return np.take_along_axis(angle, order, 1), normal, shear
 
 
 def _edge_points(system: PrismSystem, start: int, end: int) -> Array:

@@ -17,7 +17,7 @@ def moved(mesh: Triangulation, radius: float) -> Array:
     vertices = _slide(mesh.points[: mesh.vertices], mesh.radius, radius)
     points = np.concatenate([vertices, vertices[mesh.ends].mean(axis=1)])
     points[mesh.arc] *= radius / np.linalg.norm(points[mesh.arc], axis=1, keepdims=True)  # z = 0 of eq. 14
-    return points
+    return np.asarray(points)
 
 
 def _slide(points: Array, old: float, new: float) -> Array:
@@ -27,4 +27,4 @@ def _slide(points: Array, old: float, new: float) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         side = distance / reach  # distance of the square's side along the ray
         outer = (new + (distance - old) * (side - new) / (side - old)) / distance
-    return points * np.where(distance <= old * (1 + 1e-9), new / old, outer)[:, None]
+    return np.asarray(points * np.where(distance <= old * (1 + 1e-9), new / old, outer)[:, None])

@@ -71,7 +71,7 @@ class PrismSystem:
         if self.grid.conforming:
             return np.tile(self.grid.plane.inside, self.grid.layers)[:, None].astype(float)
         x = np.einsum("qn,cnd->cqd", self.form.shapes, self.positions[self.grid.cells])
-        return (np.hypot(x[..., 0], x[..., 1]) < self.map(x[..., 2])).astype(float)  # z < 0 in eq. 14
+        return np.asarray(np.hypot(x[..., 0], x[..., 1]) < self.map(x[..., 2]), float)  # z < 0 in eq. 14
 
     def stiffness(self, phase: int) -> PETSc.Mat:
         """Reduced K_m (phase 0) or K_i (phase 1) for a unit modulus."""
@@ -101,18 +101,19 @@ class PrismSystem:
         rule = layered_rule(self.map.distribution, layers=self.grid.layers, points=slices.slices)
         weights = rule.weights / rule.weights.sum()
         shares = np.broadcast_to(self.share, (len(self.share), len(self.form.points))).reshape(self.grid.layers, -1, slices.slices, 6)
-        stress, fraction, energy = [], [], 0.0
+        stress, fraction = [], []
+        energy = np.zeros((displacement.shape[2],) * 2)
         for k, layer in enumerate(slices.layers(displacement, stiffness)):
             stress.append(layer.mean)
             fraction.append(np.einsum("msp,msp->s", layer.area, shares[k]) / CELL_AREA)
             energy += np.tensordot(weights[k * slices.slices : (k + 1) * slices.slices], layer.energy, axes=1)
-        return SliceMeans(ThetaRule(rule.nodes, weights), np.concatenate(stress), np.concatenate(fraction), np.asarray(energy))
+        return SliceMeans(ThetaRule(rule.nodes, weights), np.concatenate(stress), np.concatenate(fraction), energy)
 
     def affine(self, loads: Array) -> Array:
         """Displacements ε̄·x of the nodes, shape (nodes, 2, loads)."""
         x = self.positions[:, :2]
         tensors = np.array([[[e[0], e[2] / 2], [e[2] / 2, e[1]]] for e in loads])
-        return np.einsum("lij,nj->nil", tensors, x)
+        return np.asarray(np.einsum("lij,nj->nil", tensors, x))
 
     def preconditioner(self, phases: tuple[Phase, Phase]) -> ThetaPreconditioner:
         """The θ-preconditioner for these phases."""

@@ -35,7 +35,7 @@ class LayerStress:
     @property
     def mean(self) -> Array:
         """Homogenised stress of each slice, shape (slices, 3, loads)."""
-        return (self.area[..., None, None] * self.stress).sum(axis=(0, 2)) / CELL_AREA
+        return np.asarray((self.area[..., None, None] * self.stress).sum(axis=(0, 2)) / CELL_AREA)
 
     @property
     def energy(self) -> Array:
@@ -43,7 +43,7 @@ class LayerStress:
         slices, loads = self.area.shape[1], self.stress.shape[-1]
         weighted = self.area[..., None, None] * self.stress
         left, right = (field.swapaxes(0, 1).reshape(slices, -1, loads) for field in (weighted, self.strain))
-        return left.swapaxes(1, 2) @ right / CELL_AREA
+        return np.asarray(left.swapaxes(1, 2) @ right / CELL_AREA)
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,8 @@ class ThetaMass:
 def theta_mass(law: TruncatedNormal, levels: Array) -> ThetaMass:
     """The mass matrices on the given levels, shape (layers + 1,)."""
     layers = len(levels) - 1
-    t, w = np.polynomial.legendre.leggauss(3)  # as the stiffness is integrated
-    t, w = (t + 1) / 2, w / 2
+    abscissae, double = np.polynomial.legendre.leggauss(3)  # as the stiffness is integrated
+    t, w = (abscissae + 1) / 2, double / 2
     shapes = np.array([1 - t, t, 4 * t * (1 - t)])
     theta = levels[:-1, None] + np.diff(levels)[:, None] * t
     local = np.einsum("lq,iq,jq->lij", w * np.diff(levels)[:, None] * law.pdf(theta), shapes, shapes)
