@@ -120,6 +120,7 @@ def compute(wanted: Campaign, *, workers: int = 1, progress: Tick | None = None)
         workers: Processes; the result is the same for any number. Under ``mpirun … -m mpi4py.futures`` all of those are used.
         progress: Told the share done.
     """
+    wanted.task.choice.model()  # a model that cannot be had is one problem, not one for each sample
     result = propagate(
         wanted.task,
         wanted.inputs,

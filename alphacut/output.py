@@ -7,7 +7,7 @@ import math
 import os
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -82,7 +82,8 @@ def standard_output(json_to_stdout: bool) -> Iterator[TextIO]:
     os.dup2(target, 1)
     stream = os.fdopen(kept if rank() == 0 else os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8")
     try:
-        yield stream
+        with redirect_stdout(sys.stderr if rank() == 0 else stream):
+            yield stream
     finally:
         stream.flush()
         sys.stdout.flush()

@@ -16,7 +16,7 @@ COARSE = {
     "modulus.tolerance": 1e-2,
     "envelope.alpha": LEVELS,
     "microstructure.bootstrap": 100,
-    "microstructure.packing.packings": 4,
+    "microstructure.packing.packings": 5,
     "microstructure.packing.discs": 500,
 }
 

@@ -12,7 +12,8 @@ SHIPPED = sorted(path for path in CASES.glob("*.toml") if not path.name.endswith
 
 
 def test_the_stored_schema_is_up_to_date():
-    assert (CASES / "case.schema.json").read_text(encoding="utf-8") == text(), "make it anew: python -m alphacut.json_schema > cases/case.schema.json"
+    stored = (CASES / "case.schema.json").read_text(encoding="utf-8")
+    assert stored == text(), "make it anew: python -m alphacut.json_schema > cases/case.schema.json"
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
