@@ -19,6 +19,7 @@ from fuzzy.result import FuzzyResult
 
 Method = Literal["multistart", "differential_evolution", "shgo", "direct", "dual_annealing"]
 _DIFFERENCE = 1e-6  # step of a derivative, as a share of the width of the cut
+_APART = 0.25  # least distance of two starts, as a share of the width of the cut: they should lie in different valleys
 _CORNERS = 6  # inputs up to which the first look includes all corners
 
 
@@ -125,12 +126,15 @@ class _Cut:
             self.memo(points[allowed])
 
     def best(self, output: str, sign: float, count: int) -> Array:
-        """The best few of all samples in the cut, in unit coordinates."""
+        """The best few of all samples in the cut that are not close to a better one, in unit coordinates."""
         points = self.memo.points
         points = points[self.domain.inside(points)[self.level]]
-        order = np.argsort(sign * self.memo(points).select([output])[:, 0], kind="stable")[:count]
-        unit: Array = (points[order] - self.lower)[:, self.moving] / (self.upper - self.lower)[self.moving]
-        return np.clip(unit, 0, 1)
+        unit: Array = np.clip((points - self.lower)[:, self.moving] / (self.upper - self.lower)[self.moving], 0, 1)
+        chosen: list[Array] = []
+        for row in np.argsort(sign * self.memo(points).select([output])[:, 0], kind="stable"):
+            if len(chosen) < count and all(np.abs(unit[row] - other).max() > _APART for other in chosen):
+                chosen.append(unit[row])
+        return np.array(chosen)
 
     def descend(self, start: Array, output: str, sign: float) -> None:
         """A descent by gradients inside the cut; its samples stay in the memo."""
