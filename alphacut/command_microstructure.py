@@ -50,10 +50,12 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
 
 
 def write(found: Microstructure, folder: Path, said: Mapping[str, str | int], *, figures: bool = True) -> list[str]:
-    """Write dataset and figures and, last of all, the fragment; returns the paths from `folder`."""
-    with whole_file(folder / "microstructure.nc") as partial:
-        found.to_dataset().assign_attrs(said).to_netcdf(partial)
+    """Write numbers, figures, the fragment and, last of all, the dataset; returns the paths from `folder`."""
+    write_text(folder / "microstructure.json", as_json(found.summary(), indent=2))
     drawn = found.draw(folder / "figures") if figures else {}
     write_text(folder / "radius.toml", found.fragment())
-    files = [folder / "microstructure.nc", folder / "radius.toml", *(path for paths in drawn.values() for path in paths)]
+    with whole_file(folder / "microstructure.nc") as partial:
+        found.to_dataset().assign_attrs(said).to_netcdf(partial)
+    numbers = [folder / name for name in ("microstructure.json", "microstructure.nc", "radius.toml")]
+    files = [*numbers, *(path for paths in drawn.values() for path in paths)]
     return [str(path.relative_to(folder)) for path in files]

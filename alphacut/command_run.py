@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TextIO
 
-from alphacut import figures, summary
-from alphacut.chain import Chain
+from alphacut import figures, shares, summary
+from alphacut.chain import Chain, Results
 from alphacut.loading import load
 from alphacut.options import add_common, add_workers, check_workers
-from alphacut.output import as_json, say, write_text
+from alphacut.output import as_json, say, whole_file, write_text
+from alphacut.provenance import attributes, fingerprint
 from alphacut.quick import quick
 
 ABOUT = "run every stage of a case: files, figures, summary, and the comparison with the paper where the case has one"
@@ -40,8 +41,14 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     start = time.perf_counter()
     chain = Chain(case, folder, options.workers, options.fresh, options.quiet, petsc, options.strict)
     results = chain.run()
-    drawn = [] if options.no_figures else figures.draw(results, quiet=options.quiet)
-    found: dict[str, Any] = {**summary.summary(results), "figures": drawn, "seconds": time.perf_counter() - start}
+    driving = chain.stored("shares.nc", *driven(chain, results))
+    drawn = [] if options.no_figures else figures.draw(results, driving, quiet=options.quiet)
+    found: dict[str, Any] = {
+        **summary.summary(results),
+        "shares": shares.mean_shares(driving),
+        "figures": drawn,
+        "seconds": time.perf_counter() - start,
+    }
     document = as_json(found, indent=2)
     write_text(folder / "summary.json", document)
     if options.json == "-":
@@ -52,3 +59,14 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         out.write(summary.table(found["paper"]) if found["paper"] else "")
         say(f"results are in {folder}, {len(drawn)} figures among them, after {found['seconds']:.0f} s")
     return 0
+
+
+def driven(chain: Chain, results: Results) -> tuple[str, Callable[[Path], None]]:
+    """Fingerprint and making of shares.nc, which says what drives the widths."""
+    key = fingerprint({"case": results.case.values, "modulus": results.handed}, ("stochastic", "rve", "fuzzy", "frame", "alphacut"))
+
+    def compute(path: Path) -> None:
+        with whole_file(path) as partial:
+            shares.dataset(results).assign_attrs(attributes(results.case.text_of_file, key)).to_netcdf(partial)
+
+    return key, compute

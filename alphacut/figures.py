@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from alphacut import figure_envelope, figure_follower, figure_frame, figure_fuzzy, figure_modulus, figure_radius
+from alphacut import figure_envelope, figure_follower, figure_frame, figure_fuzzy, figure_modulus, figure_radius, figure_shares
 from alphacut.chain import Results
 from alphacut.figure_style import save, style
 from alphacut.progress import progress
 
 if TYPE_CHECKING:
+    import xarray
     from matplotlib.figure import Figure
 
 Drawing = tuple[str, Callable[[], "Figure"]]
@@ -19,8 +22,9 @@ Drawing = tuple[str, Callable[[], "Figure"]]
 def drawings(results: Results) -> Iterator[Drawing]:
     """Name and function of each figure that the results allow."""
     if results.case.has("radius.a1"):
-        yield "fig11-radii", lambda: figure_radius.radii(results.case)
-        yield "fig13-p-box", lambda: figure_radius.p_box(results.case)
+        if "microstructure" not in results.case.stages:  # that stage draws both from its particles
+            yield "fig11-radii", lambda: figure_radius.radii(results.case)
+            yield "fig13-p-box", lambda: figure_radius.p_box(results.case)
         yield "fig14-cone", lambda: figure_radius.cone(results.case)
     if (modulus := results.modulus) is not None:
         yield "fig16-stress-curves", lambda: figure_modulus.stress_curves(modulus)
@@ -38,17 +42,33 @@ def drawings(results: Results) -> Iterator[Drawing]:
         yield from figure_envelope.drawings(study, results.envelopes[study.name])
 
 
-def draw(results: Results, *, quiet: bool = False) -> list[str]:
+def share_drawings(driving: xarray.Dataset) -> Iterator[Drawing]:
+    """Figures of what drives the widths."""
+    if "modulus_share" in driving:
+        yield "shares-modulus", lambda: figure_shares.of_modulus(driving)
+    if "share" in driving:
+        yield "shares-over-time", lambda: figure_shares.over_time(driving)
+
+
+def draw(results: Results, driving: xarray.Dataset, *, quiet: bool = False) -> list[str]:
     """Draw every figure as SVG and PNG into figures/; returns the names of the files."""
     folder = results.folder / "figures"
     names: list[str] = []
-    todo = list(drawings(results))
+    todo = [*drawings(results), *share_drawings(driving)]
     with progress("Figures", quiet=quiet) as tick, style():
         for done, (name, make) in enumerate(todo, start=1):
             names += [str(path.relative_to(results.folder)) for path in save(make(), folder / name)]
             if tick:
                 tick(done / len(todo))
-    return names + mesh_picture(results)
+    return [*particle_pictures(folder, results), *names, *mesh_picture(results)]
+
+
+def particle_pictures(folder: Path, results: Results) -> list[str]:
+    """The figures that the microstructure stage has drawn: 03-04_two_point … 13_pbox, radius_map."""
+    if "microstructure" not in results.case.stages:
+        return []
+    found = [path for path in sorted(folder.iterdir()) if re.match(r"\d|radius_map", path.name)]
+    return [str(path.relative_to(results.folder)) for path in found]
 
 
 def mesh_picture(results: Results) -> list[str]:

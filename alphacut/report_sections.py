@@ -17,6 +17,8 @@ SVG_LIMIT = 200_000  # bytes; a heavier figure goes into the page as PNG
 
 def sections(summary: Mapping[str, Any], folder: Path) -> Iterator[str]:
     """All sections that the results allow, in reading order."""
+    if "microstructure" in summary:
+        yield microstructure(summary["microstructure"])
     if "modulus" in summary:
         yield modulus(summary["modulus"], folder)
     if summary.get("envelopes"):
@@ -48,6 +50,19 @@ def table(head: Sequence[str], rows: Sequence[Sequence[object]], *, numbers: int
     top = "".join(cell("th", column, name) for column, name in enumerate(head))
     body = "".join("<tr>" + "".join(cell("td", column, entry) for column, entry in enumerate(row)) + "</tr>\n" for row in rows)
     return f"<table><thead><tr>{top}</tr></thead><tbody>\n{body}</tbody></table>"
+
+
+def microstructure(found: Mapping[str, Any]) -> str:
+    """Particles, cells, and the fuzzy radius map."""
+    low, high = found["limits"]
+    words = (
+        f"<p>{found['discs']} discs in {found['packings']} sections, area fraction {found['area_fraction']:.4f}. The limits "
+        f"{low:.4g} and {high:.4g} of r/a keep {found['share_kept']:.3%} of the area.</p>"
+    )
+    rows = [("a1", f"{found['a1']:.5g}")]
+    rows += [(name, "[" + ", ".join(f"{end:.5g}" for end in found[name]) + "]") for name in ("a2", "a4")]
+    rows.insert(2, ("a3", f"{found['a3']:.5g}"))
+    return section("Microstructure", words, table(("parameter of the radius map", "fuzzy value"), rows))
 
 
 def modulus(found: Mapping[str, Any], folder: Path) -> str:
@@ -137,7 +152,9 @@ def gallery(summary: Mapping[str, Any], folder: Path) -> str:
 def caption(stem: str) -> str:
     """Words for the name of a figure's file: fig13-p-box becomes Fig. 13: p-box."""
     number, _, words = stem.partition("-")
-    found = re.fullmatch(r"fig(\d+)", number)
+    if particles := re.fullmatch(r"([\d-]+)_(.*)", stem):
+        return f"Fig. {particles[1]}: {particles[2].replace('_', ' ')}"
+    found = re.fullmatch(r"fig([\d]+)", number)
     return f"Fig. {found[1]}: {words.replace('-', ' ')}" if found else stem.replace("-", " ")
 
 

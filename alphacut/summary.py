@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import tomllib
 from collections.abc import Mapping
@@ -26,6 +27,9 @@ def summary(results: Results) -> dict[str, Any]:
     case = results.case
     words = {"case": case.name, "title": case.text("title"), "about": case.text("about"), "case_text": case.text_of_file}
     found: dict[str, Any] = {"format_version": FORMAT, **words, "command": " ".join(sys.argv), "versions": versions()}
+    particles = results.folder / "microstructure.json"
+    if "microstructure" in case.stages and particles.is_file():
+        found["microstructure"] = json.loads(particles.read_text(encoding="utf-8"))
     if case.has("radius.a1"):
         found["area_fraction"] = area_fraction(results)
     if results.modulus is not None:
