@@ -6,11 +6,14 @@ from fuzzy.chebyshev import Chebyshev
 from fuzzy.domain import Domain, levels
 from fuzzy.explain import Explanation, explain
 from fuzzy.interaction import Ellipsoidal, Linear
+from fuzzy.interval_sampling import IntervalQuasiMonteCarlo, IntervalResponse, RandomInput
 from fuzzy.known import Known
+from fuzzy.metamodel import Metamodel, TrainedBounds
 from fuzzy.monotone import Verification
 from fuzzy.numbers import Crisp, Cut, FuzzyNumber, Interval, PiecewiseLinear, Trapezoidal, Triangular
 from fuzzy.optimisation import Optimisation
 from fuzzy.plan import Plan
+from fuzzy.polymorphic import RandomResponse
 from fuzzy.propagation import propagate
 from fuzzy.response_surface import ResponseSurface
 from fuzzy.result import FuzzyResult, Nature
@@ -36,20 +39,26 @@ __all__ = [
     "FuzzySet",
     "General",
     "Interval",
+    "IntervalQuasiMonteCarlo",
+    "IntervalResponse",
     "Known",
     "Linear",
+    "Metamodel",
     "MonteCarlo",
     "Nature",
     "Optimisation",
     "PiecewiseLinear",
     "Plan",
     "QuasiMonteCarlo",
+    "RandomInput",
+    "RandomResponse",
     "Reduced",
     "ResponseSurface",
     "Shares",
     "Signed",
     "Store",
     "StoreError",
+    "TrainedBounds",
     "Trapezoidal",
     "Triangular",
     "Verification",

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import PchipInterpolator
 
 from fuzzy.design import Design
 from fuzzy.domain import Domain
@@ -46,6 +45,8 @@ class RandomResponse:
             theta: Output with the nodes, rising.
             quantile: Quantile function of θ, any shape.
         """
+        from scipy.interpolate import PchipInterpolator
+
         wanted = quantile((np.arange(_STRATA) + 0.5) / _STRATA)
         nodes, values = result.values.output(theta), result.values.output(curve)
         rows = [PchipInterpolator(nodes[i], values[i], extrapolate=True)(wanted) for i in range(len(nodes))]
