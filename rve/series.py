@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from time import perf_counter
 
 from rve.cell import Phase
-from rve.result import Homogenised, StressCurve
+from rve.result import Homogenised
 from rve.series_stiffness import square_stiffness
-from rve.slices import curve_of
+from rve.slices_curve import certified
 from rve.slices_rule import settle_rule
-from stochastic import RadiusMap, ThetaRule
+from stochastic import RadiusMap
 from stochastic.truncated_normal import Array
 
 
@@ -50,15 +50,16 @@ class SeriesModel:
         start = perf_counter()
         used: list[tuple[Array, Array]] = []
 
-        def curves_at(rule: ThetaRule) -> list[StressCurve]:
-            cells = square_stiffness(radius_map(rule.nodes), matrix, inclusions, tolerance=self.accuracy)
-            used.append((rule.mean(cells.error), cells.harmonics.max(axis=0)))
-            return [curve_of(rule, cells.matrix[:, k]) for k in range(len(inclusions))]
+        def stiffness_at(radii: Array) -> Array:
+            cells = square_stiffness(radii, matrix, inclusions, tolerance=self.accuracy)
+            used.append((cells.error, cells.harmonics))
+            return cells.matrix
 
-        curves, gaps = settle_rule(radius_map, curves_at, points=self.points, accuracy=self.accuracy)
-        error, harmonics = used[-1]
+        curves, gaps = settle_rule(radius_map, stiffness_at, points=self.points, accuracy=self.accuracy)
+        nodes = curves[0].theta.size
+        error, harmonics = curves[0].weights @ used[-1][0][-nodes:], used[-1][1][-nodes:].max(axis=0)
         seconds = {"solve": perf_counter() - start, "total": perf_counter() - start}
-        return [
+        results = [
             Homogenised(
                 curve=curve,
                 method=self.name,
@@ -69,3 +70,4 @@ class SeriesModel:
             )
             for k, curve in enumerate(curves)
         ]
+        return [certified(r, radius_map, matrix, phase) for r, phase in zip(results, inclusions, strict=True)]

@@ -8,7 +8,7 @@ out, as in Weierstrass' ζ and Natanzon's Q; what that leaves out is linear in z
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 from scipy.special import gammaln, zeta
@@ -31,7 +31,7 @@ class LatticeSums:
     plain: Array
     conjugate: Array
 
-    @property
+    @cached_property
     def natanzon_period(self) -> float:
         """The constant g of Q(z + P) − Q(z) = conj(P) ℘(z) + g P, from z = −1, P = 2, where Q and ℘ are 1 and −1 apart by oddness."""
         n = np.arange(2, len(self.plain))

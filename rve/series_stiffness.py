@@ -36,11 +36,16 @@ class SquareStiffness:
     @property
     def matrix(self) -> Array:
         """Voigt matrices (11, 22, 12 with 2 ε12), shape (…, 3, 3)."""
-        voigt = np.zeros((*self.bulk.shape, 3, 3))
-        voigt[..., 0, 0] = voigt[..., 1, 1] = (self.bulk + self.deviator) / 2
-        voigt[..., 0, 1] = voigt[..., 1, 0] = (self.bulk - self.deviator) / 2
-        voigt[..., 2, 2] = self.shear
-        return voigt
+        return square_voigt(self.bulk, self.deviator, self.shear)
+
+
+def square_voigt(bulk: Array, deviator: Array, shear: Array) -> Array:
+    """Voigt matrices (…, 3, 3) of square symmetry from C11 + C12, C11 − C12 and C33 of one shape."""
+    voigt = np.zeros((*bulk.shape, 3, 3))
+    voigt[..., 0, 0] = voigt[..., 1, 1] = (bulk + deviator) / 2
+    voigt[..., 0, 1] = voigt[..., 1, 0] = (bulk - deviator) / 2
+    voigt[..., 2, 2] = shear
+    return voigt
 
 
 def square_stiffness(
@@ -84,9 +89,9 @@ def square_stiffness(
 
 def _first_guess(radius: Array, tolerance: float) -> Array:
     """Harmonics for each radius, from the rate at which images of touching particles fade, in steps that keep batches few."""
-    rate = 6 * np.arccosh(1 / np.maximum(radius, 1e-3))
-    steps = np.array([3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, MOST_HARMONICS])
-    return steps[np.minimum(np.searchsorted(steps, 1 + np.log(100 / tolerance) / rate), steps.size - 1)]
+    rate = 8 * np.arccosh(1 / np.maximum(radius, 1e-3))
+    steps = np.array([3, 4, 5, 6, 8, 10, 12, 16, 24, 32, 48, 64, 96, 128, MOST_HARMONICS])
+    return steps[np.minimum(np.searchsorted(steps, np.log(1 / tolerance) / rate), steps.size - 1)]
 
 
 def _batches(rows: Array, entries: int) -> list[Array]:

@@ -11,10 +11,11 @@ from time import perf_counter
 
 import numpy as np
 
-from rve.cell import STRAIN, Phase
-from rve.result import Homogenised, StressCurve
+from rve.cell import Phase
+from rve.result import Homogenised
+from rve.slices_curve import certified, curve_of, modulus_error, stresses
 from rve.slices_rule import DIGITS, extreme_radii, theta_error, theta_rule
-from stochastic import RadiusMap, ThetaRule
+from stochastic import RadiusMap
 from stochastic.truncated_normal import Array
 
 _IRREGULAR_FADE = 0.15
@@ -87,7 +88,8 @@ class SlicesModel:
                 "theta": theta_error(radius_map, rule, radii=radii, stress=np.stack(stresses(stiffness), axis=1)),
             }
             reason = f"{rule.nodes.size} nodes in θ, elements of order {self.order}, mesh size {self.mesh_size:g}"
-            results.append(Homogenised(curve, self.name, slices[0].solver, max(s.unknowns for s in slices), (), seconds, error, reason))
+            result = Homogenised(curve, self.name, slices[0].solver, max(s.unknowns for s in slices), (), seconds, error, reason)
+            results.append(certified(result, radius_map, matrix, inclusions[m]))
         return results
 
 
@@ -159,21 +161,3 @@ def solve_slice(
     for name in ("mesh", "jit", "assemble"):
         seconds[name] = seconds.get(name, 0.0) + sum(cell.seconds[name] for cell in cells)
     return Slice(orders[-1], stiffness, cells[-1].unknowns, SOLVER, sum(cell.factorisations for cell in cells), seconds)
-
-
-def stresses(stiffness: Array) -> tuple[Array, Array]:
-    """σ11 under load 1 and σ12 under load 2 of eq. 15 from stiffnesses (n, 3, 3)."""
-    return STRAIN * (stiffness[:, 0, 0] + stiffness[:, 0, 1]), 2 * STRAIN * stiffness[:, 2, 2]
-
-
-def curve_of(rule: ThetaRule, stiffness: Array) -> StressCurve:
-    """Stress over θ from the stiffness (n, 3, 3) at the nodes."""
-    return StressCurve(rule.nodes, rule.weights, *stresses(stiffness), stiffness)
-
-
-def modulus_error(curve: StressCurve, error: Array) -> float:
-    """Relative error of E of eq. 16 from that of C11 + C12 and C33 at the nodes, shape (n,), whatever their signs."""
-    s11, s12 = curve.mean
-    bulk, shear = (float(curve.weights @ (s * error)) / mean for s, mean in ((curve.s11, s11), (curve.s12, s12)))
-    ratio = s12 / s11
-    return (abs(ratio) * bulk + abs(3 - 2 * ratio) * shear) / abs(3 - ratio)  # E = A (3 − A/B) / 2

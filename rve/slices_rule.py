@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 
 from rve.result import StressCurve, effective_modulus
+from rve.slices_curve import curve_of
 from stochastic import RadiusMap, ThetaRule, gauss_rule
-from stochastic.truncated_normal import Array
+from stochastic.truncated_normal import Array, TruncatedNormal
 
 _SAMPLES = 2049
 _LEAST_JUMP = 1e-3  # in radii
 _FINE = 128
 _MOST_POINTS = 800
 DIGITS = 12  # radii equal to so many decimals are one slice
+
+
+@lru_cache(maxsize=256)
+def _gauss_rule(law: TruncatedNormal, points: int) -> ThetaRule:
+    return gauss_rule(law, points=points)
 
 
 class RuleError(RuntimeError):
@@ -53,7 +60,7 @@ def theta_rule(radius_map: RadiusMap, *, points: int) -> ThetaRule:
     law = radius_map.distribution
     breaks = jumps(radius_map)
     if breaks.size == 0:
-        return gauss_rule(law, points=points)
+        return _gauss_rule(law, points)
     x, w = np.polynomial.legendre.leggauss(points)
     edges = np.concatenate([[law.lower], breaks, [law.upper]])
     half = np.diff(edges)[:, None] / 2
@@ -63,39 +70,65 @@ def theta_rule(radius_map: RadiusMap, *, points: int) -> ThetaRule:
 
 
 def settle_rule(
-    radius_map: RadiusMap, curves_at: Callable[[ThetaRule], list[StressCurve]], *, points: int | None, accuracy: float
+    radius_map: RadiusMap, stiffness_at: Callable[[Array], Array], *, points: int | None, accuracy: float
 ) -> tuple[list[StressCurve], list[float]]:
-    """Curves by a rule whose nodes are doubled until E of all of them settles within `accuracy`, and the last change of each.
+    """Curves by a rule whose nodes are added until E of all of them settles within `accuracy`, and the estimated error of each.
+
+    Rules of four, two and one nodes less tell how large the error is and how fast it fades; what fades further is declared, doubled.
 
     Args:
         radius_map: The map.
-        curves_at: Stress curves at the nodes of a rule; cheap.
+        stiffness_at: Stiffness at n radii for m inclusions, shape (n, m, 3, 3); cheap. The nodes of the last rule come last.
         points: Nodes, or None to have them found.
-        accuracy: Relative change of E that counts as settled.
+        accuracy: Relative error of E that counts as settled.
 
     Raises:
         RuleError: No rule in reach settles.
     """
-    count = points or 12
-    coarse, coarse_count = curves_at(theta_rule(radius_map, points=-(-3 * count // 4))), -(-3 * count // 4)
+    count = points or max(6, int(np.ceil(1 - 0.75 * np.log10(accuracy))))
+    known: dict[int, list[StressCurve]] = {}
     while True:
-        fine = curves_at(theta_rule(radius_map, points=count))
-        gaps = [abs(effective_modulus(*a.mean)[0] / effective_modulus(*b.mean)[0] - 1) for a, b in zip(coarse, fine, strict=True)]
+        counts = [max(count - less, 1) for less in (4, 2, 1, 0)]
+        _add_curves(known, [n for n in dict.fromkeys(counts) if n not in known], radius_map, stiffness_at)
+        found = zip(*(known[n] for n in counts), strict=True)
+        gaps = [_faded(*(effective_modulus(*curve.mean)[0] for curve in four)) for four in found]
         if points or max(gaps) <= accuracy:
-            return fine, gaps
+            return known[count], gaps
         if count >= _MOST_POINTS:
             raise RuleError(
-                f"rules of {coarse_count} and {count} nodes in θ leave E {max(gaps):.1e} apart and {accuracy:.1e} is wanted: "
-                f"the radius map is not smooth; allow a larger error, or give the number of nodes"
+                f"the rule of {count} nodes in θ leaves a relative error of {max(gaps):.1e} in E and {accuracy:.1e} is wanted: the radius "
+                f"map is not smooth; allow a larger error, or give the number of nodes"
             )
-        coarse, coarse_count, count = fine, count, 2 * count
+        count = count + 2 if count < 20 else 2 * count
+
+
+def _add_curves(
+    known: dict[int, list[StressCurve]], counts: list[int], radius_map: RadiusMap, stiffness_at: Callable[[Array], Array]
+) -> None:
+    """Curves by the rules of `counts` nodes, all their radii solved in one go."""
+    rules = [theta_rule(radius_map, points=n) for n in counts]
+    stiffness = stiffness_at(np.concatenate([radius_map(rule.nodes) for rule in rules]))
+    parts = np.split(stiffness, np.cumsum([rule.nodes.size for rule in rules])[:-1])
+    for count, rule, part in zip(counts, rules, parts, strict=True):
+        known[count] = [curve_of(rule, part[:, k]) for k in range(part.shape[1])]
+
+
+def _faded(first: float, second: float, third: float, last: float) -> float:
+    """Estimated relative error of the last of four values that close in on a limit: four, two and one nodes less, and none."""
+    before, after = abs(second - first) / abs(last), max(abs(last - second), abs(last - third)) / abs(last)
+    fade = min(max(after / before, 0.02), 0.5) if before > 0 else 0.5
+    return 2 * after * fade / (1 - fade)
 
 
 def extreme_radii(radius_map: RadiusMap) -> Array:
-    """Least and greatest radius that a fine rule in θ meets, shape (2,)."""
+    """Bounds of the radius on the support, shape (2,): exact at the ends of θ, a thousandth wide of an extremum between them."""
     law = radius_map.distribution
-    radii = radius_map(np.concatenate([[law.lower, law.upper], theta_rule(radius_map, points=_FINE).nodes]))
-    return np.array([radii.min(), radii.max()])
+    radii = radius_map(np.linspace(law.lower, law.upper, _SAMPLES))
+    ends = np.sort(radii[[0, -1]])
+    slack = 1e-3 * (radii.max() - radii.min())
+    low = ends[0] if radii.min() >= ends[0] else max(radii.min() - slack, 0.9 * radii.min())
+    high = ends[1] if radii.max() <= ends[1] else radii.max() + min(slack, 0.1 * (1 - radii.max()))
+    return np.array([low, high])
 
 
 def theta_error(radius_map: RadiusMap, rule: ThetaRule, *, radii: Array, stress: Array) -> float:

@@ -10,12 +10,12 @@ from time import perf_counter
 import numpy as np
 
 from rve.cell import Phase
-from rve.result import Homogenised, StressCurve
-from rve.slices import curve_of, modulus_error
+from rve.result import Homogenised
+from rve.slices_curve import certified, modulus_error
 from rve.slices_rule import extreme_radii, settle_rule
 from rve.table_chebyshev import Table, TableRange
 from rve.table_store import stored_table
-from stochastic import RadiusMap, ThetaRule
+from stochastic import RadiusMap
 from stochastic.truncated_normal import Array
 
 _THETA_SHARE = 0.05  # of the accuracy; nodes in θ cost nothing here
@@ -67,7 +67,8 @@ class TableModel:
             span = self._span(radius_map, matrix, poisson, moduli)
             table, found = stored_table(span, self.cache, accuracy=self.accuracy, source=self.source, progress=self.progress)
             built = perf_counter() - started
-            results |= dict(zip(places, self._evaluate(table, radius_map, moduli, built=built, found=found), strict=True))
+            evaluated = self._evaluate(table, radius_map, moduli, built=built, found=found)
+            results |= {k: certified(r, radius_map, matrix, inclusions[k]) for k, r in zip(places, evaluated, strict=True)}
         return [results[k] for k in range(len(inclusions))]
 
     def _span(self, radius_map: RadiusMap, matrix: Phase, poisson: float, moduli: Array) -> TableRange:
@@ -79,11 +80,10 @@ class TableModel:
     def _evaluate(self, table: Table, radius_map: RadiusMap, moduli: Array, *, built: float, found: bool) -> list[Homogenised]:
         started = perf_counter()
 
-        def curves_at(rule: ThetaRule) -> list[StressCurve]:
-            values = table.moduli(radius_map(rule.nodes), moduli)
-            return [curve_of(rule, _voigt(values[:, k])) for k in range(moduli.size)]
+        def stiffness_at(radii: Array) -> Array:
+            return table.stiffness(radii, moduli)
 
-        curves, gaps = settle_rule(radius_map, curves_at, points=None, accuracy=max(_THETA_SHARE * self.accuracy, 1e-13))
+        curves, gaps = settle_rule(radius_map, stiffness_at, points=None, accuracy=max(_THETA_SHARE * self.accuracy, 1e-13))
         seconds = {"table": built, "solve": perf_counter() - started, "total": built + perf_counter() - started}
         origin = "kept" if found else f"built in {table.seconds:.2f} s from {table.systems} linear solves"
         shape = f"{table.coefficients.shape[0]} radii by {table.coefficients.shape[1]} moduli"
@@ -103,16 +103,6 @@ class TableModel:
             )
             for curve, gap in zip(curves, gaps, strict=True)
         ]
-
-
-def _voigt(moduli: Array) -> Array:
-    """Stiffness (n, 3, 3) from C11 + C12, C11 − C12 and C33, shape (n, 3)."""
-    bulk, deviator, shear = moduli.T
-    stiffness = np.zeros((len(bulk), 3, 3))
-    stiffness[:, 0, 0] = stiffness[:, 1, 1] = (bulk + deviator) / 2
-    stiffness[:, 0, 1] = stiffness[:, 1, 0] = (bulk - deviator) / 2
-    stiffness[:, 2, 2] = shear
-    return stiffness
 
 
 def _rounded_radii(low: float, high: float) -> tuple[float, float]:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from rve.cell import Phase
+from rve.series_stiffness import square_voigt
 from stochastic.truncated_normal import Array
 
 _SLACK = 1e-9
@@ -169,3 +170,7 @@ class Table:
         rows = chebyshev.chebvander(at_r, self.coefficients.shape[0] - 1)
         columns = chebyshev.chebvander(at_e, self.coefficients.shape[1] - 1)
         return np.exp(np.einsum("ni,ijk,mj->nmk", rows, self.coefficients, columns, optimize=True))
+
+    def stiffness(self, radius: Array, modulus: Array) -> Array:
+        """Voigt matrices in Pa at n radii times m moduli, shape (n, m, 3, 3); errors as of `moduli`."""
+        return square_voigt(*np.moveaxis(self.moduli(radius, modulus), -1, 0))
