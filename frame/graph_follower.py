@@ -19,7 +19,6 @@ from frame.box_quadratic import gain, global_maximum, linear_maximum, local_maxi
 from frame.jet import Array
 from frame.storage import Storage
 
-
 Index = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 APART = 0.5
 """Distance in unit coordinates from which graphs count as distinct."""
@@ -191,11 +190,11 @@ class GraphFollower:
         return global_maximum(g, H, lower, upper) if self.exact else local_maximum(g, H, lower, upper)
 
     def _correct(self, out: Followed, level: int) -> None:
-        """The gain that the Taylor model of the best graph still promises nearby; at most the tolerance (above it is no model)."""
+        """The gain that the Taylor model of the best graph still promises; what is above the tolerance was tried and is no model."""
         box = out.storage.flow.boxes.unit(level)
         for node in range(out.bounds.shape[1]):
             _, _, promised = self._optima(out.storage, node, out.best[level, node].ravel(), box)
-            out.correction[level, node] = np.clip(promised, 0, self.tolerance).reshape(out.correction.shape[2:])
+            out.correction[level, node] = np.where(promised <= self.tolerance, promised, 0.0).reshape(out.correction.shape[2:])
 
     def _note(
         self,
