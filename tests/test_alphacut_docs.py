@@ -1,0 +1,88 @@
+"""The documentation: its links lead somewhere, its Python runs, its commands exist, its generated pages are up to date."""
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from alphacut.case_format import commands, page
+from alphacut.entry import COMMANDS, parsers
+from alphacut.options import split_petsc
+
+ROOT = Path(__file__).parent.parent
+PAGES = sorted(
+    [*(ROOT / "docs").rglob("*.md"), *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md") if (ROOT / name).is_file())]
+)
+DOORS = {"rve solve": "cell", "fuzzy modulus": "modulus", "frame envelope": "envelope", "stochastic microstructure": "microstructure"}
+
+
+def blocks(path, language):
+    """Fenced code blocks of one language."""
+    return re.findall(rf"^ *```{language}\n(.*?)^ *```", path.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+
+
+def name(path):
+    return str(path.relative_to(ROOT))
+
+
+@pytest.mark.parametrize("path", PAGES, ids=name)
+def test_links_lead_somewhere(path):
+    text = re.sub(r"```.*?```", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if not re.match(r"https?:|#|mailto:", target):
+            assert (path.parent / target.partition("#")[0]).exists(), f"{name(path)} links to {target}"
+
+
+@pytest.mark.parametrize(
+    ("path", "block"), [(path, block) for path in PAGES for block in blocks(path, "python")], ids=lambda x: getattr(x, "stem", "")
+)
+def test_python_blocks_run(path, block):
+    subprocess.run([sys.executable, "-c", block], check=True, capture_output=True, text=True, cwd=ROOT, timeout=120)
+
+
+def documented():
+    """Every call of this program in a console block."""
+    for path in PAGES:
+        for block in blocks(path, "(?:console|sh|bash)"):
+            for line in block.replace("\\\n", " ").splitlines():
+                if match := re.search(r"(?:python -m (alphacut|rve|fuzzy|frame|stochastic)|^\s*alphacut) (.+)", line.partition("#")[0]):
+                    yield path, match[1] or "alphacut", match[2]
+
+
+@pytest.mark.parametrize(("path", "package", "rest"), list(documented()), ids=lambda x: x if isinstance(x, str) else x.stem)
+def test_documented_commands_exist(path, package, rest):
+    words, _ = split_petsc([word for word in shlex.split(rest) if word != "…"])
+    if package != "alphacut":
+        words[0] = DOORS[f"{package} {words[0]}"]
+    _, made = parsers("alphacut", COMMANDS)
+    _, left = made[words[0]].parse_known_args([*words[1:], *(["CASE"] if "…" in rest else [])])
+    assert not left
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", [path for path in PAGES if path.parent.name in ("docs", "howto")], ids=name)
+def test_console_blocks_run(path, tmp_path):
+    for block in blocks(path, "console"):
+        script = (
+            block.replace("./enter ", "")
+            .replace("results/", f"{tmp_path}/results/")
+            .replace(" my/", f" {tmp_path}/my/")
+            .replace(" my\n", f" {tmp_path}/my\n")
+        )
+        lines = [
+            line
+            for line in script.splitlines()
+            if "…" not in line and not re.search(r"alphacut (run cases/paper|report results/paper)", line)
+        ]
+        done = subprocess.run(["bash", "-euc", "\n".join(lines)], capture_output=True, text=True, cwd=ROOT, timeout=900, check=False)
+        assert done.returncode == 0, f"{lines}\n{done.stderr[-2000:]}"
+
+
+def test_generated_pages_are_up_to_date():
+    stored = (ROOT / "docs" / "case-format.md").read_text(encoding="utf-8")
+    assert stored == page(), "make it anew: python -m alphacut.case_format > docs/case-format.md"
+    text = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    assert text == commands(), "make it anew: python -m alphacut.case_format commands > docs/commands.md"
