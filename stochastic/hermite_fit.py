@@ -115,12 +115,21 @@ class HermiteFit:
         """Minimiser of the quadratic form over the half planes steep.T @ a ≥ floor: on one of their edges or corners."""
         inverse = np.linalg.inv(self._gram)
         lift = (floor - steep.T @ best) / np.einsum("ik,ij,jk->k", steep, inverse, steep)
-        on_edges = best[:, None] + inverse @ steep * lift
-        i, j = np.triu_indices(steep.shape[1], 1)
-        determinant = steep[0, i] * steep[1, j] - steep[1, i] * steep[0, j]
-        i, j, determinant = (array[np.abs(determinant) > 1e-12] for array in (i, j, determinant))
-        corners = np.array([floor[i] * steep[1, j] - floor[j] * steep[1, i], floor[j] * steep[0, i] - floor[i] * steep[0, j]]) / determinant
-        points = np.concatenate([on_edges, corners], axis=1)
-        points = points[:, (steep.T @ points >= floor[:, None] - 1e-9).all(axis=0)]
-        apart = points - best[:, None]
-        return np.asarray(points[:, np.argmin(np.einsum("ik,ij,jk->k", apart, self._gram, apart))])
+        on_edges = (best[:, None] + inverse @ steep * lift)[:, lift > 0]
+        optimal = (steep.T @ on_edges >= floor[:, None] - 1e-9).all(axis=0)  # feasible with a positive multiplier
+        if optimal.any():
+            return np.asarray(on_edges[:, np.argmax(optimal)])
+        corners = _corners(steep, floor)
+        corners = corners[:, (steep.T @ corners >= floor[:, None] - 1e-9).all(axis=0)]
+        apart = corners - best[:, None]
+        return np.asarray(corners[:, np.argmin(np.einsum("ik,ij,jk->k", apart, self._gram, apart))])
+
+
+def _corners(steep: Array, floor: Array) -> Array:
+    """Points where two of the lines steep.T @ a = floor meet, shape (2, m)."""
+    i, j = np.triu_indices(steep.shape[1], 1)
+    determinant = steep[0, i] * steep[1, j] - steep[1, i] * steep[0, j]
+    i, j, determinant = (array[np.abs(determinant) > 1e-12] for array in (i, j, determinant))
+    return np.asarray(
+        np.array([floor[i] * steep[1, j] - floor[j] * steep[1, i], floor[j] * steep[0, i] - floor[i] * steep[0, j]]) / determinant
+    )
