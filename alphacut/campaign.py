@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -118,7 +118,9 @@ def campaign(case: Case, *, petsc: Mapping[str, str] | None = None, exclude: tup
     """
     inputs = fuzzy_inputs(case)
     crisp = {name: case.fuzzy(key_of(name)).modal for name in INPUTS if name not in inputs}
-    task = CellTask(cell_choice(case, exclude=exclude, petsc=petsc), crisp, case.numbers("radius.theta"))
+    support = case.fuzzy(key_of("inclusion_modulus")).cut(0.0)
+    choice = replace(cell_choice(case, exclude=exclude, petsc=petsc), moduli=(support.lower, support.upper))
+    task = CellTask(choice, crisp, case.numbers("radius.theta"))
     shared = tuple(name for name in inputs if name in SHARED) or ("inclusion_modulus",)
     return Campaign(task, inputs, plan_of(case), case.numbers("modulus.alpha"), shared, store)
 

@@ -45,6 +45,7 @@ class CellChoice:
         exclude: Models that method auto must not take.
         petsc: PETSc options that override the solver's, without their prefix.
         parallel: Whether all MPI ranks work on one cell together.
+        moduli: Moduli of the particle that all samples together span, in Pa, for a table that they share; None if not known.
     """
 
     method: str = "prism"
@@ -55,6 +56,7 @@ class CellChoice:
     exclude: tuple[str, ...] = ()
     petsc: Mapping[str, str] = field(default_factory=dict)
     parallel: bool = False
+    moduli: tuple[float, float] | None = None
 
     def model(self) -> CellModel:
         """The model itself; this is where DOLFINx may be imported."""

@@ -31,6 +31,7 @@ def cell_model(choice: CellChoice) -> CellModel:
         "tolerance": choice.tolerance,
         "exclude": choice.exclude,
         "parallel": choice.parallel,
+        "moduli": choice.moduli,
     }
     try:
         return cast(CellModel, named(choice.method, **{name: value for name, value in offered.items() if name in known}))

@@ -36,6 +36,7 @@ class AutoModel:
         tolerance: Relative error of E allowed, in [1e-10, 0.1].
         exclude: Names of models not to take, of series, table, slices, prism.
         cache: Folder where tables are kept; None keeps them in the process.
+        moduli: Moduli of the particle that a table is to cover, in Pa, where further ones will be asked for; None: those of each call.
         progress: Called with the fraction done by models that take long.
 
     Raises:
@@ -45,6 +46,7 @@ class AutoModel:
     tolerance: float = 1e-4
     exclude: tuple[str, ...] = ()
     cache: Path | None = None
+    moduli: tuple[float, float] | None = None
     progress: Callable[[float], None] | None = None
     name = "auto"
 
@@ -85,7 +87,8 @@ class AutoModel:
         elif name == "table":
             from rve.table import TableModel
 
-            results = TableModel(self.tolerance, self.cache, progress=self.progress).solve(radius_map, matrix, inclusions)
+            model = TableModel(self.tolerance, self.cache, moduli=self.moduli, progress=self.progress)
+            results = model.solve(radius_map, matrix, inclusions)
         elif name == "slices":
             from rve.choice_slices import refined_slices
 
