@@ -59,6 +59,7 @@ def planar_mesh(radius: float, *, size: float, centre: tuple[float, float] = (0.
         _periodic_sides()
         gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
         gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)
+        gmsh.option.setNumber("Mesh.LcIntegrationPrecision", 1e-4)  # of the size along a curve; the default asks for thousands of points
         gmsh.model.mesh.setSizeCallback(lambda dim, tag, x, y, z, lc: size * _grading(x - centre[0], y - centre[1], radius))
         gmsh.model.mesh.generate(2)
         points, triangles, inside = _triangles(particle)
