@@ -56,6 +56,14 @@ class CellTask:
             outputs.append({**means, **curves, **errors, **{f"check:{name}": value for name, value in result.checks.items()}})
         return outputs
 
+    def reason(self, point: Mapping[str, float]) -> str:
+        """Which model method auto takes at a point, and why; empty for any other method."""
+        if self.choice.method != "auto":
+            return ""
+        radius, matrix, inclusion = parts({**self.crisp, **point}, self.theta)
+        result = self.choice.model().solve(radius, matrix, [inclusion])[0]
+        return f"{result.method}: {result.reason}"
+
     def resampled(self, nodes: Array, stress: Array) -> Array:
         """A stress curve at `SHOWN` points over θ, for pictures: models choose their own nodes, and not the same for every sample."""
         from scipy.interpolate import PchipInterpolator

@@ -34,11 +34,13 @@ class FuzzyModulus:
         result: Bounds of every output over the levels, with all samples.
         choice: Model of the cell that was used.
         theta: Support of θ.
+        reason: Which model method auto took at the modal point, and why.
     """
 
     result: FuzzyResult
     choice: CellChoice
     theta: tuple[float, ...] = (-3.0, 3.0)
+    reason: str = ""
 
     @property
     def number(self) -> PiecewiseLinear:
@@ -73,6 +75,7 @@ class FuzzyModulus:
             "notes": list(self.result.notes),
             "plan": self.result.plan,
             "method": self.choice.method,
+            "reason": self.reason,
             "error": self.largest("error"),
             "checks": self.largest("check"),
             "versions": versions(),
@@ -109,7 +112,7 @@ class FuzzyModulus:
             "parameter": list(result.inputs),
         }
         numbers = {"samples": result.runs, "solves": self.solves, "seconds": result.seconds, "nature": str(result.nature)}
-        return xarray.Dataset(variables, coordinates, {"method": self.choice.method, "plan": result.plan, **numbers})
+        return xarray.Dataset(variables, coordinates, {"method": self.choice.method, "reason": self.reason, "plan": result.plan, **numbers})
 
 
 def compute(wanted: Campaign, *, workers: int = 1, progress: Tick | None = None) -> FuzzyModulus:
@@ -132,7 +135,8 @@ def compute(wanted: Campaign, *, workers: int = 1, progress: Tick | None = None)
         store=wanted.store,
         identity=wanted.identity,
     )
-    return FuzzyModulus(result, wanted.task.choice, wanted.task.theta)
+    modal = {name: number.modal for name, number in wanted.inputs.items()}
+    return FuzzyModulus(result, wanted.task.choice, wanted.task.theta, wanted.task.reason(modal))
 
 
 def explain(wanted: Campaign) -> Explanation:

@@ -60,6 +60,7 @@ def modulus_numbers(dataset: xarray.Dataset) -> dict[str, Any]:
     cuts = {"alpha": dataset["alpha"].values, "E_GPa": {"lower": ends[:, 0], "upper": ends[:, 1]}}
     support = {"modal_GPa": ends[-1].mean(), "lower_GPa": ends[0, 0], "upper_GPa": ends[0, 1], "nu": dataset["nu"].values[-1].mean()}
     cost = {name: dataset.attrs[name] for name in ("samples", "solves", "seconds", "method", "plan", "nature")}
+    cost["reason"] = dataset.attrs.get("reason", "")
     budget = {"error": listed(dataset, "error"), "checks": listed(dataset, "check")}
     return {**cuts, **support, **cost, **budget}
 

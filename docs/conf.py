@@ -1,5 +1,10 @@
 """Sphinx settings: `make docs` builds the pages into build/docs."""
 
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
 project = "alphacut"
 author = "The alphacut developers"
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax"]
