@@ -49,12 +49,13 @@ class Campaign:
     Args:
         call: The function with the way it is called.
         executor: Any `concurrent.futures` executor; None runs in this process.
-        progress: Called with the share done, 0 … 1, of each batch of points.
+        progress: Called with the share done, 0 … 1.
         known: What the caller knows about the model.
         shelf: Where samples are kept; None keeps none.
         runs: Samples run so far.
         reused: Samples taken from the store so far.
         calls: Calls of the function so far.
+        stepwise: Whether the plan itself reports the share done, since it asks for its samples batch by batch.
     """
 
     call: Call
@@ -65,6 +66,9 @@ class Campaign:
     runs: int = 0
     reused: int = 0
     calls: int = 0
+    stepwise: bool = False
+    _before: float = field(default=0.0, repr=False)
+    _told: float = field(default=0.0, repr=False)
 
     def __call__(self, points: Array) -> Values:
         """Outputs at the points, shape (n, inputs), in their order.
@@ -80,6 +84,19 @@ class Campaign:
             failed = [(named_point(self.call.names, points[row]), batch.failures[row]) for row in sorted(batch.failures)]
             raise CampaignError(failed, len(points))
         return Values(batch.layout, batch.array)
+
+    def report(self, share: float, *, last: bool = False) -> None:
+        """Tell the share done, which never falls; with `last`, one batch of points is still to come and fills the rest."""
+        if last:
+            self.stepwise, self._before = False, share
+        if self.progress and share > self._told:
+            self._told = share
+            self.progress(share)
+
+    def report_batch(self, share: float) -> None:
+        """Tell the share done of the batch under way."""
+        if not self.stepwise:
+            self.report(self._before + (1 - self._before) * share)
 
 
 class _Batch:
@@ -152,5 +169,4 @@ class _Batch:
         self._open[row] = False
 
     def _tell(self) -> None:
-        if self.campaign.progress:
-            self.campaign.progress(1 - self._open.sum() / len(self.points))
+        self.campaign.report_batch(float(1 - self._open.mean()))

@@ -50,6 +50,11 @@ class Chebyshev:
         if not (self.tolerance > 0 and self.budget >= 1):
             raise ValueError(f"tolerance and budget are {self.tolerance:g} and {self.budget}; both must be positive")
 
+    @property
+    def stepwise(self) -> bool:
+        """Samples depend on those before."""
+        return True
+
     def run(self, model: Model, domain: Domain) -> FuzzyResult:
         """Build the surface, search it, confirm what it says."""
         from fuzzy.sparse_grid import SparseGrid

@@ -83,6 +83,9 @@ class _Rehearsal:
             raise _MissingError(points, points[[row is None for row in rows]])
         return Values(found[0].layout, np.array([row.row for row in found]))
 
+    def report(self, share: float, *, last: bool = False) -> None:
+        """Nothing is done, so nothing is told."""
+
 
 def explain(
     inputs: Mapping[str, Any],

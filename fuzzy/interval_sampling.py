@@ -135,7 +135,7 @@ class IntervalQuasiMonteCarlo:
 
         u: Array = qmc.Sobol(len(random), rng=np.random.default_rng(self.seed)).random(self.points)
         ends = {name: [one.interval(u[:, i], level) for level in alpha] for i, (name, one) in enumerate(random.items())}
-        campaign = Campaign(Call(function, (*random, *inputs), vectorised=vectorised), known=known or Known())
+        campaign = Campaign(Call(function, (*random, *inputs), vectorised=vectorised), known=known or Known(), stepwise=True)
         rows: list[tuple[Array, Array]] = []
         outputs: tuple[str, ...] = ()
         runs = 0

@@ -28,6 +28,10 @@ class Memo:
         """What the caller knows about the model."""
         return self._model.known
 
+    def report(self, share: float, *, last: bool = False) -> None:
+        """Tell the share done, 0 … 1."""
+        self._model.report(share, last=last)
+
     @property
     def points(self) -> Array:
         """All samples so far in the order of their first use, shape (n, inputs)."""

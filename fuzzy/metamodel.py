@@ -45,6 +45,11 @@ class Metamodel:
         if self.boxes < 2 or self.held_out < 1:
             raise ValueError(f"the metamodel has {self.boxes} boxes and {self.held_out} held out; it needs 2 and 1 at least")
 
+    @property
+    def stepwise(self) -> bool:
+        """Samples depend on those before."""
+        return True
+
     def run(self, model: Model, domain: Domain) -> FuzzyResult:
         """Train on boxes within the support and predict the bounds of every cut."""
         return self.train(model, domain).bounds(domain)
@@ -63,7 +68,11 @@ class Metamodel:
         lower, upper = (ends[0] for ends in Domain(domain.inputs, (0.0,)).boxes)
         moving = np.flatnonzero(upper > lower)
         unit = self._boxes(len(moving))
-        taught = np.array([self._taught(memo, domain, _real(box, lower, upper, moving)) for box in unit])
+        lessons = []
+        for row in range(len(unit)):
+            lessons.append(self._taught(memo, domain, _real(unit[row], lower, upper, moving)))
+            model.report(0.9 * (row + 1) / len(unit))
+        taught = np.array(lessons)
         features, targets = unit.reshape(len(unit), -1), taught.reshape(len(unit), -1)
         learn, test = slice(0, self.boxes + 2), slice(self.boxes + 2, None)
         predict = RBFInterpolator(features[learn], targets[learn], kernel="cubic", degree=1)

@@ -73,6 +73,9 @@ class Model(Protocol):
     def __call__(self, points: Array) -> Values:
         """Outputs at the points, shape (n, inputs)."""
 
+    def report(self, share: float, *, last: bool = False) -> None:
+        """Tell the share done, 0 … 1; with `last`, one batch of points is still to come and fills the rest."""
+
 
 def flatten(output: Output) -> tuple[Layout, Array]:
     """One sample's outputs as a layout and a row of numbers.

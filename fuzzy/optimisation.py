@@ -53,6 +53,11 @@ class Optimisation:
         if min(self.starts, self.look, self.budget) < 1:
             raise ValueError(f"starts, look and budget are {self.starts}, {self.look}, {self.budget}; each must be 1 or more")
 
+    @property
+    def stepwise(self) -> bool:
+        """Samples depend on those before."""
+        return True
+
     def run(self, model: Model, domain: Domain) -> FuzzyResult:
         """Search all bounds."""
         if self.method != "multistart":
@@ -70,6 +75,7 @@ class Optimisation:
             for name in names:
                 for sign in (1.0, -1.0):
                     self._search(cut, name, sign)
+            model.report(1 - level / len(domain.alpha))
         return Design.from_samples(domain, memo.points).bounds(memo.values, plan=f"optimisation by {self.method}")
 
     def _search(self, cut: _Cut, output: str, sign: float) -> None:

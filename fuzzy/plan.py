@@ -12,5 +12,9 @@ from fuzzy.result import FuzzyResult
 class Plan(Protocol):
     """A way to search the boxes of the inputs for the extremes of a model."""
 
+    @property
+    def stepwise(self) -> bool:
+        """Whether its samples depend on those before, so that it reports its progress itself."""
+
     def run(self, model: Model, domain: Domain) -> FuzzyResult:
         """Bounds of every output of the model on every level."""

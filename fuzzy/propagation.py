@@ -67,6 +67,8 @@ def propagate(
     call = Call(function, domain.names, tuple(shared), vectorised)
     start = perf_counter()
     with nullcontext(executor) if executor else pool(workers) as running, shelf(store, identity, domain.names) as samples:
-        campaign = Campaign(call, running, progress, known, samples)
-        result = (plan or General()).run(campaign, domain)
+        plan = plan or General()
+        campaign = Campaign(call, running, progress, known, samples, stepwise=plan.stepwise)
+        result = plan.run(campaign, domain)
+        campaign.report(1.0)
     return result.charged(calls=campaign.calls, reused=campaign.reused, seconds=perf_counter() - start)

@@ -32,6 +32,11 @@ class _Sampling:
     samples: int = 256
     seed: int = 0
 
+    @property
+    def stepwise(self) -> bool:
+        """All samples are known beforehand."""
+        return False
+
     def __post_init__(self) -> None:
         if self.samples < 1:
             raise ValueError(f"the number of samples per level is {self.samples}; it must be 1 or more")

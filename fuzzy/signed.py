@@ -35,11 +35,17 @@ class Signed:
     verification: Verification = field(default_factory=Verification)
     limit: int = 10_000
 
+    @property
+    def stepwise(self) -> bool:
+        """Samples depend on those before."""
+        return True
+
     def run(self, model: Model, domain: Domain) -> FuzzyResult:
         """Verify the signs, run the corners, rearrange them into α-cuts."""
         domain.require_free("Signed")
         memo = Memo(model)
         effects = verify(memo, domain, self.verification, outputs=self.outputs)
+        model.report(0.5, last=True)
         require_few(_size(effects, domain), self.limit, effects.notes(domain))
         design = Design.from_levels(domain, self._points(effects, domain))
         result = design.bounds(memo(design.points), plan="signed")

@@ -72,6 +72,7 @@ class SparseGrid:
                 return left, True
             if not self._active or len(self.memo) >= budget:
                 return left, False
+            self.memo.report(0.9 * len(self.memo) / budget)
             self._accept(rough[0] if rough else self._worst(tolerance))
 
     def polynomial(self) -> Polynomial:

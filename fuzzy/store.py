@@ -128,7 +128,7 @@ class Store:
         """Raise what goes wrong with the file as a StoreError."""
         try:
             yield
-        except (sqlite3.OperationalError, OSError) as error:
+        except (sqlite3.DatabaseError, OSError) as error:
             cure = "free some space or find what blocks it, and run again: what is stored stays"
             raise StoreError(f"the store {self.path} cannot be used ({error}): {cure}") from error
 
@@ -180,13 +180,11 @@ class Shelf:
         self._order = sorted(range(len(names)), key=lambda i: names[i])
         self._gathered: dict[str, Outcome] = {}
         self._written, self._cost = perf_counter(), 0.0
-        text = canonical(identity)
-        with store.transaction() as database:
-            database.execute("INSERT OR IGNORE INTO model (identity) VALUES (?)", (text,))
-            self._model, layout = database.execute("SELECT id, layout FROM model WHERE identity = ?", (text,)).fetchone()
-        self._layout: Layout | None = _layout(layout) if layout else None
-        with store.reported():
-            self._claims = Claims(store.path, text)
+        self._model: int = 0
+        self._layout: Layout = ()
+        self._identity = canonical(identity)
+        self._model, self._layout = self._known_model()
+        self._claims: Claims | None = None  # neither these nor the model's row are made before there is something to run
 
     def key(self, point: Array) -> str:
         """A point as text, exact to the last bit and the same whatever the order of the inputs."""
@@ -196,8 +194,9 @@ class Shelf:
         """The samples that are there; failed ones are not."""
         found: dict[str, Sample] = {}
         with self._store.reported():
+            self._model, self._layout = self._known_model()
             for key, blob, seconds in self._rows("outputs, seconds", keys, "outputs IS NOT NULL"):
-                found[key] = Sample(self._known_layout(), np.frombuffer(blob, "<f8").astype(float), seconds)
+                found[key] = Sample(self._layout, np.frombuffer(blob, "<f8").astype(float), seconds)
         return found
 
     def failed(self, keys: Iterable[str]) -> dict[str, str]:
@@ -222,6 +221,9 @@ class Shelf:
             The keys that are now this campaign's to run, and the samples that turned out to be stored. What is in neither, another
             campaign is running.
         """
+        if self._claims is None:
+            with self._store.reported():
+                self._claims = Claims(self._store.path, self._identity)
         mine = self._claims.take(keys)
         stored = self.stored(keys)
         self._claims.release(mine & stored.keys())
@@ -236,43 +238,64 @@ class Shelf:
         start = perf_counter()
         if not self._gathered or not (now or start - self._written > max(_PAUSE, _SHARE * self._cost)):
             return
-        with self._store.transaction() as database:
-            self._save(database)
-        self._claims.release(self._gathered)
-        self._gathered = {}
+        self._commit(list(self._gathered))
         self._written = perf_counter()
         self._cost = self._written - start
+
+    def _commit(self, keys: list[str]) -> None:
+        """Write gathered outcomes in one transaction; where the disk is too full for all, as many as fit."""
+        try:
+            with self._store.transaction() as database:
+                self._save(database, keys)
+        except BaseException as error:
+            self._model, self._layout = 0, ()  # nothing of it was written
+            if not isinstance(error, StoreError) or len(keys) == 1:
+                raise
+            self._commit(keys[: len(keys) // 2])
+            self._commit(keys[len(keys) // 2 :])
+            return
+        if self._claims:
+            self._claims.release(keys)
+        for key in keys:
+            del self._gathered[key]
 
     def close(self) -> None:
         """Write what is gathered and give up all claims."""
         try:
             self.write(now=True)
         finally:
-            self._claims.close()
+            if self._claims:
+                self._claims.close()
 
-    def _save(self, database: sqlite3.Connection) -> None:
+    def _save(self, database: sqlite3.Connection, keys: Iterable[str]) -> None:
+        database.execute("INSERT OR IGNORE INTO model (identity) VALUES (?)", (self._identity,))
+        self._model, self._layout = self._known_model()
         rows: list[tuple[int, str, bytes | None, str | None, float]] = []
-        for key, outcome in self._gathered.items():
+        for key in keys:
+            outcome = self._gathered[key]
             if isinstance(outcome, Failure):
                 rows.append((self._model, key, None, outcome.error, outcome.seconds))
             else:
-                self._require_layout(outcome.layout)
+                self._require_layout(database, outcome.layout)
                 rows.append((self._model, key, outcome.row.astype("<f8").tobytes(), None, outcome.seconds))
         database.executemany(_SAVE, rows)
 
-    def _require_layout(self, layout: Layout) -> None:
-        if self._layout is None:
-            text = json.dumps(layout)
-            self._store.database.execute("UPDATE model SET layout = ? WHERE id = ? AND layout IS NULL", (text, self._model))
-        if layout != self._known_layout():
+    def _known_model(self) -> tuple[int, Layout]:
+        """Number of the model in the store (0 if it has none yet) and the layout of its outputs."""
+        if self._model and self._layout:
+            return self._model, self._layout
+        with self._store.reported():
+            query = "SELECT id, layout FROM model WHERE identity = ?"
+            number, layout = self._store.database.execute(query, (self._identity,)).fetchone() or (0, None)
+        return number, tuple((name, tuple(shape)) for name, shape in json.loads(layout or "[]"))
+
+    def _require_layout(self, database: sqlite3.Connection, layout: Layout) -> None:
+        if not self._layout:
+            database.execute("UPDATE model SET layout = ? WHERE id = ?", (json.dumps(layout), self._model))
+            self._layout = layout
+        if layout != self._layout:
             outputs = f"the store holds the outputs {self._layout} for this model, a new sample has {layout}"
             raise ValueError(f"{outputs}; a model that changed needs another identity")
-
-    def _known_layout(self) -> Layout:
-        if self._layout is None:
-            row = self._store.database.execute("SELECT layout FROM model WHERE id = ?", (self._model,)).fetchone()
-            self._layout = _layout(row[0])
-        return self._layout
 
     def _rows(self, columns: str, keys: Iterable[str], condition: str) -> Iterator[tuple[Any, ...]]:
         source = iter(keys)
@@ -280,10 +303,6 @@ class Shelf:
             marks = ",".join("?" * len(chunk))
             query = f"SELECT point, {columns} FROM sample WHERE model = ? AND point IN ({marks}) AND {condition}"
             yield from self._store.database.execute(query, (self._model, *chunk)).fetchall()
-
-
-def _layout(text: str) -> Layout:
-    return tuple((name, tuple(shape)) for name, shape in json.loads(text))
 
 
 @contextmanager

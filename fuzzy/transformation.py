@@ -60,6 +60,11 @@ def _settled(x: float, known: list[float], width: float) -> float:
 class _Transformation:
     """What the methods share: a grid per level, and the retransformation."""
 
+    @property
+    def stepwise(self) -> bool:
+        """All samples are known beforehand."""
+        return False
+
     def _refined(self, names: Sequence[str]) -> set[str]:
         """Inputs that get the recursion's inner points."""
         raise NotImplementedError
@@ -136,6 +141,11 @@ class Extended(_Transformation):
     outputs: tuple[str, ...] = ()
     limit: int = 10_000
 
+    @property
+    def stepwise(self) -> bool:
+        """Whether monotonicity is looked for first."""
+        return self.monotone is None
+
     def _refined(self, names: Sequence[str]) -> set[str]:
         unknown = set(self.monotone or ()) - set(names)
         if unknown:
@@ -152,5 +162,6 @@ class Extended(_Transformation):
         widest = effects.signs[0] != 0
         classes = (widest | model.known.monotone_in(domain.names, effects.outputs)).all(axis=0)
         chosen = replace(self, monotone=tuple(name for name, holds in zip(domain.names, classes, strict=True) if holds))
+        model.report(0.5, last=True)
         require_few(chosen.size(domain), self.limit, effects.notes(domain))
         return verified(super(Extended, chosen).run(memo, domain), memo, effects)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import islice
 from typing import Any
 
@@ -47,6 +48,12 @@ class ProcessPool(Executor):
                     return [Failure("the process that ran it died: out of memory, or a crash in compiled code")]
         return [self.alone(call, point[None])[0] for point in points]
 
+    def stop(self) -> None:
+        """End the processes in the middle of what they do: nobody waits for it any more."""
+        for process in list(getattr(self._inner, "_processes", None) or {}):
+            with suppress(ProcessLookupError):
+                os.kill(process, signal.SIGTERM)
+
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """End the processes."""
         self._inner.shutdown(wait, cancel_futures=cancel_futures)
@@ -81,16 +88,20 @@ def pool(workers: int) -> Iterator[Executor | None]:
         processes = ProcessPool(workers)
         try:
             yield processes
+        except BaseException:
+            processes.stop()
+            raise
         finally:
             processes.shutdown(wait=True, cancel_futures=True)
 
 
 def _end_with_parent() -> None:
-    """Watch the process that started this one, and leave when it is gone: a killed campaign leaves no orphans."""
+    """Leave when the process that started this one is gone: a killed campaign leaves no orphans."""
     from multiprocessing import parent_process
     from multiprocessing.connection import wait as wait_for
     from threading import Thread
 
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
     parent = parent_process()
 
     def watch() -> None:

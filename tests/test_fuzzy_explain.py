@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from fuzzy import CampaignError, Chebyshev, General, Interval, Triangular, explain, levels, propagate
+from fuzzy import CampaignError, Chebyshev, General, Interval, Store, Triangular, explain, levels, propagate
 
 INPUTS = {"a": Triangular(0.0, 0.3, 1.0), "b": Triangular(-1.0, 0.0, 2.0)}
 IDENTITY = {"cell": {"mesh": 0.15, "layers": 12}, "version": "1"}
@@ -53,6 +53,7 @@ def test_a_wider_support_is_told_by_its_new_values(tmp_path):
 def test_another_model_is_told_by_what_differs(tmp_path):
     run(tmp_path / "s.db")
     found = ask(tmp_path / "s.db", identity={"cell": {"mesh": 0.08, "layers": 12}, "version": "1"})
+    assert len(Store(tmp_path / "s.db").models()) == 1  # asking leaves nothing
     assert found.reasons == ("no sample of this model is stored; the nearest model, with 55 samples, differs: cell.mesh: 0.15 → 0.08",)
     text = str(found)
     assert text.startswith("55 samples: 0 stored, 55 to run in 55 calls; ")

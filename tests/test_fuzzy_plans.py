@@ -176,15 +176,15 @@ def check_claims(seed, plans):
     return guaranteed
 
 
-QUICK = (General(), Reduced(), Signed(), Extended(), QuasiMonteCarlo(16))
+QUICK = ((General(), Signed()), (Reduced(), Extended(), QuasiMonteCarlo(16)))
 
 
 def test_claims_hold_on_a_thousand_random_problems():
-    assert sum(check_claims(seed, QUICK) for seed in range(1000)) > 300
+    assert sum(check_claims(seed, QUICK[seed % 2]) for seed in range(1000)) > 150
 
 
 def test_claims_of_the_searching_plans_hold_on_random_problems():
-    for seed in range(1000, 1025):
+    for seed in range(1000, 1012):
         check_claims(seed, (Optimisation(), Chebyshev(tolerance=1e-3), Chebyshev(tolerance=1e-3, confirm=False)))
 
 
