@@ -111,6 +111,7 @@ def document(result: Homogenised) -> dict[str, Any]:
         "E_GPa": result.modulus / GPA,
         "nu": result.poisson,
         "stress_GPa": {"s11": mean11 / GPA, "s12": mean12 / GPA},
+        "stiffness_GPa": None if result.stiffness is None else result.stiffness / GPA,
         "curve": {
             "theta": result.curve.theta,
             "weights": result.curve.weights,

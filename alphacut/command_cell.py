@@ -9,6 +9,7 @@ from typing import TextIO
 
 from alphacut import cell
 from alphacut.loading import load
+from alphacut.material_card import check_format, export
 from alphacut.options import CELL_OPTIONS, add_common, add_keys, changes
 from alphacut.output import as_json, ranks, write_text
 from alphacut.problem import BadInput, Problem
@@ -24,6 +25,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
     add_keys(parser, CELL_OPTIONS)
     parser.add_argument("--exclude", metavar="NAMES", default="", help="models that method auto must not take, separated by commas")
+    parser.add_argument(
+        "--export", metavar="FILE", help="write the material for another program: .inp, .comm, .mac, or .json with the stiffness"
+    )
     parser.add_argument(
         "--cross-check", metavar="A,B", default="", help="run two models; fail if their moduli differ by more than --tolerance"
     )
@@ -41,6 +45,8 @@ def named_models(option: str, text: str) -> tuple[str, ...]:
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Solve and report."""
     case = load(options.case, changes(options, CELL_OPTIONS), modal=True)
+    if options.export:
+        check_format(options.export)
     choice = cell.cell_choice(case, exclude=named_models("--exclude", options.exclude), petsc=petsc)
     choice = replace(choice, parallel=ranks() > 1)
     pair = named_models("--cross-check", options.cross_check)
@@ -51,6 +57,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         result = first
     else:
         result = cell.solve(case, choice.model())
+    if options.export:
+        export(result, options.export)
     document = as_json(cell.document(result), indent=None if options.json == "-" else 2)
     if options.json == "-":
         out.write(document)

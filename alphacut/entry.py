@@ -10,6 +10,7 @@ from types import ModuleType
 
 from alphacut import (
     command_cell,
+    command_charts,
     command_check,
     command_cite,
     command_envelope,
@@ -35,6 +36,7 @@ COMMANDS: dict[str, ModuleType] = {
     "modulus": command_modulus,
     "envelope": command_envelope,
     "report": command_report,
+    "charts": command_charts,
     "cite": command_cite,
 }
 STATUSES = """\

@@ -72,7 +72,8 @@ def modulus(found: Mapping[str, Any], folder: Path) -> str:
     words = (
         f"<p>Modal value <strong>{found['modal_GPa']:.4f} GPa</strong>, support [{found['lower_GPa']:.4f}, {found['upper_GPa']:.4f}] GPa; "
         f"Poisson's ratio {found['nu']:.4f}. E is the modulus of eq. 16, the paper's convention: a square array is not isotropic. "
-        f"{found['samples']} samples, {found['solves']} linear systems, {found['seconds']:.1f} s. {html.escape(found.get('reason', ''))}</p>"
+        f"{found['samples']} samples, {found['solves']} linear systems, {found['seconds']:.1f} s. "
+        f"{html.escape(found.get('reason', ''))}</p>"
     )
     budget = [(name, f"{value:.2g}") for name, value in found.get("error", {}).items()]
     checks = [(name, f"{value:.2g}") for name, value in found.get("checks", {}).items()]

@@ -1,0 +1,44 @@
+"""``alphacut charts``: what the methods cost and how well they do, measured on this machine."""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TextIO
+
+from alphacut.output import as_json
+from alphacut.problem import BadInput, Problem
+
+ABOUT = "measure what the methods cost on this machine, into benchmarks/results (needs a checkout; takes a while)"
+FOLDER = Path(__file__).resolve().parent.parent / "benchmarks"
+
+
+def programs() -> list[str]:
+    """Names of the benchmarks of this checkout."""
+    return [file.stem for file in sorted(FOLDER.glob("*_*.py")) if not file.stem.startswith("_")]
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument("names", metavar="NAME", nargs="*", help=f"which (default: all of {', '.join(programs()) or 'none here'})")
+    parser.add_argument("--json", metavar="FILE", help="print the names of those that were run as JSON (-)")
+    parser.add_argument("--quiet", action="store_true", help="print nothing")
+
+
+def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
+    """Run each as a program of its own."""
+    known = programs()
+    for name in options.names:
+        if name not in known:
+            raise BadInput(Problem("charts", "there is no such benchmark", name, ", ".join(known)))
+    for name in options.names or known:
+        stream = subprocess.DEVNULL if options.quiet or options.json == "-" else None
+        done = subprocess.run([sys.executable, "-m", f"benchmarks.{name}"], cwd=FOLDER.parent, stdout=stream, check=False)
+        if done.returncode:
+            raise RuntimeError(f"the benchmark {name} ended with status {done.returncode}; its own messages are above")
+    if options.json == "-":
+        out.write(as_json({"run": options.names or known}))
+    return 0
