@@ -51,17 +51,17 @@ class LevelCholesky:
     def _apply(self, vectors: Array, system: int) -> Array:
         result = np.empty_like(vectors)
         for factor, source, target in zip(self._factors, vectors, result, strict=True):
-            column = matrix(source)
-            cholmod.solve(factor, column, sys=system)
-            target[:] = np.asarray(column).ravel()
+            columns = matrix(source)
+            cholmod.solve(factor, columns, sys=system)
+            target[:] = np.asarray(columns)
         return result
 
     def forward(self, vectors: Array) -> Array:
-        """L_k⁻¹ P v_k for each k, shape (matrices, size)."""
+        """L_k⁻¹ P v_k for each k and column, shape (matrices, size, columns)."""
         return self._apply(vectors[:, self._order], _SOLVE_L)
 
     def backward(self, vectors: Array) -> Array:
-        """Pᵀ L_k⁻ᵀ v_k for each k, shape (matrices, size)."""
+        """Pᵀ L_k⁻ᵀ v_k for each k and column, shape (matrices, size, columns)."""
         result = np.empty_like(vectors)
         result[:, self._order] = self._apply(vectors, _SOLVE_LT)
         return result

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from petsc4py import PETSc
 
 from rve.cell import Phase
 from rve.level_blocks import LevelBlocks
-from rve.linear_solver import LinearSolver, Preconditioner
+from rve.linear_solver import LinearSolver
 from rve.prism_system import PrismSystem
 from rve.solver_options import SolverOptions
 from rve.stopwatch import Stopwatch
@@ -57,8 +58,7 @@ class PrismTask:
             with self.watch("assemble"):
                 self._assemble((matrix, inclusion))
             with self.watch("setup"):
-                operator = self._combined(self.matrices[0].copy(), self.matrices[1], (matrix, inclusion))
-                solver = LinearSolver(operator, self.options, self._context(operator, (matrix, inclusion)))
+                solver = self._solver((matrix, inclusion))
             with self.watch("solve"):
                 solution = self._solve_loads(solver, (matrix, inclusion))
             yield solution
@@ -81,24 +81,23 @@ class PrismTask:
         soft.axpy(phases[1].modulus, hard, *structure)
         return soft
 
-    def _solve_loads(self, solver: LinearSolver, phases: tuple[Phase, Phase]) -> Displacements:
-        total, iterations, residuals = self.affine.copy(), [], [0.0]
-        for n, (soft, hard) in enumerate(zip(*self.loads, strict=True)):
-            size = phases[0].modulus * soft.norm() + phases[1].modulus * hard.norm()
-            load = self._combined(soft.copy(), hard, phases)
-            if load.norm() <= NO_LOAD * size:  # equal phases: the affine field is the solution
-                iterations.append(0)
-                continue
-            solution, count, residual = solver.solve(load)
-            total[:, :, n] += self.system.numbering.to_nodes(solution)
-            iterations.append(count)
-            residuals.append(residual)
-        return Displacements(total, self.affine, tuple(iterations), max(residuals))
+    def _solver(self, phases: tuple[Phase, Phase]) -> LinearSolver:
+        operator = self._combined(self.matrices[0].copy(), self.matrices[1], phases)
+        if self.options.all["pc_type"] == "python" and self.options.solver == "theta":
+            return LinearSolver(operator, self.options, self._theta(phases), together=len(self.strains))
+        operator = operator.convert("aij")  # PETSc's own preconditioners want it
+        operator.setOption(PETSc.Mat.Option.SPD, True)
+        blocks = self.options.solver == "blocks" and self.options.all["pc_type"] == "python"
+        return LinearSolver(operator, self.options, LevelBlocks(self.system.numbering, operator) if blocks else None)
 
-    def _context(self, operator: PETSc.Mat, phases: tuple[Phase, Phase]) -> Preconditioner | None:
-        if self.options.all["pc_type"] != "python":
-            return None
-        return LevelBlocks(self.system.numbering, operator) if self.options.solver == "blocks" else self._theta(phases)
+    def _solve_loads(self, solver: LinearSolver, phases: tuple[Phase, Phase]) -> Displacements:
+        size = max(phases[k].modulus * load.norm() for k in range(2) for load in self.loads[k])
+        loads = [self._combined(soft.copy(), hard, phases) for soft, hard in zip(*self.loads, strict=True)]
+        if all(load.norm() <= NO_LOAD * size for load in loads):  # equal phases: the affine field is the solution
+            return Displacements(self.affine, self.affine, (0,) * len(loads), 0.0)
+        solutions = solver.solve(loads)
+        fluctuation = np.stack([self.system.numbering.to_nodes(column) for column in solutions.values.T], axis=-1)
+        return Displacements(self.affine + fluctuation, self.affine, solutions.iterations, solutions.residual)
 
     def _theta(self, phases: tuple[Phase, Phase]) -> ThetaPreconditioner:
         """Made once and kept while the contrast stays within a factor 1.25."""

@@ -79,12 +79,12 @@ class LevelNumbering:
         return (incidence.T @ incidence).astype(bool).tocsr()
 
     def matrix(self, local_map: PETSc.LGMap, comm: MPI.Comm) -> PETSc.Mat:
-        """A matrix of zeros that takes element matrices in DOLFINx's local numbering and keeps Pᵀ K P."""
+        """A matrix of zeros in 2 × 2 blocks that takes element matrices in DOLFINx's local numbering and keeps Pᵀ K P."""
         first = sum(comm.allgather(self.local_size(comm))[: comm.rank])
-        rows = sp.kron(self.couplings()[first // 2 : (first + self.local_size(comm)) // 2], np.ones((2, 2)), format="csr")
+        rows = self.couplings()[first // 2 : (first + self.local_size(comm)) // 2]
         rows.sort_indices()
-        csr = (rows.indptr.astype(PETSc.IntType), rows.indices.astype(PETSc.IntType), np.zeros(rows.nnz))
-        matrix = PETSc.Mat().createAIJ(((self.local_size(comm), self.size),) * 2, bsize=2, csr=csr, comm=comm)
+        csr = (rows.indptr.astype(PETSc.IntType), rows.indices.astype(PETSc.IntType), np.zeros(4 * rows.nnz))
+        matrix = PETSc.Mat().createBAIJ(((self.local_size(comm), self.size),) * 2, bsize=2, csr=csr, comm=comm)
         matrix.setLGMap(local_map, local_map)
         return matrix
 

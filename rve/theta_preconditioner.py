@@ -68,19 +68,18 @@ class ThetaPreconditioner:
         self.linear = LevelCholesky(linear, (linear.values(_LINEAR.T @ k @ _LINEAR) for k in on + between))
 
     def apply(self, _pc: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
-        """Result = P⁻¹ residual, called by PETSc."""
-        level, middle = self._split(self._gather(residual.array_r))
-        level[:-1, : middle.shape[1]] += middle / 2  # from nodal values half-way to bubbles on top of the hats
-        level[1:, : middle.shape[1]] += middle / 2
-        own, between = self.levels, self.middles
-        hats = self.quadratic.backward(self.mass.linear[own] @ self._gather(self.quadratic.forward(level[own])))
-        correction, bubbles = self._excess(level[own] @ self.injection, middle[between])
-        hats += (self.injection @ correction.T).T
-        hats = self._gather(hats)
+        """Result = P⁻¹ residual, called by PETSc; residuals of several loads side by side are treated together."""
+        columns = residual.size // self.numbering.size
+        level, middle = self._split(self._gather(residual.array_r.reshape(-1, columns)))
         vertices = middle.shape[1]
-        self._join(
-            hats[own], bubbles + (hats[between, :vertices] + hats[range(between.start + 1, between.stop + 1), :vertices]) / 2, result
-        )
+        level[:-1, :vertices] += middle / 2  # from nodal values half-way to bubbles on top of the hats
+        level[1:, :vertices] += middle / 2
+        own, between = slice(self.levels.start, self.levels.stop), slice(self.middles.start, self.middles.stop)
+        hats = self.quadratic.backward(_along_theta(self.mass.linear[own], self._gather(self.quadratic.forward(level[own]))))
+        correction, bubbles = self._excess(_in_plane(self.injection.T, level[own]), middle[between])
+        hats = self._gather(hats + _in_plane(self.injection, correction))
+        above = slice(between.start + 1, between.stop + 1)
+        self._join(hats[own], bubbles + (hats[between, :vertices] + hats[above, :vertices]) / 2, result)
 
     def _excess(self, level: Array, middle: Array) -> tuple[Array, Array]:
         """(M_quad⁻¹ − M_lin⁻¹) ⊗ K_1⁻¹ on vertices: this rank's rows of the two parts, on and between levels."""
@@ -88,19 +87,31 @@ class ThetaPreconditioner:
         every = np.concatenate([self._gather(lifted[: len(level)]), self._gather(lifted[len(level) :])])
         layers = self.numbering.grid.layers
         rows = [*self.levels, *(layers + 1 + k for k in self.middles)]
-        solved = self.linear.backward(self.mass.excess[rows] @ every)
+        solved = self.linear.backward(_along_theta(self.mass.excess[rows], every))
         return solved[: len(level)], solved[len(level) :]
 
     def _gather(self, local: Array) -> Array:
         return np.concatenate(self.comm.allgather(local)) if self.comm.size > 1 else local
 
-    def _split(self, vector: Array) -> tuple[Array, Array]:
-        """Values on all levels and half-way between them, shapes (layers + 1, 2·count) and (layers, 2·vertices)."""
-        stride, planar = self.numbering.stride, 2 * self.numbering.periodicity.count
-        table = vector[:-planar].reshape(-1, stride)
-        return np.concatenate([table[:, :planar], vector[None, -planar:]]), table[:, planar:]
+    def _split(self, vectors: Array) -> tuple[Array, Array]:
+        """Values on all levels and half-way between them, shapes (layers + 1, 2·count, columns) and (layers, 2·vertices, columns)."""
+        stride, planar, columns = self.numbering.stride, 2 * self.numbering.periodicity.count, vectors.shape[1]
+        table = vectors[:-planar].reshape(-1, stride, columns)
+        return np.concatenate([table[:, :planar], vectors[None, -planar:]]), table[:, planar:]
 
     def _join(self, level: Array, middle: Array, target: PETSc.Vec) -> None:
-        """This rank's part of the vector from its levels and what lies between."""
-        paired = np.hstack([level[: len(middle)], middle]).ravel()
+        """This rank's part of the vectors from its levels and what lies between."""
+        paired = np.concatenate([level[: len(middle)], middle], axis=1).ravel()
         target.array[:] = np.concatenate([paired, level[len(middle) :].ravel()])
+
+
+def _along_theta(matrix: Array, vectors: Array) -> Array:
+    """Matrix (k, l) times vectors (l, size, columns)."""
+    return np.asarray((matrix @ vectors.reshape(len(vectors), -1)).reshape(len(matrix), *vectors.shape[1:]))
+
+
+def _in_plane(matrix: sp.csr_matrix, vectors: Array) -> Array:
+    """Sparse matrix (m, size) times each of vectors (k, size, columns)."""
+    k, size, columns = vectors.shape
+    flat = vectors.transpose(1, 0, 2).reshape(size, k * columns)
+    return np.asarray((matrix @ flat).reshape(-1, k, columns).transpose(1, 0, 2))
