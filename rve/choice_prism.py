@@ -1,4 +1,4 @@
-"""The product-space model refined until E settles."""
+"""The product-space model with its error estimated from coarser meshes, and refined until that is small enough."""
 
 from __future__ import annotations
 
@@ -9,42 +9,60 @@ from rve.cell import Phase
 from rve.result import Homogenised
 from stochastic import RadiusMap
 
-_STEP = 2**0.5
-_COARSEST, _FINEST = 0.3, 0.05  # mesh sizes
-_LAYERS = 12
-_RATES = {"space": 3.0, "theta": 3.0}  # of E in mesh size and layer height; quadratic wedges reach more
+_COARSEST, _FINEST, _MOST_LAYERS = 0.25, 0.05, 100
+_FINER_MESH, _MORE_LAYERS = 2**0.5, 1.5
+_ORDER = 2.0  # of E in mesh size and layer height; quadratic wedges reach 3 to 4
 
 
 def refined_prism(radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase], *, tolerance: float) -> list[Homogenised]:
-    """Results at the coarsest mesh and layers whose differences to the next coarser ones, carried on at order 3, are below `tolerance`.
+    """Results at the coarsest mesh and layers whose estimated error is below `tolerance`.
 
     Raises:
         RuntimeError: The finest mesh leaves more.
     """
+    size, layers = _COARSEST, 6
+    while True:
+        results = prism_with_error(radius_map, matrix, inclusions, mesh_size=size, layers=layers)
+        worst = max(results, key=lambda r: r.estimated_error)
+        if worst.estimated_error <= tolerance:
+            return results
+        if size <= _FINEST or layers >= _MOST_LAYERS:
+            raise RuntimeError(f"mesh size {size:.3g} with {layers} layers leaves a relative error of {worst.estimated_error:.1e}")
+        if worst.error["theta"] > worst.error["space"]:
+            layers = round(layers * _MORE_LAYERS)
+        else:
+            size = max(_FINEST, size / _FINER_MESH)
+
+
+def prism_with_error(
+    radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase], *, mesh_size: float, layers: int
+) -> list[Homogenised]:
+    """Prism results with the error that a mesh of twice the size and half the layers let them expect.
+
+    Args:
+        radius_map: The map.
+        matrix: Material outside the particle.
+        inclusions: Materials of the particle.
+        mesh_size: Triangle size in halves of the cell's side, in (0, 0.7].
+        layers: At least 2.
+    """
     from rve.prism import PrismModel
 
-    def moduli(size: float, layers: int) -> list[Homogenised]:
-        return PrismModel(mesh_size=size, layers=layers).solve(radius_map, matrix, inclusions)
+    def solve(size: float, count: int) -> list[Homogenised]:
+        return PrismModel(mesh_size=size, layers=count).solve(radius_map, matrix, inclusions)
 
-    size, layers = _COARSEST, _LAYERS
-    coarse = moduli(size, layers)
-    while True:
-        finer = moduli(size / _STEP, layers)
-        thinner = moduli(size, layers * 3 // 2)
-        space = [_carried(a, b, _STEP ** _RATES["space"]) for a, b in zip(coarse, finer, strict=True)]
-        theta = [_carried(a, b, 1.5 ** _RATES["theta"]) * 1.5 ** _RATES["theta"] for a, b in zip(coarse, thinner, strict=True)]
-        if max(s + t for s, t in zip(space, theta, strict=True)) <= tolerance:
-            return [replace(r, error={"space": s, "theta": t}) for r, s, t in zip(finer, space, theta, strict=True)]
-        if max(theta) > max(space):
-            layers = layers * 3 // 2
-            coarse = thinner
-        else:
-            size /= _STEP
-            coarse = finer
-        if size < _FINEST or layers > 100:
-            raise RuntimeError(f"mesh size {size:.3g} with {layers} layers leaves a relative error of {max(space) + max(theta):.1e}")
+    fine = solve(mesh_size, layers)
+    rough_size, fewer = min(1.0, 2 * mesh_size), max(1, layers // 2)
+    rough = solve(rough_size, layers)
+    thick = solve(rough_size, fewer)
+    space = [_carried(a, b, (rough_size / mesh_size) ** _ORDER) for a, b in zip(rough, fine, strict=True)]
+    theta = [_carried(a, b, (layers / fewer) ** _ORDER) for a, b in zip(thick, rough, strict=True)]
+    return [
+        replace(r, error={"space": s, "theta": t}, reason=f"mesh size {mesh_size:.3g}, {layers} layers")
+        for r, s, t in zip(fine, space, theta, strict=True)
+    ]
 
 
 def _carried(coarse: Homogenised, fine: Homogenised, gain: float) -> float:
-    """Error of the finer of two results whose errors differ by the factor `gain`, doubled for safety."""
-    return 2 * abs(coarse.modulus / fine.modulus - 1) / (gain - 1)
+    """Error of the finer of two results whose errors differ by the factor `gain`, trebled for safety."""
+    return 3 * abs(coarse.modulus / fine.modulus - 1) / (gain - 1)
