@@ -150,7 +150,7 @@ def table(*, small: bool) -> Iterator[Row]:
     for layers in LAYERS[:4] if small else LAYERS:
 
         def prism(radius_map: RadiusMap, matrix: Phase, particle: Phase, layers: int = layers) -> Homogenised:
-            return prism_with_error(radius_map, matrix, [particle], mesh_size=0.4, layers=layers)[0]
+            return prism_with_error(radius_map, matrix, [particle], mesh_size=0.25, layers=layers)[0]
 
         yield meet(Edge(f"{layers} layers", PAPER_MAP), "prism", prism)
 
