@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from petsc4py import PETSc
@@ -17,6 +17,7 @@ from rve.stopwatch import Stopwatch
 from rve.theta_preconditioner import ThetaPreconditioner
 from stochastic.truncated_normal import Array
 
+CONTRAST_GRID = 1.25
 NO_LOAD = 1e-12  # relative size of a load that is nothing but round-off
 
 
@@ -71,7 +72,7 @@ class PrismTask:
         system.form.set_poisson(phases)
         self.matrices = [system.stiffness(k) for k in range(2)]
         self.loads = [[system.load(k, strain) for strain in self.strains] for k in range(2)]
-        self.theta: tuple[float, ThetaPreconditioner] | None = None
+        self.theta: tuple[int, ThetaPreconditioner] | None = None
 
     @staticmethod
     def _combined(soft: PETSc.Object, hard: PETSc.Object, phases: tuple[Phase, Phase]) -> PETSc.Object:
@@ -100,8 +101,9 @@ class PrismTask:
         return Displacements(self.affine + fluctuation, self.affine, solutions.iterations, solutions.residual)
 
     def _theta(self, phases: tuple[Phase, Phase]) -> ThetaPreconditioner:
-        """Made once and kept while the contrast stays within a factor 1.25."""
-        contrast = phases[1].modulus / phases[0].modulus
-        if self.theta is None or not 0.8 <= contrast / self.theta[0] <= 1.25:
-            self.theta = contrast, self.system.preconditioner(phases)
+        """Made for a contrast on a grid, so that near contrasts share one and no result depends on who else is in the task."""
+        step = round(np.log(phases[1].modulus / phases[0].modulus) / np.log(CONTRAST_GRID))
+        if self.theta is None or self.theta[0] != step:
+            near = replace(phases[1], modulus=phases[0].modulus * CONTRAST_GRID**step)
+            self.theta = step, self.system.preconditioner((phases[0], near))
         return self.theta[1]
