@@ -1,0 +1,201 @@
+"""The ways to one modulus that the charts compare: each a family of runs, from coarse to fine, on the paper's case at modal values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from rve.cell import Phase
+from rve.result import Homogenised, effective_modulus
+from rve.series import SeriesModel
+from stochastic import HermiteMap
+
+PAPER_MAP = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)  # modal values of the paper, section 4.1
+MATRIX, PARTICLE = Phase(20e9), Phase(80e9)
+
+
+@dataclass(frozen=True)
+class Run:
+    """One point of a chart.
+
+    Args:
+        family: What is compared.
+        setting: Its resolution, in words.
+        error: Relative error of E against the series.
+        seconds: Wall time on one core, without imports and compilation.
+        unknowns: Of one linear system.
+        capped: Whether the run was not made because it would take longer than allowed; then `seconds` is the cap and `error` nan.
+    """
+
+    family: str
+    setting: str
+    error: float
+    seconds: float
+    unknowns: int = 0
+    capped: bool = False
+
+
+Way = Callable[[], tuple[float, float, int]]  # → E in Pa, seconds, unknowns
+Family = tuple[str, list[tuple[str, Way]]]
+
+
+def exact_modulus() -> float:
+    """E of the case by the series at its own accuracy, in Pa."""
+    return SeriesModel().solve(PAPER_MAP, MATRIX, [PARTICLE])[0].modulus
+
+
+def _of(result: Homogenised) -> tuple[float, float, int]:
+    return result.modulus, result.seconds["total"], result.unknowns
+
+
+def prism(mesh_size: float, layers: int, *, interface: str = "conforming", solver: str = "theta") -> Way:
+    """The product-space model."""
+    from rve.prism import PrismModel
+
+    model = PrismModel(mesh_size=mesh_size, layers=layers, interface=interface, solver=solver)
+    return lambda: _of(model.solve(PAPER_MAP, MATRIX, [PARTICLE])[0])
+
+
+def slices(order: int, mesh_size: float, points: int) -> Way:
+    """Planar cells at Gauss nodes, without the extra ones that only estimate the error."""
+    from rve.slices import solve_slice
+    from rve.slices_curve import curve_of
+    from rve.slices_rule import theta_rule
+
+    def run() -> tuple[float, float, int]:
+        started = perf_counter()
+        rule = theta_rule(PAPER_MAP, points=points)
+        cells = [solve_slice(float(r), MATRIX, [PARTICLE], orders=(order,), mesh_size=mesh_size) for r in PAPER_MAP(rule.nodes)]
+        curve = curve_of(rule, np.array([cell.stiffness[0] for cell in cells]))
+        compiled = sum(cell.seconds["jit"] for cell in cells)
+        return effective_modulus(*curve.mean)[0], perf_counter() - started - compiled, max(cell.unknowns for cell in cells)
+
+    return run
+
+
+def table_built(accuracy: float) -> Way:
+    """A table made for this map and modulus."""
+    from rve.table_build import build_table
+    from rve.table_chebyshev import TableRange
+
+    def run() -> tuple[float, float, int]:
+        started = perf_counter()
+        span = TableRange(MATRIX, PARTICLE.poisson, (0.13, 0.87), (PARTICLE.modulus, PARTICLE.modulus))
+        table = build_table(span, accuracy=accuracy)
+        modulus = _table_modulus(table)
+        return modulus, perf_counter() - started, table.unknowns
+
+    return run
+
+
+def table_reused(accuracy: float) -> Way:
+    """A further map by a table that is there."""
+    from rve.table_build import build_table
+    from rve.table_chebyshev import TableRange
+
+    def run() -> tuple[float, float, int]:
+        span = TableRange(MATRIX, PARTICLE.poisson, (0.13, 0.87), (PARTICLE.modulus, PARTICLE.modulus))
+        table = build_table(span, accuracy=accuracy)
+        started = perf_counter()
+        return _table_modulus(table), perf_counter() - started, 0
+
+    return run
+
+
+def _table_modulus(table: object) -> float:
+    from rve.slices_rule import settle_rule
+    from rve.table_chebyshev import Table
+
+    assert isinstance(table, Table)
+    moduli = np.array([PARTICLE.modulus])
+    curves, _ = settle_rule(PAPER_MAP, lambda radii: table.stiffness(radii, moduli), points=None, accuracy=1e-10)
+    return effective_modulus(*curves[0].mean)[0]
+
+
+def series(points: int) -> Way:
+    """The series at so many nodes, converged at each."""
+    from rve.series_stiffness import square_stiffness
+    from rve.slices_curve import curve_of
+    from rve.slices_rule import theta_rule
+
+    def run() -> tuple[float, float, int]:
+        started = perf_counter()
+        rule = theta_rule(PAPER_MAP, points=points)
+        cells = square_stiffness(PAPER_MAP(rule.nodes), MATRIX, [PARTICLE])
+        return effective_modulus(*curve_of(rule, cells.matrix[:, 0]).mean)[0], perf_counter() - started, int(cells.harmonics.max())
+
+    return run
+
+
+def monte_carlo(samples: int) -> Way:
+    """The mean over θ by sampling: the root mean square error of 20 seeds, and the time of as many planar cells.
+
+    Each cell is as cheap as a planar cell can be; the sampling error hides its discretisation.
+    """
+    from rve.series_stiffness import square_stiffness
+    from rve.slices import solve_slice
+
+    def run() -> tuple[float, float, int]:
+        law, squares, exact = PAPER_MAP.distribution, [], exact_modulus()
+        for seed in range(20):
+            radii = PAPER_MAP(law.quantile(np.random.default_rng(seed).uniform(size=samples)))
+            cells = square_stiffness(radii, MATRIX, [PARTICLE], tolerance=1e-6)
+            modulus = effective_modulus(0.01 * float(cells.bulk.mean()), 0.02 * float(cells.shear.mean()))[0]
+            squares.append((modulus / exact - 1) ** 2)
+        timed = [solve_slice(r, MATRIX, [PARTICLE], orders=(2,), mesh_size=0.5) for r in (0.3, 0.5, 0.7)]
+        seconds = float(np.mean([sum(t for stage, t in cell.seconds.items() if stage != "jit") for cell in timed])) * samples
+        return exact * (1 + float(np.sqrt(np.mean(squares)))), seconds, timed[0].unknowns
+
+    return run
+
+
+def mpc(order: int, mesh_size: float, points: int) -> Way:
+    """dolfinx_mpc on the same planar cells."""
+    from benchmarks.cell_mpc import mpc_modulus
+
+    return lambda: mpc_modulus(PAPER_MAP, MATRIX, PARTICLE, order=order, mesh_size=mesh_size, points=points)
+
+
+def families(*, small: bool = False) -> list[Family]:
+    """All families, every one from coarse to fine; two short ones if `small`."""
+    planar = ((0.6, 4), (0.45, 5), (0.3, 6), (0.2, 8), (0.14, 9), (0.1, 10))
+    if small:
+        return [("series", [(f"{n} nodes", series(n)) for n in (3, 5)]), ("slices, order 2", [("h 0.6", slices(2, 0.6, 3))])]
+    return [
+        ("series", [(f"{n} nodes in θ", series(n)) for n in (2, 3, 4, 5, 6, 8, 10, 12)]),
+        ("table, kept", [(f"accuracy {a:g}", table_reused(a)) for a in (1e-2, 1e-4, 1e-5, 1e-6, 1e-7)]),
+        ("table, made", [(f"accuracy {a:g}", table_built(a)) for a in (1e-2, 1e-4, 1e-5, 1e-6, 1e-7)]),
+        *((f"slices, order {p}", [(f"h {h:g}, {n} nodes in θ", slices(p, h, n)) for h, n in planar]) for p in (2, 3, 4)),
+        *((f"dolfinx_mpc, order {p}", [(f"h {h:g}, {n} nodes in θ", mpc(p, h, n)) for h, n in planar]) for p in (2, 3)),
+        (
+            "prism",
+            [
+                (f"h {h:g}, {n} layers", prism(h, n))
+                for h, n in ((0.5, 4), (0.3, 6), (0.2, 9), (0.15, 12), (0.1, 12), (0.07, 12), (0.05, 12))
+            ],
+        ),
+        (
+            "prism, MUMPS",
+            [(f"h {h:g}, {n} layers", prism(h, n, solver="mumps")) for h, n in ((0.5, 4), (0.3, 6), (0.2, 9), (0.15, 12), (0.1, 12))],
+        ),
+        ("prism, CG + GAMG", [(f"h {h:g}, {n} layers", prism(h, n, solver="gamg")) for h, n in ((0.5, 4), (0.3, 6), (0.2, 9), (0.15, 12))]),
+        ("prism, interface ignored", [(f"h {h:g}, 12 layers", prism(h, 12, interface="sign")) for h in (0.3, 0.15, 0.1, 0.07, 0.05)]),
+        ("Monte Carlo over θ", [(f"{n} samples", monte_carlo(n)) for n in (10, 100, 1000, 10_000)]),
+    ]
+
+
+def measure(family: Family, *, exact: float, cap: float) -> Iterator[Run]:
+    """Run one family; what would take longer than `cap` seconds, five times the run before, is marked and not run."""
+    name, ways = family
+    last, stopped = 0.0, False
+    ways[0][1]()  # compilation and first imports are not what is compared
+    for setting, way in ways:
+        stopped = stopped or 5 * last > cap
+        if stopped:
+            yield Run(name, setting, float("nan"), cap, capped=True)
+            continue
+        modulus, last, unknowns = way()
+        yield Run(name, setting, max(abs(modulus / exact - 1), 1e-16), last, unknowns)
