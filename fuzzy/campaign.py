@@ -109,16 +109,17 @@ class _Batch:
         self.array: Array = np.empty((len(points), 0))
         self.failures: dict[int, str] = {}
         self._open = np.ones(len(points), bool)
+        self._left = len(points)
 
     def run(self) -> None:
         """Take what is stored, run the rest, wait for what other campaigns run."""
-        while self._open.any():
-            before = self._open.sum()
+        while self._left:
+            before = self._left
             for rows, outcomes in completed(self.campaign.call, self._tasks(), self.campaign.executor):
                 self._record(rows, outcomes)
             if self.campaign.shelf:
                 self.campaign.shelf.write()
-            if self._open.sum() == before:
+            if self._left == before:
                 sleep(_POLL)
 
     def _tasks(self) -> Iterator[Task]:
@@ -150,7 +151,7 @@ class _Batch:
                 shelf.gather(shelf.key(self.points[row]), outcome)
             if isinstance(outcome, Failure):
                 self.failures[row] = outcome.error
-                self._open[row] = False
+                self._close(row)
             else:
                 self._keep(row, outcome)
         if shelf:
@@ -166,7 +167,11 @@ class _Batch:
             got = f"a sample has the outputs {sample.layout} where others have {self.layout}"
             raise ValueError(f"{got}; all must have the same names and shapes")
         self.array[row] = sample.row
+        self._close(row)
+
+    def _close(self, row: int) -> None:
         self._open[row] = False
+        self._left -= 1
 
     def _tell(self) -> None:
-        self.campaign.report_batch(float(1 - self._open.mean()))
+        self.campaign.report_batch(1 - self._left / len(self.points))
