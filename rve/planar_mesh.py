@@ -15,6 +15,11 @@ from stochastic.truncated_normal import Array
 
 EDGES = ((1, 2), (0, 2), (0, 1))  # of a triangle, in the order of Basix
 _TOUCH = 1e-6
+_CLOSEST = 0.9995
+
+
+class TouchingError(RuntimeError):
+    """Particles so close that the mesh between them has no end."""
 
 
 @dataclass(frozen=True)
@@ -46,11 +51,17 @@ def planar_mesh(radius: float, *, size: float, centre: tuple[float, float] = (0.
 
     Raises:
         ValueError: A value out of range, or a particle whose edge touches a side of the cell without crossing it.
+        TouchingError: Particles nearly touch.
     """
     if not 0 < radius < 1:
         raise ValueError(f"the radius is {radius:g}; it must lie in (0, 1), in halves of the cell's side")
     if not 0 < size <= 1:
         raise ValueError(f"the mesh size is {size:g}; it must lie in (0, 1], in halves of the cell's side")
+    if radius > _CLOSEST:
+        raise TouchingError(
+            f"the radius is {radius:.6g} and planar meshes end at {_CLOSEST:g}: the gap between particles would need elements without "
+            f"end; lower the radius"
+        )
     _refuse_touching_side(radius, centre)
     gmsh.initialize(["", "-v", "1"], readConfigFiles=False, interruptible=False)
     try:

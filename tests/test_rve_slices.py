@@ -88,6 +88,11 @@ def test_moving_the_particle_leaves_the_stiffness(centre):
     assert largest_error(moved, 0.55, MATRIX, [Phase(80e9)]) < 1e-6
 
 
+def test_refuses_particles_that_nearly_touch():
+    with pytest.raises(planar_mesh.TouchingError, match="planar meshes end at 0.9995"):
+        planar_mesh.planar_mesh(0.9996, size=0.3)
+
+
 def test_refuses_a_particle_that_touches_a_side():
     with pytest.raises(ValueError, match="touches a side of the cell without crossing it"):
         planar_mesh.planar_mesh(0.5, size=0.3, centre=(0.5, 0.0))
