@@ -19,7 +19,7 @@ import numpy as np
 from stochastic.discs import Discs
 from stochastic.envelope import Arcs, upper_envelopes
 from stochastic.hyperbola import anomaly, sector_area
-from stochastic.reach import Pairs, nearest_in_each_class, size_classes, within_reach
+from stochastic.reach import Pairs, Surroundings, hidden_discs, nearest_in_each_class, size_classes
 from stochastic.truncated_normal import Array
 
 
@@ -80,29 +80,31 @@ def apollonius(discs: Discs) -> Apollonius:
     Args:
         discs: Periodic box or open window.
     """
-    largest, hidden = _first_bound(discs)
-    everyone = np.arange(len(discs))
-    walls = _Walls.towards(discs, within_reach(discs, 2 * largest - discs.radii), of=everyone, hidden=hidden)
-    arcs, pairs = walls.arcs, walls.pairs
-    second, apart = pairs.second[arcs.function], pairs.apart[arcs.function]
-    return Apollonius(discs, walls.areas(), walls.hidden, arcs.owner, second, apart, arcs.start, arcs.end)
+    hidden = hidden_discs(discs, 16 * np.finfo(float).eps * discs.size.max())
+    reach = 2 * _first_bound(discs, hidden) - discs.radii
+    surroundings = Surroundings(discs, reach)
+    areas, parts = np.zeros(len(discs)), []
+    for of in surroundings.portions():
+        walls = _Walls.towards(discs, surroundings.pairs(of, reach), of=of, hidden=hidden)
+        areas += walls.areas()
+        arcs, pairs = walls.arcs, walls.pairs
+        parts.append((arcs.owner, pairs.second[arcs.function], pairs.apart[arcs.function], arcs.start, arcs.end))
+    return Apollonius(discs, areas, hidden, *(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
-def _first_bound(discs: Discs) -> tuple[Array, Array]:
-    """Upper bound of each cell's largest radius from few neighbours, from more where few leave it wide; and discs found hidden."""
+def _first_bound(discs: Discs, hidden: Array) -> Array:
+    """Upper bound of each cell's largest radius, shape (n,), from few neighbours, and from more where few leave it wide."""
     largest: Array = np.zeros(len(discs))
-    hidden: Array = np.zeros(len(discs), bool)
-    of: Array = np.arange(len(discs))
+    of: Array = np.flatnonzero(~hidden)
     number = math.ceil(24 / sum(1 for _ in size_classes(discs.radii)))
     for _ in range(3):
         few = _Walls.towards(discs, nearest_in_each_class(discs, number, of), of=of, hidden=hidden)
-        hidden = few.hidden
         largest[of] = few.largest_radius()[of]
         of = np.flatnonzero(largest - discs.radii > 3 * np.sqrt(discs.area / len(discs)))
         number *= 4
         if not len(of) or number > 4 * len(discs):
             break
-    return largest, hidden
+    return largest
 
 
 def _near_far(radii: Array, first: Array, second: Array, apart: Array) -> tuple[Array, Array]:
@@ -118,21 +120,16 @@ class _Walls:
 
     discs: Discs
     pairs: Pairs
-    hidden: Array
     arcs: Arcs
 
     @classmethod
     def towards(cls, discs: Discs, others: Pairs, *, of: Array, hidden: Array) -> _Walls:
         """Cells of the discs `of` if only the `others` (and their own images, or the edges of the window) were their neighbours.
 
-        A disc counts as hidden when it lies inside another one to round-off; its cell would be a line. It is then nobody's neighbour.
+        Hidden discs, whose cell would be a line at most, are nobody's neighbours.
         """
-        round_off = 16 * np.finfo(float).eps * discs.size.max()
         near, far = _near_far(discs.radii, others.first, others.second, others.apart)
-        inside = (near <= round_off) & ((far > round_off) | (others.second < others.first))  # of two discs in one place the first stays
-        hidden = hidden.copy()
-        hidden[others.first[inside]] = True
-        seen = (near > round_off) & (far > round_off) & ~hidden[others.first] & ~hidden[others.second]
+        seen = (near > 0) & (far > 0) & ~hidden[others.first] & ~hidden[others.second]
         pairs = Pairs.join([others.where(seen), _bounds(discs, of[~hidden[of]])])
         near, far = _near_far(discs.radii, pairs.first, pairs.second, pairs.apart)
         direction = pairs.apart / np.hypot(pairs.apart[:, 0], pairs.apart[:, 1])[:, None]
@@ -140,7 +137,7 @@ class _Walls:
         arcs = upper_envelopes(
             amplitude * direction[:, 0], amplitude * direction[:, 1], 1 / near - 1 / far, np.bincount(pairs.first, minlength=len(discs))
         )
-        return cls(discs, pairs, hidden, arcs)
+        return cls(discs, pairs, arcs)
 
     def _anomalies(self) -> tuple[Array, Array, Array, Array]:
         """Anomalies at both ends of every arc, and d + Δ, d − Δ of its wall."""

@@ -62,29 +62,59 @@ def nearest_in_each_class(discs: Discs, number: int, of: Array) -> Pairs:
     return Pairs.join(parts)
 
 
-def within_reach(discs: Discs, reach: Array) -> Pairs:
-    """All pairs, every periodic image of j (of i itself too), with |c_j − c_i| < reach_i + r_j.
+def hidden_discs(discs: Discs, round_off: float) -> Array:
+    """Whether each disc lies inside another one, but for `round_off` (m), shape (n,); of two in one place the first does not."""
+    surroundings = Surroundings(discs, discs.radii.max() - discs.radii + round_off)
+    hidden = np.zeros(len(discs), bool)
+    for of in surroundings.portions():
+        pairs = surroundings.pairs(of, round_off - discs.radii, closed=True)
+        near = np.hypot(pairs.apart[:, 0], pairs.apart[:, 1]) + discs.radii[pairs.first] - discs.radii[pairs.second]
+        same = np.abs(discs.radii[pairs.first] - discs.radii[pairs.second]) + np.hypot(*pairs.apart.T) <= round_off
+        inside = (near <= round_off) & (pairs.first != pairs.second) & (~same | (pairs.second < pairs.first))
+        hidden[pairs.first[inside]] = True
+    return hidden
+
+
+class Surroundings:
+    """Discs and their images, ready to be asked which come within reach of which.
 
     Args:
         discs: The discs.
-        reach: shape (n,), in m; may be negative.
+        reach: Greatest reach of each disc that will be asked for, plus the largest radius where it is negative, shape (n,), in m.
     """
-    from scipy.spatial import KDTree
 
-    parts = []
-    for members in size_classes(discs.radii):
-        largest = discs.radii[members].max()
-        second, shift = _images(discs, members, float(reach.max() + largest))
-        tree = KDTree(discs.centres[second] + shift)
-        found = tree.query_ball_point(discs.centres, np.maximum(reach + largest, 0) * (1 + 1e-12), return_sorted=False)
-        counts = np.fromiter(map(len, found), int, len(found))
-        image = np.fromiter((k for one in found for k in one), int, counts.sum())
-        pairs = Pairs(np.repeat(np.arange(len(discs)), counts), second[image], np.zeros((0, 2)))
-        apart = discs.centres[pairs.second] - discs.centres[pairs.first] + shift[image]  # the same, with its sign, seen from j
-        distance = np.hypot(*apart.T)
-        keep = (distance < reach[pairs.first] + discs.radii[pairs.second]) & ((pairs.first != pairs.second) | (distance > 0))
-        parts.append(Pairs(pairs.first[keep], pairs.second[keep], apart[keep]))
-    return Pairs.join(parts)
+    def __init__(self, discs: Discs, reach: Array) -> None:
+        from scipy.spatial import KDTree
+
+        self.discs, self.reach = discs, reach
+        self.classes = []
+        for members in size_classes(discs.radii):
+            largest = float(discs.radii[members].max())
+            second, shift = _images(discs, members, float(reach.max()) + largest)
+            self.classes.append((KDTree(discs.centres[second] + shift), second, shift, largest))
+
+    def portions(self, most: int = 3_000_000) -> Iterator[Array]:
+        """Indices of discs in portions whose pairs within reach fit into memory together (about `most` of them)."""
+        counts = np.zeros(len(self.discs))
+        for tree, _, _, largest in self.classes:
+            counts += tree.query_ball_point(self.discs.centres, np.maximum(self.reach + largest, 0), return_length=True)
+        portion = np.floor(np.cumsum(counts) / most)
+        for value in np.unique(portion):
+            yield np.flatnonzero(portion == value)
+
+    def pairs(self, of: Array, reach: Array, *, closed: bool = False) -> Pairs:
+        """All pairs of discs i in `of` with every image of j (of i itself too) with |c_j − c_i| < reach_i + r_j (≤ where `closed`)."""
+        discs, parts = self.discs, []
+        for tree, second, shift, largest in self.classes:
+            found = tree.query_ball_point(discs.centres[of], np.maximum(reach[of] + largest, 0) * (1 + 1e-12), return_sorted=False)
+            counts = np.fromiter(map(len, found), int, len(found))
+            image = np.fromiter((k for one in found for k in one), int, counts.sum())
+            first, other = np.repeat(of, counts), second[image]
+            apart = discs.centres[other] - discs.centres[first] + shift[image]  # the same, with its sign, seen from j
+            distance, limit = np.hypot(apart[:, 0], apart[:, 1]), reach[first] + discs.radii[other]
+            keep = ((distance <= limit) if closed else (distance < limit)) & ((first != other) | (distance > 0))
+            parts.append(Pairs(first[keep], other[keep], apart[keep]))
+        return Pairs.join(parts)
 
 
 def _images(discs: Discs, members: Array, margin: float) -> tuple[Array, Array]:

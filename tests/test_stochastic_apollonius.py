@@ -216,3 +216,25 @@ def test_envelope_against_dense_sampling():
 def test_nonsense_is_refused(change, message):
     with pytest.raises(ValueError, match=message):
         Discs(**(dict(centres=[(0.1, 0.1), (0.5, 0.5)], radii=[0.1, 0.1], size=(1, 1)) | change))
+
+
+def test_clusters_with_voids_between_them():
+    rng = np.random.default_rng(0)
+    centres = np.mod(rng.random((8, 2))[rng.integers(0, 8, 400)] + 0.01 * rng.standard_normal((400, 2)), 1)
+    discs = Discs(centres, np.full(400, 1e-4), (1, 1))
+    diagram = apollonius(discs)
+    assert diagram.areas.sum() == pytest.approx(1, abs=1e-12)
+    widest = np.argsort(diagram.areas)[-3:]
+    assert diagram.areas[widest] == pytest.approx([quadrature_area(discs, i) for i in widest], rel=1e-9)
+
+
+def test_portions_do_not_change_the_cells(monkeypatch):
+    from stochastic.reach import Surroundings
+
+    discs = configuration(101)
+    whole = apollonius(discs)
+    split = Surroundings.portions
+    monkeypatch.setattr(Surroundings, "portions", lambda self: split(self, most=50))
+    portioned = apollonius(discs)
+    assert portioned.areas.tolist() == whole.areas.tolist()
+    assert portioned.cell.tolist() == whole.cell.tolist()
