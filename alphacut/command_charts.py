@@ -23,7 +23,7 @@ def programs() -> list[str]:
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    parser.add_argument("names", metavar="NAME", nargs="*", help=f"which (default: all of {', '.join(programs()) or 'none here'})")
+    parser.add_argument("names", metavar="NAME", nargs="*", help="which (default: all files of benchmarks/)")
     parser.add_argument("--json", metavar="FILE", help="print the names of those that were run as JSON (-)")
     parser.add_argument("--quiet", action="store_true", help="print nothing")
 

@@ -15,6 +15,7 @@ from stochastic import HermiteMap, TruncatedNormal
 
 SLOPES = ("a1", "a2", "a3", "a4")
 GROUPS = ("E", "I", "m", "l", "d", "q0", "v0", "rayleigh_mass", "rayleigh_stiffness")
+SWINGING = ("m", "l", "d", "g", "phi_0", "omega_0")
 FILES = ("microstructure.circles.file", "microstructure.image.file", "modulus.file", "modulus.measured", "frame.accelerogram")
 
 
@@ -32,6 +33,10 @@ def inconsistencies(case: Case, *, modal: bool = False) -> Iterator[Problem]:
             yield from levels(case, f"{section}.alpha")
     if case.has("frame.masses"):
         yield from floors(case)
+    elif case.has("pendulum.mass"):
+        yield from swings(case)
+    if "envelope" in case.stages and case.has("frame.masses") == case.has("pendulum.mass"):
+        yield Problem("frame", "stage envelope needs one structure", allowed="[frame] or [pendulum]")
     if case.has("envelope.step"):
         yield from times(case)
 
@@ -142,9 +147,23 @@ def floors(case: Case) -> Iterator[Problem]:
         if found not in (1, count):
             yield Problem(f"frame.{name}", f"got {found} values for {count} floors", allowed=f"{count} values, or one for all floors")
     yield from known_output(case, count)
-    for key in ("envelope.fuzzy", *(f"study[{i}].fuzzy" for i in range(study_count(case)))):
-        for name in case.names(key) if case.has(key) else ():
+    for key in fuzzy_keys(case):
+        for name in case.names(key):
             yield from known_input(key, name, count)
+
+
+def swings(case: Case) -> Iterator[Problem]:
+    """Fuzzy inputs of a pendulum."""
+    for key in fuzzy_keys(case):
+        for name in case.names(key):
+            if name not in SWINGING:
+                yield Problem(key, f"the pendulum has no input {name}", name, ", ".join(SWINGING), nearest(name, SWINGING))
+
+
+def fuzzy_keys(case: Case) -> list[str]:
+    """Keys that name fuzzy inputs of the structure."""
+    keys = ["envelope.fuzzy", *(f"study[{i}].fuzzy" for i in range(study_count(case)))]
+    return [key for key in keys if case.has(key)]
 
 
 def known_output(case: Case, floors: int) -> Iterator[Problem]:

@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any
 
-from alphacut.accelerogram import accelerogram
 from alphacut.case import Case
-from alphacut.consistency import beside
 from alphacut.output import say, whole_file
 from alphacut.problem import BadInput, Problem
 from alphacut.progress import Tick
 from alphacut.provenance import attributes, versions
+from alphacut.structure import Structure, structure
 from fuzzy import FuzzyNumber
 
 if TYPE_CHECKING:
     import xarray
 
     from frame import Envelope, StoreyFrame
-
-LISTS = {"m": "masses", "l": "lengths", "d": "dampers"}
-RAYLEIGH = ("rayleigh_mass", "rayleigh_stiffness")
-STARTS = {"q": "displacements", "v": "velocities"}
 
 
 @dataclass(frozen=True)
@@ -38,7 +33,7 @@ class EnvelopeTask:
         method: How the envelope is found.
         integrator: Time stepping; None leaves it to the method.
         order: Order κ of the Taylor models.
-        tolerance: Gain that is worth a new trajectory, in m.
+        tolerance: Gain that is worth a new trajectory, in the unit of the outputs.
     """
 
     fuzzy: tuple[str, ...]
@@ -61,76 +56,8 @@ def task_of(case: Case, *, fuzzy: Sequence[str] | None = None, duration: float |
         case.text("envelope.method"),
         case.text("envelope.integrator") if case.has("envelope.integrator") else None,
         case.integer("envelope.order"),
-        case.number("envelope.tolerance"),
+        case.number("pendulum.tolerance" if case.has("pendulum.mass") else "envelope.tolerance"),
     )
-
-
-def per_floor(case: Case, key: str) -> tuple[FuzzyNumber, ...]:
-    """One value for each floor; a single one holds for all of them."""
-    values, floors = case.fuzzies(key), len(case.fuzzies("frame.masses"))
-    return values * floors if len(values) == 1 else values
-
-
-def numbers(case: Case, modulus: FuzzyNumber) -> dict[str, FuzzyNumber]:
-    """Every parameter of the frame by the name that `frame` gives it, in SI."""
-    found = {"E": modulus, "I": case.fuzzy("frame.second_moment")}
-    found |= {name: case.fuzzy(f"frame.{name}") for name in RAYLEIGH}
-    for letter, key in LISTS.items():
-        found |= {f"{letter}{floor}": value for floor, value in enumerate(per_floor(case, f"frame.{key}"), start=1)}
-    for letter, key in STARTS.items():
-        found |= {f"{letter}{floor}_0": value for floor, value in enumerate(per_floor(case, f"frame.{key}"), start=1)}
-    return found
-
-
-def structure(case: Case, modulus: FuzzyNumber) -> StoreyFrame:
-    """The frame at the modal values of its parameters."""
-    from frame import StoreyFrame
-
-    modal = {name: tuple(x.modal for x in per_floor(case, f"frame.{name}")) for name in (*LISTS.values(), *STARTS.values())}
-    return StoreyFrame(
-        modal["masses"],
-        modal["lengths"],
-        modulus.modal,
-        case.fuzzy("frame.second_moment").modal,
-        dampers=modal["dampers"],
-        damper_placement=cast(Literal["ground", "storey"], case.text("frame.damper_placement")),
-        q0=modal["displacements"],
-        v0=modal["velocities"],
-        outputs=case.names("frame.outputs"),
-        rayleigh=(case.fuzzy("frame.rayleigh_mass").modal, case.fuzzy("frame.rayleigh_stiffness").modal),
-        ground=accelerogram(beside(case, case.text("frame.accelerogram"))) if case.has("frame.accelerogram") else None,
-    )
-
-
-def modulus_of(case: Case, given: FuzzyNumber | None) -> FuzzyNumber:
-    """The modulus handed on, else the frame's own.
-
-    Raises:
-        BadInput: There is none.
-    """
-    if given is not None:
-        return given
-    if not case.has("frame.modulus"):
-        raise BadInput(Problem("frame.modulus", "missing: give it in the case or by --modulus", file=str(case.path)))
-    return case.fuzzy("frame.modulus")
-
-
-def fuzzy_inputs(model: StoreyFrame, names: Sequence[str], values: Mapping[str, FuzzyNumber]) -> dict[str, FuzzyNumber]:
-    """The fuzzy inputs that the names stand for; those of a group that are crisp are left out.
-
-    Raises:
-        BadInput: A name stands for nothing, or for nothing fuzzy.
-    """
-    found: dict[str, FuzzyNumber] = {}
-    for name in names:
-        try:
-            members = {member: values[member] for member in model.group(name) if values[member].support.width > 0}
-        except (ValueError, KeyError) as error:
-            raise BadInput(Problem("envelope.fuzzy", " ".join(str(error.args[0]).split()), name)) from None
-        if not members:
-            raise BadInput(Problem("envelope.fuzzy", "this input is crisp in the case", name, "an input with a triangle or an interval"))
-        found |= members
-    return found
 
 
 def guard_step(model: StoreyFrame, task: EnvelopeTask, *, strict: bool) -> None:
@@ -156,7 +83,7 @@ def compute(
     """The envelope of all outputs on all levels.
 
     Args:
-        case: With the sections frame and envelope.
+        case: With the sections envelope and frame or pendulum.
         task: What is wanted.
         modulus: Handed on from the stage before, in Pa.
         strict: Refuse a step that cannot resolve the fastest mode instead of warning.
@@ -164,15 +91,13 @@ def compute(
     """
     import frame
 
-    young = modulus_of(case, modulus)
-    try:
-        model = structure(case, young)
-    except ValueError as error:
-        raise BadInput(Problem("frame", str(error), file=str(case.path))) from None
-    guard_step(model, task, strict=strict)
-    inputs = fuzzy_inputs(model, task.fuzzy, numbers(case, young))
+    wanted = structure(case, modulus)
+    inputs = wanted.inputs(task.fuzzy)
+    if wanted.frame is None:
+        return nonlinear(wanted, task, progress)
+    guard_step(wanted.frame, task, strict=strict)
     return frame.envelope(
-        model,
+        wanted.frame,
         inputs,
         alpha=task.alpha,
         duration=task.duration,
@@ -182,6 +107,23 @@ def compute(
         progress=progress,
         **method_options(task),
     )
+
+
+def nonlinear(wanted: Structure, task: EnvelopeTask, progress: Tick | None) -> Envelope:
+    """The envelope of a structure that is not linear.
+
+    Raises:
+        BadInput: The method or the integrator is for linear structures only.
+    """
+    from frame import METHODS
+    from frame.box import UnitFlow, boxes
+
+    cuts = boxes(wanted.inputs(task.fuzzy), task.alpha)
+    try:
+        flow = UnitFlow(wanted.flow(cuts.names, task.duration, task.step, task.integrator), cuts)
+        return METHODS[task.method](flow, progress, **method_options(task))
+    except ValueError as error:
+        raise BadInput(Problem("envelope.method", str(error), task.method)) from None
 
 
 def method_options(task: EnvelopeTask) -> dict[str, float]:

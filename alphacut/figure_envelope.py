@@ -41,7 +41,8 @@ def envelope(dataset: xarray.Dataset, output: str, study: Study) -> Figure:
     axes.set_xlabel("time t, s")
     axes.set_ylabel(f"{output}, {output_unit(output)}")
     axes.set_xlim(time[0], time[-1])
-    words = ", ".join(WORDS.get(name, name) for name in study.task.fuzzy)
+    known = WORDS if output.startswith(("q", "v", "drift", "shear", "base")) else {}  # letters mean something else in a pendulum
+    words = ", ".join(known.get(name, name) for name in study.task.fuzzy)
     axes.set_title(f"{output}, fuzzy {words}", loc="left", fontsize=10)
     alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return drawn

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from alphacut import envelope
 from alphacut.chain import Results, Study
 from alphacut.figure_style import BLUE, GREY, INK, ORANGE
+from alphacut.structure import structure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -72,22 +72,16 @@ def base(panel: Axes, found: FollowerRecord, graphs: range | list[int], *, node:
 
 def recorded(results: Results, study: Study) -> tuple[FollowerRecord, str]:
     """A run of the Graph Follower that keeps every step, and the output it followed."""
-    from frame.record import record
+    from frame.box import UnitFlow, boxes
+    from frame.record import record_flow
 
-    young = envelope.modulus_of(results.case, results.handed)
-    model = envelope.structure(results.case, young)
-    inputs = envelope.fuzzy_inputs(model, study.task.fuzzy, envelope.numbers(results.case, young))
+    wanted = structure(results.case, results.handed)
+    cuts = boxes(wanted.inputs(study.task.fuzzy), (0.0,))
     steps = max(1, min(round(DURATION / study.task.step), round(study.task.duration / study.task.step)))
-    output = len([name for name in model.outputs if name.startswith("q")]) - 1
+    flow = UnitFlow(wanted.flow(cuts.names, steps * study.task.step, study.task.step), cuts)
+    output = max(0, len([name for name in flow.outputs if name.startswith("q")]) - 1)
     for tolerance in (1.0, 1e-2, 1e-4, 1e-8):  # fine enough that there is something to see
-        found = record(
-            model,
-            inputs,
-            duration=steps * study.task.step,
-            step=study.task.step,
-            output=max(output, 0),
-            tolerance=tolerance * study.task.tolerance,
-        )
+        found = record_flow(flow, output=output, tolerance=tolerance * study.task.tolerance)
         if any(step.found >= 0 for step in found.steps):
             break
-    return found, model.outputs[max(output, 0)]
+    return found, flow.outputs[output]

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.case import Case
-from alphacut.envelope import per_floor
 from alphacut.figure_style import BLUE, GREY, INK, ORANGE, figure
+from alphacut.structure import per_floor
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut import envelope
 from alphacut.cell import GPA
 from alphacut.chain import Results
 from alphacut.figure_style import BLUE, INK, ORANGE, figure, membership_axes
+from alphacut.structure import structure
 
 if TYPE_CHECKING:
     import xarray
@@ -36,18 +36,16 @@ def membership(dataset: xarray.Dataset) -> Figure:
 
 def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figure:
     """Fig. 20: trajectories for parameters inside an α-cut, and the envelope that encloses them."""
-    from frame import LinearFlow
     from frame.envelope import output_unit
 
     study = next((s for s in results.studies if len(s.task.fuzzy) > 1), results.studies[0])
     dataset = results.envelopes[study.name].isel(alpha=0)
     output = str(dataset["output"].values[-1 if "q" in str(dataset["output"].values[-1]) else 0])
-    young = envelope.modulus_of(results.case, results.handed)
-    model = envelope.structure(results.case, young)
-    inputs = envelope.fuzzy_inputs(model, study.task.fuzzy, envelope.numbers(results.case, young))
+    wanted = structure(results.case, results.handed)
+    inputs = wanted.inputs(study.task.fuzzy)
     end = min(duration, study.task.duration)
     end = round(end / study.task.step) * study.task.step
-    flow = LinearFlow(model, tuple(inputs), end, study.task.step)
+    flow = wanted.flow(tuple(inputs), end, study.task.step)
     ends = np.array([number.cut(float(dataset["alpha"])) for number in inputs.values()])
     points = np.random.default_rng(0).uniform(ends[:, 0], ends[:, 1], (count, len(ends)))
     curves = flow.values(points)[:, :, list(flow.outputs).index(output)]
@@ -60,5 +58,5 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
     axes.set_xlabel("time t, s")
     axes.set_ylabel(f"{output}, {output_unit(output)}")
     axes.set_title(f"Fuzzy mapping of {output} at α = {float(dataset['alpha']):g}", loc="left", fontsize=10)
-    axes.legend(loc="lower right")
+    axes.legend(loc="lower left", bbox_to_anchor=(0.45, 1.0), ncols=2, fontsize=8, borderaxespad=0.2)
     return drawn

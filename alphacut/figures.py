@@ -33,6 +33,7 @@ def drawings(results: Results) -> Iterator[Drawing]:
         yield "fig19-membership", lambda: figure_fuzzy.membership(modulus)
     if results.envelopes:
         yield "fig20-mapping", lambda: figure_fuzzy.mapping(results)
+    if results.envelopes and results.case.has("frame.masses"):
         yield "fig26-frame", lambda: figure_frame.frame(results.case)
         yield "fig27-chain", lambda: figure_frame.chain(results.case)
     if results.case.has("envelope.method") and results.case.text("envelope.method") == "graph-follower" and results.envelopes:

@@ -14,7 +14,7 @@ from fuzzy import Crisp
 VERSION = 1
 STAGES = ("microstructure", "modulus", "envelope")
 ENVELOPE_METHODS = ("modal", "graph-follower", "vertex", "monte-carlo", "quasi-monte-carlo")
-INTEGRATORS = ("midpoint", "newmark", "rk4", "gauss4", "exact")
+INTEGRATORS = ("midpoint", "newmark", "rk4", "gauss4", "exact", "composition4")
 PLANS = ("general", "reduced", "extended", "signed")
 CELL_METHODS = ("prism", "slices", "table", "series", "auto")
 ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -196,6 +196,19 @@ FRAME = Section(
     },
 )
 
+PENDULUM = Section(
+    "Damped pendulum: a mass on a bar under gravity; the output is the force in the bar.",
+    {
+        "mass": Key("mass", unit="kg", required=True, allowed=POSITIVE),
+        "length": Key("length of the bar", unit="m", required=True, allowed=POSITIVE),
+        "damping": Key("moment over angular velocity", unit="N*m*s", required=True, allowed=NOT_NEGATIVE),
+        "gravity": Key("acceleration of gravity", unit="m/s^2", required=True, allowed=POSITIVE),
+        "angle": Key("angle at the start, 0 hanging down", unit="rad", required=True),
+        "angular_velocity": Key("angular velocity at the start", unit="rad/s", required=True),
+        "tolerance": Key("gain that is worth a new trajectory", "number", "N", default=1e-3, allowed=POSITIVE),
+    },
+)
+
 STUDY = Section(
     "One envelope that `alphacut run` computes; what it leaves out is taken from [envelope].",
     {
@@ -211,12 +224,16 @@ STUDY = Section(
 ENVELOPE = Section(
     "Fuzzy forward dynamics.",
     {
-        "fuzzy": Key("inputs that are fuzzy: E, I, m or m1 …, l, d, q0, v0, rayleigh_mass, rayleigh_stiffness", "choices", required=True),
+        "fuzzy": Key(
+            "inputs that are fuzzy: E, I, m or m1 …, l, d, q0, v0, rayleigh_mass …; of a pendulum m, l, d, g, phi_0, omega_0",
+            "choices",
+            required=True,
+        ),
         "alpha": Key("α-levels", "numbers", default=ALPHA, allowed=MEMBERSHIP),
         "method": Key("how the envelope is found", "choice", default="graph-follower", choices=ENVELOPE_METHODS),
         "integrator": Key("time stepping; by the method if left out: exact for modal, else midpoint", "choice", choices=INTEGRATORS),
         "order": Key("order κ of the Taylor models", "integer", default=2, allowed=Range("1 or 2", 1, 2, closed=True)),
-        "tolerance": Key("gain that is worth a new trajectory", "number", "m", required=True, allowed=POSITIVE),
+        "tolerance": Key("gain that is worth a new trajectory; of a frame", "number", "m", default=1e-4, allowed=POSITIVE),
         "duration": Key("length of the simulation", "number", "s", required=True, allowed=POSITIVE),
         "step": Key("time step", "number", "s", required=True, allowed=POSITIVE),
     },
@@ -233,13 +250,14 @@ SECTIONS: dict[str, Section] = {
     "mesh": MESH,
     "modulus": MODULUS,
     "frame": FRAME,
+    "pendulum": PENDULUM,
     "study": STUDY,
     "envelope": ENVELOPE,
 }
 NEEDED = {
     "microstructure": ("microstructure",),
     "modulus": ("radius", "cell", "mesh"),
-    "envelope": ("frame", "envelope"),
+    "envelope": ("envelope",),
 }  # sections that a stage cannot do without
 
 

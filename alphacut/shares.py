@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from alphacut import envelope
 from alphacut.campaign import campaign
 from alphacut.case import Case
 from alphacut.chain import Results, Study
+from alphacut.structure import structure
 from fuzzy import Crisp, FuzzyNumber, Reduced, propagate
 from stochastic.truncated_normal import Array
 
@@ -53,10 +53,10 @@ def envelope_shares(results: Results, study: Study) -> tuple[Shares, Array]:
     import frame
     from fuzzy.shares import width_shares
 
-    young = envelope.modulus_of(results.case, results.handed)
-    model = envelope.structure(results.case, young)
-    inputs = envelope.fuzzy_inputs(model, study.task.fuzzy, envelope.numbers(results.case, young))
-    groups = {name: tuple(member for member in model.group(name) if member in inputs) for name in study.task.fuzzy}
+    wanted = structure(results.case, results.handed)
+    assert wanted.frame is not None
+    model, inputs = wanted.frame, wanted.inputs(study.task.fuzzy)
+    groups = {name: wanted.members(name) for name in study.task.fuzzy}
     times: list[Array] = []
 
     def bounds(fuzzy: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
@@ -80,13 +80,18 @@ def dataset(results: Results) -> xarray.Dataset:
         variables["modulus_share"] = (("cell_input", "alpha"), cell.share, {"units": "1"})
         coordinates |= {"cell_input": list(cell.names), "alpha": list(results.case.numbers("modulus.alpha"))}
     study = richest(results)
-    if study is not None and len(study.task.fuzzy) > 1 and not results.case.has("frame.accelerogram"):
+    if study is not None and len(study.task.fuzzy) > 1 and free_frame(results.case):
         structure, time = envelope_shares(results, study)
         variables["share"] = (("input", "time", "output"), structure.share, {"units": "1"})
         variables["width"] = (("time", "output"), structure.width)
         names = [str(name) for name in results.envelopes[study.name]["output"].values]
         coordinates |= {"input": list(structure.names), "time": time, "output": names}
     return xarray.Dataset(variables, coordinates, {"study": study.name if study else ""})
+
+
+def free_frame(case: Case) -> bool:
+    """Whether the structure is a frame in free vibration, which the modal method can treat quickly."""
+    return case.has("frame.masses") and not case.has("frame.accelerogram")
 
 
 def richest(results: Results) -> Study | None:

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from alphacut import envelope
 from alphacut.cell import GPA, SHARED, key_of, parts
 from alphacut.chain import Results
 from alphacut.provenance import FORMAT, versions
+from alphacut.structure import structure
 
 if TYPE_CHECKING:
     import xarray
@@ -76,7 +76,9 @@ def structure_numbers(results: Results) -> dict[str, Any]:
     """Natural frequencies at the modal values."""
     from frame.linear import frequencies
 
-    model = envelope.structure(results.case, envelope.modulus_of(results.case, results.handed))
+    model = structure(results.case, results.handed).frame
+    if model is None:
+        return {}
     omega = frequencies(model)
     period = 2 * np.pi / omega[0]
     return {"omega_rad_per_s": omega, "period_s": period, "two_periods_s": 2 * period, "parameters": 1 + 5 * model.floors}

@@ -1,0 +1,151 @@
+"""The structure of a case: its model at modal values, and every parameter as a fuzzy number by the name that the model gives it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, cast
+
+from alphacut.accelerogram import accelerogram
+from alphacut.case import Case
+from alphacut.consistency import beside
+from alphacut.problem import BadInput, Problem
+from fuzzy import FuzzyNumber
+
+if TYPE_CHECKING:
+    from frame import StoreyFrame
+    from frame.flow import Flow
+    from frame.lagrangian import LagrangianSystem
+
+LISTS = {"m": "masses", "l": "lengths", "d": "dampers"}
+RAYLEIGH = ("rayleigh_mass", "rayleigh_stiffness")
+STARTS = {"q": "displacements", "v": "velocities"}
+PENDULUM = {"m": "mass", "l": "length", "d": "damping", "g": "gravity", "phi_0": "angle", "omega_0": "angular_velocity"}
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A frame or a pendulum.
+
+    Args:
+        model: The model at modal values.
+        numbers: Every parameter, crisp or fuzzy, in SI.
+    """
+
+    model: StoreyFrame | LagrangianSystem
+    numbers: Mapping[str, FuzzyNumber]
+
+    @property
+    def frame(self) -> StoreyFrame | None:
+        """The model if it is a storey frame, else None."""
+        from frame import StoreyFrame
+
+        return self.model if isinstance(self.model, StoreyFrame) else None
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the observed quantities."""
+        return self.model.outputs
+
+    def members(self, name: str) -> tuple[str, ...]:
+        """The fuzzy parameters that a name stands for: ``m`` all masses of a frame, any other name itself.
+
+        Raises:
+            BadInput: It stands for nothing, or for nothing fuzzy.
+        """
+        try:
+            members = self.frame.group(name) if self.frame else (name,)
+            found = tuple(member for member in members if self.numbers[member].support.width > 0)
+        except (ValueError, KeyError) as error:
+            raise BadInput(Problem("envelope.fuzzy", " ".join(str(error.args[0]).split()), name, ", ".join(self.numbers))) from None
+        if not found:
+            raise BadInput(Problem("envelope.fuzzy", "this input is crisp in the case", name, "an input with a triangle or an interval"))
+        return found
+
+    def inputs(self, names: Sequence[str]) -> dict[str, FuzzyNumber]:
+        """The fuzzy inputs that the names stand for."""
+        return {member: self.numbers[member] for name in names for member in self.members(name)}
+
+    def flow(self, names: Sequence[str], duration: float, step: float, integrator: str | None = None) -> Flow:
+        """Trajectories as a function of the named parameters, by the midpoint rule unless said otherwise."""
+        from frame import INTEGRATORS, LinearFlow
+        from frame.nonlinear_flow import LagrangianFlow
+
+        if self.frame is not None:
+            return LinearFlow(self.frame, tuple(names), duration, step, INTEGRATORS[integrator or "midpoint"])
+        system = cast("LagrangianSystem", self.model)
+        return LagrangianFlow(system, tuple(names), duration, step, integrator or "midpoint", observe=("force",))
+
+
+def structure(case: Case, handed: FuzzyNumber | None) -> Structure:
+    """The structure of a case, with the modulus handed on from the stage before, if any.
+
+    Raises:
+        BadInput: Its values do not make a structure.
+    """
+    try:
+        return pendulum(case) if case.has("pendulum.mass") else storey_frame(case, modulus_of(case, handed))
+    except ValueError as error:
+        raise BadInput(Problem("frame", str(error), file=str(case.path))) from None
+
+
+def pendulum(case: Case) -> Structure:
+    """A damped pendulum."""
+    from frame.lagrangian import pendulum as make
+
+    numbers = {name: case.fuzzy(f"pendulum.{key}") for name, key in PENDULUM.items()}
+    names = {"m": "mass", "l": "length", "d": "damping", "g": "gravity", "phi_0": "phi0", "omega_0": "omega0"}
+    modal: dict[str, Any] = {names[name]: number.modal for name, number in numbers.items()}
+    return Structure(make(**modal), numbers)
+
+
+def storey_frame(case: Case, modulus: FuzzyNumber) -> Structure:
+    """A storey frame."""
+    from frame import StoreyFrame
+
+    numbers = parameters(case, modulus)
+    modal = {name: tuple(x.modal for x in per_floor(case, f"frame.{name}")) for name in (*LISTS.values(), *STARTS.values())}
+    model = StoreyFrame(
+        modal["masses"],
+        modal["lengths"],
+        modulus.modal,
+        case.fuzzy("frame.second_moment").modal,
+        dampers=modal["dampers"],
+        damper_placement=cast(Literal["ground", "storey"], case.text("frame.damper_placement")),
+        q0=modal["displacements"],
+        v0=modal["velocities"],
+        outputs=case.names("frame.outputs"),
+        rayleigh=(case.fuzzy("frame.rayleigh_mass").modal, case.fuzzy("frame.rayleigh_stiffness").modal),
+        ground=accelerogram(beside(case, case.text("frame.accelerogram"))) if case.has("frame.accelerogram") else None,
+    )
+    return Structure(model, numbers)
+
+
+def parameters(case: Case, modulus: FuzzyNumber) -> dict[str, FuzzyNumber]:
+    """Every parameter of the frame by the name that `frame` gives it, in SI."""
+    found = {"E": modulus, "I": case.fuzzy("frame.second_moment")}
+    found |= {name: case.fuzzy(f"frame.{name}") for name in RAYLEIGH}
+    for letter, key in LISTS.items():
+        found |= {f"{letter}{floor}": value for floor, value in enumerate(per_floor(case, f"frame.{key}"), start=1)}
+    for letter, key in STARTS.items():
+        found |= {f"{letter}{floor}_0": value for floor, value in enumerate(per_floor(case, f"frame.{key}"), start=1)}
+    return found
+
+
+def per_floor(case: Case, key: str) -> tuple[FuzzyNumber, ...]:
+    """One value for each floor; a single one holds for all of them."""
+    values, floors = case.fuzzies(key), len(case.fuzzies("frame.masses"))
+    return values * floors if len(values) == 1 else values
+
+
+def modulus_of(case: Case, given: FuzzyNumber | None) -> FuzzyNumber:
+    """The modulus handed on, else the frame's own.
+
+    Raises:
+        BadInput: There is none.
+    """
+    if given is not None:
+        return given
+    if not case.has("frame.modulus"):
+        raise BadInput(Problem("frame.modulus", "missing: give it in the case or by --modulus", file=str(case.path)))
+    return case.fuzzy("frame.modulus")
