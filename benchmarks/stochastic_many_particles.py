@@ -37,7 +37,7 @@ def homogenised(discs: Discs, *, size: float, around: int) -> np.ndarray:
     return many_particles(discs, MATRIX, INCLUSION, size=size, around=around)
 
 
-def compare(*, cells: int, discs: int, fraction: float = 0.2, seed: int = 1, workers: int = 1, size: float = 0.35, around: int = 12):
+def compare(*, cells: int, discs: int, fraction: float = 0.2, seed: int = 1, workers: int = 1, size: float = 0.2, around: int = 20):
     """Stiffness of each many-particle cell, shape (cells, 3, 3), and the averages over the r_n of the same packings."""
     wish = Packing(discs, fraction, LogNormalRadii(1e-3, 1e-2), gap=1e-4)
     sample = reduced_radii(Simulated(wish, cells).sections(seed))
@@ -103,8 +103,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--discs", type=int, default=60, help="discs in each (60)")
     parser.add_argument("--seed", type=int, default=1, help="seed of the packings (1)")
     parser.add_argument("--workers", type=int, default=1, help="processes (1)")
-    parser.add_argument("--size", type=float, default=0.35, help="edge length over the mean spacing of discs (0.35)")
-    parser.add_argument("--around", type=int, default=12, help="edges around each circle (12)")
+    parser.add_argument("--size", type=float, default=0.2, help="edge length over the mean spacing of discs (0.2)")
+    parser.add_argument("--around", type=int, default=20, help="edges around each circle (20)")
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder for the results")
     options = parser.parse_args(arguments)
     stiffness, known = compare(
