@@ -69,11 +69,11 @@ class PlanarCell:
         self._forms = [fem.form(density * dx(tag)) for tag in (0, 1)]
         self.seconds["jit"] = perf_counter() - started
 
-    def _stiffness_of(self, tag: int, poisson: float) -> sp.csr_matrix:
+    def _stiffness_of(self, tag: int, poisson: float) -> sp.bsr_matrix:
         """Unreduced stiffness of one phase for a modulus of 1 Pa."""
         unit = Phase(1.0, poisson).stiffness
         self._lame[0].value, self._lame[1].value = unit[0, 1], unit[2, 2]
-        return fem.assemble_matrix(self._forms[tag]).to_scipy().tocsr()
+        return fem.assemble_matrix(self._forms[tag]).to_scipy()
 
     @cached_property
     def coordinates(self) -> Array:

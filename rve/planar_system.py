@@ -21,29 +21,36 @@ class PlanarError(RuntimeError):
 
 
 class PeriodicPattern:
-    """K ↦ the entries of Pᵀ K P, for several K that then share one sparsity pattern.
+    """K ↦ the entries of Pᵀ K P, for several K of 2 × 2 blocks that then share one sparsity pattern.
 
     Args:
         nodes: Periodic number of each node, two degrees of freedom on each; those of node 0 are fixed.
         matrices: Unreduced matrices, one for each pattern to come.
     """
 
-    def __init__(self, nodes: Integers, matrices: Sequence[sp.csr_matrix]) -> None:
-        target = (2 * nodes[:, None] + np.arange(2)).ravel() - 2
-        size = int(target.max()) + 1
+    def __init__(self, nodes: Integers, matrices: Sequence[sp.bsr_matrix]) -> None:
+        size = int(nodes.max())
         keys, self._kept = [], []
         for full in matrices:
-            row, column = np.repeat(target, np.diff(full.indptr)), target[full.indices]
+            row, column = np.repeat(nodes - 1, np.diff(full.indptr)), nodes[full.indices] - 1
             self._kept.append((row >= 0) & (column >= 0))
             keys.append((row * size + column)[self._kept[-1]])
         united, place = np.unique(np.concatenate(keys), return_inverse=True)
         self._place = np.split(place, np.cumsum([k.size for k in keys])[:-1])
-        self.rows = np.searchsorted(united, np.arange(size + 1) * size)
-        self.columns = united % size
+        starts = np.searchsorted(united, np.arange(size + 1) * size)
+        self._blocks = united % size, starts
+        entries = self._csr(np.arange(4.0 * united.size).reshape(-1, 2, 2))
+        self.rows, self.columns, self._order = entries.indptr, entries.indices, entries.data.astype(np.int64)
 
-    def __call__(self, which: int, full: sp.csr_matrix) -> Array:
+    def _csr(self, blocks: Array) -> sp.csr_matrix:
+        size = 2 * (self._blocks[1].size - 1)
+        return sp.bsr_matrix((blocks, *self._blocks), shape=(size, size)).tocsr()
+
+    def __call__(self, which: int, full: sp.bsr_matrix) -> Array:
         """Entries in CSR order of the matrix whose pattern is number `which`."""
-        return np.bincount(self._place[which], weights=full.data[self._kept[which]], minlength=self.columns.size)
+        kept, place, count = full.data[self._kept[which]], self._place[which], self._blocks[0].size
+        sums = [np.bincount(place, weights=kept[:, i, j], minlength=count) for i in (0, 1) for j in (0, 1)]
+        return np.asarray(np.stack(sums, axis=-1).ravel()[self._order])
 
 
 class Cholesky:
@@ -100,7 +107,7 @@ class Pencil:
         affine: Displacements of the three unit strains, shape (2n, 3).
     """
 
-    def __init__(self, fixed: sp.csr_matrix, unit: sp.csr_matrix, nodes: Integers, periodic: sp.csr_matrix, affine: Array) -> None:
+    def __init__(self, fixed: sp.bsr_matrix, unit: sp.bsr_matrix, nodes: Integers, periodic: sp.csr_matrix, affine: Array) -> None:
         pattern = PeriodicPattern(nodes, [fixed, unit])
         self._values = pattern(0, fixed), pattern(1, unit)
         self._shape = pattern.columns, pattern.rows
@@ -116,10 +123,10 @@ class Pencil:
         uniform = self.uniform[0] + modulus * self.uniform[1]
         return correction, (uniform - load.T @ correction) / AREA  # ⟨σ⟩ by Hill–Mandel
 
-    def project(self, basis: Array) -> tuple[Array, Array]:
-        """Vᵀ K V of both parts for a basis V, shape (unknowns, k)."""
-        parts = [basis.T @ (sp.csr_matrix((values, *self._shape)) @ basis) for values in self._values]
-        return parts[0], parts[1]
+    def applied(self, vectors: Array) -> tuple[Array, Array]:
+        """K V of both parts for vectors of shape (unknowns, k)."""
+        fixed, unit = (np.asarray(sp.csr_matrix((values, *self._shape)) @ vectors) for values in self._values)
+        return fixed, unit
 
 
 class ModulusBasis:
@@ -135,35 +142,43 @@ class ModulusBasis:
     def __init__(self, pencil: Pencil) -> None:
         self._pencil, self.size = pencil, 0
         self._vectors = np.empty((pencil.loads[0].shape[0], 0))
+        self._projected = [np.empty((0, 0)), np.empty((0, 0))]  # Vᵀ K V of both parts
 
     def stiffness(self, moduli: Array) -> Array:
         """Stiffness for every one of `moduli` in Pa, shape (m, 3, 3)."""
         if moduli.size <= 2:
             self.size = moduli.size
             return np.array([self._pencil.solve(float(e))[1] for e in moduli])
-        self._add(float(moduli.min()))
-        self._add(float(moduli.max()))
-        found, taken = self._galerkin(moduli), {float(moduli.min()), float(moduli.max())}
-        change = np.array([0.0 if float(e) in taken else np.inf for e in moduli])
-        middle = np.sqrt(moduli.min() * moduli.max())
-        while change.max() > _BASIS_TOLERANCE:
-            candidates = np.flatnonzero(change == change.max())
-            worst = float(moduli[candidates[np.argmin(np.abs(np.log(moduli[candidates] / middle)))]])
+        low, high = float(moduli.min()), float(moduli.max())
+        for modulus in (low, high):
+            self._add(modulus)
+        found, taken = self._galerkin(moduli), {low, high}
+        worst: float | None = float(moduli[np.argmin(np.abs(np.log(moduli / np.sqrt(low * high))))])
+        while worst is not None and worst not in taken:
             self._add(worst)
             taken.add(worst)
             better = self._galerkin(moduli)
             change = np.abs(better - found).max(axis=(1, 2)) / np.abs(better).max(axis=(1, 2))
-            change[[float(e) in taken for e in moduli]] = 0.0
+            change[[float(e) in taken and e != worst for e in moduli]] = 0.0
             found = better
+            left = np.where([float(e) in taken for e in moduli], 0.0, change)
+            worst = float(moduli[left.argmax()]) if change.max() > _BASIS_TOLERANCE else None
         return found
 
     def _add(self, modulus: float) -> None:
+        """Put the three solutions at `modulus` into the orthonormal basis."""
         solution = self._pencil.solve(modulus)[0]
-        self._vectors = np.linalg.qr(np.hstack([self._vectors, solution / np.linalg.norm(solution, axis=0)]))[0]
+        fresh = solution / np.linalg.norm(solution, axis=0)
+        for _ in range(2):
+            fresh = np.linalg.qr(fresh - self._vectors @ (self._vectors.T @ fresh))[0]
+        for k, image in enumerate(self._pencil.applied(fresh)):
+            side = self._vectors.T @ image
+            self._projected[k] = np.block([[self._projected[k], side], [side.T, fresh.T @ image]])
+        self._vectors = np.hstack([self._vectors, fresh])
         self.size += 1
 
     def _galerkin(self, moduli: Array) -> Array:
-        fixed, unit = self._pencil.project(self._vectors)
+        fixed, unit = self._projected
         loads = [self._vectors.T @ load for load in self._pencil.loads]
         stiffness = []
         for modulus in moduli:

@@ -62,13 +62,13 @@ class Contrast:
     @property
     def inner(self) -> Array:
         """The factor of b_n, n ≥ 2."""
-        return (self.kappa - self.ratio * self.kappa_i) / (1 + self.ratio * self.kappa_i)
+        return np.asarray((self.kappa - self.ratio * self.kappa_i) / (1 + self.ratio * self.kappa_i))
 
     @property
     def swelling(self) -> Array:
         """The factor of b_1."""
         lam, k = self.ratio, self.kappa_i - 1
-        return 2 * ((self.kappa - 1) - lam * k) / (2 + lam * k)
+        return np.asarray(2 * ((self.kappa - 1) - lam * k) / (2 + lam * k))
 
 
 @dataclass(frozen=True)
@@ -96,14 +96,14 @@ def _images(sums: LatticeSums, k: Array, n: Array) -> Array:
     """Taylor coefficient k of Σ' (z − P)^-n for odd n, shape (len(k), len(n))."""
     k, n = k[:, None], n[None, :]
     halved = np.exp(gammaln(n + k) - gammaln(n) - gammaln(k + 1) - (n + k) * np.log(2))  # binomial over 2^(n + k)
-    return -halved * sums.plain[n + k]
+    return np.asarray(-halved * sums.plain[n + k])
 
 
 def _conjugate_images(sums: LatticeSums, k: Array, n: Array) -> Array:
     """Taylor coefficient k of n Σ' conj(P) (z − P)^(-n-1) for odd n."""
     k, n = k[:, None], n[None, :]
     halved = np.exp(gammaln(n + k + 1) - gammaln(n + 1) - gammaln(k + 1) - (n + k) * np.log(2))
-    return n * halved * sums.conjugate[n + k + 1]
+    return np.asarray(n * halved * sums.conjugate[n + k + 1])
 
 
 @cache
@@ -176,7 +176,7 @@ def _swelling_pole(a: Array, radius: Array, contrast: Contrast) -> Array:
     """b_1 = swelling · (p_1 of the images + r A), shape (n, m)."""
     kind = family(a.shape[-1], hydrostatic=True)
     to_first = kind.to_p[0] * radius[:, None] ** (kind.a + 1)
-    return contrast.swelling * (np.einsum("nk,nmk->nm", to_first, a) + radius[:, None])
+    return np.asarray(contrast.swelling * (np.einsum("nk,nmk->nm", to_first, a) + radius[:, None]))
 
 
 def _sums() -> LatticeSums:

@@ -91,7 +91,7 @@ def _first_guess(radius: Array, tolerance: float) -> Array:
     """Harmonics for each radius, from the rate at which images of touching particles fade, in steps that keep batches few."""
     rate = 8 * np.arccosh(1 / np.maximum(radius, 1e-3))
     steps = np.array([3, 4, 5, 6, 8, 10, 12, 16, 24, 32, 48, 64, 96, 128, MOST_HARMONICS])
-    return steps[np.minimum(np.searchsorted(steps, np.log(1 / tolerance) / rate), steps.size - 1)]
+    return np.asarray(steps[np.minimum(np.searchsorted(steps, np.log(1 / tolerance) / rate), steps.size - 1)])
 
 
 def _batches(rows: Array, entries: int) -> list[Array]:

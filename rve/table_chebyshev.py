@@ -74,7 +74,7 @@ class TableRange:
 
 
 def _touch(radius: Array) -> Array:
-    return np.sqrt((1 - radius) * (1 + radius))
+    return np.asarray(np.sqrt((1 - radius) * (1 + radius)))
 
 
 def _unit(values: Array, ends: Array) -> Array:
@@ -158,7 +158,7 @@ class Table:
 
     def space_error(self, radius: Array) -> Array:
         """Estimated relative error of the interpolated moduli at `radius`, any shape."""
-        return np.exp(np.interp(radius, self.space[0], np.log(self.space[1])))
+        return np.asarray(np.exp(np.interp(radius, self.space[0], np.log(self.space[1]))))
 
     def moduli(self, radius: Array, modulus: Array) -> Array:
         """C11 + C12, C11 − C12 and C33 in Pa at n radii times m moduli, shape (n, m, 3).
@@ -169,7 +169,7 @@ class Table:
         at_r, at_e = self.span.coordinates(radius, modulus)
         rows = chebyshev.chebvander(at_r, self.coefficients.shape[0] - 1)
         columns = chebyshev.chebvander(at_e, self.coefficients.shape[1] - 1)
-        return np.exp(np.einsum("ni,ijk,mj->nmk", rows, self.coefficients, columns, optimize=True))
+        return np.asarray(np.exp(np.einsum("ni,ijk,mj->nmk", rows, self.coefficients, columns, optimize=True)))
 
     def stiffness(self, radius: Array, modulus: Array) -> Array:
         """Voigt matrices in Pa at n radii times m moduli, shape (n, m, 3, 3); errors as of `moduli`."""

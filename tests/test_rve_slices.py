@@ -89,7 +89,7 @@ def test_moving_the_particle_leaves_the_stiffness(centre):
 
 
 def test_refuses_particles_that_nearly_touch():
-    with pytest.raises(planar_mesh.TouchingError, match="planar meshes end at 0.9995"):
+    with pytest.raises(planar_mesh.TouchingError, match=r"planar meshes end at 0\.9995"):
         planar_mesh.planar_mesh(0.9996, size=0.3)
 
 
