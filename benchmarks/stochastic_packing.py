@@ -79,9 +79,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         writer.writerows(asdict(timing) for timing in timings)
     draw(timings, options.out)
     for timing in timings:
-        print(
-            f"{timing.kind:16} {timing.discs:7d} discs: packed in {timing.pack:6.2f} s, cells {timing.cells:6.2f} s, sum off by {timing.error:.1e}"
-        )
+        seconds = f"packed in {timing.pack:6.2f} s, cells {timing.cells:6.2f} s"
+        print(f"{timing.kind:16} {timing.discs:7d} discs: {seconds}, sum off by {timing.error:.1e}")
 
 
 if __name__ == "__main__":

@@ -49,7 +49,7 @@ def upper_envelopes(a: Array, b: Array, c: Array, counts: Array) -> Arcs:
     order = np.argsort(counts, kind="stable")
     order = order[counts[order] > 0]
     nothing = np.zeros(0, int)
-    parts = [(nothing, nothing, np.zeros(0), np.zeros(0))]
+    parts: list[tuple[Array, Array, Array, Array]] = [(nothing, nothing, np.zeros(0), np.zeros(0))]
     while len(order):
         # groups of like size share one padded table, small enough for the cache; the padding repeats the last function
         width = int(counts[order[: max(1, len(order) // 64)]][-1])
