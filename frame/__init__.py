@@ -4,7 +4,9 @@ from frame.envelope import Envelope
 from frame.flow import LinearFlow
 from frame.graph_follower import GraphFollower
 from frame.integrators import INTEGRATORS, Exact, Gauss4, Midpoint, Newmark, RungeKutta4
+from frame.lagrangian import LagrangianSystem, pendulum
 from frame.linear import Accelerogram
+from frame.nonlinear_flow import LagrangianFlow
 from frame.propagation import METHODS, envelope
 from frame.record import FollowerRecord, record
 from frame.step_guard import StepGuard, guard
@@ -19,6 +21,8 @@ __all__ = [
     "FollowerRecord",
     "Gauss4",
     "GraphFollower",
+    "LagrangianFlow",
+    "LagrangianSystem",
     "LinearFlow",
     "Midpoint",
     "Newmark",
@@ -27,5 +31,6 @@ __all__ = [
     "StoreyFrame",
     "envelope",
     "guard",
+    "pendulum",
     "record",
 ]

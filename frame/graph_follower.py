@@ -2,8 +2,8 @@
 
 This differs from the paper in: 1. One storage serves all outputs, both sides and all levels: levels are treated from the narrowest
 box to the widest, so that every stored graph is admissible and α-cuts are nested by construction. 2. A new graph is computed only
-where the Taylor model promises more than an explicit tolerance. 3. `improved` adds sweeps, the exact quadratic problem, models of
-several graphs and the Taylor-corrected value, each on its own switch.
+where the Taylor model promises more than an explicit tolerance. 3. Further sweeps, the exact quadratic problem, models of
+several graphs and the Taylor-corrected value are there, each on its own switch.
 """
 
 from __future__ import annotations
@@ -214,8 +214,3 @@ class GraphFollower:
 def _signed(values: Array) -> Array:
     """(−values, values) on a new axis before the last: both bounds become maxima; (…, G) to (…, 2, G)."""
     return np.stack([-values, values], -2)
-
-
-def improved(tolerance: float = 1e-4, budget: int | None = None) -> GraphFollower:
-    """The Graph Follower with the switches that pay."""
-    return GraphFollower(tolerance=tolerance, sweeps=2, exact=True, corrected=True, budget=budget)

@@ -9,13 +9,16 @@ from typing import Any
 
 import numpy as np
 
+from frame.batch_follower import pursue
 from frame.box import ALPHA, UnitFlow, boxes
 from frame.envelope import Envelope, signed_envelope
 from frame.flow import LinearFlow
 from frame.graph_follower import Followed, GraphFollower
 from frame.integrators import INTEGRATORS, Exact, Integrator
+from frame.lagrangian import LagrangianSystem
 from frame.linear import LinearSystem
 from frame.modal_method import modal
+from frame.nonlinear_flow import LagrangianFlow
 from frame.sampling import monte_carlo, quasi_monte_carlo, vertex
 from fuzzy import FuzzyNumber
 
@@ -23,13 +26,13 @@ Progress = Callable[[float], None]
 
 
 def envelope(
-    model: LinearSystem,
+    model: LinearSystem | LagrangianSystem,
     inputs: Mapping[str, FuzzyNumber],
     *,
     duration: float,
     step: float,
     alpha: Sequence[float] = ALPHA,
-    method: str = "modal",
+    method: str | None = None,
     integrator: str | Integrator | None = None,
     progress: Progress | None = None,
     **options: Any,
@@ -37,12 +40,12 @@ def envelope(
     """Lower and upper envelopes of the outputs of `model`.
 
     Args:
-        model: The structure.
+        model: A linear structure or a general Lagrangian system.
         inputs: Fuzzy parameters by name, in SI units.
         duration: Length of the simulation, in s.
         step: Distance of the nodes and step of the integrator, in s.
         alpha: Levels in [0, 1].
-        method: Name of a method, see `METHODS`.
+        method: Name of a method, see `METHODS`; modal for linear structures and improved-graph-follower for others unless given.
         integrator: Time stepping: a method or its name; exact for the method modal and midpoint for all others unless given.
         progress: Called with the fraction done.
         options: Options of the method, such as `order`, `tolerance`, `budget` of the Graph Follower.
@@ -50,17 +53,26 @@ def envelope(
     Raises:
         ValueError: An unknown name, or a value outside its range.
     """
-    if method not in METHODS:
-        raise ValueError(f"method: '{method}' is unknown; allowed are {', '.join(METHODS)}")
+    cuts = boxes(inputs, alpha)
+    if isinstance(model, LagrangianSystem):
+        flow = LagrangianFlow(model, cuts.names, duration, step, str(integrator or "midpoint"))
+        return _method(method or "improved-graph-follower")(UnitFlow(flow, cuts), progress, **options)
+    method = method or "modal"
+    propagate = _method(method)
     if integrator is None:
         integrator = "exact" if method in EXACT_BY_DEFAULT else "midpoint"
     if isinstance(integrator, str) and integrator not in INTEGRATORS:
         raise ValueError(f"integrator: '{integrator}' is unknown; allowed are {', '.join(INTEGRATORS)}")
     scheme = INTEGRATORS[integrator] if isinstance(integrator, str) else integrator
-    cuts = boxes(inputs, alpha)
-    flow = LinearFlow(model, cuts.names, duration, step, scheme)
-    found = METHODS[method](UnitFlow(flow, cuts), progress, **options)
-    return replace(found, facts={"integrator": scheme.name, "step_error": step_error(flow), **found.facts})
+    linear = LinearFlow(model, cuts.names, duration, step, scheme)
+    found = propagate(UnitFlow(linear, cuts), progress, **options)
+    return replace(found, facts={"integrator": scheme.name, "step_error": step_error(linear), **found.facts})
+
+
+def _method(name: str) -> Callable[..., Envelope]:
+    if name not in METHODS:
+        raise ValueError(f"method: '{name}' is unknown; allowed are {', '.join(METHODS)}")
+    return METHODS[name]
 
 
 def step_error(flow: LinearFlow) -> float:
@@ -102,6 +114,7 @@ EXACT_BY_DEFAULT = ("modal",)
 METHODS: dict[str, Callable[..., Envelope]] = {
     "modal": modal,
     "graph-follower": follow,
+    "improved-graph-follower": pursue,
     "vertex": vertex,
     "monte-carlo": monte_carlo,
     "quasi-monte-carlo": quasi_monte_carlo,

@@ -122,3 +122,26 @@ def test_dataset_keeps_names_and_units(short: Envelope) -> None:
     assert dataset["upper_at"].sizes["parameter"] == 4
     assert dataset["lower"].attrs["units"] == "m"
     assert float(dataset["lower"].sel(alpha=0, output="q1").min()) == short.minimum[0, 0]
+
+
+def test_rounds_need_fewer_graphs_for_a_smaller_error() -> None:
+    inputs = {**E, **MASSES}
+    common = {"duration": 10, "step": 0.02, "alpha": (0,)}
+    truth = envelope(FRAME, inputs, **common)
+    plain = envelope(FRAME, inputs, method="graph-follower", integrator="exact", **common)
+    rounds = envelope(FRAME, inputs, method="improved-graph-follower", integrator="exact", **common)
+    error = [max(np.abs(truth.upper - x.upper).max(), np.abs(truth.lower - x.lower).max()) for x in (plain, rounds)]
+    assert error[1] < 6e-5
+    assert error[1] < error[0]
+    assert rounds.trajectories < 1.3 * plain.trajectories + 64
+    assert rounds.nature == "estimated"
+
+
+def test_pendulum_goes_through_the_same_door() -> None:
+    inputs = {"m": Triangular(0.95, 1, 1.05), "l": Triangular(0.95, 1, 1.05), "phi_0": Triangular(1.4, 1.5, 1.6)}
+    found = envelope(frame.pendulum(), inputs, duration=3, step=0.02, alpha=(0, 1), tolerance=0.01, batch=16)
+    sampled = envelope(frame.pendulum(), inputs, duration=3, step=0.02, alpha=(0, 1), method="quasi-monte-carlo", samples=512)
+    assert found.outputs == ("force", "phi")
+    assert max((sampled.upper - found.upper).max(), (found.lower - sampled.lower).max()) < 0.02
+    assert (found.upper - sampled.upper).max() < 0.3
+    assert found.nesting_violation() < 0.01
