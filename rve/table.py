@@ -106,9 +106,9 @@ class TableModel:
 
 
 def _rounded_radii(low: float, high: float) -> tuple[float, float]:
-    """Outwards to twentieths; below 0.05, and of the gap 1 − r below 0.05, to powers of 2."""
-    least = np.floor(low * 20 + 1e-9) / 20 or 2.0 ** np.floor(np.log2(low))
-    gap = np.floor((1 - high) * 20 + 1e-9) / 20 or 2.0 ** np.floor(np.log2(1 - high))
+    """Outwards to fortieths; below 1/40, and of the gap 1 − r below 1/40, to powers of 2."""
+    least = np.floor(low * 40 + 1e-9) / 40 or 2.0 ** np.floor(np.log2(low))
+    gap = np.floor((1 - high) * 40 + 1e-9) / 40 or 2.0 ** np.floor(np.log2(1 - high))
     return float(least), float(1 - gap)
 
 

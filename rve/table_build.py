@@ -17,7 +17,7 @@ from stochastic.truncated_normal import Array
 
 _ORDER = 4
 _ROUGH, _FINEST = 0.5, 0.04  # mesh sizes
-_RATE = 7.0  # of the moduli in the mesh size
+_RATE = 7.5  # of the moduli in the mesh size
 _LEAST, _MOST_NODES = 7, 65  # radii
 _SPACE_SHARE = 0.6  # of the accuracy; the rest is for interpolation
 
