@@ -1,9 +1,11 @@
 """Fuzzy inputs through any model: α-cuts, plans of samples, fuzzy results."""
 
 from fuzzy.arithmetic import DependencyError, apply
+from fuzzy.branch_and_bound import BranchAndBound
 from fuzzy.campaign import CampaignError
 from fuzzy.chebyshev import Chebyshev
 from fuzzy.domain import Domain, levels
+from fuzzy.enclosure import gradient_range
 from fuzzy.explain import Explanation, explain
 from fuzzy.interaction import Ellipsoidal, Linear
 from fuzzy.interval_sampling import IntervalQuasiMonteCarlo, IntervalResponse, RandomInput
@@ -25,6 +27,7 @@ from fuzzy.store import Store, StoreError
 from fuzzy.transformation import Extended, General, Reduced, Vertex
 
 __all__ = [
+    "BranchAndBound",
     "CampaignError",
     "Chebyshev",
     "Crisp",
@@ -66,6 +69,7 @@ __all__ = [
     "apply",
     "explain",
     "from_data",
+    "gradient_range",
     "levels",
     "propagate",
     "width_shares",

@@ -1,0 +1,161 @@
+"""Guaranteed bounds by branch and bound: boxes are split until their enclosures meet the values that the model attains."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fuzzy.domain import Domain
+from fuzzy.enclosure import Pair, enclose
+from fuzzy.model import Model
+from fuzzy.numbers import Array, Rows
+from fuzzy.result import FuzzyResult, Nature
+
+_ROUND_OFF = 1 + 1e-12  # more than the round-off of the mean-value form
+_TOGETHER = 256  # boxes that are split at once
+
+
+class _Boxes(NamedTuple):
+    """Boxes (n, inputs) with a proved lower bound of the searched output in each, (n,), and its slopes, (n, inputs)."""
+
+    lower: Array
+    upper: Array
+    bound: Array
+    effect: Array
+
+
+@dataclass(frozen=True)
+class BranchAndBound:
+    """Proves bounds of a function that can be enclosed, from outside, to a stated gap.
+
+    Args:
+        function: The function itself, written in arithmetic and numpy's functions.
+        tolerance: Gap between proved and attained bound at which the search ends, as a share of the range seen.
+        budget: Boxes per bound at which it ends at the latest; the bound is proved all the same, but wider.
+
+    Raises:
+        ValueError: A number is not positive.
+    """
+
+    function: Callable[..., Any]
+    tolerance: float = 1e-4
+    budget: int = 50_000
+
+    def __post_init__(self) -> None:
+        if not (self.tolerance > 0 and self.budget >= 1):
+            raise ValueError(f"tolerance and budget are {self.tolerance:g} and {self.budget}; both must be positive")
+
+    @property
+    def stepwise(self) -> bool:
+        """Samples depend on those before."""
+        return True
+
+    def run(self, model: Model, domain: Domain) -> FuzzyResult:
+        """Prove both bounds of every output on every level; the error is the gap to what the model attains."""
+        domain.require_free("BranchAndBound")
+        first = model(np.array([[number.modal for number in domain.inputs.values()]], float))
+        columns = first.columns
+        shape = (len(domain.alpha), len(columns), 2)
+        proved, attained, places = np.empty(shape), np.empty(shape), np.empty((*shape, len(domain.names)))
+        runs = 1
+        for level in reversed(range(len(domain.alpha))):
+            for column, name in enumerate(columns):
+                for side, sign in enumerate((1.0, -1.0)):
+                    search = _Search(self, model, domain, level=level, output=name, sign=sign)
+                    search.run()
+                    proved[level, column, side] = sign * search.proved
+                    attained[level, column, side] = sign * search.best
+                    places[level, column, side] = search.place
+                    runs += search.runs
+            model.report(1 - level / len(domain.alpha))
+        return FuzzyResult(
+            domain=domain,
+            outputs=columns,
+            lower=np.maximum.accumulate(proved[..., 0]),  # what is proved of a cut holds in all cuts inside
+            upper=np.minimum.accumulate(proved[..., 1]),
+            lower_at=places[:, :, 0],
+            upper_at=places[:, :, 1],
+            base=Nature.GUARANTEED,
+            plan="branch and bound",
+            runs=runs,
+            error=np.abs(proved - attained).max(axis=2),
+            proved=np.ones(shape[:2], bool),
+            enforced=np.zeros(shape[:2], bool),
+        )
+
+
+class _Search:
+    """The least value of sign · output over one cut."""
+
+    def __init__(self, plan: BranchAndBound, model: Model, domain: Domain, *, level: int, output: str, sign: float) -> None:
+        self.plan, self.model, self.names, self.output, self.sign = plan, model, domain.names, output, sign
+        self.best, self.worst, self.runs = np.inf, -np.inf, 0
+        lower, upper = (ends[level : level + 1] for ends in domain.boxes)
+        self.place: Array = lower[0]
+        self.boxes = self._examined(lower, upper)
+
+    @property
+    def proved(self) -> float:
+        """A proved lower bound of the least value."""
+        return float(min(self.boxes.bound.min(initial=np.inf), self.best))
+
+    def run(self) -> None:
+        """Split the boxes of the lowest bounds until the gap is small enough."""
+        count = 1
+        while (
+            self.best - self.proved > self.plan.tolerance * max(self.worst - self.best, abs(self.best) * 1e-9) and count < self.plan.budget
+        ):
+            order = np.argsort(self.boxes.bound)
+            chosen, rest = order[:_TOGETHER], order[_TOGETHER:]
+            children = self._examined(*self._halves(chosen))
+            kept = rest[self.boxes.bound[rest] <= self.best]
+            fresh = children.bound <= self.best
+            if not (self.boxes.upper[chosen] > self.boxes.lower[chosen]).any():
+                break
+            parts = [np.concatenate([old[kept], new[fresh]]) for old, new in zip(self.boxes, children, strict=True)]
+            self.boxes = _Boxes(*parts)
+            count += len(children.bound)
+
+    def _scale(self) -> float:
+        return max(self.worst - self.best, abs(self.best) * 1e-9)
+
+    def _halves(self, chosen: Rows) -> tuple[Array, Array]:
+        """Chosen boxes cut in two across the input that matters most."""
+        lower, upper = self.boxes.lower[chosen], self.boxes.upper[chosen]
+        across = self.boxes.effect[chosen].argmax(axis=1)[:, None]
+        middle = np.take_along_axis((lower + upper) / 2, across, axis=1)
+        left, right = upper.copy(), lower.copy()
+        np.put_along_axis(left, across, middle, axis=1)
+        np.put_along_axis(right, across, middle, axis=1)
+        return np.concatenate([lower, right]), np.concatenate([left, upper])
+
+    def _examined(self, lower: Array, upper: Array) -> _Boxes:
+        """Boxes with their bounds: the enclosure, and the mean-value form about the middle; the model is run at the middle and an end."""
+        middle, half = (lower + upper) / 2, (upper - lower).T / 2
+        value, slope = self._enclosed(lower, upper)
+        about = self._enclosed(middle, middle)[0][0]
+        steep = np.maximum(np.abs(slope[0]), np.abs(slope[1]))
+        reach = (np.nan_to_num(steep * half, nan=np.inf) * _ROUND_OFF).sum(axis=0) * _ROUND_OFF
+        effect = np.where(half > 0, np.minimum(steep, 1e300) * half + half * 1e-300, -1.0)
+        low_end = np.where(slope[0].T >= 0, lower, np.where(slope[1].T <= 0, upper, middle))  # monotone inputs go to their end
+        self._attain(low_end)
+        mean_value = np.nextafter(about - reach, -np.inf)
+        return _Boxes(lower, upper, np.maximum(np.nan_to_num(value[0], nan=-np.inf, neginf=-np.inf), mean_value), effect.T)
+
+    def _enclosed(self, lower: Array, upper: Array) -> tuple[Pair, Pair]:
+        """Values (n,) and slopes (inputs, n) of sign · output over boxes."""
+        found = enclose(self.plan.function, self.names, lower, upper)[self.output]
+        found = found if self.sign > 0 else -found
+        return found.value, found.slope
+
+    def _attain(self, points: Array) -> None:
+        """Run the model and remember the least value."""
+        values = self.sign * self.model(points).select([self.output])[:, 0]
+        self.runs += len(points)
+        least = int(values.argmin())
+        if values[least] < self.best:
+            self.best, self.place = float(values[least]), points[least]
+        self.worst = max(self.worst, float(values.max()))
