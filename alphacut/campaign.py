@@ -12,7 +12,7 @@ import numpy as np
 from alphacut.case import Case
 from alphacut.cell import INPUTS, SHARED, CellChoice, cell_choice, key_of, parts
 from alphacut.provenance import source_digest, versions
-from fuzzy import Extended, FuzzyNumber, General, Plan, Reduced, Signed
+from fuzzy import Extended, FuzzyNumber, General, Known, Plan, Reduced, Signed
 from stochastic.truncated_normal import Array
 
 SOURCES = ("space", "theta", "table")  # of error, see rve.result.Homogenised
@@ -99,6 +99,7 @@ class Campaign:
         plan: How their boxes are searched.
         alpha: Levels, rising.
         shared: Inputs whose equality lets samples share a mesh and its assembly.
+        known: What mechanics proves of the cell's response.
         store: File that keeps every sample; a campaign that was stopped goes on from there.
     """
 
@@ -107,6 +108,7 @@ class Campaign:
     plan: Plan
     alpha: tuple[float, ...]
     shared: tuple[str, ...]
+    known: Known
     store: Path | None = None
 
     @property
@@ -130,7 +132,25 @@ def campaign(case: Case, *, petsc: Mapping[str, str] | None = None, exclude: tup
     choice = replace(cell_choice(case, exclude=exclude, petsc=petsc), moduli=(support.lower, support.upper))
     task = CellTask(choice, crisp, case.numbers("radius.theta"))
     shared = tuple(name for name in inputs if name in SHARED) or ("inclusion_modulus",)
-    return Campaign(task, inputs, plan_of(case), case.numbers("modulus.alpha"), shared, store)
+    return Campaign(task, inputs, plan_of(case), case.numbers("modulus.alpha"), shared, known(case, inputs), store)
+
+
+def known(case: Case, inputs: Mapping[str, FuzzyNumber]) -> Known:
+    """The signs of the inputs' effects on E, where mechanics proves them.
+
+    Where both phases have the same Poisson's ratio ν >= 0, more stiff material can only stiffen: A and B of eq. 16 rise, and with them
+    E = 3A/2 − A²/(2B). The radius rises with a1, a2, a3 and falls with a4, since h1, h2, h3 >= 0 >= h4 (eq. 12). Nothing is stated for
+    finite elements on the product space, whose error depends on the mesh that moves with the radius.
+    """
+    matrix, inclusion = case.fuzzy("cell.matrix_modulus").support, case.fuzzy("cell.inclusion_modulus").support
+    poisson = {case.fuzzy(f"cell.{phase}_poisson").support for phase in ("matrix", "inclusion")}
+    stiffer, softer = inclusion.lower >= matrix.upper, inclusion.upper <= matrix.lower
+    one = next(iter(poisson))
+    if case.text("modulus.method") == "prism" or len(poisson) > 1 or one.width or one.lower < 0 or not (stiffer or softer):
+        return Known()
+    way = 1 if stiffer else -1
+    signs = {"a1": way, "a2": way, "a3": way, "a4": -way, "matrix_modulus": 1, "inclusion_modulus": 1}
+    return Known(signs={name: {"E": sign} for name, sign in signs.items() if name in inputs})
 
 
 def identity(choice: CellChoice, crisp: Mapping[str, float], theta: tuple[float, ...]) -> dict[str, Any]:

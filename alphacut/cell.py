@@ -46,6 +46,7 @@ class CellChoice:
         petsc: PETSc options that override the solver's, without their prefix.
         parallel: Whether all MPI ranks work on one cell together.
         moduli: Moduli of the particle that all samples together span, in Pa, for a table that they share; None if not known.
+        estimate: Whether a model that can is to estimate its error at an extra cost.
     """
 
     method: str = "prism"
@@ -57,6 +58,7 @@ class CellChoice:
     petsc: Mapping[str, str] = field(default_factory=dict)
     parallel: bool = False
     moduli: tuple[float, float] | None = None
+    estimate: bool = False
 
     def model(self) -> CellModel:
         """The model itself; this is where DOLFINx may be imported."""

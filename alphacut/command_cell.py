@@ -48,7 +48,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     if options.export:
         check_format(options.export)
     choice = cell.cell_choice(case, exclude=named_models("--exclude", options.exclude), petsc=petsc)
-    choice = replace(choice, parallel=ranks() > 1)
+    choice = replace(choice, parallel=ranks() > 1, estimate=True)
     pair = named_models("--cross-check", options.cross_check)
     if pair:
         first, *others = [cell.solve(case, replace(choice, method=name).model()) for name in pair]

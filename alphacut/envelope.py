@@ -133,7 +133,7 @@ def method_options(task: EnvelopeTask) -> dict[str, float]:
     from frame import METHODS, GraphFollower
 
     taken = set(inspect.signature(METHODS[task.method]).parameters)
-    if task.method == "graph-follower":
+    if task.method.endswith("graph-follower"):
         taken |= {field.name for field in fields(GraphFollower)}
     return {name: value for name, value in (("order", task.order), ("tolerance", task.tolerance)) if name in taken}
 

@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import fields
 from importlib import import_module
+from pathlib import Path
 from typing import Any, cast
 
 from alphacut.cell import CellChoice, CellModel
 from alphacut.problem import BadInput, Problem
 from rve.model import MODELS, named
+
+
+def table_folder() -> Path | None:
+    """Where tables of the cell outlive a run: a cache folder that ALPHACUT_CACHE or XDG_CACHE_HOME may move; None if it cannot be made."""
+    base = os.environ.get("ALPHACUT_CACHE") or Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "alphacut"
+    folder = Path(base) / "tables"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return None
+    return folder
 
 
 def cell_model(choice: CellChoice) -> CellModel:
@@ -31,7 +44,9 @@ def cell_model(choice: CellChoice) -> CellModel:
         "tolerance": choice.tolerance,
         "exclude": choice.exclude,
         "parallel": choice.parallel,
+        "cache": table_folder(),
         "moduli": choice.moduli,
+        "estimate": choice.estimate,
     }
     try:
         return cast(CellModel, named(choice.method, **{name: value for name, value in offered.items() if name in known}))

@@ -48,6 +48,12 @@ class FuzzyModulus:
         return self.result.number("E")
 
     @property
+    def nature(self) -> str:
+        """What the bounds of E are worth: guaranteed if they are on every level, else what they are at least."""
+        natures = sorted({str(nature) for nature in self.result.nature_of("E")})
+        return natures[0] if len(natures) == 1 else str(self.result.nature)
+
+    @property
     def solves(self) -> int:
         """Linear systems solved."""
         return int(self.result.values.output("systems").sum())
@@ -71,7 +77,7 @@ class FuzzyModulus:
             "calls": self.result.calls,
             "reused": self.result.reused,
             "seconds": self.result.seconds,
-            "nature": str(self.result.nature),
+            "nature": self.nature,
             "notes": list(self.result.notes),
             "plan": self.result.plan,
             "method": self.choice.method,
@@ -111,7 +117,7 @@ class FuzzyModulus:
             "bound": ["lower", "upper"],
             "parameter": list(result.inputs),
         }
-        numbers = {"samples": result.runs, "solves": self.solves, "seconds": result.seconds, "nature": str(result.nature)}
+        numbers = {"samples": result.runs, "solves": self.solves, "seconds": result.seconds, "nature": self.nature}
         return xarray.Dataset(variables, coordinates, {"method": self.choice.method, "reason": self.reason, "plan": result.plan, **numbers})
 
 
@@ -132,6 +138,7 @@ def compute(wanted: Campaign, *, workers: int = 1, progress: Tick | None = None)
         shared=wanted.shared,
         workers=workers,
         progress=progress,
+        known=wanted.known,
         store=wanted.store,
         identity=wanted.identity,
     )
@@ -141,7 +148,15 @@ def compute(wanted: Campaign, *, workers: int = 1, progress: Tick | None = None)
 
 def explain(wanted: Campaign) -> Explanation:
     """What `compute` would run and why."""
-    return fuzzy_explain(wanted.inputs, wanted.plan, alpha=wanted.alpha, shared=wanted.shared, store=wanted.store, identity=wanted.identity)
+    return fuzzy_explain(
+        wanted.inputs,
+        wanted.plan,
+        alpha=wanted.alpha,
+        shared=wanted.shared,
+        known=wanted.known,
+        store=wanted.store,
+        identity=wanted.identity,
+    )
 
 
 def write(modulus: FuzzyModulus, path: Path | str, *, case_text: str, key: str) -> None:

@@ -16,7 +16,7 @@ MAY_IMPORT = {
     "alphacut": {"stochastic", "fuzzy", "rve", "frame"},
 }
 HEAVY = {"dolfinx", "petsc4py", "mpi4py", "basix", "ufl", "gmsh", "pyvista", "matplotlib", "xarray", "pandas", "sklearn", "skimage", "rich"}
-SECONDS = 1.0  # for a fresh interpreter with NumPy and SciPy's special functions; most of it is theirs
+SECONDS = 0.8  # of processor time in a fresh interpreter; most of it is that of NumPy and SciPy
 
 
 def imported(tree: ast.AST) -> set[str]:
@@ -52,7 +52,7 @@ def test_a_wrong_direction_would_be_seen():
 
 @pytest.mark.parametrize("package", [*MAY_IMPORT, "alphacut.entry"])
 def test_a_package_imports_fast_and_without_dolfinx(package):
-    program = f"import sys, time; t = time.perf_counter(); import {package}; s = time.perf_counter() - t; print(s, *sys.modules)"
+    program = f"import sys, time; t = time.process_time(); import {package}; s = time.process_time() - t; print(s, *sys.modules)"
     runs = [subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split() for _ in range(2)]
     assert not HEAVY & set(runs[0])
     assert min(float(run[0]) for run in runs) < SECONDS
