@@ -102,17 +102,26 @@ class PlanarCell:
         zero = np.zeros_like(x)
         return np.stack([np.stack([x, zero, y / 2], axis=-1), np.stack([zero, y, x / 2], axis=-1)], axis=1).reshape(-1, 3)
 
-    def stiffness(self, matrix: Phase, inclusions: Sequence[Phase]) -> Array:
+    def stiffness(self, matrix: Phase, inclusions: Sequence[Phase], *, share: bool = False) -> Array:
         """Homogenised stiffness of m inclusions in Pa, shape (m, 3, 3).
 
-        Inclusions of one Poisson's ratio share assembly, ordering and, where they are many, a few full solutions (`ModulusBasis`).
+        Args:
+            matrix: Material outside the particle.
+            inclusions: Materials of the particle; those of one Poisson's ratio share assembly and ordering.
+            share: Whether many of them share a few full solutions too (`ModulusBasis`): faster, but the last digits of one then
+                depend on which others come along.
         """
         found = np.empty((len(inclusions), 3, 3))
         for poisson in dict.fromkeys(p.poisson for p in inclusions):
             places = [k for k, p in enumerate(inclusions) if p.poisson == poisson]
-            basis = ModulusBasis(self._pencil(matrix, poisson))
-            found[places] = basis.stiffness(np.array([inclusions[k].modulus for k in places]))
-            self.factorisations += basis.size
+            pencil, moduli = self._pencil(matrix, poisson), np.array([inclusions[k].modulus for k in places])
+            if share and moduli.size > 2:
+                basis = ModulusBasis(pencil)
+                found[places] = basis.stiffness(moduli)
+                self.factorisations += basis.size
+            else:
+                found[places] = [pencil.solve(float(e))[1] for e in moduli]
+                self.factorisations += moduli.size
         return found
 
     def displacement(self, matrix: Phase, inclusion: Phase) -> Array:

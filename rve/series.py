@@ -48,24 +48,25 @@ class SeriesModel:
             RuleError: No rule in θ settles (a map that is not smooth).
         """
         start = perf_counter()
-        used: list[tuple[Array, Array]] = []
+        used: dict[float, tuple[Array, Array]] = {}
 
         def stiffness_at(radii: Array) -> Array:
             cells = square_stiffness(radii, matrix, inclusions, tolerance=self.accuracy)
-            used.append((cells.error, cells.harmonics))
+            used.update((float(r), found) for r, *found in zip(radii, cells.error, cells.harmonics, strict=True))
             return cells.matrix
 
         curves, gaps = settle_rule(radius_map, stiffness_at, points=self.points, accuracy=self.accuracy)
-        nodes = curves[0].theta.size
-        error, harmonics = curves[0].weights @ used[-1][0][-nodes:], used[-1][1][-nodes:].max(axis=0)
+        spent = [[used[float(r)] for r in radius_map(curve.theta)] for curve in curves]
+        error = [float(curve.weights @ [cell[0][k] for cell in spent[k]]) for k, curve in enumerate(curves)]
+        harmonics = [max(int(cell[1][k]) for cell in spent[k]) for k in range(len(curves))]
         seconds = {"solve": perf_counter() - start, "total": perf_counter() - start}
         results = [
             Homogenised(
                 curve=curve,
                 method=self.name,
-                unknowns=int(harmonics[k]),
+                unknowns=harmonics[k],
                 seconds=seconds,
-                error={"space": float(error[k]), "theta": gaps[k]},
+                error={"space": error[k], "theta": gaps[k]},
                 reason=f"{curve.theta.size} nodes in θ, {harmonics[k]} harmonics",
             )
             for k, curve in enumerate(curves)

@@ -73,18 +73,22 @@ def square_stiffness(
         raise ValueError(f"a radius is {worst:g} halves of the cell's side; it must lie in [0, 1)")
     contrast = Contrast.of(matrix, inclusions)
     shape = (radius.size, len(inclusions))
-    moduli = {load: np.full(shape, np.nan) for load in LOADS}
+    found = {load: np.full(shape, np.nan) for load in loads}
     error, used = np.full(shape, np.inf), np.zeros(shape, int)
     todo, harmonics = np.arange(radius.size), _first_guess(radius, tolerance)
     while todo.size:
         for count in np.unique(harmonics[todo]):
             for rows in _batches(todo[harmonics[todo] == count], shape[1] * count**2):
-                error[rows] = _solve_batch(radius[rows], contrast, int(count), {load: moduli[load] for load in loads}, rows)
-                used[rows] = count
+                open_ = error[rows] > max(tolerance, _ROUND_OFF)  # what is settled stays, whatever its companions need
+                values, left = _solve_batch(radius[rows], contrast, int(count), loads)
+                for load in loads:
+                    found[load][rows] = np.where(open_, values[load], found[load][rows])
+                error[rows], used[rows] = np.where(open_, left, error[rows]), np.where(open_, count, used[rows])
         todo = todo[error[todo].max(axis=1) > max(tolerance, _ROUND_OFF)]
         _refuse_touching(radius[todo], harmonics[todo], error[todo], tolerance)
         harmonics[todo] = np.minimum(harmonics[todo] * 4 // 3 + 2, MOST_HARMONICS)
-    return SquareStiffness(moduli["hydrostatic"], moduli["deviator"], moduli["shear"], error, used)
+    bulk, deviator, shear = (found.get(load, np.full(shape, np.nan)) for load in LOADS)
+    return SquareStiffness(bulk, deviator, shear, error, used)
 
 
 def _first_guess(radius: Array, tolerance: float) -> Array:
@@ -99,19 +103,19 @@ def _batches(rows: Array, entries: int) -> list[Array]:
     return np.array_split(rows, max(1, -(-rows.size * entries // _BATCH)))
 
 
-def _solve_batch(radius: Array, contrast: Contrast, count: int, moduli: dict[str, Array], rows: Array) -> Array:
-    """Fill `moduli` at `rows`; the estimated relative error, shape (rows, m).
+def _solve_batch(radius: Array, contrast: Contrast, count: int, loads: Sequence[str]) -> tuple[dict[str, Array], Array]:
+    """Moduli by load and their largest estimated relative error, all of shape (rows, m).
 
     One harmonic more or less changes a modulus by all but the factor `fade` of its error, fade = exp(−5 arccosh(1/r)) being slower
     than any decay met; doubled for safety.
     """
     fade = np.exp(-5 * np.arccosh(1 / np.maximum(radius, 1e-3)))[:, None]
-    error = np.zeros((radius.size, contrast.kappa_i.size))
-    for load, values in moduli.items():
+    values, error = {}, np.full((radius.size, contrast.kappa_i.size), _ROUND_OFF / 10)
+    for load in loads:
         value, shorter = (modulus(load, multipoles(load, radius, contrast, harmonics=n), radius, contrast) for n in (count, count - 1))
-        values[rows] = value
-        error = np.maximum(error, 2 * np.abs(value / shorter - 1) * fade / (1 - fade))
-    return error + _ROUND_OFF / 10
+        values[load] = value
+        error = np.maximum(error, _ROUND_OFF / 10 + 2 * np.abs(value / shorter - 1) * fade / (1 - fade))
+    return values, error
 
 
 class SeriesError(RuntimeError):

@@ -145,8 +145,9 @@ def solve_slice(
     orders: Sequence[int],
     mesh_size: float,
     centre: tuple[float, float] = (0.0, 0.0),
+    share: bool = False,
 ) -> Slice:
-    """Solve one planar cell by each of `orders`, rising, on one mesh."""
+    """Solve one planar cell by each of `orders`, rising, on one mesh; `share` as of `PlanarCell.stiffness`."""
     from rve.planar import PlanarCell
     from rve.planar_mesh import planar_mesh
     from rve.planar_system import SOLVER
@@ -156,7 +157,7 @@ def solve_slice(
     seconds = {"mesh": perf_counter() - started}
     cells = [PlanarCell(mesh, order) for order in orders]
     started = perf_counter()
-    stiffness = np.array([cell.stiffness(matrix, inclusions) for cell in cells])
+    stiffness = np.array([cell.stiffness(matrix, inclusions, share=share) for cell in cells])
     seconds["solve"] = perf_counter() - started - sum(cell.seconds["assemble"] for cell in cells)
     for name in ("mesh", "jit", "assemble"):
         seconds[name] = seconds.get(name, 0.0) + sum(cell.seconds[name] for cell in cells)

@@ -72,13 +72,13 @@ def theta_rule(radius_map: RadiusMap, *, points: int) -> ThetaRule:
 def settle_rule(
     radius_map: RadiusMap, stiffness_at: Callable[[Array], Array], *, points: int | None, accuracy: float
 ) -> tuple[list[StressCurve], list[float]]:
-    """Curves by a rule whose nodes are added until E of all of them settles within `accuracy`, and the estimated error of each.
+    """Curves by rules whose nodes are added until E of each inclusion settles within `accuracy`, and the estimated error of each.
 
     Rules of four, two and one nodes less tell how large the error is and how fast it fades; what fades further is declared, doubled.
 
     Args:
         radius_map: The map.
-        stiffness_at: Stiffness at n radii for m inclusions, shape (n, m, 3, 3); cheap. The nodes of the last rule come last.
+        stiffness_at: Stiffness at n radii for m inclusions, shape (n, m, 3, 3); cheap.
         points: Nodes, or None to have them found.
         accuracy: Relative error of E that counts as settled.
 
@@ -87,13 +87,16 @@ def settle_rule(
     """
     count = points or max(6, int(np.ceil(1 - 0.75 * np.log10(accuracy))))
     known: dict[int, list[StressCurve]] = {}
+    settled: dict[int, tuple[StressCurve, float]] = {}
     while True:
         counts = [max(count - less, 1) for less in (4, 2, 1, 0)]
         _add_curves(known, [n for n in dict.fromkeys(counts) if n not in known], radius_map, stiffness_at)
-        found = zip(*(known[n] for n in counts), strict=True)
-        gaps = [_faded(*(effective_modulus(*curve.mean)[0] for curve in four)) for four in found]
-        if points or max(gaps) <= accuracy:
-            return known[count], gaps
+        gaps = [_faded(*(effective_modulus(*curve.mean)[0] for curve in four)) for four in zip(*(known[n] for n in counts), strict=True)]
+        for k, (curve, gap) in enumerate(zip(known[count], gaps, strict=True)):
+            if k not in settled and (points or gap <= accuracy):  # each inclusion by itself, whatever its companions need
+                settled[k] = curve, gap
+        if len(settled) == len(gaps):
+            return [settled[k][0] for k in range(len(gaps))], [settled[k][1] for k in range(len(gaps))]
         if count >= _MOST_POINTS:
             raise RuleError(
                 f"the rule of {count} nodes in θ leaves a relative error of {max(gaps):.1e} in E and {accuracy:.1e} is wanted: the radius "

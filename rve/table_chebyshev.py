@@ -169,8 +169,10 @@ class Table:
         at_r, at_e = self.span.coordinates(radius, modulus)
         rows = chebyshev.chebvander(at_r, self.coefficients.shape[0] - 1)
         columns = chebyshev.chebvander(at_e, self.coefficients.shape[1] - 1)
-        over_modulus = np.tensordot(columns, self.coefficients, axes=(1, 1))  # (m, n_r, 3)
-        return np.asarray(np.exp(np.moveaxis(rows @ over_modulus, 0, 1)))
+        logarithms = [
+            rows @ np.tensordot(column, self.coefficients, axes=(0, 1)) for column in columns
+        ]  # one by one: same bits in any company
+        return np.asarray(np.exp(np.stack(logarithms, axis=1)))
 
     def stiffness(self, radius: Array, modulus: Array) -> Array:
         """Voigt matrices in Pa at n radii times m moduli, shape (n, m, 3, 3); errors as of `moduli`."""

@@ -4,6 +4,7 @@ import pytest
 from rve import Phase
 from rve.choice import AutoModel, ChoiceError
 from rve.series import SeriesModel
+from rve.slices import SlicesModel
 from stochastic import HermiteMap, TruncatedNormal
 
 MATRIX = Phase(20e9)
@@ -98,3 +99,18 @@ def test_refuses_with_the_reason_of_every_model():
 def test_options_out_of_range(options, message):
     with pytest.raises(ValueError, match=message):
         AutoModel(**options)
+
+
+@pytest.mark.parametrize("exclude", [(), ("series",)])
+def test_a_result_is_the_same_bits_in_any_company(exclude):
+    model = AutoModel(1e-5, exclude=exclude, moduli=(75e9, 85e9))
+    inclusions = [Phase(e) for e in (75e9, 78.3e9, 80e9, 85e9)]
+    together = model.solve(PAPER, MATRIX, inclusions)
+    assert [r.modulus for r in together] == [model.solve(PAPER, MATRIX, [phase])[0].modulus for phase in inclusions]
+
+
+def test_slices_are_the_same_bits_in_any_company():
+    model = SlicesModel(order=2, mesh_size=0.5, points=3)
+    inclusions = [Phase(e) for e in (75e9, 78.3e9, 80e9, 85e9)]
+    together = model.solve(PAPER, MATRIX, inclusions)
+    assert [r.modulus for r in together] == [model.solve(PAPER, MATRIX, [phase])[0].modulus for phase in inclusions]
