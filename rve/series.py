@@ -52,7 +52,7 @@ class SeriesModel:
 
         def stiffness_at(radii: Array) -> Array:
             cells = square_stiffness(radii, matrix, inclusions, tolerance=self.accuracy)
-            used.update((float(r), found) for r, *found in zip(radii, cells.error, cells.harmonics, strict=True))
+            used.update((float(r), (e, n)) for r, e, n in zip(radii, cells.error, cells.harmonics, strict=True))
             return cells.matrix
 
         curves, gaps = settle_rule(radius_map, stiffness_at, points=self.points, accuracy=self.accuracy)
