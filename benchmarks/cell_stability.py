@@ -92,9 +92,10 @@ def models(*, small: bool) -> dict[str, Solve]:
         return TableModel(1e-3 if small else 1e-6).solve(radius_map, matrix, [particle])[0]
 
     def prism(layers: int, size: float) -> Solve:
-        from rve.choice_prism import prism_with_error
+        from rve.prism import PrismModel
 
-        return lambda radius_map, matrix, particle: prism_with_error(radius_map, matrix, [particle], mesh_size=size, layers=layers)[0]
+        model = PrismModel(mesh_size=size, layers=layers, estimate=True)
+        return lambda radius_map, matrix, particle: model.solve(radius_map, matrix, [particle])[0]
 
     size = 0.5 if small else 0.25
     return {
@@ -145,12 +146,12 @@ def table(*, small: bool) -> Iterator[Row]:
     for edge in EDGES:
         for name, solve in chosen.items():
             yield meet(edge, name, solve)
-    from rve.choice_prism import prism_with_error
+    from rve.prism import PrismModel
 
     for layers in LAYERS[:4] if small else LAYERS:
 
         def prism(radius_map: RadiusMap, matrix: Phase, particle: Phase, layers: int = layers) -> Homogenised:
-            return prism_with_error(radius_map, matrix, [particle], mesh_size=0.25, layers=layers)[0]
+            return PrismModel(mesh_size=0.25, layers=layers, estimate=True).solve(radius_map, matrix, [particle])[0]
 
         yield meet(Edge(f"{layers} layers", PAPER_MAP), "prism", prism)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rve.triangulation import Triangulation
 from stochastic.truncated_normal import Array
@@ -11,13 +12,22 @@ from stochastic.truncated_normal import Array
 def moved(mesh: Triangulation, radius: float) -> Array:
     """Positions of all nodes, shape (n, 2), with the interface at `radius`, curved edges on the circle.
 
-    Vertices slide along rays from the centre: inside the particle in proportion, outside between the circle and the side of the
-    square. Edge midpoints stay in the middle of their straight edge, which keeps the elements affine away from the interface.
+    Nodes slide along rays from the centre: inside the particle in proportion, outside between the circle and the side of the
+    square. Edge midpoints slide too, so that the layers between a large particle and the side bend with it; only an edge across a
+    diagonal of the square, where sliding has a kink, stays straight.
     """
-    vertices = _slide(mesh.points[: mesh.vertices], mesh.radius, radius)
-    points = np.concatenate([vertices, vertices[mesh.ends].mean(axis=1)])
+    points = _slide(mesh.points, mesh.radius, radius)
+    straight = np.flatnonzero(_across_diagonal(mesh)) + mesh.vertices
+    points[straight] = points[mesh.ends[straight - mesh.vertices]].mean(axis=1)
     points[mesh.arc] *= radius / np.linalg.norm(points[mesh.arc], axis=1, keepdims=True)  # z = 0 of eq. 14
     return np.asarray(points)
+
+
+def _across_diagonal(mesh: Triangulation) -> NDArray[np.bool_]:
+    """Whether the ends of an edge lie on different sides of a diagonal, outside the particle, shape (edges,)."""
+    x, y = mesh.points[mesh.ends].transpose(2, 1, 0)
+    crossed = ((x - y).prod(axis=0) < -1e-12) | ((x + y).prod(axis=0) < -1e-12)
+    return np.asarray(crossed)
 
 
 def _slide(points: Array, old: float, new: float) -> Array:

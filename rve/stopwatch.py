@@ -22,7 +22,7 @@ class Stopwatch:
         try:
             yield
         finally:
-            self.seconds[stage] += perf_counter() - started
+            self.seconds[stage] = self.seconds.get(stage, 0.0) + perf_counter() - started
 
     def shift(self, source: str, target: str, seconds: float) -> None:
         """Book `seconds` under another stage."""

@@ -106,3 +106,28 @@ def test_an_option_out_of_range_is_refused(options, message):
 def test_a_misspelt_petsc_option_is_not_passed_over():
     with pytest.raises(ValueError, match="PETSc has no use for -rve_ksp_tipe cg: check its spelling"):
         solve(mesh_size=0.3, layers=4, petsc={"ksp_tipe": "cg"})
+
+
+@pytest.mark.parametrize("options", [{"mesh_size": 0.4}, {"layers": 1}, {"layers": 2}, {"mesh_size": 0.2, "layers": 5}])
+@pytest.mark.parametrize(
+    ("radius_map", "particle"),
+    [
+        (PAPER, PARTICLE),
+        (PAPER, Phase(20e13)),
+        (PAPER, Phase(2e6)),
+        (HermiteMap(0.5, 2.0, 0.5, 2.0), PARTICLE),
+        (HermiteMap(0.02, 0, 0.02, 0), PARTICLE),
+    ],
+)
+def test_the_declared_error_covers_the_true_one(options, radius_map, particle):
+    from rve.series import SeriesModel
+
+    exact = SeriesModel().solve(radius_map, MATRIX, [particle])[0].modulus
+    result = solve(radius_map, particle, estimate=True, **options)
+    assert set(result.error) == {"space", "theta"}
+    assert abs(result.modulus / exact - 1) <= result.estimated_error
+
+
+def test_a_mesh_follows_a_particle_from_a_speck_to_nearly_touching():
+    coarse, fine = (solve(HermiteMap(0.01, 0, 0.98, 0), mesh_size=h).modulus for h in (0.15, 0.08))
+    assert 0 < coarse / fine - 1 < 2e-4
