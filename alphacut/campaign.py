@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -156,4 +157,6 @@ def known(case: Case, inputs: Mapping[str, FuzzyNumber]) -> Known:
 def identity(choice: CellChoice, crisp: Mapping[str, float], theta: tuple[float, ...]) -> dict[str, Any]:
     """What a sample depends on besides its fuzzy inputs: model, resolution, crisp inputs, the program and its libraries."""
     source = source_digest(("stochastic", "rve"))
-    return {"choice": asdict(choice), "crisp": dict(crisp), "theta": list(theta), "source": source, "versions": versions()}
+    content = {"choice": asdict(choice), "crisp": dict(crisp), "theta": theta, "source": source, "versions": versions()}
+    found: dict[str, Any] = json.loads(json.dumps(content))  # tuples become lists, as they are when read again
+    return found
