@@ -17,6 +17,7 @@ from fuzzy import Extended, FuzzyNumber, General, Known, Plan, Reduced, Signed
 from stochastic.truncated_normal import Array
 
 SOURCES = ("space", "theta", "table")  # of error, see rve.result.Homogenised
+TABULATED = ("table", "auto")  # methods whose samples may share a table over the particle's moduli
 SHOWN = 61  # points of a stored stress curve
 
 
@@ -130,7 +131,9 @@ def campaign(case: Case, *, petsc: Mapping[str, str] | None = None, exclude: tup
     inputs = fuzzy_inputs(case)
     crisp = {name: case.fuzzy(key_of(name)).modal for name in INPUTS if name not in inputs}
     support = case.fuzzy(key_of("inclusion_modulus")).cut(0.0)
-    choice = replace(cell_choice(case, exclude=exclude, petsc=petsc), moduli=(support.lower, support.upper))
+    choice = cell_choice(case, exclude=exclude, petsc=petsc)
+    if choice.method in TABULATED:  # no other method's samples depend on the range, and a wider one may take them as they are
+        choice = replace(choice, moduli=(support.lower, support.upper))
     task = CellTask(choice, crisp, case.numbers("radius.theta"))
     shared = tuple(name for name in inputs if name in SHARED) or ("inclusion_modulus",)
     return Campaign(task, inputs, plan_of(case), case.numbers("modulus.alpha"), shared, known(case, inputs), store)
