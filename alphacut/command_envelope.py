@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TextIO
 
 from alphacut import envelope, quantity
 from alphacut.loading import load
-from alphacut.modulus import read_number
+from alphacut.modulus import read_number, stand_in
 from alphacut.options import add_common, add_keys, changes
 from alphacut.output import as_json, write_text
 from alphacut.problem import BadInput, Problem
@@ -48,7 +48,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     """Compute and report."""
     add_units(options)
     case = load(options.case, changes(options, KEYS))
-    handed = given_modulus(options.modulus)
+    handed = given_modulus(options.modulus) or stand_in(case)
     task = envelope.task_of(case)
     with progress("Envelopes", quiet=options.quiet) as tick:
         found = envelope.compute(case, task, modulus=handed, strict=options.strict, progress=tick)

@@ -11,6 +11,7 @@ import numpy as np
 from alphacut.campaign import Campaign, theta_shown
 from alphacut.case import Case
 from alphacut.cell import GPA, CellChoice
+from alphacut.measured import measured_modulus
 from alphacut.output import whole_file
 from alphacut.problem import BadInput, Problem
 from alphacut.progress import Tick
@@ -194,4 +195,6 @@ def stand_in(case: Case) -> FuzzyNumber | None:
         return case.fuzzy("modulus.value")
     if case.has("modulus.file"):
         return read_number(case.path.parent / case.text("modulus.file"), "modulus.file")
+    if case.has("modulus.measured"):
+        return measured_modulus(case.path.parent / case.text("modulus.measured"))
     return None

@@ -1,0 +1,54 @@
+"""Measured moduli from a CSV file with its unit in the header, ``E [GPa]``: they can stand in for the cell."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+from alphacut.problem import BadInput, Problem
+from alphacut.units import factor
+from fuzzy import FuzzyNumber
+
+HEADER = "E [GPa]"
+
+
+def measured_modulus(path: Path, key: str = "modulus.measured") -> FuzzyNumber:
+    """The fuzzy modulus in Pa of measured values: its cut at α holds the middle share 1 − α of them, its modal value is their median.
+
+    Raises:
+        BadInput: The file is missing, its header has no unit, or a row is no positive number.
+    """
+    from fuzzy.sets import from_data
+
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadInput(Problem(key, f"the file cannot be read: {error}", str(path))) from None
+    rows = [(number, line.strip()) for number, line in enumerate(lines, start=1) if line.strip() and not line.startswith("#")]
+    if len(rows) < 2:
+        raise BadInput(Problem(key, "the file needs a header and one value or more", str(path), HEADER))
+    scale = unit_of(rows[0][1], path, key)
+    return from_data([scale * positive(text, path, number, key) for number, text in rows[1:]])
+
+
+def unit_of(header: str, path: Path, key: str) -> float:
+    """Pascals in the header's unit."""
+    match = re.fullmatch(r"\w+\s*\[([^\]]+)\]", header)
+    try:
+        if match is None:
+            raise ValueError(f"the header {header!r} has no unit")
+        return float(factor(match[1], "Pa"))
+    except ValueError as error:
+        raise BadInput(Problem(key, str(error), file=str(path), line=1, allowed=HEADER)) from None
+
+
+def positive(text: str, path: Path, line: int, key: str) -> float:
+    """One value of the column."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value > 0):
+        raise BadInput(Problem(key, "this row is no positive number", text, file=str(path), line=line))
+    return value
