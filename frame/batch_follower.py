@@ -134,7 +134,7 @@ class Pursuit:
     def leave(self, level: int) -> None:
         """Post-processing of a level."""
         promised = np.maximum(self.promise - self.value, 0.0)
-        small = promised <= self.tolerance
+        small = promised <= self.tolerance * self.flow.scale[:, None]
         self.bounds[level], self.where[level] = self.value, self.at
         self.correction[level] = np.where(small, promised, 0.0)
         self.open_gain[level] = np.where(small, 0.0, promised)
@@ -173,7 +173,7 @@ class Pursuit:
         """The most promising point of every window of time, apart from the others and from all graphs computed, shape (≤ count, d)."""
         chosen: list[Array] = []
         for window in np.array_split(np.arange(len(self.value)), max(1, min(count, len(self.value)))):
-            gains = (self.promise - self.value)[window]
+            gains = (self.promise - self.value)[window] / self.flow.scale[:, None]
             for k in np.argsort(-gains, axis=None)[:TRIES]:
                 t, o, side = np.unravel_index(k, gains.shape)
                 place = (window[t], o, side)
@@ -201,7 +201,7 @@ def pursue(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> 
     """
     method, begun = BatchFollower(**options), time.perf_counter()
     found = method.run(flow, progress=progress)
-    error = np.maximum(found.correction, found.open_gain).max(-1) + method.tolerance / 2
+    error = np.maximum(found.correction, found.open_gain).max(-1) + method.tolerance / 2 * flow.scale
     facts: dict[str, float | str] = {"tolerance": method.tolerance, "order": 2}
     if found.open_gain.any():
         facts["reason"] = f"stopped at the budget of {method.budget} trajectories; models promise {found.open_gain.max():.2g} more"

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from frame.envelope import output_unit
 from frame.flow import Flow
 from frame.jet import Array, Jet
 from fuzzy import FuzzyNumber
@@ -103,6 +105,15 @@ class UnitFlow:
     def outputs(self) -> tuple[str, ...]:
         """Names of the observed quantities."""
         return self.flow.outputs
+
+    @cached_property
+    def scale(self) -> Array:
+        """Factor on a tolerance for each output, shape (m,): 1 when all share a unit, else their modal peaks by the first one's."""
+        if len({output_unit(name) for name in self.outputs}) == 1:
+            return np.ones(len(self.outputs))
+        peak = np.abs(self.flow.values(self.boxes.modal[None])[0]).max(0)
+        shares: Array = np.where(peak > 0, peak, peak.max() or 1.0) / (peak[0] or 1.0)
+        return shares
 
     def values(self, unit: Array) -> Array:
         """Trajectories at unit coordinates (S, d), shape (S, T, outputs)."""

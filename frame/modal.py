@@ -156,7 +156,7 @@ def _scaled(jet: Jet, radius: Array) -> Jet:
     return Jet(jet.value, first, jet.second * (radius[:, None] * radius).reshape(*2 * (len(radius),), *shape))
 
 
-def fit_modes(flow: LinearFlow, boxes: Boxes, *, tolerance: float = 1e-6, budget: int = 280) -> ModalModel:
+def fit_modes(flow: LinearFlow, boxes: Boxes, *, tolerance: float = 1e-6, budget: int = 280, scale: Array | float = 1.0) -> ModalModel:
     """Fits polynomials of rising degree until held-out trajectories deviate by less than `tolerance`, or the budget is spent.
 
     Args:
@@ -164,6 +164,7 @@ def fit_modes(flow: LinearFlow, boxes: Boxes, *, tolerance: float = 1e-6, budget
         boxes: The parameters' boxes.
         tolerance: Wanted deviation, in units of the outputs.
         budget: Most eigen-analyses.
+        scale: Factor on the tolerance for each output, shape (m,).
 
     Raises:
         ModalError: No oscillating modes, or modes that cross or veer so that polynomials do not converge.
@@ -174,14 +175,14 @@ def fit_modes(flow: LinearFlow, boxes: Boxes, *, tolerance: float = 1e-6, budget
     used, best = len(held), None
     data_per_analysis = 1 + d + d * (d + 1) // 2
     for degree in range(2, 13):
-        needed = ceil(2.5 * terms(d, degree) / data_per_analysis) + 1
+        needed = ceil((2.5 if d <= 6 else 5) * terms(d, degree) / data_per_analysis) + 1
         if used + needed > budget or terms(d, degree) > 2500:
             break
         model = _fitted(flow, boxes, np.vstack([np.zeros((1, d)), chebyshev_points(d, needed - 1)]), degree, used + needed)
         error = np.abs(model.values(held) - truth).max(0)
-        if best is None or error.max() < best.error.max():
+        if best is None or (error / scale).max() < (best.error / scale).max():
             best = replace(model, error=error)
-        if error.max() <= tolerance:
+        if (error / scale).max() <= tolerance:
             break
     if best is None:
         raise ModalError(f"modal: {d} parameters need more than {budget} eigen-analyses; raise the budget, or use graph-follower")

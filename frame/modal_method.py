@@ -68,7 +68,7 @@ def modal(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> E
         raise ValueError("method: 'modal' needs a linear structure; take graph-follower")
     method, begun = Modal(**options), time.perf_counter()
     tolerance = method.tolerance if method.certify is None else min(method.tolerance, method.certify / 30)
-    model = fit_modes(flow.flow, flow.boxes, tolerance=tolerance, budget=method.budget)
+    model = fit_modes(flow.flow, flow.boxes, tolerance=tolerance, budget=method.budget, scale=flow.scale)
     bounds, at = search_levels(model, ModalSearch(seed=method.seed), progress if method.certify is None else None)
     facts: dict[str, float | str] = {"model_error": float(model.error.max()), "degree": int(model.eigenvalue.index.sum(1).max())}
     if method.certify is not None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from frame.auto import auto
 from frame.batch_follower import pursue
 from frame.box import ALPHA, UnitFlow, boxes
 from frame.envelope import Envelope, signed_envelope
@@ -18,6 +19,7 @@ from frame.integrators import INTEGRATORS, Exact, Integrator
 from frame.lagrangian import LagrangianSystem
 from frame.linear import LinearSystem
 from frame.modal_method import modal
+from frame.modes import ModalError
 from frame.nonlinear_flow import LagrangianFlow
 from frame.sampling import monte_carlo, quasi_monte_carlo, vertex
 from fuzzy import FuzzyNumber
@@ -45,7 +47,8 @@ def envelope(
         duration: Length of the simulation, in s.
         step: Distance of the nodes and step of the integrator, in s.
         alpha: Levels in [0, 1].
-        method: Name of a method, see `METHODS`; modal for linear structures and improved-graph-follower for others unless given.
+        method: Name of a method, see `METHODS`; unless given, modal for linear structures and
+            improved-graph-follower for others and where the modes do not allow it.
         integrator: Time stepping: a method or its name; exact for the method modal and midpoint for all others unless given.
         progress: Called with the fraction done.
         options: Options of the method, such as `order`, `tolerance`, `budget` of the Graph Follower.
@@ -57,16 +60,25 @@ def envelope(
     if isinstance(model, LagrangianSystem):
         flow = LagrangianFlow(model, cuts.names, duration, step, str(integrator or "midpoint"))
         return _method(method or "improved-graph-follower")(UnitFlow(flow, cuts), progress, **options)
-    method = method or "modal"
-    propagate = _method(method)
+    propagate = _modal_if_possible if method is None else _method(method)
     if integrator is None:
-        integrator = "exact" if method in EXACT_BY_DEFAULT else "midpoint"
+        integrator = "exact" if method is None or method in EXACT_BY_DEFAULT else "midpoint"
     if isinstance(integrator, str) and integrator not in INTEGRATORS:
         raise ValueError(f"integrator: '{integrator}' is unknown; allowed are {', '.join(INTEGRATORS)}")
     scheme = INTEGRATORS[integrator] if isinstance(integrator, str) else integrator
     linear = LinearFlow(model, cuts.names, duration, step, scheme)
     found = propagate(UnitFlow(linear, cuts), progress, **options)
     return replace(found, facts={"integrator": scheme.name, "step_error": step_error(linear), **found.facts})
+
+
+def _modal_if_possible(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> Envelope:
+    try:
+        return modal(flow, progress, **options)
+    except ModalError as error:
+        if options:
+            raise
+        found = pursue(flow, progress)
+        return replace(found, facts={**found.facts, "reason": f"improved-graph-follower, since {error}"})
 
 
 def _method(name: str) -> Callable[..., Envelope]:
@@ -109,9 +121,10 @@ def followed_envelope(flow: UnitFlow, follower: GraphFollower, followed: Followe
     )
 
 
-EXACT_BY_DEFAULT = ("modal",)
+EXACT_BY_DEFAULT = ("auto", "modal")
 
 METHODS: dict[str, Callable[..., Envelope]] = {
+    "auto": auto,
     "modal": modal,
     "graph-follower": follow,
     "improved-graph-follower": pursue,
