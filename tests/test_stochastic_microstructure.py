@@ -34,6 +34,13 @@ def test_neighbours_on_the_torus(discs):
     assert found.number.sum() == len(found.first)
 
 
+def test_neighbours_across_wide_voids():
+    centres = np.mod(0.5 + 0.03 * np.random.default_rng(7).standard_normal((900, 2)), 1)
+    discs = Discs(centres, np.full(900, 1e-6), (1, 1))
+    assert neighbours(discs).number.sum() == 6 * 900
+    assert neighbours(discs).number.tolist() == np.bincount(apollonius(discs).cell, minlength=900).tolist()
+
+
 def test_neighbours_are_those_of_the_cells():
     packing = Packing(200, 0.3, EQUAL).make(np.random.default_rng(1))
     assert neighbours(packing).number.tolist() == np.bincount(apollonius(packing).cell, minlength=200).tolist()
