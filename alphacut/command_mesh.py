@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TextIO
 
+from alphacut.fields import cell_fields
 from alphacut.loading import load
 from alphacut.options import CELL_OPTIONS, add_common, add_keys, changes
 from alphacut.output import as_json
@@ -20,12 +21,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_common(parser)
     add_keys(parser, KEYS)
+    parser.add_argument("--fields", action="store_true", help="solve, and write displacements and stresses of both loads as well (VTU)")
     parser.add_argument("--out", metavar="FILE", required=True, help="the mesh; its ending names the format")
 
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Mesh and write."""
-    mesh = prism_mesh(load(options.case, changes(options, KEYS), modal=True))
+    case = load(options.case, changes(options, KEYS), modal=True)
+    mesh = cell_fields(case) if options.fields else prism_mesh(case)
     write_mesh(mesh, Path(options.out))
     counts = {"nodes": len(mesh.points), "wedges": len(mesh.cells[0].data), "file": options.out}
     if options.json == "-":

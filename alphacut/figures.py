@@ -73,10 +73,12 @@ def particle_pictures(folder: Path, results: Results) -> list[str]:
 
 
 def mesh_picture(results: Results) -> list[str]:
-    """Fig. 15, where the modulus was computed on prisms."""
+    """Fig. 15 and the stress on slices, where the modulus was computed on prisms."""
     if results.modulus is None or results.case.text("modulus.method") != "prism":
         return []
     from alphacut.figure_mesh import draw_mesh
 
-    name = "figures/fig15-prism-mesh.png"
-    return [name] if draw_mesh(results.case, results.folder / name) else []
+    pictures = {"figures/fig15-prism-mesh.png": "mesh"}
+    if results.case.text("mesh.interface") == "conforming":
+        pictures["figures/stress-on-slices.png"] = "stress"
+    return [name for name, kind in pictures.items() if draw_mesh(results.case, results.folder / name, kind)]

@@ -53,3 +53,29 @@ def test_wedges_stand_the_right_way_round_for_vtk(tmp_path):
     assert volumes.sum() == pytest.approx(24, rel=1e-9)  # cell of 2 × 2 times θ from -3 to 3
     particle = volumes[grid.cell_data["phase"] == 1].sum() / 24
     assert 0.15 < particle < 0.35
+
+
+def test_fields_of_a_homogeneous_cell_are_uniform(tmp_path):
+    pytest.importorskip("dolfinx")
+    from alphacut.fields import cell_fields
+    from alphacut.loading import load
+
+    mesh = cell_fields(load(PAPER, ["mesh.size=0.5", "mesh.layers=3", "inclusion_modulus=20 GPa"]))
+    lateral = 20e9 / ((1 + 0.3) * (1 - 2 * 0.3)) * 0.01  # plane strain, ε11 = ε22 = 0.01 (eq. 6)
+    assert mesh.point_data["stress_1_11"] == pytest.approx(np.full(len(mesh.points), lateral), rel=1e-8)
+    assert mesh.point_data["displacement_1"][:, 0] == pytest.approx(0.01 * mesh.points[:, 0], abs=1e-10)
+
+
+def test_stress_jumps_across_the_interface_and_displacement_does_not():
+    pytest.importorskip("dolfinx")
+    from alphacut.fields import cell_fields
+    from alphacut.loading import load
+
+    mesh = cell_fields(load(PAPER, ["mesh.size=0.4", "mesh.layers=3"]))
+    _, first, count = np.unique(mesh.points.round(12), axis=0, return_index=True, return_counts=True)
+    twice = mesh.points[first[count == 2]].round(12)
+    assert len(twice) > 50
+    pairs = [np.flatnonzero((mesh.points.round(12) == point).all(axis=1)) for point in twice[:40]]
+    jumps = [abs(np.subtract(*mesh.point_data["stress_2_12"][pair])) for pair in pairs]
+    assert max(jumps) > 1e7
+    assert all(np.ptp(mesh.point_data["displacement_2"][pair], axis=0).max() < 1e-14 for pair in pairs)

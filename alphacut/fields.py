@@ -1,0 +1,81 @@
+"""Displacements and stresses of a case's cell on its prism mesh, for ParaView and for pictures."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from alphacut.case import Case
+from alphacut.cell import modal_values, parts
+from alphacut.prism_mesh import ORDER
+from alphacut.problem import BadInput, Problem
+from stochastic.truncated_normal import Array
+
+if TYPE_CHECKING:
+    import meshio
+
+    from rve.prism_system import PrismSystem
+
+VERTICES = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1)]
+EDGES = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5)]  # Basix's order
+COMPONENTS = ("11", "22", "12")
+
+
+def reference_nodes() -> Array:
+    """The 15 nodes of the reference wedge in Basix's order of vertices and edges, shape (15, 3)."""
+    vertices = np.array(VERTICES, float)
+    return np.concatenate([vertices, [(vertices[a] + vertices[b]) / 2 for a, b in EDGES]])
+
+
+def cell_fields(case: Case) -> meshio.Mesh:
+    """Total displacements and stresses under both loads at modal values.
+
+    Stresses are means over the wedges of one phase that meet in a node; nodes on the interface stand twice, once for each phase, since
+    stresses jump there. Point data: ``displacement_1``, ``displacement_2`` in halves of the cell's side, ``stress_1_11`` … in Pa; cell
+    data: ``phase``.
+
+    Raises:
+        BadInput: The mesh does not follow the interface.
+    """
+    import meshio
+    from meshio._mesh import topological_dimension
+    from mpi4py import MPI
+
+    from rve.cell import LOADS
+    from rve.prism import reference_radius
+    from rve.prism_grid import PrismGrid
+    from rve.prism_system import PrismSystem
+    from rve.prism_task import PrismTask
+    from rve.solver_options import SolverOptions
+    from rve.stopwatch import Stopwatch
+    from rve.triangulation import triangulate
+
+    if case.text("mesh.interface") != "conforming":
+        raise BadInput(
+            Problem("mesh.interface", "fields need a mesh that follows the interface", case.text("mesh.interface"), "conforming")
+        )
+    radius, matrix, inclusion = parts(modal_values(case), case.numbers("radius.theta"))
+    plane = triangulate(size=case.number("mesh.size"), radius=reference_radius(radius))
+    system = PrismSystem(PrismGrid(plane, case.integer("mesh.layers")), MPI.COMM_SELF)
+    system.move(radius)
+    (solved,) = PrismTask(system, SolverOptions("theta"), LOADS, Stopwatch()).solve(matrix, [inclusion])
+    phase = np.tile(plane.inside.astype(np.int64), system.grid.layers)
+    stiffness = np.array([matrix.stiffness, inclusion.stiffness])[phase][:, None]
+    stress = stiffness @ system.slice_stress.strain(system.grid.cells, solved.total, reference_nodes())[0]
+    nodes, cells, mean = by_phase(system, phase, stress)
+    data: dict[str, Array] = {f"displacement_{load + 1}": np.pad(solved.total[nodes, :, load], ((0, 0), (0, 1))) for load in (0, 1)}
+    data |= {f"stress_{load + 1}_{name}": mean[:, row, load] for load in (0, 1) for row, name in enumerate(COMPONENTS)}
+    topological_dimension.setdefault("wedge15", 3)  # see alphacut.prism_mesh
+    return meshio.Mesh(system.positions[nodes], [("wedge15", cells[:, ORDER])], data, {"phase": [phase]})
+
+
+def by_phase(system: PrismSystem, phase: Array, stress: Array) -> tuple[Array, Array, Array]:
+    """Nodes apart by phase: which node each is, the wedges' new nodes, and the mean stress at each, shape (n, 3, loads)."""
+    numbered = system.grid.cells + phase[:, None] * len(system.positions)
+    kept, cells = np.unique(numbered, return_inverse=True)
+    cells = cells.reshape(numbered.shape)
+    total = np.zeros((len(kept), *stress.shape[2:]))
+    np.add.at(total, cells, stress)
+    count = np.bincount(cells.ravel(), minlength=len(kept))
+    return kept % len(system.positions), cells, total / count[:, None, None]
