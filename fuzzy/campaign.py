@@ -14,7 +14,7 @@ from fuzzy.known import Known
 from fuzzy.memory import require
 from fuzzy.model import Layout, Values
 from fuzzy.numbers import Array
-from fuzzy.store import Shelf
+from fuzzy.shelf import Shelf
 from fuzzy.workers import Task, completed
 
 Progress = Callable[[float], None]

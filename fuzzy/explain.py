@@ -16,7 +16,8 @@ from fuzzy.memory import needed
 from fuzzy.model import Values
 from fuzzy.numbers import Array
 from fuzzy.plan import Plan
-from fuzzy.store import Identity, Shelf, Store, Stored, shelf
+from fuzzy.shelf import Shelf, shelf
+from fuzzy.store import Identity, Store, Stored
 
 _SHOWN = 5
 

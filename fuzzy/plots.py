@@ -49,6 +49,7 @@ def plot_cuts(axes: Axes, number: FuzzyNumber, alpha: Sequence[float], *, quanti
         cut = number.cut(level)
         axes.plot(cut, (level, level), color=_COLOURS[1], marker="|", markersize=9, linewidth=1.4)
         axes.annotate(f"α = {level:.3g}", (cut.upper, level), xytext=(5, 2), textcoords="offset points", fontsize="small")
+    axes.margins(x=0.15)  # room for the labels
     axes.set(xlabel=quantity, ylabel="membership μ, α", ylim=(-0.03, 1.12))
 
 

@@ -16,7 +16,8 @@ from fuzzy.known import Known
 from fuzzy.numbers import FuzzyNumber
 from fuzzy.plan import Plan
 from fuzzy.result import FuzzyResult
-from fuzzy.store import Identity, Store, shelf
+from fuzzy.shelf import shelf
+from fuzzy.store import Identity, Store
 from fuzzy.transformation import General
 from fuzzy.workers import pool
 

@@ -15,7 +15,9 @@ import numpy as np
 import pytest
 
 from fuzzy import CampaignError, Interval, Store, StoreError, Triangular, levels, propagate
-from fuzzy.store import Shelf, canonical
+from fuzzy.call import Sample
+from fuzzy.shelf import Shelf
+from fuzzy.store import canonical
 
 INPUTS = {"a": Triangular(0.0, 0.3, 1.0), "b": Triangular(-1.0, 0.0, 2.0)}
 IDENTITY = {"model": "sum", "mesh": 0.15}
@@ -285,6 +287,17 @@ def test_overhead_per_sample_is_under_two_milliseconds(tmp_path):
     result = propagate(lambda a, b: a, INPUTS, alpha=levels(17), store=tmp_path / "s.db", identity=IDENTITY)
     assert result.runs > 1500
     assert result.seconds / result.runs < 2e-3
+
+
+def test_a_sample_that_took_long_is_written_at_once(tmp_path):
+    with Store(tmp_path / "s.db") as store:
+        shelf = Shelf(store, IDENTITY, ["a"])
+        for count, seconds in ((1, 5.0), (2, 5.0), (2, 1e-6)):
+            shelf.gather(f"{{{count}{seconds}}}", Sample((("y", ()),), np.ones(1), seconds))
+            shelf.write()
+            assert store.models()[0].samples == count
+        shelf.close()
+        assert store.models()[0].samples == 3
 
 
 def test_key_is_exact_and_free_of_order(tmp_path):
