@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, TextIO
 
 from alphacut import envelope, quantity
@@ -14,6 +15,7 @@ from alphacut.output import as_json, write_text
 from alphacut.problem import BadInput, Problem
 from alphacut.progress import progress
 from alphacut.provenance import fingerprint
+from alphacut.schema import ENVELOPE_METHODS
 from fuzzy import FuzzyNumber
 
 if TYPE_CHECKING:
@@ -40,6 +42,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--modulus", metavar="QUANTITY|FILE.nc", help="Young's modulus: '[22, 24, 26] GPa' or the α-cuts of a file (default: the case's)"
     )
+    parser.add_argument("--exclude", metavar="NAMES", default="", help="methods that method auto must not take, separated by commas")
     parser.add_argument("--strict", action="store_true", help="refuse a step with ω_max·h above 0.5 instead of warning")
     parser.add_argument("--out", metavar="FILE.nc", help="write envelopes and where they are reached as NetCDF")
 
@@ -49,7 +52,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     add_units(options)
     case = load(options.case, changes(options, KEYS))
     handed = given_modulus(options.modulus) or stand_in(case)
-    task = envelope.task_of(case)
+    task = replace(envelope.task_of(case), exclude=excluded(options.exclude))
     with progress("Envelopes", quiet=options.quiet) as tick:
         found = envelope.compute(case, task, modulus=handed, strict=options.strict, progress=tick)
     if options.out:
@@ -72,6 +75,15 @@ def add_units(options: argparse.Namespace) -> None:
         text = getattr(options, name)
         if text is not None and quantity.SINGLE.fullmatch(text.strip()) and not text.strip()[-1].isalpha():
             setattr(options, name, f"{text} {unit}")
+
+
+def excluded(text: str) -> tuple[str, ...]:
+    """Names of methods, separated by commas."""
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    for name in names:
+        if name not in ENVELOPE_METHODS:
+            raise BadInput(Problem("--exclude", f"there is no method {name}", text, ", ".join(ENVELOPE_METHODS)))
+    return names
 
 
 def given_modulus(text: str | None) -> FuzzyNumber | None:

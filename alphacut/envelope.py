@@ -33,7 +33,8 @@ class EnvelopeTask:
         method: How the envelope is found.
         integrator: Time stepping; None leaves it to the method.
         order: Order κ of the Taylor models.
-        tolerance: Gain that is worth a new trajectory, in the unit of the outputs.
+        tolerance: Gain that is worth a new trajectory, or the error wanted of auto, in the unit of the outputs.
+        exclude: Methods that auto must not take.
     """
 
     fuzzy: tuple[str, ...]
@@ -44,6 +45,7 @@ class EnvelopeTask:
     integrator: str | None
     order: int
     tolerance: float
+    exclude: tuple[str, ...] = ()
 
 
 def task_of(case: Case, *, fuzzy: Sequence[str] | None = None, duration: float | None = None) -> EnvelopeTask:
@@ -96,17 +98,20 @@ def compute(
     if wanted.frame is None:
         return nonlinear(wanted, task, progress)
     guard_step(wanted.frame, task, strict=strict)
-    return frame.envelope(
-        wanted.frame,
-        inputs,
-        alpha=task.alpha,
-        duration=task.duration,
-        step=task.step,
-        method=task.method,
-        integrator=task.integrator,
-        progress=progress,
-        **method_options(task),
-    )
+    try:
+        return frame.envelope(
+            wanted.frame,
+            inputs,
+            alpha=task.alpha,
+            duration=task.duration,
+            step=task.step,
+            method=task.method,
+            integrator=task.integrator,
+            progress=progress,
+            **method_options(task),
+        )
+    except ValueError as error:
+        raise BadInput(Problem("envelope", str(error))) from None
 
 
 def nonlinear(wanted: Structure, task: EnvelopeTask, progress: Tick | None) -> Envelope:
@@ -126,7 +131,7 @@ def nonlinear(wanted: Structure, task: EnvelopeTask, progress: Tick | None) -> E
         raise BadInput(Problem("envelope.method", str(error), task.method)) from None
 
 
-def method_options(task: EnvelopeTask) -> dict[str, float]:
+def method_options(task: EnvelopeTask) -> dict[str, Any]:
     """Those of the task's options that its method has."""
     import inspect
 
@@ -135,7 +140,8 @@ def method_options(task: EnvelopeTask) -> dict[str, float]:
     taken = set(inspect.signature(METHODS[task.method]).parameters)
     if task.method.endswith("graph-follower"):
         taken |= {field.name for field in fields(GraphFollower)}
-    return {name: value for name, value in (("order", task.order), ("tolerance", task.tolerance)) if name in taken}
+    offered = {"order": task.order, "tolerance": task.tolerance, "exclude": task.exclude}
+    return {name: value for name, value in offered.items() if name in taken}
 
 
 def document(found: Envelope) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from fuzzy import Crisp
 
 VERSION = 1
 STAGES = ("microstructure", "modulus", "envelope")
-ENVELOPE_METHODS = ("modal", "graph-follower", "improved-graph-follower", "vertex", "monte-carlo", "quasi-monte-carlo")
+ENVELOPE_METHODS = ("auto", "modal", "graph-follower", "improved-graph-follower", "vertex", "monte-carlo", "quasi-monte-carlo")
 INTEGRATORS = ("midpoint", "newmark", "rk4", "gauss4", "exact", "composition4")
 PLANS = ("general", "reduced", "extended", "signed")
 CELL_METHODS = ("prism", "slices", "table", "series", "auto")
