@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fuzzy import BranchAndBound, Known, Linear, Nature, Signed, Triangular, gradient_range, levels, propagate
@@ -20,6 +20,7 @@ ends = st.floats(-3, 3)
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
+@settings(deadline=None)
 @given(a=ends, b=ends, c=ends, d=ends)
 def test_enclosures_hold_values_and_slopes(name, a, b, c, d):
     function = FUNCTIONS[name]

@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fuzzy import Crisp, Cut, Interval, PiecewiseLinear, Trapezoidal, Triangular
@@ -35,6 +35,7 @@ def test_membership_is_the_highest_level_whose_cut_holds_the_point(number):
         assert number.membership(x) == pytest.approx(max(holding, default=0.0), abs=6e-4)
 
 
+@settings(deadline=None)
 @given(st.lists(finite, min_size=3, max_size=3).map(sorted))
 def test_triangle_meets_its_three_values_exactly(values):
     triangle = Triangular(*values)

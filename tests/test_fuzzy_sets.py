@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fuzzy import Crisp, DependencyError, FuzzySet, Interval, Reduced, Triangular, apply, from_data, levels, propagate
@@ -23,6 +23,7 @@ def test_cuts_of_a_non_convex_set_are_several_intervals():
     assert not TWO_HUMPS.convex
 
 
+@settings(deadline=None)
 @given(st.floats(0.01, 1.0), st.floats(-1, 5))
 def test_a_point_is_in_a_cut_exactly_if_its_grade_reaches_it(alpha, x):
     inside = any(cut.lower - 1e-9 <= x <= cut.upper + 1e-9 for cut in TWO_HUMPS.cut(alpha))
@@ -72,6 +73,7 @@ def test_numbers_from_data_hold_the_middle_share():
         assert np.mean((data >= lower) & (data <= upper)) == pytest.approx(1 - alpha, abs=2e-3)
 
 
+@settings(deadline=None)
 @given(triangles, triangles)
 def test_arithmetic_agrees_with_the_corners_of_the_cuts(a, b):
     for expression, function in (
