@@ -97,10 +97,10 @@ def draw_two_point(discs: Discs, generator: np.random.Generator) -> Figure:
     drawn, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.8))
     fake = _from_pair_distances(discs, len(near), reach, generator)
     _around(left, fake, float(discs.radii[centre]), reach, ["#9ecae1"] * len(fake))
-    left.set_title(f"from pair distances alone: {_overlaps(fake, discs.radii[centre])} of {len(fake)} overlap another")
+    left.set_title(f"pair distances alone: {_overlaps(fake, discs.radii[centre])} of {len(fake)} overlap")
     is_direct = [tuple(np.round(apart[k], 12)) in touching for k in near]
     _around(right, apart[near], float(discs.radii[centre]), reach, [GREEN if yes else "#9ecae1" for yes in is_direct])
-    right.set_title(f"the packing: none overlap, {sum(is_direct)} of {len(near)} are direct neighbours")
+    right.set_title(f"the packing: {sum(is_direct)} of {len(near)} are direct neighbours")
     return drawn
 
 

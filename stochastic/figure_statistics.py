@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from stochastic.figure_style import BLUE, GREY, INK, ORANGE, PALE
+from stochastic.neighbours import neighbouring_values
 from stochastic.truncated_normal import Array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from stochastic.apollonius import Apollonius
     from stochastic.log_normal import LogNormalRadii
     from stochastic.microstructure import Microstructure
     from stochastic.neighbours import Neighbours
@@ -49,6 +51,21 @@ def draw_neighbour_statistics(direct: list[Neighbours], diameter: float) -> Figu
     right.axvline(number.mean(), color=ORANGE, label=f"mean {number.mean():.4g}")
     right.set(xlabel="number of direct neighbours", ylabel="share of discs", xlim=(2.3, number.max() + 0.7))
     right.legend()
+    return drawn
+
+
+def draw_correlation(found: Microstructure, equal: Apollonius) -> Figure:
+    """Values of r_n of cells that share a wall, for the sections and for equal discs of the same area fraction (Fig. 9)."""
+    import matplotlib.pyplot as plt
+
+    drawn, both = plt.subplots(1, 2, figsize=(9.6, 4.4))
+    diagrams = [section.diagram for section in found.sections]
+    for axes, shown, title in zip(both, (diagrams, [equal]), ("the sections", "equal discs"), strict=True):
+        pairs = np.concatenate([neighbouring_values(one, one.reduced_radii) for one in shown], axis=1)
+        axes.hist2d(*pairs, bins=80, cmap="Blues", range=[np.quantile(pairs, (0.0005, 0.9995))] * 2)
+        axes.set(xlabel="r_n of a cell", ylabel="r_n of a neighbour", aspect="equal")
+        axes.set_title(f"{title}: correlation {np.corrcoef(pairs)[0, 1]:+.3f}")
+        axes.grid(visible=False)
     return drawn
 
 

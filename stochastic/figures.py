@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from stochastic.apollonius import apollonius
 from stochastic.discs import Discs
 from stochastic.figure_cells import draw_cells, draw_neighbours, draw_two_point
-from stochastic.figure_statistics import draw_areas, draw_map, draw_neighbour_statistics, draw_pbox, draw_radii
+from stochastic.figure_statistics import draw_areas, draw_correlation, draw_map, draw_neighbour_statistics, draw_pbox, draw_radii
 from stochastic.figure_style import save, style
 from stochastic.log_normal import LogNormalRadii
 from stochastic.neighbours import neighbours
@@ -38,6 +39,7 @@ def draw(found: Microstructure, folder: Path) -> dict[str, list[Path]]:
         "03-04_two_point": lambda: draw_two_point(many, generator),
         "05-08_neighbours": lambda: draw_neighbours(equal),
         "06-07_neighbour_statistics": lambda: draw_neighbour_statistics([neighbours(many)], 2 * float(many.radii[0])),
+        "09_correlation": lambda: draw_correlation(found, apollonius(many)),
         "10_cells": lambda: draw_cells(discs),
         "11_radii": lambda: draw_radii(radii, law),
         "12_areas": lambda: draw_areas(found),

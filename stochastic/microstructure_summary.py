@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     import xarray
 
 
+EDGE = "only cells that no disc beyond the window's edge can change; each stands for 1/p, p the share of places where its like is whole"
+
+
 def summary(found: Microstructure) -> dict[str, Any]:
     """Every number found, lengths in m."""
     box, sample, discs = found.pbox, found.sample, [section.discs for section in found.sections]
@@ -20,6 +23,7 @@ def summary(found: Microstructure) -> dict[str, Any]:
         "packings": len(discs),
         "discs": len(radii),
         "cells": len(sample.values),
+        "edge": "none: the boxes are periodic" if all(one.periodic for one in discs) else EDGE,
         "hidden": int(sum(section.diagram.hidden.sum() for section in found.sections)),
         "rejected": {str(row): reason for section in found.sections for row, reason in section.rejected.items()},
         "area_fraction": float(np.mean([one.area_fraction for one in discs])),

@@ -67,12 +67,16 @@ def neighbours(discs: Discs) -> Neighbours:
     return Neighbours(np.bincount(first, minlength=len(discs))[counted], first, points[other] - points[first])
 
 
-def cell_correlation(diagram: Apollonius, values: Array) -> float:
-    """Correlation of `values` (one per disc, shape (n,)) between cells that share a wall, each pair of cells counted once."""
+def neighbouring_values(diagram: Apollonius, values: Array) -> Array:
+    """Pairs of `values` (one per disc, shape (n,)) of cells that share a wall, either way round, shape (2, m)."""
     beyond = (diagram.neighbour > diagram.cell) & np.isfinite(values[diagram.cell]) & np.isfinite(values[diagram.neighbour])
     pair = np.unique(np.stack([diagram.cell[beyond], diagram.neighbour[beyond]]), axis=1)
-    both = np.concatenate([values[pair], values[pair[::-1]]], axis=1)
-    return float(np.corrcoef(both)[0, 1])
+    return np.concatenate([values[pair], values[pair[::-1]]], axis=1)
+
+
+def cell_correlation(diagram: Apollonius, values: Array) -> float:
+    """Correlation of `values` (one per disc, shape (n,)) between cells that share a wall, each pair of cells counted once."""
+    return float(np.corrcoef(neighbouring_values(diagram, values))[0, 1])
 
 
 def _with_images(discs: Discs, margin: float) -> Array:
