@@ -124,4 +124,4 @@ def signed_envelope(flow: Trajectories, bounds: Array, at: Array, **rest: Any) -
 def output_unit(name: str) -> str:
     """SI unit of an output by its name."""
     kind = name.rstrip("0123456789")
-    return {"q": "m", "drift": "m", "v": "m/s", "shear": "N", "base_shear": "N", "force": "N", "phi": "rad"}.get(kind, "SI")
+    return {"q": "m", "drift": "m", "v": "m/s", "shear": "N", "base_shear": "N", "roof": "m", "force": "N", "phi": "rad"}.get(kind, "SI")

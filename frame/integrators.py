@@ -78,7 +78,7 @@ class Midpoint:
         left = inverse(m.mass * (1 / h) + m.damping * 0.5 + m.stiffness * (h / 4))
         forward = left @ (m.mass * (1 / h) + m.damping * 0.5 - m.stiffness * (h / 4))
         kick = left @ m.mass
-        push = kick @ np.full((m.mass.value.shape[-1], 2), -h / 4)  # half a step of the mean ground acceleration
+        push = kick @ (m.rigid * np.full(2, -h / 4))  # half a step of the mean ground acceleration
         eye = np.eye(m.mass.value.shape[-1])
         upper = concatenate([forward, kick], -1)
         lower = concatenate([(forward - eye) * (2 / h), kick * (2 / h) - eye], -1)
@@ -132,8 +132,7 @@ class Newmark:
         )
         drift = np.block([[eye, h * eye], [zero, eye]])
         left = inverse(np.eye(2 * n) - new @ acceleration)
-        ones = -np.ones((n, 1))
-        load = left @ np.hstack([old @ ones, new @ ones])
+        load = left @ np.hstack([old @ -matrices.rigid, new @ -matrices.rigid])
         return StepMap(left @ (drift + old @ acceleration), load)
 
 
@@ -215,7 +214,7 @@ def _loaded_flow(m: Matrices, step: float) -> Jet:
     out = Jet.constant(np.zeros((len(flow.value), size, size)), flow.directions)
     for whole, part in ((out.value, flow.value), (out.first, flow.first), (out.second, flow.second)):
         whole[..., : 2 * n, : 2 * n] = part
-    out.value[:, n : 2 * n, 2 * n] = -1.0
+    out.value[:, n : 2 * n, 2 * n] = -m.rigid[:, 0]
     out.value[:, 2 * n, 2 * n + 1] = 1 / step
     return out
 

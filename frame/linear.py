@@ -21,6 +21,7 @@ class Matrices:
         stiffness: K, shape (S, n, n), in N/m.
         q0: Initial displacement, shape (S, n, 1), in m.
         v0: Initial velocity, shape (S, n, 1), in m/s.
+        pattern: ι, how the unknowns move rigidly with the ground, shape (n, 1); ones when None.
     """
 
     mass: Jet
@@ -28,6 +29,12 @@ class Matrices:
     stiffness: Jet
     q0: Jet
     v0: Jet
+    pattern: Array | None = None
+
+    @property
+    def rigid(self) -> Array:
+        """ι, shape (n, 1)."""
+        return np.ones((self.mass.value.shape[-1], 1)) if self.pattern is None else self.pattern
 
 
 @dataclass(frozen=True, eq=False)

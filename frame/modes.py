@@ -44,7 +44,7 @@ def modes(matrices: Matrices, rows: Jet) -> Modes:
     n = values.value.shape[-1] // 2
     start = concatenate([matrices.q0, matrices.v0], -2)
     kick = np.zeros((2 * n, 1))
-    kick[n:] = -1.0
+    kick[n:] = -matrices.rigid
     seen = (rows @ X)[..., :n]  # V = (S, m, n)
 
     def through(excitation: Jet) -> Jet:

@@ -1,0 +1,94 @@
+"""Envelope error over trajectories and time for all methods on the paper's frame: CSV and figure in benchmarks/results/.
+
+Run `python -m benchmarks.frame_envelopes --help`, or from `make charts`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from frame import Envelope, StoreyFrame, envelope
+from fuzzy import Triangular
+
+FRAME = StoreyFrame((20e3, 10e3, 5e3), (2.5, 2.7, 2.7), 24.7561e9, 1e-6, (50, 50, 50), "ground", (0.01, 0.03, 0.08), (0, -0.5, -0.5))
+"""The paper's frame in the reading that reproduces its numbers."""
+INPUTS = {
+    "E": Triangular(22.7626e9, 24.7561e9, 25.8312e9),
+    **{f"m{i + 1}": Triangular(0.95 * m, m, 1.05 * m) for i, m in enumerate(FRAME.masses)},
+}
+RESULTS = Path(__file__).parent / "results"
+METHODS: list[tuple[str, str, dict[str, Any]]] = [
+    *[("Graph Follower, faithful", "graph-follower", {"tolerance": t}) for t in (1e-2, 1e-3, 1e-4)],
+    *[("Graph Follower, improved", "improved-graph-follower", {"tolerance": t}) for t in (1e-2, 1e-3, 7e-5)],
+    *[("modal", "modal", {"tolerance": t}) for t in (1e-2, 1e-4, 1e-6)],
+    ("vertex", "vertex", {}),
+    *[("Monte Carlo", "monte-carlo", {"samples": n}) for n in (100, 1000, 10000)],
+    *[("quasi-Monte Carlo", "quasi-monte-carlo", {"samples": n}) for n in (128, 1024, 8192)],
+]
+
+
+def worst(found: Envelope, truth: Envelope) -> float:
+    """Largest deviation of an envelope from the certified one, in m."""
+    return float(max(np.abs(found.upper - truth.upper).max(), np.abs(found.lower - truth.lower).max()))
+
+
+def measured(duration: float, step: float, gap: float, methods: list[tuple[str, str, dict[str, Any]]]) -> Iterator[dict[str, Any]]:
+    """One row per method: error (m), trajectories and seconds on the support (α = 0)."""
+    common: dict[str, Any] = {"duration": duration, "step": step, "alpha": (0,), "integrator": "exact"}
+    truth = envelope(FRAME, INPUTS, method="modal", certify=gap, **common)
+    yield {"method": "certified", "error_m": gap, "trajectories": truth.trajectories, "seconds": truth.seconds}
+    for name, method, options in methods:
+        begun = time.perf_counter()
+        found = envelope(FRAME, INPUTS, method=method, **options, **common)
+        seconds = time.perf_counter() - begun
+        yield {"method": name, "error_m": worst(found, truth), "trajectories": found.trajectories, "seconds": seconds}
+
+
+def draw(rows: list[dict[str, Any]], path: Path) -> None:
+    """Error over trajectories and over time."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(1, 2, figsize=(11, 4.5), sharey=True, layout="constrained")
+    for axis, key, label in ((axes[0], "trajectories", "trajectories or eigen-analyses"), (axes[1], "seconds", "wall time, s")):
+        for name in dict.fromkeys(row["method"] for row in rows):
+            points = [(row[key], row["error_m"]) for row in rows if row["method"] == name]
+            axis.loglog(*zip(*points, strict=True), "o-", label=name)
+        axis.set_xlabel(label)
+        axis.grid(alpha=0.3)
+    axes[0].set_ylabel("largest envelope error, m")
+    axes[1].legend(fontsize=8)
+    figure.savefig(path)
+    plt.close(figure)
+
+
+def main() -> None:
+    """Measures, prints, writes."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--duration", type=float, default=30.0, help="length of the simulation, s (30)")
+    parser.add_argument("--step", type=float, default=0.01, help="distance of nodes, s (0.01)")
+    parser.add_argument("--gap", type=float, default=1e-6, help="gap of the certified reference, m (1e-6)")
+    options = parser.parse_args()
+    RESULTS.mkdir(exist_ok=True)
+    rows = []
+    for row in measured(options.duration, options.step, options.gap, METHODS):
+        rows.append(row)
+        print(f"{row['method']:26s} {row['trajectories']:7d} runs {row['seconds']:8.2f} s  error {row['error_m']:.2e} m", flush=True)
+    with (RESULTS / "frame_envelopes.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    draw(rows, RESULTS / "frame_envelopes.svg")
+
+
+if __name__ == "__main__":
+    main()
