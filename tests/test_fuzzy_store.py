@@ -202,6 +202,7 @@ def test_failed_samples_are_recorded_and_tried_again(tmp_path):
         assert store.models()[0][:3] == (IDENTITY, 50, 5)
     mended = propagate(model, INPUTS, store=tmp_path / "s.db", identity=IDENTITY)
     assert (mended.reused, mended.calls) == (50, 5)
+    assert propagate(model, INPUTS, store=tmp_path / "s.db", identity=IDENTITY).reused == 55
 
 
 def test_store_gives_the_bits_back(tmp_path):
