@@ -42,6 +42,7 @@ class Study:
         confidence: Level of the simultaneous bootstrap band, in (0, 1).
         bootstrap: Number of resamples, at least 100.
         band: Half width, in probability, by which the distribution may leave the p-box; None for that bootstrap band.
+        sampling: Whether the supports of a2 and a4 shall also hold the slopes' own bootstrap band, so that fewer data make a fuzzier map.
         distribution: Law of θ.
 
     Raises:
@@ -55,6 +56,7 @@ class Study:
     confidence: float = 0.99
     bootstrap: int = 500
     band: float | None = None
+    sampling: bool = False
     distribution: TruncatedNormal = field(default_factory=TruncatedNormal)
 
     def __post_init__(self) -> None:
@@ -160,8 +162,8 @@ def study(case: Study, *, executor: Executor | None = None, progress: Callable[[
     band = kept.band(case.confidence, case.bootstrap, np.random.default_rng(streams[0]))
     tell(0.8)
     allowed = band if case.band is None else case.band
-    pbox = least_pbox(fit, kept, allowed)
     slopes = slope_band(fit, kept, level=case.confidence, resamples=case.bootstrap, generator=np.random.default_rng(streams[1]))
+    pbox = least_pbox(fit, kept, allowed, hold=slopes if case.sampling else None)
     tell(0.9)
     fitted = perf_counter()
     direct = [neighbours(section.discs) for section in sections]

@@ -16,6 +16,7 @@ from numpy.polynomial import polynomial
 from stochastic.area_weighted import AreaWeighted
 from stochastic.hermite_fit import SHAPES, SLOPES, HermiteFit
 from stochastic.refused import RefusedError
+from stochastic.slope_band import SlopeBand
 from stochastic.truncated_normal import Array
 
 
@@ -59,27 +60,40 @@ class PBox:
         return self.excess(sample) <= band + 1e-6
 
 
-def least_pbox(fit: HermiteFit, sample: AreaWeighted, band: float) -> PBox:
+def least_pbox(fit: HermiteFit, sample: AreaWeighted, band: float, *, hold: SlopeBand | None = None) -> PBox:
     """The p-box of least area around the fitted map that contains `sample` but for a band of half width `band`.
+
+    Misfit alone gives little fuzziness where data are few and the band is wide; `hold` adds what the slopes may be by chance.
 
     Args:
         fit: Ends of the map and law of θ.
         sample: r_n within the ends.
         band: In probability, in [0, 1).
+        hold: Slopes that the supports must hold as well, such as their own bootstrap band.
 
     Raises:
         RefusedError: No p-box of monotone cubics with these ends contains the sample.
     """
     modal = fit.slopes(sample)
+    core = _core(modal, hold)
     wish = _Containment(fit, sample, band)
     chosen = np.unique(np.linspace(0, len(wish) - 1, min(len(wish), 400)).astype(int))
     for _ in range(50):
-        ends = _solve(fit, modal, wish, chosen)
+        ends = _solve(fit, core, wish, chosen)
         worst = wish.breach(np.array(ends))
         if worst.max(initial=0.0) <= 1e-9:
             return PBox(fit, (ends[0], modal[0], ends[1]), (ends[2], modal[1], ends[3]))
         chosen = np.unique(np.concatenate([chosen, np.argsort(worst)[-100:]]))
     raise RefusedError("the p-box did not settle after 50 rounds of added values")
+
+
+def _core(modal: tuple[float, float], hold: SlopeBand | None) -> list[tuple[float, float | None]]:
+    """Ranges of the four ends (a2L, a2U, a4L, a4U) that leave the modal slopes, and the band to hold, inside the supports."""
+    low, high = list(modal), list(modal)
+    if hold is not None:
+        low = [max(0.0, min(value, ends[0])) for value, ends in zip(modal, (hold.a2, hold.a4), strict=True)]
+        high = [max(value, ends[2]) for value, ends in zip(modal, (hold.a2, hold.a4), strict=True)]
+    return [(0, low[0]), (high[0], None), (0, low[1]), (high[1], None)]
 
 
 class _Containment:
@@ -114,7 +128,7 @@ class _Containment:
         return np.asarray(matrix @ ends - right)
 
 
-def _solve(fit: HermiteFit, modal: tuple[float, float], wish: _Containment, chosen: Array) -> list[float]:
+def _solve(fit: HermiteFit, core: list[tuple[float, float | None]], wish: _Containment, chosen: Array) -> list[float]:
     """Ends (a2L, a2U, a4L, a4U) of least p-box area that obey the chosen rows and keep all four corners monotone."""
     from scipy.optimize import linprog
 
@@ -130,18 +144,18 @@ def _solve(fit: HermiteFit, modal: tuple[float, float], wish: _Containment, chos
         [-h2, h2, -h4, h4],
         A_ub=np.concatenate([matrix, *monotone]),
         b_ub=np.concatenate([right, np.tile(fit.rising + 1e-9, 4)]),
-        bounds=[(0, modal[0]), (modal[0], None), (0, modal[1]), (modal[1], None)],
+        bounds=core,
     )
     if result.status == 0:
         return [float(x) for x in result.x]
-    least = _least_breach(matrix, right, np.concatenate(monotone), np.tile(fit.rising + 1e-9, 4), modal)
+    least = _least_breach(matrix, right, np.concatenate(monotone), np.tile(fit.rising + 1e-9, 4), core)
     raise RefusedError(
         f"no p-box of monotone cubics from {fit.a1:g} to {fit.a3:g} contains the distribution: the best leaves r_n = "
         f"{wish.values[chosen[least[0]]]:.4g} outside by {least[1]:.2g}; widen the limits, or the band by more confidence"
     )
 
 
-def _least_breach(matrix: Array, right: Array, monotone: Array, rising: Array, modal: tuple[float, float]) -> tuple[int, float]:
+def _least_breach(matrix: Array, right: Array, monotone: Array, rising: Array, core: list[tuple[float, float | None]]) -> tuple[int, float]:
     """Where and by how much the least bad p-box breaks containment."""
     from scipy.optimize import linprog
 
@@ -150,6 +164,8 @@ def _least_breach(matrix: Array, right: Array, monotone: Array, rising: Array, m
         [0, 0, 0, 0, 1],
         A_ub=np.hstack([np.concatenate([matrix, monotone]), slack]),
         b_ub=np.concatenate([right, rising]),
-        bounds=[(0, modal[0]), (modal[0], None), (0, modal[1]), (modal[1], None), (0, None)],
+        bounds=[*core, (0, None)],
     )
+    if result.status != 0:
+        raise RefusedError("the slopes that the supports must hold make maps that are not monotone; use more data, or hold less")
     return int(np.argmax(matrix @ result.x[:4] - right)), float(result.x[4])

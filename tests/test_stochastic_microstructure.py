@@ -267,6 +267,16 @@ def test_narrower_band_gives_a_wider_pbox(found):
     assert not crisp.contains(found.kept, 0.8 * least)
 
 
+def test_supports_hold_what_chance_may_do_to_the_slopes(found):
+    wider = study(Study(SMALL, limits=(0.15, 0.85), seed=3, bootstrap=100, sampling=True))
+    assert wider.slopes == found.slopes
+    for slope, band in ((wider.pbox.a2, wider.slopes.a2), (wider.pbox.a4, wider.slopes.a4)):
+        assert slope[0] <= max(band[0], 0) + 1e-9
+        assert slope[2] >= band[2] - 1e-9
+    assert wider.pbox.contains(wider.kept, wider.allowed)
+    assert wider.pbox.area > found.pbox.area
+
+
 def test_study_is_the_same_whatever_the_workers(found):
     with ThreadPoolExecutor(3) as pool:
         again = study(Study(SMALL, limits=(0.15, 0.85), seed=3, bootstrap=100), executor=pool)
