@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,7 +16,11 @@ from alphacut.provenance import source_digest, versions
 from fuzzy import Extended, FuzzyNumber, General, Known, Plan, Reduced, Signed
 from stochastic.truncated_normal import Array
 
+if TYPE_CHECKING:
+    from rve.result import Homogenised
+
 SOURCES = ("space", "theta", "table")  # of error, see rve.result.Homogenised
+JUDGED = ("prism", "auto")
 TABULATED = ("table", "auto")  # methods whose samples may share a table over the particle's moduli
 SHOWN = 61  # points of a stored stress curve
 
@@ -58,13 +62,12 @@ class CellTask:
             outputs.append({**means, **curves, **errors, **{f"check:{name}": value for name, value in result.checks.items()}})
         return outputs
 
-    def reason(self, point: Mapping[str, float]) -> str:
-        """Which model method auto takes at a point, and why; empty for any other method."""
-        if self.choice.method != "auto":
-            return ""
+    def judged(self, point: Mapping[str, float]) -> Homogenised | None:
+        """A sample once more with what the campaign leaves out to be quick: the prism's estimated error, or auto's reason."""
+        if self.choice.method not in JUDGED:
+            return None
         radius, matrix, inclusion = parts({**self.crisp, **point}, self.theta)
-        result = self.choice.model().solve(radius, matrix, [inclusion])[0]
-        return f"{result.method}: {result.reason}"
+        return replace(self.choice, estimate=True).model().solve(radius, matrix, [inclusion])[0]
 
     def resampled(self, nodes: Array, stress: Array) -> Array:
         """A stress curve at `SHOWN` points over θ, for pictures: models choose their own nodes, and not the same for every sample."""

@@ -22,6 +22,8 @@ from fuzzy import explain as fuzzy_explain
 if TYPE_CHECKING:
     import xarray
 
+    from rve.result import Homogenised
+
 QUANTITIES = {"E": ("Pa", "effective Young's modulus, eq. 16"), "nu": ("1", "effective Poisson's ratio, eq. 16")}
 STRESSES = {"s11": ("Pa", "mean homogenised stress 11 under load 1"), "s12": ("Pa", "mean homogenised stress 12 under load 2")}
 BOUNDS = QUANTITIES | STRESSES
@@ -35,13 +37,13 @@ class FuzzyModulus:
         result: Bounds of every output over the levels, with all samples.
         choice: Model of the cell that was used.
         theta: Support of θ.
-        reason: Which model method auto took at the modal point, and why.
+        judged: The modal sample once more, with its estimated error and auto's reason; None for models that give both with every sample.
     """
 
     result: FuzzyResult
     choice: CellChoice
     theta: tuple[float, ...] = (-3.0, 3.0)
-    reason: str = ""
+    judged: Homogenised | None = None
 
     @property
     def number(self) -> PiecewiseLinear:
@@ -53,6 +55,16 @@ class FuzzyModulus:
         """What the bounds of E are worth: guaranteed if they are on every level, else what they are at least."""
         natures = sorted({str(nature) for nature in self.result.nature_of("E")})
         return natures[0] if len(natures) == 1 else str(self.result.nature)
+
+    @property
+    def reason(self) -> str:
+        """Which model method auto took at the modal point, and why; empty for any other method."""
+        return f"{self.judged.method}: {self.judged.reason}" if self.judged and self.choice.method == "auto" else ""
+
+    @property
+    def error(self) -> dict[str, float]:
+        """Estimated relative error of E by source: the largest of all samples, or that of the modal one where each would cost too much."""
+        return self.largest("error") or (dict(self.judged.error) if self.judged else {})
 
     @property
     def solves(self) -> int:
@@ -83,7 +95,7 @@ class FuzzyModulus:
             "plan": self.result.plan,
             "method": self.choice.method,
             "reason": self.reason,
-            "error": self.largest("error"),
+            "error": self.error,
             "checks": self.largest("check"),
             "versions": versions(),
         }
@@ -109,9 +121,9 @@ class FuzzyModulus:
         for name, about in (("curve11", "stress 11 under load 1"), ("curve12", "stress 12 under load 2")):
             variables[name] = (("sample", "theta"), result.values.output(name), {"units": "Pa", "long_name": f"homogenised {about}"})
         for kind in ("error", "check"):
-            largest = self.largest(kind)
+            largest = self.error if kind == "error" else self.largest(kind)
             variables[kind] = ((f"{kind}_name",), list(largest.values()), {"long_name": f"largest {kind} of all samples"})
-        names = {f"{kind}_name": list(self.largest(kind)) for kind in ("error", "check")}
+        names = {"error_name": list(self.error), "check_name": list(self.largest("check"))}
         coordinates = names | {
             "theta": theta_shown(self.theta),
             "alpha": result.alpha,
@@ -144,7 +156,7 @@ def compute(wanted: Campaign, *, workers: int = 1, progress: Tick | None = None)
         identity=wanted.identity,
     )
     modal = {name: number.modal for name, number in wanted.inputs.items()}
-    return FuzzyModulus(result, wanted.task.choice, wanted.task.theta, wanted.task.reason(modal))
+    return FuzzyModulus(result, wanted.task.choice, wanted.task.theta, wanted.task.judged(modal))
 
 
 def explain(wanted: Campaign) -> Explanation:

@@ -82,7 +82,7 @@ def modulus(found: Mapping[str, Any], folder: Path) -> str:
         words,
         picture(folder / "figures" / "fig18-modulus.svg", "Fuzzy effective modulus (counterpart of Fig. 18)."),
         table(("α", "lower E, GPa", "upper E, GPa"), rows),
-        "<h3>Error budget</h3>" + table(("source", "estimated relative error of E, largest of all samples"), budget) if budget else "",
+        "<h3>Error budget</h3>" + table(("source", "estimated relative error of E"), budget) if budget else "",
         "<h3>Certificate</h3>" + table(("property", "measured violation, largest of all samples"), checks) if checks else "",
     )
 
