@@ -1,4 +1,4 @@
-"""The rule in θ of the models that solve slice by slice, fit for maps that jump."""
+"""The rule in θ of the models that solve slice by slice, fit for maps that jump or bend."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from stochastic import RadiusMap, ThetaRule, gauss_rule
 from stochastic.truncated_normal import Array, TruncatedNormal
 
 _SAMPLES = 2049
-_LEAST_JUMP = 1e-3  # in radii
+_LEAST_JUMP, _LEAST_BEND = 1e-3, 1e-8  # in radii, over one or two steps of the sampling
 _FINE = 128
 _MOST_POINTS = 800
 DIGITS = 12  # radii equal to so many decimals are one slice
@@ -28,21 +28,25 @@ class RuleError(RuntimeError):
     """No rule in θ reaches the wanted accuracy."""
 
 
-def jumps(radius_map: RadiusMap) -> Array:
-    """The θ at which the map jumps, rising; found by sampling and bisection.
-
-    A jump is where halving an interval of θ leaves the change of r over it as it was.
-    """
+def breaks(radius_map: RadiusMap) -> Array:
+    """The θ at which the map jumps or its slope does, rising; found by sampling and bisection."""
     law = radius_map.distribution
     theta = np.linspace(law.lower, law.upper, _SAMPLES)
-    change = np.abs(np.diff(radius_map(theta)))
+    radius = radius_map(theta)
+    change = np.abs(np.diff(radius))
     suspects = np.flatnonzero(change > np.maximum(_LEAST_JUMP, 4 * np.median(change)))
-    found = [_bisect(radius_map, theta[k], theta[k + 1]) for k in suspects]
-    return np.array([x for x in found if x is not None])
+    jumps = [x for k in suspects if (x := _bisect_jump(radius_map, theta[k], theta[k + 1])) is not None]
+    bend = np.abs(np.diff(radius, 2))
+    bent = np.flatnonzero(bend > np.maximum(_LEAST_BEND, 20 * np.median(bend)))
+    bends = [_bisect_bend(radius_map, theta[k], theta[k + 2]) for k in bent]
+    step = theta[1] - theta[0]
+    kinks = [x for x in bends if all(abs(x - jump) > 3 * step for jump in jumps)]
+    found = np.sort(np.array(jumps + kinks))
+    return found[np.append(True, np.diff(found) > step)] if found.size else found
 
 
-def _bisect(radius_map: RadiusMap, low: float, high: float) -> float | None:
-    """The jump inside [low, high], or None if the map is continuous there."""
+def _bisect_jump(radius_map: RadiusMap, low: float, high: float) -> float | None:
+    """The jump inside [low, high], or None if the map is continuous there: halving leaves the change over a jump as it was."""
     before, after = radius_map([low, high])
     size = abs(after - before)
     for _ in range(48):
@@ -55,14 +59,23 @@ def _bisect(radius_map: RadiusMap, low: float, high: float) -> float | None:
     return high if abs(after - before) > size / 4 else None
 
 
+def _bisect_bend(radius_map: RadiusMap, low: float, high: float) -> float:
+    """Where the map bends most inside [low, high], to a billionth."""
+    while high - low > 1e-9:
+        theta = np.linspace(low, high, 9)
+        most = int(np.argmax(np.abs(np.convolve(radius_map(theta), [1, 0, -2, 0, 1], "valid"))))
+        low, high = theta[most], theta[most + 4]
+    return (low + high) / 2
+
+
 def theta_rule(radius_map: RadiusMap, *, points: int) -> ThetaRule:
-    """Gauss rule of f_Θ with `points` nodes; where the map jumps, Gauss–Legendre with as many in each smooth piece."""
+    """Gauss rule of f_Θ with `points` nodes; where the map has breaks, Gauss–Legendre with as many in each smooth piece."""
     law = radius_map.distribution
-    breaks = jumps(radius_map)
-    if breaks.size == 0:
+    cuts = breaks(radius_map)
+    if cuts.size == 0:
         return _gauss_rule(law, points)
     x, w = np.polynomial.legendre.leggauss(points)
-    edges = np.concatenate([[law.lower], breaks, [law.upper]])
+    edges = np.concatenate([[law.lower], cuts, [law.upper]])
     half = np.diff(edges)[:, None] / 2
     nodes = (edges[:-1, None] + half * (1 + x)).ravel()
     weights = (half * w).ravel() * law.pdf(nodes)

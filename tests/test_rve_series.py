@@ -4,7 +4,7 @@ import pytest
 from rve import Phase
 from rve.series import SeriesModel
 from rve.series_stiffness import SeriesError, square_stiffness
-from rve.slices_rule import jumps, theta_rule
+from rve.slices_rule import breaks, theta_rule
 from stochastic import HermiteMap, TruncatedNormal
 
 MATRIX = Phase(20e9)
@@ -145,12 +145,32 @@ def test_rule_in_theta_declares_its_error():
 
 def test_a_map_that_jumps_is_cut_at_its_jump():
     radius_map = Piecewise()
-    np.testing.assert_allclose(jumps(radius_map), [0.3], atol=1e-12)
-    assert jumps(HermiteMap(0.1337, 0.1, 0.8663, 0.1692)).size == 0
+    np.testing.assert_allclose(breaks(radius_map), [0.3], atol=1e-12)
+    assert breaks(HermiteMap(0.1337, 0.1, 0.8663, 0.1692)).size == 0
     result = SeriesModel().solve(radius_map, MATRIX, [Phase(80e9)])[0]
     assert result.error["theta"] < 1e-11
     rule = theta_rule(radius_map, points=20)
     assert rule.weights @ (rule.nodes < 0.3) == pytest.approx(float(radius_map.distribution.cdf(0.3)), rel=1e-13)
+
+
+class Bent:
+    """r = 0.4 + 0.12 |θ − 0.3|."""
+
+    distribution = TruncatedNormal()
+
+    def __call__(self, theta):
+        return 0.4 + 0.12 * np.abs(np.asarray(theta, float) - 0.3)
+
+
+def test_a_map_that_bends_is_cut_at_its_bend():
+    np.testing.assert_allclose(breaks(Bent()), [0.3], atol=1e-8)
+    exact = SeriesModel(points=40).solve(Bent(), MATRIX, [Phase(80e9)])[0]
+    assert SeriesModel().solve(Bent(), MATRIX, [Phase(80e9)])[0].modulus == pytest.approx(exact.modulus, rel=1e-11)
+
+
+@pytest.mark.parametrize("slopes", [(0.3145, 0.001), (0.001, 0.9975), (0.0, 0.0), (-0.2, -0.3)])
+def test_smooth_maps_are_not_cut(slopes):
+    assert breaks(HermiteMap(0.1337 + 0.1, slopes[0], 0.8663, slopes[1])).size == 0
 
 
 @pytest.mark.parametrize(("options", "message"), [({"points": 1}, "at least 2"), ({"accuracy": 1e-15}, "must lie in")])
