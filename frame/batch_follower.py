@@ -34,6 +34,7 @@ class BatchFollower:
         spread: Graphs on a spread of points per level that start the search.
         batch: Graphs computed together.
         reach: Trust region of a Taylor model, as a share of the half width of the box.
+        order: Degree κ of the Taylor models, which must be 2.
 
     Raises:
         ValueError: A switch is out of its range.
@@ -44,10 +45,13 @@ class BatchFollower:
     spread: int = 64
     batch: int = 32
     reach: float = 0.6
+    order: int = 2
 
     def __post_init__(self) -> None:
         if not (self.tolerance > 0 and np.isfinite(self.tolerance)):
             raise ValueError(f"tolerance: {self.tolerance:g} is not allowed; it must be positive")
+        if self.order != 2:
+            raise ValueError(f"order: {self.order} is not allowed; the Graph Follower in rounds needs Taylor models of degree 2")
         if min(self.budget, self.spread, self.batch) < 1 or not 0 < self.reach <= 2:
             raise ValueError(f"budget {self.budget}, spread {self.spread}, batch {self.batch}, reach {self.reach:g}: out of range")
 

@@ -73,7 +73,7 @@ class GraphFollower:
 
     Args:
         order: Degree κ of the Taylor model, 1 or 2.
-        tolerance: Predicted gain above which a new graph is computed, in units of the outputs.
+        tolerance: Predicted gain above which a new graph is computed, in units of the (first) output.
         sweeps: Passes over time, alternately forward and backward.
         exact: Solve the quadratic problem globally over the faces of the box instead of uphill from the guess.
         models: Number of distinct graphs whose models are asked at each node.
@@ -148,7 +148,7 @@ class GraphFollower:
         for guess in guesses.T:
             base, x, promised = self._optima(storage, node, guess, box)
             value = base + promised
-            for k in np.flatnonzero(value > attained + self.tolerance):
+            for k in np.flatnonzero(value > attained + self.tolerance * np.repeat(storage.flow.scale, 2)):
                 point = np.clip(storage.points[guess[k]] + x[k], *box)
                 fresh = not storage.holds(point) and all(np.abs(point - other).max() > 1e-9 for other in new)
                 tried.append((int(k), int(guess[k]), len(storage) + len(new) if fresh else -1, float(value[k])))
@@ -192,9 +192,10 @@ class GraphFollower:
     def _correct(self, out: Followed, level: int) -> None:
         """The gain that the Taylor model of the best graph still promises; what is above the tolerance was tried and is no model."""
         box = out.storage.flow.boxes.unit(level)
+        limit = self.tolerance * np.repeat(out.storage.flow.scale, 2)
         for node in range(out.bounds.shape[1]):
             _, _, promised = self._optima(out.storage, node, out.best[level, node].ravel(), box)
-            out.correction[level, node] = np.where(promised <= self.tolerance, promised, 0.0).reshape(out.correction.shape[2:])
+            out.correction[level, node] = np.where(promised <= limit, promised, 0.0).reshape(out.correction.shape[2:])
 
     def _note(
         self,

@@ -1,4 +1,4 @@
-"""Response of single modes to the motion of the ground, as a Taylor series in the eigenvalue."""
+"""Response of single modes to the motion of the ground, as Taylor series in the eigenvalue over windows of time."""
 
 from __future__ import annotations
 
@@ -9,59 +9,78 @@ import numpy as np
 
 from frame.jet import Array
 from frame.linear import Accelerogram
-from frame.modes import ModalError
 from frame.polynomial import Polynomial
 
-REACH = 12.0
-"""Largest change of phase (rad) over the box that the series covers."""
+REACH = 6.0
+"""Largest change of phase (rad) over the box within a window."""
+Waves = tuple[Array, Array, Array]
 
 
 @dataclass(frozen=True, eq=False)
 class LoadTable:
-    """R_k(t_j; λ) = ∫ exp(λ (t_j − s)) a(s) ds near the middle λ_k of the box, as Σ_i moment[j, k, i] ((λ − λ_k) / scale)^i.
+    """R_k(t_j; λ) = ∫ exp(λ (t_j − s)) a(s) ds near the middle λ_k of the box.
+
+    Time is cut into windows so short that phases change little over the box within one. The part of R that arises in the window of
+    t_j is Σ_i moment[j, k, i] x^i with x = (λ − λ_k) / scale; what earlier windows leave behind goes on as exp(λ (t_j − their end)).
 
     Args:
         middle: λ_k in the middle of the box, shape (n,).
         scale: Length that makes the coefficients of order one, in 1/s.
         moment: Coefficients, shape (T, n, order).
+        starts: First node of every window, rising from 0, shape (W,).
+        time: Nodes, shape (T,), in s.
         share: What one unit of R_k puts into the outputs, n m polynomials.
     """
 
     middle: Array
     scale: float
     moment: Array
+    starts: Array
+    time: Array
     share: Polynomial
 
     @classmethod
     def build(cls, ground: Accelerogram, time: Array, rate: Polynomial, share: Polynomial) -> LoadTable:
-        """The table for modes whose eigenvalues are `rate` over the unit box.
-
-        Raises:
-            ModalError: The phase changes too much over the box.
-        """
+        """The table for modes whose eigenvalues are `rate` over the unit box."""
         middle = rate.coefficients[0]
-        reach = float((np.abs(rate.coefficients[1:]).sum(0) * time[-1]).max())
-        if reach > REACH:
-            raise ModalError(f"modal: phases change by {reach:.1f} rad over the box, more than {REACH:g} under a load; use graph-follower")
-        order = max(6, ceil(2.72 * reach + 18))
-        return cls(middle, 1 / time[-1], _moments(ground.at(time), middle, time, order), share)
+        spread = float(np.abs(rate.coefficients[1:]).sum(0).max())
+        length = min(len(time) - 1, max(1, int(REACH / max(spread, 1e-12) / (time[1] - time[0]))))
+        starts = np.arange(0, len(time) - 1, length)
+        window = length * (time[1] - time[0])
+        order = max(6, ceil(2.72 * spread * window + 18))
+        return cls(middle, 1 / window, _moments(ground.at(time), middle, time, starts, window, order), starts, time, share)
 
     def values(self, unit: Array, rate: Array) -> Array:
         """Response of the outputs at points (S, d) with eigenvalues (S, n), shape (S, T, m)."""
-        powers = self._powers(rate, 0)
         share = self.share(unit).reshape(*rate.shape, -1)
-        weights = share[..., None] * powers[:, :, None, :]  # (S, n, m, order)
-        flat = weights.transpose(0, 2, 1, 3).reshape(-1, powers.shape[1] * powers.shape[2])
-        table = self.moment.reshape(len(self.moment), -1).T
-        out = 2 * (flat.real @ table.real - flat.imag @ table.imag)
-        values: Array = out.reshape(len(unit), -1, len(self.moment)).swapaxes(1, 2)
-        return values
+        powers = self._powers(rate, 0)
+        out = np.zeros((len(unit), len(self.time), share.shape[-1]))
+        left = np.zeros_like(rate)  # what is left of earlier windows at the start of this one
+        ends = np.append(self.starts[1:], len(self.time) - 1)
+        for start, end in zip(self.starts, ends, strict=True):
+            rows = slice(start + 1, end + 1)
+            own = np.einsum("jki,ski->sjk", self.moment[rows], powers, optimize=True)
+            wave = np.exp(rate[:, None, :] * (self.time[rows] - self.time[start])[None, :, None])
+            response = own + wave * left[:, None, :]
+            left = response[:, -1]
+            out[:, rows] = 2 * (response @ share).real
+        return out
 
-    def response(self, rate: Array, node: Array) -> tuple[Array, Array, Array]:
+    def response(self, rate: Array, node: Array) -> Waves:
         """R, dR/dλ and d²R/dλ² at one node per point, each shape (N, n), for eigenvalues (N, n)."""
-        moment = self.moment[node]
-        r0, r1, r2 = ((moment * self._powers(rate, order)).sum(-1) for order in range(3))
-        return r0, r1, r2
+        powers = [self._powers(rate, order) for order in range(3)]
+        total = [(self.moment[node] * p).sum(-1) for p in powers]
+        for end in self.starts[1:]:
+            later = np.flatnonzero(node > end)
+            if not len(later):
+                break
+            tau = (self.time[node[later]] - self.time[end])[:, None]
+            s0, s1, s2 = ((self.moment[end] * p[later]).sum(-1) for p in powers)
+            wave = np.exp(rate[later] * tau)
+            total[0][later] += wave * s0
+            total[1][later] += wave * (s1 + tau * s0)
+            total[2][later] += wave * (s2 + 2 * tau * s1 + tau * tau * s0)
+        return total[0], total[1], total[2]
 
     def _powers(self, rate: Array, derivative: int) -> Array:
         """Powers of the scaled deviation, differentiated by λ, shape (S, n, order)."""
@@ -75,25 +94,27 @@ class LoadTable:
         return plain
 
 
-def _moments(acceleration: Array, middle: Array, time: Array, order: int) -> Array:
-    """Taylor coefficients of R_k by scaled λ at all nodes, shape (T, n, order), for a load linear between nodes.
+def _moments(acceleration: Array, middle: Array, time: Array, starts: Array, window: float, order: int) -> Array:
+    """Taylor coefficients of the window's own part of R_k at all nodes, shape (T, n, order), for a load linear between nodes.
 
-    Per step: ∫ of exp((λ + x/T) τ) over the step as a truncated series in x, by Gauss quadrature to round-off; from node to node
-    the series is multiplied by that of exp((λ + x/T) h).
+    Per step: ∫ of exp((λ + x/window) τ) over the step as a truncated series in x, by Gauss quadrature to round-off; from node to
+    node the series is multiplied by that of exp((λ + x/window) h). A node that ends one window starts the next from nothing.
     """
-    h, total = time[1] - time[0], time[-1]
+    h = time[1] - time[0]
     points, weights = np.polynomial.legendre.leggauss(8 + ceil(abs(middle).max() * h))
     tau = h * (1 - points) / 2  # time from the quadrature point to the end of the step
     factorial = np.cumprod(np.concatenate([[1.0], np.arange(1, order)]))
-    series = (tau[:, None] / total) ** np.arange(order) / factorial  # (Q, order)
+    series = (tau[:, None] / window) ** np.arange(order) / factorial  # (Q, order)
     kernel = np.exp(middle[:, None] * tau) * weights * (h / 2)  # (n, Q)
     late = (points + 1) / 2
     old, new = (np.einsum("kq,qi->ki", kernel * share, series) for share in (1 - late, late))
-    advance = np.exp(middle * h)[:, None] * (h / total) ** np.arange(order) / factorial  # (n, order)
-    window = np.zeros((len(middle), order, order), complex)  # truncated product with `advance` as a matrix
+    advance = np.exp(middle * h)[:, None] * (h / window) ** np.arange(order) / factorial  # (n, order)
+    product = np.zeros((len(middle), order, order), complex)  # truncated product with `advance` as a matrix
     for i in range(order):
-        window[:, i, i:] = advance[:, : order - i]
+        product[:, i, i:] = advance[:, : order - i]
     out = np.zeros((len(time), len(middle), order), complex)
+    fresh = {int(start) for start in starts}
     for j in range(1, len(time)):
-        out[j] = (out[j - 1][:, None] @ window)[:, 0] + old * acceleration[j - 1] + new * acceleration[j]
+        carried = 0.0 if j - 1 in fresh else (out[j - 1][:, None] @ product)[:, 0]
+        out[j] = carried + old * acceleration[j - 1] + new * acceleration[j]
     return out

@@ -145,3 +145,12 @@ def test_pendulum_goes_through_the_same_door() -> None:
     assert max((sampled.upper - found.upper).max(), (found.lower - sampled.lower).max()) < 0.02
     assert (found.upper - sampled.upper).max() < 0.3
     assert found.nesting_violation() < 0.01
+
+
+def test_outputs_of_different_units_get_their_own_tolerance() -> None:
+    from dataclasses import replace
+
+    mixed = envelope(replace(FRAME, outputs=("q3", "base_shear")), E, duration=4, step=0.05, alpha=(0,), method="graph-follower")
+    alone = envelope(replace(FRAME, outputs=("q3",)), E, duration=4, step=0.05, alpha=(0,), method="graph-follower")
+    assert mixed.trajectories < 6 * alone.trajectories
+    assert mixed.to_dataset()["lower"].attrs["units"] == "SI, by output"

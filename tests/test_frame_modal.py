@@ -63,6 +63,25 @@ def test_base_excitation_enters_the_modal_model() -> None:
     assert np.abs(g.T - jet.first[:, k, node, output]).max() < 1e-5 * np.abs(jet.first).max()
 
 
+def test_long_excitation_is_cut_into_windows() -> None:
+    ground = Accelerogram(0.05, np.random.default_rng(5).standard_normal(800))
+    inputs = {"E": Triangular(20e9, 24.7561e9, 28e9)}
+    cuts = boxes(inputs, (0,))
+    flow = LinearFlow(replace(FRAME, ground=ground, dampers=(900.0, 800.0, 500.0)), ("E",), 40, 0.05, Exact())
+    model = fit_modes(flow, cuts)
+    assert model.load is not None
+    assert len(model.load.starts) >= 2
+    points = np.linspace(-1, 1, 9)[:, None]
+    truth = UnitFlow(flow, cuts).taylor(points)
+    size = np.abs(truth.value).max()
+    assert np.abs(model.values(points) - truth.value).max() < 1e-5 * size
+    node, output, k = np.full(9, 777), np.full(9, 2), np.arange(9)
+    f, g, H = model.at(points, node, output)
+    assert np.abs(f - truth.value[k, node, output]).max() < 1e-5 * size
+    assert np.abs(g.T - truth.first[:, k, node, output]).max() < 1e-4 * np.abs(truth.first).max()
+    assert np.abs(np.moveaxis(H, 0, -1) - truth.second[:, :, k, node, output]).max() < 1e-3 * np.abs(truth.second).max()
+
+
 def test_default_method_is_modal_and_meets_the_certified_envelope(certified: Envelope) -> None:
     found = envelope(FRAME, INPUTS, duration=6, step=0.1, alpha=(0, 0.5, 1))
     assert found.method == "modal"
