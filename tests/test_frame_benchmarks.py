@@ -1,0 +1,25 @@
+"""The benchmarks' functions in small."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from benchmarks import frame_envelopes, frame_integrators
+
+
+def test_envelope_benchmark_ranks_the_methods(tmp_path: Path) -> None:
+    wanted = [m for m in frame_envelopes.METHODS if m[1] in ("modal", "vertex", "improved-graph-follower")]
+    rows = list(frame_envelopes.measured(8.0, 0.1, 1e-6, wanted))
+    error = {row["method"]: row["error_m"] for row in rows}
+    assert error["modal"] < error["Graph Follower, improved"] < error["vertex"]
+    frame_envelopes.draw(rows, tmp_path / "figure.svg")
+    assert (tmp_path / "figure.svg").stat().st_size > 1000
+
+
+def test_integrator_benchmark_measures_every_integrator(tmp_path: Path) -> None:
+    rows = list(frame_integrators.errors([0.1, 0.05], 3.0))
+    assert {row["integrator"] for row in rows} == {"midpoint", "newmark", "rk4", "gauss4", "exact"}
+    frame_integrators.draw(rows, tmp_path / "figure.svg")
+    drift = frame_integrators.drift(2000, 0.01)
+    assert drift["midpoint"] < 1e-11
+    assert drift["rk4"] > 1e-10
