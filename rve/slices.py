@@ -18,7 +18,7 @@ from rve.slices_rule import DIGITS, extreme_radii, theta_error, theta_rule
 from stochastic import RadiusMap
 from stochastic.truncated_normal import Array
 
-_IRREGULAR_FADE = 0.15
+_IRREGULAR_FADE = 0.15  # least share of a change that is taken to be left by orders below 4
 _ROUND_OFF = 1e-13
 
 
@@ -29,7 +29,7 @@ class SlicesModel:
     Args:
         order: Polynomial degree of the elements, 2 to 4.
         mesh_size: Edge length far from the interface, in halves of the cell's side, in (0, 1].
-        points: Nodes in θ, of each smooth piece where the map jumps; at least 2.
+        points: Nodes in θ, of each smooth piece where the map jumps or bends; at least 2.
         centre: Centre of the particle in the cell [−1, 1]²; the moduli do not depend on it.
         progress: Called with the fraction done.
 
