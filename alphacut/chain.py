@@ -11,7 +11,7 @@ from alphacut import envelope, microstructure, modulus
 from alphacut.campaign import campaign
 from alphacut.case import Case
 from alphacut.command_microstructure import write as write_microstructure
-from alphacut.consistency import FILES
+from alphacut.consistency import FILES, OTHERS
 from alphacut.output import say
 from alphacut.progress import progress
 from alphacut.provenance import attributes, fingerprint
@@ -117,8 +117,8 @@ class Chain:
 
     def envelope(self, study: Study, handed: FuzzyNumber | None) -> xarray.Dataset:
         """One study's envelope, in envelope_NAME.nc."""
-        inputs = {key: value for key, value in self.case.values.items() if key.startswith("frame.")}
-        record = self.case.digest("frame.accelerogram") if self.case.has("frame.accelerogram") else ""
+        inputs = {key: value for key, value in self.case.values.items() if key.partition(".")[0] in ("frame", *OTHERS)}
+        record = [self.case.digest(key) for key in FILES if key.endswith("accelerogram") and self.case.has(key)]
         key = fingerprint({"case": inputs, "record": record, "task": study.task, "modulus": handed}, ("fuzzy", "frame"))
 
         def compute(path: Path) -> None:

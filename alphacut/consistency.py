@@ -15,8 +15,18 @@ from stochastic import HermiteMap, TruncatedNormal
 
 SLOPES = ("a1", "a2", "a3", "a4")
 GROUPS = ("E", "I", "m", "l", "d", "q0", "v0", "rayleigh_mass", "rayleigh_stiffness")
-SWINGING = ("m", "l", "d", "g", "phi_0", "omega_0")
-FILES = ("microstructure.circles.file", "microstructure.image.file", "modulus.file", "modulus.measured", "frame.accelerogram")
+OTHERS = {  # structures beside the storey frame, and their inputs
+    "pendulum": ("m", "l", "d", "g", "phi_0", "omega_0"),
+    "tower": ("E_columns", "E_columns_top", "E_beams", "mass", "rayleigh_mass", "rayleigh_stiffness"),
+}
+FILES = (
+    "microstructure.circles.file",
+    "microstructure.image.file",
+    "modulus.file",
+    "modulus.measured",
+    "frame.accelerogram",
+    "tower.accelerogram",
+)
 
 
 def inconsistencies(case: Case, *, modal: bool = False) -> Iterator[Problem]:
@@ -33,10 +43,12 @@ def inconsistencies(case: Case, *, modal: bool = False) -> Iterator[Problem]:
             yield from levels(case, f"{section}.alpha")
     if case.has("frame.masses"):
         yield from floors(case)
-    elif case.has("pendulum.mass"):
-        yield from swings(case)
-    if "envelope" in case.stages and case.has("frame.masses") == case.has("pendulum.mass"):
-        yield Problem("frame", "stage envelope needs one structure", allowed="[frame] or [pendulum]")
+    for section, names in OTHERS.items():
+        if any(key.startswith(f"{section}.") for key in case.values):
+            yield from named_inputs(case, section, names)
+    found = [name for name in ("frame", *OTHERS) if any(key.startswith(f"{name}.") for key in case.values)]
+    if "envelope" in case.stages and len(found) != 1:
+        yield Problem("frame", f"stage envelope needs one structure, got {len(found)}", ", ".join(found), "[frame], [pendulum] or [tower]")
     if case.has("envelope.step"):
         yield from times(case)
 
@@ -152,12 +164,12 @@ def floors(case: Case) -> Iterator[Problem]:
             yield from known_input(key, name, count)
 
 
-def swings(case: Case) -> Iterator[Problem]:
-    """Fuzzy inputs of a pendulum."""
+def named_inputs(case: Case, section: str, known: tuple[str, ...]) -> Iterator[Problem]:
+    """Fuzzy inputs of a structure that has no groups of them."""
     for key in fuzzy_keys(case):
         for name in case.names(key):
-            if name not in SWINGING:
-                yield Problem(key, f"the pendulum has no input {name}", name, ", ".join(SWINGING), nearest(name, SWINGING))
+            if name not in known:
+                yield Problem(key, f"the {section} has no input {name}", name, ", ".join(known), nearest(name, known))
 
 
 def fuzzy_keys(case: Case) -> list[str]:

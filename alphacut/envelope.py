@@ -18,7 +18,8 @@ from fuzzy import FuzzyNumber
 if TYPE_CHECKING:
     import xarray
 
-    from frame import Envelope, StoreyFrame
+    from frame import Envelope
+    from frame.linear import LinearSystem
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ def task_of(case: Case, *, fuzzy: Sequence[str] | None = None, duration: float |
     )
 
 
-def guard_step(model: StoreyFrame, task: EnvelopeTask, *, strict: bool) -> None:
+def guard_step(model: LinearSystem, task: EnvelopeTask, *, strict: bool) -> None:
     """Warn where the step cannot resolve the fastest mode, with the phase error that means.
 
     Raises:
@@ -95,12 +96,12 @@ def compute(
 
     wanted = structure(case, modulus)
     inputs = wanted.inputs(task.fuzzy)
-    if wanted.frame is None:
+    if wanted.linear is None:
         return nonlinear(wanted, task, progress)
-    guard_step(wanted.frame, task, strict=strict)
+    guard_step(wanted.linear, task, strict=strict)
     try:
         return frame.envelope(
-            wanted.frame,
+            wanted.linear,
             inputs,
             alpha=task.alpha,
             duration=task.duration,

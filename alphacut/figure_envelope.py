@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WORDS = {"E": "modulus", "m": "masses", "l": "lengths", "d": "dampers", "q0": "initial displacements", "v0": "initial velocities"}
+WORDS |= {"E_columns": "lower columns", "E_columns_top": "upper columns", "E_beams": "beams", "mass": "floor mass"}
 WORDS |= {"rayleigh_mass": "mass damping", "rayleigh_stiffness": "stiffness damping", "I": "second moment"}
 
 
@@ -41,7 +42,7 @@ def envelope(dataset: xarray.Dataset, output: str, study: Study) -> Figure:
     axes.set_xlabel("time t, s")
     axes.set_ylabel(f"{output}, {output_unit(output)}")
     axes.set_xlim(time[0], time[-1])
-    known = WORDS if output.startswith(("q", "v", "drift", "shear", "base")) else {}  # letters mean something else in a pendulum
+    known = WORDS if output.startswith(("q", "v", "drift", "shear", "base", "roof")) else {}  # letters mean something else in a pendulum
     words = ", ".join(known.get(name, name) for name in study.task.fuzzy)
     axes.set_title(f"{output}, fuzzy {words}", loc="left", fontsize=10)
     alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))

@@ -196,6 +196,28 @@ FRAME = Section(
     },
 )
 
+TOWER = Section(
+    "Plane beam frame of many storeys and bays, clamped at its foot, reduced to a few shapes that hold for all its fuzzy inputs.",
+    {
+        "storeys": Key("number of storeys", "integer", required=True, allowed=COUNT),
+        "bays": Key("number of bays", "integer", required=True, allowed=COUNT),
+        "height": Key("height of a storey", "number", "m", required=True, allowed=POSITIVE),
+        "width": Key("width of a bay", "number", "m", required=True, allowed=POSITIVE),
+        "column_area": Key("area of a column", "number", "m^2", required=True, allowed=POSITIVE),
+        "column_moment": Key("second moment of area of a column", "number", "m^4", required=True, allowed=POSITIVE),
+        "beam_area": Key("area of a beam", "number", "m^2", required=True, allowed=POSITIVE),
+        "beam_moment": Key("second moment of area of a beam", "number", "m^4", required=True, allowed=POSITIVE),
+        "E_columns": Key("Young's modulus of the lower half's columns", unit="Pa", required=True, allowed=POSITIVE),
+        "E_columns_top": Key("Young's modulus of the upper half's columns", unit="Pa", required=True, allowed=POSITIVE),
+        "E_beams": Key("Young's modulus of the beams", unit="Pa", required=True, allowed=POSITIVE),
+        "mass": Key("mass of the floors over the length of the beams", unit="kg/m", required=True, allowed=POSITIVE),
+        "density": Key("density of the columns", "number", "kg/m^3", required=True, allowed=NOT_NEGATIVE),
+        "rayleigh_mass": Key("factor a of Rayleigh damping a M + b K", unit="1/s", required=True, allowed=NOT_NEGATIVE),
+        "rayleigh_stiffness": Key("factor b of Rayleigh damping a M + b K", unit="s", required=True, allowed=NOT_NEGATIVE),
+        "accelerogram": Key("CSV file of the ground's acceleration", "text", required=True),
+    },
+)
+
 PENDULUM = Section(
     "Damped pendulum: a mass on a bar under gravity; the output is the force in the bar.",
     {
@@ -225,7 +247,7 @@ ENVELOPE = Section(
     "Fuzzy forward dynamics.",
     {
         "fuzzy": Key(
-            "inputs that are fuzzy: E, I, m or m1 …, l, d, q0, v0, rayleigh_mass …; of a pendulum m, l, d, g, phi_0, omega_0",
+            "inputs that are fuzzy, of a frame: E, I, m or m1 …, l, d, q0, v0, rayleigh_mass …",
             "choices",
             required=True,
         ),
@@ -251,6 +273,7 @@ SECTIONS: dict[str, Section] = {
     "modulus": MODULUS,
     "frame": FRAME,
     "pendulum": PENDULUM,
+    "tower": TOWER,
     "study": STUDY,
     "envelope": ENVELOPE,
 }

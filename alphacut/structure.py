@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 from alphacut.accelerogram import accelerogram
 from alphacut.case import Case
-from alphacut.consistency import beside
+from alphacut.consistency import OTHERS, beside
 from alphacut.problem import BadInput, Problem
 from fuzzy import FuzzyNumber
 
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from frame import StoreyFrame
     from frame.flow import Flow
     from frame.lagrangian import LagrangianSystem
+    from frame.linear import LinearSystem
+    from frame.reduction import ReducedStructure
 
 LISTS = {"m": "masses", "l": "lengths", "d": "dampers"}
 RAYLEIGH = ("rayleigh_mass", "rayleigh_stiffness")
@@ -25,14 +27,14 @@ PENDULUM = {"m": "mass", "l": "length", "d": "damping", "g": "gravity", "phi_0":
 
 @dataclass(frozen=True)
 class Structure:
-    """A frame or a pendulum.
+    """A storey frame, a tower of beams, or a pendulum.
 
     Args:
         model: The model at modal values.
         numbers: Every parameter, crisp or fuzzy, in SI.
     """
 
-    model: StoreyFrame | LagrangianSystem
+    model: StoreyFrame | ReducedStructure | LagrangianSystem
     numbers: Mapping[str, FuzzyNumber]
 
     @property
@@ -41,6 +43,13 @@ class Structure:
         from frame import StoreyFrame
 
         return self.model if isinstance(self.model, StoreyFrame) else None
+
+    @property
+    def linear(self) -> LinearSystem | None:
+        """The model if it is linear, else None."""
+        from frame.lagrangian import LagrangianSystem
+
+        return None if isinstance(self.model, LagrangianSystem) else self.model
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -71,8 +80,8 @@ class Structure:
         from frame import INTEGRATORS, LinearFlow
         from frame.nonlinear_flow import LagrangianFlow
 
-        if self.frame is not None:
-            return LinearFlow(self.frame, tuple(names), duration, step, INTEGRATORS[integrator or "midpoint"])
+        if self.linear is not None:
+            return LinearFlow(self.linear, tuple(names), duration, step, INTEGRATORS[integrator or "midpoint"])
         system = cast("LagrangianSystem", self.model)
         return LagrangianFlow(system, tuple(names), duration, step, integrator or "midpoint", observe=("force",))
 
@@ -84,7 +93,9 @@ def structure(case: Case, handed: FuzzyNumber | None) -> Structure:
         BadInput: Its values do not make a structure.
     """
     try:
-        return pendulum(case) if case.has("pendulum.mass") else storey_frame(case, modulus_of(case, handed))
+        if case.has("pendulum.mass"):
+            return pendulum(case)
+        return tower(case) if case.has("tower.storeys") else storey_frame(case, modulus_of(case, handed))
     except ValueError as error:
         raise BadInput(Problem("frame", str(error), file=str(case.path))) from None
 
@@ -97,6 +108,20 @@ def pendulum(case: Case) -> Structure:
     names = {"m": "mass", "l": "length", "d": "damping", "g": "gravity", "phi_0": "phi0", "omega_0": "omega0"}
     modal: dict[str, Any] = {names[name]: number.modal for name, number in numbers.items()}
     return Structure(make(**modal), numbers)
+
+
+def tower(case: Case) -> Structure:
+    """A plane beam frame, reduced to shapes that hold for the whole supports of its fuzzy inputs."""
+    from frame.beam_frame import BeamFrame
+
+    numbers = {name: case.fuzzy(f"tower.{name}") for name in OTHERS["tower"]}
+    sizes: dict[str, Any] = {name: case.number(f"tower.{name}") for name in ("height", "width", "density")}
+    column, beam = ((case.number(f"tower.{part}_area"), case.number(f"tower.{part}_moment")) for part in ("column", "beam"))
+    ground = accelerogram(beside(case, case.text("tower.accelerogram")), "tower.accelerogram")
+    frame = BeamFrame(case.integer("tower.storeys"), case.integer("tower.bays"), column=column, beam=beam, ground=ground, **sizes)
+    full = replace(frame.structure(), parameters={name: number.modal for name, number in numbers.items()})
+    bounds = {name: (number.support.lower, number.support.upper) for name, number in numbers.items() if number.support.width > 0}
+    return Structure(full.reduced(bounds), numbers)
 
 
 def storey_frame(case: Case, modulus: FuzzyNumber) -> Structure:

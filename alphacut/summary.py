@@ -19,6 +19,8 @@ from alphacut.structure import structure
 if TYPE_CHECKING:
     import xarray
 
+    from frame.linear import LinearSystem
+
 Row = dict[str, Any]
 
 
@@ -76,12 +78,20 @@ def structure_numbers(results: Results) -> dict[str, Any]:
     """Natural frequencies at the modal values."""
     from frame.linear import frequencies
 
-    model = structure(results.case, results.handed).frame
+    model = structure(results.case, results.handed).linear
     if model is None:
         return {}
     omega = frequencies(model)
     period = 2 * np.pi / omega[0]
-    return {"omega_rad_per_s": omega, "period_s": period, "two_periods_s": 2 * period, "parameters": 1 + 5 * model.floors}
+    return {"omega_rad_per_s": omega, "period_s": period, "two_periods_s": 2 * period, "parameters": counted(model)}
+
+
+def counted(model: LinearSystem) -> int:
+    """Parameters of the structure, initial conditions included; the factors that the paper's frame does not have are left out."""
+    from frame import StoreyFrame
+
+    left_out = {"I", "rayleigh_mass", "rayleigh_stiffness"} if isinstance(model, StoreyFrame) else set()
+    return len(set(model.parameters) - left_out)
 
 
 def envelope_numbers(dataset: xarray.Dataset) -> dict[str, Any]:

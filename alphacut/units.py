@@ -16,6 +16,8 @@ QUANTITIES = {  # SI unit: (name of the quantity, a value as a user would write 
     "m^2": ("area", "0.01 m^2"),
     "m^4": ("second moment of area", "1e-6 m^4"),
     "kg": ("mass", "20 t"),
+    "kg/m": ("mass per length", "12 t/m"),
+    "kg/m^3": ("density", "2500 kg/m^3"),
     "s": ("time", "30 s"),
     "m/s": ("velocity", "-0.5 m/s"),
     "m/s^2": ("acceleration", "9.81 m/s^2"),

@@ -143,6 +143,30 @@ def test_a_second_run_takes_what_is_up_to_date(tmp_path, monkeypatch, capfd):
     capfd.readouterr()
 
 
+def test_another_structure_or_record_is_computed_anew(tmp_path, capfd):
+    from alphacut.chain import Chain, studies
+    from alphacut.loading import load
+
+    record = tmp_path / "building.record.csv"
+    record.write_text((CASES / "building.record.csv").read_text(encoding="utf-8"), encoding="utf-8")
+    case = tmp_path / "tower.toml"
+    case.write_text((CASES / "tower.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    seen = set()
+
+    def key_of(changes):
+        chain = Chain(load(case, changes), tmp_path, quiet=True)
+        keys = []
+        object.__setattr__(chain, "stored", lambda name, key, compute: keys.append(key))
+        chain.envelope(studies(chain.case)[0], None)
+        return keys[0]
+
+    for changes in ([], ["tower.mass=12 t/m"], ["envelope.step=0.04 s"]):
+        seen.add(key_of(changes))
+    record.write_text(record.read_text(encoding="utf-8").replace("0.01,-0.00001", "0.01,-0.00002", 1), encoding="utf-8")
+    seen.add(key_of([]))
+    assert len(seen) == 4
+
+
 def test_a_failed_campaign_ends_with_status_3(tmp_path, monkeypatch, capfd):
     from rve.series import SeriesModel
 
