@@ -9,7 +9,7 @@ import numpy as np
 
 from rve.result import StressCurve, effective_modulus
 from rve.slices_curve import curve_of
-from stochastic import RadiusMap, ThetaRule, gauss_rule
+from stochastic import HermiteMap, RadiusMap, ThetaRule, gauss_rule
 from stochastic.truncated_normal import Array, TruncatedNormal
 
 _SAMPLES = 2049
@@ -45,6 +45,11 @@ def breaks(radius_map: RadiusMap) -> Array:
     return found[np.append(True, np.diff(found) > step)] if found.size else found
 
 
+@lru_cache(maxsize=64)
+def _kept_breaks(radius_map: HermiteMap) -> Array:
+    return breaks(radius_map)
+
+
 def _bisect_jump(radius_map: RadiusMap, low: float, high: float) -> float | None:
     """The jump inside [low, high], or None if the map is continuous there: halving leaves the change over a jump as it was."""
     before, after = radius_map([low, high])
@@ -71,7 +76,7 @@ def _bisect_bend(radius_map: RadiusMap, low: float, high: float) -> float:
 def theta_rule(radius_map: RadiusMap, *, points: int) -> ThetaRule:
     """Gauss rule of f_Θ with `points` nodes; where the map has breaks, Gauss–Legendre with as many in each smooth piece."""
     law = radius_map.distribution
-    cuts = breaks(radius_map)
+    cuts = _kept_breaks(radius_map) if isinstance(radius_map, HermiteMap) else breaks(radius_map)
     if cuts.size == 0:
         return _gauss_rule(law, points)
     x, w = np.polynomial.legendre.leggauss(points)
