@@ -54,7 +54,7 @@ class AffineStructure:
         return M.tocsc(), K.tocsc()
 
     def reduced(
-        self, bounds: Mapping[str, tuple[float, float]], *, order: int = 24, samples: int = 1, keep: float = 1e-8
+        self, bounds: Mapping[str, tuple[float, float]], *, order: int = 16, samples: int = 8, keep: float = 1e-10
     ) -> ReducedStructure:
         """Projection on Krylov spaces of the load and the initial state at several points of a box.
 
@@ -91,13 +91,12 @@ class AffineStructure:
                 x = lu.solve(M @ vectors[-1])
         return np.column_stack(vectors)
 
-    def trajectories(self, p: Mapping[str, float], time: Array) -> Array:
-        """Outputs of the full structure by Newmark's method with 4 steps between nodes, shape (T, m); for checking."""
+    def trajectories(self, p: Mapping[str, float], time: Array, *, split: int = 8) -> Array:
+        """Outputs of the full structure by Newmark's method with `split` steps between nodes, shape (T, m); for checking."""
         from scipy.sparse.linalg import splu
 
         M, K = self.assembled(p)
         D = float(p[self.rayleigh[0]]) * M + float(p[self.rayleigh[1]]) * K
-        split = 4
         h = (time[1] - time[0]) / split
         lu = splu((M / h + D / 2 + K * (h / 4)).tocsc())
         back = (M / h + D / 2 - K * (h / 4)).tocsr()
