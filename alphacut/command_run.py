@@ -57,6 +57,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         write_text(options.json, document)
     if options.json != "-" and not options.quiet:
         out.write(summary.table(found["paper"]) if found["paper"] else "")
+        out.write("the quick form: these numbers mean nothing\n" if options.quick else "")
         say(f"results are in {folder}, {len(drawn)} figures among them, after {found['seconds']:.0f} s")
     return 0
 
