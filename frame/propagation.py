@@ -68,7 +68,13 @@ def envelope(
     scheme = INTEGRATORS[integrator] if isinstance(integrator, str) else integrator
     linear = LinearFlow(model, cuts.names, duration, step, scheme)
     found = propagate(UnitFlow(linear, cuts), progress, **options)
-    return replace(found, facts={"integrator": scheme.name, "step_error": step_error(linear), **found.facts})
+    facts: dict[str, float | str] = {"integrator": scheme.name, "step_error": step_error(linear), **found.facts}
+    envelope_error = float(found.facts.get("tolerance", 0.0)) if found.error is None else float(found.error.max())
+    if float(facts["step_error"]) > envelope_error > 0:
+        facts["dominant_error"] = (
+            f"time stepping: {facts['step_error']:.2g} against {envelope_error:.2g} of the envelope; integrator exact has none"
+        )
+    return replace(found, facts=facts)
 
 
 def _modal_if_possible(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> Envelope:
