@@ -77,8 +77,9 @@ class Chain:
 
     def after_particles(self) -> Results:
         """The stages from the radius map on."""
-        cell = self.modulus() if "modulus" in self.case.stages else None
-        handed = modulus.read_number(self.file("modulus.nc")) if cell is not None else modulus.stand_in(self.case)
+        handed = modulus.stand_in(self.case)
+        cell = self.modulus() if "modulus" in self.case.stages and handed is None else None
+        handed = modulus.read_number(self.file("modulus.nc")) if cell is not None else handed
         envelopes = {}
         if "envelope" in self.case.stages:
             envelopes = {study.name: self.envelope(study, handed) for study in studies(self.case)}

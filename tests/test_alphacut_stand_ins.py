@@ -32,6 +32,13 @@ def test_a_value_stands_in(tmp_path):
     assert (number.support.lower, number.modal, number.support.upper) == (24e9, 25e9, 26e9)
 
 
+def test_a_value_stands_in_for_the_stage_of_a_run_too(tmp_path, capfd):
+    path = with_modulus(tmp_path, 'value = "[24, 25, 26] GPa"')
+    path.write_text(path.read_text(encoding="utf-8").replace('["envelope"]', '["modulus", "envelope"]', 1), encoding="utf-8")
+    assert main(["run", str(path), "--quick", "--no-figures", "--out", str(tmp_path / "results"), "--quiet"]) == 0
+    assert not (tmp_path / "results" / "modulus.nc").exists()
+
+
 def test_measured_values_stand_in(tmp_path):
     (tmp_path / "cores.csv").write_text("# cores\nE [GPa]\n24.1\n25.2\n23.9\n26.0\n25.0\n", encoding="utf-8")
     number = stand_in(load(with_modulus(tmp_path, 'measured = "cores.csv"')))
