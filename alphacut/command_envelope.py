@@ -43,6 +43,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--modulus", metavar="QUANTITY|FILE.nc", help="Young's modulus: '[22, 24, 26] GPa' or the α-cuts of a file (default: the case's)"
     )
     parser.add_argument("--exclude", metavar="NAMES", default="", help="methods that method auto must not take, separated by commas")
+    parser.add_argument("--certify", metavar="EPS", help="enclose the bounds and prove them to within EPS metres (method modal)")
     parser.add_argument("--strict", action="store_true", help="refuse a step with ω_max·h above 0.5 instead of warning")
     parser.add_argument("--out", metavar="FILE.nc", help="write envelopes and where they are reached as NetCDF")
 
@@ -52,7 +53,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     add_units(options)
     case = load(options.case, changes(options, KEYS))
     handed = given_modulus(options.modulus) or stand_in(case)
-    task = replace(envelope.task_of(case), exclude=excluded(options.exclude))
+    task = replace(envelope.task_of(case), exclude=excluded(options.exclude), certify=wanted_gap(options.certify))
     with progress("Envelopes", quiet=options.quiet) as tick:
         found = envelope.compute(case, task, modulus=handed, strict=options.strict, progress=tick)
     if options.out:
@@ -75,6 +76,19 @@ def add_units(options: argparse.Namespace) -> None:
         text = getattr(options, name)
         if text is not None and quantity.SINGLE.fullmatch(text.strip()) and not text.strip()[-1].isalpha():
             setattr(options, name, f"{text} {unit}")
+
+
+def wanted_gap(text: str | None) -> float | None:
+    """The gap of ``--certify`` in m; a bare number means metres."""
+    if text is None:
+        return None
+    try:
+        gap = quantity.number(text if text.strip()[-1:].isalpha() else f"{text} m", "m")
+    except ValueError as error:
+        raise BadInput(Problem("--certify", str(error), text, "a length such as 1e-6 or '1 um'")) from None
+    if not gap > 0:
+        raise BadInput(Problem("--certify", "out of range", text, "greater than 0"))
+    return gap
 
 
 def excluded(text: str) -> tuple[str, ...]:

@@ -36,6 +36,7 @@ class EnvelopeTask:
         order: Order κ of the Taylor models.
         tolerance: Gain that is worth a new trajectory, or the error wanted of auto, in the unit of the outputs.
         exclude: Methods that auto must not take.
+        certify: Gap between attained and proved bounds that is wanted, in the unit of the outputs; None for no certificate.
     """
 
     fuzzy: tuple[str, ...]
@@ -47,6 +48,7 @@ class EnvelopeTask:
     order: int
     tolerance: float
     exclude: tuple[str, ...] = ()
+    certify: float | None = None
 
 
 def task_of(case: Case, *, fuzzy: Sequence[str] | None = None, duration: float | None = None) -> EnvelopeTask:
@@ -137,11 +139,18 @@ def method_options(task: EnvelopeTask) -> dict[str, Any]:
     import inspect
 
     from frame import METHODS, GraphFollower
+    from frame.modal_method import Modal
 
     taken = set(inspect.signature(METHODS[task.method]).parameters)
     if task.method.endswith("graph-follower"):
         taken |= {field.name for field in fields(GraphFollower)}
+    if task.method == "modal":
+        taken |= {field.name for field in fields(Modal)}
     offered = {"order": task.order, "tolerance": task.tolerance, "exclude": task.exclude}
+    if task.certify is not None:
+        if task.method != "modal":
+            raise BadInput(Problem("--certify", "this method cannot certify", task.method, "--method modal, for linear frames"))
+        return {"tolerance": task.tolerance, "certify": task.certify}
     return {name: value for name, value in offered.items() if name in taken}
 
 

@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from alphacut.entry import COMMANDS, main, parsers
+from alphacut.envelope import method_options, task_of
+from alphacut.loading import load
 from alphacut.options import split_petsc
 from alphacut.output import as_json, rank, standard_output, whole_file
+from alphacut.schema import ENVELOPE_METHODS
 
 CASES = Path(__file__).parent.parent / "cases"
 PAPER = str(CASES / "paper.toml")
@@ -74,6 +77,26 @@ def test_envelope_prints_what_it_promises(capfd, tmp_path):
         assert list(dataset["parameter"].values) == ["E", "m1", "m2", "m3"]
         assert {"format_version", "command", "versions", "case", "fingerprint"} <= set(dataset.attrs)
     assert [file.name for file in tmp_path.iterdir()] == ["envelope.nc"]
+
+
+@pytest.mark.parametrize("method", ENVELOPE_METHODS)
+def test_every_offered_method_runs_and_gets_the_tolerance(method, capfd):
+    import frame
+
+    assert method in frame.METHODS
+    found = answer(["envelope", PAPER, "--method", method, "--fuzzy", "E", "--duration", "0.5", "--alpha", "[0, 1]"], capfd)
+    assert found["min"][0][0] <= found["min"][1][0] <= found["max"][1][0] <= found["max"][0][0]
+    task = task_of(load(PAPER, [f"envelope.method={method}", "envelope.tolerance=2 mm"]))
+    offered = method_options(task)
+    assert offered.get("tolerance", 2e-3) == 2e-3
+    assert "tolerance" in offered or method in ("vertex", "monte-carlo", "quasi-monte-carlo")
+
+
+def test_a_certificate_encloses_the_bounds(capfd):
+    found = answer(["envelope", PAPER, "--method", "modal", "--fuzzy", "E", "--duration", "0.5", "--certify", "1e-5"], capfd)
+    assert found["nature"] in ("guaranteed", "verified by sampling")
+    assert main(["envelope", PAPER, "--method", "vertex", "--certify", "1e-5"]) == 2
+    assert "cannot certify" in capfd.readouterr().err
 
 
 def test_what_c_code_prints_does_not_spoil_the_json(capfd):
@@ -145,7 +168,6 @@ def test_a_second_run_takes_what_is_up_to_date(tmp_path, monkeypatch, capfd):
 
 def test_another_structure_or_record_is_computed_anew(tmp_path, capfd):
     from alphacut.chain import Chain, studies
-    from alphacut.loading import load
 
     record = tmp_path / "building.record.csv"
     record.write_text((CASES / "building.record.csv").read_text(encoding="utf-8"), encoding="utf-8")
