@@ -1,13 +1,14 @@
 # make run         the paper's case, from microstructure to fuzzy vibration, into results/paper/
 # make test        the tests (slower ones: make test-slow)
 # make bench-solver, make charts, make stability    what the methods cost and where they end
+# make docs, make lint, make pictures    documentation, style and types, the README's picture
 # The environment is made on first use; make clean-env removes it.
 CASE ?= cases/paper.toml
 WORKERS ?= 2
 OUT ?= results/$(basename $(notdir $(CASE)))
 IN = ./enter
 
-.PHONY: run test test-slow lint charts bench-solver stability docs clean clean-env
+.PHONY: run test test-slow lint charts bench-solver stability docs pictures clean clean-env
 
 run:
 	$(IN) python -m alphacut run $(CASE) --out $(OUT) --workers $(WORKERS) $(if $(FRESH),--fresh)
@@ -27,9 +28,18 @@ lint:
 
 charts:
 	$(IN) python -m benchmarks.cell_charts
+	$(IN) python -m benchmarks.frame_integrators
+	$(IN) python -m benchmarks.frame_envelopes
 
 stability:
 	$(IN) python -m benchmarks.cell_stability
+
+docs:
+	$(IN) sphinx-build -q docs build/docs
+
+pictures: run
+	mkdir -p docs/pictures
+	cp results/paper/figures/fig33-envelope-E-m-30s-q3.png docs/pictures/envelope.png
 
 clean:
 	rm -rf results build
