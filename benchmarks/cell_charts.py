@@ -154,6 +154,12 @@ def draw_solvers(runs: Sequence[SolverRun], stem: Path) -> None:
             x = [getattr(run, across) for run in chosen]
             panels[0, column].loglog(x, [run.seconds for run in chosen], "o-", label=name, ms=4)
             panels[1, column].loglog(x, [max(run.iterations, 1) for run in chosen], "o-", ms=4)
+        colour = panels[0, 0].lines[-1].get_color()
+        sizes = {(run.mesh_size, run.layers): run.unknowns for run in runs if not run.capped}
+        for run in runs:
+            if run.solver == name and run.capped and (run.mesh_size, run.layers) in sizes:
+                column, x = (0, sizes[run.mesh_size, run.layers]) if run.contrast == 4.0 else (1, run.contrast)
+                panels[0, column].plot(x, run.seconds, "^", mfc="none", color=colour)
     panels[0, 0].set(ylabel="seconds, set-up and both loads", title="over unknowns, contrast 4")
     panels[0, 1].set(title="over contrast E_i / E_m, smallest mesh")
     panels[1, 0].set(xlabel="unknowns", ylabel="iterations of a load")
