@@ -73,7 +73,8 @@ def limits(key: Key) -> dict[str, float]:
     """The key's range in JSON Schema's words."""
     if key.allowed is None:
         return {}
-    low, high = ("minimum", "maximum") if key.allowed.closed else ("exclusiveMinimum", "exclusiveMaximum")
+    low = "minimum" if key.allowed.closed else "exclusiveMinimum"
+    high = "maximum" if key.allowed.closed and not key.allowed.below else "exclusiveMaximum"
     return {name: end for name, end in ((low, key.allowed.lower), (high, key.allowed.upper)) if math.isfinite(end)}
 
 

@@ -66,6 +66,8 @@ def study_of(case: Case) -> Study:
             case.integer("microstructure.seed"),
             case.number("microstructure.confidence"),
             case.integer("microstructure.bootstrap"),
+            band=case.number("microstructure.band") if case.has("microstructure.band") else None,
+            sampling=case.values["microstructure.sampling"] is True,
         )
     except ValueError as error:
         raise BadInput(Problem("microstructure", str(error), file=str(case.path))) from None

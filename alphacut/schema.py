@@ -28,9 +28,12 @@ class Range:
     lower: float = float("-inf")
     upper: float = float("inf")
     closed: bool = False
+    below: bool = False  # closed, but without its upper end
 
     def holds(self, value: float) -> bool:
         """Whether `value` is allowed; never for nan."""
+        if self.below:
+            return self.lower <= value < self.upper
         return self.lower <= value <= self.upper if self.closed else self.lower < value < self.upper
 
 
@@ -95,6 +98,12 @@ MICROSTRUCTURE = Section(
         "share": Key("share of area that the limits keep", "number", default=0.9927, allowed=UNIT),
         "confidence": Key("level of the empirical distribution's bootstrap band", "number", default=0.99, allowed=UNIT),
         "bootstrap": Key("resamples", "integer", default=500, allowed=Range("100 or more", 100.0, closed=True)),
+        "band": Key(
+            "half width, in probability, by which the distribution may leave the p-box; that bootstrap band if left out",
+            "number",
+            allowed=Range("0 or greater and below 1", 0.0, 1.0, closed=True, below=True),
+        ),
+        "sampling": Key("whether a2 and a4 also hold the slopes' own bootstrap band: fewer data, a fuzzier map", "flag", default=False),
     },
 )
 
