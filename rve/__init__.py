@@ -1,6 +1,18 @@
 """The periodic cell: four models of its homogenised stiffness behind one result type."""
 
 from rve.cell import LOADS, STRAIN, Cell, Phase
+from rve.model import Model, cross_check, named
 from rve.result import Homogenised, StressCurve, effective_modulus
 
-__all__ = ["LOADS", "STRAIN", "Cell", "Homogenised", "Phase", "StressCurve", "effective_modulus"]
+__all__ = [
+    "LOADS",
+    "STRAIN",
+    "Cell",
+    "Homogenised",
+    "Model",
+    "Phase",
+    "StressCurve",
+    "cross_check",
+    "effective_modulus",
+    "named",
+]
