@@ -7,12 +7,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from alphacut import envelope, microstructure, modulus
+from alphacut import envelope, microstructure, modulus, response
 from alphacut.campaign import campaign
 from alphacut.case import Case
 from alphacut.command_microstructure import write as write_microstructure
 from alphacut.consistency import FILES, OTHERS
-from alphacut.output import say
+from alphacut.output import say, whole_file
 from alphacut.progress import progress
 from alphacut.provenance import attributes, fingerprint
 from fuzzy import FuzzyNumber
@@ -83,7 +83,8 @@ class Chain:
         envelopes = {}
         if "envelope" in self.case.stages:
             envelopes = {study.name: self.envelope(study, handed) for study in studies(self.case)}
-        return Results(self.case, self.folder, cell, envelopes, handed)
+        stress = self.response(cell) if cell is not None and self.case.has("response.quantity") else None
+        return Results(self.case, self.folder, cell, envelopes, handed, stress)
 
     def with_particles(self) -> Case:
         """The case with the radius map of its particles; microstructure.nc, radius.toml and the stage's figures are stored."""
@@ -115,6 +116,17 @@ class Chain:
             modulus.write(found, path, case_text=self.case.text_of_file, key=key)
 
         return self.stored("modulus.nc", key, compute)
+
+    def response(self, cell: xarray.Dataset) -> xarray.Dataset:
+        """The random and fuzzy stress of the cell, in response.nc."""
+        wanted = {key: value for key, value in self.case.values.items() if key.startswith("response.")}
+        key = fingerprint({"modulus": cell.attrs["fingerprint"], "wanted": wanted}, ("stochastic", "fuzzy", "alphacut"))
+
+        def compute(path: Path) -> None:
+            with whole_file(path) as partial:
+                response.dataset(self.case, cell).assign_attrs(attributes(self.case.text_of_file, key)).to_netcdf(partial)
+
+        return self.stored("response.nc", key, compute)
 
     def envelope(self, study: Study, handed: FuzzyNumber | None) -> xarray.Dataset:
         """One study's envelope, in envelope_NAME.nc."""
@@ -152,6 +164,7 @@ class Results:
         modulus: Dataset of modulus.nc; None where the case computes none.
         envelopes: Datasets of the studies by name.
         handed: The modulus handed on to the structure, in Pa; None where the structure took its own.
+        response: Dataset of response.nc; None where the case does not ask for it.
     """
 
     case: Case
@@ -159,6 +172,7 @@ class Results:
     modulus: xarray.Dataset | None
     envelopes: Mapping[str, xarray.Dataset]
     handed: FuzzyNumber | None
+    response: xarray.Dataset | None = None
 
     @property
     def studies(self) -> tuple[Study, ...]:

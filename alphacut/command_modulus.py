@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TextIO
 
-from alphacut import modulus
+from alphacut import modulus, response
 from alphacut.campaign import campaign
 from alphacut.case import Case
 from alphacut.cell import GPA
@@ -49,13 +49,15 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     if options.out:
         key = fingerprint(case.values, ("stochastic", "rve", "fuzzy"))
         modulus.write(found, options.out, case_text=case.text_of_file, key=key)
-    document = as_json(found.document(), indent=None if options.json == "-" else 2)
+    stress = response.document(response.dataset(case, found.dataset())) if case.has("response.quantity") else None
+    answer = {**found.document(), **({"response": stress} if stress else {})}
+    document = as_json(answer, indent=None if options.json == "-" else 2)
     if options.json == "-":
         out.write(document)
     elif options.json:
         write_text(options.json, document)
     if options.json != "-" and not options.quiet:
-        out.write(summary(found))
+        out.write(summary(found) + (f"\n{response.text(stress)}" if stress else ""))
     return 0
 
 

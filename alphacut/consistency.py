@@ -38,6 +38,8 @@ def inconsistencies(case: Case, *, modal: bool = False) -> Iterator[Problem]:
         yield from particles(case)
     if case.has("radius.a1"):
         yield from radius(case, 1.0 if modal else 0.0)
+    if case.has("response.quantity"):
+        yield from stress_curves(case)
     for section in ("modulus", "envelope"):
         if case.has(f"{section}.alpha"):
             yield from levels(case, f"{section}.alpha")
@@ -70,14 +72,31 @@ def study_count(case: Case) -> int:
     return int(str(case.values.get("study", 0)))
 
 
+def stress_curves(case: Case) -> Iterator[Problem]:
+    """The response needs the stress curves of a computed modulus, and each probability once."""
+    if "modulus" not in case.stages or replaced(case):
+        yield Problem(
+            "response", "its stresses come from the samples of stage modulus", allowed="this section where the modulus is computed"
+        )
+    probabilities = case.numbers("response.quantiles")
+    if list(probabilities) != sorted(set(probabilities)):
+        yield Problem(
+            "response.quantiles", "the probabilities are not in rising order", str(list(probabilities)), "for example [0.05, 0.95]"
+        )
+
+
+def replaced(case: Case) -> bool:
+    """Whether something stands in for the computed modulus."""
+    return any(case.has(f"modulus.{key}") for key in ("value", "file", "measured"))
+
+
 def missing_sections(case: Case) -> Iterator[Problem]:
     """Sections that the wanted stages need."""
-    replaced = any(case.has(f"modulus.{key}") for key in ("value", "file", "measured"))
     for stage in case.stages:
         for section in NEEDED.get(stage, ()):
             if section == "radius" and "microstructure" in case.stages:
                 continue
-            if not any(key.startswith(f"{section}.") for key in case.values) and not (stage == "modulus" and replaced):
+            if not any(key.startswith(f"{section}.") for key in case.values) and not (stage == "modulus" and replaced(case)):
                 yield Problem(section, f"section [{section}] is missing; stage {stage} needs it")
 
 

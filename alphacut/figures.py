@@ -7,7 +7,16 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from alphacut import figure_envelope, figure_follower, figure_frame, figure_fuzzy, figure_modulus, figure_radius, figure_shares
+from alphacut import (
+    figure_envelope,
+    figure_follower,
+    figure_frame,
+    figure_fuzzy,
+    figure_modulus,
+    figure_radius,
+    figure_response,
+    figure_shares,
+)
 from alphacut.chain import Results
 from alphacut.figure_style import save, style
 from alphacut.progress import progress
@@ -31,6 +40,8 @@ def drawings(results: Results) -> Iterator[Drawing]:
         yield "fig17-mean-stress", lambda: figure_modulus.mean_stress(modulus)
         yield "fig18-modulus", lambda: figure_modulus.fuzzy_modulus(modulus, results.case)
         yield "fig19-membership", lambda: figure_fuzzy.membership(modulus)
+    if (stress := results.response) is not None:
+        yield "response", lambda: figure_response.response(stress)
     if results.envelopes:
         yield "fig20-mapping", lambda: figure_fuzzy.mapping(results)
     if results.envelopes and results.case.has("frame.masses"):

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from alphacut import response
 from alphacut.command_cite import citation
 from alphacut.differences import differences
 
@@ -21,6 +22,8 @@ def sections(summary: Mapping[str, Any], folder: Path) -> Iterator[str]:
         yield microstructure(summary["microstructure"])
     if "modulus" in summary:
         yield modulus(summary["modulus"], folder)
+    if "response" in summary:
+        yield stress(summary["response"], folder)
     if summary.get("envelopes"):
         yield envelopes(summary)
     if summary.get("shares"):
@@ -85,6 +88,17 @@ def modulus(found: Mapping[str, Any], folder: Path) -> str:
         "<h3>Error budget</h3>" + table(("source", "estimated relative error of E"), budget) if budget else "",
         "<h3>Certificate</h3>" + table(("property", "measured violation, largest of all samples"), checks) if checks else "",
     )
+
+
+def stress(found: Mapping[str, Any], folder: Path) -> str:
+    """The random and fuzzy stress of the cell."""
+    words = (
+        f"<p>Homogenised stress {found['quantity']}, random with θ at every fuzzy sample: intervals of its mean, its quantiles and of "
+        f"the probability of exceeding a limit. Bounds are {found['nature']}; {html.escape(found['note'])}.</p>"
+    )
+    head = ("quantity", f"cut at α = {found['alpha'][0]:g}", f"cut at α = {found['alpha'][-1]:g}")
+    drawn = picture(folder / "figures" / "response.svg", "Distribution between its bounds, and fuzzy quantiles.")
+    return section("Random and fuzzy stress", words, drawn, table(head, response.table(found)))
 
 
 def envelopes(summary: Mapping[str, Any]) -> str:

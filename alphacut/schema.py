@@ -187,6 +187,15 @@ MODULUS = Section(
     },
 )
 
+RESPONSE = Section(
+    "What the random stress of the cell is beside its mean: its p-box, fuzzy quantiles, and the fuzzy probability of exceeding a limit.",
+    {
+        "quantity": Key("homogenised stress 11 under load 1, or 12 under load 2", "choice", default="s11", choices=("s11", "s12")),
+        "quantiles": Key("probabilities whose quantiles are wanted", "numbers", default=(0.05, 0.5, 0.95), allowed=UNIT),
+        "limit": Key("stress whose probability of being exceeded is wanted", "number", "Pa", allowed=POSITIVE),
+    },
+)
+
 FRAME = Section(
     "Storey frame: rigid floors on elastic columns, numbered from the ground.",
     {
@@ -280,6 +289,7 @@ SECTIONS: dict[str, Section] = {
     "cell": CELL,
     "mesh": MESH,
     "modulus": MODULUS,
+    "response": RESPONSE,
     "frame": FRAME,
     "pendulum": PENDULUM,
     "tower": TOWER,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from alphacut import response
 from alphacut.cell import GPA, SHARED, key_of, parts
 from alphacut.chain import Results
 from alphacut.provenance import FORMAT, versions
@@ -36,6 +37,8 @@ def summary(results: Results) -> dict[str, Any]:
         found["area_fraction"] = area_fraction(results)
     if results.modulus is not None:
         found["modulus"] = modulus_numbers(results.modulus)
+    if results.response is not None:
+        found["response"] = response.document(results.response)
     if results.envelopes:
         found["structure"] = structure_numbers(results)
         fuzzy = {study.name: study.task.fuzzy for study in results.studies}
