@@ -89,7 +89,7 @@ class PrismModel:
         """The results with the estimated error of E; its own cost is booked as the stage `estimate`."""
         watch = Stopwatch()
         with watch("estimate"):
-            rough = replace(self, mesh_size=min(1.0, 2 * self.mesh_size), estimate=False, stiffness=False)
+            rough = replace(self, mesh_size=min(1.0, 2 * self.mesh_size), estimate=False, stiffness=False, parallel=False)
             thick = replace(rough, layers=self.layers // 2 or 2)
             companions = [model.solve(radius_map, matrix, inclusions) for model in (rough, thick)]
         errors = estimate(radius_map, results, *companions, mesh_size=self.mesh_size)
