@@ -6,9 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
+import numpy as np
+
 from alphacut.case import Case
 from alphacut.problem import BadInput, Problem
 from alphacut.provenance import versions
+from rve.anisotropy import directional_shear, directional_young, shear_ratio
 from rve.cell import Phase
 from stochastic import HermiteMap, RadiusMap, TruncatedNormal
 
@@ -47,6 +50,7 @@ class CellChoice:
         parallel: Whether all MPI ranks work on one cell together.
         moduli: Moduli of the particle that all samples together span, in Pa, for a table that they share; None if not known.
         estimate: Whether a model that can is to estimate its error at an extra cost.
+        stiffness: Whether a model that can leave it out is to make the whole planar stiffness.
     """
 
     method: str = "prism"
@@ -59,6 +63,7 @@ class CellChoice:
     parallel: bool = False
     moduli: tuple[float, float] | None = None
     estimate: bool = False
+    stiffness: bool = False
 
     def model(self) -> CellModel:
         """The model itself; this is where DOLFINx may be imported."""
@@ -106,6 +111,20 @@ def solve(case: Case, model: CellModel) -> Homogenised:
     return model.solve(radius, matrix, [inclusion])[0]
 
 
+def directions(result: Homogenised) -> dict[str, Any] | None:
+    """What eq. 16 hides: plane-strain moduli over the direction, and the anisotropy of the shear modulus; None without the stiffness."""
+    if result.stiffness is None:
+        return None
+    degrees = np.arange(0, 91, 15)
+    angle = np.deg2rad(degrees)
+    return {
+        "angle_deg": degrees,
+        "young_GPa": directional_young(result.stiffness, angle) / GPA,
+        "shear_GPa": directional_shear(result.stiffness, angle) / GPA,
+        "shear_ratio": shear_ratio(result.stiffness),
+    }
+
+
 def document(result: Homogenised) -> dict[str, Any]:
     """The result as it is printed with ``--json``; moduli and stresses in GPa."""
     mean11, mean12 = result.curve.mean
@@ -114,6 +133,7 @@ def document(result: Homogenised) -> dict[str, Any]:
         "nu": result.poisson,
         "stress_GPa": {"s11": mean11 / GPA, "s12": mean12 / GPA},
         "stiffness_GPa": None if result.stiffness is None else result.stiffness / GPA,
+        "directions": directions(result),
         "curve": {
             "theta": result.curve.theta,
             "weights": result.curve.weights,

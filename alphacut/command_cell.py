@@ -25,6 +25,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
     add_keys(parser, CELL_OPTIONS)
     parser.add_argument("--exclude", metavar="NAMES", default="", help="models that method auto must not take, separated by commas")
+    parser.add_argument("--stiffness", action="store_true", help="with method prism, solve a third load for the whole planar stiffness")
     parser.add_argument(
         "--export", metavar="FILE", help="write the material for another program: .inp, .comm, .mac, or .json with the stiffness"
     )
@@ -48,7 +49,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     if options.export:
         check_format(options.export)
     choice = cell.cell_choice(case, exclude=named_models("--exclude", options.exclude), petsc=petsc)
-    choice = replace(choice, parallel=ranks() > 1, estimate=True)
+    choice = replace(choice, parallel=ranks() > 1, estimate=True, stiffness=options.stiffness)
     pair = named_models("--cross-check", options.cross_check)
     if pair:
         first, *others = [cell.solve(case, replace(choice, method=name).model()) for name in pair]

@@ -47,6 +47,7 @@ def cell_model(choice: CellChoice) -> CellModel:
         "cache": table_folder(),
         "moduli": choice.moduli,
         "estimate": choice.estimate,
+        "stiffness": choice.stiffness,
     }
     try:
         return cast(CellModel, named(choice.method, **{name: value for name, value in offered.items() if name in known}))
