@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from alphacut import envelope, microstructure, modulus, response
+from alphacut import envelope, microstructure, modulus, outcomes, response
 from alphacut.campaign import campaign
 from alphacut.case import Case
 from alphacut.command_microstructure import write as write_microstructure
@@ -84,7 +84,8 @@ class Chain:
         if "envelope" in self.case.stages:
             envelopes = {study.name: self.envelope(study, handed) for study in studies(self.case)}
         stress = self.response(cell) if cell is not None and self.case.has("response.quantity") else None
-        return Results(self.case, self.folder, cell, envelopes, handed, stress)
+        limit = self.exceedance(handed) if envelopes and self.case.has("exceedance.output") else None
+        return Results(self.case, self.folder, cell, envelopes, handed, stress, limit)
 
     def with_particles(self) -> Case:
         """The case with the radius map of its particles; microstructure.nc, radius.toml and the stage's figures are stored."""
@@ -130,16 +131,30 @@ class Chain:
 
     def envelope(self, study: Study, handed: FuzzyNumber | None) -> xarray.Dataset:
         """One study's envelope, in envelope_NAME.nc."""
-        inputs = {key: value for key, value in self.case.values.items() if key.partition(".")[0] in ("frame", *OTHERS)}
-        record = [self.case.digest(key) for key in FILES if key.endswith("accelerogram") and self.case.has(key)]
-        key = fingerprint({"case": inputs, "record": record, "task": study.task, "modulus": handed}, ("fuzzy", "frame"))
+        key = self.vibration({"task": study.task, "holds": ("bounds", "peaks")}, handed)
 
         def compute(path: Path) -> None:
             with progress(f"Envelope {study.name}", quiet=self.quiet) as tick:
                 found = envelope.compute(self.case, study.task, modulus=handed, strict=self.strict, progress=tick)
-            envelope.write(found.to_dataset(), path, case_text=self.case.text_of_file, key=key)
+            envelope.write(outcomes.with_peaks(found), path, case_text=self.case.text_of_file, key=key)
 
         return self.stored(f"envelope_{study.name}.nc", key, compute)
+
+    def exceedance(self, handed: FuzzyNumber | None) -> xarray.Dataset:
+        """The fuzzy probability of exceeding the case's limit, in exceedance.nc."""
+        wanted = {key: value for key, value in self.case.values.items() if key.partition(".")[0] in ("exceedance", "envelope")}
+        key = self.vibration({"wanted": wanted}, handed)
+
+        def compute(path: Path) -> None:
+            envelope.write(outcomes.exceedance(self.case, handed), path, case_text=self.case.text_of_file, key=key)
+
+        return self.stored("exceedance.nc", key, compute)
+
+    def vibration(self, wanted: Mapping[str, Any], handed: FuzzyNumber | None) -> str:
+        """Fingerprint of something wanted of the structure: it depends on the structure, its record and the modulus too."""
+        inputs = {key: value for key, value in self.case.values.items() if key.partition(".")[0] in ("frame", *OTHERS)}
+        record = [self.case.digest(key) for key in FILES if key.endswith("accelerogram") and self.case.has(key)]
+        return fingerprint({"case": inputs, "record": record, "modulus": handed, **wanted}, ("fuzzy", "frame"))
 
     def stored(self, name: str, key: str, compute: Callable[[Path], None]) -> xarray.Dataset:
         """The dataset in a file: as it is if it has the fingerprint `key`, else computed first."""
@@ -165,6 +180,7 @@ class Results:
         envelopes: Datasets of the studies by name.
         handed: The modulus handed on to the structure, in Pa; None where the structure took its own.
         response: Dataset of response.nc; None where the case does not ask for it.
+        exceedance: Dataset of exceedance.nc; None where the case names no limit.
     """
 
     case: Case
@@ -173,6 +189,7 @@ class Results:
     envelopes: Mapping[str, xarray.Dataset]
     handed: FuzzyNumber | None
     response: xarray.Dataset | None = None
+    exceedance: xarray.Dataset | None = None
 
     @property
     def studies(self) -> tuple[Study, ...]:

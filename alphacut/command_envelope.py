@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, TextIO
 
-from alphacut import envelope, quantity
+from alphacut import envelope, outcomes, quantity
 from alphacut.loading import load
 from alphacut.modulus import read_number, stand_in
 from alphacut.options import add_common, add_keys, changes
@@ -58,14 +58,15 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         found = envelope.compute(case, task, modulus=handed, strict=options.strict, progress=tick)
     if options.out:
         key = fingerprint({"case": case.values, "task": task, "modulus": handed}, ("fuzzy", "frame"))
-        envelope.write(found.to_dataset(), options.out, case_text=case.text_of_file, key=key)
-    document = as_json(envelope.document(found), indent=None if options.json == "-" else 2)
+        envelope.write(outcomes.with_peaks(found), options.out, case_text=case.text_of_file, key=key)
+    limit = outcomes.exceedance_document(outcomes.exceedance(case, handed)) if case.has("exceedance.output") else None
+    document = as_json({**envelope.document(found), **({"exceedance": limit} if limit else {})}, indent=None if options.json == "-" else 2)
     if options.json == "-":
         out.write(document)
     elif options.json:
         write_text(options.json, document)
     if options.json != "-" and not options.quiet:
-        out.write(summary(found))
+        out.write(summary(found) + (outcomes.sentence(limit) if limit else ""))
     return 0
 
 
@@ -116,8 +117,12 @@ def given_modulus(text: str | None) -> FuzzyNumber | None:
 
 
 def summary(found: Envelope) -> str:
-    """Extremes at the lowest level as a small table."""
-    ends = zip(found.outputs, found.minimum[0], found.maximum[0], strict=True)
-    rows = "".join(f"{name:>8}  {low:10.4f}  {high:10.4f}\n" for name, low, high in ends)
+    """Extremes and fuzzy peaks at the lowest level as a small table."""
+    from frame.envelope import output_unit
+    from frame.outcomes import peaks
+
+    of = peaks(found)
+    ends = zip(found.outputs, found.minimum[0], found.maximum[0], of.lower[0], of.upper[0], strict=True)
+    rows = "".join(f"{f'{n}, {output_unit(n)}':>14}  {a:11.5g}  {b:11.5g}   {c:.5g} … {d:.5g}\n" for n, a, b, c, d in ends)
     cost = f"{found.trajectories} trajectories, {found.seconds:.1f} s, {found.nature}"
-    return f"  output       min m       max m   (α = {found.alpha[0]:g})\n{rows}{cost}\n"
+    return f"        output          min          max   peak   (α = {found.alpha[0]:g})\n{rows}{cost}\n"

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from alphacut.case import Case
-from alphacut.problem import Problem
+from alphacut.problem import BadInput, Problem
 from alphacut.reading import nearest
 from alphacut.schema import NEEDED, STAGES
 from stochastic import HermiteMap, TruncatedNormal
@@ -53,6 +53,8 @@ def inconsistencies(case: Case, *, modal: bool = False) -> Iterator[Problem]:
         yield Problem("frame", f"stage envelope needs one structure, got {len(found)}", ", ".join(found), "[frame], [pendulum] or [tower]")
     if case.has("envelope.step"):
         yield from times(case)
+    if case.has("exceedance.output"):
+        yield from exceedance(case)
 
 
 def order_of_stages(case: Case) -> Iterator[Problem]:
@@ -74,7 +76,7 @@ def study_count(case: Case) -> int:
 
 def stress_curves(case: Case) -> Iterator[Problem]:
     """The response needs the stress curves of a computed modulus, and each probability once."""
-    if "modulus" not in case.stages or replaced(case):
+    if replaced(case):
         yield Problem(
             "response", "its stresses come from the samples of stage modulus", allowed="this section where the modulus is computed"
         )
@@ -193,7 +195,7 @@ def named_inputs(case: Case, section: str, known: tuple[str, ...]) -> Iterator[P
 
 def fuzzy_keys(case: Case) -> list[str]:
     """Keys that name fuzzy inputs of the structure."""
-    keys = ["envelope.fuzzy", *(f"study[{i}].fuzzy" for i in range(study_count(case)))]
+    keys = ["envelope.fuzzy", "exceedance.random", *(f"study[{i}].fuzzy" for i in range(study_count(case)))]
     return [key for key in keys if case.has(key)]
 
 
@@ -214,6 +216,21 @@ def known_output(case: Case, floors: int) -> Iterator[Problem]:
         drawn = str(case.values.get(f"study[{index}].output", ""))
         if drawn and drawn not in outputs:
             yield Problem(f"study[{index}].output", f"there is no output {drawn}", drawn, ", ".join(outputs))
+    limited = case.text("exceedance.output") if case.has("exceedance.output") else outputs[0]
+    if limited not in outputs:
+        yield Problem("exceedance.output", f"there is no output {limited}", limited, ", ".join(outputs), nearest(limited, outputs))
+
+
+def exceedance(case: Case) -> Iterator[Problem]:
+    """A limit is for an output of a linear structure in vibration, and in its unit."""
+    from alphacut.outcomes import limit_of
+
+    if case.has("pendulum.mass") or not case.has("envelope.step"):
+        yield Problem("exceedance", "a probability needs a linear structure and its section [envelope]", allowed="[frame] or [tower]")
+    try:
+        limit_of(case)
+    except BadInput as error:
+        yield from error.problems
 
 
 def known_input(key: str, name: str, count: int) -> Iterator[Problem]:

@@ -12,7 +12,7 @@ from alphacut.output import say, whole_file
 from alphacut.problem import BadInput, Problem
 from alphacut.progress import Tick
 from alphacut.provenance import attributes, versions
-from alphacut.structure import Structure, structure
+from alphacut.structure import structure
 from fuzzy import FuzzyNumber
 
 if TYPE_CHECKING:
@@ -98,12 +98,11 @@ def compute(
 
     wanted = structure(case, modulus)
     inputs = wanted.inputs(task.fuzzy)
-    if wanted.linear is None:
-        return nonlinear(wanted, task, progress)
-    guard_step(wanted.linear, task, strict=strict)
+    if wanted.linear is not None:
+        guard_step(wanted.linear, task, strict=strict)
     try:
         return frame.envelope(
-            wanted.linear,
+            wanted.model,
             inputs,
             alpha=task.alpha,
             duration=task.duration,
@@ -115,23 +114,6 @@ def compute(
         )
     except ValueError as error:
         raise BadInput(Problem("envelope", str(error))) from None
-
-
-def nonlinear(wanted: Structure, task: EnvelopeTask, progress: Tick | None) -> Envelope:
-    """The envelope of a structure that is not linear.
-
-    Raises:
-        BadInput: The method or the integrator is for linear structures only.
-    """
-    from frame import METHODS
-    from frame.box import UnitFlow, boxes
-
-    cuts = boxes(wanted.inputs(task.fuzzy), task.alpha)
-    try:
-        flow = UnitFlow(wanted.flow(cuts.names, task.duration, task.step, task.integrator), cuts)
-        return METHODS[task.method](flow, progress, **method_options(task))
-    except ValueError as error:
-        raise BadInput(Problem("envelope.method", str(error), task.method)) from None
 
 
 def method_options(task: EnvelopeTask) -> dict[str, Any]:
@@ -156,12 +138,16 @@ def method_options(task: EnvelopeTask) -> dict[str, Any]:
 
 def document(found: Envelope) -> dict[str, Any]:
     """The result as it is printed with ``--json``: extremes over time, one row for each α, one column for each output, in SI."""
+    from frame.outcomes import peaks
+
+    of = peaks(found)
     return {
         "alpha": found.alpha,
         "outputs": list(found.outputs),
         "parameters": list(found.parameters),
         "min": found.minimum,
         "max": found.maximum,
+        "peak": {"lower": of.lower, "upper": of.upper},
         "trajectories": found.trajectories,
         "seconds": found.seconds,
         "method": found.method,

@@ -15,6 +15,7 @@ COARSE = {
     "modulus.alpha": LEVELS,
     "modulus.tolerance": 1e-2,
     "envelope.alpha": LEVELS,
+    "exceedance.samples": 10,
     "microstructure.bootstrap": 100,
     "microstructure.packing.packings": 5,
     "microstructure.packing.discs": 500,

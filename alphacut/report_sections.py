@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from alphacut import response
+from alphacut import outcomes, response
 from alphacut.command_cite import citation
 from alphacut.differences import differences
 
@@ -117,7 +117,23 @@ def envelopes(summary: Mapping[str, Any]) -> str:
         rows += [(name, output, f"{study['min'][output]:.4f}", f"{study['max'][output]:.4f}") for output in study["min"]]
     svg = '<svg id="plot" role="img" aria-label="Envelopes over time"></svg><div id="readout"></div>'
     extremes = table(("study", "output", "least at α = 0", "greatest at α = 0"), rows, numbers=2)
-    return section("Envelopes", controls, svg, hint, extremes)
+    return section("Envelopes", controls, svg, hint, extremes, peaks(summary))
+
+
+def peaks(summary: Mapping[str, Any]) -> str:
+    """Fuzzy peaks of every study, and the fuzzy probability of exceeding the case's limit."""
+    from frame.envelope import output_unit
+
+    rows = []
+    for name, study in summary["envelopes"].items():
+        for output, of in study.get("peak", {}).items():
+            cuts = (f"[{of['lower'][level]:.4g}, {of['upper'][level]:.4g}] {output_unit(output)}" for level in (0, -1))
+            rows.append((name, output, *cuts))
+    words = (
+        "<p>Fuzzy peak of each output's magnitude over time, on the lowest and the highest level; the lower end is a bound from below.</p>"
+    )
+    limit = f"<p>{html.escape(outcomes.sentence(summary['exceedance']))}</p>" if "exceedance" in summary else ""
+    return "<h3>Peaks</h3>" + words + table(("study", "output", "lowest α", "highest α"), rows, numbers=2) + limit if rows else limit
 
 
 def shares(found: Mapping[str, Any]) -> str:

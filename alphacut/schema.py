@@ -279,6 +279,17 @@ ENVELOPE = Section(
     },
 )
 
+EXCEEDANCE = Section(
+    "Fuzzy probability that an output of a frame or tower exceeds a limit within [envelope]'s duration; what is not random stays fuzzy.",
+    {
+        "output": Key("the output: q3, drift1, base_shear …", "text", required=True),
+        "limit": Key("magnitude it must not exceed, with the output's unit", "text", required=True),
+        "random": Key("inputs that are random, with a density of the shape of their membership", "choices", default=()),
+        "samples": Key("random draws at each fuzzy point", "integer", default=200, allowed=COUNT),
+        "seed": Key("seed of the draws", "integer", default=0, allowed=Range("0 or more", 0.0, closed=True)),
+    },
+)
+
 SECTIONS: dict[str, Section] = {
     "": TOP,
     "microstructure": MICROSTRUCTURE,
@@ -295,6 +306,7 @@ SECTIONS: dict[str, Section] = {
     "tower": TOWER,
     "study": STUDY,
     "envelope": ENVELOPE,
+    "exceedance": EXCEEDANCE,
 }
 NEEDED = {
     "microstructure": ("microstructure",),

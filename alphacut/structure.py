@@ -83,7 +83,7 @@ class Structure:
         if self.linear is not None:
             return LinearFlow(self.linear, tuple(names), duration, step, INTEGRATORS[integrator or "midpoint"])
         system = cast("LagrangianSystem", self.model)
-        return LagrangianFlow(system, tuple(names), duration, step, integrator or "midpoint", observe=("force",))
+        return LagrangianFlow(system, tuple(names), duration, step, integrator or "midpoint")
 
 
 def structure(case: Case, handed: FuzzyNumber | None) -> Structure:
@@ -107,7 +107,8 @@ def pendulum(case: Case) -> Structure:
     numbers = {name: case.fuzzy(f"pendulum.{key}") for name, key in PENDULUM.items()}
     names = {"m": "mass", "l": "length", "d": "damping", "g": "gravity", "phi_0": "phi0", "omega_0": "omega0"}
     modal: dict[str, Any] = {names[name]: number.modal for name, number in numbers.items()}
-    return Structure(make(**modal), numbers)
+    model = make(**modal)
+    return Structure(replace(model, observed={"force": model.observed["force"]}), numbers)
 
 
 def tower(case: Case) -> Structure:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from alphacut import response
+from alphacut import outcomes, response
 from alphacut.cell import GPA, SHARED, key_of, parts
 from alphacut.chain import Results
 from alphacut.provenance import FORMAT, versions
@@ -43,6 +43,8 @@ def summary(results: Results) -> dict[str, Any]:
         found["structure"] = structure_numbers(results)
         fuzzy = {study.name: study.task.fuzzy for study in results.studies}
         found["envelopes"] = {name: {"fuzzy": fuzzy[name], **envelope_numbers(dataset)} for name, dataset in results.envelopes.items()}
+    if results.exceedance is not None:
+        found["exceedance"] = outcomes.exceedance_document(results.exceedance)
     quoted = case.path.with_suffix(".quoted.toml")
     found["paper"] = comparison(quoted, found) if quoted.is_file() else []
     return found
@@ -105,7 +107,8 @@ def envelope_numbers(dataset: xarray.Dataset) -> dict[str, Any]:
     width = (lowest["upper"] - lowest["lower"]).mean("time").values
     cost = {name: dataset.attrs[name] for name in ("trajectories", "seconds", "method", "nature")}
     columns = {"min": low, "max": high, "mean_width": width}
-    return {key: dict(zip(names, map(float, column), strict=True)) for key, column in columns.items()} | cost
+    numbers = {key: dict(zip(names, map(float, column), strict=True)) for key, column in columns.items()}
+    return numbers | {"alpha": dataset["alpha"].values, "peak": outcomes.peak_document(dataset)} | cost
 
 
 def comparison(path: Path, found: Mapping[str, Any]) -> list[Row]:

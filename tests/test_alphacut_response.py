@@ -78,7 +78,6 @@ def test_a_run_keeps_it_in_file_summary_report_and_figure(tmp_path, capfd):
         ("response.quantiles=[0, 0.5]", "out of range"),
         ("response.limit=0.6 m", "unit"),
         ("response.quantity=s22", "no such choice"),
-        ('stages=["envelope"]', "samples of stage modulus"),
         ("modulus.value=24 GPa", "samples of stage modulus"),
     ],
 )

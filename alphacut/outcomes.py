@@ -1,0 +1,138 @@
+"""What an engineer reads off the envelopes: fuzzy peaks, and the fuzzy probability that an output exceeds a limit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from alphacut import quantity
+from alphacut.case import Case
+from alphacut.problem import BadInput, Problem
+from alphacut.structure import Structure, structure
+from fuzzy import FuzzyNumber
+from stochastic.truncated_normal import Array
+
+if TYPE_CHECKING:
+    import xarray
+
+    from frame import Envelope
+
+Sampler = Callable[[np.random.Generator, int], Array]
+FACTS = ("output", "limit", "fuzzy", "random", "deviation", "trajectories", "nature")
+NATURE = "inner: attained at the fuzzy points tried, with the sampling deviation given"
+
+
+def with_peaks(found: Envelope) -> xarray.Dataset:
+    """The envelope's dataset with the fuzzy peak of each output's magnitude, ``peak`` (alpha, bound, output)."""
+    from frame.outcomes import peaks
+
+    of = peaks(found)
+    words = {"units": "SI, by output", "long_name": "largest magnitude over time; the lower end is a bound from below"}
+    dataset = found.to_dataset().assign(peak=(("alpha", "bound", "output"), np.stack([of.lower, of.upper], axis=1), words))
+    return dataset.assign_coords(bound=["lower", "upper"])
+
+
+def peak_document(dataset: xarray.Dataset) -> dict[str, dict[str, Array]]:
+    """The fuzzy peak of each output: lower and upper ends by level, in SI."""
+    return {
+        str(name): {side: dataset["peak"].sel(bound=side, output=name).values for side in ("lower", "upper")}
+        for name in dataset["output"].values
+    }
+
+
+def shaped_like(number: FuzzyNumber) -> Sampler:
+    """Random values whose density is proportional to the membership: a triangle's is triangular, an interval's uniform."""
+
+    def draw(rng: np.random.Generator, count: int) -> Array:
+        kept: Array = np.empty(0)
+        while len(kept) < count:
+            values = rng.uniform(*number.support, size=2 * count)
+            kept = np.concatenate([kept, values[rng.random(2 * count) <= number.membership(values)]])
+        return kept[:count]
+
+    return draw
+
+
+def limit_of(case: Case) -> float:
+    """The limit in the SI unit of its output.
+
+    Raises:
+        BadInput: It is no positive quantity of that unit.
+    """
+    from frame.envelope import output_unit
+
+    unit = output_unit(case.text("exceedance.output"))
+    try:
+        limit = quantity.number(case.text("exceedance.limit"), unit)
+    except ValueError as error:
+        raise case.refuse("exceedance.limit", str(error), f"a quantity in {unit}, as the output is") from None
+    if not limit > 0:
+        raise case.refuse("exceedance.limit", "out of range", "greater than 0")
+    return limit
+
+
+def split_inputs(case: Case, wanted: Structure) -> tuple[dict[str, FuzzyNumber], dict[str, Sampler]]:
+    """The inputs that stay fuzzy and those that are random; where none stays fuzzy, a crisp one stands in for them."""
+    random = wanted.inputs(case.names("exceedance.random"))
+    fuzzy = {name: number for name, number in wanted.inputs(case.names("envelope.fuzzy")).items() if name not in random}
+    crisp = {name: number for name, number in wanted.numbers.items() if number.support.width == 0}
+    return fuzzy or dict([next(iter(crisp.items()))]), {name: shaped_like(number) for name, number in random.items()}
+
+
+def exceedance(case: Case, handed: FuzzyNumber | None) -> xarray.Dataset:
+    """Fuzzy probability that an output's magnitude exceeds the case's limit within the duration of [envelope].
+
+    Args:
+        case: With the sections exceedance, envelope and a linear structure.
+        handed: Modulus of the stage before, in Pa.
+
+    Raises:
+        BadInput: The structure has no such output, or is not linear.
+    """
+    import xarray
+
+    import frame.outcomes
+
+    wanted, output = structure(case, handed), case.text("exceedance.output")
+    if wanted.linear is None or output not in wanted.outputs:
+        allowed = ", ".join(wanted.outputs) if wanted.linear else "[frame] or [tower]"
+        raise BadInput(Problem("exceedance.output", "the structure has no such output, or is not linear", output, allowed))
+    fuzzy, random = split_inputs(case, wanted)
+    found = frame.outcomes.exceedance(
+        wanted.linear,
+        fuzzy,
+        random,
+        limit=limit_of(case),
+        duration=case.number("envelope.duration"),
+        step=case.number("envelope.step"),
+        output=wanted.outputs.index(output),
+        alpha=case.numbers("envelope.alpha"),
+        samples=case.integer("exceedance.samples"),
+        rng=np.random.default_rng(case.integer("exceedance.seed")),
+    )
+    about = {"long_name": f"probability that |{output}| exceeds the limit", "units": "1"}
+    ends = (("alpha", "bound"), np.column_stack([found.lower, found.upper]), about)
+    facts = {"output": output, "limit": limit_of(case), "deviation": found.deviation, "trajectories": found.trajectories, "nature": NATURE}
+    names = {"fuzzy": ", ".join(fuzzy), "random": ", ".join(random)}
+    return xarray.Dataset({"exceedance": ends}, {"alpha": found.alpha, "bound": ["lower", "upper"]}, {**facts, **names})
+
+
+def exceedance_document(found: xarray.Dataset) -> dict[str, Any]:
+    """The probability as it is printed with ``--json``; the limit in SI."""
+    from frame.envelope import output_unit
+
+    sides = {str(side): found["exceedance"].sel(bound=side).values for side in ("lower", "upper")}
+    return {
+        **{name: found.attrs[name] for name in FACTS},
+        "unit": output_unit(found.attrs["output"]),
+        "alpha": found["alpha"].values,
+        **sides,
+    }
+
+
+def sentence(found: Mapping[str, Any]) -> str:
+    """The probability in words, at the lowest and the highest level."""
+    cuts = (f"[{found['lower'][k]:.3g}, {found['upper'][k]:.3g}] at α = {found['alpha'][k]:g}" for k in (0, -1))
+    return f"probability of |{found['output']}| > {found['limit']:g} {found['unit']}: {', '.join(cuts)}\n"

@@ -1,0 +1,90 @@
+"""Peaks and probabilities of exceedance agree with each other and with answers found another way, and stand in every result."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from alphacut.entry import main
+from alphacut.loading import load
+from alphacut.outcomes import exceedance, shaped_like
+from alphacut.problem import BadInput
+from alphacut.structure import structure
+from fuzzy import Interval, Trapezoidal, Triangular
+
+CASES = Path(__file__).parent.parent / "cases"
+PAPER = CASES / "paper.toml"
+SHORT = ["envelope.duration=1 s", "envelope.alpha=[0, 1]", "exceedance.output=q3"]
+
+
+@pytest.mark.parametrize(
+    "number", [Triangular(1, 2, 5), Interval(-1, 3), Trapezoidal(0, 1, 2, 4)], ids=lambda number: type(number).__name__
+)
+def test_random_values_have_the_shape_of_the_membership(number):
+    drawn = np.sort(shaped_like(number)(np.random.default_rng(5), 4000))
+    grid = np.linspace(*number.support, 20001)
+    area = np.cumsum(number.membership(grid))
+    share = np.interp(drawn, grid, area / area[-1])
+    assert len(drawn) == 4000
+    assert np.abs(share - (np.arange(4000) + 0.5) / 4000).max() < 1.95 / np.sqrt(4000)  # Kolmogorov–Smirnov, 0.1 %
+
+
+def test_without_random_inputs_the_probability_is_what_the_peaks_say(capfd):
+    arguments = ["envelope", str(PAPER), "--fuzzy", "E", "--duration", "1", "--alpha", "[0, 1]", "--method", "modal", "--json", "-"]
+    assert main(arguments) == 0
+    peak = json.loads(capfd.readouterr()[0])["peak"]
+    (_, _, least), (_, _, modal) = peak["lower"]
+    most = peak["upper"][0][2]
+    assert least <= modal < most
+    for limit, wanted in ((0.9 * least, [1, 1]), (1.001 * most, [0, 0]), ((modal + most) / 2, [0, 1])):
+        found = exceedance(load(PAPER, [*SHORT, "envelope.fuzzy=E", f"exceedance.limit={limit} m"]), None)
+        assert found["exceedance"].sel(alpha=0).values.tolist() == wanted
+
+
+def test_a_random_modulus_gives_the_share_found_by_quadrature():
+    changes = [*SHORT, "envelope.fuzzy=E", "exceedance.random=E", "exceedance.samples=1000"]
+    wanted = structure(load(PAPER), None)
+    grid = np.linspace(*wanted.numbers["E"].support, 401)
+    peak = np.abs(wanted.flow(("E",), 1.0, 0.01, "exact").values(grid[:, None])[:, :, 2]).max(1)
+    weight = wanted.numbers["E"].membership(grid)
+    limit = float(np.quantile(peak, 0.4))
+    share = float(weight @ (peak > limit) / weight.sum())
+    assert 0.1 < share < 0.9
+    found = exceedance(load(PAPER, [*changes, f"exceedance.limit={limit} m"]), None)
+    low, high = found["exceedance"].sel(alpha=0).values
+    assert low == high == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / 1000))
+
+
+def test_a_run_keeps_peaks_and_probability(tmp_path, capfd):
+    changes = ['stages=["envelope"]', "exceedance.output=q3", "exceedance.limit=9 cm", "exceedance.random=E"]
+    arguments = ["run", str(PAPER), "--quick", "--no-figures", "--quiet", "--out", str(tmp_path)]
+    assert main([*arguments, *(f"--set={change}" for change in changes)]) == 0, capfd.readouterr().err
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert summary["exceedance"]["limit"] == pytest.approx(0.09)
+    assert summary["exceedance"]["random"] == "E"
+    study = summary["envelopes"]["E-5s"]
+    assert study["peak"]["q1"]["upper"][0] == pytest.approx(max(-study["min"]["q1"], study["max"]["q1"]))
+    with xarray.open_dataset(tmp_path / "envelope_E-5s.nc") as stored:
+        assert stored["peak"].dims == ("alpha", "bound", "output")
+    assert main(["report", str(tmp_path), "--quiet"]) == 0
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<h3>Peaks</h3>" in page
+    assert "probability of |q3| &gt; 0.09 m" in page
+
+
+@pytest.mark.parametrize(
+    ("case", "changes", "pattern"),
+    [
+        ("paper", ["exceedance.output=q3", "exceedance.limit=20 N"], 'unit "N" is wrong'),
+        ("paper", ["exceedance.output=q3", "exceedance.limit=-20 mm"], "out of range"),
+        ("paper", ["exceedance.output=q4", "exceedance.limit=20 mm"], "no output q4"),
+        ("paper", ["exceedance.output=q3", "exceedance.limit=20 mm", "exceedance.random=m9"], "no input m9"),
+        ("paper", ["exceedance.output=q3"], r"exceedance\.limit.*missing"),
+        ("pendulum", ["exceedance.output=force", "exceedance.limit=20 N"], "linear structure"),
+    ],
+)
+def test_a_limit_that_makes_no_sense_is_refused(case, changes, pattern):
+    with pytest.raises(BadInput, match=pattern):
+        load(CASES / f"{case}.toml", changes)
