@@ -16,6 +16,7 @@ from alphacut.output import whole_file
 from alphacut.problem import BadInput, Problem
 from alphacut.progress import Tick
 from alphacut.provenance import attributes, versions
+from alphacut.stored import read_dataset
 from fuzzy import Crisp, Explanation, FuzzyNumber, FuzzyResult, PiecewiseLinear, propagate
 from fuzzy import explain as fuzzy_explain
 
@@ -183,16 +184,12 @@ def read_number(path: Path | str, option: str = "--modulus") -> FuzzyNumber:
     """The fuzzy modulus in Pa from a file that `write` made.
 
     Raises:
-        BadInput: The file is missing or holds no modulus.
+        BadInput: The file is missing, holds no modulus, or was written by a newer program.
     """
-    import xarray
-
-    if not Path(path).is_file():
-        raise BadInput(Problem(option, "there is no such file", str(path)))
+    dataset = read_dataset(Path(path), key=option)
     try:
-        with xarray.open_dataset(path) as dataset:
-            alpha, ends = dataset["alpha"].values, dataset["E"].transpose("alpha", "bound").values
-    except (OSError, ValueError, KeyError) as error:
+        alpha, ends = dataset["alpha"].values, dataset["E"].transpose("alpha", "bound").values
+    except (ValueError, KeyError) as error:
         raise BadInput(
             Problem(option, f"the file holds no α-cuts of a modulus ({error})", str(path), "a modulus.nc of this program")
         ) from None

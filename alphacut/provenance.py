@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, is_dataclass
@@ -73,12 +74,19 @@ def _canonical(value: object) -> object:
     return str(value)
 
 
+def command() -> str:
+    """The command line of this process as it would be typed: ``python -m alphacut run …``, without the place of the program."""
+    program = Path(sys.argv[0])
+    name = f"python -m {program.parent.name}" if program.name == "__main__.py" else program.name
+    return f"{name} {shlex.join(sys.argv[1:])}".strip()
+
+
 def attributes(case_text: str, key: str) -> dict[str, str | int]:
     """Attributes that every NetCDF file carries."""
     return {
         "format_version": FORMAT,
         "created_by": f"alphacut {own_version()}",
-        "command": " ".join(sys.argv),
+        "command": command(),
         "versions": json.dumps(versions()),
         "case": case_text,
         "fingerprint": key,

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from alphacut.problem import BadInput, Problem
 from alphacut.report_sections import sections
+from alphacut.stored import read_dataset, read_summary
 
 if TYPE_CHECKING:
     import xarray
@@ -25,14 +25,9 @@ def report(folder: Path) -> str:
     """The page for the results in a folder.
 
     Raises:
-        BadInput: The folder holds no results of a run.
+        BadInput: The folder holds no results of a run, or those of a newer program.
     """
-    file = folder / "summary.json"
-    if not file.is_file():
-        raise BadInput(
-            Problem(str(folder), "there are no results here: summary.json is missing", allowed="a folder that alphacut run has written")
-        )
-    summary: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    summary = read_summary(folder)
     text = {name: (HERE / f"report.{name}").read_text(encoding="utf-8") for name in ("html", "css", "js")}
     return Template(text["html"]).substitute(
         title=html.escape(summary["title"]),
@@ -52,12 +47,9 @@ def embedded(document: object) -> str:
 
 def plots(summary: Mapping[str, Any], folder: Path) -> list[dict[str, Any]]:
     """The data of the interactive plot: every study's bounds as 32-bit floats."""
-    import xarray
-
     found = []
     for name, study in summary.get("envelopes", {}).items():
-        with xarray.open_dataset(folder / f"envelope_{name}.nc") as dataset:
-            found.append(plot(name, study, dataset))
+        found.append(plot(name, study, read_dataset(folder / f"envelope_{name}.nc", key=str(folder))))
     return found
 
 

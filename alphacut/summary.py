@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,7 +13,7 @@ import numpy as np
 from alphacut import outcomes, response
 from alphacut.cell import GPA, SHARED, key_of, parts
 from alphacut.chain import Results
-from alphacut.provenance import FORMAT, versions
+from alphacut.provenance import FORMAT, command, versions
 from alphacut.structure import structure
 
 if TYPE_CHECKING:
@@ -29,7 +28,7 @@ def summary(results: Results) -> dict[str, Any]:
     """Everything in numbers: inputs that follow, the fuzzy modulus, the extremes of each study, the comparison."""
     case = results.case
     words = {"case": case.name, "title": case.text("title"), "about": case.text("about"), "case_text": case.text_of_file}
-    found: dict[str, Any] = {"format_version": FORMAT, **words, "command": " ".join(sys.argv), "versions": versions()}
+    found: dict[str, Any] = {"format_version": FORMAT, **words, "command": command(), "versions": versions()}
     particles = results.folder / "microstructure.json"
     if "microstructure" in case.stages and particles.is_file():
         found["microstructure"] = json.loads(particles.read_text(encoding="utf-8"))

@@ -1,0 +1,85 @@
+"""Results of format 1, kept in tests/stored-v1, are still read; those of a newer format are refused with what to do about it.
+
+The files are those of `alphacut run` for the case that their summary.json holds; they are never made anew.
+"""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+import xarray
+
+from alphacut.entry import main
+from alphacut.modulus import read_number
+from alphacut.problem import BadInput
+from alphacut.provenance import FORMAT
+from alphacut.stored import read_dataset, read_summary
+
+OLD = Path(__file__).parent / "stored-v1"
+PAPER = Path(__file__).parent.parent / "cases" / "paper.toml"
+
+
+@pytest.fixture
+def copy(tmp_path):
+    return Path(shutil.copytree(OLD, tmp_path / "results"))
+
+
+def rewritten(path, **attributes):
+    """The NetCDF file with other attributes."""
+    xarray.load_dataset(path).assign_attrs(attributes).to_netcdf(path)
+
+
+def test_a_modulus_of_format_1_is_handed_on(capfd):
+    summary = read_summary(OLD)
+    assert summary["format_version"] == 1
+    number = read_number(OLD / "modulus.nc")
+    assert number.modal / 1e9 == pytest.approx(summary["modulus"]["modal_GPa"])
+    assert number.support.lower / 1e9 == pytest.approx(summary["modulus"]["lower_GPa"])
+    arguments = ["envelope", str(PAPER), "--fuzzy", "E", "--duration", "0.5", "--modulus", str(OLD / "modulus.nc"), "--json", "-"]
+    assert main(arguments) == 0
+    capfd.readouterr()
+
+
+@pytest.mark.parametrize("peaks", [True, False], ids=["with peaks", "without peaks"])
+def test_a_folder_of_format_1_becomes_a_report(peaks, copy):
+    if not peaks:  # which the first files of this format lack
+        summary = json.loads((copy / "summary.json").read_text(encoding="utf-8"))
+        del summary["envelopes"]["all"]["peak"]
+        (copy / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
+    assert main(["report", str(copy), "--quiet"]) == 0
+    page = (copy / "report.html").read_text(encoding="utf-8")
+    assert "Sample of format 1" in page
+    assert ("<h3>Peaks</h3>" in page) == peaks
+
+
+def test_a_newer_file_is_refused_with_its_maker_and_a_cure(copy, capfd):
+    rewritten(copy / "modulus.nc", format_version=FORMAT + 1, created_by="alphacut 9.8.7")
+    assert main(["envelope", str(PAPER), "--modulus", str(copy / "modulus.nc")]) == 2
+    err = capfd.readouterr().err
+    assert err.count("\n") == 1
+    for words in (f"has format {FORMAT + 1}", "written by alphacut 9.8.7", f"reads formats up to {FORMAT}", "install that version"):
+        assert words in err
+
+
+def test_newer_results_are_refused_before_a_report_is_written(copy):
+    summary = json.loads((copy / "summary.json").read_text(encoding="utf-8"))
+    (copy / "summary.json").write_text(json.dumps({**summary, "format_version": FORMAT + 1}), encoding="utf-8")
+    assert main(["report", str(copy), "--quiet"]) == 2
+    assert not (copy / "report.html").exists()
+
+
+@pytest.mark.parametrize("version", ["newest", "-1", "0", "1.5"])
+def test_a_version_that_is_none_is_refused(version, copy):
+    rewritten(copy / "modulus.nc", format_version=version)
+    with pytest.raises(BadInput, match=f"tells no version of its format: {version}"):
+        read_dataset(copy / "modulus.nc")
+
+
+def test_what_is_no_result_is_refused(tmp_path):
+    (tmp_path / "modulus.nc").write_text("no NetCDF", encoding="utf-8")
+    with pytest.raises(BadInput, match="no NetCDF file"):
+        read_dataset(tmp_path / "modulus.nc")
+    (tmp_path / "summary.json").write_text("{", encoding="utf-8")
+    with pytest.raises(BadInput, match=r"summary\.json cannot be read"):
+        read_summary(tmp_path)
