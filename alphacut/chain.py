@@ -15,6 +15,7 @@ from alphacut.consistency import FILES, OTHERS
 from alphacut.output import say, whole_file
 from alphacut.progress import progress
 from alphacut.provenance import attributes, fingerprint
+from alphacut.stored import require_known
 from fuzzy import FuzzyNumber
 
 if TYPE_CHECKING:
@@ -198,14 +199,21 @@ class Results:
 
 
 def fingerprint_of(path: Path) -> str:
-    """The fingerprint in a NetCDF file; empty if it cannot be read."""
+    """The fingerprint in a NetCDF file; empty if it cannot be read.
+
+    Raises:
+        BadInput: A newer program wrote the file; its results are not overwritten unasked.
+    """
     import xarray
 
     try:
         with xarray.open_dataset(path) as dataset:
-            return str(dataset.attrs.get("fingerprint", ""))
+            told = dict(dataset.attrs)
     except (OSError, ValueError):
         return ""
+    if "format_version" in told:
+        require_known(str(told["format_version"]), path, key="--out", maker=str(told.get("created_by", "")))
+    return str(told.get("fingerprint", ""))
 
 
 def studies(case: Case) -> tuple[Study, ...]:

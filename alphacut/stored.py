@@ -32,7 +32,7 @@ def require_known(version: object, path: Path, *, key: str, maker: str = "") -> 
         raise BadInput(Problem(key, f"{path} tells no version of its format: {version}", allowed="format_version 1 or more"))
     if whole > FORMAT:
         made = f", written by {maker}" if maker else ""
-        cure = f"install that version, or make the file anew with this one ({own_version()})"
+        cure = f"install that version, or make the file anew with this one, {own_version()}, by alphacut run --fresh"
         raise BadInput(Problem(key, f"{path} has format {whole}{made}; this program reads formats up to {FORMAT}", allowed=cure))
 
 

@@ -69,6 +69,19 @@ def test_newer_results_are_refused_before_a_report_is_written(copy):
     assert not (copy / "report.html").exists()
 
 
+def test_a_run_does_not_overwrite_newer_results_unasked(copy, capfd):
+    case = copy / "small.toml"
+    case.write_text(read_summary(copy)["case_text"], encoding="utf-8")
+    rewritten(copy / "modulus.nc", format_version=FORMAT + 1)
+    before = (copy / "modulus.nc").read_bytes()
+    arguments = ["run", str(case), "--out", str(copy), "--no-figures", "--quiet"]
+    assert main(arguments) == 2
+    assert "alphacut run --fresh" in capfd.readouterr().err
+    assert (copy / "modulus.nc").read_bytes() == before
+    assert main([*arguments, "--fresh"]) == 0
+    assert read_dataset(copy / "modulus.nc").attrs["format_version"] == FORMAT
+
+
 @pytest.mark.parametrize("version", ["newest", "-1", "0", "1.5"])
 def test_a_version_that_is_none_is_refused(version, copy):
     rewritten(copy / "modulus.nc", format_version=version)
