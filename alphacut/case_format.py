@@ -10,8 +10,9 @@ import os
 import sys
 from collections.abc import Iterator
 
+from alphacut.key import Key
 from alphacut.reading import allowed
-from alphacut.schema import SECTIONS, VERSION, Key
+from alphacut.schema import SECTIONS, VERSION
 
 HEAD = f"""# The case format, version {VERSION}
 

@@ -9,8 +9,9 @@ import json
 import math
 from typing import Any
 
+from alphacut.key import Key, Section
 from alphacut.reading import allowed
-from alphacut.schema import SECTIONS, Key, Section
+from alphacut.schema import SECTIONS
 from alphacut.units import QUANTITIES
 
 NUMBERS = {"type": "array", "items": {"type": "number"}, "minItems": 1}

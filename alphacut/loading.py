@@ -10,10 +10,11 @@ from typing import Any
 
 from alphacut.case import Case
 from alphacut.consistency import inconsistencies
+from alphacut.key import Key, Section
 from alphacut.position import key_at, lines_of_keys
 from alphacut.problem import BadInput, Problem
 from alphacut.reading import Unfit, allowed, nearest, read
-from alphacut.schema import SECTIONS, Key, Section, dotted, every_key
+from alphacut.schema import SECTIONS, dotted, every_key
 
 Raw = dict[str, Any]
 ARRAYS = ("fuzzy list", "numbers", "choices")  # kinds of keys that hold arrays

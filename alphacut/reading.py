@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterable
 
 from alphacut import quantity
-from alphacut.schema import Key
+from alphacut.key import Key
 from alphacut.units import QUANTITIES
 from fuzzy import FuzzyNumber
 

@@ -1,14 +1,8 @@
-"""The case file's keys: one table that the checks, the JSON Schema, the help texts and the docs all read.
-
-A key's kind says what the file may hold: ``fuzzy`` a crisp or fuzzy quantity, ``number`` a crisp one, ``fuzzy list`` and
-``numbers`` arrays of them, ``integer``, ``text``, ``choice``, ``choices`` (an array of names), ``flag``.
-"""
+"""The case file's keys: one table that the checks, the JSON Schema, the help texts and the docs all read."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-
+from alphacut.key import COUNT, DEVIATIONS, MEMBERSHIP, NOT_NEGATIVE, POISSON, POSITIVE, UNIT, Key, Range, Section
 from fuzzy import Crisp
 
 VERSION = 1
@@ -19,65 +13,7 @@ PLANS = ("general", "reduced", "extended", "signed")
 CELL_METHODS = ("prism", "slices", "table", "series", "auto")
 ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)
 
-
-@dataclass(frozen=True)
-class Range:
-    """Allowed values, in SI: between two ends that belong to it or not, told in words."""
-
-    words: str
-    lower: float = float("-inf")
-    upper: float = float("inf")
-    closed: bool = False
-    below: bool = False  # closed, but without its upper end
-
-    def holds(self, value: float) -> bool:
-        """Whether `value` is allowed; never for nan."""
-        if self.below:
-            return self.lower <= value < self.upper
-        return self.lower <= value <= self.upper if self.closed else self.lower < value < self.upper
-
-
-POSITIVE = Range("greater than 0", lower=0.0)
-NOT_NEGATIVE = Range("0 or greater", lower=0.0, upper=float("inf"), closed=True)
-POISSON = Range("inside (-1, 0.5)", lower=-1.0, upper=0.5)
-UNIT = Range("inside (0, 1)", lower=0.0, upper=1.0)
-MEMBERSHIP = Range("from 0 to 1", lower=0.0, upper=1.0, closed=True)
 KNOWN_VERSION = Range(f"equal to {VERSION}", lower=VERSION, upper=VERSION, closed=True)
-COUNT = Range("from 1 to 10000", lower=1.0, upper=1e4, closed=True)
-DEVIATIONS = Range("from -10 to 10", lower=-10.0, upper=10.0, closed=True)
-
-
-@dataclass(frozen=True)
-class Key:
-    """One key of a case file.
-
-    Args:
-        about: What it is, for help texts and docs.
-        kind: What the file may hold; see the head of this module.
-        unit: SI unit; empty for a number without a unit.
-        required: Whether its section cannot do without it.
-        default: What stands in for it, in SI, where it is left out.
-        allowed: Range of every number in it.
-        choices: The names allowed, for the kinds choice and choices.
-    """
-
-    about: str
-    kind: str = "fuzzy"
-    unit: str = ""
-    required: bool = False
-    default: object = None
-    allowed: Range | None = None
-    choices: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Section:
-    """One table of a case file; `repeated` if it is written ``[[name]]``."""
-
-    about: str
-    keys: Mapping[str, Key] = field(default_factory=dict)
-    repeated: bool = False
-
 
 TOP = Section(
     "What the case is.",
