@@ -8,6 +8,7 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from numbers import Real
 from typing import NamedTuple
 
 import numpy as np
@@ -134,6 +135,9 @@ def _highest_level(x: Array, levels: Array, lower: Array) -> Array:
 
 
 def _require_order(kind: str, values: Sequence[float], order: str) -> None:
+    wrong = [value for value in values if not isinstance(value, Real)]
+    if wrong:
+        raise ValueError(f"the {kind} holds {wrong[0]!r}; it needs plain numbers: convert units before")
     if not (np.isfinite(values).all() and all(a <= b for a, b in itertools.pairwise(values))):
         shown = ", ".join(f"{value:g}" for value in values)
         raise ValueError(f"the {kind} is [{shown}]; it needs {order}, all finite")

@@ -19,12 +19,13 @@ from fuzzy.result import FuzzyResult
 from fuzzy.shelf import shelf
 from fuzzy.store import Identity, Store
 from fuzzy.transformation import General
+from fuzzy.vetting import fuzzy_inputs, require_callable, require_plan
 from fuzzy.workers import pool
 
 
 def propagate(
     function: Function,
-    inputs: Mapping[str, FuzzyNumber],
+    inputs: Mapping[str, FuzzyNumber | float],
     plan: Plan | None = None,
     *,
     alpha: Sequence[float] | None = None,
@@ -44,7 +45,7 @@ def propagate(
         function: Gets the inputs by name and returns a number, an array, or a mapping of names to either. With `shared` it gets a list
             of points (mappings of names to numbers) that agree in those inputs and returns a list of outputs; with `vectorised` it gets
             arrays, shape (n,), and returns arrays whose first axis is n.
-        inputs: Fuzzy number of each input.
+        inputs: Fuzzy number of each input; a plain number is crisp.
         plan: How the boxes of the inputs are searched; the general transformation method if not given.
         alpha: Rising levels; 0, ¼, ½, ¾, 1 if not given.
         interactions: Constraints between the inputs; plans that cannot respect them refuse.
@@ -62,13 +63,15 @@ def propagate(
         CampaignError: Samples failed; the others were run first.
         StoreError: The store cannot be written.
     """
-    domain = Domain(inputs, levels(4) if alpha is None else alpha, interactions)
+    domain = Domain(fuzzy_inputs(inputs), levels(4) if alpha is None else alpha, interactions)
     known = known or Known()
     known.check(domain.names)
+    plan = plan or General()
+    require_plan(plan)
+    require_callable(function, domain.names, by_name=not shared, sent=workers > 1)
     call = Call(function, domain.names, tuple(shared), vectorised)
     start = perf_counter()
     with nullcontext(executor) if executor else pool(workers) as running, shelf(store, identity, domain.names) as samples:
-        plan = plan or General()
         campaign = Campaign(call, running, progress, known, samples, stepwise=plan.stepwise)
         result = plan.run(campaign, domain)
         campaign.report(1.0)

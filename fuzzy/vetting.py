@@ -1,0 +1,65 @@
+"""What can be said of a user's arguments before any sample is run."""
+
+from __future__ import annotations
+
+import inspect
+import pickle
+from collections.abc import Mapping, Sequence
+from numbers import Real
+from typing import Any
+
+from fuzzy.numbers import Crisp, FuzzyNumber
+
+
+def fuzzy_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNumber]:
+    """The inputs by name; a plain number is a crisp one.
+
+    Raises:
+        ValueError: The inputs are no mapping, or a value is neither a fuzzy number nor a number.
+    """
+    if not isinstance(inputs, Mapping):
+        raise ValueError(
+            f"the inputs are a {type(inputs).__name__}; they must map names to fuzzy numbers, as {{'E': Triangular(24, 25, 26)}}"
+        )
+    return {name: _fuzzy(name, value) for name, value in inputs.items()}
+
+
+def _fuzzy(name: str, value: object) -> FuzzyNumber:
+    if isinstance(value, FuzzyNumber):
+        return value
+    if isinstance(value, Real):
+        return Crisp(float(value))
+    raise ValueError(f"the input {name!r} is {value!r}; it must be a number or a fuzzy number such as Triangular(24, 25, 26)")
+
+
+def require_plan(plan: object) -> None:
+    """A plan is an object that runs, not its name.
+
+    Raises:
+        ValueError: It is not.
+    """
+    if isinstance(plan, type) or not hasattr(plan, "run"):
+        raise ValueError(f"the plan is {plan!r}; it must be a plan such as fuzzy.General(), fuzzy.Reduced() or fuzzy.Signed()")
+
+
+def require_callable(function: Any, names: Sequence[str], *, by_name: bool, sent: bool) -> None:
+    """The function can be called with the inputs, and sent to worker processes where there are some.
+
+    Raises:
+        ValueError: It cannot.
+    """
+    if not callable(function):
+        raise ValueError(f"the function is {function!r}, which cannot be called")
+    if by_name:
+        try:
+            inspect.signature(function).bind(**dict.fromkeys(names))
+        except TypeError as mismatch:
+            raise ValueError(f"the function cannot be called with the inputs {', '.join(names)}: {mismatch}") from None
+        except ValueError:
+            pass  # a function of C without a signature
+    if sent:
+        try:
+            pickle.dumps(function)
+        except Exception as failure:
+            cure = "define it at the top level of a module, or take workers=1"
+            raise ValueError(f"the function cannot be sent to worker processes ({failure}): {cure}") from None
