@@ -104,4 +104,4 @@ class AutoModel:
 
     def _reason(self, result: Homogenised, refusals: list[str]) -> str:
         before = f" ({'; '.join(refusals)})" if refusals else ""
-        return f"{result.method} for {self.tolerance:g}{before}: {_WHY[result.method]}; {result.reason}"
+        return f"{result.method} reaches a relative error of {self.tolerance:g} in E{before}: {_WHY[result.method]}; {result.reason}"

@@ -69,7 +69,7 @@ def test_several_moduli_and_poissons_ratios_at_once():
 def test_reason_names_model_tolerance_and_what_was_excluded():
     result = AutoModel(1e-3, exclude=("series",)).solve(PAPER, MATRIX, [Phase(80e9)])[0]
     assert result.method == "table"
-    assert result.reason.startswith("table for 0.001 (series excluded): planar cells over r and E_i once")
+    assert result.reason.startswith("table reaches a relative error of 0.001 in E (series excluded): planar cells over r and E_i once")
     assert set(result.error) == {"space", "theta", "table"}
     assert AutoModel(1e-3).solve(PAPER, MATRIX, [Phase(80e9)])[0].method == "series"
 
