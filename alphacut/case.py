@@ -34,6 +34,12 @@ class Case:
         return self.path.stem
 
     @property
+    def quoted(self) -> Path | None:
+        """File of the numbers that a paper quotes for this case; None for a case of one's own."""
+        path = self.path.with_suffix(".quoted.toml")
+        return path if path.is_file() else None
+
+    @property
     def text_of_file(self) -> str:
         """The file as it stands."""
         return self.path.read_text(encoding="utf-8-sig")

@@ -14,7 +14,7 @@ from alphacut.loading import load
 from alphacut.options import add_common, add_workers, check_workers
 from alphacut.output import as_json, say, whole_file, write_text
 from alphacut.provenance import attributes, fingerprint
-from alphacut.quick import quick
+from alphacut.quick import banner, quick, settings
 
 ABOUT = "run every stage of a case: files, figures, summary, and the comparison with the paper where the case has one"
 
@@ -45,6 +45,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     drawn = [] if options.no_figures else figures.draw(results, driving, quiet=options.quiet)
     found: dict[str, Any] = {
         **summary.summary(results),
+        **({"quick": settings(results.case)} if options.quick else {}),
         "shares": shares.mean_shares(driving),
         "figures": drawn,
         "seconds": time.perf_counter() - start,
@@ -56,8 +57,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     elif options.json:
         write_text(options.json, document)
     if options.json != "-" and not options.quiet:
+        out.write(f"{banner(found['quick'])}\n" if options.quick else "")
         out.write(summary.table(found["paper"]) if found["paper"] else "")
-        out.write("the quick form: these numbers mean nothing\n" if options.quick else "")
         say(f"results are in {folder}, {len(drawn)} figures among them, after {found['seconds']:.0f} s")
     return 0
 

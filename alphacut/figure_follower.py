@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 DURATION = 5.0  # s
 TITLES = (
-    "Fig. 21: initial guess, the modal graph",
-    "Fig. 22: optimum of the Taylor model, new graphs",
-    "Fig. 23: at a later node the best stored graph is the guess",
-    "Fig. 24: bounds left by the sweep, and the best of all graphs",
-    "Fig. 25: the discrete fuzzy mapping",
+    "initial guess, the modal graph",
+    "optimum of the Taylor model, new graphs",
+    "at a later node the best stored graph is the guess",
+    "bounds left by the sweep, and the best of all graphs",
+    "the discrete fuzzy mapping",
 )
 
 
@@ -50,8 +50,8 @@ def follower(results: Results, study: Study) -> Figure:
     panels[4].fill_between(found.time, found.lower, found.upper, color=BLUE, alpha=0.2, lw=0)
     for final in (found.lower, found.upper):
         panels[4].plot(found.time, final, color=INK, lw=1.3)
-    for panel, title in zip(panels, TITLES, strict=False):
-        panel.set_title(title, loc="left", fontsize=9)
+    for number, (panel, title) in enumerate(zip(panels, TITLES, strict=False), start=1):
+        panel.set_title(f"{f'Fig. {20 + number}' if results.case.quoted else number}: {title}", loc="left", fontsize=9)
     for panel in (panels[4], panels[3]):
         panel.set_xlabel("time t, s")
         panel.tick_params(labelbottom=True)

@@ -38,14 +38,14 @@ def modal_map(case: Case) -> HermiteMap:
 
 
 def radii(case: Case) -> Figure:
-    """Fig. 11: distribution of the log-normal particle radii, σ_r = ln 10 / 6, median 1."""
+    """Fig. 11: distribution of the paper's log-normal particle radii, σ_r = (ln 10)/6, median 1."""
     drawn, axes = figure()
     theta = np.linspace(law(case).lower, law(case).upper, 400)
     axes.plot(np.exp(SIGMA * theta), law(case).cdf(theta), color=BLUE, lw=1.8)  # eq. 11
     axes.set_xlabel("radius r over its median")
     axes.set_ylabel("cumulative distribution")
     axes.set_ylim(0, 1.02)
-    axes.set_title(f"Log-normal particle radii, σ$_r$ = ln 10/6 = {SIGMA:.4f}, truncated", loc="left", fontsize=10)
+    axes.set_title(f"Log-normal particle radii, σ$_r$ = (ln 10)/6 = {SIGMA:.4f}, truncated", loc="left", fontsize=10)
     return drawn
 
 

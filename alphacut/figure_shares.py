@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from alphacut.captions import in_words
 from alphacut.figure_envelope import WORDS
 from alphacut.figure_style import BLUE, GREY, ORANGE, PURPLE, figure
 
@@ -19,12 +20,14 @@ def over_time(found: xarray.Dataset) -> Figure:
     """Width lost when an input is fixed, over the width, for the last output; above it the width itself."""
     import matplotlib.pyplot as plt
 
+    from frame.envelope import output_unit
+
     drawn, grid = plt.subplots(2, 1, figsize=(7.2, 4.8), sharex=True, height_ratios=(1, 1.6))
     output = str(found["output"].values[-1])
     time = found["time"].values
     grid[0].fill_between(time, 0, found["width"].sel(output=output), color="#cfe3f0", lw=0)
     grid[0].plot(time, found["width"].sel(output=output), color=BLUE, lw=1)
-    grid[0].set_ylabel(f"width of {output}, SI")
+    grid[0].set_ylabel(f"width of {output}, {output_unit(output)}")
     grid[0].set_ylim(bottom=0)
     for index, name in enumerate(found["input"].values):
         colour, dashes = COLOURS[index % len(COLOURS)], STYLES[(index // len(COLOURS)) % len(STYLES)]
@@ -47,7 +50,7 @@ def of_modulus(found: xarray.Dataset) -> Figure:
     for index, name in enumerate(names):
         share = [float(found["modulus_share"].sel(cell_input=name, alpha=level)) for level in levels]
         places = [place + (index - (len(names) - 1) / 2) * thickness for place in range(len(levels))]
-        axes.bar(places, share, thickness, color=COLOURS[index % len(COLOURS)], label=name.replace("_", " "))
+        axes.bar(places, share, thickness, color=COLOURS[index % len(COLOURS)], label=in_words(name))
     axes.set_xticks(range(len(levels)), [f"α = {level:g}" for level in levels])
     axes.set_ylabel("share of the width of E")
     axes.set_ylim(0, 1)

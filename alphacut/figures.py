@@ -32,14 +32,16 @@ def drawings(results: Results) -> Iterator[Drawing]:
     """Name and function of each figure that the results allow."""
     if results.case.has("radius.a1"):
         if "microstructure" not in results.case.stages:  # that stage draws both from its particles
-            yield "fig11-radii", lambda: figure_radius.radii(results.case)
+            if results.case.quoted:
+                yield "fig11-radii", lambda: figure_radius.radii(results.case)
             yield "fig13-p-box", lambda: figure_radius.p_box(results.case)
         yield "fig14-cone", lambda: figure_radius.cone(results.case)
     if (modulus := results.modulus) is not None:
         yield "fig16-stress-curves", lambda: figure_modulus.stress_curves(modulus)
         yield "fig17-mean-stress", lambda: figure_modulus.mean_stress(modulus)
         yield "fig18-modulus", lambda: figure_modulus.fuzzy_modulus(modulus, results.case)
-        yield "fig19-membership", lambda: figure_fuzzy.membership(modulus)
+        if results.case.quoted:
+            yield "fig19-membership", lambda: figure_fuzzy.membership(modulus)
     if (stress := results.response) is not None:
         yield "response", lambda: figure_response.response(stress)
     if results.envelopes:
@@ -62,6 +64,11 @@ def share_drawings(driving: xarray.Dataset) -> Iterator[Drawing]:
         yield "shares-over-time", lambda: figure_shares.over_time(driving)
 
 
+def file_stem(name: str, results: Results) -> str:
+    """The figure's name; the paper's number leads it in the paper's case alone."""
+    return name if results.case.quoted else re.sub(r"^fig[\d-]+-", "", name)
+
+
 def draw(results: Results, driving: xarray.Dataset, *, quiet: bool = False) -> list[str]:
     """Draw every figure as SVG and PNG into figures/; returns the names of the files."""
     folder = results.folder / "figures"
@@ -69,7 +76,7 @@ def draw(results: Results, driving: xarray.Dataset, *, quiet: bool = False) -> l
     todo = [*drawings(results), *share_drawings(driving)]
     with progress("Figures", quiet=quiet) as tick, style():
         for done, (name, make) in enumerate(todo, start=1):
-            names += [str(path.relative_to(results.folder)) for path in save(make(), folder / name)]
+            names += [str(path.relative_to(results.folder)) for path in save(make(), folder / file_stem(name, results))]
             if tick:
                 tick(done / len(todo))
     return [*particle_pictures(folder, results), *names, *mesh_picture(results)]
@@ -89,7 +96,7 @@ def mesh_picture(results: Results) -> list[str]:
         return []
     from alphacut.figure_mesh import draw_mesh
 
-    pictures = {"figures/fig15-prism-mesh.png": "mesh"}
+    pictures = {f"figures/{file_stem('fig15-prism-mesh', results)}.png": "mesh"}
     if results.case.text("mesh.interface") == "conforming":
         pictures["figures/stress-on-slices.png"] = "stress"
     return [name for name, kind in pictures.items() if draw_mesh(results.case, results.folder / name, kind)]

@@ -60,7 +60,7 @@ class FuzzyModulus:
     @property
     def reason(self) -> str:
         """Which model method auto took at the modal point, and why; empty for any other method."""
-        return f"{self.judged.method}: {self.judged.reason}" if self.judged and self.choice.method == "auto" else ""
+        return self.judged.reason if self.judged and self.choice.method == "auto" else ""
 
     @property
     def error(self) -> dict[str, float]:

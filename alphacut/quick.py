@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from alphacut.case import Case
 
@@ -20,6 +23,24 @@ COARSE = {
     "microstructure.packing.packings": 5,
     "microstructure.packing.discs": 500,
 }
+
+
+PARTS = {"mesh": "modulus", "modulus": "modulus", "exceedance": "envelope", "study": "envelope", "envelope": "envelope"}
+
+
+def settings(case: Case) -> dict[str, object]:
+    """What the quick form of a case takes in place of the case's own values, of the stages that are computed."""
+    keys = [key for key in case.values if (key in COARSE or key.endswith(".duration")) and case.has(key)]
+    return {key: case.values[key] for key in keys if PARTS.get(re.split(r"[.\[]", key)[0], "microstructure") in case.stages}
+
+
+def banner(found: Mapping[str, Any]) -> str:
+    """What to say above the results of a quick form, from `settings`."""
+    parts = []
+    for key, value in found.items():
+        words = f"[{', '.join(f'{x:g}' for x in value)}]" if isinstance(value, Sequence) and not isinstance(value, str) else f"{value}"
+        parts.append(f"{key} = {value:g} s" if key.endswith(".duration") else f"{key} = {words}")
+    return f"Quick form: {', '.join(parts)}; these numbers mean nothing"
 
 
 def quick(case: Case) -> Case:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from alphacut.quick import banner
 from alphacut.report_sections import sections
 from alphacut.stored import read_dataset, read_summary
 
@@ -33,6 +34,7 @@ def report(folder: Path) -> str:
         title=html.escape(summary["title"]),
         name=html.escape(summary["case"]),
         about=html.escape(" ".join(summary.get("about", "").split())),
+        banner=f'<p class="banner">{html.escape(banner(summary["quick"]))}.</p>' if "quick" in summary else "",
         css=text["css"],
         js=text["js"],
         sections="\n".join(sections(summary, folder)),

@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from alphacut import outcomes, response
+from alphacut.captions import caption, in_words
 from alphacut.command_cite import citation
 from alphacut.differences import differences
+from alphacut.units import engineering
 
 SVG_LIMIT = 200_000  # bytes; a heavier figure goes into the page as PNG
 
@@ -21,7 +23,7 @@ def sections(summary: Mapping[str, Any], folder: Path) -> Iterator[str]:
     if "microstructure" in summary:
         yield microstructure(summary["microstructure"])
     if "modulus" in summary:
-        yield modulus(summary["modulus"], folder)
+        yield modulus(summary["modulus"], folder, paper=bool(summary.get("paper")))
     if "response" in summary:
         yield stress(summary["response"], folder)
     if summary.get("envelopes"):
@@ -33,7 +35,7 @@ def sections(summary: Mapping[str, Any], folder: Path) -> Iterator[str]:
     yield methods(summary)
     yield gallery(summary, folder)
     yield case_text(summary)
-    yield differing()
+    yield differing(summary)
     yield versions(summary)
 
 
@@ -68,7 +70,7 @@ def microstructure(found: Mapping[str, Any]) -> str:
     return section("Microstructure", words, table(("parameter of the radius map", "fuzzy value"), rows))
 
 
-def modulus(found: Mapping[str, Any], folder: Path) -> str:
+def modulus(found: Mapping[str, Any], folder: Path, *, paper: bool) -> str:
     """The fuzzy modulus with its α-cuts, error budget and certificate."""
     cuts = zip(found["alpha"], found["E_GPa"]["lower"], found["E_GPa"]["upper"], strict=True)
     rows = [(f"{alpha:g}", f"{low:.4f}", f"{high:.4f}") for alpha, low, high in cuts]
@@ -76,14 +78,16 @@ def modulus(found: Mapping[str, Any], folder: Path) -> str:
         f"<p>Modal value <strong>{found['modal_GPa']:.4f} GPa</strong>, support [{found['lower_GPa']:.4f}, {found['upper_GPa']:.4f}] GPa; "
         f"Poisson's ratio {found['nu']:.4f}. E is the modulus of eq. 16, the paper's convention: a square array is not isotropic. "
         f"{found['samples']} samples, {found['solves']} linear systems, {found['seconds']:.1f} s. "
-        f"{html.escape(found.get('reason', ''))}</p>"
+        f"{html.escape(sentence(found.get('reason', '')))}</p>"
     )
-    budget = [(name, f"{value:.2g}") for name, value in found.get("error", {}).items()]
-    checks = [(name, f"{value:.2g}") for name, value in found.get("checks", {}).items()]
+    stem = "fig18-modulus" if paper else "modulus"
+    drawn = picture(folder / "figures" / f"{stem}.svg", caption(stem, paper=paper))
+    budget = [(in_words(name), f"{value:.2g}") for name, value in found.get("error", {}).items()]
+    checks = [(in_words(name), f"{value:.2g}") for name, value in found.get("checks", {}).items()]
     return section(
         "Fuzzy modulus",
         words,
-        picture(folder / "figures" / "fig18-modulus.svg", "Fuzzy effective modulus (counterpart of Fig. 18)."),
+        drawn,
         table(("α", "lower E, GPa", "upper E, GPa"), rows),
         "<h3>Error budget</h3>" + table(("source", "estimated relative error of E"), budget) if budget else "",
         "<h3>Certificate</h3>" + table(("property", "measured violation, largest of all samples"), checks) if checks else "",
@@ -112,9 +116,13 @@ def envelopes(summary: Mapping[str, Any]) -> str:
         '<p class="hint">The shaded bands are the computed α-cuts, the darker the higher α; the orange line is the cut at the slider\'s α, '
         "between computed levels by linear interpolation. Drag or turn the wheel to zoom, double click to see everything.</p>"
     )
-    rows = []
+    from frame.envelope import output_unit
+
+    rows: list[tuple[str, ...]] = []
     for name, study in summary["envelopes"].items():
-        rows += [(name, output, f"{study['min'][output]:.4f}", f"{study['max'][output]:.4f}") for output in study["min"]]
+        for output in study["min"]:
+            ends = (engineering(study[side][output], output_unit(output)) for side in ("min", "max"))
+            rows.append((name, output, *ends))
     svg = '<svg id="plot" role="img" aria-label="Envelopes over time"></svg><div id="readout"></div>'
     extremes = table(("study", "output", "least at α = 0", "greatest at α = 0"), rows, numbers=2)
     return section("Envelopes", controls, svg, hint, extremes, peaks(summary))
@@ -127,7 +135,8 @@ def peaks(summary: Mapping[str, Any]) -> str:
     rows = []
     for name, study in summary["envelopes"].items():
         for output, of in study.get("peak", {}).items():
-            cuts = (f"[{of['lower'][level]:.4g}, {of['upper'][level]:.4g}] {output_unit(output)}" for level in (0, -1))
+            unit = output_unit(output)
+            cuts = (f"{engineering(of['lower'][level], unit)} … {engineering(of['upper'][level], unit)}" for level in (0, -1))
             rows.append((name, output, *cuts))
     words = (
         "<p>Fuzzy peak of each output's magnitude over time, on the lowest and the highest level; the lower end is a bound from below.</p>"
@@ -138,7 +147,7 @@ def peaks(summary: Mapping[str, Any]) -> str:
 
 def shares(found: Mapping[str, Any]) -> str:
     """What drives the width."""
-    rows = [(quantity, name, f"{share:.1%}") for quantity, entry in found.items() for name, share in entry.items()]
+    rows = [(quantity, in_words(name), f"{share:.1%}") for quantity, entry in found.items() for name, share in entry.items()]
     words = "<p>Share of the width at α = 0 that is lost when an input is fixed at its modal value and all others are kept.</p>"
     return section("What drives the width", words, table(("quantity", "input", "share"), rows, numbers=2))
 
@@ -176,17 +185,14 @@ def methods(summary: Mapping[str, Any]) -> str:
 def gallery(summary: Mapping[str, Any], folder: Path) -> str:
     """Every figure of the run."""
     names = [name for name in summary.get("figures", []) if name.endswith(".png")]
-    figures = [picture((folder / name).with_suffix(".svg"), caption(Path(name).stem)) for name in names]
+    paper = bool(summary.get("paper"))
+    figures = [picture((folder / name).with_suffix(".svg"), caption(Path(name).stem, paper=paper)) for name in names]
     return section("Figures", '<div class="gallery">' + "\n".join(figures) + "</div>") if figures else ""
 
 
-def caption(stem: str) -> str:
-    """Words for the name of a figure's file: fig13-p-box becomes Fig. 13: p-box."""
-    number, _, words = stem.partition("-")
-    if particles := re.fullmatch(r"([\d-]+)_(.*)", stem):
-        return f"Fig. {particles[1]}: {particles[2].replace('_', ' ')}"
-    found = re.fullmatch(r"fig([\d]+)", number)
-    return f"Fig. {found[1]}: {words.replace('-', ' ')}" if found else stem.replace("-", " ")
+def sentence(text: str) -> str:
+    """Text as a sentence: a capital at its head, a full stop at its end."""
+    return f"{text[0].upper()}{text[1:].rstrip('.')}." if text else ""
 
 
 def picture(svg: Path, caption: str) -> str:
@@ -217,10 +223,11 @@ def case_text(summary: Mapping[str, Any]) -> str:
     )
 
 
-def differing() -> str:
-    """What the program does otherwise than the paper, from the heads of its modules."""
-    rows = "".join(f"<li><strong>{html.escape(subject)}</strong>: {html.escape(text)}</li>" for subject, text in differences())
-    return section("Differences from the paper", f"<ul>{rows}</ul>")
+def differing(summary: Mapping[str, Any]) -> str:
+    """What the program does otherwise than the paper, from the heads of the modules that the run used."""
+    found = tuple(differences(summary))
+    rows = "".join(f"<li><strong>{html.escape(subject)}</strong>: {html.escape(text)}</li>" for subject, text in found)
+    return section("Differences from the paper", f"<ul>{rows}</ul>") if found else ""
 
 
 def versions(summary: Mapping[str, Any]) -> str:

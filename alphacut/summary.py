@@ -44,8 +44,7 @@ def summary(results: Results) -> dict[str, Any]:
         found["envelopes"] = {name: {"fuzzy": fuzzy[name], **envelope_numbers(dataset)} for name, dataset in results.envelopes.items()}
     if results.exceedance is not None:
         found["exceedance"] = outcomes.exceedance_document(results.exceedance)
-    quoted = case.path.with_suffix(".quoted.toml")
-    found["paper"] = comparison(quoted, found) if quoted.is_file() else []
+    found["paper"] = comparison(case.quoted, found) if case.quoted else []
     return found
 
 

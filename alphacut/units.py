@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from decimal import Decimal
 from functools import cache
 from typing import TYPE_CHECKING
@@ -63,6 +64,22 @@ def factor(unit: str, si: str) -> Decimal:
         raise ValueError(f'the unit "{unit}" is wrong') from None
     except Exception:  # pint's tokeniser raises whatever Python's does on text that is not a unit at all
         raise ValueError(f'the unit "{unit}" cannot be read') from None
+
+
+PREFIXES = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
+MINUS = "\u2212"
+PREFIXED = ("m", "m/s", "m/s^2", "N", "Pa", "s", "rad", "W", "J")
+
+
+def engineering(value: float, si: str, *, digits: int = 4) -> str:
+    """A value in `si` for people: ``−3.590 MN``; a unit that takes no prefix stands as it is."""
+    if si not in PREFIXED or not value or not math.isfinite(value):
+        return f"{value:.{digits}g} {si}".strip().replace("-", MINUS)
+    rounded = float(f"{value:.{digits}g}")
+    exponent = min(9, max(-9, 3 * math.floor(math.log10(abs(rounded)) / 3)))
+    scaled = rounded / 10.0**exponent
+    places = max(0, digits - 1 - math.floor(math.log10(abs(scaled))))
+    return f"{'-' if value < 0 else ''}{abs(scaled):.{places}f} {PREFIXES[exponent]}{si}".replace("-", MINUS)
 
 
 def shown(value: float, unit: str, si: str) -> float:
