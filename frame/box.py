@@ -91,10 +91,12 @@ class UnitFlow:
     Args:
         flow: The flow in physical parameters.
         boxes: The boxes; its names must be those of `flow`.
+        relative: Whether tolerances are shares of each output's modal peak instead of lengths.
     """
 
     flow: Flow
     boxes: Boxes
+    relative: bool = False
 
     @property
     def time(self) -> Array:
@@ -108,11 +110,14 @@ class UnitFlow:
 
     @cached_property
     def scale(self) -> Array:
-        """Factor on a tolerance for each output, shape (m,): 1 when all share a unit, else their modal peaks by the first one's."""
-        if len({output_unit(name) for name in self.outputs}) == 1:
+        """Factor on a tolerance for each output, shape (m,).
+
+        Relative: the modal peaks. Else 1 when all outputs share a unit, or their modal peaks by the first one's.
+        """
+        if not self.relative and len({output_unit(name) for name in self.outputs}) == 1:
             return np.ones(len(self.outputs))
         peak = np.abs(self.flow.values(self.boxes.modal[None])[0]).max(0)
-        shares: Array = np.where(peak > 0, peak, peak.max() or 1.0) / (peak[0] or 1.0)
+        shares: Array = np.where(peak > 0, peak, peak.max() or 1.0) / (1.0 if self.relative else peak[0] or 1.0)
         return shares
 
     def values(self, unit: Array) -> Array:

@@ -10,9 +10,10 @@ from typing import Protocol
 
 import numpy as np
 
-from frame.integrators import Integrator, Midpoint, StepMap
+from frame.integrators import Exact, Integrator, Midpoint, StepMap
 from frame.jet import Array, Jet, concatenate
 from frame.linear import LinearSystem, check_names, evaluate
+from frame.spectral import LARGE, NearlyCriticalError, spectral_trajectory
 
 
 class Flow(Protocol):
@@ -96,11 +97,25 @@ class LinearFlow:
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
         matrices, rows = evaluate(self.system, self.names, points, derivatives=derivatives)
-        step_map = self.integrator.step_map(matrices, self.step)
+        load, every = self._load()
+        h = self.step / every
+        if isinstance(self.integrator, Exact) and rows.value.shape[-1] >= LARGE:
+            try:
+                return spectral_trajectory(matrices, rows, load=load, step=h, every=every, count=len(self.time))
+            except NearlyCriticalError:
+                pass  # powers of the transfer matrix need no eigenvectors
+        step_map = self.integrator.step_map(matrices, h)
         start = concatenate([matrices.q0, matrices.v0], -2)
+        found = trajectory(step_map, start, rows, load=load, count=(len(self.time) - 1) * every + 1)
+        return found if every == 1 else found[:, ::every]
+
+    def _load(self) -> tuple[Array | None, int]:
+        """Ground acceleration at the nodes; the exact propagator also takes the samples of a finer record between them."""
         ground = self.system.ground
-        load = None if ground is None else ground.at(self.time)
-        return trajectory(step_map, start, rows, load=load, count=len(self.time))
+        if ground is None:
+            return None, 1
+        every = ground.intervals(self.step) if isinstance(self.integrator, Exact) else 1
+        return ground.at(np.arange((len(self.time) - 1) * every + 1) * (self.step / every)), every
 
 
 def trajectory(step_map: StepMap, start: Jet, rows: Jet, *, load: Array | None, count: int) -> Jet:

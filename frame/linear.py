@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import ceil
 from typing import Protocol
 
 import numpy as np
@@ -60,6 +61,21 @@ class Accelerogram:
         """Acceleration at `time`, any shape, in m/s²."""
         samples = np.arange(len(self.acceleration)) * self.step
         return np.interp(time, samples, self.acceleration, left=0.0, right=0.0)
+
+    def intervals(self, step: float) -> int:
+        """Into how many equal parts a step must be cut so that the record is linear, or nearly so, within each."""
+        least = ceil(step / self.step - 1e-9)
+        for parts in range(least, 8 * least):
+            share = self.step * parts / step
+            if abs(share - round(share)) < 1e-9:
+                return parts
+        return 8 * least
+
+    def band(self, share: float = 0.999) -> float:
+        """Angular frequency below which `share` of the record's power lies, in rad/s."""
+        power = np.cumsum(np.abs(np.fft.rfft(self.acceleration)) ** 2)
+        place = int(np.searchsorted(power, share * power[-1]))
+        return 2 * np.pi * place / (len(self.acceleration) * self.step)
 
 
 class LinearSystem(Protocol):

@@ -15,10 +15,11 @@ import numpy as np
 from frame.box import Boxes
 from frame.flow import LinearFlow
 from frame.halton import chebyshev_points
+from frame.integrators import state_matrix
 from frame.jet import Array, Jet
 from frame.linear import evaluate
 from frame.modal_load import LoadTable
-from frame.modes import ModalError, Modes, modes
+from frame.modes import ModalError, Modes, eigenvectors, modes
 from frame.polynomial import Polynomial, fit, terms
 
 
@@ -121,14 +122,20 @@ def composed(rate: Jet, share: Jet, wave: tuple[Array, Array, Array]) -> tuple[A
     return value, np.moveaxis(g, 0, -1), np.moveaxis(H, (0, 1), (-2, -1))
 
 
-def analyse(flow: LinearFlow, boxes: Boxes, unit: Array) -> Modes:
+def analyse(flow: LinearFlow, boxes: Boxes, unit: Array, chosen: Array | None = None) -> Modes:
     """Eigen-analyses at unit coordinates (S, d), with derivatives by these; eigenvalues are those of the flow's integrator.
+
+    Args:
+        flow: The trajectories.
+        boxes: The parameters' boxes.
+        unit: Where to analyse, shape (S, d).
+        chosen: Indices of the modes wanted; all when None.
 
     Raises:
         ModalError: The structure has no such modes, or the integrator mixes them.
     """
     matrices, rows = evaluate(flow.system, flow.names, boxes.to_physical(unit), derivatives=True)
-    found = modes(matrices, rows)
+    found = modes(matrices, rows, chosen)
     rate = _discrete(found.eigenvalue, flow)
     return Modes(*(_scaled(jet, boxes.radius) for jet in (rate, found.coefficient, found.load)))
 
@@ -172,13 +179,14 @@ def fit_modes(flow: LinearFlow, boxes: Boxes, *, tolerance: float = 1e-6, budget
     d = len(flow.names)
     held = _held_out(d)
     truth = flow.values(boxes.to_physical(held))
-    used, best = len(held), None
+    used, best, chosen = len(held), None, _needed(flow, boxes, tolerance / 4 * np.broadcast_to(scale, truth.shape[-1:]))
     data_per_analysis = 1 + d + d * (d + 1) // 2
     for degree in range(2, 13):
         needed = ceil((2.5 if d <= 6 else 5) * terms(d, degree) / data_per_analysis) + 1
         if used + needed > budget or terms(d, degree) > 2500:
             break
-        model = _fitted(flow, boxes, np.vstack([np.zeros((1, d)), chebyshev_points(d, needed - 1)]), degree, used + needed)
+        model = _fitted(flow, boxes, np.vstack([np.zeros((1, d)), chebyshev_points(d, needed - 1)]), degree, chosen)
+        model = replace(model, analyses=used + needed)
         error = np.abs(model.values(held) - truth).max(0)
         if best is None or (error / scale).max() < (best.error / scale).max():
             best = replace(model, error=error)
@@ -189,13 +197,36 @@ def fit_modes(flow: LinearFlow, boxes: Boxes, *, tolerance: float = 1e-6, budget
     return best
 
 
-def _fitted(flow: LinearFlow, boxes: Boxes, points: Array, degree: int, analyses: int) -> ModalModel:
-    found = analyse(flow, boxes, points)
+def _needed(flow: LinearFlow, boxes: Boxes, allowed: Array) -> Array:
+    """Indices of the modes whose share in some output matters, by a bound of it in the middle of the box.
+
+    Args:
+        flow: The trajectories.
+        boxes: The parameters' boxes.
+        allowed: What all modes left out may reach together, for each output, shape (m,).
+    """
+    matrices, rows = evaluate(flow.system, flow.names, boxes.centre[None], derivatives=False)
+    rate, X, Y = (jet.value[0] for jet in eigenvectors(state_matrix(matrices)))
+    state = np.abs(Y @ np.vstack([matrices.q0.value[0], matrices.v0.value[0]]))
+    ground = flow.system.ground
+    if ground is not None:
+        record = np.abs(ground.acceleration)
+        push = np.minimum(record.sum() * ground.step, record.max() / np.maximum(-rate.real, 1e-300))  # bound of |R(t; λ)|
+        state += np.abs(Y[:, len(matrices.rigid) :] @ matrices.rigid) * push[:, None]
+    upper = np.flatnonzero(rate.imag >= 0)
+    size = (2 * np.abs(rows.value[0] @ X).T * state / allowed)[upper]
+    order = np.argsort(size.max(1))
+    small = order[:-1][(np.cumsum(size[order[:-1]], 0) <= 1).all(1)]
+    return np.setdiff1d(upper, upper[small])
+
+
+def _fitted(flow: LinearFlow, boxes: Boxes, points: Array, degree: int, chosen: Array) -> ModalModel:
+    found = analyse(flow, boxes, points, chosen)
     flat = [jet.map(lambda x: x.reshape((*x.shape[:-2], -1))) for jet in (found.coefficient, found.load)]
     rate = fit(points, found.eigenvalue, degree)
     ground = flow.system.ground
     load = None if ground is None else LoadTable.build(ground, flow.time, rate, fit(points, flat[1], degree))
-    return ModalModel(flow, boxes, rate, fit(points, flat[0], degree), load, np.zeros((len(flow.time), len(flow.outputs))), analyses)
+    return ModalModel(flow, boxes, rate, fit(points, flat[0], degree), load, np.zeros((len(flow.time), len(flow.outputs))), 0)
 
 
 def _held_out(d: int) -> Array:

@@ -48,7 +48,7 @@ class LoadTable:
         starts = np.arange(0, len(time) - 1, length)
         window = length * (time[1] - time[0])
         order = max(6, ceil(2.72 * spread * window + 18))
-        return cls(middle, 1 / window, _moments(ground.at(time), middle, time, starts, window, order), starts, time, share)
+        return cls(middle, 1 / window, _moments(ground, middle, time, starts, window, order), starts, time, share)
 
     def values(self, unit: Array, rate: Array) -> Array:
         """Response of the outputs at points (S, d) with eigenvalues (S, n), shape (S, T, m)."""
@@ -94,20 +94,24 @@ class LoadTable:
         return plain
 
 
-def _moments(acceleration: Array, middle: Array, time: Array, starts: Array, window: float, order: int) -> Array:
-    """Taylor coefficients of the window's own part of R_k at all nodes, shape (T, n, order), for a load linear between nodes.
+def _moments(ground: Accelerogram, middle: Array, time: Array, starts: Array, window: float, order: int) -> Array:
+    """Taylor coefficients of the window's own part of R_k at all nodes, shape (T, n, order), for a load linear between its samples.
 
-    Per step: ∫ of exp((λ + x/window) τ) over the step as a truncated series in x, by Gauss quadrature to round-off; from node to
+    Per step: ∫ of exp((λ + x/window) τ) a over the step as a truncated series in x, by Gauss quadrature to round-off; from node to
     node the series is multiplied by that of exp((λ + x/window) h). A node that ends one window starts the next from nothing.
     """
     h = time[1] - time[0]
-    points, weights = np.polynomial.legendre.leggauss(8 + ceil(abs(middle).max() * h))
-    tau = h * (1 - points) / 2  # time from the quadrature point to the end of the step
+    parts = ground.intervals(h)
+    points, weights = np.polynomial.legendre.leggauss(8 + ceil(abs(middle).max() * h / parts))
+    share = (points + 1) / 2
+    tau = h - (np.arange(parts)[:, None] + share).ravel() * (h / parts)  # from each point to the end of the step
+    fine = ground.at(np.arange((len(time) - 1) * parts + 1) * (h / parts))  # as the exact propagator takes it
+    load = (fine[:-1, None] * (1 - share) + fine[1:, None] * share).reshape(len(time) - 1, -1)
     factorial = np.cumprod(np.concatenate([[1.0], np.arange(1, order)]))
     series = (tau[:, None] / window) ** np.arange(order) / factorial  # (Q, order)
-    kernel = np.exp(middle[:, None] * tau) * weights * (h / 2)  # (n, Q)
-    late = (points + 1) / 2
-    old, new = (np.einsum("kq,qi->ki", kernel * share, series) for share in (1 - late, late))
+    kernel = np.exp(middle[:, None] * tau) * np.tile(weights, parts) * (h / parts / 2)  # (n, Q)
+    pushed = load @ (kernel.T[:, :, None] * series[:, None]).reshape(len(tau), -1)
+    pushed = pushed.reshape(len(time) - 1, len(middle), order)
     advance = np.exp(middle * h)[:, None] * (h / window) ** np.arange(order) / factorial  # (n, order)
     product = np.zeros((len(middle), order, order), complex)  # truncated product with `advance` as a matrix
     for i in range(order):
@@ -116,5 +120,5 @@ def _moments(acceleration: Array, middle: Array, time: Array, starts: Array, win
     fresh = {int(start) for start in starts}
     for j in range(1, len(time)):
         carried = 0.0 if j - 1 in fresh else (out[j - 1][:, None] @ product)[:, 0]
-        out[j] = carried + old * acceleration[j - 1] + new * acceleration[j]
+        out[j] = carried + pushed[j - 1]
     return out

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from frame.integrators import state_matrix
-from frame.jet import Jet, concatenate, inverse
+from frame.jet import Array, Jet, concatenate, inverse
 from frame.linear import Matrices
 
 
@@ -20,7 +20,7 @@ class Modes:
     """Intervening variables of a structure (paper, section 7): smooth in the parameters, free of oscillation.
 
     Args:
-        eigenvalue: λ_k with Im λ_k > 0, rising, complex jet, V = (S, n), in 1/s.
+        eigenvalue: λ_k with Im λ_k > 0, by rising |λ_k|, complex jet, V = (S, n), in 1/s.
         coefficient: C_k, what the initial state puts into the outputs, V = (S, n, m).
         load: The same for a unit impulse of the ground's acceleration, V = (S, n, m).
     """
@@ -30,46 +30,54 @@ class Modes:
     load: Jet
 
 
-def modes(matrices: Matrices, rows: Jet) -> Modes:
+def modes(matrices: Matrices, rows: Jet, chosen: Array | None = None) -> Modes:
     """Eigen-analyses at S parameter sets.
 
     Args:
         matrices: The structure.
         rows: Observation rows, V = (S, m, 2n).
+        chosen: Indices of the modes wanted, among those that oscillate, by rising |λ|; all modes when None.
 
     Raises:
-        ModalError: A mode does not oscillate (overdamped or free to drift).
+        ModalError: A mode that is wanted does not oscillate (overdamped or free to drift).
     """
-    values, X, Y = _eigen(state_matrix(matrices))
-    n = values.value.shape[-1] // 2
+    values, X, Y = eigenvectors(state_matrix(matrices))
+    wanted = np.arange(values.value.shape[-1] // 2) if chosen is None else chosen
+    values = values[..., wanted]
+    if not oscillating(values.value).all():
+        raise ModalError(
+            "a mode does not oscillate: modal intervening variables need damping below critical in every mode; use graph-follower"
+        )
     start = concatenate([matrices.q0, matrices.v0], -2)
-    kick = np.zeros((2 * n, 1))
-    kick[n:] = -matrices.rigid
-    seen = (rows @ X)[..., :n]  # V = (S, m, n)
+    kick = np.concatenate([np.zeros_like(matrices.rigid), -matrices.rigid])
+    seen = rows @ X[..., wanted]  # V = (S, m, n)
 
-    def through(excitation: Jet) -> Jet:
-        share = (Y @ excitation)[..., :n, 0][..., None, :]
+    def through(excitation: Jet | Array) -> Jet:
+        share = (Y @ excitation)[..., wanted, 0][..., None, :]
         return (seen * share).map(lambda x: x.swapaxes(-1, -2))
 
-    return Modes(values[..., :n], through(start), (seen * (Y @ kick)[..., :n, 0][..., None, :]).map(lambda x: x.swapaxes(-1, -2)))
+    return Modes(values, through(start), through(kick))
 
 
-def _eigen(A: Jet) -> tuple[Jet, Jet, Jet]:
-    """Eigenvalues (upper half plane first, rising), right and left vectors of V = (S, 2n, 2n).
+def oscillating(rate: Array) -> Array:
+    """Which eigenvalues belong to the upper of a conjugate pair."""
+    yes: Array = rate.imag > 1e-9 * np.abs(rate)
+    return yes
+
+
+def eigenvectors(A: Jet) -> tuple[Jet, Jet, Jet]:
+    """Eigenvalues (upper half plane, then real ones, then lower, each by rising |λ|), right and left vectors of V = (S, 2n, 2n).
 
     With X(p) = X(p0) Z(p), Z(p0) = I and diag Z = I, second-order perturbation in the eigenbasis gives all derivatives.
     """
     values, X = np.linalg.eig(A.value)
-    order = np.lexsort((values.imag, values.imag < 0), axis=-1)
+    group = np.where(oscillating(values), 0, np.where(oscillating(values.conj()), 2, 1))
+    order = np.lexsort((np.abs(values), group), axis=-1)
     values, X = np.take_along_axis(values, order, -1), np.take_along_axis(X, order[:, None, :], -1)
-    n = values.shape[-1] // 2
-    if (values[:, :n].imag <= 1e-9 * np.abs(values[:, :n])).any() or (values[:, n:].imag >= 0).any():
-        raise ModalError(
-            "a mode does not oscillate: modal intervening variables need damping below critical in every mode; use graph-follower"
-        )
     Y = np.linalg.inv(X)
     gap = values[:, None, :] - values[:, :, None]
-    off = ~np.eye(2 * n, dtype=bool)
+    size = values.shape[-1]
+    off = ~np.eye(size, dtype=bool)
     weight = np.where(off, 1 / np.where(off & (gap != 0), gap, 1.0), 0.0)
     G1, G2 = Y @ A.first @ X, Y @ A.second @ X
     slope = np.einsum("...kk->...k", G1)
@@ -77,6 +85,6 @@ def _eigen(A: Jet) -> tuple[Jet, Jet, Jet]:
     pair = G1[:, None] @ Z1[None, :] - Z1[:, None] * slope[None, :, :, None, :]
     second = G2 + pair + pair.swapaxes(0, 1)
     Z2 = second * weight
-    eye = np.broadcast_to(np.eye(2 * n), Z1.shape[1:])
+    eye = np.broadcast_to(np.eye(size), Z1.shape[1:])
     right = X @ Jet(eye, Z1, Z2)
     return Jet(values, slope, np.einsum("...kk->...k", second)), right, inverse(right)

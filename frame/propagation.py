@@ -36,6 +36,7 @@ def envelope(
     alpha: Sequence[float] = ALPHA,
     method: str | None = None,
     integrator: str | Integrator | None = None,
+    relative: bool = False,
     progress: Progress | None = None,
     **options: Any,
 ) -> Envelope:
@@ -50,6 +51,7 @@ def envelope(
         method: Name of a method, see `METHODS`; unless given, modal for linear structures and
             improved-graph-follower for others and where the modes do not allow it.
         integrator: Time stepping: a method or its name; exact for the method modal and midpoint for all others unless given.
+        relative: Whether the method's tolerance is a share of each output's peak at the modal parameters, instead of a length in SI units.
         progress: Called with the fraction done.
         options: Options of the method, such as `order`, `tolerance`, `budget` of the Graph Follower.
 
@@ -59,7 +61,7 @@ def envelope(
     cuts = boxes(inputs, alpha)
     if isinstance(model, LagrangianSystem):
         flow = LagrangianFlow(model, cuts.names, duration, step, str(integrator or "midpoint"))
-        return _method(method or "improved-graph-follower")(UnitFlow(flow, cuts), progress, **options)
+        return _method(method or "improved-graph-follower")(UnitFlow(flow, cuts, relative), progress, **options)
     propagate = _modal_if_possible if method is None else _method(method)
     if integrator is None:
         integrator = "exact" if method is None or method in EXACT_BY_DEFAULT else "midpoint"
@@ -67,7 +69,7 @@ def envelope(
         raise ValueError(f"integrator: '{integrator}' is unknown; allowed are {', '.join(INTEGRATORS)}")
     scheme = INTEGRATORS[integrator] if isinstance(integrator, str) else integrator
     linear = LinearFlow(model, cuts.names, duration, step, scheme)
-    found = propagate(UnitFlow(linear, cuts), progress, **options)
+    found = propagate(UnitFlow(linear, cuts, relative), progress, **options)
     facts: dict[str, float | str] = {"integrator": scheme.name, "step_error": step_error(linear), **found.facts}
     envelope_error = float(found.facts.get("tolerance", 0.0)) if found.error is None else float(found.error.max())
     if float(facts["step_error"]) > envelope_error > 0:

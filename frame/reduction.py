@@ -2,8 +2,8 @@
 
 The full structure has thousands of unknowns and matrices that are sums of a few given matrices, each times a smooth factor of the
 parameters: K(p) = Σ_i f_i(p) K_i, likewise M and D. Projection on a common basis V makes it a small structure with n = V's columns,
-and everything in this package applies. The basis gathers Krylov vectors of the load at a few parameter sets;
-the error is measured against trajectories of the full structure at other parameter sets.
+and everything in this package applies. The basis holds the energy of harmonic responses at a few parameter sets
+(`frame.response_basis`); the error is measured against trajectories of the full structure at other parameter sets.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ import numpy as np
 from frame.halton import chebyshev_points
 from frame.jet import Array, Jet
 from frame.linear import Accelerogram, Matrices
+from frame.response_basis import energy_basis, response_shapes
+from frame.spectral import responses
 
 Factor = Callable[[Mapping[str, Any]], Any]
 
@@ -54,65 +56,65 @@ class AffineStructure:
         return M.tocsc(), K.tocsc()
 
     def reduced(
-        self, bounds: Mapping[str, tuple[float, float]], *, order: int = 16, samples: int = 8, keep: float = 1e-10
+        self, bounds: Mapping[str, tuple[float, float]], *, keep: float = 1e-11, samples: int = 5, frequencies: int = 24
     ) -> ReducedStructure:
-        """Projection on Krylov spaces of the load and the initial state at several points of a box.
+        """Projection on the shapes that carry the energy of the response to harmonic loads at several points of a box.
 
         Args:
             bounds: Lower and upper ends of the uncertain parameters.
-            order: Krylov vectors taken at each point.
+            keep: Share of the strongest shape's strain energy below which a shape is left out.
             samples: Points of the box.
-            keep: Share of the strongest direction of the shapes under which a direction is left out.
+            frequencies: Frequencies of the load at each point.
         """
-        shapes = [self._shapes(point, order) for point in _points(self.parameters, bounds, samples)]
-        M, _ = self.assembled(self.parameters)
-        basis = _orthonormal(np.hstack(shapes), M, keep)
+        band = self._band()
+        shapes = [response_shapes(self, point, np.geomspace(*band, frequencies)) for point in _points(self.parameters, bounds, samples)]
+        M, K = self.assembled(self.parameters)
+        always = [self.excitation] if self.ground is not None else []  # so that the rigid motion is projected without error
+        basis = energy_basis(
+            np.hstack(shapes), M, K, keep=keep, always=always + [x for x in (self.q0, self.v0) if x is not None and x.any()]
+        )
         small = [[(f, basis.T @ (A @ basis)) for f, A in terms] for terms in (self.mass, self.stiffness)]
         push = basis.T @ (M @ self.excitation)  # V is orthonormal in M: the coordinates of the rigid motion
         state = [np.zeros(basis.shape[1]) if x is None else basis.T @ (M @ x) for x in (self.q0, self.v0)]
         rows = np.array([row @ basis for row in self.observed.values()])
         return ReducedStructure(self, basis, small[0], small[1], push, rows, state[0], state[1])
 
-    def _shapes(self, p: Mapping[str, float], order: int) -> Array:
-        """Krylov vectors of the load: the static response x to M ι, then to M x, and so on, made M-orthonormal."""
+    def _band(self) -> tuple[float, float]:
+        """Angular frequencies from half the fundamental one to the end of the record's spectrum, at least to twenty times the lower."""
         from scipy.sparse.linalg import splu
 
-        M, K = self.assembled(p)
-        lu = splu(K)
-        starts = [M @ self.excitation, *(M @ x for x in (self.q0, self.v0) if x is not None and x.any())]
-        vectors: list[Array] = []
-        for start in starts:
-            x = lu.solve(start)
-            for _ in range(order):
-                for _ in range(2):  # twice is enough to stay orthogonal
-                    for other in vectors:
-                        x = x - other * (other @ (M @ x))
-                vectors.append(x / np.sqrt(x @ (M @ x)))
-                x = lu.solve(M @ vectors[-1])
-        return np.column_stack(vectors)
+        M, K = self.assembled(self.parameters)
+        x = splu(K).solve(M @ self.excitation)
+        fundamental = float(np.sqrt((x @ (K @ x)) / (x @ (M @ x))))
+        top = 0.0 if self.ground is None else self.ground.band()
+        return fundamental / 2, max(top, 20 * fundamental)
 
-    def trajectories(self, p: Mapping[str, float], time: Array, *, split: int = 8) -> Array:
-        """Outputs of the full structure by Newmark's method with `split` steps between nodes, shape (T, m); for checking."""
-        from scipy.sparse.linalg import splu
+    def trajectories(self, p: Mapping[str, float], time: Array) -> Array:
+        """Outputs of the full structure, exact for a record linear between its samples, by all its modes; shape (T, m); for checking.
+
+        Rayleigh damping keeps the undamped modes, each of which answers with two exponentials.
+        """
+        from scipy.linalg import eigh
 
         M, K = self.assembled(p)
-        D = float(p[self.rayleigh[0]]) * M + float(p[self.rayleigh[1]]) * K
-        h = (time[1] - time[0]) / split
-        lu = splu((M / h + D / 2 + K * (h / 4)).tocsc())
-        back = (M / h + D / 2 - K * (h / 4)).tocsr()
-        load = M @ self.excitation
-        q = np.zeros(M.shape[0]) if self.q0 is None else self.q0
-        v = np.zeros(M.shape[0]) if self.v0 is None else self.v0
-        rows = np.array(list(self.observed.values()))
-        fine = np.arange((len(time) - 1) * split + 1) * h
-        ground = np.zeros(len(fine)) if self.ground is None else self.ground.at(fine)
-        out = [rows @ q]
-        for k in range(len(fine) - 1):
-            new = lu.solve(back @ q + M @ v - load * (h / 4 * (ground[k] + ground[k + 1])))
-            q, v = new, 2 * (new - q) / h - v
-            if (k + 1) % split == 0:
-                out.append(rows @ q)
-        return np.array(out)
+        squared, shape = eigh(K.toarray(), M.toarray())
+        half = (float(p[self.rayleigh[0]]) + float(p[self.rayleigh[1]]) * squared) / 2
+        root = np.sqrt(half**2 - squared + 0j)
+        slow, fast = -half + root, -half - root
+        rows = np.array(list(self.observed.values())) @ shape
+        h, out = time[1] - time[0], np.zeros((len(time), len(rows)), complex)
+        if self.ground is not None:
+            every = self.ground.intervals(h)
+            load = self.ground.at(np.arange((len(time) - 1) * every + 1) * (h / every))
+            share = -(shape.T @ (M @ self.excitation)) / (slow - fast)
+            two = responses(np.stack([slow, fast]), load, h / every, every=every)[0]
+            out += ((two[0] - two[1]) * share) @ rows.T
+        for x, parts in ((self.q0, (-fast, slow)), (self.v0, (1.0, -1.0))):
+            if x is not None and x.any():
+                share = shape.T @ (M @ x) / (slow - fast)
+                out += (share * (parts[0] * np.exp(np.outer(time, slow)) + parts[1] * np.exp(np.outer(time, fast)))) @ rows.T
+        found: Array = out.real
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,15 +190,6 @@ def _points(modal: Mapping[str, float], bounds: Mapping[str, tuple[float, float]
     low, high = np.array(list(bounds.values())).T
     unit = np.vstack([np.zeros((1, len(low))), chebyshev_points(len(low), samples - 1)])
     return [{**modal, **dict(zip(bounds, (low + high) / 2 + (high - low) / 2 * u, strict=True))} for u in unit]
-
-
-def _orthonormal(shapes: Array, M: Any, share: float) -> Array:
-    """M-orthonormal basis of the shapes, directions under `share` of the largest left out."""
-    shapes = shapes / np.sqrt(np.einsum("ij,ij->j", shapes, M @ shapes))
-    values, vectors = np.linalg.eigh(shapes.T @ (M @ shapes))
-    keep = values > share * values.max()
-    basis: Array = shapes @ (vectors[:, keep] / np.sqrt(values[keep]))
-    return basis
 
 
 def _lifted(factor: Any, size: int, directions: int) -> Jet:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.sparse.linalg import eigsh
@@ -38,25 +40,49 @@ def test_rigid_motion_costs_no_energy_away_from_the_foot() -> None:
 
 def test_reduced_structure_follows_the_full_one() -> None:
     structure = TOWER.structure()
-    reduced = structure.reduced({"E_beams": (27e9, 33e9), "mass": (11e3, 13e3)}, order=14)
-    points = np.array([[27e9, 13e3], [33e9, 11.5e3]])
-    values = LinearFlow(reduced, ("E_beams", "mass"), 4, 0.02, Exact()).values(points)
+    box = {"E_beams": (27e9, 33e9), "mass": (11e3, 13e3)}
+    reduced, poor = structure.reduced(box), structure.reduced(box, keep=1e-3)
+    points = np.array([[27e9, 13e3], [33e9, 11.5e3], [28e9, 11e3]])
     named = [{"E_beams": a, "mass": b} for a, b in points]
-    assert reduced.error(named, TIME, values) < 5e-3
-    poor = structure.reduced({"E_beams": (27e9, 33e9), "mass": (11e3, 13e3)}, order=1)
-    worse = LinearFlow(poor, ("E_beams", "mass"), 4, 0.02, Exact()).values(points)
-    assert poor.error(named, TIME, worse) > 0.02
+    values, worse = (LinearFlow(x, ("E_beams", "mass"), 4, 0.02, Exact()).values(points) for x in (reduced, poor))
+    assert reduced.error(named, TIME, values) < 5e-4
+    assert poor.error(named, TIME, worse) > 5e-3
+
+
+def test_full_structure_agrees_with_the_propagator_of_its_matrices() -> None:
+    structure = replace(BeamFrame(2, 1, ground=GROUND).structure(), q0=np.full(12, 1e-3), v0=np.linspace(-0.1, 0.1, 12))
+    small = replace(structure.reduced({"mass": (11e3, 13e3)}), basis=np.eye(12))
+    rows = np.array(list(structure.observed.values()))
+    terms = [[(f, A.toarray()) for f, A in pairs] for pairs in (structure.mass, structure.stiffness)]
+    small = replace(small, mass=terms[0], stiffness=terms[1], push=structure.excitation, rows=rows, q0=structure.q0, v0=structure.v0)
+    found = LinearFlow(small, ("mass",), 4, 0.04, Exact()).values(np.array([[12e3]]))[0]
+    truth = structure.trajectories(structure.parameters, TIME)[::2]
+    assert np.abs(found - truth).max() < 1e-9 * np.abs(truth).max()
 
 
 def test_envelope_of_a_reduced_tower() -> None:
     inputs = {"E_beams": Triangular(27e9, 30e9, 33e9), "rayleigh_mass": Triangular(0.03, 0.05, 0.07)}
-    reduced = TOWER.structure().reduced({"E_beams": (27e9, 33e9)}, order=6, samples=2)
+    reduced = TOWER.structure().reduced({"E_beams": (27e9, 33e9)}, keep=1e-5)
     common = {"duration": 4, "step": 0.02, "alpha": (0,), "integrator": "exact"}
     found = envelope(reduced, inputs, method="improved-graph-follower", tolerance=1e-5, **common)
     sampled = envelope(reduced, inputs, method="quasi-monte-carlo", samples=256, **common)
     beyond = np.maximum(sampled.upper - found.upper, found.lower - sampled.lower).max((0, 1))
     assert (beyond < 1e-3 * np.abs(found.upper).max((0, 1))).all()
     assert found.outputs == ("roof", "drift")
+
+
+def test_eigenvalues_and_powers_give_the_same_trajectory(monkeypatch: pytest.MonkeyPatch) -> None:
+    noise = Accelerogram(0.03, np.random.default_rng(0).standard_normal(100))
+    frame = StoreyFrame([1e4] * 3, [3.0] * 3, 25e9, 1e-6, [900, 0, 700], "storey", [0.01] * 3, [0.1] * 3, rayleigh=(0.1, 0.2), ground=noise)
+    flow, point = LinearFlow(frame, ("E", "m1", "d1"), 3, 0.05, Exact()), np.array([[25e9, 1e4, 900], [24e9, 1.1e4, 950]])
+    powers = flow.taylor(point)
+    monkeypatch.setattr("frame.flow.LARGE", 2)
+    modes = flow.taylor(point)  # some of them overdamped
+    assert np.abs(powers.value - modes.value).max() < 1e-11 * np.abs(powers.value).max()
+    for i in range(3):
+        assert np.abs(powers.first[i] - modes.first[i]).max() < 1e-10 * np.abs(powers.first[i]).max()
+        assert np.abs(powers.second[i] - modes.second[i]).max() < 1e-9 * np.abs(powers.second[i]).max()
+    assert noise.intervals(0.05) == 5
 
 
 def test_impossible_frames_are_refused() -> None:
