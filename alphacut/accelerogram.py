@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from frame import Accelerogram
 
 COLUMNS = {"time": "s", "acceleration": "m/s^2"}
+ALLOWED = "time [s],acceleration [m/s^2]"
+PAIR = "a time and an acceleration, such as 0.02,-0.35, with points and not commas in the numbers"
 EVEN = 1e-6  # relative: steps that differ by more are not even
 
 
@@ -28,34 +30,41 @@ def accelerogram(path: Path, key: str = "frame.accelerogram") -> Accelerogram:
     """
     from frame import Accelerogram
 
-    rows = table(path, key)
-    scales = header(rows[0], path, key)
-    times, values = [], []
-    for number, row in enumerate(rows[1:], start=2):
-        try:
-            time, value = (float(text) for text in row)
-        except ValueError:
-            raise BadInput(Problem(key, "this row is no pair of numbers", ",".join(row), file=str(path), line=number)) from None
-        if not (math.isfinite(time) and math.isfinite(value)):
-            raise BadInput(Problem(key, "this row is not finite", ",".join(row), file=str(path), line=number))
+    (line, first), *rows = table(path, key)
+    scales = header(first, path, line, key)
+    times, values, lines = [], [], []
+    for line, row in rows:
+        time, value = pair(row, path, line, key)
         times.append(time * scales[0])
         values.append(value * scales[1])
-    return Accelerogram(even_step(times, path, key), np.array(values))
+        lines.append(line)
+    return Accelerogram(even_step(times, lines, path, key), np.array(values))
 
 
-def table(path: Path, key: str) -> list[list[str]]:
-    """Rows of the file that are neither empty nor comments; at least a header and two more."""
+def table(path: Path, key: str) -> list[tuple[int, list[str]]]:
+    """Line and entries of every row that is neither empty nor a comment; at least a header and two more."""
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise BadInput(Problem(key, f"the record cannot be read: {error}", str(path))) from None
-    rows = [row for row in csv.reader(line for line in lines if line.strip() and not line.startswith("#"))]
-    if len(rows) < 3:
-        raise BadInput(Problem(key, "the record needs a header and two rows or more", str(path), "time [s],acceleration [m/s^2]"))
-    return rows
+    kept = [(number, line) for number, line in enumerate(lines, start=1) if line.strip() and not line.startswith("#")]
+    if len(kept) < 3:
+        raise BadInput(Problem(key, "the record needs a header and two rows or more", str(path), ALLOWED))
+    return [(number, next(csv.reader([line]))) for number, line in kept]
 
 
-def header(row: list[str], path: Path, key: str) -> list[float]:
+def pair(row: list[str], path: Path, line: int, key: str) -> tuple[float, float]:
+    """Time and acceleration of a row."""
+    try:
+        time, value = (float(text) for text in row)
+    except ValueError:
+        raise BadInput(Problem(key, "this row is no pair of numbers", ",".join(row), PAIR, file=str(path), line=line)) from None
+    if not (math.isfinite(time) and math.isfinite(value)):
+        raise BadInput(Problem(key, "this row is not finite", ",".join(row), PAIR, file=str(path), line=line))
+    return time, value
+
+
+def header(row: list[str], path: Path, line: int, key: str) -> list[float]:
     """Factors that bring the columns to SI, from the units in the header."""
     scales = []
     for text, (name, si) in zip(row, COLUMNS.items(), strict=False):
@@ -65,16 +74,17 @@ def header(row: list[str], path: Path, key: str) -> list[float]:
                 raise ValueError(f"the column {text.strip()!r} is not {name} with its unit")
             scales.append(float(factor(match[1], si)))
         except ValueError as error:
-            raise BadInput(Problem(key, str(error), file=str(path), line=1, allowed="time [s],acceleration [m/s^2]")) from None
+            raise BadInput(Problem(key, str(error), file=str(path), line=line, allowed=ALLOWED)) from None
     if len(row) != len(COLUMNS):
-        raise BadInput(Problem(key, f"got {len(row)} columns", file=str(path), line=1, allowed="time [s],acceleration [m/s^2]"))
+        raise BadInput(Problem(key, f"got {len(row)} columns", file=str(path), line=line, allowed=ALLOWED))
     return scales
 
 
-def even_step(times: list[float], path: Path, key: str) -> float:
+def even_step(times: list[float], lines: list[int], path: Path, key: str) -> float:
     """The step of evenly spaced times from 0."""
     step = times[1] - times[0]
     for index, time in enumerate(times):
         if not step > 0 or abs(time - index * step) > EVEN * step * max(1, index):
-            raise BadInput(Problem(key, f"the times are not evenly spaced from 0: row {index + 1} is at {time:g} s", str(path)))
+            what = f"the times are not evenly spaced from 0: this row is at {time:g} s"
+            raise BadInput(Problem(key, what, allowed=f"{index * step:g} s here, by the first two rows", file=str(path), line=lines[index]))
     return step

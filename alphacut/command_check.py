@@ -9,8 +9,9 @@ from typing import TextIO
 
 from alphacut.loading import load
 from alphacut.options import add_common
-from alphacut.output import as_json, write_text
+from alphacut.output import as_json, say, write_text
 from alphacut.problem import BadInput
+from alphacut.readiness import ready
 
 ABOUT = "check a case without computing anything: one line for each problem, with line, key, value, what is allowed, the nearest key"
 
@@ -24,10 +25,13 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     """Check and report; with ``--json`` the problems as data."""
     try:
         case = load(options.case, options.set)
+        warnings = ready(case)
     except BadInput as error:
         answer(options, {"case": options.case, "ok": False, "problems": [asdict(problem) for problem in error.problems]}, out)
         raise
-    answer(options, {"case": options.case, "ok": True, "problems": [], "stages": list(case.stages)}, out)
+    answer(options, {"case": options.case, "ok": True, "problems": [], "warnings": warnings, "stages": list(case.stages)}, out)
+    for warning in warnings:
+        say(warning)
     if options.json != "-" and not options.quiet:
         out.write(f"{options.case}: no problems; stages {', '.join(case.stages)}; {case.text('title')}\n")
     return 0

@@ -13,8 +13,10 @@ from alphacut.chain import Chain, Results
 from alphacut.loading import load
 from alphacut.options import add_common, add_workers, check_workers
 from alphacut.output import as_json, say, whole_file, write_text
+from alphacut.problem import BadInput, Problem
 from alphacut.provenance import attributes, fingerprint
 from alphacut.quick import banner, quick, settings
+from alphacut.readiness import ready
 
 ABOUT = "run every stage of a case: files, figures, summary, and the comparison with the paper where the case has one"
 
@@ -38,6 +40,12 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     case = load(options.case, options.set)
     case = quick(case) if options.quick else case
     folder = Path(options.out or f"results/{case.name}{'-quick' if options.quick else ''}")
+    for warning in ready(case):
+        coarse = "omega_max" in warning
+        if coarse and options.strict:
+            raise BadInput(Problem("envelope.step", warning.partition("step: ")[2]))
+        if not coarse:  # of that the stage itself warns, with the modulus that it gets
+            say(warning)
     start = time.perf_counter()
     chain = Chain(case, folder, options.workers, options.fresh, options.quiet, petsc, options.strict)
     results = chain.run()

@@ -71,15 +71,21 @@ def guard_step(model: LinearSystem, task: EnvelopeTask, *, strict: bool) -> None
     Raises:
         BadInput: `strict`, and the step cannot.
     """
+    message = coarse_step(model, task)
+    if message and strict:
+        raise BadInput(Problem("envelope.step", message.removeprefix("step: ")))
+    if message:
+        say(f"warning: envelope.{message}")
+
+
+def coarse_step(model: LinearSystem, task: EnvelopeTask) -> str:
+    """What is to be said of a step that cannot resolve the fastest mode; empty for one that can, or need not."""
     from frame import guard
 
     if task.integrator == "exact" or (task.integrator is None and task.method == "modal"):
-        return
+        return ""
     found = guard(model, task.step, task.duration)
-    if not found.ok and strict:
-        raise BadInput(Problem("envelope.step", found.message.removeprefix("step: ")))
-    if not found.ok:
-        say(f"warning: envelope.{found.message}")
+    return "" if found.ok else found.message
 
 
 def compute(

@@ -1,0 +1,83 @@
+"""What a run would stumble over later, found before anything is computed: it reads the files that a case names and builds its structure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from alphacut import envelope, modulus
+from alphacut.accelerogram import accelerogram
+from alphacut.case import Case
+from alphacut.chain import studies
+from alphacut.consistency import beside, fuzzy_keys, replaced
+from alphacut.problem import BadInput, Problem
+from alphacut.structure import Structure, structure
+from fuzzy import FuzzyNumber, Triangular
+
+RECORDS = ("frame.accelerogram", "tower.accelerogram")
+
+
+def ready(case: Case) -> list[str]:
+    """Warnings about a case that can be run.
+
+    Raises:
+        BadInput: It cannot: a stage lacks what it needs, a file is broken, an input named as fuzzy is crisp.
+    """
+    if "microstructure" in case.stages:
+        from alphacut.microstructure import study_of
+
+        study_of(case)
+    stand_in = modulus.stand_in(case) if "modulus" in case.stages or replaced(case) else None
+    if "envelope" not in case.stages:
+        return []
+    if problems := list(lacking(case)):
+        raise BadInput(problems)
+    wanted = structure(case, stand_in or expected(case))
+    if problems := list(crisp_names(case, wanted)):
+        raise BadInput(problems)
+    return [*outlasted(case), *coarse_steps(case, wanted)]
+
+
+def lacking(case: Case) -> Iterator[Problem]:
+    """A frame needs a modulus from somewhere."""
+    if case.has("frame.masses") and not case.has("frame.modulus") and "modulus" not in case.stages and not replaced(case):
+        what = 'missing; stage envelope needs a modulus: give frame.modulus, or compute one with stages = ["modulus", "envelope"]'
+        yield Problem("frame.modulus", what, file=str(case.path), line=case.lines.get("frame", 0))
+
+
+def expected(case: Case) -> FuzzyNumber | None:
+    """In place of a modulus that is yet to be computed: the matrix's, between both phases; None where the structure has its own."""
+    if "modulus" not in case.stages or case.has("frame.modulus") or not case.has("frame.masses"):
+        return None
+    matrix, inclusion = case.fuzzy("cell.matrix_modulus"), case.fuzzy("cell.inclusion_modulus")
+    ends = sorted([*matrix.support, *inclusion.support])
+    return Triangular(ends[0], matrix.modal, max(ends[-1], ends[0] * (1 + 1e-9)))
+
+
+def crisp_names(case: Case, wanted: Structure) -> Iterator[Problem]:
+    """Names of fuzzy inputs that are crisp in the case, by the key that names them."""
+    for key in fuzzy_keys(case):
+        for name in case.names(key):
+            try:
+                wanted.members(name)
+            except BadInput as error:
+                (problem,) = error.problems
+                yield Problem(key, problem.what, name, problem.allowed, file=str(case.path), line=case.lines.get(key, 0))
+
+
+def outlasted(case: Case) -> Iterator[str]:
+    """A remark on durations that are longer than the record."""
+    for key in RECORDS:
+        if case.has(key):
+            record = accelerogram(beside(case, case.text(key)), key)
+            end = (len(record.acceleration) - 1) * record.step
+            longest = max(study.task.duration for study in studies(case))
+            if longest > end + 0.5 * record.step:
+                yield f"warning: {key}: the record ends at {end:g} s and the simulation at {longest:g} s; in between the ground is at rest"
+
+
+def coarse_steps(case: Case, wanted: Structure) -> Iterator[str]:
+    """Steps that cannot resolve the fastest mode."""
+    if wanted.linear is None:
+        return
+    found = (envelope.coarse_step(wanted.linear, study.task) for study in studies(case))
+    yield from dict.fromkeys(f"warning: envelope.{message}" for message in found if message)
