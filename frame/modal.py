@@ -18,7 +18,7 @@ from frame.halton import chebyshev_points
 from frame.integrators import state_matrix
 from frame.jet import Array, Jet
 from frame.linear import evaluate
-from frame.modal_load import LoadTable
+from frame.modal_load import LoadTables
 from frame.modes import ModalError, Modes, eigenvectors, modes
 from frame.polynomial import Polynomial, fit, terms
 
@@ -41,7 +41,7 @@ class ModalModel:
     boxes: Boxes
     eigenvalue: Polynomial
     coefficient: Polynomial
-    load: LoadTable | None
+    load: LoadTables | None
     error: Array
     analyses: int
 
@@ -225,7 +225,7 @@ def _fitted(flow: LinearFlow, boxes: Boxes, points: Array, degree: int, chosen: 
     flat = [jet.map(lambda x: x.reshape((*x.shape[:-2], -1))) for jet in (found.coefficient, found.load)]
     rate = fit(points, found.eigenvalue, degree)
     ground = flow.system.ground
-    load = None if ground is None else LoadTable.build(ground, flow.time, rate, fit(points, flat[1], degree))
+    load = None if ground is None else LoadTables.build(ground, flow.time, rate, fit(points, flat[1], degree))
     return ModalModel(flow, boxes, rate, fit(points, flat[0], degree), load, np.zeros((len(flow.time), len(flow.outputs))), 0)
 
 

@@ -13,6 +13,8 @@ from frame.polynomial import Polynomial
 
 REACH = 6.0
 """Largest change of phase (rad) over the box within a window."""
+FADED = 37.0
+"""Exponent at which what is left of a window has fallen below round-off."""
 Waves = tuple[Array, Array, Array]
 
 
@@ -70,10 +72,13 @@ class LoadTable:
         """R, dR/dλ and d²R/dλ² at one node per point, each shape (N, n), for eigenvalues (N, n)."""
         powers = [self._powers(rate, order) for order in range(3)]
         total = [(self.moment[node] * p).sum(-1) for p in powers]
+        fade = FADED / max(float(-rate.real.max()), 1e-300)
         for end in self.starts[1:]:
-            later = np.flatnonzero(node > end)
-            if not len(later):
+            if not (node > end).any():
                 break
+            later = np.flatnonzero((node > end) & (self.time[node] - self.time[end] < fade))
+            if not len(later):
+                continue
             tau = (self.time[node[later]] - self.time[end])[:, None]
             s0, s1, s2 = ((self.moment[end] * p[later]).sum(-1) for p in powers)
             wave = np.exp(rate[later] * tau)
@@ -92,6 +97,56 @@ class LoadTable:
             factor = np.arange(order) / self.scale
             plain = np.concatenate([np.zeros((*x.shape, 1)), plain[..., :-1]], -1) * factor
         return plain
+
+
+@dataclass(frozen=True, eq=False)
+class LoadTables:
+    """Tables of modes grouped by how much their eigenvalues vary, so that slow modes need few windows and fast ones soon forget.
+
+    Args:
+        share: What one unit of R_k puts into the outputs, n m polynomials.
+        tables: One table per group.
+        members: Indices of the modes of each group.
+    """
+
+    share: Polynomial
+    tables: tuple[LoadTable, ...]
+    members: tuple[Array, ...]
+
+    @classmethod
+    def build(cls, ground: Accelerogram, time: Array, rate: Polynomial, share: Polynomial) -> LoadTables:
+        """The tables for modes whose eigenvalues are `rate` over the unit box."""
+        spread = np.abs(rate.coefficients[1:]).sum(0)
+        octave = np.floor(np.log2(np.maximum(spread, 1e-12) / max(spread.max(), 1e-12)))
+        members = tuple(np.flatnonzero(octave == o) for o in np.unique(octave))
+        columns = share.coefficients.reshape(len(share.index), rate.coefficients.shape[1], -1)
+        tables = tuple(
+            LoadTable.build(
+                ground,
+                time,
+                Polynomial(rate.index, rate.coefficients[:, own]),
+                Polynomial(share.index, columns[:, own].reshape(len(share.index), -1)),
+            )
+            for own in members
+        )
+        return cls(share, tables, members)
+
+    @property
+    def starts(self) -> Array:
+        """First node of every window of the group that needs most."""
+        return max((table.starts for table in self.tables), key=len)
+
+    def values(self, unit: Array, rate: Array) -> Array:
+        """As `LoadTable.values`."""
+        parts = [table.values(unit, rate[:, own]) for table, own in zip(self.tables, self.members, strict=True)]
+        return sum(parts[1:], parts[0])
+
+    def response(self, rate: Array, node: Array) -> Waves:
+        """As `LoadTable.response`."""
+        R, dR, ddR = (np.empty_like(rate) for _ in range(3))
+        for table, own in zip(self.tables, self.members, strict=True):
+            R[:, own], dR[:, own], ddR[:, own] = table.response(rate[:, own], node)
+        return R, dR, ddR
 
 
 def _moments(ground: Accelerogram, middle: Array, time: Array, starts: Array, window: float, order: int) -> Array:
