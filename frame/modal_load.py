@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import ceil
 
 import numpy as np
@@ -55,7 +56,7 @@ class LoadTable:
     def values(self, unit: Array, rate: Array) -> Array:
         """Response of the outputs at points (S, d) with eigenvalues (S, n), shape (S, T, m)."""
         share = self.share(unit).reshape(*rate.shape, -1)
-        powers = self._powers(rate, 0)
+        powers = self._powers(rate)
         out = np.zeros((len(unit), len(self.time), share.shape[-1]))
         left = np.zeros_like(rate)  # what is left of earlier windows at the start of this one
         ends = np.append(self.starts[1:], len(self.time) - 1)
@@ -70,8 +71,8 @@ class LoadTable:
 
     def response(self, rate: Array, node: Array) -> Waves:
         """R, dR/dλ and d²R/dλ² at one node per point, each shape (N, n), for eigenvalues (N, n)."""
-        powers = [self._powers(rate, order) for order in range(3)]
-        total = [(self.moment[node] * p).sum(-1) for p in powers]
+        powers = self._powers(rate).swapaxes(0, 1)  # (n, N, order)
+        total = np.einsum("kpi,pkix->pkx", powers, self._differentiated[node], optimize=True)
         fade = FADED / max(float(-rate.real.max()), 1e-300)
         for end in self.starts[1:]:
             if not (node > end).any():
@@ -80,22 +81,27 @@ class LoadTable:
             if not len(later):
                 continue
             tau = (self.time[node[later]] - self.time[end])[:, None]
-            s0, s1, s2 = ((self.moment[end] * p[later]).sum(-1) for p in powers)
+            s0, s1, s2 = np.moveaxis(powers[:, later] @ self._differentiated[end], -1, 0).swapaxes(1, 2)
             wave = np.exp(rate[later] * tau)
-            total[0][later] += wave * s0
-            total[1][later] += wave * (s1 + tau * s0)
-            total[2][later] += wave * (s2 + 2 * tau * s1 + tau * tau * s0)
-        return total[0], total[1], total[2]
+            total[later] += np.stack([wave * s0, wave * (s1 + tau * s0), wave * (s2 + 2 * tau * s1 + tau * tau * s0)], -1)
+        return total[..., 0], total[..., 1], total[..., 2]
 
-    def _powers(self, rate: Array, derivative: int) -> Array:
-        """Powers of the scaled deviation, differentiated by λ, shape (S, n, order)."""
+    @cached_property
+    def _differentiated(self) -> Array:
+        """Coefficients of the moments' series and of their first and second derivatives by λ, shape (T, n, order, 3)."""
+        out = [self.moment]
+        for _ in range(2):
+            following = np.zeros_like(self.moment)
+            following[..., :-1] = out[-1][..., 1:] * (np.arange(1, self.moment.shape[-1]) / self.scale)
+            out.append(following)
+        return np.stack(out, -1)
+
+    def _powers(self, rate: Array) -> Array:
+        """Powers of the scaled deviation, shape (S, n, order)."""
         x = (rate - self.middle) / self.scale
-        order = self.moment.shape[-1]
-        plain = np.ones((*x.shape, order), complex)
-        plain[..., 1:] = np.cumprod(np.broadcast_to(x[..., None], (*x.shape, order - 1)), axis=-1)
-        for _ in range(derivative):
-            factor = np.arange(order) / self.scale
-            plain = np.concatenate([np.zeros((*x.shape, 1)), plain[..., :-1]], -1) * factor
+        plain = np.ones((*x.shape, self.moment.shape[-1]), complex)
+        for i in range(1, plain.shape[-1]):
+            plain[..., i] = plain[..., i - 1] * x
         return plain
 
 
