@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from benchmarks import frame_envelopes, frame_integrators
+from benchmarks import frame_certificate, frame_envelopes, frame_integrators, frame_tower
+from frame.beam_frame import BeamFrame
 
 
 def test_envelope_benchmark_ranks_the_methods(tmp_path: Path) -> None:
@@ -23,3 +24,16 @@ def test_integrator_benchmark_measures_every_integrator(tmp_path: Path) -> None:
     drift = frame_integrators.drift(2000, 0.01)
     assert drift["midpoint"] < 1e-11
     assert drift["rk4"] > 1e-10
+
+
+def test_tower_benchmark_compares_with_the_full_structure() -> None:
+    row = frame_tower.measured(BeamFrame(5, 2, ground=frame_tower.recorded()), 4.0, (0.0,), 2, 2)
+    assert row["outside"] < 5e-4
+    assert row["at_bounds"] < 5e-4
+
+
+def test_certificate_benchmark_finds_no_trajectory_outside() -> None:
+    row = frame_certificate.measured(6.0, 0.2, 1e-6, 3000, 1)
+    assert row["gap"] <= 1.001e-6
+    assert row["outside"] < 0
+    assert row["beyond_inner"] < 1e-6
