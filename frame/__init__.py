@@ -6,6 +6,7 @@ from frame.graph_follower import GraphFollower
 from frame.integrators import INTEGRATORS, Exact, Gauss4, Midpoint, Newmark, RungeKutta4
 from frame.lagrangian import LagrangianSystem, pendulum
 from frame.linear import Accelerogram
+from frame.matrix_structure import MatrixStructure
 from frame.nonlinear_flow import LagrangianFlow
 from frame.propagation import METHODS, envelope
 from frame.record import FollowerRecord, record
@@ -24,6 +25,7 @@ __all__ = [
     "LagrangianFlow",
     "LagrangianSystem",
     "LinearFlow",
+    "MatrixStructure",
     "Midpoint",
     "Newmark",
     "RungeKutta4",

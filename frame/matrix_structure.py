@@ -1,0 +1,107 @@
+"""A general linear structure from its matrices M, D, K, each a sum of given arrays times smooth factors of named parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from frame.jet import Array, Jet
+from frame.linear import Accelerogram, Matrices
+
+Factor = Callable[[Mapping[str, Any]], Any]
+Terms = Sequence[tuple[Factor | str | float, Array]]
+
+
+@dataclass(frozen=True, eq=False)
+class MatrixStructure:
+    """M(p) q̈ + D(p) q̇ + K(p) q = −M(p) ι a(t) with M(p) = Σ_i f_i(p) M_i, likewise D and K.
+
+    A factor is a number, the name of a parameter, or a function of all parameters in plain arithmetic, such as
+    `lambda p: p["E"] * p["l"] ** -3`.
+
+    Args:
+        parameters: All parameters with their modal values, in SI units.
+        mass: Pairs (factor, symmetric array (n, n)), in kg.
+        stiffness: Pairs, in N/m.
+        observed: Rows by output name, each (n,) acting on displacements or (2n,) acting on displacements and velocities.
+        damping: Pairs, in N s/m.
+        q0: Initial displacements, shape (n,), in m; zero when None.
+        v0: Initial velocities, shape (n,), in m/s; zero when None.
+        ground: Base excitation, or None.
+        pattern: ι, how the unknowns move rigidly with the ground, shape (n,); ones when None.
+
+    Raises:
+        ValueError: A shape does not fit, a factor names no parameter, or the modal mass matrix is not positive definite.
+    """
+
+    parameters: Mapping[str, float]
+    mass: Terms
+    stiffness: Terms
+    observed: Mapping[str, Array]
+    damping: Terms = ()
+    q0: Array | None = None
+    v0: Array | None = None
+    ground: Accelerogram | None = None
+    pattern: Array | None = None
+    size: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        if not self.mass or not self.stiffness or not self.observed:
+            raise ValueError("mass, stiffness and observed: each needs at least one entry")
+        n = len(self.mass[0][1])
+        object.__setattr__(self, "size", n)
+        for kind in ("mass", "damping", "stiffness"):
+            for factor, array in getattr(self, kind):
+                if np.shape(array) != (n, n):
+                    raise ValueError(f"{kind}: an array has shape {np.shape(array)}; all must be ({n}, {n})")
+                if isinstance(factor, str) and factor not in self.parameters:
+                    raise ValueError(f"{kind}: factor '{factor}' is no parameter; known are {', '.join(self.parameters)}")
+        for name in ("q0", "v0", "pattern"):
+            if getattr(self, name) is not None and np.shape(getattr(self, name)) != (n,):
+                raise ValueError(f"{name}: shape {np.shape(getattr(self, name))} does not fit; it must be ({n},)")
+        for name, row in self.observed.items():
+            if np.shape(row) not in ((n,), (2 * n,)):
+                raise ValueError(f"observed: '{name}' has shape {np.shape(row)}; it must be ({n},) or ({2 * n},)")
+        modal = sum(float(_value(f, self.parameters)) * np.asarray(A, float) for f, A in self.mass)
+        if not np.linalg.eigvalsh(modal).min() > 0:
+            raise ValueError("mass: the matrix at the modal parameters is not positive definite; every unknown needs a mass")
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the observed quantities."""
+        return tuple(self.observed)
+
+    def matrices(self, p: Mapping[str, Jet]) -> Matrices:
+        """M, D, K and the initial state at S parameter sets."""
+        like = next(iter(p.values()))
+        n, samples, d = self.size, like.value.size, like.directions
+
+        def total(terms: Terms) -> Jet:
+            out = Jet.constant(np.zeros((samples, n, n)), d)
+            for factor, array in terms:
+                value = _value(factor, p)
+                lifted = value if isinstance(value, Jet) else Jet.constant(np.full(samples, float(value)), d)
+                out = out + lifted[:, None, None] * np.asarray(array, float)
+            return out
+
+        start = [np.zeros(n) if x is None else np.asarray(x, float) for x in (self.q0, self.v0)]
+        q0, v0 = (Jet.constant(np.tile(x[None, :, None], (samples, 1, 1)), d) for x in start)
+        pattern = None if self.pattern is None else np.asarray(self.pattern, float)[:, None]
+        return Matrices(total(self.mass), total(self.damping), total(self.stiffness), q0, v0, pattern)
+
+    def observation(self, p: Mapping[str, Jet]) -> Jet:
+        """Rows C(p) with output = C(p) [q; v], shape (S, m, 2n)."""
+        like = next(iter(p.values()))
+        rows = np.zeros((len(self.observed), 2 * self.size))
+        for k, row in enumerate(self.observed.values()):
+            rows[k, : len(row)] = row
+        return Jet.constant(np.tile(rows, (like.value.size, 1, 1)), like.directions)
+
+
+def _value(factor: Factor | str | float, p: Mapping[str, Any]) -> Any:
+    if isinstance(factor, str):
+        return p[factor]
+    return factor(p) if callable(factor) else factor
