@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from alphacut.key import Key
 from alphacut.reading import allowed
 from alphacut.schema import SECTIONS, VERSION
+from alphacut.units import ACCEPTED, QUANTITIES
 
 HEAD = f"""# The case format, version {VERSION}
 
@@ -25,12 +26,21 @@ This page is made by `python -m alphacut.case_format`; the same table makes `cas
 """
 DOORS = """`python -m stochastic microstructure`, `python -m rve solve`, `python -m fuzzy modulus` and `python -m frame envelope`
 are the commands `microstructure`, `cell`, `modulus` and `envelope` under other names.
+
+From a checkout write `./enter python -m alphacut` where these pages write `alphacut`; after `pip install` it is `alphacut`.
 """
 
 
 def page() -> str:
     """The case format in Markdown."""
-    return "\n".join([HEAD, *sections()])
+    return "\n".join([HEAD, units(), *sections()])
+
+
+def units() -> str:
+    """The accepted units, by quantity."""
+    rows = "\n".join(f"| {QUANTITIES[si][0]} | {', '.join(f'`{name}`' for name in names)} |" for si, names in ACCEPTED.items())
+    words = "Any other unit of the same dimension that Pint knows is taken too; `mm2` and `cm4` mean `mm^2` and `cm^4`."
+    return f"## Units\n\nNumbers have a decimal point, never a comma. {words}\n\n| quantity | units |\n|---|---|\n{rows}\n"
 
 
 def sections() -> Iterator[str]:

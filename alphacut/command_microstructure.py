@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, TextIO
 from alphacut import microstructure
 from alphacut.loading import load
 from alphacut.options import add_common, add_workers, check_workers
-from alphacut.output import as_json, whole_file, write_text
+from alphacut.output import as_json, say, whole_file, write_text
 from alphacut.progress import progress
 from alphacut.provenance import attributes, fingerprint, versions
 
@@ -46,7 +47,19 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         write_text(options.json, as_json(document, indent=2))
     if options.json != "-" and not options.quiet:
         out.write(found.fragment())
+        advise(found.fragment(), options.out)
     return 0
+
+
+def advise(fragment: str, folder: str | None) -> None:
+    """Say what the fragment is for, and warn of a slope that came out crisp."""
+    radius = tomllib.loads(fragment)["radius"]
+    for name in ("a2", "a4"):
+        ends = radius[name] if isinstance(radius[name], list) else [radius[name]]
+        if len(set(ends)) == 1:
+            say(f"warning: {name} came out crisp: the particles leave its slope no room within the band; microstructure.sampling widens it")
+    place = f"{folder}/radius.toml" if folder else "this section (--out FOLDER keeps it as radius.toml)"
+    say(f"next: put {place} in place of [radius] of a case with [cell] and [mesh], then alphacut modulus CASE")
 
 
 def write(found: Microstructure, folder: Path, said: Mapping[str, str | int], *, figures: bool = True) -> list[str]:

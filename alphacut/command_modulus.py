@@ -14,7 +14,7 @@ from alphacut.cell import GPA
 from alphacut.command_cell import named_models
 from alphacut.loading import load
 from alphacut.options import CELL_OPTIONS, add_common, add_keys, add_workers, changes, check_workers
-from alphacut.output import as_json, write_text
+from alphacut.output import as_json, say, write_text
 from alphacut.progress import progress
 from alphacut.provenance import fingerprint
 from fuzzy import Explanation
@@ -58,6 +58,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         write_text(options.json, document)
     if options.json != "-" and not options.quiet:
         out.write(summary(found) + (f"\n{response.text(stress)}" if stress else ""))
+        if not options.out:
+            say("to keep this and hand it on: the same command with --out modulus.nc, then frame envelope CASE --modulus modulus.nc")
     return 0
 
 

@@ -10,6 +10,7 @@ from typing import Any, TextIO
 
 from alphacut import figures, shares, summary
 from alphacut.chain import Chain, Results
+from alphacut.destination import unwritable
 from alphacut.loading import load
 from alphacut.options import add_common, add_workers, check_workers
 from alphacut.output import as_json, say, whole_file, write_text
@@ -17,6 +18,7 @@ from alphacut.problem import BadInput, Problem
 from alphacut.provenance import attributes, fingerprint
 from alphacut.quick import banner, quick, settings
 from alphacut.readiness import ready
+from alphacut.units import engineering
 
 ABOUT = "run every stage of a case: files, figures, summary, and the comparison with the paper where the case has one"
 
@@ -40,6 +42,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     case = load(options.case, options.set)
     case = quick(case) if options.quick else case
     folder = Path(options.out or f"results/{case.name}{'-quick' if options.quick else ''}")
+    if problems := list(unwritable("--out", folder, folder=True)):
+        raise BadInput(problems)
     for warning in ready(case):
         coarse = "omega_max" in warning
         if coarse and options.strict:
@@ -67,8 +71,24 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     if options.json != "-" and not options.quiet:
         out.write(f"{banner(found['quick'])}\n" if options.quick else "")
         out.write(summary.table(found["paper"]) if found["paper"] else "")
+        out.write(main_numbers(found))
         say(f"results are in {folder}, {len(drawn)} figures among them, after {found['seconds']:.0f} s")
+        say(f"next: alphacut report {folder}")
     return 0
+
+
+def main_numbers(found: Mapping[str, Any]) -> str:
+    """The fuzzy modulus and every study's extremes, a line each."""
+    from frame.envelope import output_unit
+
+    lines = []
+    if cell := found.get("modulus"):
+        lines.append(f"E = {cell['modal_GPa']:.4f} GPa, support [{cell['lower_GPa']:.4f}, {cell['upper_GPa']:.4f}] GPa")
+    for name, study in found.get("envelopes", {}).items():
+        for output, low in study["min"].items():
+            low, high = (engineering(float(value), output_unit(output)) for value in (low, study["max"][output]))
+            lines.append(f"{output} from {low} to {high} at the lowest α (study {name})")
+    return "".join(f"{line}\n" for line in lines)
 
 
 def driven(chain: Chain, results: Results) -> tuple[str, Callable[[Path], None]]:

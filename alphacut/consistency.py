@@ -178,7 +178,9 @@ def floors(case: Case) -> Iterator[Problem]:
     for name in ("lengths", "dampers", "displacements", "velocities"):
         found = len(case.fuzzies(f"frame.{name}"))
         if found not in (1, count):
-            yield Problem(f"frame.{name}", f"got {found} values for {count} floors", allowed=f"{count} values, or one for all floors")
+            few = f"{count} value{'s' if count > 1 else ''}"
+            words = f"{few}, or one for all floors; the number of floors is that of frame.masses, which has {count}"
+            yield Problem(f"frame.{name}", f"got {found} values for {count} floor{'s' if count > 1 else ''}", allowed=words)
     yield from known_output(case, count)
     for key in fuzzy_keys(case):
         for name in case.names(key):

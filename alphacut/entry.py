@@ -20,7 +20,8 @@ from alphacut import (
     command_report,
     command_run,
 )
-from alphacut.options import Parser, split_petsc
+from alphacut.destination import check_destinations
+from alphacut.options import Parser, refuse_petsc, split_petsc
 from alphacut.output import rank, ranks, say, standard_output
 from alphacut.problem import BadInput
 from alphacut.provenance import own_version
@@ -86,6 +87,8 @@ def main(arguments: Sequence[str] | None = None, *, program: str = "alphacut", n
         options, left = top.parse_known_args(ours)
         if left:
             made[options.command].refuse([word for word in left if word.startswith("-")] or left)
+        refuse_petsc(commands[options.command].__name__.rpartition("command_")[2], petsc)
+        check_destinations(made[options.command], options)
         with standard_output(getattr(options, "json", None) == "-") as out:
             return int(commands[options.command].run(options, petsc, out))
     except BadInput as error:

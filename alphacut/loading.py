@@ -10,9 +10,11 @@ from typing import Any
 
 from alphacut.case import Case
 from alphacut.consistency import inconsistencies
+from alphacut.destination import hint
 from alphacut.key import Key, Section
 from alphacut.position import key_at, lines_of_keys
 from alphacut.problem import BadInput, Problem
+from alphacut.quantity import NUMBER
 from alphacut.reading import Unfit, allowed, nearest, read
 from alphacut.schema import SECTIONS, dotted, every_key
 
@@ -53,7 +55,7 @@ def contents(path: Path) -> str:
         data = path.read_bytes()
     except OSError as error:
         reason = {FileNotFoundError: "there is no such file", IsADirectoryError: "this is a folder"}.get(type(error), error.strerror)
-        raise BadInput(Problem(str(path), f"{reason}", allowed="a case file such as cases/paper.toml")) from None
+        raise BadInput(Problem(str(path), f"{reason}", allowed=hint(path) or "a case file such as cases/paper.toml")) from None
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -75,8 +77,18 @@ def parsed(path: Path, text: str) -> Raw:
         reason = re.sub(r"\s*\(at .*\)$", "", str(error)).rstrip(".")
         shown = text.splitlines()[line - 1].strip() if text.splitlines() else ""
         key = broken_key(text, line)
-        problem = Problem(key, f"this is not TOML: {reason[:1].lower()}{reason[1:]}, at '{shown}'", file=str(path), line=line)
+        what = f"this is not TOML: {reason[:1].lower()}{reason[1:]}, at '{shown}'"
+        problem = Problem(key, what, allowed=cure(shown), file=str(path), line=line)
         raise BadInput(problem) from None
+
+
+def cure(line: str) -> str:
+    """What to write instead of a broken line, where that is plain; else empty."""
+    value = line.partition("=")[2].partition("#")[0].strip()
+    if match := re.fullmatch(r"([-+]?\d+),(\d+)(.*)", value):
+        return f"{match[1]}.{match[2]}{match[3]}, with a point"
+    unquoted = re.fullmatch(r"(\[[^\]\"']*\]|[-+]?[\d.,]+)\s*[A-Za-z%µ][^\"']*", value)
+    return f'put it in quotes: "{value}"' if unquoted else ""
 
 
 def broken_key(text: str, line: int) -> str:
@@ -126,7 +138,9 @@ def toml_or_text(value: str, key: Key) -> object:
     except tomllib.TOMLDecodeError:
         found = float(value) if re.fullmatch(r"[+-]?(\d+\.|\.\d+)([eE][+-]?\d+)?", value) else value  # .3 and 3. are no TOML
     if key.kind in ARRAYS and not isinstance(found, list):
-        return [item.strip() for item in value.strip("[] ").split(",") if item.strip()]
+        items = [item.strip() for item in value.strip("[] ").split(",") if item.strip()]
+        plain = key.kind == "numbers" and not key.unit
+        return [float(item) if plain and re.fullmatch(NUMBER, item) else item for item in items]
     return str(found) if key.kind == "text" else found
 
 

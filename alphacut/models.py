@@ -36,6 +36,9 @@ def cell_model(choice: CellChoice) -> CellModel:
     except ImportError as error:
         what = f"this model cannot be loaded ({error}); ./enter brings an environment that has everything"
         raise BadInput(Problem("modulus.method", what, choice.method, "series needs NumPy and SciPy alone")) from None
+    if choice.petsc and "petsc" not in known:
+        what = f"method {choice.method} does not use PETSc"
+        raise BadInput([Problem(f"-rve_{name}", what, allowed="--method prism") for name in choice.petsc])
     offered: dict[str, Any] = {
         "layers": choice.layers,
         "mesh_size": choice.size,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NoReturn
 
 from alphacut.problem import BadInput, Problem
@@ -26,6 +26,9 @@ CELL_OPTIONS = {
     "--tolerance": "modulus.tolerance",
 }
 PETSC_PREFIX = "-rve_"
+METAVARS = {"integer": "INTEGER", "choice": "CHOICE", "choices": "NAMES", "numbers": "LIST"}
+FORMS = {"numbers": ", as 0,0.5,1 or '[0, 0.5, 1]'", "choices": ", separated by commas"}
+EXAMPLES = {"envelope.step": "0.01 s", "envelope.tolerance": "0.1 mm"}
 
 
 class Parser(argparse.ArgumentParser):
@@ -33,14 +36,35 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Raise instead of printing usage and leaving."""
-        raise BadInput(Problem(self.prog, message))
+        raise BadInput(self.complaint(message))
+
+    def complaint(self, message: str) -> Problem:
+        """A complaint of argparse in this project's words."""
+        if match := re.match(r"argument COMMAND: invalid choice: '(.*?)' \(choose from (.*)\)", message):
+            known = [name.strip(" '") for name in match[2].split(",")]
+            return Problem("command", "there is no such command", match[1], f"{', '.join(known)}; see --help", nearest(match[1], known))
+        if match := re.match(r"argument (\S+): invalid int value: '(.*)'", message):
+            return Problem(match[1], "this is no whole number", match[2], "a whole number such as 2")
+        return Problem(self.prog.removeprefix("alphacut ") if self.prog != "alphacut" else "command line", f"{message}; see --help")
+
+    def stranger(self, word: str, known: Sequence[str]) -> Problem:
+        """The problem of a word that is no option, with what was meant."""
+        here, what = self.prog.removeprefix("alphacut "), f"there is no such option: {word}"
+        if re.match(r"-(ksp|pc|mat|snes|mg|sub|log|options)_", word):
+            return Problem(here, what, allowed=f"PETSc's options with their prefix: {PETSC_PREFIX}{word[1:]}")
+        return Problem(here, what, nearest=nearest(word.partition("=")[0], known))
 
     def refuse(self, words: Sequence[str]) -> NoReturn:
         """Complain about words that are no options of this command, with the nearest that is."""
         known = [name for name in self._option_string_actions if name.startswith("--")]
-        raise BadInput(
-            [Problem(self.prog, f"there is no such option: {word}", nearest=nearest(word.partition("=")[0], known)) for word in words]
-        )
+        raise BadInput([self.stranger(word, known) for word in words])
+
+
+def refuse_petsc(command: str, petsc: Mapping[str, str]) -> None:
+    """Refuse PETSc's options with a command that solves nothing with PETSc."""
+    if petsc and command not in ("cell", "modulus", "run"):
+        allowed = "with the commands cell, modulus and run"
+        raise BadInput([Problem(f"{PETSC_PREFIX}{name}", f"command {command} does not use PETSc", allowed=allowed) for name in petsc])
 
 
 def split_petsc(arguments: Sequence[str]) -> tuple[list[str], dict[str, str]]:
@@ -78,9 +102,9 @@ def add_keys(parser: argparse.ArgumentParser, keys: dict[str, str]) -> None:
     known = every_key()
     for option, key in keys.items():
         entry = known[key]
-        example = f", for example '{QUANTITIES[entry.unit][1]}'" if entry.unit else ""
+        example = f", for example '{EXAMPLES.get(key) or QUANTITIES[entry.unit][1]}'" if entry.unit else FORMS.get(entry.kind, "")
         choices = f": {', '.join(entry.choices)}" if entry.choices else ""
-        metavar = entry.kind.upper().split()[0] if entry.kind in ("integer", "choice") else "QUANTITY" if entry.unit else "NUMBER"
+        metavar = METAVARS.get(entry.kind) or ("QUANTITY" if entry.unit else "NUMBER")
         parser.add_argument(option, metavar=metavar, help=f"{entry.about}{choices}{example} (default: {key} of the case)")
 
 

@@ -15,6 +15,7 @@ NUMBER = r"[-+\u2212]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 LIST = re.compile(r"\[(.*)\]\s*(.*)", re.DOTALL)
 SPREAD = re.compile(rf"({NUMBER})\s*(.*?)\s*(?:±|\+/-|\+-)\s*({NUMBER})\s*(.*)")
 SINGLE = re.compile(rf"({NUMBER})\s*(.*)")
+ORDERS = {2: "lower ≤ upper", 3: 'lower ≤ modal ≤ upper, as in "[90, 95, 105] GPa"', 4: "four values that rise"}
 SHAPES = {1: "crisp", 2: "interval", 3: "triangle", 4: "trapezoid"}
 
 
@@ -25,6 +26,8 @@ def decimal(text: str) -> Decimal:
 
 def one(text: str, si: str) -> Decimal:
     """A single quantity such as "80 GPa", in `si`."""
+    if comma := re.match(r"([-+\u2212]?\d+),(\d+)", text.strip()):
+        raise ValueError(f"a comma stands in the number: write {comma[1]}.{comma[2]} with a point")
     match = SINGLE.fullmatch(text.strip())
     if match is None:
         raise ValueError(f'"{text.strip()}" does not begin with a number')
@@ -33,6 +36,8 @@ def one(text: str, si: str) -> Decimal:
 
 def listed(inner: str, unit: str, si: str) -> tuple[Decimal, ...]:
     """The numbers between brackets: the unit stands behind the bracket or behind each number."""
+    if (comma := re.search(r"(\d+),(\d+)", inner)) and re.search(r",\s", inner):
+        raise ValueError(f"a comma may stand in a number: write {comma[1]}.{comma[2]} with a point, or a blank after every comma")
     items = [item.strip() for item in inner.split(",")]
     for item in items:
         if SINGLE.fullmatch(item) is None:
@@ -94,7 +99,7 @@ def fuzzy(value: object, si: str) -> FuzzyNumber:
     if len(found) not in SHAPES:
         raise ValueError(f"got {len(found)} values; one is crisp, two an interval, three a triangle, four a trapezoid")
     if list(found) != sorted(found):
-        raise ValueError(f"the {SHAPES[len(found)]} is not in rising order")
+        raise ValueError(f"the {SHAPES[len(found)]} is not in rising order: {ORDERS[len(found)]}")
     if len(found) == 1:
         return Crisp(found[0])
     if len(found) == 2:

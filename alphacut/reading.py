@@ -49,8 +49,7 @@ def in_range(values: Iterable[float], key: Key) -> None:
     """Refuse values that are not finite or lie outside the key's range."""
     for value in values:
         if not math.isfinite(value) or (key.allowed and not key.allowed.holds(value)):
-            unit = f" {key.unit.replace('*', ' ')}" if key.unit else ""
-            raise Unfit(f"{value:g}{unit} is out of range", allowed(key))
+            raise Unfit("out of range" if key.unit else f"{value:g} is out of range", allowed(key))
 
 
 def not_quoted(value: object, key: Key) -> None:
@@ -96,7 +95,17 @@ def read_array(value: object, key: Key) -> tuple[object, ...]:
     if not items:
         raise Unfit("the array is empty", allowed(key))
     read = read_fuzzy if key.kind == "fuzzy list" else read_number
-    return tuple(read(item, key) for item in items)
+    return tuple(entry(read, item, number, key) for number, item in enumerate(items, start=1))
+
+
+def entry(read: Callable[[object, Key], object], item: object, number: int, key: Key) -> object:
+    """One entry of an array; a complaint says which it is, as the user wrote it."""
+    try:
+        return read(item, key)
+    except Unfit as unfit:
+        raise Unfit(f'entry {number}, "{item}": {unfit.what}', unfit.allowed, unfit.nearest) from None
+    except (ValueError, ArithmeticError) as error:
+        raise Unfit(f'entry {number}, "{item}": {error}', allowed(key)) from None
 
 
 def read_name(value: object, key: Key) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 
 from alphacut.quick import banner
 from alphacut.report_sections import sections
-from alphacut.stored import read_dataset, read_summary
+from alphacut.stored import damaged, read_dataset, read_summary
 
 if TYPE_CHECKING:
     import xarray
@@ -29,6 +29,14 @@ def report(folder: Path) -> str:
         BadInput: The folder holds no results of a run, or those of a newer program.
     """
     summary = read_summary(folder)
+    try:
+        return page(summary, folder)
+    except (KeyError, TypeError, AttributeError, IndexError) as error:
+        raise damaged(folder / "summary.json", f"{type(error).__name__} at {error}") from error
+
+
+def page(summary: Mapping[str, Any], folder: Path) -> str:
+    """The page for a summary."""
     text = {name: (HERE / f"report.{name}").read_text(encoding="utf-8") for name in ("html", "css", "js")}
     return Template(text["html"]).substitute(
         title=html.escape(summary["title"]),

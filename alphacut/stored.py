@@ -6,8 +6,11 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from alphacut.destination import hint
 from alphacut.problem import BadInput, Problem
 from alphacut.provenance import FORMAT, own_version
+
+NEEDED = ("case", "title", "case_text", "command", "versions", "seconds")  # of summary.json
 
 if TYPE_CHECKING:
     import xarray
@@ -45,14 +48,22 @@ def read_dataset(path: Path, *, key: str = "file") -> xarray.Dataset:
     import xarray
 
     if not path.is_file():
-        raise BadInput(Problem(key, "there is no such file", str(path)))
+        raise BadInput(Problem(key, "there is no such file", str(path), hint(path)))
     try:
         found = xarray.load_dataset(path)
     except (OSError, ValueError) as error:
-        raise BadInput(Problem(key, f"the file is no NetCDF file ({error})", str(path), "a file of this program")) from None
+        what = "this is no NetCDF file, or a damaged one"
+        raise BadInput(Problem(key, what, str(path), "a file of this program, such as modulus.nc of a run")) from error
     version = found.attrs.get("format_version")
     require_known(None if version is None else str(version), path, key=key, maker=str(found.attrs.get("created_by", "")))
     return found
+
+
+def damaged(path: Path, why: str) -> BadInput:
+    """The error for a summary that cannot be used."""
+    return BadInput(
+        Problem(str(path), f"this file is damaged: {why}", allowed="make it anew with alphacut run, which keeps what is computed")
+    )
 
 
 def read_summary(folder: Path) -> dict[str, Any]:
@@ -68,7 +79,12 @@ def read_summary(folder: Path) -> dict[str, Any]:
     try:
         found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:
-        raise BadInput(Problem(str(folder), f"summary.json cannot be read: {error}", allowed=allowed)) from None
-    version = found.get("versions", {}).get("alphacut")
+        raise damaged(path, str(error)) from None
+    if not isinstance(found, dict):
+        raise damaged(path, "it holds no object")
+    told = found.get("versions")
+    version = told.get("alphacut") if isinstance(told, dict) else None
     require_known(found.get("format_version"), path, key=str(folder), maker=f"alphacut {version}" if version else "")
+    if missing := [name for name in NEEDED if name not in found]:
+        raise damaged(path, f"it holds no {missing[0]}")
     return found

@@ -173,5 +173,11 @@ def modulus_of(case: Case, given: FuzzyNumber | None) -> FuzzyNumber:
     if given is not None:
         return given
     if not case.has("frame.modulus"):
-        raise BadInput(Problem("frame.modulus", "missing: give it in the case or by --modulus", file=str(case.path)))
+        raise BadInput(
+            Problem(
+                "frame.modulus",
+                "missing: give it here, or by --modulus FILE.nc from `fuzzy modulus CASE --out FILE.nc`; `alphacut run CASE` does both",
+                file=str(case.path),
+            )
+        )
     return case.fuzzy("frame.modulus")

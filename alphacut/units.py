@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from decimal import Decimal
 from functools import cache
 from typing import TYPE_CHECKING
@@ -29,6 +30,26 @@ QUANTITIES = {  # SI unit: (name of the quantity, a value as a user would write 
     "1/s": ("rate", "0.05 1/s"),
     "rad": ("angle", "1.5 rad"),
     "rad/s": ("angular velocity", "0.1 rad/s"),
+}
+
+ACCEPTED = {  # units that the page on the case format lists; any other of the same dimension that pint knows is taken too
+    "Pa": ("Pa", "kPa", "MPa", "GPa", "N/mm^2", "N/m^2", "kN/cm^2", "psi", "ksi"),
+    "m": ("m", "mm", "cm", "um", "km", "inch", "ft"),
+    "m^2": ("m^2", "cm^2", "mm^2"),
+    "m^4": ("m^4", "cm^4", "mm^4"),
+    "kg": ("kg", "t", "g"),
+    "kg/m": ("kg/m", "t/m"),
+    "kg/m^3": ("kg/m^3", "t/m^3", "g/cm^3"),
+    "s": ("s", "ms", "min"),
+    "m/s": ("m/s", "mm/s", "cm/s", "km/h"),
+    "m/s^2": ("m/s^2", "cm/s^2", "mm/s^2", "g_0"),
+    "N*s/m": ("N s/m", "kN s/m", "kg/s"),
+    "N*m*s": ("N m s", "kN m s"),
+    "N/m": ("N/m", "kN/m", "N/mm"),
+    "N": ("N", "kN", "MN"),
+    "1/s": ("1/s", "Hz"),
+    "rad": ("rad", "mrad", "deg"),
+    "rad/s": ("rad/s", "deg/s"),
 }
 
 
@@ -58,10 +79,11 @@ def factor(unit: str, si: str) -> Decimal:
     if not unit:
         raise ValueError("the unit is missing")
     try:
-        one = registry().Quantity(Decimal(1), registry().parse_units(unit))
+        one = registry().Quantity(Decimal(1), registry().parse_units(re.sub(r"([A-Za-z])([234])(?!\w)", r"\1^\2", unit)))
         return Decimal(one.to(si).magnitude)
     except (pint.UndefinedUnitError, pint.DimensionalityError):
-        raise ValueError(f'the unit "{unit}" is wrong') from None
+        close = next((name for name in ACCEPTED.get(si, ()) if name.lower() == unit.lower()), "")
+        raise ValueError(f'the unit "{unit}" is wrong' + (f"; did you mean {close}?" if close else "")) from None
     except Exception:  # pint's tokeniser raises whatever Python's does on text that is not a unit at all
         raise ValueError(f'the unit "{unit}" cannot be read') from None
 

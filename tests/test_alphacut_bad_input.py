@@ -87,7 +87,7 @@ def test_a_bad_case_is_one_line_per_problem_and_status_2(name, tmp_path, capfd):
         (["envelope", str(PAPER), "--step", "0.2", "--strict"], "envelope.step.*omega_max h"),
         (["envelope", str(PAPER), "--exclude", "modals"], "--exclude.*no method modals"),
         (["envelope", str(PAPER), "--method", "auto", "--exclude", "vertex"], "'vertex' is unknown"),
-        (["nothing"], "invalid choice"),
+        (["nothing"], "command = nothing: there is no such command.*see --help"),
         ([], "required"),
     ],
 )

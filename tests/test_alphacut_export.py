@@ -27,7 +27,7 @@ def test_an_ending_without_a_format_is_refused_before_computing(tmp_path, capfd)
     assert main(["cell", PAPER, "--export", str(tmp_path / "material.docx")]) == 2
     assert "names no format" in capfd.readouterr().err
     assert main(["mesh", PAPER, "--out", str(tmp_path / "mesh.docx")]) == 2
-    assert "ending is not known" in capfd.readouterr().err
+    assert "ending names no format" in capfd.readouterr().err
     assert not list(tmp_path.iterdir())
 
 

@@ -94,5 +94,5 @@ def test_what_is_no_result_is_refused(tmp_path):
     with pytest.raises(BadInput, match="no NetCDF file"):
         read_dataset(tmp_path / "modulus.nc")
     (tmp_path / "summary.json").write_text("{", encoding="utf-8")
-    with pytest.raises(BadInput, match=r"summary\.json cannot be read"):
+    with pytest.raises(BadInput, match=r"summary\.json: this file is damaged"):
         read_summary(tmp_path)
