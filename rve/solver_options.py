@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 PREFIX = "rve_"
-_CG = {"ksp_type": "cg", "ksp_rtol": "1e-9", "ksp_norm_type": "preconditioned", "ksp_max_it": "2000"}
+_CG = {"ksp_type": "cg", "ksp_rtol": "2e-9", "ksp_norm_type": "preconditioned", "ksp_max_it": "2000"}
 
 
 class OptionError(ValueError):
