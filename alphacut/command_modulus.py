@@ -59,7 +59,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     if options.json != "-" and not options.quiet:
         out.write(summary(found) + (f"\n{response.text(stress)}" if stress else ""))
         if not options.out:
-            say("to keep this and hand it on: the same command with --out modulus.nc, then frame envelope CASE --modulus modulus.nc")
+            say("to keep this and hand it on: the same command with --out modulus.nc, then alphacut envelope CASE --modulus modulus.nc")
     return 0
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from alphacut import units
+from alphacut.command_microstructure import advise
 from alphacut.entry import main
 from alphacut.quantity import fuzzy
 
@@ -111,6 +112,19 @@ def test_a_damaged_summary_is_named_with_its_cure(text, tmp_path, capfd):
 def test_a_damaged_modulus_is_one_line_without_the_libraries_words(tmp_path, capfd):
     (tmp_path / "bad.nc").write_text("nothing", encoding="utf-8")
     refused(["envelope", PAPER, "--modulus", str(tmp_path / "bad.nc")], "--modulus = .*bad.nc: this is no NetCDF file", capfd)
+
+
+def test_a_fragment_says_what_it_is_for_and_a_crisp_slope_is_warned_of(capfd):
+    advise("[radius]\na2 = 0.3\na4 = [0.1, 0.2, 0.3]\n", "particles")
+    err = capfd.readouterr().err
+    assert "warning: a2 came out crisp" in err
+    assert "a4 came out" not in err
+    assert "put particles/radius.toml in place of [radius]" in err
+
+
+def test_a_modulus_that_is_not_kept_says_how_to_keep_it(capfd):
+    assert main(["modulus", str(CASES / "porous.toml"), "--method", "series", "--plan", "reduced", "--alpha", "0,1"]) == 0
+    assert "--out modulus.nc, then alphacut envelope CASE --modulus modulus.nc" in capfd.readouterr().err
 
 
 def test_a_run_ends_with_its_main_numbers_and_the_next_command(tmp_path, capfd):
