@@ -13,7 +13,7 @@ from alphacut.loading import load
 from alphacut.options import add_common, add_workers, check_workers
 from alphacut.output import as_json, say, whole_file, write_text
 from alphacut.progress import progress
-from alphacut.provenance import attributes, fingerprint, versions
+from alphacut.provenance import attributes, door, fingerprint, versions
 
 if TYPE_CHECKING:
     from stochastic.microstructure import Microstructure
@@ -59,7 +59,7 @@ def advise(fragment: str, folder: str | None) -> None:
         if len(set(ends)) == 1:
             say(f"warning: {name} came out crisp: the particles leave its slope no room within the band; microstructure.sampling widens it")
     place = f"{folder}/radius.toml" if folder else "this section (--out FOLDER keeps it as radius.toml)"
-    say(f"next: put {place} in place of [radius] of a case with [cell] and [mesh], then alphacut modulus CASE")
+    say(f"next: put {place} in place of [radius] of a case with [cell] and [mesh], then {door()} modulus CASE")
 
 
 def write(found: Microstructure, folder: Path, said: Mapping[str, str | int], *, figures: bool = True) -> list[str]:

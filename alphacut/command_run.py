@@ -15,7 +15,7 @@ from alphacut.loading import load
 from alphacut.options import add_common, add_workers, check_workers
 from alphacut.output import as_json, say, whole_file, write_text
 from alphacut.problem import BadInput, Problem
-from alphacut.provenance import attributes, fingerprint
+from alphacut.provenance import attributes, door, fingerprint
 from alphacut.quick import banner, quick, settings
 from alphacut.readiness import ready
 from alphacut.units import engineering
@@ -73,7 +73,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         out.write(summary.table(found["paper"]) if found["paper"] else "")
         out.write(main_numbers(found))
         say(f"results are in {folder}, {len(drawn)} figures among them, after {found['seconds']:.0f} s")
-        say(f"next: alphacut report {folder}")
+        say(f"next: {door()} report {folder}")
     return 0
 
 

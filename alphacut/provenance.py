@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import platform
 import shlex
 import sys
@@ -72,6 +73,11 @@ def _canonical(value: object) -> object:
     if is_dataclass(value) and not isinstance(value, type):
         return [type(value).__name__, asdict(value)]
     return str(value)
+
+
+def door() -> str:
+    """How this program is called here: ``./enter python -m alphacut`` inside the environment, else ``alphacut``."""
+    return "./enter python -m alphacut" if os.environ.get("ALPHACUT_INSIDE") else "alphacut"
 
 
 def command() -> str:

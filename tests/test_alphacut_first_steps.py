@@ -8,6 +8,7 @@ import pytest
 from alphacut import units
 from alphacut.command_microstructure import advise
 from alphacut.entry import main
+from alphacut.provenance import door
 from alphacut.quantity import fuzzy
 
 CASES = Path(__file__).parent.parent / "cases"
@@ -132,4 +133,4 @@ def test_a_run_ends_with_its_main_numbers_and_the_next_command(tmp_path, capfd):
     assert main(case) == 0
     out, err = capfd.readouterr()
     assert re.search(r"q3 from −\S+ [mµ]?m to \S+ [mµ]?m at the lowest α", out)
-    assert f"next: alphacut report {tmp_path}" in err
+    assert f"next: {door()} report {tmp_path}" in err
