@@ -24,13 +24,14 @@ from fuzzy.model import Model
 
 @dataclass(frozen=True)
 class Row:
-    """One campaign: samples, time per sample in ms, memory of the process before and at its end in MB."""
+    """One campaign: samples, time per sample in ms, memory of the process before and at its end, and what its numbers alone take, in MB."""
 
     samples: int
     where: str
     milliseconds: float
     before: float
     after: float
+    data: float
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,8 @@ def measure(samples: int, store: Path | None) -> Row:
     identity = {"benchmark": "overhead", "samples": samples}
     before, start = resident(), perf_counter()
     propagate(nothing, inputs, Points(samples), alpha=[0.0], store=store, identity=identity)
-    return Row(samples, "store" if store else "no store", 1e3 * (perf_counter() - start) / samples, before, resident())
+    milliseconds, data = 1e3 * (perf_counter() - start) / samples, 8 * samples * (len(inputs) + 1) / 2**20
+    return Row(samples, "store" if store else "no store", milliseconds, before, resident(), data)
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
@@ -77,10 +79,12 @@ def draw(rows: Sequence[Row], path: Path) -> None:
         samples = [row.samples for row in chosen]
         time.plot(samples, [row.milliseconds for row in chosen], "o-", color=colour, label=where)
         memory.plot(samples, [row.after - row.before for row in chosen], "o-", color=colour, label=where)
+    memory.plot(samples, [row.data for row in chosen], ":", color="#999999", label="points and outputs")
     time.axhline(2, color="#999999", linestyle=":", label="2 ms")
     time.set(xscale="log", yscale="log", xlabel="samples", ylabel="overhead per sample in ms")
     memory.set(xscale="log", xlabel="samples", ylabel="memory taken in MB")
     time.legend(frameon=False)
+    memory.legend(frameon=False)
     figure.savefig(path, dpi=150)
 
 
@@ -99,7 +103,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         writer.writerows(asdict(row) for row in rows)
     draw(rows, options.out / "fuzzy_overhead.png")
     for row in rows:
-        print(f"{row.samples:8} samples, {row.where:8}: {row.milliseconds:.3f} ms per sample, {row.before:.0f} to {row.after:.0f} MB")
+        print(f"{row.samples:8} samples, {row.where:8}: {row.milliseconds:.3f} ms per sample, {row.before:.0f} to {row.after:.0f} MB (points and outputs: {row.data:.1f})")
 
 
 if __name__ == "__main__":

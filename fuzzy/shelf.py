@@ -22,6 +22,7 @@ from fuzzy.store import Identity, Store, Stored, StoreError, canonical
 _CHUNK = 500  # points asked for in one query
 _PAUSE = 0.05  # seconds between two transactions at least
 _SHARE = 10  # a transaction that took t is not followed by another within 10 t
+_FULL = 1000  # outcomes that wait for a transaction at most: what is gathered takes no more memory however large the store has grown
 _SAVE = """
 INSERT INTO sample VALUES (?, ?, ?, ?, ?) ON CONFLICT (model, point)
 DO UPDATE SET outputs = excluded.outputs, error = excluded.error, seconds = excluded.seconds WHERE sample.outputs IS NULL
@@ -32,7 +33,7 @@ class Shelf:
     """The samples of one model in a store, as one campaign uses them.
 
     An outcome that took long is written at once. Quick ones are gathered and written together, a transaction every twentieth of a second
-    or so: that much finished work is what a kill can cost.
+    or so, or every thousand outcomes: that much finished work is what a kill can cost.
 
     Args:
         store: The store.
@@ -103,7 +104,7 @@ class Shelf:
     def write(self, *, now: bool = False) -> None:
         """Write what is gathered: now, or when the last transaction is long enough ago not to slow the campaign down."""
         start = perf_counter()
-        due = now or self._urgent or start - self._written > max(_PAUSE, _SHARE * self._cost)
+        due = now or self._urgent or len(self._gathered) >= _FULL or start - self._written > max(_PAUSE, _SHARE * self._cost)
         if not (self._gathered and due):
             return
         self._commit(list(self._gathered))

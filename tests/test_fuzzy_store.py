@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fuzzy import CampaignError, Interval, Store, StoreError, Triangular, levels, propagate
+from fuzzy import CampaignError, Interval, MonteCarlo, Store, StoreError, Triangular, levels, propagate
 from fuzzy.call import Sample
 from fuzzy.shelf import Shelf
 from fuzzy.store import canonical
@@ -288,6 +288,15 @@ def test_overhead_per_sample_is_under_two_milliseconds(tmp_path):
     result = propagate(lambda a, b: a, INPUTS, alpha=levels(17), store=tmp_path / "s.db", identity=IDENTITY)
     assert result.runs > 1500
     assert result.seconds / result.runs < 2e-3
+
+
+def test_what_waits_to_be_written_does_not_grow_with_the_store(tmp_path, monkeypatch):
+    waiting = []
+    write = Shelf.write
+    monkeypatch.setattr(Shelf, "write", lambda self, *, now=False: (waiting.append(len(self._gathered)), write(self, now=now)))
+    monkeypatch.setattr("fuzzy.shelf._PAUSE", 1e9)
+    propagate(lambda a: a, {"a": Interval(0, 1)}, MonteCarlo(3000), alpha=[0.0], store=tmp_path / "s.db", identity={"model": "a"})
+    assert 900 < max(waiting) <= 1000
 
 
 def test_a_sample_that_took_long_is_written_at_once(tmp_path):
