@@ -103,7 +103,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         writer.writerows(asdict(row) for row in rows)
     draw(rows, options.out / "fuzzy_overhead.png")
     for row in rows:
-        print(f"{row.samples:8} samples, {row.where:8}: {row.milliseconds:.3f} ms per sample, {row.before:.0f} to {row.after:.0f} MB (points and outputs: {row.data:.1f})")
+        memory = f"{row.before:.0f} to {row.after:.0f} MB (points and outputs: {row.data:.1f})"
+        print(f"{row.samples:8} samples, {row.where:8}: {row.milliseconds:.3f} ms per sample, {memory}")
 
 
 if __name__ == "__main__":
