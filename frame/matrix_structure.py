@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from frame.damping import modal_damping
 from frame.jet import Array, Jet
 from frame.linear import Accelerogram, Matrices
 
@@ -32,9 +33,12 @@ class MatrixStructure:
         v0: Initial velocities, shape (n,), in m/s; zero when None.
         ground: Base excitation, or None.
         pattern: ι, how the unknowns move rigidly with the ground, shape (n,); ones when None.
+        ratios: Damping ratios ζ, numbers or names of parameters: one for all modes, or n by rising frequency; added to `damping`, they
+            follow the parameters through the modes (`frame.damping`).
 
     Raises:
-        ValueError: A shape does not fit, a factor names no parameter, or the modal mass matrix is not positive definite.
+        ValueError: A shape does not fit, a factor names no parameter, the modal mass matrix is not positive definite, or a modal ratio
+            is outside [0, 1).
     """
 
     parameters: Mapping[str, float]
@@ -46,6 +50,7 @@ class MatrixStructure:
     v0: Array | None = None
     ground: Accelerogram | None = None
     pattern: Array | None = None
+    ratios: Sequence[str | float] = ()
     size: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -65,9 +70,20 @@ class MatrixStructure:
         for name, row in self.observed.items():
             if np.shape(row) not in ((n,), (2 * n,)):
                 raise ValueError(f"observed: '{name}' has shape {np.shape(row)}; it must be ({n},) or ({2 * n},)")
+        self._check_ratios()
         modal = sum(float(_value(f, self.parameters)) * np.asarray(A, float) for f, A in self.mass)
         if not np.linalg.eigvalsh(modal).min() > 0:
             raise ValueError("mass: the matrix at the modal parameters is not positive definite; every unknown needs a mass")
+
+    def _check_ratios(self) -> None:
+        if len(self.ratios) not in (0, 1, self.size):
+            raise ValueError(f"ratios: got {len(self.ratios)}; give one for all modes, or {self.size}, by rising frequency")
+        for ratio in self.ratios:
+            if isinstance(ratio, str) and ratio not in self.parameters:
+                raise ValueError(f"ratios: '{ratio}' is no parameter; known are {', '.join(self.parameters)}")
+            value = float(_value(ratio, self.parameters))
+            if not 0 <= value < 1:
+                raise ValueError(f"ratios: {value:g} is not allowed; it must be 0 or greater and below 1, the critical damping")
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -79,18 +95,23 @@ class MatrixStructure:
         like = next(iter(p.values()))
         n, samples, d = self.size, like.value.size, like.directions
 
+        def lifted(factor: Factor | str | float) -> Jet:
+            value = _value(factor, p)
+            return value if isinstance(value, Jet) else Jet.constant(np.full(samples, float(value)), d)
+
         def total(terms: Terms) -> Jet:
             out = Jet.constant(np.zeros((samples, n, n)), d)
             for factor, array in terms:
-                value = _value(factor, p)
-                lifted = value if isinstance(value, Jet) else Jet.constant(np.full(samples, float(value)), d)
-                out = out + lifted[:, None, None] * np.asarray(array, float)
+                out = out + lifted(factor)[:, None, None] * np.asarray(array, float)
             return out
 
         start = [np.zeros(n) if x is None else np.asarray(x, float) for x in (self.q0, self.v0)]
         q0, v0 = (Jet.constant(np.tile(x[None, :, None], (samples, 1, 1)), d) for x in start)
         pattern = None if self.pattern is None else np.asarray(self.pattern, float)[:, None]
-        return Matrices(total(self.mass), total(self.damping), total(self.stiffness), q0, v0, pattern)
+        mass, damping, stiffness = (total(terms) for terms in (self.mass, self.damping, self.stiffness))
+        if self.ratios:
+            damping = damping + modal_damping(mass, stiffness, [lifted(ratio) for ratio in self.ratios])
+        return Matrices(mass, damping, stiffness, q0, v0, pattern)
 
     def observation(self, p: Mapping[str, Jet]) -> Jet:
         """Rows C(p) with output = C(p) [q; v], shape (S, m, 2n)."""

@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 
+from frame.damping import modal_damping
 from frame.jet import Jet, stack
 from frame.linear import Accelerogram, Matrices
 
@@ -20,7 +21,7 @@ class StoreyFrame:
     """A chain of n floors; storey z has the stiffness k_z = 24 E I / l_z³.
 
     Parameters that can be uncertain: "E", "I", "m1" … "mn", "l1" …, "d1" …, "q1_0" … (initial displacements), "v1_0" … (initial
-    velocities), and "rayleigh_mass", "rayleigh_stiffness".
+    velocities), "rayleigh_mass", "rayleigh_stiffness", and "zeta", or "zeta1" … where each mode has its own ratio.
     Outputs: "q1" … (displacement, m), "v1" … (velocity, m/s), "drift1" … (q_z − q_(z−1), m), "shear1" … (k_z drift_z, N); "base_shear"
     is "shear1".
 
@@ -36,9 +37,12 @@ class StoreyFrame:
         outputs: Names of the observed quantities; all displacements when empty.
         rayleigh: Mass and stiffness factors a (1/s), b (s) of a damping a M + b K added to the dampers.
         ground: Base excitation, if any; displacements are then relative to the ground.
+        damping_ratio: ζ of all modes, or one for each by rising frequency, added to the other damping; it follows the parameters through
+            the modes (`frame.damping`).
 
     Raises:
-        ValueError: A length of the lists differs, or a mass, length, modulus or moment is not positive, or a damper is negative.
+        ValueError: A length of the lists differs, a mass, length, modulus or moment is not positive, a damper is negative, or a ratio
+            is outside [0, 1).
     """
 
     masses: Sequence[float]
@@ -52,9 +56,12 @@ class StoreyFrame:
     outputs: tuple[str, ...] = ()
     rayleigh: tuple[float, float] = (0.0, 0.0)
     ground: Accelerogram | None = None
+    damping_ratio: float | Sequence[float] = ()
 
     def __post_init__(self) -> None:
         n = len(self.masses)
+        single = np.ndim(self.damping_ratio) == 0
+        object.__setattr__(self, "damping_ratio", (self.damping_ratio,) if single else tuple(cast(Sequence[float], self.damping_ratio)))
         for name in ("dampers", "q0", "v0"):
             object.__setattr__(self, name, tuple(getattr(self, name)) or (0.0,) * n)
         object.__setattr__(self, "outputs", tuple(self.outputs) or tuple(f"q{z + 1}" for z in range(n)))
@@ -74,6 +81,11 @@ class StoreyFrame:
             for value in values:
                 if not (value >= 0 and np.isfinite(value)):
                     raise ValueError(f"{name}: {value:g} is not allowed; damping must not be negative")
+        for value in self.ratios.values():
+            if not 0 <= value < 1:
+                raise ValueError(f"damping_ratio: {value:g} is not allowed; it must be 0 or greater and below 1, the critical damping")
+        if len(self.ratios) not in (0, 1, n):
+            raise ValueError(f"damping_ratio: {len(self.ratios)} values for {n} modes; give one for all modes, or {n}, by rising frequency")
         if self.damper_placement not in ("ground", "storey"):
             raise ValueError(f"damper_placement: '{self.damper_placement}' is unknown; allowed are 'ground' and 'storey'")
         for output in self.outputs:
@@ -85,15 +97,21 @@ class StoreyFrame:
         return len(self.masses)
 
     @property
+    def ratios(self) -> dict[str, float]:
+        """Damping ratios by the names of their parameters; empty where there are none."""
+        values = cast(Sequence[float], self.damping_ratio)
+        return {"zeta" if len(values) == 1 else f"zeta{k + 1}": float(x) for k, x in enumerate(values)}
+
+    @property
     def parameters(self) -> dict[str, float]:
         """All parameters with their modal values, in SI units."""
         lists = {"m{}": self.masses, "l{}": self.lengths, "d{}": self.dampers, "q{}_0": self.q0, "v{}_0": self.v0}
         named = {pattern.format(z + 1): float(x) for pattern, values in lists.items() for z, x in enumerate(values)}
         damping = {"rayleigh_mass": self.rayleigh[0], "rayleigh_stiffness": self.rayleigh[1]}
-        return {"E": self.modulus, "I": self.second_moment, **named, **damping}
+        return {"E": self.modulus, "I": self.second_moment, **named, **damping, **self.ratios}
 
     def group(self, name: str) -> tuple[str, ...]:
-        """The parameters meant by a short name: "m" is m1 … mn, likewise "l", "d", "q0", "v0"; any other name is itself.
+        """The parameters meant by a short name: "m" is m1 … mn, likewise "l", "d", "q0", "v0", "zeta"; any other name is itself.
 
         Raises:
             ValueError: The name is neither a group nor a parameter.
@@ -101,6 +119,8 @@ class StoreyFrame:
         patterns = {"m": "m{}", "l": "l{}", "d": "d{}", "q0": "q{}_0", "v0": "v{}_0"}
         if name in patterns:
             return tuple(patterns[name].format(z + 1) for z in range(self.floors))
+        if name == "zeta" and self.ratios:
+            return tuple(self.ratios)
         if name not in self.parameters:
             raise ValueError(f"uncertain parameter '{name}' is unknown; known are {', '.join([*patterns, *self.parameters])}")
         return (name,)
@@ -117,6 +137,8 @@ class StoreyFrame:
             damping = stack([[dampers[i] if i == j else 0.0 for j in range(n)] for i in range(n)], p)
         if any(p[name].value.any() or p[name].first.any() for name in ("rayleigh_mass", "rayleigh_stiffness")):
             damping = damping + p["rayleigh_mass"][:, None, None] * mass + p["rayleigh_stiffness"][:, None, None] * chain
+        if self.ratios:
+            damping = damping + modal_damping(mass, chain, [p[name] for name in self.ratios])
         q0, v0 = (stack([[p[f"{x}{z + 1}_0"]] for z in range(n)], p) for x in "qv")
         return Matrices(mass, damping, chain, q0, v0)
 
