@@ -19,7 +19,7 @@ class BeamFrame:
     """A regular frame clamped at its foot, uncertain in the moduli of columns and beams, the floor mass and the damping.
 
     Parameters: "E_columns", "E_columns_top" (upper half), "E_beams", "mass" (of the floors, per length of beam), "rayleigh_mass",
-    "rayleigh_stiffness". Outputs: "roof" (displacement, m) and "drift" (of the first storey, m).
+    "rayleigh_stiffness", "zeta" where a damping ratio is given. Outputs: "roof" (displacement, m) and "drift" (of the first storey, m).
 
     Args:
         storeys: Number of storeys.
@@ -33,9 +33,10 @@ class BeamFrame:
         density: Density of the columns, in kg/m³.
         rayleigh: Damping factors, 1/s and s.
         ground: Base excitation.
+        damping_ratio: ζ of all modes, beside Rayleigh's damping; None for none.
 
     Raises:
-        ValueError: A count or quantity is not positive.
+        ValueError: A count or quantity is not positive, or the ratio is outside [0, 1).
     """
 
     storeys: int
@@ -49,11 +50,14 @@ class BeamFrame:
     density: float = 2500.0
     rayleigh: tuple[float, float] = (0.05, 0.004)
     ground: Accelerogram | None = None
+    damping_ratio: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("storeys", "bays", "height", "width", "modulus", "floor", "density"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name}: {getattr(self, name):g} is not allowed; it must be positive")
+        if self.damping_ratio is not None and not 0 <= self.damping_ratio < 1:
+            raise ValueError(f"damping_ratio: {self.damping_ratio:g} is not allowed; it must be 0 or greater and below 1")
 
     def structure(self) -> AffineStructure:
         """The frame as an affine structure with 3 (bays + 1) storeys unknowns."""
@@ -70,6 +74,8 @@ class BeamFrame:
         parameters = {"E_columns": self.modulus, "E_columns_top": self.modulus, "E_beams": self.modulus, "mass": self.floor}
         parameters |= {"rayleigh_mass": self.rayleigh[0], "rayleigh_stiffness": self.rayleigh[1]}
         names = ("E_columns", "E_columns_top", "E_beams")
+        if self.damping_ratio is not None:
+            parameters["zeta"] = self.damping_ratio
         return AffineStructure(
             parameters,
             [(_one, heavy[0]), (itemgetter("mass"), heavy[1])],
@@ -78,6 +84,7 @@ class BeamFrame:
             sway,
             {"roof": roof, "drift": first},
             self.ground,
+            ratio=None if self.damping_ratio is None else "zeta",
         )
 
     def _column(self, storey: int, line: int) -> tuple[list[int], Array, Array]:

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from frame.damping import modal_damping
 from frame.halton import chebyshev_points
 from frame.jet import Array, Jet
 from frame.linear import Accelerogram, Matrices
@@ -37,6 +38,7 @@ class AffineStructure:
         ground: Base excitation, or None.
         q0: Initial displacements, shape (N,).
         v0: Initial velocities, shape (N,).
+        ratio: Name of the parameter that is the damping ratio of all modes, added to Rayleigh's; None for none.
     """
 
     parameters: Mapping[str, float]
@@ -48,6 +50,7 @@ class AffineStructure:
     ground: Accelerogram | None = None
     q0: Array | None = None
     v0: Array | None = None
+    ratio: str | None = None
 
     def assembled(self, p: Mapping[str, float]) -> tuple[Any, Any]:
         """Sparse M and K at one parameter set."""
@@ -92,13 +95,14 @@ class AffineStructure:
     def trajectories(self, p: Mapping[str, float], time: Array) -> Array:
         """Outputs of the full structure, exact for a record linear between its samples, by all its modes; shape (T, m); for checking.
 
-        Rayleigh damping keeps the undamped modes, each of which answers with two exponentials.
+        Rayleigh and modal damping keep the undamped modes, each of which answers with two exponentials.
         """
         from scipy.linalg import eigh
 
         M, K = self.assembled(p)
         squared, shape = eigh(K.toarray(), M.toarray())
         half = (float(p[self.rayleigh[0]]) + float(p[self.rayleigh[1]]) * squared) / 2
+        half += float(p[self.ratio]) * np.sqrt(squared) if self.ratio else 0.0
         root = np.sqrt(half**2 - squared + 0j)
         slow, fast = -half + root, -half - root
         rows = np.array(list(self.observed.values())) @ shape
@@ -168,7 +172,10 @@ class ReducedStructure:
         M, K = total(self.mass), total(self.stiffness)
         a, b = (p[name][:, None, None] for name in self.full.rayleigh)
         q0, v0 = (Jet.constant(np.tile(x[None, :, None], (size, 1, 1)), d) for x in (self.q0, self.v0))
-        return Matrices(M, a * M + b * K, K, q0, v0, self.push[:, None])
+        D = a * M + b * K
+        if self.full.ratio:
+            D = D + modal_damping(M, K, [p[self.full.ratio]])
+        return Matrices(M, D, K, q0, v0, self.push[:, None])
 
     def observation(self, p: Mapping[str, Jet]) -> Jet:
         """Rows C(p) with output = C(p) [q; v], shape (S, m, 2n)."""

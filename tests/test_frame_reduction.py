@@ -38,8 +38,9 @@ def test_rigid_motion_costs_no_energy_away_from_the_foot() -> None:
     assert structure.excitation @ (M @ structure.excitation) == pytest.approx(columns + beams - 3 * 3.0 * 2500 * 0.49 + foot, rel=0.02)
 
 
-def test_reduced_structure_follows_the_full_one() -> None:
-    structure = TOWER.structure()
+@pytest.mark.parametrize("ratio", [None, 0.05])
+def test_reduced_structure_follows_the_full_one(ratio: float | None) -> None:
+    structure = replace(TOWER, damping_ratio=ratio).structure()
     box = {"E_beams": (27e9, 33e9), "mass": (11e3, 13e3)}
     reduced, poor = structure.reduced(box), structure.reduced(box, keep=1e-3)
     points = np.array([[27e9, 13e3], [33e9, 11.5e3], [28e9, 11e3]])
@@ -49,8 +50,11 @@ def test_reduced_structure_follows_the_full_one() -> None:
     assert poor.error(named, TIME, worse) > 5e-3
 
 
-def test_full_structure_agrees_with_the_propagator_of_its_matrices() -> None:
-    structure = replace(BeamFrame(2, 1, ground=GROUND).structure(), q0=np.full(12, 1e-3), v0=np.linspace(-0.1, 0.1, 12))
+@pytest.mark.parametrize("ratio", [None, 0.05])
+def test_full_structure_agrees_with_the_propagator_of_its_matrices(ratio: float | None) -> None:
+    structure = replace(
+        BeamFrame(2, 1, ground=GROUND, damping_ratio=ratio).structure(), q0=np.full(12, 1e-3), v0=np.linspace(-0.1, 0.1, 12)
+    )
     small = replace(structure.reduced({"mass": (11e3, 13e3)}), basis=np.eye(12))
     rows = np.array(list(structure.observed.values()))
     terms = [[(f, A.toarray()) for f, A in pairs] for pairs in (structure.mass, structure.stiffness)]
