@@ -11,7 +11,8 @@ from alphacut import envelope, microstructure, modulus, outcomes, response
 from alphacut.campaign import campaign
 from alphacut.case import Case
 from alphacut.command_microstructure import write as write_microstructure
-from alphacut.consistency import FILES, OTHERS
+from alphacut.consistency import FILES
+from alphacut.frame_names import OTHERS
 from alphacut.output import say, whole_file
 from alphacut.progress import progress
 from alphacut.provenance import attributes, fingerprint

@@ -8,17 +8,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from alphacut.case import Case
+from alphacut.completeness import incomplete
+from alphacut.frame_names import OTHERS, floors, named_inputs, study_count
 from alphacut.problem import BadInput, Problem
-from alphacut.reading import nearest
 from alphacut.schema import NEEDED, STAGES
 from stochastic import HermiteMap, TruncatedNormal
 
 SLOPES = ("a1", "a2", "a3", "a4")
-GROUPS = ("E", "I", "m", "l", "d", "q0", "v0", "rayleigh_mass", "rayleigh_stiffness")
-OTHERS = {  # structures beside the storey frame, and their inputs
-    "pendulum": ("m", "l", "d", "g", "phi_0", "omega_0"),
-    "tower": ("E_columns", "E_columns_top", "E_beams", "mass", "rayleigh_mass", "rayleigh_stiffness"),
-}
 FILES = (
     "microstructure.circles.file",
     "microstructure.image.file",
@@ -34,6 +30,7 @@ def inconsistencies(case: Case, *, modal: bool = False) -> Iterator[Problem]:
     yield from order_of_stages(case)
     yield from missing_sections(case)
     yield from files(case)
+    yield from incomplete(case)
     if case.has("microstructure.seed"):
         yield from particles(case)
     if case.has("radius.a1"):
@@ -67,11 +64,6 @@ def order_of_stages(case: Case) -> Iterator[Problem]:
             yield Problem(f"study[{index}].name", "a file will be called so", name, "letters, digits and . _ + -")
         if name in names[:index]:
             yield Problem(f"study[{index}].name", "another study has this name", name)
-
-
-def study_count(case: Case) -> int:
-    """Number of [[study]] tables."""
-    return int(str(case.values.get("study", 0)))
 
 
 def stress_curves(case: Case) -> Iterator[Problem]:
@@ -172,57 +164,6 @@ def levels(case: Case, key: str) -> Iterator[Problem]:
         yield Problem(key, "the α-levels are not in rising order", str(list(alpha)), "for example [0, 0.25, 0.5, 0.75, 1]")
 
 
-def floors(case: Case) -> Iterator[Problem]:
-    """Every array of the frame has one entry for each floor; one entry alone holds for all of them."""
-    count = len(case.fuzzies("frame.masses"))
-    for name in ("lengths", "dampers", "displacements", "velocities"):
-        found = len(case.fuzzies(f"frame.{name}"))
-        if found not in (1, count):
-            few = f"{count} value{'s' if count > 1 else ''}"
-            words = f"{few}, or one for all floors; the number of floors is that of frame.masses, which has {count}"
-            yield Problem(f"frame.{name}", f"got {found} values for {count} floor{'s' if count > 1 else ''}", allowed=words)
-    yield from known_output(case, count)
-    for key in fuzzy_keys(case):
-        for name in case.names(key):
-            yield from known_input(key, name, count)
-
-
-def named_inputs(case: Case, section: str, known: tuple[str, ...]) -> Iterator[Problem]:
-    """Fuzzy inputs of a structure that has no groups of them."""
-    for key in fuzzy_keys(case):
-        for name in case.names(key):
-            if name not in known:
-                yield Problem(key, f"the {section} has no input {name}", name, ", ".join(known), nearest(name, known))
-
-
-def fuzzy_keys(case: Case) -> list[str]:
-    """Keys that name fuzzy inputs of the structure."""
-    keys = ["envelope.fuzzy", "exceedance.random", *(f"study[{i}].fuzzy" for i in range(study_count(case)))]
-    return [key for key in keys if case.has(key)]
-
-
-def known_output(case: Case, floors: int) -> Iterator[Problem]:
-    """The observed quantities, and the one that a study draws."""
-    kinds = ("q", "v", "drift", "shear")
-    possible = [f"{kind}{floor + 1}" for kind in kinds for floor in range(floors)] + ["base_shear"]
-    for name in case.names("frame.outputs"):
-        if name not in possible:
-            yield Problem(
-                "frame.outputs",
-                f"there is no output {name}",
-                name,
-                f"q, v, drift or shear with a floor, base_shear: {', '.join(possible[:floors])} …",
-            )
-    outputs = case.names("frame.outputs") or tuple(possible[:floors])
-    for index in range(study_count(case)):
-        drawn = str(case.values.get(f"study[{index}].output", ""))
-        if drawn and drawn not in outputs:
-            yield Problem(f"study[{index}].output", f"there is no output {drawn}", drawn, ", ".join(outputs))
-    limited = case.text("exceedance.output") if case.has("exceedance.output") else outputs[0]
-    if limited not in outputs:
-        yield Problem("exceedance.output", f"there is no output {limited}", limited, ", ".join(outputs), nearest(limited, outputs))
-
-
 def exceedance(case: Case) -> Iterator[Problem]:
     """A limit is for an output of a linear structure in vibration, and in its unit."""
     from alphacut.outcomes import limit_of
@@ -233,15 +174,6 @@ def exceedance(case: Case) -> Iterator[Problem]:
         limit_of(case)
     except BadInput as error:
         yield from error.problems
-
-
-def known_input(key: str, name: str, count: int) -> Iterator[Problem]:
-    """A fuzzy input of the frame: a group or one floor's member of it."""
-    members = [f"{group}{floor + 1}" for group in ("m", "l", "d") for floor in range(count)]
-    members += [f"{group}{floor + 1}_0" for group in ("q", "v") for floor in range(count)]
-    if name not in GROUPS and name not in members:
-        allowed = f"{', '.join(GROUPS)}, or one floor: m1 to m{count}, l1, d1, q1_0, v1_0 …"
-        yield Problem(key, f"the frame has no input {name}", name, allowed, nearest(name, members) if re.match("[mldqv]", name) else "")
 
 
 def times(case: Case) -> Iterator[Problem]:

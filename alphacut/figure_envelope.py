@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 WORDS = {"E": "modulus", "m": "masses", "l": "lengths", "d": "dampers", "q0": "initial displacements", "v0": "initial velocities"}
 WORDS |= {"E_columns": "lower columns", "E_columns_top": "upper columns", "E_beams": "beams", "mass": "floor mass"}
-WORDS |= {"rayleigh_mass": "mass damping", "rayleigh_stiffness": "stiffness damping", "I": "second moment"}
+WORDS |= {"rayleigh_mass": "mass damping", "rayleigh_stiffness": "stiffness damping", "I": "second moment", "zeta": "damping ratio"}
 
 
 def drawings(study: Study, dataset: xarray.Dataset) -> Iterator[tuple[str, Callable[[], Figure]]]:

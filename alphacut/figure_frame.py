@@ -49,7 +49,7 @@ def ground(axes: Axes, left: float, right: float) -> None:
 def chain(case: Case) -> Figure:
     """Fig. 27: the frame with rigid floors and bending columns as masses on springs, with its dampers."""
     floors = len(case.fuzzies("frame.masses"))
-    grounded = case.text("frame.damper_placement") == "ground"
+    placement = case.text("frame.damper_placement") if case.has("frame.damper_placement") else "none"
     drawn, axes = figure(min(10.0, 2.2 + 1.5 * floors), 2.6)
     axes.plot([0, 0], [-0.9, 0.6], color=INK, lw=1)
     axes.fill_betweenx([-0.9, 0.6], [-0.12] * 2, [0, 0], hatch="////", facecolor="white", edgecolor=GREY, lw=0)
@@ -62,13 +62,13 @@ def chain(case: Case) -> Figure:
         axes.annotate(f"$m_{{{floor}}}$", ((left + right) / 2, 0.15), ha="center", va="center")
         axes.annotate("", (right + 0.12, 0.85), (left + 0.4, 0.85), arrowprops={"arrowstyle": "-|>", "color": ORANGE})
         axes.annotate(f"$q_{{{floor}}}$", (left + 0.25, 0.85), ha="center", va="center", color=ORANGE)
-        if grounded:
+        if placement == "ground":
             damper(axes, ((left + right) / 2, -0.3), ((left + right) / 2, -0.9))
             axes.annotate(f"$d_{{{floor}}}$", ((left + right) / 2 + 0.16, -0.6), va="center", fontsize=9)
-        else:
+        elif placement == "storey":
             damper(axes, (start, -0.1), (left, -0.1))
             axes.annotate(f"$d_{{{floor}}}$", ((start + left) / 2, -0.3), ha="center", va="top", fontsize=9)
-    if grounded:
+    if placement == "ground":
         axes.plot([-0.12, 1.6 * floors + 0.2], [-0.9, -0.9], color=INK, lw=1)
         axes.fill_between([-0.12, 1.6 * floors + 0.2], [-1.02] * 2, [-0.9] * 2, hatch="////", facecolor="white", edgecolor=GREY, lw=0)
     axes.set_aspect("equal")

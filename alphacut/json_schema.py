@@ -59,7 +59,10 @@ def value_schema(key: Key) -> dict[str, Any]:
     if key.kind == "integer":
         return {"type": "integer", **limits(key)}
     single = quantity_schema(key)
-    return {"type": "array", "items": single, "minItems": 1} if key.kind in ("numbers", "fuzzy list") else single
+    if key.kind not in ("numbers", "fuzzy list"):
+        return single
+    listed = {"type": "array", "items": single, "minItems": 1}
+    return {"anyOf": [listed, {"type": ["string", "number"]}]} if key.alone else listed
 
 
 def quantity_schema(key: Key) -> dict[str, Any]:

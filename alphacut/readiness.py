@@ -8,7 +8,8 @@ from alphacut import envelope, modulus
 from alphacut.accelerogram import accelerogram
 from alphacut.case import Case
 from alphacut.chain import studies
-from alphacut.consistency import beside, fuzzy_keys, replaced
+from alphacut.consistency import beside, replaced
+from alphacut.frame_names import fuzzy_keys
 from alphacut.problem import BadInput, Problem
 from alphacut.structure import Structure, structure
 from fuzzy import FuzzyNumber, Triangular

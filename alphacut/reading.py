@@ -41,6 +41,7 @@ def allowed(key: Key) -> str:
     kind, example = QUANTITIES[key.unit]
     kind = "whole number" if key.kind == "integer" else kind
     many = "an array, each a " if key.kind in ("numbers", "fuzzy list") else "a "
+    many = "one for all, or an array, each a " if key.alone else many
     words = f"{many}{kind}" + (f" {key.allowed.words}" if key.allowed else "")
     return words + (f', for example "{example}"' if key.unit else "")
 
@@ -91,7 +92,7 @@ def array(value: object, key: Key) -> list[object]:
 
 def read_array(value: object, key: Key) -> tuple[object, ...]:
     """An array of quantities, at least one."""
-    items = array(value, key)
+    items = [value] if key.alone and isinstance(value, str | float | int) and not isinstance(value, bool) else array(value, key)
     if not items:
         raise Unfit("the array is empty", allowed(key))
     read = read_fuzzy if key.kind == "fuzzy list" else read_number
@@ -121,7 +122,7 @@ def read_name(value: object, key: Key) -> str:
 
 def read_names(value: object, key: Key) -> tuple[str, ...]:
     """An array of names, each one of the choices if there are any."""
-    names = tuple(read_name(item, key) for item in array(value, key))
+    names = tuple(str(entry(read_name, item, number, key)) for number, item in enumerate(array(value, key), start=1))
     if len(set(names)) < len(names):
         raise Unfit("a name stands there twice", allowed(key))
     if key.required and not names:

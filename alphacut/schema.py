@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from alphacut.key import COUNT, DEVIATIONS, MEMBERSHIP, NOT_NEGATIVE, POISSON, POSITIVE, UNIT, Key, Range, Section
+from alphacut.key import COUNT, DEVIATIONS, MEMBERSHIP, NOT_NEGATIVE, POISSON, POSITIVE, RATIO, UNIT, Key, Range, Section
 from fuzzy import Crisp
 
 VERSION = 1
@@ -136,13 +136,30 @@ FRAME = Section(
     "Storey frame: rigid floors on elastic columns, numbered from the ground.",
     {
         "masses": Key("mass of each floor", "fuzzy list", "kg", required=True, allowed=POSITIVE),
-        "lengths": Key("length of the columns below each floor", "fuzzy list", "m", required=True, allowed=POSITIVE),
+        "lengths": Key("length of the columns below each floor", "fuzzy list", "m", required=True, allowed=POSITIVE, alone=True),
         "modulus": Key("Young's modulus where none is handed on", unit="Pa", allowed=POSITIVE),
         "second_moment": Key("second moment of area of one column", unit="m^4", required=True, allowed=POSITIVE),
-        "dampers": Key("viscous damper of each floor", "fuzzy list", "N*s/m", required=True, allowed=NOT_NEGATIVE),
-        "damper_placement": Key("to the ground, or between storeys", "choice", required=True, choices=("ground", "storey")),
-        "displacements": Key("displacement of each floor at the start", "fuzzy list", "m", required=True),
-        "velocities": Key("velocity of each floor at the start", "fuzzy list", "m/s", required=True),
+        "damping_ratio": Key(
+            "viscous damping over the critical one: of all modes, or of each by rising frequency; beside the other damping",
+            "fuzzy list",
+            allowed=RATIO,
+            alone=True,
+        ),
+        "dampers": Key(
+            "viscous damper of each floor; needed where no other damping is given",
+            "fuzzy list",
+            "N*s/m",
+            default=(Crisp(0.0),),
+            allowed=NOT_NEGATIVE,
+            alone=True,
+        ),
+        "damper_placement": Key("to the ground, or between storeys; needed with dampers", "choice", choices=("ground", "storey")),
+        "displacements": Key(
+            "displacement of each floor at the start; needed without an accelerogram", "fuzzy list", "m", default=(Crisp(0.0),), alone=True
+        ),
+        "velocities": Key(
+            "velocity of each floor at the start; needed without an accelerogram", "fuzzy list", "m/s", default=(Crisp(0.0),), alone=True
+        ),
         "rayleigh_mass": Key("factor a of Rayleigh damping a M + b K", unit="1/s", default=Crisp(0.0), allowed=NOT_NEGATIVE),
         "rayleigh_stiffness": Key("factor b of Rayleigh damping a M + b K", unit="s", default=Crisp(0.0), allowed=NOT_NEGATIVE),
         "accelerogram": Key("CSV file of the ground's acceleration; displacements are then relative to the ground", "text"),
@@ -166,8 +183,13 @@ TOWER = Section(
         "E_beams": Key("Young's modulus of the beams", unit="Pa", required=True, allowed=POSITIVE),
         "mass": Key("mass of the floors over the length of the beams", unit="kg/m", required=True, allowed=POSITIVE),
         "density": Key("density of the columns", "number", "kg/m^3", required=True, allowed=NOT_NEGATIVE),
-        "rayleigh_mass": Key("factor a of Rayleigh damping a M + b K", unit="1/s", required=True, allowed=NOT_NEGATIVE),
-        "rayleigh_stiffness": Key("factor b of Rayleigh damping a M + b K", unit="s", required=True, allowed=NOT_NEGATIVE),
+        "damping_ratio": Key("viscous damping over the critical one, of all modes; beside Rayleigh's", allowed=RATIO),
+        "rayleigh_mass": Key(
+            "factor a of Rayleigh damping a M + b K; needed without damping_ratio", unit="1/s", default=Crisp(0.0), allowed=NOT_NEGATIVE
+        ),
+        "rayleigh_stiffness": Key(
+            "factor b of Rayleigh damping a M + b K; needed without damping_ratio", unit="s", default=Crisp(0.0), allowed=NOT_NEGATIVE
+        ),
         "accelerogram": Key("CSV file of the ground's acceleration", "text", required=True),
     },
 )
@@ -201,7 +223,7 @@ ENVELOPE = Section(
     "Fuzzy forward dynamics.",
     {
         "fuzzy": Key(
-            "inputs that are fuzzy, of a frame: E, I, m or m1 …, l, d, q0, v0, rayleigh_mass …",
+            "inputs that are fuzzy, of a frame: E, I, m or m1 …, l, d, q0, v0, zeta (damping ratio) …",
             "choices",
             required=True,
         ),

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 
 from alphacut.accelerogram import accelerogram
 from alphacut.case import Case
-from alphacut.consistency import OTHERS, beside
+from alphacut.consistency import beside
+from alphacut.frame_names import OTHERS
 from alphacut.problem import BadInput, Problem
 from fuzzy import FuzzyNumber
 
@@ -115,11 +116,15 @@ def tower(case: Case) -> Structure:
     """A plane beam frame, reduced to shapes that hold for the whole supports of its fuzzy inputs."""
     from frame.beam_frame import BeamFrame
 
-    numbers = {name: case.fuzzy(f"tower.{name}") for name in OTHERS["tower"]}
+    numbers = {name: case.fuzzy(f"tower.{name}") for name in OTHERS["tower"] if name != "zeta"}
+    if case.has("tower.damping_ratio"):
+        numbers["zeta"] = case.fuzzy("tower.damping_ratio")
     sizes: dict[str, Any] = {name: case.number(f"tower.{name}") for name in ("height", "width", "density")}
     column, beam = ((case.number(f"tower.{part}_area"), case.number(f"tower.{part}_moment")) for part in ("column", "beam"))
     ground = accelerogram(beside(case, case.text("tower.accelerogram")), "tower.accelerogram")
-    frame = BeamFrame(case.integer("tower.storeys"), case.integer("tower.bays"), column=column, beam=beam, ground=ground, **sizes)
+    ratio = numbers["zeta"].modal if "zeta" in numbers else None
+    counts = (case.integer("tower.storeys"), case.integer("tower.bays"))
+    frame = BeamFrame(*counts, column=column, beam=beam, ground=ground, damping_ratio=ratio, **sizes)
     full = replace(frame.structure(), parameters={name: number.modal for name, number in numbers.items()})
     bounds = {name: (number.support.lower, number.support.upper) for name, number in numbers.items() if number.support.width > 0}
     return Structure(full.reduced(bounds), numbers)
@@ -137,12 +142,15 @@ def storey_frame(case: Case, modulus: FuzzyNumber) -> Structure:
         modulus.modal,
         case.fuzzy("frame.second_moment").modal,
         dampers=modal["dampers"],
-        damper_placement=cast(Literal["ground", "storey"], case.text("frame.damper_placement")),
+        damper_placement=cast(
+            Literal["ground", "storey"], case.text("frame.damper_placement") if case.has("frame.damper_placement") else "ground"
+        ),
         q0=modal["displacements"],
         v0=modal["velocities"],
         outputs=case.names("frame.outputs"),
         rayleigh=(case.fuzzy("frame.rayleigh_mass").modal, case.fuzzy("frame.rayleigh_stiffness").modal),
         ground=accelerogram(beside(case, case.text("frame.accelerogram"))) if case.has("frame.accelerogram") else None,
+        damping_ratio=tuple(ratio.modal for ratio in ratios(case)),
     )
     return Structure(model, numbers)
 
@@ -151,11 +159,17 @@ def parameters(case: Case, modulus: FuzzyNumber) -> dict[str, FuzzyNumber]:
     """Every parameter of the frame by the name that `frame` gives it, in SI."""
     found = {"E": modulus, "I": case.fuzzy("frame.second_moment")}
     found |= {name: case.fuzzy(f"frame.{name}") for name in RAYLEIGH}
+    found |= {"zeta" if len(ratios(case)) == 1 else f"zeta{mode}": ratio for mode, ratio in enumerate(ratios(case), start=1)}
     for letter, key in LISTS.items():
         found |= {f"{letter}{floor}": value for floor, value in enumerate(per_floor(case, f"frame.{key}"), start=1)}
     for letter, key in STARTS.items():
         found |= {f"{letter}{floor}_0": value for floor, value in enumerate(per_floor(case, f"frame.{key}"), start=1)}
     return found
+
+
+def ratios(case: Case) -> tuple[FuzzyNumber, ...]:
+    """Damping ratios: none, one for all modes, or one for each."""
+    return case.fuzzies("frame.damping_ratio") if case.has("frame.damping_ratio") else ()
 
 
 def per_floor(case: Case, key: str) -> tuple[FuzzyNumber, ...]:
