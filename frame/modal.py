@@ -33,6 +33,7 @@ class ModalModel:
         eigenvalue: λ_k, n polynomials, in 1/s.
         coefficient: C_k, n m polynomials.
         load: Response to the ground's motion, or None.
+        chosen: Which modes it has, by rising |λ|, shape (n,).
         error: Largest deviation of held-out trajectories, shape (T, m).
         analyses: Eigen-analyses made.
     """
@@ -42,6 +43,7 @@ class ModalModel:
     eigenvalue: Polynomial
     coefficient: Polynomial
     load: LoadTables | None
+    chosen: Array
     error: Array
     analyses: int
 
@@ -59,6 +61,11 @@ class ModalModel:
     def count(self) -> int:
         """Number of modes n."""
         return self.eigenvalue.coefficients.shape[1]
+
+    @property
+    def degree(self) -> int:
+        """Total degree of the polynomials."""
+        return int(self.eigenvalue.index.sum(1).max())
 
     @cached_property
     def together(self) -> Polynomial:
@@ -122,7 +129,7 @@ def composed(rate: Jet, share: Jet, wave: tuple[Array, Array, Array]) -> tuple[A
     return value, np.moveaxis(g, 0, -1), np.moveaxis(H, (0, 1), (-2, -1))
 
 
-def analyse(flow: LinearFlow, boxes: Boxes, unit: Array, chosen: Array | None = None) -> Modes:
+def analyse(flow: LinearFlow, boxes: Boxes, unit: Array, chosen: Array | None = None, *, states: bool = False) -> Modes:
     """Eigen-analyses at unit coordinates (S, d), with derivatives by these; eigenvalues are those of the flow's integrator.
 
     Args:
@@ -130,11 +137,14 @@ def analyse(flow: LinearFlow, boxes: Boxes, unit: Array, chosen: Array | None = 
         boxes: The parameters' boxes.
         unit: Where to analyse, shape (S, d).
         chosen: Indices of the modes wanted; all when None.
+        states: Whether to observe the whole state [q; v] in place of the outputs.
 
     Raises:
         ModalError: The structure has no such modes, or the integrator mixes them.
     """
     matrices, rows = evaluate(flow.system, flow.names, boxes.to_physical(unit), derivatives=True)
+    if states:
+        rows = Jet.constant(np.broadcast_to(np.eye(rows.value.shape[-1]), (len(unit), *2 * rows.value.shape[-1:])), rows.directions)
     found = modes(matrices, rows, chosen)
     rate = _discrete(found.eigenvalue, flow)
     return Modes(*(_scaled(jet, boxes.radius) for jet in (rate, found.coefficient, found.load)))
@@ -180,13 +190,12 @@ def fit_modes(flow: LinearFlow, boxes: Boxes, *, tolerance: float = 1e-6, budget
     held = _held_out(d)
     truth = flow.values(boxes.to_physical(held))
     used, best, chosen = len(held), None, _needed(flow, boxes, tolerance / 4 * np.broadcast_to(scale, truth.shape[-1:]))
-    data_per_analysis = 1 + d + d * (d + 1) // 2
     for degree in range(2, 13):
-        needed = ceil((2.5 if d <= 6 else 5) * terms(d, degree) / data_per_analysis) + 1
-        if used + needed > budget or terms(d, degree) > 2500:
+        points = fit_points(d, degree)
+        if used + len(points) > budget or terms(d, degree) > 2500:
             break
-        model = _fitted(flow, boxes, np.vstack([np.zeros((1, d)), chebyshev_points(d, needed - 1)]), degree, chosen)
-        model = replace(model, analyses=used + needed)
+        model = _fitted(flow, boxes, points, degree, chosen)
+        model = replace(model, analyses=used + len(points))
         error = np.abs(model.values(held) - truth).max(0)
         if best is None or (error / scale).max() < (best.error / scale).max():
             best = replace(model, error=error)
@@ -220,13 +229,27 @@ def _needed(flow: LinearFlow, boxes: Boxes, allowed: Array) -> Array:
     return np.setdiff1d(upper, upper[small])
 
 
+def fit_points(d: int, degree: int) -> Array:
+    """Where to analyse for polynomials of a total degree in d variables: enough for least squares with derivatives, shape (S, d)."""
+    data = 1 + d + d * (d + 1) // 2
+    count = ceil((2.5 if d <= 6 else 5) * terms(d, degree) / data)
+    return np.vstack([np.zeros((1, d)), chebyshev_points(d, count)])
+
+
+def fit_states(model: ModalModel) -> Polynomial:
+    """The states [φ_k; λ_k φ_k] of the model's modes, n · 2N polynomials of its degree, fitted where it was."""
+    unit = fit_points(len(model.boxes.names), model.degree)
+    found = analyse(model.flow, model.boxes, unit, model.chosen, states=True).coefficient
+    return fit(unit, found.map(lambda x: x.reshape((*x.shape[:-2], -1))), model.degree)
+
+
 def _fitted(flow: LinearFlow, boxes: Boxes, points: Array, degree: int, chosen: Array) -> ModalModel:
     found = analyse(flow, boxes, points, chosen)
     flat = [jet.map(lambda x: x.reshape((*x.shape[:-2], -1))) for jet in (found.coefficient, found.load)]
     rate = fit(points, found.eigenvalue, degree)
     ground = flow.system.ground
     load = None if ground is None else LoadTables.build(ground, flow.time, rate, fit(points, flat[1], degree))
-    return ModalModel(flow, boxes, rate, fit(points, flat[0], degree), load, np.zeros((len(flow.time), len(flow.outputs))), 0)
+    return ModalModel(flow, boxes, rate, fit(points, flat[0], degree), load, chosen, np.zeros((len(flow.time), len(flow.outputs))), 0)
 
 
 def _held_out(d: int) -> Array:

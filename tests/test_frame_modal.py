@@ -94,7 +94,8 @@ def test_default_method_is_modal_and_meets_the_certified_envelope(certified: Env
 
 
 def test_certificate_has_the_gap_asked_for_and_contains_sampled_trajectories(certified: Envelope) -> None:
-    assert certified.nature == "verified by sampling"
+    assert certified.nature == "guaranteed"
+    assert float(certified.facts["gap"]) <= 1e-6
     assert certified.outer_upper is not None
     assert certified.outer_lower is not None
     assert (certified.outer_upper - certified.upper).min() > 0

@@ -1,0 +1,127 @@
+"""A proved bound of what the polynomials of a modal model do wrong, over the whole box and not at samples.
+
+Polynomials z_k = [φ_k; w_k] for the states of the modes make q(t) = 2 Re Σ φ_k exp(λ_k t) a motion that nearly obeys the equations. What
+it misses, λ_k φ_k − w_k and λ_k M w_k + D w_k + K φ_k, is a polynomial in the parameters, bounded by its Chebyshev coefficients. Damping
+only takes energy, so the deviation from the true motion, in the norm √(qᵀ K q + vᵀ M v), grows no faster than this defect: no eigenvalue
+problem is solved anew, and nothing rests on a distance between eigenvalues.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from frame.chebyshev_grid import ChebyshevGrid
+from frame.integrators import Exact
+from frame.jet import Array
+from frame.linear import evaluate
+from frame.modal import ModalModel, fit_states
+from frame.polynomial import Polynomial
+from frame.polynomial_structure import UnprovedError, degrees
+from frame.remainder import largest_growth
+
+MOST_NUMBERS = 120_000_000
+"""Values of the defects on their grid, at most: 1 GB."""
+CHUNK = 10_000
+
+
+def proved_error(model: ModalModel) -> Array:
+    """Bound of |model − true motion| over the box, shape (T, m), in units of the outputs; up to the rounding of this computation.
+
+    Raises:
+        UnprovedError: The structure is not known to be a polynomial that loses energy, the scheme is not the exact propagator, there is a
+            load, or the box is so wide or has so many parameters that the bound cannot be computed.
+    """
+    if model.load is not None:
+        raise UnprovedError("base excitation is not covered")
+    if not isinstance(model.flow.integrator, Exact):
+        raise UnprovedError(f"the motion is that of the scheme '{model.flow.integrator.name}'; only the exact propagator is covered")
+    defect = _coefficients(model)
+    stiffness, mass = Comparison.of(defect["stiffness"]), Comparison.of(defect["mass"])
+    energy = np.hypot(stiffness.sup(defect["start_q"]), mass.sup(defect["start_v"]))
+    growth, time = largest_growth(model.eigenvalue, np.ones(len(model.boxes.names))), model.time
+    total = np.full(len(time), energy)
+    for k, rate in enumerate(growth):
+        grows = np.hypot(stiffness.sup(defect["kinematic"][:, k]), mass.sup_dual(defect["dynamic"][:, k]))
+        total += 2 * grows * (np.expm1(rate * time) / rate if rate else time)
+    size = defect["start_q"].shape[-1]
+    rows = np.moveaxis(defect["rows"], 1, 0)  # (m, J, 2N)
+    reading = np.array([np.hypot(stiffness.sup_dual(row[:, :size]), mass.sup_dual(row[:, size:])) for row in rows])
+    own = 2 * np.abs(defect["outputs"]).sum(0)  # (n, m)
+    bound: Array = total[:, None] * reading + np.exp(np.outer(time, growth)) @ own
+    return bound
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A symmetric matrix A(p) against its mean A₀ = L Lᵀ: lowest A₀ ≤ A(p) ≤ highest A₀ over the box.
+
+    Args:
+        factor: L, shape (N, N).
+        lowest: See above.
+        highest: See above.
+    """
+
+    factor: Array
+    lowest: float
+    highest: float
+
+    @classmethod
+    def of(cls, coefficients: Array) -> Comparison:
+        """From the Chebyshev coefficients of A, shape (J, N, N), the mean first.
+
+        Raises:
+            UnprovedError: A(p) is not shown to stay positive definite.
+        """
+        try:
+            factor = np.linalg.cholesky(coefficients[0])
+        except np.linalg.LinAlgError:
+            raise UnprovedError("the mean mass or stiffness matrix is not positive definite") from None
+        inverse = np.linalg.inv(factor)
+        spread = float(np.linalg.norm(np.abs(inverse @ coefficients[1:] @ inverse.T).sum(0), 2))
+        if spread >= 1:
+            raise UnprovedError("the box is so wide that mass and stiffness are not shown to stay positive definite")
+        return cls(factor, 1 - spread, 1 + spread)
+
+    def sup(self, coefficients: Array) -> float:
+        """Bound of √(x* A x) over the box from the coefficients of x, shape (J, N)."""
+        return float(np.sqrt(self.highest) * np.linalg.norm(coefficients @ self.factor, axis=-1).sum())
+
+    def sup_dual(self, coefficients: Array) -> float:
+        """Bound of √(x* A⁻¹ x) over the box from the coefficients of x, shape (J, N)."""
+        solved = np.linalg.solve(self.factor, coefficients.T)
+        return float(np.linalg.norm(solved, axis=0).sum() / np.sqrt(self.lowest))
+
+
+def _coefficients(model: ModalModel) -> Mapping[str, Array]:
+    """Chebyshev coefficients of all that the bound needs, each of shape (J, …)."""
+    box = dict(zip(model.boxes.names, zip(model.boxes.lower[0].tolist(), model.boxes.upper[0].tolist(), strict=True), strict=True))
+    exponents = degrees(model.flow.system, box)
+    grid = ChebyshevGrid(tuple(2 * model.degree + exponents[name] for name in model.boxes.names))
+    points, states = grid.points if len(grid) < MOST_NUMBERS else np.zeros((1, 1)), fit_states(model)
+    width = sum(part[0].size * (2 if np.iscomplexobj(part) else 1) for part in _defects(model, states, points[:1]).values())
+    if len(grid) * width > MOST_NUMBERS:
+        raise UnprovedError(f"the defects need {len(grid):.2g} points of a grid in {len(box)} parameters: too many")
+    parts = [_defects(model, states, chunk) for chunk in np.array_split(points, -(-len(points) // CHUNK))]
+    return {name: grid.coefficients(np.concatenate([part.pop(name) for part in parts])) for name in list(parts[0])}
+
+
+def _defects(model: ModalModel, states: Polynomial, unit: Array) -> dict[str, Array]:
+    """What the motion misses at unit coordinates (S, d), and the matrices that measure it."""
+    matrices, rows = evaluate(model.flow.system, model.flow.names, model.boxes.to_physical(unit), derivatives=False)
+    M, D, K, C = matrices.mass.value, matrices.damping.value, matrices.stiffness.value, rows.value
+    rate = model.eigenvalue(unit)[..., None]
+    z = states(unit).reshape(len(unit), model.count, -1)  # (S, n, 2N)
+    shape, speed = np.split(z, 2, axis=-1)
+    return {
+        "mass": M,
+        "stiffness": K,
+        "rows": C,
+        "start_q": 2 * shape.real.sum(1) - matrices.q0.value[..., 0],
+        "start_v": 2 * speed.real.sum(1) - matrices.v0.value[..., 0],
+        "kinematic": rate * shape - speed,
+        "dynamic": rate * (speed @ M) + speed @ D.swapaxes(-1, -2) + shape @ K,
+        "outputs": model.coefficient(unit).reshape(len(unit), model.count, -1) - z @ C.swapaxes(-1, -2),
+    }

@@ -1,0 +1,142 @@
+"""The proved error of modal models: never below the true one, wherever that is sampled, and near enough to be of use."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from frame import Accelerogram, Exact, LinearFlow, MatrixStructure, Midpoint, StoreyFrame, envelope
+from frame.box import UnitFlow, boxes
+from frame.chebyshev_grid import ChebyshevGrid
+from frame.modal import ModalModel, fit_modes
+from frame.model_error import Comparison, proved_error
+from frame.polynomial import Polynomial
+from frame.polynomial_structure import UnprovedError, degrees, inverse_cube_degree
+from fuzzy import Interval, Triangular
+
+FRAME = StoreyFrame(
+    (20e3, 15e3, 10e3),
+    (4.0, 3.5, 3.0),
+    25e9,
+    1e-4,
+    (9e3, 5e3, 0.0),
+    q0=(0.1, 0.2, 0.25),
+    v0=(0.0, 0.5, 0.0),
+    outputs=("q3", "v1", "drift2"),
+)
+SHEAR = replace(FRAME, outputs=("base_shear",), rayleigh=(0.02, 1e-4), dampers=(), damper_placement="storey")
+CHAIN = MatrixStructure(
+    {"m": 2.0, "k": 80.0, "d": 0.3},
+    mass=[("m", np.eye(2))],
+    stiffness=[("k", np.array([[2.0, -1.0], [-1.0, 1.0]])), (3.0, np.eye(2))],
+    observed={"tip": np.array([0.0, 1.0])},
+    damping=[("d", np.diag([1.0, 0.0]))],
+    q0=np.array([0.0, 0.1]),
+)
+
+
+def model(system, inputs, tolerance=1e-4, **changes) -> ModalModel:
+    flow = LinearFlow(system, tuple(inputs), 10.0, 0.1, Exact())
+    return fit_modes(replace(flow, **changes), boxes(inputs, (0,)), tolerance=tolerance)
+
+
+@pytest.mark.parametrize(
+    ("system", "inputs"),
+    [
+        (FRAME, {"E": Triangular(23e9, 25e9, 26e9), "m1": Interval(19e3, 21e3), "m3": Interval(9e3, 11e3)}),
+        (FRAME, {"l1": Interval(3.9, 4.1), "d1": Interval(7e3, 11e3), "q3_0": Interval(0.2, 0.3)}),
+        (SHEAR, {"E": Interval(24e9, 26e9), "rayleigh_mass": Interval(0.01, 0.03), "rayleigh_stiffness": Interval(0.0, 2e-4)}),
+        (CHAIN, {"m": Interval(1.9, 2.1), "k": Interval(75, 85), "d": Interval(0.0, 0.6)}),
+    ],
+)
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-5])
+def test_no_sampled_trajectory_deviates_by_more_than_the_proved_error(system, inputs, tolerance) -> None:
+    scale = 1e5 if system is SHEAR else 1.0  # N beside m
+    found = model(system, inputs, scale * tolerance)
+    unit = np.vstack([np.random.default_rng(3).uniform(-1, 1, (300, 3)), np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T])
+    truth = UnitFlow(found.flow, found.boxes).values(unit)
+    deviation, proved = np.abs(found.values(unit) - truth).max(0), proved_error(found)
+    assert (deviation <= proved + 1e-12 * np.abs(truth).max()).all()
+    assert proved.max() < 1000 * deviation.max()
+
+
+def test_a_model_that_is_wrong_is_proved_to_be_no_better() -> None:
+    good = model(FRAME, {"E": Interval(24e9, 26e9), "m2": Interval(14e3, 16e3)}, 1e-8)
+    rate = good.eigenvalue.coefficients.copy()
+    rate[1, 0] *= 1.001
+    bad = replace(good, eigenvalue=Polynomial(good.eigenvalue.index, rate))
+    unit = np.array([[-1.0, 0.3], [1.0, -0.2], [0.9, 1.0]])
+    deviation = np.abs(bad.values(unit) - UnitFlow(bad.flow, bad.boxes).values(unit)).max(0)
+    assert deviation.max() > 1e-4 > proved_error(good).max()
+    assert (deviation <= proved_error(bad)).all()
+
+
+def test_what_is_not_known_is_not_proved() -> None:
+    inputs = {"E": Interval(24e9, 26e9), "m2": Interval(14e3, 16e3)}
+    record = Accelerogram(0.1, np.sin(np.arange(50.0)))
+    with pytest.raises(UnprovedError, match="midpoint"):
+        proved_error(model(FRAME, inputs, integrator=Midpoint()))
+    with pytest.raises(UnprovedError, match="excitation"):
+        proved_error(model(replace(FRAME, ground=record), inputs))
+    with pytest.raises(UnprovedError, match="positive definite"):
+        proved_error(model(FRAME, {"l1": Interval(3.0, 5.0), "l2": Interval(2.5, 4.5), "l3": Interval(2.0, 4.0)}, 0.1))
+
+
+def test_structures_that_may_gain_energy_or_are_no_polynomials_are_refused() -> None:
+    box = {"m": (1.9, 2.1)}
+    with pytest.raises(UnprovedError, match="function"):
+        degrees(replace(CHAIN, mass=[(lambda p: p["m"] ** 2, np.eye(2))]), box)
+    with pytest.raises(UnprovedError, match="feed energy"):
+        degrees(replace(CHAIN, damping=[("d", np.array([[0.0, 1.0], [1.0, 0.0]]))]), box)
+    with pytest.raises(UnprovedError, match="feed energy"):
+        degrees(CHAIN, {"d": (-0.1, 0.1)})
+    with pytest.raises(UnprovedError, match="symmetric"):
+        degrees(replace(CHAIN, stiffness=[("k", np.array([[2.0, 1.0], [0.0, 1.0]]))]), box)
+    with pytest.raises(UnprovedError, match="nothing is known"):
+        degrees(object(), box)  # type: ignore[arg-type]
+
+
+def test_certificate_says_why_it_is_only_sampled() -> None:
+    inputs = {"m": Interval(1.9, 2.1), "k": Interval(75, 85)}
+    stretched = replace(CHAIN, stiffness=[(lambda p: p["k"], np.array([[2.0, -1.0], [-1.0, 1.0]])), (3.0, np.eye(2))])
+    proved, sampled = (envelope(s, inputs, duration=4, step=0.5, alpha=(0,), method="modal", certify=1e-4) for s in (CHAIN, stretched))
+    assert proved.nature == "guaranteed"
+    assert "energy" in str(proved.facts["proof"])
+    assert sampled.nature == "verified by sampling"
+    assert "stiffness has a factor that is a function" in str(sampled.facts["proof"])
+    assert np.abs(proved.upper - sampled.upper).max() < 1e-4
+
+
+@pytest.mark.parametrize(("lower", "upper"), [(3.96, 4.04), (3.0, 5.0), (1.0, 4.0)])
+def test_degree_of_the_inverse_cube_reaches_round_off_and_not_far_beyond(lower, upper) -> None:
+    degree = inverse_cube_degree(lower, upper)
+    coefficients = np.polynomial.chebyshev.chebinterpolate(
+        lambda u: ((upper + lower) / 2 + (upper - lower) / 2 * u) ** -3.0, 2 * degree + 8
+    )
+    size = np.abs(coefficients) / np.abs(coefficients).max()
+    assert size[degree + 1 :].max() < 1e-13
+    assert size[: degree // 2 + 1].min() > 1e-14
+
+
+def test_chebyshev_coefficients_are_exact() -> None:
+    grid = ChebyshevGrid((3, 2))
+    x, y = grid.points.T
+    values = np.stack([1 + 2 * x - y, (4 * x**3 - 3 * x) * (2 * y**2 - 1) * 5], -1)
+    found = grid.coefficients(values.copy()).reshape(4, 3, 2)
+    expected = np.zeros((4, 3, 2))
+    expected[0, 0, 0], expected[1, 0, 0], expected[0, 1, 0], expected[3, 2, 1] = 1, 2, -1, 5
+    assert np.abs(found - expected).max() < 1e-14
+
+
+def test_comparison_holds_over_the_box() -> None:
+    rng = np.random.default_rng(5)
+    mean, part = np.diag([2.0, 3.0, 4.0]), rng.uniform(-0.3, 0.3, (2, 3, 3))
+    coefficients = np.stack([mean, *(part + part.swapaxes(-1, -2)) / 2])
+    found = Comparison.of(coefficients)
+    x = rng.standard_normal((5, 3))
+    for u, v in rng.uniform(-1, 1, (200, 2)):
+        A = coefficients[0] + u * coefficients[1] + v * coefficients[2]
+        assert np.linalg.eigvalsh(A - found.lowest * mean).min() > 0 > np.linalg.eigvalsh(A - found.highest * mean).max()
+        assert all(np.sqrt(y @ A @ y) <= found.sup(y[None]) and np.sqrt(y @ np.linalg.solve(A, y)) <= found.sup_dual(y[None]) for y in x)
