@@ -13,6 +13,7 @@ from stochastic.truncated_normal import Array
 
 _BATCH = 2_000_000  # entries of one batch of matrices
 _ROUND_OFF = 2e-14
+_SLOWEST = 0.97  # decay from one harmonic to the next that is believed
 
 
 @dataclass(frozen=True)
@@ -106,15 +107,17 @@ def _batches(rows: Array, entries: int) -> list[Array]:
 def _solve_batch(radius: Array, contrast: Contrast, count: int, loads: Sequence[str]) -> tuple[dict[str, Array], Array]:
     """Moduli by load and their largest estimated relative error, all of shape (rows, m).
 
-    One harmonic more or less changes a modulus by all but the factor `fade` of its error, fade = exp(−5 arccosh(1/r)) being slower
-    than any decay met; doubled for safety.
+    A harmonic changes a modulus by all but the factor `fade` of the error that it leaves; fade is what the last two changes show, and
+    at least exp(−5 arccosh(1/r)), the slowest decay met at moderate contrasts. Doubled for safety.
     """
-    fade = np.exp(-5 * np.arccosh(1 / np.maximum(radius, 1e-3)))[:, None]
+    least = np.exp(-5 * np.arccosh(1 / np.maximum(radius, 1e-3)))[:, None]
     values, error = {}, np.full((radius.size, contrast.kappa_i.size), _ROUND_OFF / 10)
     for load in loads:
-        value, shorter = (modulus(load, multipoles(load, radius, contrast, harmonics=n), radius, contrast) for n in (count, count - 1))
-        values[load] = value
-        error = np.maximum(error, _ROUND_OFF / 10 + 2 * np.abs(value / shorter - 1) * fade / (1 - fade))
+        last, before, first = (modulus(load, multipoles(load, radius, contrast, harmonics=count - n), radius, contrast) for n in range(3))
+        change, earlier = np.abs(last / before - 1), np.abs(before / first - 1)
+        fade = np.clip(change / np.maximum(earlier, _ROUND_OFF / 10), least, np.maximum(least, _SLOWEST))
+        values[load] = last
+        error = np.maximum(error, _ROUND_OFF / 10 + 2 * np.maximum(change, earlier * least**1.5) * fade / (1 - fade))
     return values, error
 
 

@@ -15,7 +15,7 @@ from stochastic.truncated_normal import Array, TruncatedNormal
 _SAMPLES = 2049
 _LEAST_JUMP, _LEAST_BEND = 1e-3, 1e-8  # in radii, over one or two steps of the sampling
 _FINE = 128
-_MOST_POINTS = 800
+_MOST_POINTS = 1200
 DIGITS = 12  # radii equal to so many decimals are one slice
 
 
@@ -92,7 +92,7 @@ def settle_rule(
 ) -> tuple[list[StressCurve], list[float]]:
     """Curves by rules whose nodes are added until E of each inclusion settles within `accuracy`, and the estimated error of each.
 
-    Rules of four, two and one nodes less tell how large the error is and how fast it fades; what fades further is declared, doubled.
+    Two finer rules tell how large the error of a rule is: its distance from them, doubled.
 
     Args:
         radius_map: The map.
@@ -107,20 +107,20 @@ def settle_rule(
     known: dict[int, list[StressCurve]] = {}
     settled: dict[int, tuple[StressCurve, float]] = {}
     while True:
-        counts = [max(count - less, 1) for less in (4, 2, 1, 0)]
-        _add_curves(known, [n for n in dict.fromkeys(counts) if n not in known], radius_map, stiffness_at)
-        gaps = [_faded(*(effective_modulus(*curve.mean)[0] for curve in four)) for four in zip(*(known[n] for n in counts), strict=True)]
+        counts = [count, _finer(count), _finer(_finer(count))]
+        _add_curves(known, [n for n in counts if n not in known], radius_map, stiffness_at)
+        gaps = [_gap(*(effective_modulus(*curve.mean)[0] for curve in three)) for three in zip(*(known[n] for n in counts), strict=True)]
         for k, (curve, gap) in enumerate(zip(known[count], gaps, strict=True)):
             if k not in settled and (points or gap <= accuracy):  # each inclusion by itself, whatever its companions need
                 settled[k] = curve, gap
         if len(settled) == len(gaps):
             return [settled[k][0] for k in range(len(gaps))], [settled[k][1] for k in range(len(gaps))]
-        if count >= _MOST_POINTS:
+        if counts[-1] >= _MOST_POINTS:
             raise RuleError(
                 f"the rule of {count} nodes in θ leaves a relative error of {max(gaps):.1e} in E and {accuracy:.1e} is wanted: the radius "
                 f"map is not smooth; allow a larger error, or give the number of nodes"
             )
-        count = count + 2 if count < 20 else 2 * count
+        count = counts[1]
 
 
 def _add_curves(
@@ -134,11 +134,14 @@ def _add_curves(
         known[count] = [curve_of(rule, part[:, k]) for k in range(part.shape[1])]
 
 
-def _faded(first: float, second: float, third: float, last: float) -> float:
-    """Estimated relative error of the last of four values that close in on a limit: four, two and one nodes less, and none."""
-    before, after = abs(second - first) / abs(last), max(abs(last - second), abs(last - third)) / abs(last)
-    fade = min(max(after / before, 0.02), 0.5) if before > 0 else 0.5
-    return 2 * after * fade / (1 - fade)
+def _finer(count: int) -> int:
+    """Nodes of the next finer rule: a third more."""
+    return count + max(2, count // 3)
+
+
+def _gap(value: float, finer: float, finest: float) -> float:
+    """Estimated relative error of `value`; two finer ones, since one alone may meet it by chance."""
+    return 2 * max(abs(finer - value), abs(finest - value)) / abs(finest)
 
 
 def extreme_radii(radius_map: RadiusMap) -> Array:
