@@ -1,6 +1,6 @@
 # make run         the paper's case, from microstructure to fuzzy vibration, into results/paper/
 # make test        the tests (slower ones: make test-slow)
-# make bench-solver, make charts, make stability    what the methods cost and where they end
+# make bench-solver, make bench-scaling, make charts, make stability    what the methods cost and where they end
 # make docs, make lint, make pictures    documentation, style and types, the README's picture
 # The environment is made on first use; make clean-env removes it.
 CASE ?= cases/paper.toml
@@ -8,7 +8,7 @@ WORKERS ?= 2
 OUT ?= results/$(basename $(notdir $(CASE)))
 IN = ./enter
 
-.PHONY: run test test-slow lint charts bench-solver stability docs pictures clean clean-env
+.PHONY: run test test-slow lint charts bench-solver bench-scaling stability docs pictures clean clean-env
 
 run:
 	$(IN) python -m alphacut run $(CASE) --out $(OUT) --workers $(WORKERS) $(if $(FRESH),--fresh)
@@ -21,6 +21,10 @@ test-slow:
 
 bench-solver:
 	$(IN) python -m benchmarks.cell_solvers
+
+bench-scaling:
+	$(IN) python -m benchmarks.cell_scaling
+	$(IN) python -m benchmarks.cell_solvers --mesh-size 0.04 --solvers gamg --out benchmarks/results/cell_solvers_large.csv
 
 lint:
 	ruff check . && ruff format --check .
