@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 from scipy.special import gammaln
@@ -49,22 +49,22 @@ class Contrast:
         kappa, mu = zip(*((3 - 4 * p.poisson, p.modulus / (2 * (1 + p.poisson))) for p in (matrix, *inclusions)), strict=True)
         return cls(kappa[0], mu[0], np.array(kappa[1:]), np.array(mu[1:]))
 
-    @property
+    @cached_property
     def ratio(self) -> Array:
         """λ = μ_m / μ_i."""
         return self.mu / self.mu_i
 
-    @property
+    @cached_property
     def outer(self) -> Array:
         """The factor of a_n."""
         return (1 - self.ratio) / (self.kappa + self.ratio)
 
-    @property
+    @cached_property
     def inner(self) -> Array:
         """The factor of b_n, n ≥ 2."""
         return np.asarray((self.kappa - self.ratio * self.kappa_i) / (1 + self.ratio * self.kappa_i))
 
-    @property
+    @cached_property
     def swelling(self) -> Array:
         """The factor of b_1."""
         lam, k = self.ratio, self.kappa_i - 1
