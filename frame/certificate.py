@@ -25,8 +25,9 @@ class Certificate:
         bounds: Attained upper bounds of (−output, output), less the model error, shape (A, T, m, 2).
         at: Their unit coordinates, shape (A, T, m, 2, d).
         outer: Proved upper bounds, shape (A, T, m, 2).
-        between: Bound of what the outputs do between nodes beyond a straight line, in units of the outputs.
+        between: Bound of what the outputs do between nodes beyond a straight line, in units of the first output.
         boxes: Boxes of parameters looked at.
+        scale: Size of each output beside the first, shape (m,).
     """
 
     bounds: Array
@@ -34,11 +35,12 @@ class Certificate:
     outer: Array
     between: float
     boxes: int
+    scale: Array
 
     @property
     def gap(self) -> float:
-        """Largest difference between proved and attained bound."""
-        return float((self.outer - self.bounds).max())
+        """Largest difference between proved and attained bound, in units of the first output."""
+        return float(((self.outer - self.bounds) / self.scale[:, None]).max())
 
 
 def certify(
@@ -48,6 +50,7 @@ def certify(
     *,
     gap: float,
     model_error: Array,
+    scale: Array | None = None,
     workers: int = 1,
     budget: float = 4000,
     progress: Callable[[float], None] | None = None,
@@ -58,8 +61,9 @@ def certify(
         model: The modal model.
         bounds: Upper bounds of (−output, output), shape (A, T, m, 2).
         at: Their unit coordinates, shape (A, T, m, 2, d).
-        gap: Wanted difference between proved and attained bound, in units of the outputs.
+        gap: Wanted difference between proved and attained bound, in units of the first output.
         model_error: Bound of the difference between the modal model and the trajectories, shape (T, m).
+        scale: Factor on the gap for each output, shape (m,); ones if not given.
         workers: Processes.
         budget: Most boxes per bound on average.
         progress: Called with the fraction done.
@@ -67,7 +71,10 @@ def certify(
     Raises:
         ValueError: The model error alone exceeds the gap.
     """
-    margin = model_error + ROUNDING * np.abs(bounds).max()
+    scale = np.ones(len(model.outputs)) if scale is None else scale
+    model, unit = model.in_units(scale), scale[:, None]
+    bounds = bounds / unit
+    margin = model_error / scale + ROUNDING * np.abs(bounds).max()
     slack = (1 - 1e-6) * gap - 2 * float(margin.max())  # so that rounding does not lift the gap above what was asked for
     if slack <= 0:
         limit = 2 * float(margin.max())
@@ -85,7 +92,7 @@ def certify(
         inner[level], points[level] = found.value.reshape(inner[level].shape), found.point.reshape(points[level].shape)
         outer[level], boxes = found.proved.reshape(outer[level].shape), boxes + found.boxes
     wide = margin[None, :, :, None]
-    return Certificate(inner - wide, points, outer + wide, _between(model), boxes)
+    return Certificate((inner - wide) * unit, points, (outer + wide) * unit, _between(model), boxes, scale)
 
 
 def _between(model: ModalModel) -> float:

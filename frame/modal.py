@@ -67,6 +67,14 @@ class ModalModel:
         """Total degree of the polynomials."""
         return int(self.eigenvalue.index.sum(1).max())
 
+    def in_units(self, scale: Array) -> ModalModel:
+        """The same with every output divided by its scale (m,)."""
+        repeated = np.tile(scale, self.count)
+        share = Polynomial(self.coefficient.index, self.coefficient.coefficients / repeated)
+        if self.load is not None:
+            raise ModalError("modal: the response to a load has no other units")
+        return replace(self, coefficient=share, error=self.error / scale)
+
     @cached_property
     def together(self) -> Polynomial:
         """λ_k and then C_k as one vector of polynomials, n + n m of them."""

@@ -18,6 +18,7 @@ from frame.modal import ModalModel, fit_modes
 from frame.modal_search import ModalSearch
 from frame.model_error import proved_error
 from frame.polynomial_structure import UnprovedError
+from frame.remainder import require_certifiable
 
 Progress = Callable[[float], None]
 SAFETY = 3.0
@@ -85,10 +86,22 @@ def modal(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> E
 
 
 def _certified(flow: UnitFlow, method: Modal, gap: float, begun: float, progress: Progress | None) -> Envelope:
-    model, error, unproved = _model_with_error(flow, method, gap)
+    assert isinstance(flow.flow, LinearFlow)
+    require_certifiable(len(flow.boxes.names), loaded=flow.flow.system.ground is not None)
+    model, error, unproved = _model_with_error(flow.flow, flow, method, gap)
     bounds, at = search_levels(model, ModalSearch(seed=method.seed), None)
-    proof = certify(model, bounds, at, gap=gap, model_error=error, workers=method.workers, budget=method.boxes, progress=progress)
-    facts: dict[str, float | str] = {"model_error": float(error.max()), "degree": model.degree, "gap": proof.gap}
+    proof = certify(
+        model,
+        bounds,
+        at,
+        gap=gap,
+        model_error=error,
+        scale=flow.scale,
+        workers=method.workers,
+        budget=method.boxes,
+        progress=progress,
+    )
+    facts: dict[str, float | str] = {"model_error": float((error / flow.scale).max()), "degree": model.degree, "gap": proof.gap}
     facts |= {
         "between_nodes": proof.between,
         "boxes": proof.boxes,
@@ -111,13 +124,11 @@ def _certified(flow: UnitFlow, method: Modal, gap: float, begun: float, progress
     return replace(envelope, outer_lower=-proof.outer[..., 0], outer_upper=proof.outer[..., 1])
 
 
-def _model_with_error(flow: UnitFlow, method: Modal, gap: float) -> tuple[ModalModel, Array, str]:
+def _model_with_error(linear: LinearFlow, flow: UnitFlow, method: Modal, gap: float) -> tuple[ModalModel, Array, str]:
     """A modal model fit for a certificate, its error (T, m), and why that is only sampled; empty where it is proved.
 
     The proved bound exceeds the sampled error some thirty times, so the polynomials are refined until it takes little of the gap.
     """
-    assert isinstance(flow.flow, LinearFlow)
-    linear = flow.flow
 
     def fitted(tolerance: float) -> ModalModel:
         return fit_modes(linear, flow.boxes, tolerance=tolerance, budget=method.budget, scale=flow.scale)
@@ -130,10 +141,11 @@ def _model_with_error(flow: UnitFlow, method: Modal, gap: float) -> tuple[ModalM
         except UnprovedError as unknown:
             reason = str(unknown)
             break
-        if error.max() <= PORTION * gap:
+        largest = float((error / flow.scale).max())
+        if largest <= PORTION * gap:
             return model, error, ""
-        reason = f"its bound, {error.max():.2g}, takes too much of the gap {gap:g}"
-        model = fitted(float(model.error.max()) * PORTION * gap / float(error.max()))
+        reason = f"its bound, {largest:.2g}, takes too much of the gap {gap:g}"
+        model = fitted(float((model.error / flow.scale).max()) * PORTION * gap / largest)
     return first, SAFETY * first.error, reason
 
 

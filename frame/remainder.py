@@ -15,6 +15,21 @@ MOST_PARAMETERS = 6
 """Tensors of third derivatives grow with the cube of the number of parameters."""
 
 
+def require_certifiable(parameters: int, *, loaded: bool) -> None:
+    """Refuse what the branch and bound does not cover.
+
+    Raises:
+        ValueError: Too many parameters, or a load.
+    """
+    if parameters > MOST_PARAMETERS:
+        raise ValueError(
+            f"certify: {parameters} uncertain parameters; branch and bound is affordable up to {MOST_PARAMETERS}; "
+            "make some crisp, or leave the certificate out"
+        )
+    if loaded:
+        raise ValueError("certify: base excitation is not covered, only free vibration; leave the certificate out")
+
+
 def suprema(polynomial: Polynomial, reach: Array) -> list[Array]:
     """Bounds of |derivative| for |u_i| <= reach_i by sums of magnitudes, orders 0 to 3, shapes (d,) * order + (K,)."""
     d = polynomial.index.shape[1]
@@ -61,10 +76,7 @@ class Remainder:
             ValueError: Too many parameters, or a load.
         """
         d = len(lower)
-        if d > MOST_PARAMETERS:
-            raise ValueError(f"certify: {d} uncertain parameters; branch and bound is affordable up to {MOST_PARAMETERS}")
-        if model.load is not None:
-            raise ValueError("certify: base excitation is not covered; only free vibration can be certified")
+        require_certifiable(d, loaded=model.load is not None)
         reach = np.maximum(np.abs(lower), np.abs(upper))
         n, t = model.count, model.time
         rate = suprema(model.eigenvalue, reach)

@@ -140,3 +140,24 @@ def test_comparison_holds_over_the_box() -> None:
         A = coefficients[0] + u * coefficients[1] + v * coefficients[2]
         assert np.linalg.eigvalsh(A - found.lowest * mean).min() > 0 > np.linalg.eigvalsh(A - found.highest * mean).max()
         assert all(np.sqrt(y @ A @ y) <= found.sup(y[None]) and np.sqrt(y @ np.linalg.solve(A, y)) <= found.sup_dual(y[None]) for y in x)
+
+
+def test_gap_is_shared_out_by_the_size_of_outputs_with_other_units() -> None:
+    inputs = {"E": Interval(24e9, 26e9), "m2": Interval(14e3, 16e3)}
+    both = replace(FRAME, outputs=("q3", "base_shear"))
+    found = envelope(both, inputs, duration=2, step=0.25, alpha=(0,), method="modal", certify=1e-5)
+    assert found.nature == "guaranteed"
+    assert found.outer_upper is not None
+    length, force = (found.outer_upper - found.upper)[0].max(0)
+    ratio = np.abs(found.upper[0, :, 1]).max() / np.abs(found.upper[0, :, 0]).max()
+    assert 1e-6 < length <= 1e-5
+    assert 1e-6 * ratio < force < 2e-5 * ratio
+
+
+def test_what_branch_and_bound_does_not_cover_is_refused_at_once() -> None:
+    record = Accelerogram(0.1, np.sin(np.arange(50.0)))
+    with pytest.raises(ValueError, match="base excitation"):
+        envelope(replace(FRAME, ground=record), {"E": Interval(24e9, 26e9)}, duration=2, step=0.1, alpha=(0,), method="modal", certify=1e-5)
+    seven = {name: Interval(0.99 * x, 1.01 * x) for name, x in list(FRAME.parameters.items())[:7]}
+    with pytest.raises(ValueError, match="7 uncertain parameters"):
+        envelope(FRAME, seven, duration=2, step=0.1, alpha=(0,), method="modal", certify=1e-5)
