@@ -76,9 +76,12 @@ class ModalModel:
         return replace(self, coefficient=share, error=self.error / scale)
 
     @cached_property
-    def together(self) -> Polynomial:
-        """λ_k and then C_k as one vector of polynomials, n + n m of them."""
-        return Polynomial(self.eigenvalue.index, np.hstack([self.eigenvalue.coefficients, self.coefficient.coefficients]))
+    def of_output(self) -> list[Polynomial]:
+        """For each output, λ_k, then its C_k, then what one unit of its load response puts into it: 2 n or 3 n polynomials."""
+        shares = [self.coefficient.coefficients] + ([] if self.load is None else [self.load.share.coefficients])
+        m = len(self.outputs)
+        columns = [np.hstack([self.eigenvalue.coefficients, *(share[:, o::m] for share in shares)]) for o in range(m)]
+        return [Polynomial(self.eigenvalue.index, chosen) for chosen in columns]
 
     def values(self, unit: Array) -> Array:
         """Trajectories at unit coordinates (S, d), shape (S, T, m)."""
@@ -96,33 +99,35 @@ class ModalModel:
 
     def at(self, unit: Array, node: Array, output: Array) -> tuple[Array, Array, Array]:
         """Values (N,), gradients (N, d) and Hessians (N, d, d) of one output at one node per point (N, d)."""
-        both, n = self.together.jet(unit), self.count
-        rate, share = both[..., :n], picked(both[..., n:], n, output)
-        t = self.time[node][:, None]
+        d = unit.shape[1]
+        f, g, H = np.empty(len(unit)), np.empty((len(unit), d)), np.empty((len(unit), d, d))
+        for o in np.unique(output):
+            rows = np.flatnonzero(output == o)
+            f[rows], g[rows], H[rows] = self._taylor(self.of_output[o].jet(unit[rows]), node[rows])
+        return f, g, H
+
+    def _taylor(self, both: Jet, node: Array) -> tuple[Array, Array, Array]:
+        n = self.count
+        rate, t = both[..., :n], self.time[node][:, None]
         wave = np.exp(rate.value * t)
-        f, g, H = composed(rate, share, (wave, t * wave, t * t * wave))
+        f, g, H = composed(rate, both[..., n : 2 * n], (wave, t * wave, t * t * wave))
         if self.load is not None:
-            more = composed(rate, picked(self.load.share.jet(unit), self.count, output), self.load.response(rate.value, node))
+            more = composed(rate, both[..., 2 * n :], self.load.response(rate.value, node))
             f, g, H = f + more[0], g + more[1], H + more[2]
         return f, g, H
 
     def value_at(self, unit: Array, node: Array, output: Array) -> Array:
         """Values (N,) of one output at one node per point (N, d)."""
-        both, rows = self.together(unit), np.arange(len(unit))
-        rate, share = both[:, : self.count], both[:, self.count :].reshape(len(unit), self.count, -1)[rows, :, output]
-        total = share * np.exp(rate * self.time[node][:, None])
-        if self.load is not None:
-            pushed = self.load.share(unit).reshape(len(unit), self.count, -1)[rows, :, output]
-            total = total + pushed * self.load.response(rate, node)[0]
-        values: Array = 2 * total.real.sum(1)
+        values, n = np.empty(len(unit)), self.count
+        for o in np.unique(output):
+            rows = np.flatnonzero(output == o)
+            both = self.of_output[o](unit[rows])
+            rate = both[:, :n]
+            total = both[:, n : 2 * n] * np.exp(rate * self.time[node[rows]][:, None])
+            if self.load is not None:
+                total = total + both[:, 2 * n :] * self.load.response(rate, node[rows])[0]
+            values[rows] = 2 * total.real.sum(1)
         return values
-
-
-def picked(jet: Jet, count: int, output: Array) -> Jet:
-    """One output per point from V = (N, n m), giving V = (N, n)."""
-    m = jet.value.shape[-1] // count
-    column = np.arange(count) * m + output[:, None]
-    return jet.map(lambda x: np.take_along_axis(x, np.broadcast_to(column, (*x.shape[:-1], count)), -1))
 
 
 def composed(rate: Jet, share: Jet, wave: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:

@@ -25,7 +25,7 @@ SAFETY = 3.0
 """Factor on the model error sampled at held-out points."""
 PORTION = 0.2
 """Share of the gap that the error of the modal model may take on either side."""
-ATTEMPTS = 3
+ATTEMPTS = 5
 """Models of rising degree that are tried before the error is sampled instead of proved."""
 PROVED = "the error of its polynomials is bounded over the whole box by the energy of what they miss in the equations of motion"
 
@@ -145,7 +145,8 @@ def _model_with_error(linear: LinearFlow, flow: UnitFlow, method: Modal, gap: fl
         if largest <= PORTION * gap:
             return model, error, ""
         reason = f"its bound, {largest:.2g}, takes too much of the gap {gap:g}"
-        model = fitted(float((model.error / flow.scale).max()) * PORTION * gap / largest)
+        sampled = float((model.error / flow.scale).max())
+        model = fitted(sampled * min(0.99, 4 * PORTION * gap / largest))  # a degree more divides the bound by ten or so
     return first, SAFETY * first.error, reason
 
 
