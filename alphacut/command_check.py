@@ -25,10 +25,11 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     """Check and report; with ``--json`` the problems as data."""
     try:
         case = load(options.case, options.set)
-        warnings = ready(case)
+        found = ready(case)
     except BadInput as error:
         answer(options, {"case": options.case, "ok": False, "problems": [asdict(problem) for problem in error.problems]}, out)
         raise
+    warnings = [f"warning: {remark}" for remark in (*found.warnings, *found.rough)]
     answer(options, {"case": options.case, "ok": True, "problems": [], "warnings": warnings, "stages": list(case.stages)}, out)
     for warning in warnings:
         say(warning)

@@ -31,6 +31,7 @@ KEYS = {
     "--integrator": "envelope.integrator",
     "--order": "envelope.order",
     "--tolerance": "envelope.tolerance",
+    "--relative-tolerance": "envelope.relative_tolerance",
 }
 BARE = {"--duration": "s", "--step": "s", "--tolerance": "m"}  # options that may leave the unit out
 
@@ -44,14 +45,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--exclude", metavar="NAMES", default="", help="methods that method auto must not take, separated by commas")
     parser.add_argument("--certify", metavar="EPS", help="enclose the bounds and prove them to within EPS metres (method modal)")
-    parser.add_argument("--strict", action="store_true", help="refuse a step with ω_max·h above 0.5 instead of warning")
+    parser.add_argument("--strict", action="store_true", help="refuse a time step or tolerance too coarse for the motion")
     parser.add_argument("--out", metavar="FILE.nc", help="write envelopes and where they are reached as NetCDF")
 
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Compute and report."""
     add_units(options)
-    case = load(options.case, changes(options, KEYS))
+    case = load(options.case, changes(options, KEYS), without=replaced(options))
     handed = given_modulus(options.modulus) or stand_in(case)
     task = replace(envelope.task_of(case), exclude=excluded(options.exclude), certify=wanted_gap(options.certify))
     with progress("Envelopes", quiet=options.quiet) as tick:
@@ -77,6 +78,13 @@ def add_units(options: argparse.Namespace) -> None:
         text = getattr(options, name)
         if text is not None and quantity.SINGLE.fullmatch(text.strip()) and not text.strip()[-1].isalpha():
             setattr(options, name, f"{text} {unit}")
+
+
+def replaced(options: argparse.Namespace) -> tuple[str, ...]:
+    """The case's tolerance, where an option gives the other kind."""
+    if options.tolerance is not None and options.relative_tolerance is None:
+        return ("envelope.relative_tolerance",)
+    return ("envelope.tolerance", "pendulum.tolerance") if options.relative_tolerance is not None and options.tolerance is None else ()
 
 
 def wanted_gap(text: str | None) -> float | None:

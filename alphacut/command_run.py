@@ -14,7 +14,7 @@ from alphacut.destination import unwritable
 from alphacut.loading import load
 from alphacut.options import add_common, add_workers, check_workers
 from alphacut.output import as_json, say, whole_file, write_text
-from alphacut.problem import BadInput, Problem
+from alphacut.problem import BadInput
 from alphacut.provenance import attributes, door, fingerprint
 from alphacut.quick import banner, quick, settings
 from alphacut.readiness import ready
@@ -29,7 +29,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     add_workers(parser)
     parser.add_argument("--out", metavar="FOLDER", help="where results go (default: results/NAME-OF-THE-CASE)")
     parser.add_argument("--fresh", action="store_true", help="compute everything anew instead of taking what is up to date")
-    parser.add_argument("--strict", action="store_true", help="refuse a time step with ω_max·h above 0.5 instead of warning")
+    parser.add_argument("--strict", action="store_true", help="refuse a time step or tolerance too coarse for the motion")
     parser.add_argument(
         "--quick", action="store_true", help="the quick form: same stages in seconds on coarse meshes; numbers mean nothing"
     )
@@ -44,12 +44,11 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     folder = Path(options.out or f"results/{case.name}{'-quick' if options.quick else ''}")
     if problems := list(unwritable("--out", folder, folder=True)):
         raise BadInput(problems)
-    for warning in ready(case):
-        coarse = "omega_max" in warning
-        if coarse and options.strict:
-            raise BadInput(Problem("envelope.step", warning.partition("step: ")[2]))
-        if not coarse:  # of that the stage itself warns, with the modulus that it gets
-            say(warning)
+    prepared = ready(case)
+    if prepared.rough and options.strict:
+        raise BadInput(prepared.rough)
+    for warning in prepared.warnings:  # of what is rough the stage itself warns, with the modulus that it gets
+        say(f"warning: {warning}")
     start = time.perf_counter()
     chain = Chain(case, folder, options.workers, options.fresh, options.quiet, petsc, options.strict)
     results = chain.run()

@@ -50,6 +50,10 @@ def inconsistencies(case: Case, *, modal: bool = False) -> Iterator[Problem]:
         yield Problem("frame", f"stage envelope needs one structure, got {len(found)}", ", ".join(found), "[frame], [pendulum] or [tower]")
     if case.has("envelope.step"):
         yield from times(case)
+    if case.has("envelope.relative_tolerance") and any(f"{name}.tolerance" in case.written for name in ("envelope", "pendulum")):
+        yield Problem("envelope.relative_tolerance", "there is a tolerance besides", allowed="one of tolerance and relative_tolerance")
+    if case.has("pendulum.mass") and "envelope.tolerance" in case.written:
+        yield Problem("envelope.tolerance", "a pendulum's output is a force", allowed="pendulum.tolerance, or envelope.relative_tolerance")
     if case.has("exceedance.output"):
         yield from exceedance(case)
 

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from alphacut.case import Case
-from alphacut.output import say, whole_file
+from alphacut.output import whole_file
 from alphacut.problem import BadInput, Problem
 from alphacut.progress import Tick
 from alphacut.provenance import attributes, versions
+from alphacut.roughness import guard_against
 from alphacut.structure import structure
 from fuzzy import FuzzyNumber
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     import xarray
 
     from frame import Envelope
-    from frame.linear import LinearSystem
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,7 @@ class EnvelopeTask:
         tolerance: Gain that is worth a new trajectory, or the error wanted of auto, in the unit of the outputs.
         exclude: Methods that auto must not take.
         certify: Gap between attained and proved bounds that is wanted, in the unit of the outputs; None for no certificate.
+        relative: Whether the tolerance is a share of each output's peak.
     """
 
     fuzzy: tuple[str, ...]
@@ -49,10 +50,13 @@ class EnvelopeTask:
     tolerance: float
     exclude: tuple[str, ...] = ()
     certify: float | None = None
+    relative: bool = False
 
 
 def task_of(case: Case, *, fuzzy: Sequence[str] | None = None, duration: float | None = None) -> EnvelopeTask:
     """The envelope that [envelope] asks for, with other fuzzy inputs or another duration if given."""
+    tolerance = "pendulum.tolerance" if case.has("pendulum.mass") else "envelope.tolerance"
+    relative = case.has("envelope.relative_tolerance")
     return EnvelopeTask(
         tuple(fuzzy) if fuzzy else case.names("envelope.fuzzy"),
         duration or case.number("envelope.duration"),
@@ -61,31 +65,9 @@ def task_of(case: Case, *, fuzzy: Sequence[str] | None = None, duration: float |
         case.text("envelope.method"),
         case.text("envelope.integrator") if case.has("envelope.integrator") else None,
         case.integer("envelope.order"),
-        case.number("pendulum.tolerance" if case.has("pendulum.mass") else "envelope.tolerance"),
+        case.number("envelope.relative_tolerance" if relative else tolerance),
+        relative=relative,
     )
-
-
-def guard_step(model: LinearSystem, task: EnvelopeTask, *, strict: bool) -> None:
-    """Warn where the step cannot resolve the fastest mode, with the phase error that means.
-
-    Raises:
-        BadInput: `strict`, and the step cannot.
-    """
-    message = coarse_step(model, task)
-    if message and strict:
-        raise BadInput(Problem("envelope.step", message.removeprefix("step: ")))
-    if message:
-        say(f"warning: envelope.{message}")
-
-
-def coarse_step(model: LinearSystem, task: EnvelopeTask) -> str:
-    """What is to be said of a step that cannot resolve the fastest mode; empty for one that can, or need not."""
-    from frame import guard
-
-    if task.integrator == "exact" or (task.integrator is None and task.method == "modal"):
-        return ""
-    found = guard(model, task.step, task.duration)
-    return "" if found.ok else found.message
 
 
 def compute(
@@ -97,15 +79,14 @@ def compute(
         case: With the sections envelope and frame or pendulum.
         task: What is wanted.
         modulus: Handed on from the stage before, in Pa.
-        strict: Refuse a step that cannot resolve the fastest mode instead of warning.
+        strict: Refuse a step or tolerance that is coarse beside the motion instead of warning.
         progress: Told the share done.
     """
     import frame
 
     wanted = structure(case, modulus)
     inputs = wanted.inputs(task.fuzzy)
-    if wanted.linear is not None:
-        guard_step(wanted.linear, task, strict=strict)
+    guard_against(wanted, task, strict=strict)
     try:
         return frame.envelope(
             wanted.model,
@@ -115,6 +96,7 @@ def compute(
             step=task.step,
             method=task.method,
             integrator=task.integrator,
+            relative=task.relative and task.certify is None,
             progress=progress,
             **method_options(task),
         )

@@ -78,7 +78,7 @@ def recorded(results: Results, study: Study) -> tuple[FollowerRecord, str]:
     wanted = structure(results.case, results.handed)
     cuts = boxes(wanted.inputs(study.task.fuzzy), (0.0,))
     steps = max(1, min(round(DURATION / study.task.step), round(study.task.duration / study.task.step)))
-    flow = UnitFlow(wanted.flow(cuts.names, steps * study.task.step, study.task.step), cuts)
+    flow = UnitFlow(wanted.flow(cuts.names, steps * study.task.step, study.task.step), cuts, study.task.relative)
     output = max(0, len([name for name in flow.outputs if name.startswith("q")]) - 1)
     for tolerance in (1.0, 1e-2, 1e-4, 1e-8):  # fine enough that there is something to see
         found = record_flow(flow, output=output, tolerance=tolerance * study.task.tolerance)

@@ -22,13 +22,14 @@ Raw = dict[str, Any]
 ARRAYS = ("fuzzy list", "numbers", "choices")  # kinds of keys that hold arrays
 
 
-def load(path: Path | str, changes: Sequence[str] = (), *, modal: bool = False) -> Case:
+def load(path: Path | str, changes: Sequence[str] = (), *, modal: bool = False, without: Sequence[str] = ()) -> Case:
     """Read and check a case file.
 
     Args:
         path: TOML file.
         changes: ``KEY=VALUE`` each; the key in full (``cell.matrix_modulus``) or alone where that is clear.
         modal: Only modal values are wanted: fuzzy inputs need not fit together over their whole supports.
+        without: Keys of the file that are passed over.
 
     Raises:
         BadInput: With every problem found.
@@ -37,6 +38,8 @@ def load(path: Path | str, changes: Sequence[str] = (), *, modal: bool = False) 
     text = contents(path)
     raw = parsed(path, text)
     lines = lines_of_keys(text)
+    for section, _, key in (name.rpartition(".") for name in without):
+        (table_of(raw, section) or {}).pop(key, None)
     changed = {apply_change(raw, change) for change in changes}
     values: dict[str, object] = {}
     written: dict[str, object] = {}

@@ -18,6 +18,7 @@ COARSE = {
     "modulus.alpha": LEVELS,
     "modulus.tolerance": 1e-2,
     "envelope.alpha": LEVELS,
+    "envelope.relative_tolerance": 1e-2,
     "exceedance.samples": 10,
     "microstructure.bootstrap": 100,
     "microstructure.packing.packings": 5,
@@ -46,7 +47,7 @@ def banner(found: Mapping[str, Any]) -> str:
 def quick(case: Case) -> Case:
     """The case with few levels, samples and time steps on a coarse mesh."""
     values = dict(case.values)
-    values |= {key: value for key, value in COARSE.items() if case.has(key)}
+    values |= {key: value for key, value in COARSE.items() if key in case.values}
     for key in case.values:
         if key.endswith(".duration") and case.has(key):
             values[key] = min(case.number(key), NODES * case.number("envelope.step"))

@@ -3,22 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
-from alphacut import envelope, modulus
+from alphacut import modulus
 from alphacut.accelerogram import accelerogram
 from alphacut.case import Case
 from alphacut.chain import studies
 from alphacut.consistency import beside, replaced
 from alphacut.frame_names import fuzzy_keys
 from alphacut.problem import BadInput, Problem
+from alphacut.roughness import rough
 from alphacut.structure import Structure, structure
 from fuzzy import FuzzyNumber, Triangular
 
 RECORDS = ("frame.accelerogram", "tower.accelerogram")
 
 
-def ready(case: Case) -> list[str]:
-    """Warnings about a case that can be run.
+@dataclass(frozen=True)
+class Readiness:
+    """What is to be said of a case that can be run.
+
+    Args:
+        warnings: Remarks.
+        rough: A step or tolerance that is coarse beside the motion: refused where it is meant strictly.
+    """
+
+    warnings: tuple[str, ...] = ()
+    rough: tuple[Problem, ...] = ()
+
+
+def ready(case: Case) -> Readiness:
+    """Remarks about a case that can be run.
 
     Raises:
         BadInput: It cannot: a stage lacks what it needs, a file is broken, an input named as fuzzy is crisp.
@@ -29,13 +44,14 @@ def ready(case: Case) -> list[str]:
         study_of(case)
     stand_in = modulus.stand_in(case) if "modulus" in case.stages or replaced(case) else None
     if "envelope" not in case.stages:
-        return []
+        return Readiness()
     if problems := list(lacking(case)):
         raise BadInput(problems)
     wanted = structure(case, stand_in or expected(case))
     if problems := list(crisp_names(case, wanted)):
         raise BadInput(problems)
-    return [*outlasted(case), *coarse_steps(case, wanted)]
+    found = dict.fromkeys(problem for study in studies(case) for problem in rough(wanted, study.task))
+    return Readiness(tuple(outlasted(case)), tuple(found))
 
 
 def lacking(case: Case) -> Iterator[Problem]:
@@ -73,12 +89,4 @@ def outlasted(case: Case) -> Iterator[str]:
             end = (len(record.acceleration) - 1) * record.step
             longest = max(study.task.duration for study in studies(case))
             if longest > end + 0.5 * record.step:
-                yield f"warning: {key}: the record ends at {end:g} s and the simulation at {longest:g} s; in between the ground is at rest"
-
-
-def coarse_steps(case: Case, wanted: Structure) -> Iterator[str]:
-    """Steps that cannot resolve the fastest mode."""
-    if wanted.linear is None:
-        return
-    found = (envelope.coarse_step(wanted.linear, study.task) for study in studies(case))
-    yield from dict.fromkeys(f"warning: envelope.{message}" for message in found if message)
+                yield f"{key}: the record ends at {end:g} s and the simulation at {longest:g} s; in between the ground is at rest"

@@ -203,7 +203,7 @@ PENDULUM = Section(
         "gravity": Key("acceleration of gravity", unit="m/s^2", required=True, allowed=POSITIVE),
         "angle": Key("angle at the start, 0 hanging down", unit="rad", required=True),
         "angular_velocity": Key("angular velocity at the start", unit="rad/s", required=True),
-        "tolerance": Key("gain that is worth a new trajectory", "number", "N", default=1e-3, allowed=POSITIVE),
+        "tolerance": Key("wanted error of the force, or gain worth a new trajectory", "number", "N", default=1e-3, allowed=POSITIVE),
     },
 )
 
@@ -231,7 +231,14 @@ ENVELOPE = Section(
         "method": Key("how the envelope is found", "choice", default="graph-follower", choices=ENVELOPE_METHODS),
         "integrator": Key("time stepping; by the method if left out: exact for modal, else midpoint", "choice", choices=INTEGRATORS),
         "order": Key("order κ of the Taylor models", "integer", default=2, allowed=Range("1 or 2", 1, 2, closed=True)),
-        "tolerance": Key("gain that is worth a new trajectory; of a frame", "number", "m", default=1e-4, allowed=POSITIVE),
+        "tolerance": Key(
+            "wanted error of a frame's displacements; for graph-follower the gain that is worth a new trajectory",
+            "number",
+            "m",
+            default=1e-4,
+            allowed=POSITIVE,
+        ),
+        "relative_tolerance": Key("the same as a share of each output's peak, in place of tolerance", "number", allowed=UNIT),
         "duration": Key("length of the simulation", "number", "s", required=True, allowed=POSITIVE),
         "step": Key("time step", "number", "s", required=True, allowed=POSITIVE),
     },
