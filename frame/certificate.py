@@ -11,7 +11,9 @@ from frame.branch_and_bound import BranchAndBound
 from frame.jet import Array
 from frame.modal import ModalModel
 from frame.modal_search import problems
+from frame.polynomial import Polynomial
 from frame.remainder import largest_growth, suprema
+from frame.wave_bounds import parts
 
 ROUNDING = 1e-11
 """Margin for floating point, as a share of the largest output."""
@@ -98,7 +100,14 @@ def certify(
 def _between(model: ModalModel) -> float:
     """h²/8 times a bound of the second time derivative: how far an output strays from a straight line between nodes."""
     reach = np.ones(len(model.boxes.names))
-    rate, share = suprema(model.eigenvalue, reach)[0], suprema(model.coefficient, reach)[0].reshape(model.count, -1)
-    growth = np.exp(np.outer(model.time, largest_growth(model.eigenvalue, reach))).max(0)
-    acceleration = 2 * (growth * rate**2) @ share
-    return float(acceleration.max() * model.flow.step**2 / 8)
+    rate, growth = suprema(model.eigenvalue, reach)[0], largest_growth(model.eigenvalue, reach)
+    curve = np.zeros(len(model.outputs))
+    ground = model.flow.system.ground
+    for part in parts(model, growth):
+        share = suprema(part.share, reach)[0].reshape(model.count, -1)
+        curve += 2 * (part.waves[0].max(0) * rate**2) @ share
+        if part.forced and ground is not None:  # R'' = λ² R + λ a + a', and a' acts on Σ C_k alone
+            jump = Polynomial(part.share.index, 2 * part.share.coefficients.reshape(-1, model.count, len(curve)).sum(1).real)
+            slope = np.abs(np.diff(ground.acceleration, append=0.0, prepend=0.0)).max() / ground.step
+            curve += 2 * np.abs(ground.acceleration).max() * rate @ share + slope * suprema(jump, reach)[0]
+    return float(curve.max() * model.flow.step**2 / 8)

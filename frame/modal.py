@@ -69,11 +69,9 @@ class ModalModel:
 
     def in_units(self, scale: Array) -> ModalModel:
         """The same with every output divided by its scale (m,)."""
-        repeated = np.tile(scale, self.count)
-        share = Polynomial(self.coefficient.index, self.coefficient.coefficients / repeated)
-        if self.load is not None:
-            raise ModalError("modal: the response to a load has no other units")
-        return replace(self, coefficient=share, error=self.error / scale)
+        share = Polynomial(self.coefficient.index, self.coefficient.coefficients / np.tile(scale, self.count))
+        load = None if self.load is None else self.load.in_units(scale)
+        return replace(self, coefficient=share, load=load, error=self.error / scale)
 
     @cached_property
     def of_output(self) -> list[Polynomial]:
@@ -249,11 +247,17 @@ def fit_points(d: int, degree: int) -> Array:
     return np.vstack([np.zeros((1, d)), chebyshev_points(d, count)])
 
 
-def fit_states(model: ModalModel) -> Polynomial:
-    """The states [φ_k; λ_k φ_k] of the model's modes, n · 2N polynomials of its degree, fitted where it was."""
+def fit_states(model: ModalModel) -> tuple[Polynomial, Polynomial]:
+    """The states [φ_k; λ_k φ_k] of the model's modes, n · 2N polynomials of its degree, fitted where it was.
+
+    Returns:
+        What the initial state puts into them, and what a unit impulse of the ground's acceleration does.
+    """
     unit = fit_points(len(model.boxes.names), model.degree)
-    found = analyse(model.flow, model.boxes, unit, model.chosen, states=True).coefficient
-    return fit(unit, found.map(lambda x: x.reshape((*x.shape[:-2], -1))), model.degree)
+    found = analyse(model.flow, model.boxes, unit, model.chosen, states=True)
+    flat = (jet.map(lambda x: x.reshape((*x.shape[:-2], -1))) for jet in (found.coefficient, found.load))
+    free, forced = (fit(unit, jet, model.degree) for jet in flat)
+    return free, forced
 
 
 def _fitted(flow: LinearFlow, boxes: Boxes, points: Array, degree: int, chosen: Array) -> ModalModel:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from math import ceil
+from math import ceil, exp, lgamma, log
 
 import numpy as np
 
@@ -33,6 +33,7 @@ class LoadTable:
         starts: First node of every window, rising from 0, shape (W,).
         time: Nodes, shape (T,), in s.
         share: What one unit of R_k puts into the outputs, n m polynomials.
+        truncation: Bound of what the series leave out of R, as a share of ∫ |a(s)| exp(Re λ (t − s)) ds.
     """
 
     middle: Array
@@ -41,6 +42,7 @@ class LoadTable:
     starts: Array
     time: Array
     share: Polynomial
+    truncation: float
 
     @classmethod
     def build(cls, ground: Accelerogram, time: Array, rate: Polynomial, share: Polynomial) -> LoadTable:
@@ -51,7 +53,8 @@ class LoadTable:
         starts = np.arange(0, len(time) - 1, length)
         window = length * (time[1] - time[0])
         order = max(6, ceil(2.72 * spread * window + 18))
-        return cls(middle, 1 / window, _moments(ground, middle, time, starts, window, order), starts, time, share)
+        left = exp(order * log(max(spread * window, 1e-300)) - lgamma(order + 1) + 2 * spread * window)
+        return cls(middle, 1 / window, _moments(ground, middle, time, starts, window, order), starts, time, share, left)
 
     def values(self, unit: Array, rate: Array) -> Array:
         """Response of the outputs at points (S, d) with eigenvalues (S, n), shape (S, T, m)."""
@@ -137,6 +140,19 @@ class LoadTables:
         )
         return cls(share, tables, members)
 
+    def in_units(self, scale: Array) -> LoadTables:
+        """The same for outputs divided by their scale (m,)."""
+        tables = tuple(replace(table, share=_divided(table.share, scale)) for table in self.tables)
+        return LoadTables(_divided(self.share, scale), tables, self.members)
+
+    @property
+    def truncation(self) -> Array:
+        """Bound of what the series leave out of R_k, as a share of ∫ |a(s)| exp(Re λ (t − s)) ds, shape (n,)."""
+        out = np.empty(sum(map(len, self.members)))
+        for table, own in zip(self.tables, self.members, strict=True):
+            out[own] = table.truncation
+        return out
+
     @property
     def starts(self) -> Array:
         """First node of every window of the group that needs most."""
@@ -153,6 +169,11 @@ class LoadTables:
         for table, own in zip(self.tables, self.members, strict=True):
             R[:, own], dR[:, own], ddR[:, own] = table.response(rate[:, own], node)
         return R, dR, ddR
+
+
+def _divided(share: Polynomial, scale: Array) -> Polynomial:
+    columns = share.coefficients.reshape(len(share.index), -1, len(scale)) / scale
+    return Polynomial(share.index, columns.reshape(share.coefficients.shape))
 
 
 def _moments(ground: Accelerogram, middle: Array, time: Array, starts: Array, window: float, order: int) -> Array:

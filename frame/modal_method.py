@@ -87,7 +87,7 @@ def modal(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> E
 
 def _certified(flow: UnitFlow, method: Modal, gap: float, begun: float, progress: Progress | None) -> Envelope:
     assert isinstance(flow.flow, LinearFlow)
-    require_certifiable(len(flow.boxes.names), loaded=flow.flow.system.ground is not None)
+    require_certifiable(len(flow.boxes.names))
     model, error, unproved = _model_with_error(flow.flow, flow, method, gap)
     bounds, at = search_levels(model, ModalSearch(seed=method.seed), None)
     proof = certify(

@@ -8,8 +8,9 @@ problem is solved anew, and nothing rests on a distance between eigenvalues.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -20,7 +21,8 @@ from frame.linear import evaluate
 from frame.modal import ModalModel, fit_states
 from frame.polynomial import Polynomial
 from frame.polynomial_structure import UnprovedError, degrees
-from frame.remainder import largest_growth
+from frame.remainder import largest_growth, suprema
+from frame.wave_bounds import Part, parts
 
 MOST_NUMBERS = 120_000_000
 """Values of the defects on their grid, at most: 1 GB."""
@@ -31,26 +33,28 @@ def proved_error(model: ModalModel) -> Array:
     """Bound of |model − true motion| over the box, shape (T, m), in units of the outputs; up to the rounding of this computation.
 
     Raises:
-        UnprovedError: The structure is not known to be a polynomial that loses energy, the scheme is not the exact propagator, there is a
-            load, or the box is so wide or has so many parameters that the bound cannot be computed.
+        UnprovedError: The structure is not known to be a polynomial that loses energy, the scheme is not the exact propagator, or the box
+            is so wide or has so many parameters that the bound cannot be computed.
     """
-    if model.load is not None:
-        raise UnprovedError("base excitation is not covered")
     if not isinstance(model.flow.integrator, Exact):
         raise UnprovedError(f"the motion is that of the scheme '{model.flow.integrator.name}'; only the exact propagator is covered")
-    defect = _coefficients(model)
-    stiffness, mass = Comparison.of(defect["stiffness"]), Comparison.of(defect["mass"])
-    energy = np.hypot(stiffness.sup(defect["start_q"]), mass.sup(defect["start_v"]))
-    growth, time = largest_growth(model.eigenvalue, np.ones(len(model.boxes.names))), model.time
-    total = np.full(len(time), energy)
-    for k, rate in enumerate(growth):
-        grows = np.hypot(stiffness.sup(defect["kinematic"][:, k]), mass.sup_dual(defect["dynamic"][:, k]))
-        total += 2 * grows * (np.expm1(rate * time) / rate if rate else time)
-    size = defect["start_q"].shape[-1]
-    rows = np.moveaxis(defect["rows"], 1, 0)  # (m, J, 2N)
+    reach, m = np.ones(len(model.boxes.names)), len(model.outputs)
+    grid = _grid(model)
+    structure = _expanded(grid, partial(_structure, model))
+    stiffness, mass = Comparison.of(structure["stiffness"]), Comparison.of(structure["mass"])
+    deviation, own = np.zeros(len(model.time)), np.zeros((len(model.time), m))
+    for part, states in zip(parts(model, largest_growth(model.eigenvalue, reach)), fit_states(model), strict=False):
+        defect = _expanded(grid, partial(_defects, model, part, states))
+        deviation += part.push * np.hypot(stiffness.sup(defect["start_q"]), mass.sup(defect["start_v"]))
+        for k in range(model.count):
+            missed = np.hypot(stiffness.sup(defect["kinematic"][:, k]), mass.sup_dual(defect["dynamic"][:, k]))
+            deviation += 2 * missed * part.elapsed[:, k]
+        largest = suprema(part.share, reach)[0].reshape(model.count, m)
+        own += 2 * part.waves[0] @ (np.abs(defect["outputs"]).sum(0) + part.left_out[:, None] * largest)
+    size = len(stiffness.factor)
+    rows = np.moveaxis(structure["rows"], 1, 0)  # (m, J, 2N)
     reading = np.array([np.hypot(stiffness.sup_dual(row[:, :size]), mass.sup_dual(row[:, size:])) for row in rows])
-    own = 2 * np.abs(defect["outputs"]).sum(0)  # (n, m)
-    bound: Array = total[:, None] * reading + np.exp(np.outer(time, growth)) @ own
+    bound: Array = deviation[:, None] * reading + own
     return bound
 
 
@@ -95,33 +99,40 @@ class Comparison:
         return float(np.linalg.norm(solved, axis=0).sum() / np.sqrt(self.lowest))
 
 
-def _coefficients(model: ModalModel) -> Mapping[str, Array]:
-    """Chebyshev coefficients of all that the bound needs, each of shape (J, …)."""
+def _grid(model: ModalModel) -> ChebyshevGrid:
+    """The grid on which all defects are known by their values."""
     box = dict(zip(model.boxes.names, zip(model.boxes.lower[0].tolist(), model.boxes.upper[0].tolist(), strict=True), strict=True))
     exponents = degrees(model.flow.system, box)
-    grid = ChebyshevGrid(tuple(2 * model.degree + exponents[name] for name in model.boxes.names))
-    points, states = grid.points if len(grid) < MOST_NUMBERS else np.zeros((1, 1)), fit_states(model)
-    width = sum(part[0].size * (2 if np.iscomplexobj(part) else 1) for part in _defects(model, states, points[:1]).values())
+    return ChebyshevGrid(tuple(2 * model.degree + exponents[name] for name in model.boxes.names))
+
+
+def _expanded(grid: ChebyshevGrid, sample: Callable[[Array], dict[str, Array]]) -> dict[str, Array]:
+    """Chebyshev coefficients of what `sample` gives at unit coordinates (S, d), each of shape (J, …)."""
+    width = sum(part.size * (2 if np.iscomplexobj(part) else 1) for part in sample(np.zeros((1, len(grid.degrees)))).values())
     if len(grid) * width > MOST_NUMBERS:
-        raise UnprovedError(f"the defects need {len(grid):.2g} points of a grid in {len(box)} parameters: too many")
-    parts = [_defects(model, states, chunk) for chunk in np.array_split(points, -(-len(points) // CHUNK))]
-    return {name: grid.coefficients(np.concatenate([part.pop(name) for part in parts])) for name in list(parts[0])}
+        raise UnprovedError(f"the defects need {len(grid):.2g} points of a grid over {len(grid.degrees)} parameters: too many")
+    pieces = [sample(chunk) for chunk in np.array_split(grid.points, -(-len(grid) // CHUNK))]
+    return {name: grid.coefficients(np.concatenate([piece.pop(name) for piece in pieces])) for name in list(pieces[0])}
 
 
-def _defects(model: ModalModel, states: Polynomial, unit: Array) -> dict[str, Array]:
-    """What the motion misses at unit coordinates (S, d), and the matrices that measure it."""
+def _structure(model: ModalModel, unit: Array) -> dict[str, Array]:
+    """The matrices that measure what the motion misses."""
+    matrices, rows = evaluate(model.flow.system, model.flow.names, model.boxes.to_physical(unit), derivatives=False)
+    return {"mass": matrices.mass.value, "stiffness": matrices.stiffness.value, "rows": rows.value}
+
+
+def _defects(model: ModalModel, part: Part, states: Polynomial, unit: Array) -> dict[str, Array]:
+    """What one part misses at unit coordinates (S, d): of what sets it off, and of the equations of motion mode by mode."""
     matrices, rows = evaluate(model.flow.system, model.flow.names, model.boxes.to_physical(unit), derivatives=False)
     M, D, K, C = matrices.mass.value, matrices.damping.value, matrices.stiffness.value, rows.value
+    q, v = (0.0, -matrices.rigid[:, 0]) if part.forced else (matrices.q0.value[..., 0], matrices.v0.value[..., 0])
     rate = model.eigenvalue(unit)[..., None]
     z = states(unit).reshape(len(unit), model.count, -1)  # (S, n, 2N)
     shape, speed = np.split(z, 2, axis=-1)
     return {
-        "mass": M,
-        "stiffness": K,
-        "rows": C,
-        "start_q": 2 * shape.real.sum(1) - matrices.q0.value[..., 0],
-        "start_v": 2 * speed.real.sum(1) - matrices.v0.value[..., 0],
+        "start_q": 2 * shape.real.sum(1) - q,
+        "start_v": 2 * speed.real.sum(1) - v,
         "kinematic": rate * shape - speed,
         "dynamic": rate * (speed @ M) + speed @ D.swapaxes(-1, -2) + shape @ K,
-        "outputs": model.coefficient(unit).reshape(len(unit), model.count, -1) - z @ C.swapaxes(-1, -2),
+        "outputs": part.share(unit).reshape(len(unit), model.count, -1) - z @ C.swapaxes(-1, -2),
     }

@@ -10,24 +10,23 @@ import numpy as np
 from frame.jet import Array
 from frame.modal import ModalModel
 from frame.polynomial import Polynomial, derivative
+from frame.wave_bounds import parts
 
 MOST_PARAMETERS = 6
 """Tensors of third derivatives grow with the cube of the number of parameters."""
 
 
-def require_certifiable(parameters: int, *, loaded: bool) -> None:
+def require_certifiable(parameters: int) -> None:
     """Refuse what the branch and bound does not cover.
 
     Raises:
-        ValueError: Too many parameters, or a load.
+        ValueError: Too many parameters.
     """
     if parameters > MOST_PARAMETERS:
         raise ValueError(
             f"certify: {parameters} uncertain parameters; branch and bound is affordable up to {MOST_PARAMETERS}; "
             "make some crisp, or leave the certificate out"
         )
-    if loaded:
-        raise ValueError("certify: base excitation is not covered, only free vibration; leave the certificate out")
 
 
 def suprema(polynomial: Polynomial, reach: Array) -> list[Array]:
@@ -70,25 +69,21 @@ class Remainder:
 
     @classmethod
     def of(cls, model: ModalModel, lower: Array, upper: Array) -> Remainder:
-        """Bounds for the box [lower, upper] by Leibniz' rule on C_k exp(λ_k t).
+        """Bounds for the box [lower, upper] by Leibniz' rule on C_k w(t; λ_k).
 
         Raises:
-            ValueError: Too many parameters, or a load.
+            ValueError: Too many parameters.
         """
-        d = len(lower)
-        require_certifiable(d, loaded=model.load is not None)
+        d, n, m = len(lower), model.count, len(model.outputs)
+        require_certifiable(d)
         reach = np.maximum(np.abs(lower), np.abs(upper))
-        n, t = model.count, model.time
-        rate = suprema(model.eigenvalue, reach)
-        share = [x.reshape((*x.shape[:-1], n, -1)) for x in suprema(model.coefficient, reach)]
-        growth = largest_growth(model.eigenvalue, reach)
-        out = np.zeros((len(t), share[0].shape[-1], d, d, d))
-        for k in range(n):
-            wave = 2 * np.exp(growth[k] * t)
-            c = [x[..., k, :] for x in share]
-            r = [x[..., k] for x in rate]
-            for power, part in enumerate(_leibniz(c, r)):
-                out += (wave * t**power)[:, None, None, None, None] * np.moveaxis(part, -1, 0)
+        rate, growth = suprema(model.eigenvalue, reach), largest_growth(model.eigenvalue, reach)
+        out = np.zeros((len(model.time), m, d, d, d))
+        for part in parts(model, growth):
+            share = [x.reshape((*x.shape[:-1], n, m)) for x in suprema(part.share, reach)]
+            for k in range(n):
+                bounds = np.stack(_leibniz([x[..., k, :] for x in share], [x[..., k] for x in rate]))  # (4, d, d, d, m)
+                out += np.einsum("rt,rxyzm->tmxyz", 2 * part.waves[..., k], bounds)
         return cls(out)
 
     def at(self, node: Array, output: Array) -> Array:
