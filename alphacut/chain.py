@@ -148,7 +148,9 @@ class Chain:
         key = self.vibration({"wanted": wanted}, handed)
 
         def compute(path: Path) -> None:
-            envelope.write(outcomes.exceedance(self.case, handed), path, case_text=self.case.text_of_file, key=key)
+            with progress("Exceedance", quiet=self.quiet) as tick:
+                found = outcomes.exceedance(self.case, handed, tick)
+            envelope.write(found, path, case_text=self.case.text_of_file, key=key)
 
         return self.stored("exceedance.nc", key, compute)
 

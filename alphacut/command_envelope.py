@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from alphacut import envelope, outcomes, quantity
+from alphacut.case import Case
 from alphacut.loading import load
 from alphacut.modulus import read_number, stand_in
 from alphacut.options import add_common, add_keys, changes
@@ -16,6 +17,7 @@ from alphacut.problem import BadInput, Problem
 from alphacut.progress import progress
 from alphacut.provenance import fingerprint
 from alphacut.schema import ENVELOPE_METHODS
+from alphacut.units import engineering
 from fuzzy import FuzzyNumber
 
 if TYPE_CHECKING:
@@ -60,7 +62,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     if options.out:
         key = fingerprint({"case": case.values, "task": task, "modulus": handed}, ("fuzzy", "frame"))
         envelope.write(outcomes.with_peaks(found), options.out, case_text=case.text_of_file, key=key)
-    limit = outcomes.exceedance_document(outcomes.exceedance(case, handed)) if case.has("exceedance.output") else None
+    limit = exceeded(options, case, handed)
     document = as_json({**envelope.document(found), **({"exceedance": limit} if limit else {})}, indent=None if options.json == "-" else 2)
     if options.json == "-":
         out.write(document)
@@ -69,6 +71,14 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     if options.json != "-" and not options.quiet:
         out.write(summary(found) + (outcomes.sentence(limit) if limit else ""))
     return 0
+
+
+def exceeded(options: argparse.Namespace, case: Case, handed: FuzzyNumber | None) -> dict[str, Any] | None:
+    """The fuzzy probability of exceeding the case's limit; None where it names none."""
+    if not case.has("exceedance.output"):
+        return None
+    with progress("Exceedance", quiet=options.quiet) as tick:
+        return outcomes.exceedance_document(outcomes.exceedance(case, handed, tick))
 
 
 def add_units(options: argparse.Namespace) -> None:
@@ -131,6 +141,7 @@ def summary(found: Envelope) -> str:
 
     of = peaks(found)
     ends = zip(found.outputs, found.minimum[0], found.maximum[0], of.lower[0], of.upper[0], strict=True)
-    rows = "".join(f"{f'{n}, {output_unit(n)}':>14}  {a:11.5g}  {b:11.5g}   {c:.5g} … {d:.5g}\n" for n, a, b, c, d in ends)
+    rows = [(name, *(engineering(float(value), output_unit(name)) for value in values)) for name, *values in ends]
+    lines = [f"{name:>14}  {low:>12}  {high:>12}   {least} … {most}\n" for name, low, high, least, most in rows]
     cost = f"{found.trajectories} trajectories, {found.seconds:.1f} s, {found.nature}"
-    return f"        output          min          max   peak   (α = {found.alpha[0]:g})\n{rows}{cost}\n"
+    return f"        output           min           max   peak   (α = {found.alpha[0]:g})\n{''.join(lines)}{cost}\n"

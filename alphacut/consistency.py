@@ -9,8 +9,10 @@ from pathlib import Path
 
 from alphacut.case import Case
 from alphacut.completeness import incomplete
-from alphacut.frame_names import OTHERS, floors, named_inputs, study_count
+from alphacut.destination import hint
+from alphacut.frame_names import OTHERS, OUTPUTS, floors, named_inputs, study_count
 from alphacut.problem import BadInput, Problem
+from alphacut.reading import nearest
 from alphacut.schema import NEEDED, STAGES
 from stochastic import HermiteMap, TruncatedNormal
 
@@ -101,8 +103,9 @@ def missing_sections(case: Case) -> Iterator[Problem]:
 def files(case: Case) -> Iterator[Problem]:
     """Files that the case names must be there."""
     for key in FILES:
-        if case.has(key) and not beside(case, case.text(key)).is_file():
-            yield Problem(key, "there is no such file", case.text(key), f"a path from the case's folder, {case.path.parent}")
+        if case.has(key) and not (path := beside(case, case.text(key))).is_file():
+            what = "this is a folder" if path.is_dir() else "there is no such file"
+            yield Problem(key, what, case.text(key), hint(path) or f"a path from the case's folder, {case.path.parent}")
 
 
 def beside(case: Case, name: str) -> Path:
@@ -169,11 +172,15 @@ def levels(case: Case, key: str) -> Iterator[Problem]:
 
 
 def exceedance(case: Case) -> Iterator[Problem]:
-    """A limit is for an output of a linear structure in vibration, and in its unit."""
+    """A limit is for an output of the structure in vibration, and in its unit."""
     from alphacut.outcomes import limit_of
 
-    if case.has("pendulum.mass") or not case.has("envelope.step"):
-        yield Problem("exceedance", "a probability needs a linear structure and its section [envelope]", allowed="[frame] or [tower]")
+    if not case.has("envelope.step"):
+        yield Problem("exceedance", "a probability needs the section [envelope]")
+    for section, outputs in OUTPUTS.items():
+        name = case.text("exceedance.output")
+        if any(key.startswith(f"{section}.") for key in case.values) and name not in outputs:
+            yield Problem("exceedance.output", f"there is no output {name}", name, ", ".join(outputs), nearest(name, outputs))
     try:
         limit_of(case)
     except BadInput as error:

@@ -9,8 +9,9 @@ import numpy as np
 
 from alphacut import quantity
 from alphacut.case import Case
-from alphacut.problem import BadInput, Problem
+from alphacut.progress import Tick
 from alphacut.structure import Structure, structure
+from alphacut.units import engineering
 from fuzzy import FuzzyNumber
 from stochastic.truncated_normal import Array
 
@@ -81,27 +82,27 @@ def split_inputs(case: Case, wanted: Structure) -> tuple[dict[str, FuzzyNumber],
     return fuzzy or dict([next(iter(crisp.items()))]), {name: shaped_like(number) for name, number in random.items()}
 
 
-def exceedance(case: Case, handed: FuzzyNumber | None) -> xarray.Dataset:
+def exceedance(case: Case, handed: FuzzyNumber | None, progress: Tick | None = None) -> xarray.Dataset:
     """Fuzzy probability that an output's magnitude exceeds the case's limit within the duration of [envelope].
 
     Args:
-        case: With the sections exceedance, envelope and a linear structure.
+        case: With the sections exceedance, envelope and a structure.
         handed: Modulus of the stage before, in Pa.
+        progress: Told the share done.
 
     Raises:
-        BadInput: The structure has no such output, or is not linear.
+        BadInput: The structure has no such output.
     """
     import xarray
 
     import frame.outcomes
 
     wanted, output = structure(case, handed), case.text("exceedance.output")
-    if wanted.linear is None or output not in wanted.outputs:
-        allowed = ", ".join(wanted.outputs) if wanted.linear else "[frame] or [tower]"
-        raise BadInput(Problem("exceedance.output", "the structure has no such output, or is not linear", output, allowed))
+    if output not in wanted.outputs:
+        raise case.refuse("exceedance.output", "the structure has no such output", ", ".join(wanted.outputs))
     fuzzy, random = split_inputs(case, wanted)
     found = frame.outcomes.exceedance(
-        wanted.linear,
+        wanted.model,
         fuzzy,
         random,
         limit=limit_of(case),
@@ -111,6 +112,7 @@ def exceedance(case: Case, handed: FuzzyNumber | None) -> xarray.Dataset:
         alpha=case.numbers("envelope.alpha"),
         samples=case.integer("exceedance.samples"),
         rng=np.random.default_rng(case.integer("exceedance.seed")),
+        progress=progress,
     )
     about = {"long_name": f"probability that |{output}| exceeds the limit", "units": "1"}
     ends = (("alpha", "bound"), np.column_stack([found.lower, found.upper]), about)
@@ -137,4 +139,4 @@ def sentence(found: Mapping[str, Any]) -> str:
     cuts = (f"[{found['lower'][k]:.3g}, {found['upper'][k]:.3g}] at α = {found['alpha'][k]:g}" for k in (0, -1))
     random = f" with random {found['random']}" if found["random"] else ""
     worth = f"; standard deviation of the estimates up to {found['deviation']:.2g}" if found["random"] else ""
-    return f"probability of |{found['output']}| > {found['limit']:g} {found['unit']}{random}: {', '.join(cuts)}{worth}\n"
+    return f"probability of |{found['output']}| > {engineering(found['limit'], found['unit'])}{random}: {', '.join(cuts)}{worth}\n"

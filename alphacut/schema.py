@@ -245,9 +245,9 @@ ENVELOPE = Section(
 )
 
 EXCEEDANCE = Section(
-    "Fuzzy probability that an output of a frame or tower exceeds a limit within [envelope]'s duration; what is not random stays fuzzy.",
+    "Fuzzy probability that an output exceeds a limit within [envelope]'s duration; what is not random stays fuzzy.",
     {
-        "output": Key("the output: q3, drift1, base_shear …", "text", required=True),
+        "output": Key("the output: q3, drift1, base_shear …; of a tower roof or drift, of a pendulum force", "text", required=True),
         "limit": Key("magnitude it must not exceed, with the output's unit", "text", required=True),
         "random": Key("inputs that are random, with a density of the shape of their membership", "choices", default=()),
         "samples": Key("random draws at each fuzzy point", "integer", default=200, allowed=COUNT),

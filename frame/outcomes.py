@@ -9,11 +9,13 @@ import numpy as np
 
 from frame.box import ALPHA, Boxes, boxes
 from frame.envelope import Envelope
-from frame.flow import LinearFlow
+from frame.flow import Flow, LinearFlow
 from frame.halton import chebyshev_points
 from frame.integrators import Exact
 from frame.jet import Array
+from frame.lagrangian import LagrangianSystem
 from frame.linear import LinearSystem
+from frame.nonlinear_flow import LagrangianFlow
 from fuzzy import FuzzyNumber
 
 
@@ -62,7 +64,7 @@ class FuzzyProbability:
 
 
 def exceedance(
-    system: LinearSystem,
+    system: LinearSystem | LagrangianSystem,
     inputs: Mapping[str, FuzzyNumber],
     random: Mapping[str, Callable[[np.random.Generator, int], Array]],
     *,
@@ -74,6 +76,7 @@ def exceedance(
     samples: int = 200,
     spread: int = 64,
     rng: np.random.Generator | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> FuzzyProbability:
     """Fuzzy probability of exceeding a limit when some inputs are random and others fuzzy.
 
@@ -81,7 +84,7 @@ def exceedance(
     are attained at the points tried: corners and a spread of points of each box, from the narrowest to the widest.
 
     Args:
-        system: The structure.
+        system: A linear structure, by the exact propagator, or a general system, by the midpoint rule.
         inputs: Fuzzy parameters.
         random: Random parameters by name, each a sampler (generator, count) to values of shape (count,).
         limit: Magnitude of the output that must not be exceeded, in its unit.
@@ -92,6 +95,7 @@ def exceedance(
         samples: Random draws.
         spread: Points of the box besides its corners, per level.
         rng: Source of the draws; seeded with 0 unless given.
+        progress: Called with the fraction done.
 
     Raises:
         ValueError: A parameter is both fuzzy and random, or the limit is not positive.
@@ -102,17 +106,26 @@ def exceedance(
     rng = rng or np.random.default_rng(0)
     cuts = boxes(inputs, alpha)
     draws = np.column_stack([sampler(rng, samples) for sampler in random.values()]) if random else np.zeros((1, 0))
-    flow = LinearFlow(system, (*cuts.names, *random), duration, step, Exact())
-    low, high, runs = np.empty(len(cuts.alpha)), np.empty(len(cuts.alpha)), 0
+    flow = _flow(system, (*cuts.names, *random), duration, step)
+    tried = [_tried(cuts, level, spread) for level in range(len(cuts.alpha))]
+    low, high, runs, total = np.empty(len(tried)), np.empty(len(tried)), 0, sum(map(len, tried)) * len(draws)
     least, most = 1.0, 0.0
-    for level in reversed(range(len(cuts.alpha))):
-        for point in _tried(cuts, level, spread):
+    for level in reversed(range(len(tried))):
+        for point in tried[level]:
             values = flow.values(np.hstack([np.tile(point, (len(draws), 1)), draws]))[:, :, output]
             share = float((np.abs(values).max(1) > limit).mean())
             least, most, runs = min(least, share), max(most, share), runs + len(draws)
+            if progress:
+                progress(runs / total)
         low[level], high[level] = least, most
     deviation = float(np.sqrt(np.max([low * (1 - low), high * (1 - high)]) / len(draws)))
     return FuzzyProbability(cuts.alpha, low, high, deviation, runs)
+
+
+def _flow(system: LinearSystem | LagrangianSystem, names: tuple[str, ...], duration: float, step: float) -> Flow:
+    if isinstance(system, LagrangianSystem):
+        return LagrangianFlow(system, names, duration, step)
+    return LinearFlow(system, names, duration, step, Exact())
 
 
 def _tried(cuts: Boxes, level: int, spread: int) -> Array:

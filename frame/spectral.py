@@ -10,6 +10,7 @@ from math import factorial
 
 import numpy as np
 
+from frame.classical import ClassicalModes, classical_modes
 from frame.integrators import state_matrix
 from frame.jet import Array, Jet, concatenate
 from frame.linear import Matrices
@@ -39,12 +40,15 @@ def spectral_trajectory(matrices: Matrices, rows: Jet, *, load: Array | None, st
     Raises:
         NearlyCriticalError: A pair of modes is so near to critical damping that its eigenvectors coincide.
     """
+    deep = matrices.mass.directions > 0
+    undamped = None if deep else classical_modes(matrices, rows)
+    if undamped is not None:
+        return _superposed(undamped, load=load, step=step, every=every, count=count)
     rate, right, left = eigenvectors(state_matrix(matrices))
     if float((np.abs(right.value).sum(-2).max(-1) * np.abs(left.value).sum(-2).max(-1)).max()) > CONDITION:
         raise NearlyCriticalError("two modes nearly coincide at critical damping")
     seen = (rows @ right).map(lambda x: x.swapaxes(-1, -2))  # V = (S, 2n, m)
     start = concatenate([matrices.q0, matrices.v0], -2)
-    deep = rate.directions > 0
     parts = []
     if start.value.any() or start.first.any():
         time = np.arange(count) * step * every
@@ -57,6 +61,16 @@ def spectral_trajectory(matrices: Matrices, rows: Jet, *, load: Array | None, st
     if not parts:
         return Jet.constant(np.zeros((len(seen.value), count, seen.value.shape[-1])), rate.directions)
     return parts[0] if len(parts) == 1 else parts[0] + parts[1]
+
+
+def _superposed(modes: ClassicalModes, *, load: Array | None, step: float, every: int, count: int) -> Jet:
+    """As `spectral_trajectory`, from modes that damping does not couple."""
+    out = np.zeros((len(modes.rate), count, modes.start.shape[-1]))
+    if modes.start.any():
+        out += (np.exp(modes.rate[:, None, :] * (np.arange(count) * step * every)[:, None]) @ modes.start).real
+    if load is not None:
+        out += (responses(modes.rate, load, step, every=every)[0] @ modes.load).real
+    return Jet.constant(out, 0)
 
 
 def _summed(rate: Jet, share: Jet, waves: list[Array]) -> Jet:

@@ -71,7 +71,7 @@ def test_a_run_keeps_peaks_and_probability(tmp_path, capfd):
     assert main(["report", str(tmp_path), "--quiet"]) == 0
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "<h3>Peaks</h3>" in page
-    assert "probability of |q3| &gt; 0.09 m" in page
+    assert "probability of |q3| &gt; 90.00 mm" in page
 
 
 @pytest.mark.parametrize(
@@ -82,9 +82,29 @@ def test_a_run_keeps_peaks_and_probability(tmp_path, capfd):
         ("paper", ["exceedance.output=q4", "exceedance.limit=20 mm"], "no output q4"),
         ("paper", ["exceedance.output=q3", "exceedance.limit=20 mm", "exceedance.random=m9"], "no input m9"),
         ("paper", ["exceedance.output=q3"], r"exceedance\.limit.*missing"),
-        ("pendulum", ["exceedance.output=force", "exceedance.limit=20 N"], "linear structure"),
+        ("pendulum", ["exceedance.output=forse", "exceedance.limit=20 N"], "no output forse.*did you mean force"),
+        ("pendulum", ["exceedance.output=force", "exceedance.limit=20 m"], 'unit "m" is wrong'),
+        ("tower", ["exceedance.output=q3", "exceedance.limit=20 mm"], "no output q3.*roof, drift"),
     ],
 )
 def test_a_limit_that_makes_no_sense_is_refused(case, changes, pattern):
     with pytest.raises(BadInput, match=pattern):
         load(CASES / f"{case}.toml", changes)
+
+
+def test_a_pendulum_may_exceed_a_force():
+    changes = ["envelope.duration=1 s", "envelope.fuzzy=m,d", "envelope.alpha=[0, 1]", "exceedance.output=force"]
+    random = ["exceedance.random=phi_0", "exceedance.samples=400"]
+    wanted = structure(load(CASES / "pendulum.toml"), None)
+    number, points = wanted.numbers["phi_0"], []
+    grid = np.linspace(*number.support, 301)
+    for m, d in ((0.95, 0.12), (1.05, 0.08)):  # the least and the greatest force
+        points.append(np.abs(wanted.flow(("phi_0", "m", "d"), 1.0, 0.01).values(np.c_[grid, np.full((301, 2), (m, d))])[:, :, 0]).max(1))
+    limit = float(np.quantile(points[0], 0.7))
+    weight = number.membership(grid)
+    least, most = (float(weight @ (peak > limit) / weight.sum()) for peak in points)
+    found = exceedance(load(CASES / "pendulum.toml", [*changes, *random, f"exceedance.limit={limit} N"]), None)
+    low, high = found["exceedance"].sel(alpha=0).values
+    assert (low, high) == pytest.approx((least, most), abs=0.1)
+    assert low < high
+    assert found.attrs["random"] == "phi_0"

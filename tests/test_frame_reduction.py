@@ -10,7 +10,8 @@ from scipy.sparse.linalg import eigsh
 
 from frame import Accelerogram, Exact, LinearFlow, StoreyFrame, envelope
 from frame.beam_frame import BeamFrame
-from frame.linear import frequencies
+from frame.classical import classical_modes
+from frame.linear import evaluate, frequencies
 from fuzzy import Triangular
 
 TIME = np.arange(201) * 0.02
@@ -87,6 +88,28 @@ def test_eigenvalues_and_powers_give_the_same_trajectory(monkeypatch: pytest.Mon
         assert np.abs(powers.first[i] - modes.first[i]).max() < 1e-10 * np.abs(powers.first[i]).max()
         assert np.abs(powers.second[i] - modes.second[i]).max() < 1e-9 * np.abs(powers.second[i]).max()
     assert noise.intervals(0.05) == 5
+
+
+@pytest.mark.parametrize("shaken", [True, False])
+@pytest.mark.parametrize(
+    "damping", [{"rayleigh": (0.1, 0.02)}, {"damping_ratio": (0.02, 0.3, 0.1)}, {}], ids=["rayleigh", "ratios", "none"]
+)
+def test_undamped_modes_give_the_same_trajectory_as_powers(
+    shaken: bool, damping: dict[str, object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    noise = Accelerogram(0.03, np.random.default_rng(0).standard_normal(100)) if shaken else None
+    frame = StoreyFrame([1e4] * 3, [3.0] * 3, 25e9, 1e-6, q0=[0.01] * 3, v0=[0.1] * 3, outputs=("q3", "v2", "shear1"), ground=noise)
+    flow, point = LinearFlow(replace(frame, **damping), ("E", "m1"), 3, 0.05, Exact()), np.array([[25e9, 1e4], [24e9, 1.1e4]])
+    powers = flow.values(point)
+    monkeypatch.setattr("frame.flow.LARGE", 2)
+    monkeypatch.setattr("frame.spectral.eigenvectors", None)  # not needed
+    assert np.abs(flow.values(point) - powers).max() < 1e-11 * np.abs(powers).max()
+
+
+@pytest.mark.parametrize("damping", [{"dampers": (900, 0, 700)}, {"rayleigh": (0, 3.0)}], ids=["coupled", "overdamped"])
+def test_damping_that_couples_or_stops_the_modes_has_no_undamped_ones(damping: dict[str, object]) -> None:
+    frame = StoreyFrame([1e4] * 3, [3.0] * 3, 25e9, 1e-6, q0=[0.01] * 3, **damping)
+    assert classical_modes(*evaluate(frame, ("E",), np.array([[25e9]]), derivatives=False)) is None
 
 
 def test_impossible_frames_are_refused() -> None:
