@@ -67,6 +67,11 @@ class Boxes:
         points: Array = np.clip(self.centre + self.radius * unit, self.lower[0], self.upper[0])
         return points
 
+    def in_unit(self, jet: Jet) -> Jet:
+        """Derivatives by the physical parameters, turned into derivatives by the unit coordinates."""
+        shape, r = (1,) * jet.value.ndim, self.radius
+        return Jet(jet.value, jet.first * r.reshape(-1, *shape), jet.second * (r[:, None] * r).reshape(len(r), len(r), *shape))
+
     def unit(self, level: int) -> tuple[Array, Array]:
         """Lower and upper ends of a level in unit coordinates."""
         return self.to_unit(self.lower[level]), self.to_unit(self.upper[level])
@@ -126,6 +131,4 @@ class UnitFlow:
 
     def taylor(self, unit: Array) -> Jet:
         """Trajectories with derivatives by the unit coordinates, V = (S, T, outputs)."""
-        jet, r = self.flow.taylor(self.boxes.to_physical(unit)), self.boxes.radius
-        first = jet.first * r[:, None, None, None]
-        return Jet(jet.value, first, jet.second * (r[:, None] * r)[:, :, None, None, None])
+        return self.boxes.in_unit(self.flow.taylor(self.boxes.to_physical(unit)))

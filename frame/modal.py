@@ -158,7 +158,7 @@ def analyse(flow: LinearFlow, boxes: Boxes, unit: Array, chosen: Array | None = 
         rows = Jet.constant(np.broadcast_to(np.eye(rows.value.shape[-1]), (len(unit), *2 * rows.value.shape[-1:])), rows.directions)
     found = modes(matrices, rows, chosen)
     rate = _discrete(found.eigenvalue, flow)
-    return Modes(*(_scaled(jet, boxes.radius) for jet in (rate, found.coefficient, found.load)))
+    return Modes(*(boxes.in_unit(jet) for jet in (rate, found.coefficient, found.load)))
 
 
 def _discrete(rate: Jet, flow: LinearFlow) -> Jet:
@@ -176,12 +176,6 @@ def _discrete(rate: Jet, flow: LinearFlow) -> Jet:
         parts.append((np.log(value), slope / value, curve / value - (slope / value) ** 2))
     f, df, ddf = (a - b for a, b in zip(*parts, strict=True))
     return rate.chain(f / h, df, ddf * h)
-
-
-def _scaled(jet: Jet, radius: Array) -> Jet:
-    shape = (1,) * jet.value.ndim
-    first = jet.first * radius.reshape(-1, *shape)
-    return Jet(jet.value, first, jet.second * (radius[:, None] * radius).reshape(*2 * (len(radius),), *shape))
 
 
 def fit_modes(flow: LinearFlow, boxes: Boxes, *, tolerance: float = 1e-6, budget: int = 280, scale: Array | float = 1.0) -> ModalModel:
