@@ -158,8 +158,9 @@ def extreme_radii(radius_map: RadiusMap) -> Array:
 def theta_error(radius_map: RadiusMap, rule: ThetaRule, *, radii: Array, stress: Array) -> float:
     """Estimated relative error of E by `rule`, from slices already solved.
 
-    Stress is smoother in r² than in θ: polynomials in r² through the slices at the nodes and at the extreme radii are averaged by a
-    rule so fine that it leaves nothing out, and compared with the average over the nodes. The largest gap of three degrees, doubled.
+    The logarithm of the stress is smoother in √(1 − r²) than in θ: polynomials through the slices at the nodes and at the extreme radii
+    are averaged by a rule so fine that it leaves nothing out, and compared with the average over the nodes. The largest gap of several
+    degrees, doubled.
 
     Args:
         radius_map: The map.
@@ -167,17 +168,19 @@ def theta_error(radius_map: RadiusMap, rule: ThetaRule, *, radii: Array, stress:
         radii: Radii solved, shape (m,): those of the nodes and the two extreme ones.
         stress: σ11 of load 1 and σ12 of load 2 at `radii`, shape (m, 2).
     """
-    square, places = radii**2, np.searchsorted(radii, np.round(radius_map(rule.nodes), DIGITS))
+    places = np.searchsorted(radii, np.round(radius_map(rule.nodes), DIGITS))
     weights = np.maximum(np.bincount(places, rule.weights, minlength=radii.size), 1e-6)
     fine = theta_rule(radius_map, points=_FINE)
-    target = radius_map(fine.nodes) ** 2
+    touch, target, logarithm = np.sqrt(1 - radii**2), np.sqrt(1 - radius_map(fine.nodes) ** 2), np.log(stress)
+    low, high, span = logarithm.min(axis=0), logarithm.max(axis=0), np.ptp(logarithm, axis=0)
     own = effective_modulus(*(rule.weights @ stress[places]))[0]
     gaps = []
-    for degree in range(max(0, radii.size - 3), radii.size):
-        basis, carried = (_chebyshev(x, square.min(), square.max(), degree) for x in (square, target))
+    for degree in range(min(max(0, radii.size - 4), 9), min(radii.size, 13)):
+        basis, carried = (_chebyshev(x, touch.min(), touch.max(), degree) for x in (touch, target))
         root = np.sqrt(weights)[:, None]
-        coefficients = np.linalg.lstsq(basis * root, stress * root, rcond=1e-14)[0]
-        gaps.append(effective_modulus(*(fine.weights @ (carried @ coefficients)))[0] / own - 1)
+        coefficients = np.linalg.lstsq(basis * root, logarithm * root, rcond=1e-14)[0]
+        refined = np.exp(np.clip(carried @ coefficients, low - span, high + span))
+        gaps.append(effective_modulus(*(fine.weights @ refined))[0] / own - 1)
     return float(2 * np.abs(gaps).max())
 
 
