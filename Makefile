@@ -1,6 +1,7 @@
 # make run         the paper's case, from microstructure to fuzzy vibration, into results/paper/
 # make test        the tests (slower ones: make test-slow)
 # make bench-solver, make bench-scaling, make charts, make stability    what the methods cost and where they end
+# make coverage    the lines of the five packages that the tests run, and those that they do not
 # make docs, make lint, make pictures    documentation, style and types, the README's picture
 # The environment is made on first use; make clean-env removes it.
 CASE ?= cases/paper.toml
@@ -8,7 +9,7 @@ WORKERS ?= 2
 OUT ?= results/$(basename $(notdir $(CASE)))
 IN = ./enter
 
-.PHONY: run test test-slow lint charts bench-solver bench-scaling stability docs pictures clean clean-env
+.PHONY: run test test-slow coverage lint charts bench-solver bench-scaling stability docs pictures clean clean-env
 
 run:
 	$(IN) python -m alphacut run $(CASE) --out $(OUT) --workers $(WORKERS) $(if $(FRESH),--fresh)
@@ -18,6 +19,10 @@ test:
 
 test-slow:
 	$(IN) python -m pytest -m slow $(PYTEST)
+
+coverage:
+	@mkdir -p build
+	$(IN) env COVERAGE_CORE=sysmon python -m pytest -m "not slow" --cov --cov-report=term-missing:skip-covered $(PYTEST)
 
 bench-solver:
 	$(IN) python -m benchmarks.cell_solvers

@@ -143,5 +143,5 @@ def summary(found: Envelope) -> str:
     ends = zip(found.outputs, found.minimum[0], found.maximum[0], of.lower[0], of.upper[0], strict=True)
     rows = [(name, *(engineering(float(value), output_unit(name)) for value in values)) for name, *values in ends]
     lines = [f"{name:>14}  {low:>12}  {high:>12}   {least} … {most}\n" for name, low, high, least, most in rows]
-    cost = f"{found.trajectories} trajectories, {found.seconds:.1f} s, {found.nature}"
+    cost = f"{found.trajectories} {'eigen-analyses' if found.method == 'modal' else 'trajectories'}, {found.seconds:.1f} s, {found.nature}"
     return f"        output           min           max   peak   (α = {found.alpha[0]:g})\n{''.join(lines)}{cost}\n"

@@ -52,6 +52,11 @@ class EnvelopeTask:
     certify: float | None = None
     relative: bool = False
 
+    @property
+    def scheme(self) -> str:
+        """The time stepping of a linear structure: the integrator, or what the method takes where none is named."""
+        return self.integrator or ("exact" if self.method in ("auto", "modal") else "midpoint")
+
 
 def task_of(case: Case, *, fuzzy: Sequence[str] | None = None, duration: float | None = None) -> EnvelopeTask:
     """The envelope that [envelope] asks for, with other fuzzy inputs or another duration if given."""

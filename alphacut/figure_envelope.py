@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import partial
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 from alphacut.chain import Study
-from alphacut.figure_style import INK, alpha_legend, colours, figure
+from alphacut.figure_style import INK, alpha_legend, colours, figure, prefix_axis
 
 if TYPE_CHECKING:
     import xarray
@@ -40,10 +41,10 @@ def envelope(dataset: xarray.Dataset, output: str, study: Study) -> Figure:
         axes.plot(time, shown.isel(alpha=-1)[side], color=INK, lw=0.8)
         axes.plot(time, shown.isel(alpha=0)[side], color=INK, lw=0.3)
     axes.set_xlabel("time t, s")
-    axes.set_ylabel(f"{output}, {output_unit(output)}")
+    prefix_axis(axes, output, output_unit(output))
     axes.set_xlim(time[0], time[-1])
     known = WORDS if output.startswith(("q", "v", "drift", "shear", "base", "roof")) else {}  # letters mean something else in a pendulum
     words = ", ".join(known.get(name, name) for name in study.task.fuzzy)
-    axes.set_title(f"{output}, fuzzy {words}", loc="left", fontsize=10)
+    axes.set_title(fill(f"{output}, fuzzy {words}", 84), loc="left", fontsize=10)
     alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return drawn

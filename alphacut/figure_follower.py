@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from alphacut.chain import Results, Study
-from alphacut.figure_style import BLUE, GREY, INK, ORANGE
+from alphacut.figure_style import BLUE, GREY, INK, ORANGE, prefix_axis
 from alphacut.structure import structure
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def follower(results: Results, study: Study) -> Figure:
         panel.set_xlabel("time t, s")
         panel.tick_params(labelbottom=True)
     for row in range(3):
-        grid[row, 0].set_ylabel(f"{output}, {output_unit(output)}")
+        prefix_axis(grid[row, 0], output, output_unit(output))
     return drawn
 
 

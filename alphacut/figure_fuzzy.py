@@ -8,7 +8,7 @@ import numpy as np
 
 from alphacut.cell import GPA
 from alphacut.chain import Results
-from alphacut.figure_style import BLUE, INK, ORANGE, figure, membership_axes
+from alphacut.figure_style import BLUE, INK, ORANGE, figure, membership_axes, prefix_axis
 from alphacut.structure import structure
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
     inputs = wanted.inputs(study.task.fuzzy)
     end = min(duration, study.task.duration)
     end = round(end / study.task.step) * study.task.step
-    flow = wanted.flow(tuple(inputs), end, study.task.step)
+    flow = wanted.flow(tuple(inputs), end, study.task.step, study.task.scheme if wanted.linear else study.task.integrator)
     ends = np.array([number.cut(float(dataset["alpha"])) for number in inputs.values()])
     points = np.random.default_rng(0).uniform(ends[:, 0], ends[:, 1], (count, len(ends)))
     curves = flow.values(points)[:, :, list(flow.outputs).index(output)]
@@ -56,7 +56,7 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
     for side in ("lower", "upper"):
         axes.plot(flow.time, shown[side], color=INK, lw=1.3, label="envelope" if side == "lower" else None)
     axes.set_xlabel("time t, s")
-    axes.set_ylabel(f"{output}, {output_unit(output)}")
+    prefix_axis(axes, output, output_unit(output))
     axes.set_title(f"Fuzzy mapping of {output} at α = {float(dataset['alpha']):g}", loc="left", fontsize=10)
     axes.legend(loc="lower left", bbox_to_anchor=(0.45, 1.0), ncols=2, fontsize=8, borderaxespad=0.2)
     return drawn

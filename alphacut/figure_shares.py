@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from alphacut.captions import in_words
 from alphacut.figure_envelope import WORDS
-from alphacut.figure_style import BLUE, GREY, ORANGE, PURPLE, figure
+from alphacut.figure_style import BLUE, GREY, ORANGE, PURPLE, figure, prefix_axis
 
 if TYPE_CHECKING:
     import xarray
@@ -27,8 +27,8 @@ def over_time(found: xarray.Dataset) -> Figure:
     time = found["time"].values
     grid[0].fill_between(time, 0, found["width"].sel(output=output), color="#cfe3f0", lw=0)
     grid[0].plot(time, found["width"].sel(output=output), color=BLUE, lw=1)
-    grid[0].set_ylabel(f"width of {output}, {output_unit(output)}")
     grid[0].set_ylim(bottom=0)
+    prefix_axis(grid[0], f"width of {output}", output_unit(output))
     for index, name in enumerate(found["input"].values):
         colour, dashes = COLOURS[index % len(COLOURS)], STYLES[(index // len(COLOURS)) % len(STYLES)]
         share = found["share"].sel(output=output, input=name)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alphacut.output import whole_file
+from alphacut.units import MINUS, axis_prefix
 from stochastic.truncated_normal import Array
 
 if TYPE_CHECKING:
@@ -85,6 +86,14 @@ def alpha_legend(axes: Axes, alpha: Array, **options: Any) -> None:
 
     handles: list[Any] = [*patches, Line2D([], [], color=INK, lw=1, label=f"α = {alpha[-1]:g}")]
     axes.legend(handles=handles, title="α-cut", fontsize=8, title_fontsize=8, **options)
+
+
+def prefix_axis(axes: Axes, label: str, si: str) -> None:
+    """Label the vertical axis, with a prefix to its unit where the values on it are large or small; the data stay in SI."""
+    factor, unit = axis_prefix(max(map(abs, axes.get_ylim())), si)
+    axes.set_ylabel(f"{label}, {unit}")
+    if factor != 1.0:
+        axes.yaxis.set_major_formatter(lambda value, _: f"{value * factor:.10g}".replace("-", MINUS))
 
 
 def membership_axes(axes: Axes, label: str) -> None:

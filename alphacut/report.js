@@ -70,18 +70,26 @@
     for (let k = last; k >= first; k -= 1) points.push(`${x(k * entry.step).toFixed(1)},${y(lower[k]).toFixed(1)}`);
     return `M${points.join("L")}Z`;
   }
+  function prefixed(unit) {
+    // A prefix where plain numbers would be long, as in the tables.
+    const largest = Math.max(Math.abs(view.bottom), Math.abs(view.top));
+    if (!["m", "m/s", "N", "Pa", "rad"].includes(unit) || !(largest > 0) || (largest >= 0.01 && largest < 1000)) return [1, unit];
+    const power = Math.min(3, Math.max(-3, Math.floor(Math.log10(largest) / 3)));
+    return [1000 ** -power, ["n", "\u00b5", "m", "", "k", "M", "G"][power + 3] + unit];
+  }
   function axes(entry) {
+    const [factor, unit] = prefixed(entry.units[entry.outputs.indexOf(output.value)]);
     for (const t of ticks(view.left, view.right)) {
       element("line", { x1: x(t), x2: x(t), y1: margin.top, y2: height - margin.bottom, stroke: "#e6e6e6" }, svg);
       element("text", { x: x(t), y: height - margin.bottom + 18, "text-anchor": "middle" }, svg).textContent = String(t);
     }
     for (const q of ticks(view.bottom, view.top)) {
       element("line", { x1: margin.left, x2: width - margin.right, y1: y(q), y2: y(q), stroke: "#e6e6e6" }, svg);
-      element("text", { x: margin.left - 8, y: y(q) + 4, "text-anchor": "end" }, svg).textContent = String(q);
+      element("text", { x: margin.left - 8, y: y(q) + 4, "text-anchor": "end" }, svg).textContent = String(+(q * factor).toPrecision(10)).replace("-", "\u2212");
     }
     element("text", { x: (margin.left + width - margin.right) / 2, y: height - 8, "text-anchor": "middle" }, svg).textContent = "time t, s";
     const label = element("text", { x: 0, y: 0, "text-anchor": "middle", transform: `translate(16 ${(height - margin.bottom) / 2}) rotate(-90)` }, svg);
-    label.textContent = `${output.value}, ${entry.units[entry.outputs.indexOf(output.value)]}`;
+    label.textContent = `${output.value}, ${unit}`;
   }
   function draw() {
     const entry = chosen();

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import html
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -15,6 +16,12 @@ from alphacut.command_cite import citation
 from alphacut.differences import differences
 from alphacut.units import engineering
 
+NATURES = {
+    "inner": "Inner bounds are attained by the parameters stored with them; the true range may be wider, never narrower.",
+    "estimated": "Estimated bounds come from a model of the motion whose error was estimated, not proved.",
+    "verified by sampling": "Verified by sampling: the search is proved to leave nothing out, the error of its model is sampled.",
+    "guaranteed": "Guaranteed bounds are proved to hold the true range.",
+}
 SVG_LIMIT = 200_000  # bytes; a heavier figure goes into the page as PNG
 
 
@@ -122,10 +129,21 @@ def envelopes(summary: Mapping[str, Any]) -> str:
     for name, study in summary["envelopes"].items():
         for output in study["min"]:
             ends = (engineering(study[side][output], output_unit(output)) for side in ("min", "max"))
-            rows.append((name, output, *ends))
+            error = study.get("error", {}).get(output)
+            rows.append((name, output, *ends, "not estimated" if error is None else engineering(error, output_unit(output), digits=2)))
     svg = '<svg id="plot" role="img" aria-label="Envelopes over time"></svg><div id="readout"></div>'
-    extremes = table(("study", "output", "least at α = 0", "greatest at α = 0"), rows, numbers=2)
-    return section("Envelopes", controls, svg, hint, extremes, peaks(summary))
+    lowest = f"{min(study['alpha'][0] for study in summary['envelopes'].values()):g}"
+    extremes = table(("study", "output", f"least at α = {lowest}", f"greatest at α = {lowest}", "error up to"), rows, numbers=2)
+    return section("Envelopes", natural(summary), controls, svg, hint, extremes, peaks(summary))
+
+
+def natural(summary: Mapping[str, Any]) -> str:
+    """The first natural periods, where the structure is linear."""
+    omega = summary.get("structure", {}).get("omega_rad_per_s")
+    if not omega:
+        return ""
+    periods = ", ".join(f"{2 * math.pi / w:.3g}" for w in omega[:4])
+    return f"<p>First natural periods at the modal values: {periods} s.</p>"
 
 
 def peaks(summary: Mapping[str, Any]) -> str:
@@ -136,13 +154,18 @@ def peaks(summary: Mapping[str, Any]) -> str:
     for name, study in summary["envelopes"].items():
         for output, of in study.get("peak", {}).items():
             unit = output_unit(output)
-            cuts = (f"{engineering(of['lower'][level], unit)} … {engineering(of['upper'][level], unit)}" for level in (0, -1))
-            rows.append((name, output, *cuts))
+            rows.append((name, output, *(between(of["lower"][level], of["upper"][level], unit) for level in (0, -1))))
     words = (
         "<p>Fuzzy peak of each output's magnitude over time, on the lowest and the highest level; the lower end is a bound from below.</p>"
     )
     limit = f"<p>{html.escape(outcomes.sentence(summary['exceedance']))}</p>" if "exceedance" in summary else ""
     return "<h3>Peaks</h3>" + words + table(("study", "output", "lowest α", "highest α"), rows, numbers=2) + limit if rows else limit
+
+
+def between(lower: float, upper: float, unit: str) -> str:
+    """An interval, or the one value where both ends are shown alike."""
+    ends = dict.fromkeys((engineering(lower, unit), engineering(upper, unit)))
+    return " … ".join(ends)
 
 
 def shares(found: Mapping[str, Any]) -> str:
@@ -175,11 +198,15 @@ def methods(summary: Mapping[str, Any]) -> str:
             )
         )
     for name, study in summary.get("envelopes", {}).items():
-        rows.append(
-            (f"envelope {name}", study["method"], study["nature"], f"{study['trajectories']} trajectories", f"{study['seconds']:.1f}")
-        )
-    words = "<p>Inner bounds are attained by the parameters stored with them; the true range may be wider, never narrower.</p>"
+        rows.append((f"envelope {name}", study["method"], study["nature"], effort(study), f"{study['seconds']:.1f}"))
+    natures = dict.fromkeys(str(row[2]) for row in rows)
+    words = "".join(f"<p>{html.escape(NATURES[nature])}</p>" for nature in natures if nature in NATURES)
     return section("Methods and cost", table(("stage", "method", "nature of the bounds", "cost", "seconds"), rows, numbers=3), words)
+
+
+def effort(study: Mapping[str, Any]) -> str:
+    """What an envelope cost: trajectories, or eigen-analyses where the modes stand for them."""
+    return f"{study['trajectories']} {'eigen-analyses' if study['method'] == 'modal' else 'trajectories'}"
 
 
 def gallery(summary: Mapping[str, Any], folder: Path) -> str:

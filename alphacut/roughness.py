@@ -25,7 +25,7 @@ def coarse_step(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
     """A step that cannot resolve the fastest mode, with the phase error that means; the exact propagator needs none."""
     from frame import guard
 
-    if wanted.linear is None or task.integrator == "exact" or (task.integrator is None and task.method == "modal"):
+    if wanted.linear is None or task.scheme == "exact":
         return
     found = guard(wanted.linear, task.step, task.duration)
     if not found.ok:

@@ -98,7 +98,7 @@ def counted(model: LinearSystem) -> int:
 
 
 def envelope_numbers(dataset: xarray.Dataset) -> dict[str, Any]:
-    """Extremes over time at the lowest level, widths, cost."""
+    """Extremes over time at the lowest level, widths, estimated errors where there are any, cost."""
     lowest = dataset.isel(alpha=0)
     names = [str(name) for name in dataset["output"].values]
     low, high = lowest["lower"].min("time").values, lowest["upper"].max("time").values
@@ -106,6 +106,8 @@ def envelope_numbers(dataset: xarray.Dataset) -> dict[str, Any]:
     cost = {name: dataset.attrs[name] for name in ("trajectories", "seconds", "method", "nature")}
     columns = {"min": low, "max": high, "mean_width": width}
     numbers = {key: dict(zip(names, map(float, column), strict=True)) for key, column in columns.items()}
+    if "error" in dataset:
+        numbers["error"] = dict(zip(names, map(float, lowest["error"].max("time").values), strict=True))
     return numbers | {"alpha": dataset["alpha"].values, "peak": outcomes.peak_document(dataset)} | cost
 
 

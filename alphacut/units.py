@@ -104,6 +104,14 @@ def engineering(value: float, si: str, *, digits: int = 4) -> str:
     return f"{'-' if value < 0 else ''}{abs(scaled):.{places}f} {PREFIXES[exponent]}{si}".replace("-", MINUS)
 
 
+def axis_prefix(largest: float, si: str) -> tuple[float, str]:
+    """Factor and unit for an axis whose values reach `largest`: with a prefix where plain numbers would be long."""
+    if si not in PREFIXED or not math.isfinite(largest) or largest <= 0 or 0.01 <= largest < 1000:
+        return 1.0, si
+    exponent = min(9, max(-9, 3 * math.floor(math.log10(largest) / 3)))
+    return 10.0**-exponent, f"{PREFIXES[exponent]}{si}"
+
+
 def shown(value: float, unit: str, si: str) -> float:
     """A value in `si`, in `unit`, for people."""
     return float(Decimal(repr(float(value))) / factor(unit, si))
