@@ -26,7 +26,7 @@ def refined_prism(radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Pha
         results = PrismModel(mesh_size=size, layers=layers, estimate=True).solve(radius_map, matrix, inclusions)
         worst = max(results, key=lambda r: r.estimated_error)
         if worst.estimated_error <= tolerance:
-            return [replace(r, reason=f"mesh size {size:.3g}, {layers} layers") for r in results]
+            return [replace(r, reason="; ".join(filter(None, [f"mesh size {size:.3g}, {layers} layers", r.reason]))) for r in results]
         if size <= _FINEST or layers >= _MOST_LAYERS:
             raise RuntimeError(f"mesh size {size:.3g} with {layers} layers leaves a relative error of {worst.estimated_error:.1e}")
         if worst.error["theta"] > worst.error["space"]:

@@ -15,7 +15,8 @@ import numpy as np
 from mpi4py import MPI
 
 from rve.cell import LOADS, THREE_LOADS, Phase
-from rve.certificate import Limits, load_checks, require, stiffness_checks
+from rve.certificate import CertificateError, Limits, load_checks, require, stiffness_checks
+from rve.linear_solver import ConvergenceError
 from rve.local_stress import LocalStress, local_stress
 from rve.periodic import mismatch
 from rve.prism_error import estimate
@@ -73,15 +74,16 @@ class PrismModel:
         """One result for each of `inclusions`, in their order: mesh and assembly once, one solve for each load.
 
         Raises:
-            ConvergenceError: The linear solver stopped early.
+            ConvergenceError: The linear solver that was asked for stopped early; the default gives way to a direct one.
+            CertificateError: A property that every right result has is violated.
             RuntimeError: An element is inverted.
         """
         watch = Stopwatch()
         system = self._moved(radius_map, watch)
+        task = PrismTask(system, self.options, self._loads, watch)
         results = []
-        for inclusion, displacements in zip(inclusions, self._task(system, watch).solve(matrix, inclusions), strict=True):
-            with watch("solve"):
-                result = self._result(system, displacements, (matrix, inclusion))
+        for inclusion in inclusions:
+            result, _ = self._solved(task, (matrix, inclusion))
             results.append(replace(result, seconds=watch.report()))
         return self._judged(radius_map, matrix, inclusions, results) if self.estimate else results
 
@@ -100,8 +102,7 @@ class PrismModel:
         """Spread of the stresses over cell and θ, and the tractions on the interface, for the loads of eq. 15."""
         watch = Stopwatch()
         system = self._moved(radius_map, watch)
-        (displacements,) = self._task(system, watch).solve(matrix, [inclusion])
-        self._result(system, displacements, (matrix, inclusion))  # its certificate
+        _, displacements = self._solved(PrismTask(system, self.options, self._loads, watch), (matrix, inclusion))
         return local_stress(system, displacements.total, (matrix, inclusion))
 
     def _moved(self, radius_map: RadiusMap, watch: Stopwatch) -> PrismSystem:
@@ -116,16 +117,29 @@ class PrismModel:
     def _loads(self) -> Array:
         return THREE_LOADS if self.stiffness else LOADS
 
-    def _task(self, system: PrismSystem, watch: Stopwatch) -> PrismTask:
-        return PrismTask(system, self.options, self._loads, watch)
-
     @property
     def options(self) -> SolverOptions:
         """The linear solver with what overrides it."""
         return SolverOptions(self.solver, self.petsc)
 
-    def _result(self, system: PrismSystem, displacements: Displacements, phases: tuple[Phase, Phase]) -> Homogenised:
-        loads = self._loads
+    def _solved(self, task: PrismTask, phases: tuple[Phase, Phase]) -> tuple[Homogenised, Displacements]:
+        """A result with its certificate; where the default solver fails, by a direct one, and the result says so."""
+        try:
+            return self._certified(task, phases)
+        except (ConvergenceError, CertificateError) as failure:
+            if self.options != SolverOptions():  # a solver that was asked for is not replaced
+                raise
+            direct = PrismTask(task.system, SolverOptions("mumps"), self._loads, task.watch)
+            result, displacements = self._certified(direct, phases)
+            return replace(result, reason=f"solved by mumps, since by the default solver {_what(failure)}"), displacements
+
+    def _certified(self, task: PrismTask, phases: tuple[Phase, Phase]) -> tuple[Homogenised, Displacements]:
+        displacements = task.solve(phases)
+        with task.watch("solve"):
+            return self._result(task, displacements, phases), displacements
+
+    def _result(self, task: PrismTask, displacements: Displacements, phases: tuple[Phase, Phase]) -> Homogenised:
+        loads, system = self._loads, task.system
         means = system.means(displacements.total, phases)
         stress = means.stress
         stiffness = stress @ np.linalg.inv(loads).T if len(loads) == 3 else None
@@ -133,7 +147,7 @@ class PrismModel:
         return Homogenised(
             curve=curve,
             method="prism",
-            solver=str(self.options),
+            solver=str(task.options),
             unknowns=system.numbering.size,
             iterations=displacements.iterations,
             checks=require(certify(system, displacements, means, phases, loads), self.limits),
@@ -144,6 +158,11 @@ class PrismModel:
         """What the certificate allows: round-off, and for the bounds the stiffness that the mesh adds, of third order in h."""
         order = 3 if self.interface == "conforming" else 1
         return Limits(algebraic=self.options.residual_limit, discretisation=0.1 * min(self.mesh_size, 1.0) ** order)
+
+
+def _what(failure: Exception) -> str:
+    """What happened, without its cure."""
+    return str(failure).partition(":")[0]
 
 
 def certify(

@@ -92,8 +92,7 @@ class PrismSystem:
 
     def stiffness_at_points(self, phases: tuple[Phase, Phase]) -> Array:
         """Voigt stiffness, shape (cells, points or 1, 3, 3), in Pa."""
-        share = self.share[:, :, None, None]
-        return np.asarray((1 - share) * phases[0].stiffness + share * phases[1].stiffness)
+        return _mixed(self.share, phases)
 
     def means(self, displacement: Array, phases: tuple[Phase, Phase]) -> SliceMeans:
         """Homogenised stress of the slices and the mean energy from total displacements, shape (nodes, 2, loads)."""
@@ -116,18 +115,14 @@ class PrismSystem:
         return np.asarray(np.einsum("lij,nj->nil", tensors, x))
 
     def preconditioner(self, phases: tuple[Phase, Phase]) -> ThetaPreconditioner:
-        """The θ-preconditioner for these phases."""
-        planes = self.grid.planes(self.map)
-        levels = self.grid.levels(self.map.distribution)
-        stiffness = tuple(
-            self._plane_stiffness(xy, t, phases) for xy, t in zip(planes, (levels, (levels[1:] + levels[:-1]) / 2), strict=True)
-        )
-        return ThetaPreconditioner(self.numbering, planes, (stiffness[0], stiffness[1]), self.map.distribution, self.comm)
+        """The θ-preconditioner for these phases; a triangle that the interface cuts has the mean stiffness of its wedges."""
+        between = self.share.reshape(self.grid.layers, len(self.grid.plane.triangles), -1).mean(axis=2)
+        on = (np.concatenate([between[:1], between]) + np.concatenate([between, between[-1:]])) / 2
+        stiffness = _mixed(on, phases), _mixed(between, phases)
+        return ThetaPreconditioner(self.numbering, self.grid.planes(self.map), stiffness, self.map.distribution, self.comm)
 
-    def _plane_stiffness(self, plane: Array, theta: Array, phases: tuple[Phase, Phase]) -> Array:
-        """Voigt stiffness of each triangle at each θ, shape (θ, m, 3, 3); by the triangle's centre where the mesh does not conform."""
-        inside = np.broadcast_to(self.grid.plane.inside, (len(theta), len(self.grid.plane.triangles)))
-        if not self.grid.conforming:
-            centre = plane[:, self.grid.plane.triangles[:, :3]].mean(axis=2)
-            inside = np.linalg.norm(centre, axis=-1) < self.map(theta)[:, None]
-        return np.where(inside[..., None, None], phases[1].stiffness, phases[0].stiffness)
+
+def _mixed(share: Array, phases: tuple[Phase, Phase]) -> Array:
+    """Voigt stiffness, shape (…, 3, 3), in Pa, of matrix with a `share` (…) of particle."""
+    share = share[..., None, None]
+    return np.asarray((1 - share) * phases[0].stiffness + share * phases[1].stiffness)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -53,16 +52,18 @@ class PrismTask:
         self.affine = system.affine(loads)
         self.poissons: tuple[float, float] | None = None
 
-    def solve(self, matrix: Phase, inclusions: Sequence[Phase]) -> Iterator[Displacements]:
-        """One solution after another, in the order of `inclusions`."""
-        for inclusion in inclusions:
-            with self.watch("assemble"):
-                self._assemble((matrix, inclusion))
-            with self.watch("setup"):
-                solver = self._solver((matrix, inclusion))
-            with self.watch("solve"):
-                solution = self._solve_loads(solver, (matrix, inclusion))
-            yield solution
+    def solve(self, phases: tuple[Phase, Phase]) -> Displacements:
+        """The solution for a matrix and an inclusion; what an earlier call made serves again where it can.
+
+        Raises:
+            ConvergenceError: The linear solver stopped early.
+        """
+        with self.watch("assemble"):
+            self._assemble(phases)
+        with self.watch("setup"):
+            solver = self._solver(phases)
+        with self.watch("solve"):
+            return self._solve_loads(solver, phases)
 
     def _assemble(self, phases: tuple[Phase, Phase]) -> None:
         poissons = phases[0].poisson, phases[1].poisson

@@ -79,6 +79,28 @@ def test_ignoring_the_interface_is_first_order_and_too_stiff():
     assert 0.5 < np.log2(errors[0] / errors[1]) < 1.6
 
 
+@pytest.mark.parametrize(
+    ("options", "matrix", "particle", "what"),
+    [
+        ({"interface": "sign"}, MATRIX, Phase(20e15), "cg with python stopped after 2000 iterations"),
+        ({}, Phase(1.0, 0.0), Phase(1e4, 0.4999), "mean stress times mean strain"),
+    ],
+)
+def test_where_the_default_solver_fails_a_direct_one_takes_over_and_the_result_says_so(options, matrix, particle, what):
+    options = {"mesh_size": 0.4, "layers": 3, **options}
+    result = PrismModel(**options).solve(PAPER, matrix, [particle])[0]
+    direct = PrismModel(solver="mumps", **options).solve(PAPER, matrix, [particle])[0]
+    assert result.curve.s11.tobytes() == direct.curve.s11.tobytes()
+    assert result.solver == "mumps"
+    assert f"solved by mumps, since by the default solver {what}" in result.reason
+    assert direct.reason == ""
+
+
+@pytest.mark.parametrize("contrast", [1e-3, 1e3])
+def test_a_mesh_that_ignores_the_interface_needs_few_iterations_too(contrast):
+    assert max(solve(particle=Phase(20e9 * contrast), interface="sign", mesh_size=0.25, layers=6).iterations) < 350
+
+
 def test_a_solver_that_stops_early_is_an_error():
     with pytest.raises(RuntimeError, match="stopped after 2 iterations without reaching its tolerance"):
         solve(mesh_size=0.3, layers=4, petsc={"ksp_max_it": "2"})
