@@ -59,7 +59,7 @@ def cell_fields(case: Case) -> meshio.Mesh:
     plane = triangulate(size=case.number("mesh.size"), radius=reference_radius(radius))
     system = PrismSystem(PrismGrid(plane, case.integer("mesh.layers")), MPI.COMM_SELF)
     system.move(radius)
-    (solved,) = PrismTask(system, SolverOptions("theta"), LOADS, Stopwatch()).solve(matrix, [inclusion])
+    solved = PrismTask(system, SolverOptions("theta"), LOADS, Stopwatch()).solve((matrix, inclusion))
     phase = np.tile(plane.inside.astype(np.int64), system.grid.layers)
     stiffness = np.array([matrix.stiffness, inclusion.stiffness])[phase][:, None]
     stress = stiffness @ system.slice_stress.strain(system.grid.cells, solved.total, reference_nodes())[0]
