@@ -30,11 +30,16 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         answer(options, {"case": options.case, "ok": False, "problems": [asdict(problem) for problem in error.problems]}, out)
         raise
     warnings = [f"warning: {remark}" for remark in (*found.warnings, *found.rough)]
-    answer(options, {"case": options.case, "ok": True, "problems": [], "warnings": warnings, "stages": list(case.stages)}, out)
+    answer(
+        options,
+        {"case": options.case, "ok": True, "problems": [], "warnings": warnings, "stages": list(case.stages), "period_s": found.period},
+        out,
+    )
     for warning in warnings:
         say(warning)
     if options.json != "-" and not options.quiet:
-        out.write(f"{options.case}: no problems; stages {', '.join(case.stages)}; {case.text('title')}\n")
+        period = f"; first natural period {found.period:.3g} s" if found.period else ""
+        out.write(f"{options.case}: no problems; stages {', '.join(case.stages)}; {case.text('title')}{period}\n")
     return 0
 
 

@@ -20,8 +20,9 @@ def frame(case: Case) -> Figure:
     lengths = [length.modal for length in per_floor(case, "frame.lengths")]
     masses = [mass.modal for mass in per_floor(case, "frame.masses")]
     height = sum(lengths)
-    drawn, axes = figure(4.4, min(9.0, 1.4 + 0.5 * height))
     span, level = 0.45 * max(height, 6.0) if len(lengths) < 5 else 0.3 * height, 0.0
+    high = min(9.0, 1.4 + 0.5 * height, 4.4 * 1.13 * height / (2.15 * span))
+    drawn, axes = figure(high * 2.15 * span / (1.13 * height), high)
     ground(axes, 0.0, span)
     for floor, (length, mass) in enumerate(zip(lengths, masses, strict=True), start=1):
         for x in (0.0, span):
@@ -50,9 +51,11 @@ def chain(case: Case) -> Figure:
     """Fig. 27: the frame with rigid floors and bending columns as masses on springs, with its dampers."""
     floors = len(case.fuzzies("frame.masses"))
     placement = case.text("frame.damper_placement") if case.has("frame.damper_placement") else "none"
-    drawn, axes = figure(min(10.0, 2.2 + 1.5 * floors), 2.6)
-    axes.plot([0, 0], [-0.9, 0.6], color=INK, lw=1)
-    axes.fill_betweenx([-0.9, 0.6], [-0.12] * 2, [0, 0], hatch="////", facecolor="white", edgecolor=GREY, lw=0)
+    wide = min(10.0, 2.2 + 1.5 * floors)
+    drawn, axes = figure(wide, 2.15 * wide / (1.6 * floors + 0.5) + 0.1)
+    foot = -0.9 if placement == "ground" else -0.5
+    axes.plot([0, 0], [foot, 0.75], color=INK, lw=1)
+    axes.fill_betweenx([foot, 0.75], [-0.12] * 2, [0, 0], hatch="////", facecolor="white", edgecolor=GREY, lw=0)
     for floor in range(1, floors + 1):
         left, right = 1.6 * floor - 1.0, 1.6 * floor
         start = 0.0 if floor == 1 else left - 0.6
@@ -71,6 +74,8 @@ def chain(case: Case) -> Figure:
     if placement == "ground":
         axes.plot([-0.12, 1.6 * floors + 0.2], [-0.9, -0.9], color=INK, lw=1)
         axes.fill_between([-0.12, 1.6 * floors + 0.2], [-1.02] * 2, [-0.9] * 2, hatch="////", facecolor="white", edgecolor=GREY, lw=0)
+    axes.set_xlim(-0.2, 1.6 * floors + 0.3)
+    axes.set_ylim(-1.1 if placement == "ground" else -0.7, 1.05)
     axes.set_aspect("equal")
     axes.axis("off")
     return drawn

@@ -16,7 +16,7 @@ from alphacut.position import key_at, lines_of_keys
 from alphacut.problem import BadInput, Problem
 from alphacut.quantity import NUMBER
 from alphacut.reading import Unfit, allowed, nearest, read
-from alphacut.schema import SECTIONS, dotted, every_key
+from alphacut.schema import IMPLIED, SECTIONS, dotted, every_key
 
 Raw = dict[str, Any]
 ARRAYS = ("fuzzy list", "numbers", "choices")  # kinds of keys that hold arrays
@@ -158,6 +158,8 @@ def checked(raw: Raw, values: dict[str, object], written: dict[str, object]) -> 
     for name, section in SECTIONS.items():
         if name and name in raw:
             yield from checked_table(name, section, raw[name], values, written)
+        elif IMPLIED.get(name) in raw:
+            yield from checked_section(name, section, {}, values, written)
 
 
 def flattened(raw: Raw) -> Raw:

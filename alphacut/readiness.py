@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -26,10 +27,12 @@ class Readiness:
     Args:
         warnings: Remarks.
         rough: A step or tolerance that is coarse beside the motion: refused where it is meant strictly.
+        period: First natural period at the modal values, in s; None where no linear structure vibrates.
     """
 
     warnings: tuple[str, ...] = ()
     rough: tuple[Problem, ...] = ()
+    period: float | None = None
 
 
 def ready(case: Case) -> Readiness:
@@ -51,7 +54,14 @@ def ready(case: Case) -> Readiness:
     if problems := list(crisp_names(case, wanted)):
         raise BadInput(problems)
     found = dict.fromkeys(problem for study in studies(case) for problem in rough(wanted, study.task))
-    return Readiness(tuple(outlasted(case)), tuple(found))
+    return Readiness(tuple(outlasted(case)), tuple(found), first_period(wanted))
+
+
+def first_period(wanted: Structure) -> float | None:
+    """First natural period of a linear structure, in s: a wrong unit shows there at once."""
+    from frame.linear import frequencies
+
+    return None if wanted.linear is None else 2 * math.pi / float(frequencies(wanted.linear)[0])
 
 
 def lacking(case: Case) -> Iterator[Problem]:

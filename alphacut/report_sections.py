@@ -131,9 +131,12 @@ def envelopes(summary: Mapping[str, Any]) -> str:
             ends = (engineering(study[side][output], output_unit(output)) for side in ("min", "max"))
             error = study.get("error", {}).get(output)
             rows.append((name, output, *ends, "not estimated" if error is None else engineering(error, output_unit(output), digits=2)))
+    if not any(study.get("error") for study in summary["envelopes"].values()):
+        rows = [row[:-1] for row in rows]
     svg = '<svg id="plot" role="img" aria-label="Envelopes over time"></svg><div id="readout"></div>'
     lowest = f"{min(study['alpha'][0] for study in summary['envelopes'].values()):g}"
-    extremes = table(("study", "output", f"least at α = {lowest}", f"greatest at α = {lowest}", "error up to"), rows, numbers=2)
+    head = ("study", "output", f"least at α = {lowest}", f"greatest at α = {lowest}", "error up to")
+    extremes = table(head[: len(rows[0])], rows, numbers=2)
     return section("Envelopes", natural(summary), controls, svg, hint, extremes, peaks(summary))
 
 

@@ -102,8 +102,8 @@ CELL = Section(
 MESH = Section(
     "Discretisation of the product domain.",
     {
-        "layers": Key("element layers in θ", "integer", required=True, allowed=COUNT),
-        "size": Key("element size over half the cell's side", "number", required=True, allowed=UNIT),
+        "layers": Key("element layers in θ", "integer", default=12, allowed=COUNT),
+        "size": Key("element size over half the cell's side", "number", default=0.15, allowed=UNIT),
         "interface": Key(
             "conforming, or sign(z) at quadrature points (eq. 13)", "choice", default="conforming", choices=("conforming", "sign")
         ),
@@ -228,7 +228,7 @@ ENVELOPE = Section(
             required=True,
         ),
         "alpha": Key("α-levels", "numbers", default=ALPHA, allowed=MEMBERSHIP),
-        "method": Key("how the envelope is found", "choice", default="graph-follower", choices=ENVELOPE_METHODS),
+        "method": Key("how the envelope is found", "choice", default="auto", choices=ENVELOPE_METHODS),
         "integrator": Key("time stepping; by the method if left out: exact for modal, else midpoint", "choice", choices=INTEGRATORS),
         "order": Key("order κ of the Taylor models", "integer", default=2, allowed=Range("1 or 2", 1, 2, closed=True)),
         "tolerance": Key(
@@ -275,9 +275,10 @@ SECTIONS: dict[str, Section] = {
 }
 NEEDED = {
     "microstructure": ("microstructure",),
-    "modulus": ("radius", "cell", "mesh"),
+    "modulus": ("radius", "cell"),
     "envelope": ("envelope",),
 }  # sections that a stage cannot do without
+IMPLIED = {"mesh": "cell", "modulus": "cell"}  # sections that hold their defaults where they are left out and the other one is there
 
 
 def dotted(section: str, key: str) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 from alphacut.campaign import campaign
 from alphacut.case import Case
 from alphacut.chain import Results, Study
+from alphacut.output import say
 from alphacut.structure import structure
 from fuzzy import Crisp, FuzzyNumber, Reduced, propagate
 from stochastic.truncated_normal import Array
@@ -48,21 +49,23 @@ def envelope_shares(results: Results, study: Study) -> tuple[Shares, Array]:
     """Shares of a study's fuzzy inputs in the width of every output at the lowest level, (inputs, times, outputs); the times.
 
     Raises:
-        RuntimeError: The modal method cannot treat the structure.
+        ModalError: The modal method cannot treat the structure.
     """
     import frame
     from fuzzy.shares import width_shares
 
     wanted = structure(results.case, results.handed)
-    assert wanted.frame is not None
-    model, inputs = wanted.frame, wanted.inputs(study.task.fuzzy)
+    assert wanted.linear is not None
+    model, inputs = wanted.linear, wanted.inputs(study.task.fuzzy)
+    step = study.task.step if model.ground is None else thinned(study.task.duration, study.task.step)
+    options: dict[str, Any] = {} if model.ground is None else {"tolerance": 1e-2, "relative": True}  # a share needs two digits
     groups = {name: wanted.members(name) for name in study.task.fuzzy}
     times: list[Array] = []
 
     def bounds(fuzzy: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
         left = {name: number for name, number in fuzzy.items() if not isinstance(number, Crisp)}
         level, task = (study.task.alpha[0],), study.task
-        found = frame.envelope(model, left, alpha=level, duration=task.duration, step=task.step, method="modal")
+        found = frame.envelope(model, left, alpha=level, duration=task.duration, step=step, method="modal", **options)
         times.append(found.time)
         return found.lower[0], found.upper[0]
 
@@ -73,6 +76,8 @@ def dataset(results: Results) -> xarray.Dataset:
     """Shares of every input, of the modulus by level and of the richest study by time and output, where there are two inputs or more."""
     import xarray
 
+    from frame.modes import ModalError
+
     variables: dict[str, Any] = {}
     coordinates: dict[str, Any] = {}
     if results.modulus is not None and len(results.modulus["parameter"]) > 1:
@@ -80,18 +85,23 @@ def dataset(results: Results) -> xarray.Dataset:
         variables["modulus_share"] = (("cell_input", "alpha"), cell.share, {"units": "1"})
         coordinates |= {"cell_input": list(cell.names), "alpha": list(results.case.numbers("modulus.alpha"))}
     study = richest(results)
-    if study is not None and len(study.task.fuzzy) > 1 and free_frame(results.case):
-        structure, time = envelope_shares(results, study)
-        variables["share"] = (("input", "time", "output"), structure.share, {"units": "1"})
-        variables["width"] = (("time", "output"), structure.width)
-        names = [str(name) for name in results.envelopes[study.name]["output"].values]
-        coordinates |= {"input": list(structure.names), "time": time, "output": names}
+    if study is not None and len(study.task.fuzzy) > 1 and not results.case.has("pendulum.mass"):
+        try:
+            structure, time = envelope_shares(results, study)
+        except ModalError as error:
+            say(f"no shares of the width over time: {error}")
+        else:
+            variables["share"] = (("input", "time", "output"), structure.share, {"units": "1"})
+            variables["width"] = (("time", "output"), structure.width)
+            names = [str(name) for name in results.envelopes[study.name]["output"].values]
+            coordinates |= {"input": list(structure.names), "time": time, "output": names}
     return xarray.Dataset(variables, coordinates, {"study": study.name if study else ""})
 
 
-def free_frame(case: Case) -> bool:
-    """Whether the structure is a frame in free vibration, which the modal method can treat quickly."""
-    return case.has("frame.masses") and not case.has("frame.accelerogram")
+def thinned(duration: float, step: float) -> float:
+    """A multiple of the step that divides the duration into some hundreds of nodes: enough to see, where the exact propagator steps."""
+    steps = round(duration / step)
+    return step * max(k for k in range(1, max(2, steps // 300)) if steps % k == 0)
 
 
 def richest(results: Results) -> Study | None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from alphacut.case_format import commands, page
-from alphacut.entry import COMMANDS, parsers
+from alphacut.entry import COMMANDS, main, parsers
 from alphacut.options import split_petsc
 
 ROOT = Path(__file__).parent.parent
@@ -43,6 +43,23 @@ def test_python_blocks_run(path, block):
     subprocess.run([sys.executable, "-c", block], check=True, capture_output=True, text=True, cwd=ROOT, timeout=120)
 
 
+@pytest.mark.parametrize(
+    ("path", "block"),
+    [(path, block) for path in PAGES for block in blocks(path, "toml") if block.startswith("schema")],
+    ids=lambda x: getattr(x, "stem", ""),
+)
+def test_whole_cases_run_to_a_report(path, block, tmp_path, capfd):
+    """A case that a page shows in full, in a folder of its own beside `cases`, in its quick form."""
+    (tmp_path / "cases").symlink_to(ROOT / "cases")
+    (tmp_path / "my").mkdir()
+    (tmp_path / "my" / "case.toml").write_text(block, encoding="utf-8")
+    case, out = str(tmp_path / "my" / "case.toml"), str(tmp_path / "results")
+    assert main(["check", case]) == 0, capfd.readouterr().err
+    assert capfd.readouterr().err == ""
+    assert main(["run", case, "--quick", "--no-figures", "--out", out]) == 0, capfd.readouterr().err
+    assert main(["report", out]) == 0
+
+
 def documented():
     """Every call of this program in a console block."""
     for path in PAGES:
@@ -66,6 +83,10 @@ def test_documented_commands_exist(path, package, rest):
 @pytest.mark.parametrize("path", [path for path in PAGES if path.parent.name in ("docs", "howto")], ids=name)
 def test_console_blocks_run(path, tmp_path):
     (tmp_path / "cases").symlink_to(ROOT / "cases")
+    for number, block in enumerate(block for block in blocks(path, "toml") if block.startswith("schema")):
+        (tmp_path / "my").mkdir(exist_ok=True)
+        name_of = re.search(r"my/(\w+\.toml)", path.read_text(encoding="utf-8"))
+        (tmp_path / "my" / (name_of[1] if name_of else f"{number}.toml")).write_text(block, encoding="utf-8")
     for block in blocks(path, "console"):
         lines = [line.replace("./enter ", "") for line in block.splitlines()]
         lines = [line for line in lines if "…" not in line and not re.search(r"run cases/paper|report results/paper$", line)]
