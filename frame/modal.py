@@ -123,7 +123,7 @@ class ModalModel:
             rate = both[:, :n]
             total = both[:, n : 2 * n] * np.exp(rate * self.time[node[rows]][:, None])
             if self.load is not None:
-                total = total + both[:, 2 * n :] * self.load.response(rate, node[rows])[0]
+                total = total + both[:, 2 * n :] * self.load.response_alone(rate, node[rows])
             values[rows] = 2 * total.real.sum(1)
         return values
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, exp, lgamma, log
@@ -76,18 +77,28 @@ class LoadTable:
         """R, dR/dλ and d²R/dλ² at one node per point, each shape (N, n), for eigenvalues (N, n)."""
         powers = self._powers(rate).swapaxes(0, 1)  # (n, N, order)
         total = np.einsum("kpi,pkix->pkx", powers, self._differentiated[node], optimize=True)
-        fade = FADED / max(float(-rate.real.max()), 1e-300)
-        for end in self.starts[1:]:
-            if not (node > end).any():
-                break
-            later = np.flatnonzero((node > end) & (self.time[node] - self.time[end] < fade))
-            if not len(later):
-                continue
-            tau = (self.time[node[later]] - self.time[end])[:, None]
+        for end, later, tau in self._earlier(rate, node):
             s0, s1, s2 = np.moveaxis(powers[:, later] @ self._differentiated[end], -1, 0).swapaxes(1, 2)
             wave = np.exp(rate[later] * tau)
             total[later] += np.stack([wave * s0, wave * (s1 + tau * s0), wave * (s2 + 2 * tau * s1 + tau * tau * s0)], -1)
         return total[..., 0], total[..., 1], total[..., 2]
+
+    def response_alone(self, rate: Array, node: Array) -> Array:
+        """R without its derivatives."""
+        powers = self._powers(rate).swapaxes(0, 1)
+        total: Array = np.einsum("kpi,pki->pk", powers, self.moment[node])
+        for end, later, tau in self._earlier(rate, node):
+            total[later] += np.exp(rate[later] * tau) * np.einsum("kpi,ki->pk", powers[:, later], self.moment[end], optimize=True)
+        return total
+
+    def _earlier(self, rate: Array, node: Array) -> Iterator[tuple[int, Array, Array]]:
+        """Windows that end before some of the nodes: their last node, the points concerned, and the time since, shape (N, 1)."""
+        fade = FADED / max(float(-rate.real.max()), 1e-300)
+        for end in self.starts[1:]:
+            since = self.time[node] - self.time[end]
+            later = np.flatnonzero((since > 0) & (since < fade))
+            if len(later):
+                yield end, later, since[later, None]
 
     @cached_property
     def _differentiated(self) -> Array:
@@ -169,6 +180,13 @@ class LoadTables:
         for table, own in zip(self.tables, self.members, strict=True):
             R[:, own], dR[:, own], ddR[:, own] = table.response(rate[:, own], node)
         return R, dR, ddR
+
+    def response_alone(self, rate: Array, node: Array) -> Array:
+        """As `LoadTable.response_alone`."""
+        R = np.empty_like(rate)
+        for table, own in zip(self.tables, self.members, strict=True):
+            R[:, own] = table.response_alone(rate[:, own], node)
+        return R
 
 
 def _divided(share: Polynomial, scale: Array) -> Polynomial:

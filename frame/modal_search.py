@@ -112,17 +112,18 @@ class ModalSearch:
     def _follow(self, model: ModalModel, found: Optima, nodes: int, lower: Array, upper: Array) -> None:
         """Tries at every node what its neighbours found, near and far, until nothing improves."""
         grid = np.arange(len(found.value)).reshape(nodes, -1)
+        fresh = np.ones(len(found.value), bool)  # changed since it was last tried elsewhere
         for _ in range(8):
-            changed: list[Array] = []
+            changed = np.zeros(len(found.value), bool)
             for shift in (1, 2, 4, 8, 16, 32):
-                if shift >= nodes:
-                    break
                 for here, there in ((grid[shift:], grid[:-shift]), (grid[:-shift], grid[shift:])):
-                    changed.append(found.offer(model, found.point[there.ravel()], here.ravel()))
-            again = np.unique(np.concatenate(changed)) if changed else np.zeros(0, int)
+                    new = fresh[there.ravel()]
+                    changed[found.offer(model, found.point[there.ravel()[new]], here.ravel()[new])] = True
+            again = np.flatnonzero(changed)
             if not len(again):
                 return
             refine(model, found, again, lower, upper, self.iterations)
+            fresh = changed
 
     def _spread(
         self, model: ModalModel, coarse: list[Optima], lower: Array, upper: Array, pool: tuple[Array, Array]
