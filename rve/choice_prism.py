@@ -20,10 +20,17 @@ def refined_prism(radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Pha
         RuntimeError: The finest mesh leaves more.
     """
     from rve.prism import PrismModel
+    from rve.prism_system import FoldedMeshError
 
     size, layers = _COARSEST, 6
     while True:
-        results = PrismModel(mesh_size=size, layers=layers, estimate=True).solve(radius_map, matrix, inclusions)
+        try:
+            results = PrismModel(mesh_size=size, layers=layers, estimate=True).solve(radius_map, matrix, inclusions)
+        except FoldedMeshError:
+            if layers >= _MOST_LAYERS:
+                raise
+            layers = round(layers * _MORE_LAYERS)
+            continue
         worst = max(results, key=lambda r: r.estimated_error)
         if worst.estimated_error <= tolerance:
             return [replace(r, reason="; ".join(filter(None, [f"mesh size {size:.3g}, {layers} layers", r.reason]))) for r in results]

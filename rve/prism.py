@@ -19,7 +19,7 @@ from rve.certificate import CertificateError, Limits, load_checks, require, stif
 from rve.linear_solver import ConvergenceError
 from rve.local_stress import LocalStress, local_stress
 from rve.periodic import mismatch
-from rve.prism_error import estimate
+from rve.prism_error import companion_size, space_error, theta_error, unresolved
 from rve.prism_grid import PrismGrid
 from rve.prism_system import PrismSystem, SliceMeans
 from rve.prism_task import Displacements, PrismTask
@@ -45,7 +45,8 @@ class PrismModel:
         petsc: PETSc options without their prefix `rve_`; they override the solver's own.
         parallel: Whether all MPI ranks work on one cell together; if not each works on its own.
         stiffness: Whether to solve a third load, for the whole planar stiffness.
-        estimate: Whether to estimate the error of E from two coarser companions, for a seventh of the cost.
+        estimate: Whether to estimate the error of E from two companions: for a seventh of the cost where `mesh_size` is at most 0.25, for
+            several times the cost on coarser meshes, which themselves cost little.
 
     Raises:
         ValueError: An option out of range or unknown.
@@ -76,7 +77,7 @@ class PrismModel:
         Raises:
             ConvergenceError: The linear solver that was asked for stopped early; the default gives way to a direct one.
             CertificateError: A property that every right result has is violated.
-            RuntimeError: An element is inverted.
+            FoldedMeshError: The map bends more than the layers can follow.
         """
         watch = Stopwatch()
         system = self._moved(radius_map, watch)
@@ -91,12 +92,21 @@ class PrismModel:
         """The results with the estimated error of E; its own cost is booked as the stage `estimate`."""
         watch = Stopwatch()
         with watch("estimate"):
-            rough = replace(self, mesh_size=min(1.0, 2 * self.mesh_size), estimate=False, stiffness=False, parallel=False)
-            thick = replace(rough, layers=self.layers // 2 or 2)
-            companions = [model.solve(radius_map, matrix, inclusions) for model in (rough, thick)]
-        errors = estimate(radius_map, results, *companions, mesh_size=self.mesh_size)
+            own = replace(self, estimate=False, stiffness=False, parallel=False)
+            other = replace(own, mesh_size=companion_size(self.mesh_size))
+            others = other.solve(radius_map, matrix, inclusions)
+            coarse, of_coarse = (other, others) if other.mesh_size > self.mesh_size else (own, results)
+            thick = replace(coarse, layers=self.layers // 2 or 2).solve(radius_map, matrix, inclusions)
+        errors = zip(results, inclusions, space_error(results, others), theta_error(of_coarse, thick), strict=True)
         seconds = watch.seconds["estimate"] / len(results)
-        return [replace(r, error=e, seconds={**r.seconds, "estimate": seconds}) for r, e in zip(results, errors, strict=True)]
+        return [
+            replace(
+                result,
+                error={"space": space + unresolved(radius_map, result.curve, (matrix, phase), mesh_size=self.mesh_size), "theta": theta},
+                seconds={**result.seconds, "estimate": seconds},
+            )
+            for result, phase, space, theta in errors
+        ]
 
     def local_stress(self, radius_map: RadiusMap, matrix: Phase, inclusion: Phase) -> LocalStress:
         """Spread of the stresses over cell and θ, and the tractions on the interface, for the loads of eq. 15."""

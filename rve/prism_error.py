@@ -1,4 +1,4 @@
-"""Error of a product-space result, estimated from coarser companions: twice the mesh size, half the layers."""
+"""Error of a product-space result, estimated from companions: one of another mesh size, one of half the layers."""
 
 from __future__ import annotations
 
@@ -6,40 +6,45 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rve.cell import Phase
 from rve.result import Homogenised, StressCurve
+from rve.series_stiffness import square_stiffness
+from rve.slices_curve import modulus_error
 from stochastic import RadiusMap
 
 ORDER = 2.0  # taken for E in mesh size and layer height, to be on the safe side; quadratic wedges reach 3 to 4
 SAFETY = 5.0
+_ROUGH = 0.25  # mesh size above which a coarser mesh would tell nothing
 
 
-def estimate(
-    radius_map: RadiusMap, results: Sequence[Homogenised], rough: Sequence[Homogenised], thick: Sequence[Homogenised], *, mesh_size: float
-) -> list[dict[str, float]]:
-    """Relative error of E from space and from θ, for each result.
-
-    Args:
-        radius_map: The map.
-        results: What is to be judged.
-        rough: The same on a mesh of twice the size.
-        thick: The same on that mesh with half the layers.
-        mesh_size: Of the results, in halves of the cell's side.
-    """
-    unseen = 3 * _unresolved(radius_map, results[0].curve, mesh_size)
-    finer = max(1.1, np.sqrt(results[0].unknowns / rough[0].unknowns))  # a coarse mesh cannot always be made twice as coarse
-    thinner = max(1.1, rough[0].unknowns / thick[0].unknowns)
-    return [
-        {"space": _carried(b, a, finer**ORDER) + unseen, "theta": _carried(c, b, thinner**ORDER)}
-        for a, b, c in zip(results, rough, thick, strict=True)
-    ]
+def companion_size(mesh_size: float) -> float:
+    """Mesh size of the companion: twice as coarse, or twice as fine where that would be no mesh to speak of."""
+    return 2 * mesh_size if mesh_size <= _ROUGH else mesh_size / 2
 
 
-def _carried(coarse: Homogenised, fine: Homogenised, gain: float) -> float:
-    """Error of the finer of two results whose errors differ by the factor `gain`, with the safety factor."""
-    return SAFETY * abs(coarse.modulus / fine.modulus - 1) / (gain - 1)
+def space_error(results: Sequence[Homogenised], companions: Sequence[Homogenised]) -> list[float]:
+    """Relative error of E from the mesh, for each result, from companions of another mesh size."""
+    return [_gap(own, other, (own.unknowns / other.unknowns) ** (ORDER / 2)) for own, other in zip(results, companions, strict=True)]
 
 
-def _unresolved(radius_map: RadiusMap, curve: StressCurve, mesh_size: float) -> float:
-    """Mean area fraction of particles so small beside the mesh that no refinement of it tells their error."""
+def theta_error(results: Sequence[Homogenised], thick: Sequence[Homogenised]) -> list[float]:
+    """Relative error of E from the layers, for each result, from companions with half of them on the same mesh."""
+    return [_gap(own, other, (own.unknowns / other.unknowns) ** ORDER) for own, other in zip(results, thick, strict=True)]
+
+
+def _gap(own: Homogenised, other: Homogenised, gain: float) -> float:
+    """Error of `own`, with the safety factor, where that of `other` is `gain` times as large."""
+    return SAFETY * abs(other.modulus / own.modulus - 1) / max(abs(gain - 1), 0.1)
+
+
+def unresolved(radius_map: RadiusMap, curve: StressCurve, phases: tuple[Phase, Phase], *, mesh_size: float) -> float:
+    """Relative change of E, tenfold, by particles so small beside the mesh that no refinement of it tells their error."""
     radius = radius_map(curve.theta)
-    return float(curve.weights @ np.where(radius < mesh_size / 4, np.pi / 4 * radius**2, 0.0))
+    small = radius < mesh_size / 4
+    if not small.any():
+        return 0.0
+    matrix, inclusion = phases
+    cells, bare = square_stiffness(radius[small], matrix, [inclusion], loads=("hydrostatic", "shear")), matrix.stiffness
+    change = np.zeros_like(radius)
+    change[small] = np.maximum(abs(cells.bulk[:, 0] / (bare[0, 0] + bare[0, 1]) - 1), abs(cells.shear[:, 0] / bare[2, 2] - 1))
+    return 10 * modulus_error(curve, change)

@@ -19,6 +19,10 @@ from stochastic import RadiusMap, ThetaRule, layered_rule
 from stochastic.truncated_normal import Array
 
 
+class FoldedMeshError(RuntimeError):
+    """The mesh folds over where it follows a map."""
+
+
 @dataclass(frozen=True)
 class SliceMeans:
     """Means over the slices at the Gauss points of the layers.
@@ -59,12 +63,21 @@ class PrismSystem:
         return seconds
 
     def move(self, radius_map: RadiusMap) -> None:
-        """Move the nodes to the cone of a map and mark the particle at the quadrature points."""
+        """Move the nodes to the cone of a map and mark the particle at the quadrature points.
+
+        Raises:
+            FoldedMeshError: An element is inverted.
+        """
         self.map = radius_map
         self.positions = self.form.place(radius_map)
         self.share = self._share()
         if not self.grid.conforming:
             self.form.mark(self.share)
+        elif not (self.slice_stress.determinants() > 0).all():
+            raise FoldedMeshError(
+                f"the mesh folds over where it follows the radius through {self.grid.layers} layers in θ: "
+                "take more layers or a smaller mesh size"
+            )
 
     def _share(self) -> Array:
         """Share of the particle, shape (cells, 1) on a conforming mesh, else (cells, points) from the sign of z (eq. 13)."""

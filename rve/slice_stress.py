@@ -94,12 +94,26 @@ class SliceStress:
         Returns:
             (ε11, ε22, 2 ε12) for each load, shape (m, q, 3, loads), and determinants, shape (m, q).
         """
-        table = tabulate(points, derivatives=True)[:2].transpose(1, 0, 2)  # (q, 2, 15)
-        jacobian = table @ self.positions[cells, :2].reshape(len(cells), 1, NODES, 2)
-        a, b, c, d = (jacobian[..., i, j] for i in (0, 1) for j in (0, 1))
+        table = _planar_derivatives(points)
+        a, b, c, d = self._jacobian(cells, table)
         determinant = a * d - b * c
         inverse = np.stack([d, -b, -c, a], axis=-1).reshape(*a.shape, 2, 2) / determinant[..., None, None]
         values = displacement[cells].reshape(len(cells), 1, NODES, -1)
         gradient = (inverse @ table @ values).reshape(*a.shape, 2, 2, -1)  # (m, q, ∂, component, load)
         shear = gradient[..., 0, 1, :] + gradient[..., 1, 0, :]
         return np.stack([gradient[..., 0, 0, :], gradient[..., 1, 1, :], shear], axis=-2), determinant
+
+    def determinants(self) -> Array:
+        """Planar Jacobian's determinant at all quadrature points, shape (cells, q); negative where the mesh folds over."""
+        a, b, c, d = self._jacobian(self.grid.cells, _planar_derivatives(self.points))
+        return np.asarray(a * d - b * c)
+
+    def _jacobian(self, cells: Integers, table: Array) -> tuple[Array, Array, Array, Array]:
+        """∂x1/∂ξ, ∂x2/∂ξ, ∂x1/∂η and ∂x2/∂η, each of shape (m, q)."""
+        jacobian = table @ self.positions[cells, :2].reshape(len(cells), 1, NODES, 2)
+        return jacobian[..., 0, 0], jacobian[..., 0, 1], jacobian[..., 1, 0], jacobian[..., 1, 1]
+
+
+def _planar_derivatives(points: Array) -> Array:
+    """Derivatives of the shape functions in the plane at points (q, 3), shape (q, 2, 15)."""
+    return np.asarray(tabulate(points, derivatives=True)[:2].transpose(1, 0, 2))

@@ -130,7 +130,9 @@ def test_a_misspelt_petsc_option_is_not_passed_over():
         solve(mesh_size=0.3, layers=4, petsc={"ksp_tipe": "cg"})
 
 
-@pytest.mark.parametrize("options", [{"mesh_size": 0.4}, {"layers": 1}, {"layers": 2}, {"mesh_size": 0.2, "layers": 5}])
+@pytest.mark.parametrize(
+    "options", [{"mesh_size": 1.0, "layers": 4}, {"mesh_size": 0.4}, {"layers": 1}, {"layers": 2}, {"mesh_size": 0.2, "layers": 5}]
+)
 @pytest.mark.parametrize(
     ("radius_map", "particle"),
     [
@@ -153,3 +155,20 @@ def test_the_declared_error_covers_the_true_one(options, radius_map, particle):
 def test_a_mesh_follows_a_particle_from_a_speck_to_nearly_touching():
     coarse, fine = (solve(HermiteMap(0.01, 0, 0.98, 0), mesh_size=h).modulus for h in (0.15, 0.08))
     assert 0 < coarse / fine - 1 < 2e-4
+
+
+def test_the_declared_error_covers_particles_that_the_mesh_cannot_see():
+    """A hole of a thousandth in a matrix of ν near −1 counts a hundred times its area."""
+    from rve.series import SeriesModel
+
+    speck, matrix, hole = HermiteMap(1e-3, 0, 3e-3, 0), Phase(20e9, -0.9), Phase(20e3, 0.45)
+    exact = SeriesModel().solve(speck, matrix, [hole])[0].modulus
+    result = PrismModel(mesh_size=0.25, layers=6, estimate=True).solve(speck, matrix, [hole])[0]
+    assert abs(result.modulus / exact - 1) <= result.estimated_error
+
+
+def test_a_mesh_that_folds_over_is_refused_with_its_cure():
+    bent = HermiteMap(0.235, 0.0138, 0.1165, 0.932)  # down to 0.004 and up again at the end
+    with pytest.raises(RuntimeError, match="the mesh folds over where it follows the radius through 2 layers in θ: take more layers"):
+        solve(bent, mesh_size=0.4, layers=2)
+    assert solve(bent, mesh_size=0.4, layers=8).modulus > 20e9
