@@ -11,12 +11,12 @@ from alphacut import envelope, outcomes, quantity
 from alphacut.case import Case
 from alphacut.loading import load
 from alphacut.modulus import read_number, stand_in
-from alphacut.options import add_common, add_keys, changes
+from alphacut.options import add_common, add_keys, add_workers, changes, check_workers
 from alphacut.output import as_json, write_text
 from alphacut.problem import BadInput, Problem
 from alphacut.progress import progress
 from alphacut.provenance import fingerprint
-from alphacut.schema import ENVELOPE_METHODS
+from alphacut.reading import nearest
 from alphacut.units import engineering
 from fuzzy import FuzzyNumber
 
@@ -35,6 +35,7 @@ KEYS = {
     "--tolerance": "envelope.tolerance",
     "--relative-tolerance": "envelope.relative_tolerance",
 }
+OF_AUTO = ("modal", "improved-graph-follower")
 BARE = {"--duration": "s", "--step": "s", "--tolerance": "m"}  # options that may leave the unit out
 
 
@@ -46,7 +47,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--modulus", metavar="QUANTITY|FILE.nc", help="Young's modulus: '[22, 24, 26] GPa' or the α-cuts of a file (default: the case's)"
     )
     parser.add_argument("--exclude", metavar="NAMES", default="", help="methods that method auto must not take, separated by commas")
-    parser.add_argument("--certify", metavar="EPS", help="enclose the bounds and prove them to within EPS metres (method modal)")
+    parser.add_argument(
+        "--certify",
+        metavar="EPS",
+        help="enclose the bounds and prove them to within EPS metres; takes the method modal unless one is named",
+    )
+    add_workers(parser, "the proof of a certificate")
     parser.add_argument("--strict", action="store_true", help="refuse a time step or tolerance too coarse for the motion")
     parser.add_argument("--out", metavar="FILE.nc", help="write envelopes and where they are reached as NetCDF")
 
@@ -54,11 +60,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Compute and report."""
     add_units(options)
+    check_workers(options.workers)
     case = load(options.case, changes(options, KEYS), without=replaced(options))
     handed = given_modulus(options.modulus) or stand_in(case)
     task = replace(envelope.task_of(case), exclude=excluded(options.exclude), certify=wanted_gap(options.certify))
+    contradictions(options, case, task)
+    if options.certify is not None and options.method is None:
+        task = replace(task, method="modal")
     with progress("Envelopes", quiet=options.quiet) as tick:
-        found = envelope.compute(case, task, modulus=handed, strict=options.strict, progress=tick)
+        found = envelope.compute(case, task, modulus=handed, strict=options.strict, workers=options.workers, progress=tick)
     if options.out:
         key = fingerprint({"case": case.values, "task": task, "modulus": handed}, ("fuzzy", "frame"))
         envelope.write(outcomes.with_peaks(found), options.out, case_text=case.text_of_file, key=key)
@@ -110,12 +120,26 @@ def wanted_gap(text: str | None) -> float | None:
     return gap
 
 
+def contradictions(options: argparse.Namespace, case: Case, task: envelope.EnvelopeTask) -> None:
+    """Refuse options that have no meaning together.
+
+    Raises:
+        BadInput: A modulus for a structure that takes none, or methods left out where none is chosen.
+    """
+    if options.modulus is not None and not case.has("frame.masses"):
+        raise BadInput(Problem("--modulus", "this structure takes no modulus", options.modulus, "with a storey frame"))
+    if task.exclude and task.method != "auto":
+        raise BadInput(Problem("--exclude", f"the method is {task.method}", options.exclude, "with --method auto"))
+
+
 def excluded(text: str) -> tuple[str, ...]:
     """Names of methods, separated by commas."""
     names = tuple(name.strip() for name in text.split(",") if name.strip())
     for name in names:
-        if name not in ENVELOPE_METHODS:
-            raise BadInput(Problem("--exclude", f"there is no method {name}", text, ", ".join(ENVELOPE_METHODS)))
+        if name not in OF_AUTO:
+            raise BadInput(Problem("--exclude", f"{name} is no method that auto takes", text, " or ".join(OF_AUTO), nearest(name, OF_AUTO)))
+    if set(names) == set(OF_AUTO):
+        raise BadInput(Problem("--exclude", "no method is left for auto to take", text, " or ".join(OF_AUTO)))
     return names
 
 
@@ -144,4 +168,14 @@ def summary(found: Envelope) -> str:
     rows = [(name, *(engineering(float(value), output_unit(name)) for value in values)) for name, *values in ends]
     lines = [f"{name:>14}  {low:>12}  {high:>12}   {least} … {most}\n" for name, low, high, least, most in rows]
     cost = f"{found.trajectories} {'eigen-analyses' if found.method == 'modal' else 'trajectories'}, {found.seconds:.1f} s, {found.nature}"
-    return f"        output           min           max   peak   (α = {found.alpha[0]:g})\n{''.join(lines)}{cost}\n"
+    return f"        output           min           max   peak   (α = {found.alpha[0]:g})\n{''.join(lines)}{cost}\n{proved(found)}"
+
+
+def proved(found: Envelope) -> str:
+    """What a certificate says, as a line; empty without one."""
+    from frame.envelope import output_unit
+
+    if "gap" not in found.facts:
+        return ""
+    gap = engineering(float(found.facts["gap"]), output_unit(found.outputs[0]))
+    return f"every node's bounds enclosed to within {gap} of {found.outputs[0]}; {found.facts['proof']}\n"

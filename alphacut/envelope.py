@@ -76,7 +76,13 @@ def task_of(case: Case, *, fuzzy: Sequence[str] | None = None, duration: float |
 
 
 def compute(
-    case: Case, task: EnvelopeTask, *, modulus: FuzzyNumber | None = None, strict: bool = False, progress: Tick | None = None
+    case: Case,
+    task: EnvelopeTask,
+    *,
+    modulus: FuzzyNumber | None = None,
+    strict: bool = False,
+    workers: int = 1,
+    progress: Tick | None = None,
 ) -> Envelope:
     """The envelope of all outputs on all levels.
 
@@ -85,6 +91,7 @@ def compute(
         task: What is wanted.
         modulus: Handed on from the stage before, in Pa.
         strict: Refuse a step or tolerance that is coarse beside the motion instead of warning.
+        workers: Processes that share the proof, where a certificate is wanted.
         progress: Told the share done.
     """
     import frame
@@ -104,6 +111,7 @@ def compute(
             relative=task.relative and task.certify is None,
             progress=progress,
             **method_options(task),
+            **({"workers": workers} if task.certify is not None else {}),
         )
     except ValueError as error:
         raise BadInput(Problem("envelope", str(error))) from None
@@ -124,7 +132,7 @@ def method_options(task: EnvelopeTask) -> dict[str, Any]:
     offered = {"order": task.order, "tolerance": task.tolerance, "exclude": task.exclude}
     if task.certify is not None:
         if task.method != "modal":
-            raise BadInput(Problem("--certify", "this method cannot certify", task.method, "--method modal, for linear frames"))
+            raise BadInput(Problem("--certify", f"method {task.method} cannot certify", allowed="--method modal, for linear structures"))
         return {"tolerance": task.tolerance, "certify": task.certify}
     return {name: value for name, value in offered.items() if name in taken}
 

@@ -108,9 +108,9 @@ def add_keys(parser: argparse.ArgumentParser, keys: dict[str, str]) -> None:
         parser.add_argument(option, metavar=metavar, help=f"{entry.about}{choices}{example} (default: {key} of the case)")
 
 
-def add_workers(parser: argparse.ArgumentParser) -> None:
+def add_workers(parser: argparse.ArgumentParser, what: str = "the samples") -> None:
     """``--workers``."""
-    parser.add_argument("--workers", metavar="N", type=int, default=1, help="processes that share the samples (default 1)")
+    parser.add_argument("--workers", metavar="N", type=int, default=1, help=f"processes that share {what} (default 1)")
 
 
 def changes(options: argparse.Namespace, keys: dict[str, str]) -> list[str]:

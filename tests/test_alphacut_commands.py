@@ -95,6 +95,10 @@ def test_every_offered_method_runs_and_gets_the_tolerance(method, capfd):
 def test_a_certificate_encloses_the_bounds(capfd):
     found = answer(["envelope", PAPER, "--method", "modal", "--fuzzy", "E", "--duration", "0.5", "--certify", "1e-5"], capfd)
     assert found["nature"] in ("guaranteed", "verified by sampling")
+    assert main(["envelope", PAPER, "--fuzzy", "E", "--duration", "0.5", "--certify", "1e-5", "--workers", "2", "--alpha", "0"]) == 0
+    told = capfd.readouterr().out
+    assert "eigen-analyses" in told
+    assert "enclosed to within 10.00 µm of q1" in told
     assert main(["envelope", PAPER, "--method", "vertex", "--certify", "1e-5"]) == 2
     assert "cannot certify" in capfd.readouterr().err
 
