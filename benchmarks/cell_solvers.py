@@ -99,7 +99,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results" / "cell_solvers.csv", help="CSV file to write")
     parser.add_argument("--solvers", default="mumps,gamg", help="what to set beside the default, separated by commas (default mumps,gamg)")
-    parser.add_argument("--cap", type=float, default=300, help="seconds after which a solver is stopped (default 300)")
+    parser.add_argument("--cap", type=float, default=120, help="seconds after which a solver is stopped (default 120)")
     options = parser.parse_args(arguments)
     timings = [measure("theta", mesh_size=options.mesh_size, repeat=4)]
     for name in options.solvers.split(","):
