@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from alphacut.destination import hint
 from alphacut.problem import BadInput, Problem
 from alphacut.units import factor
 
@@ -45,8 +46,12 @@ def table(path: Path, key: str) -> list[tuple[int, list[str]]]:
     """Line and entries of every row that is neither empty nor a comment; at least a header and two more."""
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadInput(Problem(key, f"the record cannot be read: {error}", str(path))) from None
+    except UnicodeDecodeError:
+        raise BadInput(Problem(key, "the record is not text in UTF-8", str(path), ALLOWED)) from None
+    except OSError as error:
+        raise BadInput(
+            Problem(key, f"the record cannot be read: {(error.strerror or str(error)).lower()}", str(path), hint(path))
+        ) from None
     kept = [(number, line) for number, line in enumerate(lines, start=1) if line.strip() and not line.startswith("#")]
     if len(kept) < 3:
         raise BadInput(Problem(key, "the record needs a header and two rows or more", str(path), ALLOWED))

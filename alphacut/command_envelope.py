@@ -17,6 +17,7 @@ from alphacut.problem import BadInput, Problem
 from alphacut.progress import progress
 from alphacut.provenance import fingerprint
 from alphacut.reading import nearest
+from alphacut.schema import ENVELOPE_METHODS
 from alphacut.units import engineering
 from fuzzy import FuzzyNumber
 
@@ -136,8 +137,10 @@ def excluded(text: str) -> tuple[str, ...]:
     """Names of methods, separated by commas."""
     names = tuple(name.strip() for name in text.split(",") if name.strip())
     for name in names:
+        if name not in ENVELOPE_METHODS:
+            raise BadInput(Problem("--exclude", f"there is no method {name}", text, " or ".join(OF_AUTO), nearest(name, OF_AUTO)))
         if name not in OF_AUTO:
-            raise BadInput(Problem("--exclude", f"{name} is no method that auto takes", text, " or ".join(OF_AUTO), nearest(name, OF_AUTO)))
+            raise BadInput(Problem("--exclude", f"'{name}' is unknown to auto, which takes other methods", text, " or ".join(OF_AUTO)))
     if set(names) == set(OF_AUTO):
         raise BadInput(Problem("--exclude", "no method is left for auto to take", text, " or ".join(OF_AUTO)))
     return names

@@ -13,9 +13,10 @@ from alphacut.destination import hint
 from alphacut.frame_names import OTHERS, OUTPUTS, floors, named_inputs, study_count
 from alphacut.problem import BadInput, Problem
 from alphacut.reading import nearest
-from alphacut.schema import NEEDED, STAGES
+from alphacut.schema import ENVELOPE_METHODS, INTEGRATORS, NEEDED, NONLINEAR, STAGES
 from stochastic import HermiteMap, TruncatedNormal
 
+MOST_STEPS = 1_000_000  # more would not fit into memory, and no figure could show them
 SLOPES = ("a1", "a2", "a3", "a4")
 FILES = (
     "microstructure.circles.file",
@@ -39,6 +40,8 @@ def inconsistencies(case: Case, *, modal: bool = False) -> Iterator[Problem]:
         yield from radius(case, 1.0 if modal else 0.0)
     if case.has("response.quantity"):
         yield from stress_curves(case)
+    if len(stand_ins(case)) > 1:
+        yield Problem(stand_ins(case)[1], "more than one modulus is given", ", ".join(stand_ins(case)), "one of them")
     for section in ("modulus", "envelope"):
         if case.has(f"{section}.alpha"):
             yield from levels(case, f"{section}.alpha")
@@ -56,6 +59,8 @@ def inconsistencies(case: Case, *, modal: bool = False) -> Iterator[Problem]:
         yield Problem("envelope.relative_tolerance", "there is a tolerance besides", allowed="one of tolerance and relative_tolerance")
     if case.has("pendulum.mass") and "envelope.tolerance" in case.written:
         yield Problem("envelope.tolerance", "a pendulum's output is a force", allowed="pendulum.tolerance, or envelope.relative_tolerance")
+    if case.has("envelope.method"):
+        yield from methods(case)
     if case.has("exceedance.output"):
         yield from exceedance(case)
 
@@ -87,7 +92,12 @@ def stress_curves(case: Case) -> Iterator[Problem]:
 
 def replaced(case: Case) -> bool:
     """Whether something stands in for the computed modulus."""
-    return any(case.has(f"modulus.{key}") for key in ("value", "file", "measured"))
+    return bool(stand_ins(case))
+
+
+def stand_ins(case: Case) -> list[str]:
+    """Keys of what stands in for the computed modulus."""
+    return [key for name in ("value", "file", "measured") if case.has(key := f"modulus.{name}")]
 
 
 def missing_sections(case: Case) -> Iterator[Problem]:
@@ -171,6 +181,17 @@ def levels(case: Case, key: str) -> Iterator[Problem]:
         yield Problem(key, "the α-levels are not in rising order", str(list(alpha)), "for example [0, 0.25, 0.5, 0.75, 1]")
 
 
+def methods(case: Case) -> Iterator[Problem]:
+    """A method and a time stepping that the structure's kind has."""
+    if case.has("pendulum.mass") and case.text("envelope.method") == "modal":
+        yield Problem("envelope.method", "a pendulum has no modes", "modal", ", ".join(x for x in ENVELOPE_METHODS if x != "modal"))
+    if case.has("envelope.integrator"):
+        known = NONLINEAR if case.has("pendulum.mass") else tuple(x for x in INTEGRATORS if x != "composition4")
+        if (scheme := case.text("envelope.integrator")) not in known:
+            what = "this is for linear structures" if case.has("pendulum.mass") else "this is for a pendulum"
+            yield Problem("envelope.integrator", what, scheme, ", ".join(known))
+
+
 def exceedance(case: Case) -> Iterator[Problem]:
     """A limit is for an output of the structure in vibration, and in its unit."""
     from alphacut.outcomes import limit_of
@@ -194,6 +215,10 @@ def times(case: Case) -> Iterator[Problem]:
         if not case.has(key):
             continue
         duration = case.number(key)
+        if duration / step > MOST_STEPS:
+            what = f"{duration:g} s are {duration / step:.3g} steps of {step:g} s"
+            yield Problem(key, what, str(case.written.get(key, "")), f"at most {MOST_STEPS:,} steps; lengthen envelope.step")
+            continue
         if round(duration / step) < 1 or abs(round(duration / step) * step - duration) > 1e-9 * duration:
             what = f"{duration:g} s is not a whole number of steps of {step:g} s"
             yield Problem(key, what, str(case.written.get(key, "")), "a multiple of envelope.step")

@@ -26,7 +26,9 @@ def check_destinations(parser: argparse.ArgumentParser, options: argparse.Namesp
     problems: list[Problem] = []
     for action in parser._actions:
         given = getattr(options, action.dest, None)
-        if action.dest in OUTPUTS and isinstance(given, str) and given != "-":
+        if action.dest in OUTPUTS and given == "":
+            problems.append(Problem(action.option_strings[-1], "the name is empty", allowed=f"a {str(action.metavar).lower()}"))
+        elif action.dest in OUTPUTS and isinstance(given, str) and given != "-":
             option, kind = action.option_strings[-1], str(action.metavar)
             place = list(unwritable(option, Path(given), folder=kind == "FOLDER"))
             problems += place or unknown_ending(option, kind, given, mesh=parser.prog.endswith(" mesh"))

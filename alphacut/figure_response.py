@@ -42,10 +42,12 @@ def boxes(axes: Axes, found: xarray.Dataset) -> None:
     if "exceedance" in found:
         limit = found["exceedance"].attrs["limit"] / GPA
         axes.axvline(limit, color=ORANGE, lw=1.2, ls="--")
-        axes.annotate(f"limit {limit:g} GPa", (limit, 0.02), xytext=(4, 0), textcoords="offset points", color=ORANGE, fontsize=8)
+        axes.annotate(
+            f"limit {limit:g} GPa", (limit, 0.02), xytext=(4, 0), textcoords="offset points", color=ORANGE, fontsize=8, clip_on=False
+        )
     axes.set_ylabel("distribution function")
     axes.set_ylim(0, 1)
-    alpha_legend(axes, alpha, loc="upper left")
+    alpha_legend(axes, alpha, loc="lower right", bbox_to_anchor=(1.0, 0.12))
 
 
 def quantiles(axes: Axes, found: xarray.Dataset) -> None:

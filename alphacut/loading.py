@@ -6,20 +6,16 @@ import re
 import tomllib
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from alphacut.case import Case
+from alphacut.changes import Raw, apply_change, table_of
 from alphacut.consistency import inconsistencies
 from alphacut.destination import hint
 from alphacut.key import Key, Section
 from alphacut.position import key_at, lines_of_keys
 from alphacut.problem import BadInput, Problem
-from alphacut.quantity import NUMBER
 from alphacut.reading import Unfit, allowed, nearest, read
 from alphacut.schema import IMPLIED, SECTIONS, dotted, every_key
-
-Raw = dict[str, Any]
-ARRAYS = ("fuzzy list", "numbers", "choices")  # kinds of keys that hold arrays
 
 
 def load(path: Path | str, changes: Sequence[str] = (), *, modal: bool = False, without: Sequence[str] = ()) -> Case:
@@ -87,7 +83,9 @@ def parsed(path: Path, text: str) -> Raw:
 
 def cure(line: str) -> str:
     """What to write instead of a broken line, where that is plain; else empty."""
-    value = line.partition("=")[2].partition("#")[0].strip()
+    name, _, value = (part.strip() for part in line.partition("#")[0].partition("="))
+    if re.fullmatch(r"[\w\-]+", name) and not name.isascii():
+        return "keys of plain letters, digits and _"
     if match := re.fullmatch(r"([-+]?\d+),(\d+)(.*)", value):
         return f"{match[1]}.{match[2]}{match[3]}, with a point"
     unquoted = re.fullmatch(r"(\[[^\]\"']*\]|[-+]?[\d.,]+)\s*[A-Za-z%µ][^\"']*", value)
@@ -98,53 +96,10 @@ def broken_key(text: str, line: int) -> str:
     """The key on a broken line: what stands before the = or, without one, the first word; else the key the line belongs to."""
     key, at = key_at(text, line)
     broken = text.splitlines()[line - 1] if text else ""
+    if section := re.match(r"\s*\[+\s*([\w.\-]+)\s*\]+", broken):
+        return section[1]
     word = re.match(r"\s*([A-Za-z_][\w\-]*)\s*$", broken)
     return word[1] if word and at != line else key
-
-
-def apply_change(raw: Raw, change: str) -> str:
-    """Put one ``KEY=VALUE`` into the tree; returns the key's full name."""
-    name, equals, value = change.partition("=")
-    name = name.strip().replace("-", "_")
-    known = every_key()
-    full = [name] if name in known else [key for key in known if key.rpartition(".")[2] == name]
-    if not equals:
-        raise BadInput(Problem("--set", "there is no = in it", change, "KEY=VALUE, for example cell.matrix_modulus='20 GPa'"))
-    if not full:
-        raise BadInput(Problem("--set", f"there is no key {name}", change, "any key of the case", nearest(name, known)))
-    present = [key for key in full if key.rpartition(".")[2] in (table_of(raw, key.rpartition(".")[0]) or {})] if len(full) > 1 else full
-    if len(present) != 1 or present[0].startswith("study."):
-        raise BadInput(Problem("--set", f"the key {name} is not clear", change, "one of " + ", ".join(full)))
-    section, _, key = present[0].rpartition(".")
-    table = table_of(raw, section, make=True)
-    if table is not None:
-        table[key] = toml_or_text(value.strip(), known[present[0]])
-    return present[0]
-
-
-def table_of(raw: Raw, section: str, *, make: bool = False) -> Raw | None:
-    """The table of a section, ``microstructure.packing`` for one inside another; None where there is none."""
-    table: Any = raw
-    for name in section.split(".") if section else ():
-        if name not in table and make:
-            table[name] = {}
-        table = table.get(name)
-        if not isinstance(table, dict):
-            return None
-    return table  # type: ignore[no-any-return]
-
-
-def toml_or_text(value: str, key: Key) -> object:
-    """A value from a command line: TOML where it is TOML, else text; where an array is wanted, ``E,m`` is one."""
-    try:
-        found = tomllib.loads(f"x = {value}")["x"]
-    except tomllib.TOMLDecodeError:
-        found = float(value) if re.fullmatch(r"[+-]?(\d+\.|\.\d+)([eE][+-]?\d+)?", value) else value  # .3 and 3. are no TOML
-    if key.kind in ARRAYS and not isinstance(found, list):
-        items = [item.strip() for item in value.strip("[] ").split(",") if item.strip()]
-        plain = key.kind == "numbers" and not key.unit
-        return [float(item) if plain and re.fullmatch(NUMBER, item) else item for item in items]
-    return str(found) if key.kind == "text" else found
 
 
 def checked(raw: Raw, values: dict[str, object], written: dict[str, object]) -> Iterator[Problem]:

@@ -6,6 +6,7 @@ import math
 import re
 from pathlib import Path
 
+from alphacut.destination import hint
 from alphacut.problem import BadInput, Problem
 from alphacut.units import factor
 from fuzzy import FuzzyNumber
@@ -23,8 +24,10 @@ def measured_modulus(path: Path, key: str = "modulus.measured") -> FuzzyNumber:
 
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadInput(Problem(key, f"the file cannot be read: {error}", str(path))) from None
+    except UnicodeDecodeError:
+        raise BadInput(Problem(key, "the file is not text in UTF-8", str(path), HEADER)) from None
+    except OSError as error:
+        raise BadInput(Problem(key, f"the file cannot be read: {(error.strerror or str(error)).lower()}", str(path), hint(path))) from None
     rows = [(number, line.strip()) for number, line in enumerate(lines, start=1) if line.strip() and not line.startswith("#")]
     if len(rows) < 2:
         raise BadInput(Problem(key, "the file needs a header and one value or more", str(path), HEADER))

@@ -5,6 +5,7 @@ One number is crisp, two are an interval, three a triangle (lower, modal, upper)
 
 from __future__ import annotations
 
+import math
 import re
 from decimal import Decimal
 
@@ -78,6 +79,8 @@ def numbers(value: object, si: str) -> tuple[float, ...]:
         found = spread(match, si)
     else:
         found = (one(text, si),)
+    if not all(math.isfinite(float(x)) for x in found):
+        raise ValueError("the number is too large")
     return tuple(float(x) for x in found)
 
 

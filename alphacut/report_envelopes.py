@@ -1,0 +1,71 @@
+"""The report's section on envelopes: the interactive plot, extremes, peaks."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from alphacut import outcomes
+from alphacut.report_table import section, table
+from alphacut.units import engineering
+
+
+def envelopes(summary: Mapping[str, Any]) -> str:
+    """The interactive plot and the extremes."""
+    controls = (
+        '<div class="controls"><label>study <select id="study"></select></label><label>output <select id="output"></select></label>'
+        '<label>α <input type="range" id="alpha" min="0" max="1" step="0.01" value="0.5"><output id="alpha-shown">0.50</output></label>'
+        '<button type="button" id="reset">whole range</button></div>'
+    )
+    hint = (
+        '<p class="hint">The shaded bands are the computed α-cuts, the darker the higher α; the orange line is the cut at the slider\'s α, '
+        "between computed levels by linear interpolation. Drag or turn the wheel to zoom, double click to see everything.</p>"
+    )
+    from frame.envelope import output_unit
+
+    rows: list[tuple[str, ...]] = []
+    for name, study in summary["envelopes"].items():
+        for output in study["min"]:
+            ends = (engineering(study[side][output], output_unit(output)) for side in ("min", "max"))
+            error = study.get("error", {}).get(output)
+            rows.append((name, output, *ends, "not estimated" if error is None else engineering(error, output_unit(output), digits=2)))
+    if not any(study.get("error") for study in summary["envelopes"].values()):
+        rows = [row[:-1] for row in rows]
+    svg = '<svg id="plot" role="img" aria-label="Envelopes over time"></svg><div id="readout"></div>'
+    lowest = f"{min(study['alpha'][0] for study in summary['envelopes'].values()):g}"
+    head = ("study", "output", f"least at α = {lowest}", f"greatest at α = {lowest}", "error up to")
+    extremes = table(head[: len(rows[0])], rows, numbers=2)
+    return section("Envelopes", natural(summary), controls, svg, hint, extremes, peaks(summary))
+
+
+def natural(summary: Mapping[str, Any]) -> str:
+    """The first natural periods, where the structure is linear."""
+    omega = summary.get("structure", {}).get("omega_rad_per_s")
+    if not omega:
+        return ""
+    periods = ", ".join(f"{2 * math.pi / w:.3g}" for w in omega[:4])
+    return f"<p>First natural periods at the modal values: {periods} s.</p>"
+
+
+def peaks(summary: Mapping[str, Any]) -> str:
+    """Fuzzy peaks of every study, and the fuzzy probability of exceeding the case's limit."""
+    from frame.envelope import output_unit
+
+    rows = []
+    for name, study in summary["envelopes"].items():
+        for output, of in study.get("peak", {}).items():
+            unit = output_unit(output)
+            rows.append((name, output, *(between(of["lower"][level], of["upper"][level], unit) for level in (0, -1))))
+    words = (
+        "<p>Fuzzy peak of each output's magnitude over time, on the lowest and the highest level; the lower end is a bound from below.</p>"
+    )
+    limit = f"<p>{html.escape(outcomes.sentence(summary['exceedance']))}</p>" if "exceedance" in summary else ""
+    return "<h3>Peaks</h3>" + words + table(("study", "output", "lowest α", "highest α"), rows, numbers=2) + limit if rows else limit
+
+
+def between(lower: float, upper: float, unit: str) -> str:
+    """An interval, or the one value where both ends are shown alike."""
+    ends = dict.fromkeys((engineering(lower, unit), engineering(upper, unit)))
+    return " … ".join(ends)
