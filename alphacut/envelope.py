@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -162,8 +162,3 @@ def write(dataset: xarray.Dataset, path: Path | str, *, case_text: str, key: str
     """Write an envelope as NetCDF, whole or not at all."""
     with whole_file(path) as partial:
         dataset.assign_attrs(attributes(case_text, key)).to_netcdf(partial)
-
-
-def with_fuzzy(task: EnvelopeTask, names: str) -> EnvelopeTask:
-    """The task with the fuzzy inputs of ``--fuzzy E,m``."""
-    return replace(task, fuzzy=tuple(name.strip() for name in names.split(",") if name.strip()))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.case import Case
-from alphacut.cell import GPA, key_of
+from alphacut.cell import GPA
 from alphacut.figure_style import BLUE, INK, ORANGE, alpha_legend, colours, figure, membership_axes, shaded_cuts
 from stochastic.truncated_normal import Array
 
@@ -74,8 +74,3 @@ def fuzzy_modulus(dataset: xarray.Dataset, case: Case) -> Figure:
     axes.legend(loc="upper left")
     membership_axes(axes, "effective Young's modulus E (eq. 16), GPa")
     return drawn
-
-
-def input_names(dataset: xarray.Dataset) -> list[str]:
-    """Full case keys of the campaign's fuzzy inputs."""
-    return [key_of(str(name)) for name in dataset["parameter"].values]
