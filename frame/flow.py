@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import isqrt
@@ -190,9 +189,3 @@ def _convolution(impulse: Jet, size: int) -> Jet:
         return toeplitz
 
     return impulse.map(spread)
-
-
-def single(flow: Flow, point: Sequence[float]) -> Array:
-    """One trajectory, shape (T, outputs)."""
-    alone: Array = flow.values(np.asarray(point, float)[None])[0]
-    return alone

@@ -116,12 +116,6 @@ class Polynomial:
         first = np.stack([_product(B[:, :lower], self.slope[i, :lower]) for i in range(d)])
         return Jet(_product(B, self.coefficients), first, second)
 
-    def largest(self, order: int) -> Array:
-        """Bounds of |derivative| over the unit box by sums of magnitudes, order 0 to 2, shape (d,) * order + (K,)."""
-        source = (self.coefficients, self.slope, self.curve)[order]
-        total: Array = np.abs(source).sum(-2)
-        return total
-
 
 def fit(u: Array, data: Jet, degree: int) -> Polynomial:
     """Least-squares fit to values and first and second derivatives, V = (S, K), at points (S, d) of the unit box."""
