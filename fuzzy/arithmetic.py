@@ -42,13 +42,18 @@ class Expression(FuzzyNumber):
         """The set of values with membership at least `alpha` in [0, 1]."""
         if not 0 <= alpha <= 1:
             raise ValueError(f"the α of a cut is {alpha:g}; it must lie in [0, 1]")
-        return self.at(alpha)
+        cut = self.at(alpha)
+        if not np.isfinite(cut).all():
+            raise ValueError(
+                f"the cut of {self.text} at α = {alpha:g} is {list(cut)}: the numbers are too large, or a function has no value"
+            )
+        return cut
 
     @property
     def cuts(self) -> Cuts:
         """Cuts at 65 levels, between which the membership is drawn straight."""
         levels = tuple(float(level) for level in np.linspace(0, 1, _SAMPLED + 1))
-        ends = [self.at(level) for level in levels]
+        ends = [self.cut(level) for level in levels]
         return Cuts(levels, tuple(end.lower for end in ends), tuple(end.upper for end in ends))
 
 
@@ -103,13 +108,21 @@ def apply(function: Callable[[Array], Array], number: FuzzyNumber, *, falls: boo
         function: Monotone over the support.
         number: The number.
         falls: Whether the function falls.
+
+    Raises:
+        ValueError: The function is seen to turn between 65 points of the support.
     """
+    name = getattr(function, "__name__", "function")
+    seen = np.array([float(function(np.asarray(x))) for x in np.linspace(*number.support, _SAMPLED + 1)])
+    if (np.diff(seen) * (-1 if falls else 1) < -1e-12 * np.abs(seen).max()).any():
+        way = "fall" if falls else "rise"
+        raise ValueError(f"{name} does not {way} throughout {list(number.support)}; give falls={not falls}, or use propagate if it turns")
 
     def at(alpha: float) -> Cut:
         ends = [float(function(np.asarray(end))) for end in number.cut(alpha)]
         return Cut(*(ends[::-1] if falls else ends))
 
-    return Expression(at, f"{getattr(function, '__name__', 'function')}({_text(number)})", _sources(number))
+    return Expression(at, f"{name}({_text(number)})", _sources(number))
 
 
 def _text(number: FuzzyNumber) -> str:

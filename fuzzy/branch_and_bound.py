@@ -105,9 +105,7 @@ class _Search:
     def run(self) -> None:
         """Split the boxes of the lowest bounds until the gap is small enough."""
         count = 1
-        while (
-            self.best - self.proved > self.plan.tolerance * max(self.worst - self.best, abs(self.best) * 1e-9) and count < self.plan.budget
-        ):
+        while self.best - self.proved > self.plan.tolerance * self._scale() and count < self.plan.budget:
             order = np.argsort(self.boxes.bound)
             chosen, rest = order[:_TOGETHER], order[_TOGETHER:]
             children = self._examined(*self._halves(chosen))
@@ -120,6 +118,7 @@ class _Search:
             count += len(children.bound)
 
     def _scale(self) -> float:
+        """Range of the values seen; a share of the least one where there is none."""
         return max(self.worst - self.best, abs(self.best) * 1e-9)
 
     def _halves(self, chosen: Rows) -> tuple[Array, Array]:

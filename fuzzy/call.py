@@ -79,7 +79,7 @@ class Call:
         start = perf_counter()
         try:
             outcomes = self._outcomes(points)
-        except Exception as error:
+        except (Exception, SystemExit) as error:  # a model that ends its program ends its sample only
             if len(points) > 1:
                 return [self(point[None])[0] for point in points]
             outcomes = [Failure(f"{type(error).__name__}: {error}")]

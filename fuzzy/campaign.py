@@ -56,6 +56,7 @@ class Campaign:
         reused: Samples taken from the store so far.
         calls: Calls of the function so far.
         stepwise: Whether the plan itself reports the share done, since it asks for its samples batch by batch.
+        layout: Names and shapes of the outputs, as the first sample had them.
     """
 
     call: Call
@@ -67,6 +68,7 @@ class Campaign:
     reused: int = 0
     calls: int = 0
     stepwise: bool = False
+    layout: Layout = ()
     _before: float = field(default=0.0, repr=False)
     _told: float = field(default=0.0, repr=False)
 
@@ -83,7 +85,7 @@ class Campaign:
         if batch.failures:
             failed = [(named_point(self.call.names, points[row]), batch.failures[row]) for row in sorted(batch.failures)]
             raise CampaignError(failed, len(points))
-        return Values(batch.layout, batch.array)
+        return Values(self.layout, batch.array)
 
     def report(self, share: float, *, last: bool = False) -> None:
         """Tell the share done, which never falls; with `last`, one batch of points is still to come and fills the rest."""
@@ -105,7 +107,6 @@ class _Batch:
     def __init__(self, campaign: Campaign, points: Array) -> None:
         require(len(points), points.shape[1] + 1)
         self.campaign, self.points = campaign, points
-        self.layout: Layout = ()
         self.array: Array = np.empty((len(points), 0))
         self.failures: dict[int, str] = {}
         self._open = np.ones(len(points), bool)
@@ -136,7 +137,7 @@ class _Batch:
         keys = {shelf.key(self.points[row]): row for row in rows}
         mine, stored = shelf.claim(list(keys))
         for key, sample in stored.items():
-            self._keep(keys[key], sample)
+            self._take(keys[key], self._aligned(sample))
             self.campaign.reused += 1
         if stored:
             self._tell()
@@ -146,32 +147,46 @@ class _Batch:
         self.campaign.calls += 1
         self.campaign.runs += len(rows)
         shelf = self.campaign.shelf
-        for row, outcome in zip(rows, outcomes, strict=True):
+        for row, outcome in zip(rows, map(self._aligned, outcomes), strict=True):
             if shelf:
                 shelf.gather(shelf.key(self.points[row]), outcome)
-            if isinstance(outcome, Failure):
-                self.failures[row] = outcome.error
-                self._close(row)
-            else:
-                self._keep(row, outcome)
+            self._take(row, outcome)
         if shelf:
             shelf.write()
         self._tell()
 
-    def _keep(self, row: int, sample: Sample) -> None:
-        if not self.array.shape[1]:
-            self.layout = sample.layout
-            require(len(self.points), self.points.shape[1] + len(sample.row))
-            self.array = np.empty((len(self.points), len(sample.row)))
-        if sample.layout != self.layout:
-            got = f"a sample has the outputs {sample.layout} where others have {self.layout}"
-            raise ValueError(f"{got}; all must have the same names and shapes")
-        self.array[row] = sample.row
-        self._close(row)
+    def _aligned(self, outcome: Outcome) -> Outcome:
+        """The outcome with its outputs in the order of the first sample's; a failure where they are others."""
+        if isinstance(outcome, Sample):
+            self.campaign.layout = self.campaign.layout or outcome.layout
+            return _in_order(outcome, self.campaign.layout)
+        return outcome
 
-    def _close(self, row: int) -> None:
+    def _take(self, row: int, outcome: Outcome) -> None:
+        if isinstance(outcome, Failure):
+            self.failures[row] = outcome.error
+        else:
+            if not self.array.shape[1]:
+                require(len(self.points), self.points.shape[1] + len(outcome.row))
+                self.array = np.empty((len(self.points), len(outcome.row)))
+            self.array[row] = outcome.row
         self._open[row] = False
         self._left -= 1
 
     def _tell(self) -> None:
         self.campaign.report_batch(1 - self._left / len(self.points))
+
+
+def _in_order(sample: Sample, layout: Layout) -> Outcome:
+    """The sample with its outputs in the order of a layout."""
+    if sample.layout == layout:
+        return sample
+    if sorted(sample.layout) != sorted(layout):
+        got = f"a sample has the outputs {_named(sample.layout)} where others have {_named(layout)}"
+        return Failure(f"ValueError: {got}; all must have the same names and shapes", sample.seconds)
+    values = Values(sample.layout, sample.row[None])
+    return sample._replace(layout=layout, row=np.concatenate([values.output(name).ravel() for name, _ in layout]))
+
+
+def _named(layout: Layout) -> str:
+    return ", ".join(f"{name} {list(shape)}" if shape else name for name, shape in layout)

@@ -65,7 +65,7 @@ class Chebyshev:
         missed, met = grid.refine(self.tolerance, self.budget)
         missed = _SAFETY * missed
         columns = memo.values.columns
-        chosen = np.array([columns.index(name) for name in self.outputs or primary(columns, model.known)])
+        chosen = np.array([memo.values.column(name) for name in self.outputs or primary(columns, model.known)])
         ends = _extremes(grid.polynomial(), domain, chosen)
         error = np.broadcast_to(missed[chosen], ends.values.shape[:2])
         if self.confirm:

@@ -24,6 +24,13 @@ def levels(steps: int) -> tuple[float, ...]:
     return tuple(step / steps for step in range(steps + 1))
 
 
+def _levels(alpha: Sequence[float]) -> tuple[float, ...]:
+    try:
+        return tuple(float(level) for level in alpha)
+    except (TypeError, ValueError):
+        raise ValueError(f"the α-levels are {alpha!r}; they must be a sequence of numbers that rise within [0, 1]") from None
+
+
 @dataclass(frozen=True)
 class Domain:
     """Nested boxes of the inputs, one per α-level.
@@ -43,7 +50,7 @@ class Domain:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "inputs", dict(self.inputs))
-        object.__setattr__(self, "alpha", tuple(float(level) for level in self.alpha))
+        object.__setattr__(self, "alpha", _levels(self.alpha))
         if not self.inputs:
             raise ValueError("there is no fuzzy input; name one at least")
         rising = all(np.diff(self.alpha) > 0) and len(self.alpha) > 0

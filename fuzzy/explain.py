@@ -18,6 +18,7 @@ from fuzzy.numbers import Array
 from fuzzy.plan import Plan
 from fuzzy.shelf import Shelf, shelf
 from fuzzy.store import Identity, Store, Stored
+from fuzzy.vetting import fuzzy_inputs, require_plan
 
 _SHOWN = 5
 
@@ -101,7 +102,7 @@ def explain(
     """What `propagate` with the same arguments would run, and why. Nothing is run and no store is made.
 
     Args:
-        inputs: Fuzzy number of each input.
+        inputs: Fuzzy number of each input; a plain number is crisp.
         plan: How the boxes of the inputs are searched.
         alpha: Rising levels.
         shared: Inputs whose equality lets samples share one call.
@@ -109,7 +110,8 @@ def explain(
         store: Where samples are kept, if there.
         identity: What a sample depends on besides its inputs.
     """
-    domain = Domain(inputs, alpha)
+    require_plan(plan)
+    domain = Domain(fuzzy_inputs(inputs), alpha)
     missing: Array
     there = store if isinstance(store, Store) or (store is not None and Path(store).exists()) else None
     with shelf(there, identity, domain.names) as samples:

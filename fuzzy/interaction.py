@@ -30,10 +30,17 @@ class Linear:
     Args:
         weights: Weight of each input by name; inputs not named do not matter.
         bound: The bound.
+
+    Raises:
+        ValueError: A weight or the bound is not finite.
     """
 
     weights: Mapping[str, float]
     bound: float
+
+    def __post_init__(self) -> None:
+        if not np.isfinite([*self.weights.values(), self.bound]).all():
+            raise ValueError(f"the linear interaction has weights {dict(self.weights)} and bound {self.bound}; all must be finite")
 
     def check(self, inputs: Sequence[str]) -> None:
         """Refuse names that are no input.
@@ -44,8 +51,10 @@ class Linear:
         _require_inputs("linear", self.weights, inputs)
 
     def slack(self, points: Array, inputs: Mapping[str, FuzzyNumber], alpha: float) -> Array:
-        """Bound − Σ weights · inputs, shape (n,)."""
-        slack: Array = self.bound - points @ np.array([self.weights.get(name, 0.0) for name in inputs])
+        """Bound − Σ weights · inputs, shape (n,), as a share of the largest sum that its terms can have, so that units do not matter."""
+        weights = np.array([self.weights.get(name, 0.0) for name in inputs])
+        largest = np.array([np.abs(number.support).max() for number in inputs.values()])
+        slack: Array = (self.bound - points @ weights) / max(abs(self.bound) + float(np.abs(weights) @ largest), np.finfo(float).tiny)
         return slack
 
 

@@ -130,9 +130,15 @@ class IntervalQuasiMonteCarlo:
             vectorised: Whether the function takes arrays.
             known: Facts about the function.
             progress: Called with the share done, 0 … 1.
+
+        Raises:
+            ValueError: An input is named twice, or the levels do not rise from 0 to 1.
         """
         from scipy.stats import qmc
 
+        twice = sorted(set(random) & set(inputs))
+        if twice:
+            raise ValueError(f"{', '.join(twice)} is named among the random and the fuzzy inputs; each must be one of the two")
         u: Array = qmc.Sobol(len(random), rng=np.random.default_rng(self.seed)).random(self.points)
         ends = {name: [one.interval(u[:, i], level) for level in alpha] for i, (name, one) in enumerate(random.items())}
         campaign = Campaign(Call(function, (*random, *inputs), vectorised=vectorised), known=known or Known(), stepwise=True)

@@ -60,6 +60,9 @@ class Metamodel:
         Args:
             model: The model.
             domain: Its inputs; only their supports matter.
+
+        Raises:
+            ValueError: No input has a width.
         """
         from scipy.interpolate import RBFInterpolator
 
@@ -67,6 +70,8 @@ class Metamodel:
         memo = Memo(model)
         lower, upper = (ends[0] for ends in Domain(domain.inputs, (0.0,)).boxes)
         moving = np.flatnonzero(upper > lower)
+        if not len(moving):
+            raise ValueError("no input has a width, so there is nothing to train a metamodel on; take Reduced, which runs the model once")
         unit = self._boxes(len(moving))
         lessons = []
         for row in range(len(unit)):

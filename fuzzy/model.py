@@ -57,10 +57,17 @@ class Values:
         Raises:
             ValueError: There is no such column.
         """
-        missing = [name for name in columns if name not in self.columns]
-        if missing:
-            raise ValueError(f"there is no output {', '.join(missing)}; there are {', '.join(self.columns)}")
-        return self.array[:, [self.columns.index(name) for name in columns]]
+        return self.array[:, [self.column(name) for name in columns]]
+
+    def column(self, name: str) -> int:
+        """Index of a column.
+
+        Raises:
+            ValueError: There is no such column.
+        """
+        if name not in self.columns:
+            raise ValueError(f"there is no output {name}; there are {', '.join(self.columns)}")
+        return self.columns.index(name)
 
 
 class Model(Protocol):
@@ -84,10 +91,12 @@ def flatten(output: Output) -> tuple[Layout, Array]:
         output: A number (named `y`), an array (`y[0]`, …) or a mapping of names to numbers or arrays.
 
     Raises:
-        ValueError: An output holds something else than finite numbers.
+        ValueError: There is no number, or one that is not finite.
     """
     named = output if isinstance(output, Mapping) else {"y": output}
     arrays = {str(name): np.asarray(value, float) for name, value in named.items()}
+    if not sum(array.size for array in arrays.values()):
+        raise ValueError("the function returned no number; it must return one at least")
     for name, array in arrays.items():
         if not np.isfinite(array).all():
             raise ValueError(f"output {name!r} is {array.ravel()[~np.isfinite(array.ravel())][0]}; every output must be a finite number")

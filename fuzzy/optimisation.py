@@ -130,6 +130,9 @@ class _Cut:
         allowed = self.domain.slack(points, self.domain.alpha[self.level]) >= 0
         if allowed.any():
             self.memo(points[allowed])
+        elif not self.domain.inside(self.memo.points)[self.level].any():
+            alpha = self.domain.alpha[self.level]
+            raise ValueError(f"no point of the cut at α = {alpha:g} fulfils its interactions: they leave too little room, or none")
 
     def best(self, output: str, sign: float, count: int) -> Array:
         """The best few of all samples in the cut that are not close to a better one, in unit coordinates."""
@@ -146,7 +149,7 @@ class _Cut:
         """A descent by gradients inside the cut; its samples stay in the memo."""
         from scipy.optimize import minimize
 
-        scale = max(float(np.ptp(self.memo.values.select([output]))), np.finfo(float).tiny)
+        scale = float(np.ptp(self.memo.values.select([output]))) or 1.0
 
         def objective(unit: Array) -> tuple[float, Array]:
             steps = np.where(unit + _DIFFERENCE > 1, -_DIFFERENCE, _DIFFERENCE)

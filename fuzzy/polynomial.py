@@ -74,7 +74,8 @@ class Polynomial:
             scan = allowed
         values = sign * (self.basis(scan) @ self.coefficients[:, output])
         starts = scan[np.argsort(values)[:_STARTS]]
-        search = _Search(self, lower, upper, output=output, sign=sign, slack=slack)
+        scale = float(np.ptp(values)) or 1.0
+        search = _Search(self, lower, upper, output=output, sign=sign, scale=scale, slack=slack)
         place, least = min((search.descend(start) for start in starts), key=lambda found: found[1])
         return place, sign * least
 
@@ -88,13 +89,14 @@ class Polynomial:
 
 @dataclass(frozen=True)
 class _Search:
-    """A descent over a box in coordinates of the unit cube."""
+    """A descent over a box in coordinates of the unit cube, the output in units of `scale`: optimisers stop at absolute gradients."""
 
     polynomial: Polynomial
     lower: Array
     upper: Array
     output: int
     sign: float
+    scale: float
     slack: Slack | None
 
     def descend(self, start: Array) -> tuple[Array, float]:
@@ -114,7 +116,8 @@ class _Search:
     def _objective(self, unit: Array) -> tuple[float, Array]:
         point = self._point(unit)
         gradient = self.polynomial.gradient(point, self.output)[0] * self._span()
-        return self.sign * float(self.polynomial(point)[0, self.output]), self.sign * gradient
+        factor = self.sign / self.scale
+        return factor * float(self.polynomial(point)[0, self.output]), factor * gradient
 
     def _room(self, unit: Array) -> float:
         return float(self.slack(self._point(unit))[0]) if self.slack else 0.0

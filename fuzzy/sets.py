@@ -60,7 +60,13 @@ class FuzzySet:
         return inside
 
     def cut(self, alpha: float) -> tuple[Cut, ...]:
-        """The α-cut as intervals from left to right: several where the set is not convex, none above its height; α in (0, 1]."""
+        """The α-cut as intervals from left to right: several where the set is not convex, none above its height.
+
+        Raises:
+            ValueError: `alpha` lies outside (0, 1].
+        """
+        if not 0 < alpha <= 1:
+            raise ValueError(f"the α of a cut is {alpha:g}; it must lie in (0, 1]")
         pieces: list[Cut] = []
         for (a, p), (b, q) in pairwise(zip(self.x, self.grade, strict=True)):
             if max(p, q) < alpha:

@@ -7,6 +7,7 @@ method takes the ends only of those inputs in which the model is monotone.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise, product
@@ -38,7 +39,7 @@ def hanss_points(number: FuzzyNumber, alpha: Sequence[float]) -> list[list[float
         For each level, from the lowest, its points in rising order: n at the top (one where the cut is a single value, otherwise its two
         ends), n + 1 at the next level down, and so on.
     """
-    known: list[float] = []
+    known: list[float] = []  # in rising order
     rows: list[list[float]] = []
     for level in reversed(alpha):
         lower, upper = number.cut(level)
@@ -49,10 +50,10 @@ def hanss_points(number: FuzzyNumber, alpha: Sequence[float]) -> list[list[float
 
 def _settled(x: float, known: list[float], width: float) -> float:
     """The point already known that differs from x by round-off only, otherwise x, which is known from now on."""
-    for other in known:
-        if abs(x - other) <= _SAME * width:
-            return other
-    known.append(x)
+    place = bisect_left(known, x - _SAME * width)
+    if place < len(known) and known[place] - x <= _SAME * width:
+        return known[place]
+    known.insert(place, x)
     return x
 
 

@@ -149,6 +149,9 @@ def _outcomes(future: Future[list[Outcome]], executor: Executor, call: Call, poi
         if isinstance(executor, ProcessPool):
             return executor.alone(call, points)
         raise
+    except Exception as error:  # a call raises nothing itself
+        failure = f"the function or its outputs cannot be sent between processes ({type(error).__name__}: {error})"
+        return [Failure(failure)] * len(points)
 
 
 def _width(executor: Executor) -> int:

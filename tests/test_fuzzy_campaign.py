@@ -1,6 +1,6 @@
 """Campaigns: grouping, workers, failures, outputs."""
 
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -108,8 +108,40 @@ def test_wrong_calls_are_refused():
 
 
 def test_outputs_must_agree_between_samples():
-    with pytest.raises(ValueError, match="all must have the same names and shapes"):
-        propagate(lambda x: {"y": x} if x < 0.5 else {"z": x}, {"x": Interval(0, 1)})
+    with pytest.raises(CampaignError, match=r"3 of 7 samples failed.*has the outputs z where others have y; all must have the same names"):
+        propagate(lambda x: {"y": x} if x < 0.6 else {"z": x}, {"x": Interval(0, 1)}, alpha=(0.0, 0.25, 0.5, 0.75))
+
+
+def turning(x):
+    return {"y": x, "z": [2 * x, 3 * x]} if x < 0.1 else {"z": [2 * x, 3 * x], "y": x}
+
+
+@pytest.mark.parametrize("plan", [General(), Optimisation(), Chebyshev(), Signed()])
+def test_outputs_are_known_by_name_whatever_their_order(plan):
+    result = propagate(turning, {"x": Interval(0, 1)}, plan)
+    for name, largest in (("y", 1.0), ("z[0]", 2.0), ("z[1]", 3.0)):
+        assert result.bounds(name)[1][0] == pytest.approx(largest)
+
+
+def test_a_model_that_ends_its_program_ends_its_sample_only():
+    def ends(x):
+        if x > 0.9:
+            raise SystemExit(3)
+        return x
+
+    with pytest.raises(CampaignError, match=r"2 of 11 samples failed, the others are done: .*; at x = 1: SystemExit: 3"):
+        propagate(ends, {"x": Interval(0, 1)}, alpha=(0.0, 0.1, 0.2, 0.3, 0.4))
+
+
+def test_a_function_that_an_executor_cannot_send_is_reported():
+    with ProcessPoolExecutor(1) as executor, pytest.raises(CampaignError, match="cannot be sent between processes"):
+        propagate(lambda x: x, {"x": Interval(0, 1)}, executor=executor, alpha=(0.0,))
+
+
+@pytest.mark.parametrize("nothing", [{}, []])
+def test_a_function_without_outputs_is_refused(nothing):
+    with pytest.raises(CampaignError, match="the function returned no number"):
+        propagate(lambda x: nothing, {"x": Interval(0, 1)})
 
 
 def test_response_surface_reproduces_a_quadratic_and_states_its_error():

@@ -32,6 +32,12 @@ def test_without_a_store_everything_is_new_and_none_is_made(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_an_explanation_takes_what_a_propagation_takes():
+    assert explain({"a": INPUTS["a"], "b": 3.0}, General(), alpha=levels(2)).samples > 0
+    with pytest.raises(ValueError, match="the plan is 'general'; it must be a plan such as"):
+        explain(INPUTS, "general", alpha=levels(2))
+
+
 def test_a_whole_campaign_needs_nothing(tmp_path):
     run(tmp_path / "s.db")
     found = ask(tmp_path / "s.db")

@@ -122,6 +122,11 @@ def test_p_box_quantiles_and_exceedance_agree(response):
     [
         (lambda: Metamodel(boxes=1), "metamodel has 1 boxes and 50 held out"),
         (lambda: IntervalQuasiMonteCarlo(points=0), "quasi-random points is 0"),
+        (lambda: propagate(lambda x: x, {"x": 1.0}, Metamodel()), "no input has a width, so there is nothing to train"),
+        (
+            lambda: IntervalQuasiMonteCarlo().run(abs, {"x": RandomInput(normal, {"m": MEAN})}, {"x": MEAN}, alpha=levels(1)),
+            "x is named among the random and the fuzzy inputs",
+        ),
     ],
 )
 def test_wrong_plans_are_refused(make, message):

@@ -109,6 +109,15 @@ def test_coarse_plans_stay_inside_and_are_nested(problem, plan, truth):
     assert (np.diff(upper) <= 0).all()
 
 
+@pytest.mark.parametrize("scale", [1e-13, 1e-6, 1e13])
+@pytest.mark.parametrize("plan", [Chebyshev(), Chebyshev(confirm=False), Optimisation()])
+def test_the_unit_of_an_output_does_not_matter(plan, scale):
+    function, inputs = PROBLEMS["inside"]
+    one = propagate(function, inputs, plan, vectorised=True)
+    other = propagate(lambda **x: scale * function(**x), inputs, plan, vectorised=True)
+    np.testing.assert_allclose(np.array(other.bounds()) / scale, one.bounds(), rtol=1e-6)
+
+
 def test_product_of_eight_factors_by_its_corners():
     inputs = {f"x{i}": Triangular(0.5, 1.0, 2.0) for i in range(8)}
     result = propagate(

@@ -99,6 +99,14 @@ def test_linear_interaction_cuts_the_box(plan):
 
 
 @pytest.mark.parametrize("plan", SEARCHING)
+@pytest.mark.parametrize("scale", [1e-13, 1e13])
+def test_the_units_of_inputs_under_an_interaction_do_not_matter(plan, scale):
+    inputs = {"a": Interval(0.0, scale), "b": Interval(0.0, scale)}
+    result = propagate(lambda a, b: a + 2 * b, inputs, plan, alpha=[0.0], interactions=[Linear({"a": 1, "b": 1}, 1.2 * scale)])
+    assert result.bounds()[1][0] == pytest.approx(2.2 * scale, rel=1e-6)
+
+
+@pytest.mark.parametrize("plan", SEARCHING)
 @pytest.mark.parametrize("correlation", [0.0, 0.6, -0.6])
 def test_ellipsoidal_interaction_of_a_sum(plan, correlation):
     inputs = {"a": Triangular(-1.0, 0.0, 1.0), "b": Triangular(-1.0, 0.0, 1.0)}
@@ -131,9 +139,13 @@ def test_wrong_interactions_are_refused():
         Ellipsoidal({("a", "b"): 1.0})
     with pytest.raises(ValueError, match="names an input that is not among"):
         Ellipsoidal({("a", "b"): 0.1}, among=("a",))
+    with pytest.raises(ValueError, match=r"weights \{'a': 1\} and bound nan; all must be finite"):
+        Linear({"a": 1}, np.nan)
     three = SQUARE | {"c": Crisp(1.0)}
     impossible = Ellipsoidal({("a", "b"): 0.9, ("b", "c"): 0.9, ("a", "c"): -0.9})
     with pytest.raises(ValueError, match="contradict each other"):
         propagate(lambda a, b, c: a, three, MonteCarlo(), interactions=[impossible])
     with pytest.raises(ValueError, match="no sample lies in the cut at α = 0: its interactions leave too little room"):
         propagate(lambda a, b: a, SQUARE, MonteCarlo(10), interactions=[Linear({"a": 1}, -0.5)])
+    with pytest.raises(ValueError, match="no point of the cut at α = 1 fulfils its interactions"):
+        propagate(lambda a, b: a, SQUARE, Optimisation(), interactions=[Linear({"a": 1}, -0.5)])

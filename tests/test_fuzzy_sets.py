@@ -55,6 +55,7 @@ def test_convex_normal_sets_become_numbers():
         (lambda: FuzzySet((0,), (1,)), "1 points and 1 grades"),
         (lambda: FuzzySet((1, 0), (0, 1)), "must be finite and not fall"),
         (lambda: FuzzySet((0, 1), (0, 1.2)), r"must lie in \[0, 1\]"),
+        (lambda: FuzzySet((0, 1), (0, 1)).cut(0), r"α of a cut is 0; it must lie in \(0, 1\]"),
         (lambda: from_data([]), "the data hold 0 values"),
         (lambda: from_data([1, np.nan]), "2 values, 1 of them finite"),
     ],
@@ -117,6 +118,16 @@ def test_division_by_zero_and_broken_powers_are_refused():
         1 / Triangular(-1, 0.5, 2)
     with pytest.raises(ValueError, match=r"exponent is 0\.5; it must be a whole number"):
         Triangular(1, 2, 3) ** 0.5
+
+
+def test_functions_that_turn_and_numbers_too_large_are_refused():
+    with pytest.raises(ValueError, match=r"sin does not rise throughout \[0\.0, 3\.0\]; give falls=True, or use propagate if it turns"):
+        apply(np.sin, Triangular(0, 1, 3))
+    with pytest.raises(ValueError, match="exp does not fall throughout"):
+        apply(np.exp, Triangular(0, 1, 3), falls=True)
+    large = Triangular(1e200, 2e200, 3e200) * Triangular(1e200, 2e200, 4e200)
+    with pytest.raises(ValueError, match=r"at α = 1 is \[inf, inf\]: the numbers are too large"):
+        large.cut(1)
 
 
 def test_pictures_show_every_set_with_its_name_and_axis():

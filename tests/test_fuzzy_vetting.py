@@ -23,6 +23,8 @@ def total(a, b):
             "the function cannot be called with the inputs a, c: missing a required argument: 'b'",
         ),
         ({"plan": "signed"}, r"the plan is 'signed'; it must be a plan such as fuzzy\.General\(\)"),
+        ({"alpha": "abc"}, "the α-levels are 'abc'; they must be a sequence of numbers"),
+        ({"alpha": 0.5}, r"the α-levels are 0\.5; they must be a sequence of numbers"),
         ({"plan": Signed}, "it must be a plan such as"),
         ({"function": 3}, "the function is 3, which cannot be called"),
         ({"function": lambda a, b: a, "workers": 2}, "cannot be sent to worker processes .*top level of a module"),
