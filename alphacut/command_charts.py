@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TextIO
 
-from alphacut.output import as_json
+from alphacut.output import as_json, write_text
 from alphacut.problem import BadInput, Problem
 
 ABOUT = "measure what the methods cost on this machine, into benchmarks/results (needs a checkout; takes a while)"
@@ -24,7 +24,7 @@ def programs() -> list[str]:
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument("names", metavar="NAME", nargs="*", help="which (default: all files of benchmarks/)")
-    parser.add_argument("--json", metavar="FILE", help="print the names of those that were run as JSON (-)")
+    parser.add_argument("--json", metavar="FILE", help="write the names of those that were run as JSON; - for standard output")
     parser.add_argument("--quiet", action="store_true", help="print nothing")
 
 
@@ -39,6 +39,9 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         done = subprocess.run([sys.executable, "-m", f"benchmarks.{name}"], cwd=FOLDER.parent, stdout=stream, check=False)
         if done.returncode:
             raise RuntimeError(f"the benchmark {name} ended with status {done.returncode}; its own messages are above")
+    document = as_json({"run": options.names or known})
     if options.json == "-":
-        out.write(as_json({"run": options.names or known}))
+        out.write(document)
+    elif options.json:
+        write_text(options.json, document)
     return 0
