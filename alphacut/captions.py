@@ -17,6 +17,7 @@ FIGURES = {
     "mapping": "Fuzzy mapping: trajectories inside an α-cut, and the envelope that encloses them",
     "graph-follower": "The Graph Follower, step by step",
     "frame": "The frame, to scale",
+    "tower": "The tower, to scale",
     "chain": "The frame as masses, springs and dampers",
     "response": "Random and fuzzy stress: its distribution between two bounds, and its fuzzy quantiles",
     "shares-modulus": "Share of each input in the width of the modulus",

@@ -137,7 +137,7 @@ class Chain:
 
         def compute(path: Path) -> None:
             with progress(f"Envelope {study.name}", quiet=self.quiet) as tick:
-                found = envelope.compute(self.case, study.task, modulus=handed, strict=self.strict, progress=tick)
+                found = envelope.compute(self.case, study.task, modulus=handed, strict=self.strict, workers=self.workers, progress=tick)
             envelope.write(outcomes.with_peaks(found), path, case_text=self.case.text_of_file, key=key)
 
         return self.stored(f"envelope_{study.name}.nc", key, compute)

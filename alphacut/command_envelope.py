@@ -35,9 +35,10 @@ KEYS = {
     "--order": "envelope.order",
     "--tolerance": "envelope.tolerance",
     "--relative-tolerance": "envelope.relative_tolerance",
+    "--certify": "envelope.certify",
 }
 OF_AUTO = ("modal", "improved-graph-follower")
-BARE = {"--duration": "s", "--step": "s", "--tolerance": "m"}  # options that may leave the unit out
+BARE = {"--duration": "s", "--step": "s", "--tolerance": "m", "--certify": "m"}  # options that may leave the unit out
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,11 +49,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--modulus", metavar="QUANTITY|FILE.nc", help="Young's modulus: '[22, 24, 26] GPa' or the α-cuts of a file (default: the case's)"
     )
     parser.add_argument("--exclude", metavar="NAMES", default="", help="methods that method auto must not take, separated by commas")
-    parser.add_argument(
-        "--certify",
-        metavar="EPS",
-        help="enclose the bounds and prove them to within EPS metres; takes the method modal unless one is named",
-    )
     add_workers(parser, "the proof of a certificate")
     parser.add_argument("--strict", action="store_true", help="refuse a time step or tolerance too coarse for the motion")
     parser.add_argument("--out", metavar="FILE.nc", help="write envelopes and where they are reached as NetCDF")
@@ -62,12 +58,12 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     """Compute and report."""
     add_units(options)
     check_workers(options.workers)
+    if options.certify is not None and options.method is None:
+        options.method = "modal"  # the one that can
     case = load(options.case, changes(options, KEYS), without=replaced(options))
     handed = given_modulus(options.modulus) or stand_in(case)
-    task = replace(envelope.task_of(case), exclude=excluded(options.exclude), certify=wanted_gap(options.certify))
+    task = replace(envelope.task_of(case), exclude=excluded(options.exclude))
     contradictions(options, case, task)
-    if options.certify is not None and options.method is None:
-        task = replace(task, method="modal")
     with progress("Envelopes", quiet=options.quiet) as tick:
         found = envelope.compute(case, task, modulus=handed, strict=options.strict, workers=options.workers, progress=tick)
     if options.out:
@@ -106,19 +102,6 @@ def replaced(options: argparse.Namespace) -> tuple[str, ...]:
     if options.tolerance is not None and options.relative_tolerance is None:
         return ("envelope.relative_tolerance",)
     return ("envelope.tolerance", "pendulum.tolerance") if options.relative_tolerance is not None and options.tolerance is None else ()
-
-
-def wanted_gap(text: str | None) -> float | None:
-    """The gap of ``--certify`` in m; a bare number means metres."""
-    if text is None:
-        return None
-    try:
-        gap = quantity.number(text if text.strip()[-1:].isalpha() else f"{text} m", "m")
-    except ValueError as error:
-        raise BadInput(Problem("--certify", str(error), text, "a length such as 1e-6 or '1 um'")) from None
-    if not gap > 0:
-        raise BadInput(Problem("--certify", "out of range", text, "greater than 0"))
-    return gap
 
 
 def contradictions(options: argparse.Namespace, case: Case, task: envelope.EnvelopeTask) -> None:

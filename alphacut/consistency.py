@@ -185,6 +185,9 @@ def methods(case: Case) -> Iterator[Problem]:
     """A method and a time stepping that the structure's kind has."""
     if case.has("pendulum.mass") and case.text("envelope.method") == "modal":
         yield Problem("envelope.method", "a pendulum has no modes", "modal", ", ".join(x for x in ENVELOPE_METHODS if x != "modal"))
+    if case.has("envelope.certify") and (case.has("pendulum.mass") or case.text("envelope.method") not in ("auto", "modal")):
+        found = "a pendulum cannot be certified" if case.has("pendulum.mass") else f"method {case.text('envelope.method')} cannot certify"
+        yield Problem("envelope.certify", found, allowed="a linear structure with method modal or auto")
     if case.has("envelope.integrator"):
         known = NONLINEAR if case.has("pendulum.mass") else tuple(x for x in INTEGRATORS if x != "composition4")
         if (scheme := case.text("envelope.integrator")) not in known:

@@ -61,16 +61,18 @@ class EnvelopeTask:
 def task_of(case: Case, *, fuzzy: Sequence[str] | None = None, duration: float | None = None) -> EnvelopeTask:
     """The envelope that [envelope] asks for, with other fuzzy inputs or another duration if given."""
     tolerance = "pendulum.tolerance" if case.has("pendulum.mass") else "envelope.tolerance"
-    relative = case.has("envelope.relative_tolerance")
+    relative, method = case.has("envelope.relative_tolerance"), case.text("envelope.method")
+    certify = case.number("envelope.certify") if case.has("envelope.certify") else None
     return EnvelopeTask(
         tuple(fuzzy) if fuzzy else case.names("envelope.fuzzy"),
         duration or case.number("envelope.duration"),
         case.number("envelope.step"),
         case.numbers("envelope.alpha"),
-        case.text("envelope.method"),
+        "modal" if certify is not None and method == "auto" else method,
         case.text("envelope.integrator") if case.has("envelope.integrator") else None,
         case.integer("envelope.order"),
         case.number("envelope.relative_tolerance" if relative else tolerance),
+        certify=certify,
         relative=relative,
     )
 
@@ -131,8 +133,6 @@ def method_options(task: EnvelopeTask) -> dict[str, Any]:
         taken |= {field.name for field in fields(Modal)}
     offered = {"order": task.order, "tolerance": task.tolerance, "exclude": task.exclude}
     if task.certify is not None:
-        if task.method != "modal":
-            raise BadInput(Problem("--certify", f"method {task.method} cannot certify", allowed="--method modal, for linear structures"))
         return {"tolerance": task.tolerance, "certify": task.certify}
     return {name: value for name, value in offered.items() if name in taken}
 

@@ -1,4 +1,4 @@
-"""The structure drawn to scale (Fig. 26) and as a chain of masses, springs and dampers (Fig. 27)."""
+"""The structure drawn to scale (Fig. 26), a storey frame or a tower, and as a chain of masses, springs and dampers (Fig. 27)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.case import Case
-from alphacut.figure_style import BLUE, GREY, INK, ORANGE, figure
+from alphacut.figure_style import BLUE, GREY, INK, ORANGE, PURPLE, figure
 from alphacut.structure import per_floor
 
 if TYPE_CHECKING:
@@ -41,6 +41,30 @@ def frame(case: Case) -> Figure:
     return drawn
 
 
+def tower(case: Case) -> Figure:
+    """The beam frame to scale, its parts of one modulus in one colour."""
+    storeys, bays = case.integer("tower.storeys"), case.integer("tower.bays")
+    height, width = case.number("tower.height"), case.number("tower.width")
+    high = float(np.clip(storeys * height / (bays * width) * 2.6, 2.4, 6.5))
+    drawn, axes = figure(5.4, high)
+    levels, lines = height * np.arange(storeys + 1), width * np.arange(bays + 1)
+    half = storeys // 2
+    for label, ends, colour in (
+        ("columns, lower half", levels[[0, half]], BLUE),
+        ("columns, upper half", levels[[half, storeys]], PURPLE),
+    ):
+        if ends[1] > ends[0]:
+            axes.vlines(lines, *ends, color=colour, lw=1.2, label=label)
+    axes.hlines(levels[1:], lines[0], lines[-1], color=ORANGE, lw=0.7, label="beams")
+    ground(axes, 0.0, lines[-1])
+    axes.set_aspect("equal")
+    axes.set_xlabel(f"m; {bays} bays of {width:g} m")
+    axes.set_ylabel(f"m; {storeys} storeys of {height:g} m")
+    axes.grid(False)
+    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)
+    return drawn
+
+
 def ground(axes: Axes, left: float, right: float) -> None:
     """Hatched ground line at height 0."""
     axes.fill_between([left - 0.1 * right, 1.1 * right], [0, 0], [-0.03 * right] * 2, hatch="////", facecolor="white", edgecolor=GREY, lw=0)
@@ -48,9 +72,10 @@ def ground(axes: Axes, left: float, right: float) -> None:
 
 
 def chain(case: Case) -> Figure:
-    """Fig. 27: the frame with rigid floors and bending columns as masses on springs, with its dampers."""
+    """Fig. 27: the frame with rigid floors and bending columns as masses on springs, with its dampers if it has any."""
     floors = len(case.fuzzies("frame.masses"))
-    placement = case.text("frame.damper_placement") if case.has("frame.damper_placement") else "none"
+    damped = case.has("frame.damper_placement") and any(d.support.upper > 0 for d in case.fuzzies("frame.dampers"))
+    placement = case.text("frame.damper_placement") if damped else "none"
     wide = min(10.0, 2.2 + 1.5 * floors)
     drawn, axes = figure(wide, 2.15 * wide / (1.6 * floors + 0.5) + 0.1)
     foot = -0.9 if placement == "ground" else -0.5

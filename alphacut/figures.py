@@ -49,6 +49,8 @@ def drawings(results: Results) -> Iterator[Drawing]:
     if results.envelopes and results.case.has("frame.masses"):
         yield "fig26-frame", lambda: figure_frame.frame(results.case)
         yield "fig27-chain", lambda: figure_frame.chain(results.case)
+    if results.envelopes and results.case.has("tower.storeys"):
+        yield "tower", lambda: figure_frame.tower(results.case)
     if results.case.has("envelope.method") and results.case.text("envelope.method") == "graph-follower" and results.envelopes:
         richest = max(results.studies, key=lambda study: len(study.task.fuzzy))
         yield "fig21-25-graph-follower", lambda: figure_follower.follower(results, richest)

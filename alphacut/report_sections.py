@@ -127,9 +127,20 @@ def methods(summary: Mapping[str, Any]) -> str:
         )
     for name, study in summary.get("envelopes", {}).items():
         rows.append((f"envelope {name}", study["method"], study["nature"], effort(study), f"{study['seconds']:.1f}"))
-    natures = dict.fromkeys(str(row[2]) for row in rows)
-    words = "".join(f"<p>{html.escape(NATURES[nature])}</p>" for nature in natures if nature in NATURES)
+    words = "".join(f"<p>{html.escape(text)}</p>" for text in (*explained(rows), *proofs(summary)))
     return section("Methods and cost", table(("stage", "method", "nature of the bounds", "cost", "seconds"), rows, numbers=3), words)
+
+
+def explained(rows: Sequence[tuple[object, ...]]) -> Iterator[str]:
+    """What each nature of bounds in the table means."""
+    yield from (NATURES[nature] for nature in dict.fromkeys(str(row[2]) for row in rows) if nature in NATURES)
+
+
+def proofs(summary: Mapping[str, Any]) -> Iterator[str]:
+    """How narrowly each certified envelope is enclosed, and what that rests on."""
+    for name, study in summary.get("envelopes", {}).items():
+        if "gap" in study:
+            yield f"Envelope {name} is enclosed to within {float(study['gap']):.3g} m at every node: {study['proof']}."
 
 
 def effort(study: Mapping[str, Any]) -> str:

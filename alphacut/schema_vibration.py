@@ -117,6 +117,12 @@ ENVELOPE = Section(
             allowed=POSITIVE,
         ),
         "relative_tolerance": Key("the same as a share of each output's peak, in place of tolerance", "number", allowed=UNIT),
+        "certify": Key(
+            "gap within which the bounds of a linear structure, up to six inputs fuzzy, are enclosed and proved; no proof if left out",
+            "number",
+            "m",
+            allowed=POSITIVE,
+        ),
         "duration": Key("length of the simulation", "number", "s", required=True, allowed=POSITIVE),
         "step": Key("time step", "number", "s", required=True, allowed=POSITIVE),
     },

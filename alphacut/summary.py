@@ -106,6 +106,8 @@ def envelope_numbers(dataset: xarray.Dataset) -> dict[str, Any]:
     cost = {name: dataset.attrs[name] for name in ("trajectories", "seconds", "method", "nature")}
     columns = {"min": low, "max": high, "mean_width": width}
     numbers = {key: dict(zip(names, map(float, column), strict=True)) for key, column in columns.items()}
+    if "gap" in dataset.attrs:
+        cost |= {"gap": dataset.attrs["gap"], "proof": dataset.attrs["proof"]}
     if "error" in dataset:
         numbers["error"] = dict(zip(names, map(float, lowest["error"].max("time").values), strict=True))
     return numbers | {"alpha": dataset["alpha"].values, "peak": outcomes.peak_document(dataset)} | cost
