@@ -85,8 +85,12 @@ class Optimisation:
             return
         import scipy.optimize
 
+        factor = sign / cut.scale(output)
+
         def objective(unit: Array) -> Any:
-            return sign * cut.values(np.atleast_2d(unit.T), output) if unit.ndim > 1 else sign * float(cut.values(unit[None], output)[0])
+            if unit.ndim > 1:  # many points, one in each column
+                return factor * cut.values(unit.T, output)
+            return factor * float(cut.values(unit[None], output)[0])
 
         bounds = [(0.0, 1.0)] * len(cut.moving)
         if self.method == "differential_evolution":
@@ -119,6 +123,11 @@ class _Cut:
         """One output at points of the unit cube, shape (n,)."""
         return self.memo(self.points(unit)).select([output])[:, 0]
 
+    def scale(self, output: str) -> float:
+        """Range of an output over all samples so far, or its size: a unit in which optimisers' absolute tolerances make sense."""
+        seen = self.memo.values.select([output])
+        return float(np.ptp(seen)) or float(np.abs(seen).max()) or 1.0
+
     def look(self, per_input: int, seed: int) -> None:
         """Run the model at the corners and at spread points."""
         from scipy.stats import qmc
@@ -149,7 +158,7 @@ class _Cut:
         """A descent by gradients inside the cut; its samples stay in the memo."""
         from scipy.optimize import minimize
 
-        scale = float(np.ptp(self.memo.values.select([output]))) or 1.0
+        scale = self.scale(output)
 
         def objective(unit: Array) -> tuple[float, Array]:
             steps = np.where(unit + _DIFFERENCE > 1, -_DIFFERENCE, _DIFFERENCE)

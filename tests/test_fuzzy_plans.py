@@ -110,7 +110,7 @@ def test_coarse_plans_stay_inside_and_are_nested(problem, plan, truth):
 
 
 @pytest.mark.parametrize("scale", [1e-13, 1e-6, 1e13])
-@pytest.mark.parametrize("plan", [Chebyshev(), Chebyshev(confirm=False), Optimisation()])
+@pytest.mark.parametrize("plan", [Chebyshev(), Chebyshev(confirm=False), Optimisation(), Optimisation("shgo", budget=50)])
 def test_the_unit_of_an_output_does_not_matter(plan, scale):
     function, inputs = PROBLEMS["inside"]
     one = propagate(function, inputs, plan, vectorised=True)
