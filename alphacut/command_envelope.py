@@ -153,8 +153,19 @@ def summary(found: Envelope) -> str:
     ends = zip(found.outputs, found.minimum[0], found.maximum[0], of.lower[0], of.upper[0], strict=True)
     rows = [(name, *(engineering(float(value), output_unit(name)) for value in values)) for name, *values in ends]
     lines = [f"{name:>14}  {low:>12}  {high:>12}   {least} … {most}\n" for name, low, high, least, most in rows]
-    cost = f"{found.trajectories} {'eigen-analyses' if found.method == 'modal' else 'trajectories'}, {found.seconds:.1f} s, {found.nature}"
+    effort = "eigen-analyses" if found.method == "modal" else "trajectories"
+    cost = f"{found.method}: {found.trajectories} {effort}, {found.seconds:.1f} s, bounds {found.nature}{error_in_words(found)}"
     return f"        output           min           max   peak   (α = {found.alpha[0]:g})\n{''.join(lines)}{cost}\n{proved(found)}"
+
+
+def error_in_words(found: Envelope) -> str:
+    """The largest estimated error of each output; empty where none was estimated."""
+    from frame.envelope import output_unit
+
+    if found.error is None:
+        return ""
+    largest = zip(found.outputs, found.error.max((0, 1)), strict=True)
+    return ", error up to " + ", ".join(f"{engineering(float(value), output_unit(name), digits=2)} of {name}" for name, value in largest)
 
 
 def proved(found: Envelope) -> str:
