@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import gmsh
 import numpy as np
 
+from rve.planar_geometry import PeriodicSquare
 from stochastic.contacts import smallest_gap
 from stochastic.discs import Discs
 
@@ -42,8 +43,9 @@ def many_mesh(discs: Discs, *, size: float, around: int = 12) -> tuple[Any, Arra
     centres, radii = _off_the_sides(discs) / side, discs.radii / side
     gmsh.initialize(["", "-v", "1"], readConfigFiles=False, interruptible=False)
     try:
-        inside = _geometry(centres, radii)
-        _periodic_sides()
+        square = PeriodicSquare(0.0, 1.0)
+        inside = square.cut(np.column_stack([centres, radii]))
+        square.bind_sides()
         gmsh.option.setNumber("General.NumThreads", 1)
         gmsh.option.setNumber("Mesh.MeshSizeMax", size / np.sqrt(len(discs)))
         gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", around)
@@ -72,35 +74,3 @@ def _off_the_sides(discs: Discs) -> Array:
         if min(side, corner) > best:
             best, centres = min(side, corner), moved
     return centres
-
-
-def _geometry(centres: Array, radii: Array) -> set[int]:
-    """Unit square cut by the circles and their images; the tags of the surfaces inside discs."""
-    occ = gmsh.model.occ
-    square = occ.addRectangle(0, 0, 0, 1, 1)
-    circles = []
-    for x, y, r in np.column_stack([centres, radii]):
-        for i in (-1, 0, 1):
-            for j in (-1, 0, 1):
-                u, v = x + i, y + j
-                if np.hypot(u - np.clip(u, 0, 1), v - np.clip(v, 0, 1)) < r:
-                    circles.append((2, occ.addDisk(float(u), float(v), 0, float(r), float(r))))
-    parts, _ = occ.intersect(circles, [(2, square)], removeTool=False)
-    _, pieces = occ.fragment([(2, square)], parts)
-    occ.synchronize()
-    return {tag for piece in pieces[1:] for _, tag in piece}
-
-
-def _periodic_sides() -> None:
-    """Bind each curve of the sides x = 1 and y = 1 to its partner at 0."""
-    boxes = {tag: gmsh.model.getBoundingBox(1, tag) for _, tag in gmsh.model.getEntities(1)}
-    for axis in (0, 1):
-        sides = []
-        for value in (0.0, 1.0):
-            on = [tag for tag, box in boxes.items() if max(abs(box[axis] - value), abs(box[axis + 3] - value)) < 1e-6]
-            sides.append(sorted(on, key=lambda tag: boxes[tag][1 - axis] + boxes[tag][4 - axis]))
-        if len(sides[0]) != len(sides[1]):
-            raise RuntimeError("opposite sides of the cell are cut by circles differently; a circle grazes a side")
-        shift = np.eye(4)
-        shift[axis, 3] = 1
-        gmsh.model.mesh.setPeriodic(1, sides[1], sides[0], shift.ravel().tolist())

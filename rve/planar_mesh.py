@@ -10,6 +10,7 @@ import gmsh
 import numpy as np
 from numpy.typing import NDArray
 
+from rve.planar_geometry import PeriodicSquare
 from rve.triangulation import Integers
 from stochastic.truncated_normal import Array
 
@@ -66,8 +67,9 @@ def planar_mesh(radius: float, *, size: float, centre: tuple[float, float] = (0.
     gmsh.initialize(["", "-v", "1"], readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.setNumber("General.NumThreads", 1)
-        particle = _geometry(radius, centre)
-        _periodic_sides()
+        square = PeriodicSquare(-1.0, 1.0)
+        particle = square.cut([((centre[0] + 1) % 2 - 1, (centre[1] + 1) % 2 - 1, radius)])
+        square.bind_sides()
         gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
         gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)
         gmsh.option.setNumber("Mesh.LcIntegrationPrecision", 1e-4)  # of the size along a curve; the default asks for thousands of points
@@ -99,35 +101,6 @@ def _grading(x: float, y: float, radius: float) -> float:
     beside = 1 - radius + y * y / (2 * radius) + max(0.0, radius - x)
     above = 1 - radius + x * x / (2 * radius) + max(0.0, radius - y)
     return min(1.0, reach, 4 * beside, 4 * above)
-
-
-def _geometry(radius: float, centre: tuple[float, float]) -> set[int]:
-    """Square cut by the disc and its images; the tags of the particle's surfaces."""
-    occ = gmsh.model.occ
-    square = occ.addRectangle(-1, -1, 0, 2, 2)
-    home = [(c + 1) % 2 - 1 for c in centre]
-    discs = []
-    for x in (home[0] - 2, home[0], home[0] + 2):
-        for y in (home[1] - 2, home[1], home[1] + 2):
-            if np.hypot(x - np.clip(x, -1, 1), y - np.clip(y, -1, 1)) < radius:
-                discs.append((2, occ.addDisk(x, y, 0, radius, radius)))
-    parts, _ = occ.intersect(discs, [(2, square)], removeTool=False)
-    _, pieces = occ.fragment([(2, square)], parts)
-    occ.synchronize()
-    return {tag for piece in pieces[1:] for _, tag in piece}
-
-
-def _periodic_sides() -> None:
-    """Bind each curve of the sides x = 1 and y = 1 to its partner at −1."""
-    boxes = {tag: gmsh.model.getBoundingBox(1, tag) for _, tag in gmsh.model.getEntities(1)}
-    for axis in (0, 1):
-        sides = []
-        for value in (-1.0, 1.0):
-            on = [t for t, b in boxes.items() if abs(b[axis] - value) < _TOUCH / 2 and abs(b[axis + 3] - value) < _TOUCH / 2]
-            sides.append(sorted(on, key=lambda t: boxes[t][1 - axis] + boxes[t][4 - axis]))
-        shift = np.eye(4)
-        shift[axis, 3] = 2
-        gmsh.model.mesh.setPeriodic(1, sides[1], sides[0], shift.ravel().tolist())
 
 
 def _triangles(particle: set[int]) -> tuple[Array, Integers, NDArray[np.bool_]]:

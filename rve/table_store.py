@@ -18,7 +18,7 @@ import numpy as np
 from rve.table_build import build_table
 from rve.table_chebyshev import Table, TableRange
 
-_PROGRAMS = ("planar*.py", "series*.py", "slices*.py", "table*.py")  # the code a table comes from
+_PROGRAMS = ("cell.py", "planar*.py", "series*.py", "slices*.py", "table*.py")  # the code a table comes from
 _PACKAGES = ("numpy", "scipy", "fenics-dolfinx", "fenics-basix", "fenics-ffcx", "petsc4py", "gmsh")
 
 
