@@ -99,6 +99,12 @@ def test_a_certificate_encloses_the_bounds(capfd):
     told = capfd.readouterr().out
     assert "eigen-analyses" in told
     assert "enclosed to within 10.00 µm of q1" in told
+    asked = ["--set", "envelope.certify=20 um", "--set", "envelope.method=auto", "--duration", "0.5", "--fuzzy", "m1"]
+    found = answer(["envelope", PAPER, *asked], capfd)
+    assert found["nature"] == "guaranteed"
+    assert found["facts"]["gap"] == pytest.approx(2e-5, rel=1e-3)
+    assert main(["envelope", "cases/pendulum.toml", "--set", "envelope.certify=1 um"]) == 2
+    assert "a pendulum cannot be certified" in capfd.readouterr().err
     assert main(["envelope", PAPER, "--method", "vertex", "--certify", "1e-5"]) == 2
     assert "cannot certify" in capfd.readouterr().err
 

@@ -85,3 +85,13 @@ def test_a_folder_without_results_is_named(tmp_path, capfd):
     assert main(["report", str(tmp_path)]) == 2
     assert "summary.json is missing" in capfd.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_a_certificate_is_told_with_its_gap_and_what_it_rests_on():
+    from alphacut.report_sections import methods
+
+    study = {"method": "modal", "nature": "guaranteed", "trajectories": 52, "seconds": 3.0, "gap": 1e-6, "proof": "bounded by <energy>"}
+    page = methods({"envelopes": {"E": study}})
+    assert "Envelope E is enclosed to within 1e-06 m at every node: bounded by &lt;energy&gt;." in page
+    assert "Guaranteed bounds are proved" in page
+    assert "enclosed" not in methods({"envelopes": {"E": {k: v for k, v in study.items() if k not in ("gap", "proof")}}})
