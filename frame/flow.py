@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import isqrt
@@ -51,8 +52,32 @@ def nodes(duration: float, step: float) -> Array:
     return np.arange(count + 1) * step
 
 
+class March(ABC):
+    """What flows that march from node to node share."""
+
+    duration: float
+    step: float
+
+    @cached_property
+    def time(self) -> Array:
+        """Nodes t_j, shape (T,), in s."""
+        return nodes(self.duration, self.step)
+
+    def values(self, points: Array) -> Array:
+        """Trajectories at `points` (S, d), shape (S, T, outputs)."""
+        return self._march(points, derivatives=False).value
+
+    def taylor(self, points: Array) -> Jet:
+        """Trajectories with first and second derivatives of the scheme, V = (S, T, outputs)."""
+        return self._march(points, derivatives=True)
+
+    @abstractmethod
+    def _march(self, points: Array, *, derivatives: bool) -> Jet:
+        """Trajectories at `points`, V = (S, T, outputs)."""
+
+
 @dataclass(frozen=True)
-class LinearFlow:
+class LinearFlow(March):
     """Trajectories of a linear structure by a one-step method.
 
     Args:
@@ -80,19 +105,6 @@ class LinearFlow:
     def outputs(self) -> tuple[str, ...]:
         """Names of the observed quantities."""
         return self.system.outputs
-
-    @cached_property
-    def time(self) -> Array:
-        """Nodes t_j, shape (T,), in s."""
-        return nodes(self.duration, self.step)
-
-    def values(self, points: Array) -> Array:
-        """Trajectories at `points` (S, d), shape (S, T, outputs)."""
-        return self._march(points, derivatives=False).value
-
-    def taylor(self, points: Array) -> Jet:
-        """Trajectories with first and second derivatives of the scheme, V = (S, T, outputs)."""
-        return self._march(points, derivatives=True)
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
         matrices, rows = evaluate(self.system, self.names, points, derivatives=derivatives)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from frame.flow import nodes
+from frame.flow import March, nodes
 from frame.jet import Array, Jet, concatenate
 from frame.lagrangian import LagrangianSystem
 from frame.symbolic import Compiled, compiled
@@ -25,7 +25,7 @@ class StepError(RuntimeError):
 
 
 @dataclass(frozen=True, eq=False)
-class LagrangianFlow:
+class LagrangianFlow(March):
     """Trajectories of a general system.
 
     Args:
@@ -62,19 +62,6 @@ class LagrangianFlow:
     def outputs(self) -> tuple[str, ...]:
         """Names of the observed quantities."""
         return self.observe or self.system.outputs
-
-    @cached_property
-    def time(self) -> Array:
-        """Nodes, shape (T,), in s."""
-        return nodes(self.duration, self.step)
-
-    def values(self, points: Array) -> Array:
-        """Trajectories at `points` (S, d), shape (S, T, outputs)."""
-        return self._march(points, derivatives=False).value
-
-    def taylor(self, points: Array) -> Jet:
-        """Trajectories with first and second derivatives of the scheme, V = (S, T, outputs)."""
-        return self._march(points, derivatives=True)
 
     @cached_property
     def _stepper(self) -> Callable[[Jet, Jet, tuple[Array, ...], float], Jet]:
