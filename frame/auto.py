@@ -21,6 +21,8 @@ Progress = Callable[[float], None]
 CANDIDATES = ("modal", "improved-graph-follower")
 CHECKS = 512
 """Trajectories of the independent second pass."""
+FLOOR = 0.5
+"""Least estimate of the modal method at a node, as a share of its largest: held-out samples are few and miss the worst at single nodes."""
 
 
 class ToleranceError(RuntimeError):
@@ -54,7 +56,7 @@ def auto(
     begun, refused = time.perf_counter(), [f"{name} excluded" for name in exclude]
     if "modal" not in exclude and isinstance(flow.flow, LinearFlow):
         try:
-            found = modal(flow, progress, tolerance=tolerance / 8)
+            found = _levelled(modal(flow, progress, tolerance=tolerance / 8), flow)
             if _estimate(found, flow) <= tolerance:
                 return _reported(found, flow, begun, "modal: polynomials of the modes reach the tolerance with the fewest eigen-analyses")
             refused.append(f"modal estimates {_estimate(found, flow):.2g}")
@@ -95,6 +97,11 @@ def second_pass(found: Envelope, flow: UnitFlow, *, skip: int) -> float:
         beyond = np.maximum(values.max(0) - found.upper[0], found.lower[0] - values.min(0))
         worst = max(worst, float((beyond / flow.scale).max()))
     return worst
+
+
+def _levelled(found: Envelope, flow: UnitFlow) -> Envelope:
+    assert found.error is not None
+    return replace(found, error=np.maximum(found.error, FLOOR * _estimate(found, flow) * flow.scale))
 
 
 def _estimate(found: Envelope, flow: UnitFlow) -> float:
