@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,41 +10,21 @@ import numpy as np
 
 from alphacut.output import whole_file
 from alphacut.units import MINUS, axis_prefix
+from stochastic import figure_style
 from stochastic.truncated_normal import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-INK = "#1a1a1a"
-BLUE, ORANGE, PURPLE, GREY = "#0072b2", "#d55e00", "#7b3294", "#8c8c8c"  # Okabe & Ito, and a purple that differs from both in lightness
+INK, BLUE, ORANGE, GREY = figure_style.INK, figure_style.BLUE, figure_style.ORANGE, figure_style.GREY
+PURPLE = "#7b3294"  # differs from Okabe's and Ito's blue and orange in lightness
 WIDTH, HEIGHT = 6.4, 3.8  # inches
-SETTINGS: dict[str, Any] = {
-    "font.size": 10,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": INK,
-    "axes.labelcolor": INK,
-    "axes.grid": True,
-    "grid.color": "#e6e6e6",
-    "grid.linewidth": 0.6,
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "figure.constrained_layout.use": True,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "alphacut",
-    "savefig.dpi": 150,
-}
 
 
-@contextmanager
-def style() -> Iterator[None]:
+def style() -> AbstractContextManager[None]:
     """The project's look, for the figures drawn inside the block."""
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    with mpl.rc_context(SETTINGS):
-        yield
+    return figure_style.style({"axes.edgecolor": INK, "axes.labelcolor": INK})
 
 
 def figure(width: float = WIDTH, height: float = HEIGHT, **options: Any) -> tuple[Figure, Axes]:

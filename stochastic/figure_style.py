@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -28,12 +29,12 @@ SETTINGS: dict[str, Any] = {
 
 
 @contextmanager
-def style() -> Iterator[None]:
-    """The look, for the figures drawn inside the block."""
+def style(more: Mapping[str, Any] = MappingProxyType({})) -> Iterator[None]:
+    """The look, for the figures drawn inside the block, with `more` of matplotlib's settings."""
     import matplotlib as mpl
 
     mpl.use("Agg")
-    with mpl.rc_context(SETTINGS):
+    with mpl.rc_context({**SETTINGS, **more}):
         yield
 
 
