@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLOURS = (BLUE, ORANGE, PURPLE, GREY)
+SEEN = 0.01  # share of the largest width below which there is nothing to have a share of
 STYLES = ("-", "--", ":", "-.")
 
 
@@ -24,20 +25,20 @@ def over_time(found: xarray.Dataset) -> Figure:
 
     drawn, grid = plt.subplots(2, 1, figsize=(7.2, 4.8), sharex=True, height_ratios=(1, 1.6))
     output = str(found["output"].values[-1])
-    time = found["time"].values
-    grid[0].fill_between(time, 0, found["width"].sel(output=output), color="#cfe3f0", lw=0)
-    grid[0].plot(time, found["width"].sel(output=output), color=BLUE, lw=1)
+    time, width = found["time"].values, found["width"].sel(output=output)
+    grid[0].fill_between(time, 0, width, color="#cfe3f0", lw=0)
+    grid[0].plot(time, width, color=BLUE, lw=1)
     grid[0].set_ylim(bottom=0)
     prefix_axis(grid[0], f"width of {output}", output_unit(output))
     for index, name in enumerate(found["input"].values):
         colour, dashes = COLOURS[index % len(COLOURS)], STYLES[(index // len(COLOURS)) % len(STYLES)]
-        share = found["share"].sel(output=output, input=name)
+        share = found["share"].sel(output=output, input=name).where(width > SEEN * width.max())
         grid[1].plot(time, share, color=colour, ls=dashes, lw=1.3, label=WORDS.get(str(name), str(name)))
     grid[1].set_xlabel("time t, s")
     grid[1].set_ylabel("share of width")
     grid[1].set_ylim(0, 1)
     grid[1].set_xlim(time[0], time[-1])
-    grid[1].legend(loc="upper right", ncols=2, fontsize=8)
+    grid[1].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, fontsize=8, borderaxespad=0.2)
     return drawn
 
 
