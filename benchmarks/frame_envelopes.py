@@ -8,14 +8,17 @@ from __future__ import annotations
 import argparse
 import csv
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from frame import Envelope, StoreyFrame, envelope
-from fuzzy import Triangular
+from frame import Envelope, Exact, LinearFlow, StoreyFrame, envelope
+from frame.box import UnitFlow, boxes
+from frame.cut_optimisation import CutOptimisation
+from frame.sampling import sample
+from fuzzy import Domain, General, Reduced, Triangular, levels
 
 FRAME = StoreyFrame((20e3, 10e3, 5e3), (2.5, 2.7, 2.7), 24.7561e9, 1e-6, (50, 50, 50), "ground", (0.01, 0.03, 0.08), (0, -0.5, -0.5))
 """The paper's frame in the reading that reproduces its numbers."""
@@ -24,6 +27,10 @@ INPUTS = {
     **{f"m{i + 1}": Triangular(0.95 * m, m, 1.05 * m) for i, m in enumerate(FRAME.masses)},
 }
 RESULTS = Path(__file__).parent / "results"
+TRANSFORMATIONS = {"transformation, reduced": (Reduced(), (2, 4, 8)), "transformation, general": (General(), (2, 4, 6))}
+OPTIMISERS = ("L-BFGS-B", "differential_evolution", "shgo", "direct")
+PER_NODE = 2
+"""Nodes at which SciPy's optimisers run; their cost is extrapolated to all nodes and outputs."""
 METHODS: list[tuple[str, str, dict[str, Any]]] = [
     *[("Graph Follower, faithful", "graph-follower", {"tolerance": t}) for t in (1e-2, 1e-3, 1e-4)],
     *[("Graph Follower, improved", "improved-graph-follower", {"tolerance": t}) for t in (1e-2, 1e-3, 7e-5)],
@@ -34,12 +41,37 @@ METHODS: list[tuple[str, str, dict[str, Any]]] = [
 ]
 
 
+def transformed(plan: General | Reduced, steps: int, duration: float, step: float) -> Envelope:
+    """The envelope at α = 0 of the points that a transformation method takes with `steps` steps of membership."""
+    cuts = boxes(INPUTS, (0,))
+    points = cuts.to_unit(plan.points(Domain(INPUTS, levels(steps))).points)
+    return sample(UnitFlow(LinearFlow(FRAME, cuts.names, duration, step, Exact()), cuts), lambda lower, upper: points, "transformation")
+
+
+def optimised(truth: Envelope, duration: float, step: float, optimiser: str, nodes: int) -> dict[str, Any]:
+    """Error of a SciPy optimiser at a few nodes of the third floor, both bounds; its trajectories as if it had run at every node."""
+    cuts, output = boxes(INPUTS, (0,)), 2
+    flow = UnitFlow(LinearFlow(FRAME, cuts.names, duration, step, Exact()), cuts)
+    error, calls, begun = 0.0, 0, time.perf_counter()
+    chosen = np.linspace(0, len(flow.time) - 1, nodes + 1).astype(int)[1:]
+    for node in chosen:
+        short = UnitFlow(LinearFlow(FRAME, cuts.names, float(flow.time[node]), float(flow.time[node]), Exact()), cuts)
+        for side, bound in ((1, truth.upper), (-1, truth.lower)):
+            found, _, used = CutOptimisation(optimiser).bound(short, 0, node=1, output=output, side=side)
+            error, calls = max(error, abs(float(found) - float(bound[0, node, output]))), calls + used
+    share = len(flow.time) * len(flow.outputs) / nodes
+    spent = time.perf_counter() - begun
+    return {"method": f"SciPy {optimiser}", "error_m": error, "trajectories": round(share * calls), "seconds": share * spent}
+
+
 def worst(found: Envelope, truth: Envelope) -> float:
     """Largest deviation of an envelope from the certified one, in m."""
     return float(max(np.abs(found.upper - truth.upper).max(), np.abs(found.lower - truth.lower).max()))
 
 
-def measured(duration: float, step: float, gap: float, methods: list[tuple[str, str, dict[str, Any]]]) -> Iterator[dict[str, Any]]:
+def measured(
+    duration: float, step: float, gap: float, methods: list[tuple[str, str, dict[str, Any]]], optimisers: Sequence[str] = OPTIMISERS
+) -> Iterator[dict[str, Any]]:
     """One row per method: error (m), trajectories and seconds on the support (α = 0)."""
     common: dict[str, Any] = {"duration": duration, "step": step, "alpha": (0,), "integrator": "exact"}
     truth = envelope(FRAME, INPUTS, method="modal", certify=gap, **common)
@@ -49,6 +81,29 @@ def measured(duration: float, step: float, gap: float, methods: list[tuple[str, 
         found = envelope(FRAME, INPUTS, method=method, **options, **common)
         seconds = time.perf_counter() - begun
         yield {"method": name, "error_m": worst(found, truth), "trajectories": found.trajectories, "seconds": seconds}
+    for name, (plan, efforts) in TRANSFORMATIONS.items():
+        for steps in efforts:
+            found = transformed(plan, steps, duration, step)
+            yield {"method": name, "error_m": worst(found, truth), "trajectories": found.trajectories, "seconds": found.seconds}
+    for optimiser in optimisers:
+        yield optimised(truth, duration, step, optimiser, PER_NODE)
+
+
+LOOKS = {  # colours that all readers tell apart (Okabe and Ito), and markers besides
+    "Graph Follower, faithful": ("#e69f00", "o"),
+    "Graph Follower, improved": ("#d55e00", "o"),
+    "modal": ("#0072b2", "s"),
+    "certified": ("black", "*"),
+    "vertex": ("#999999", "v"),
+    "transformation, reduced": ("#cc79a7", "v"),
+    "transformation, general": ("#cc79a7", "^"),
+    "Monte Carlo": ("#56b4e9", "x"),
+    "quasi-Monte Carlo": ("#009e73", "+"),
+    "SciPy L-BFGS-B": ("#7f7f00", "1"),
+    "SciPy differential_evolution": ("#7f7f00", "2"),
+    "SciPy shgo": ("#7f7f00", "3"),
+    "SciPy direct": ("#7f7f00", "4"),
+}
 
 
 def draw(rows: list[dict[str, Any]], path: Path) -> None:
@@ -58,16 +113,18 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(1, 2, figsize=(11, 4.5), sharey=True, layout="constrained")
+    figure, axes = plt.subplots(1, 2, figsize=(13, 5), sharey=True, layout="constrained")
     for axis, key, label in ((axes[0], "trajectories", "trajectories or eigen-analyses"), (axes[1], "seconds", "wall time, s")):
         for name in dict.fromkeys(row["method"] for row in rows):
-            points = [(row[key], row["error_m"]) for row in rows if row["method"] == name]
-            axis.loglog(*zip(*points, strict=True), "o-", label=name)
+            points = [(row[key], max(row["error_m"], 1e-7)) for row in rows if row["method"] == name]
+            colour, marker = LOOKS[name]
+            axis.loglog(*zip(*points, strict=True), color=colour, marker=marker, markersize=8, label=name)
         axis.set_xlabel(label)
         axis.grid(alpha=0.3)
     axes[0].set_ylabel("largest envelope error, m")
-    axes[1].legend(fontsize=8)
-    figure.savefig(path)
+    figure.legend(*axes[1].get_legend_handles_labels(), loc="outside right center", fontsize=9)
+    for ending in (".svg", ".png"):
+        figure.savefig(path.with_suffix(ending), dpi=150)
     plt.close(figure)
 
 
@@ -82,7 +139,7 @@ def main() -> None:
     rows = []
     for row in measured(options.duration, options.step, options.gap, METHODS):
         rows.append(row)
-        print(f"{row['method']:26s} {row['trajectories']:7d} runs {row['seconds']:8.2f} s  error {row['error_m']:.2e} m", flush=True)
+        print(f"{row['method']:28s} {row['trajectories']:8d} runs {row['seconds']:8.2f} s  error {row['error_m']:.2e} m", flush=True)
     with (RESULTS / "frame_envelopes.csv").open("w", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]))
         writer.writeheader()

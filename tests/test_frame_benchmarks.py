@@ -13,9 +13,11 @@ from frame.beam_frame import BeamFrame
 
 def test_envelope_benchmark_ranks_the_methods(tmp_path: Path) -> None:
     wanted = [m for m in frame_envelopes.METHODS if m[1] in ("modal", "vertex", "improved-graph-follower")]
-    rows = list(frame_envelopes.measured(8.0, 0.1, 1e-6, wanted))
+    rows = list(frame_envelopes.measured(8.0, 0.1, 1e-6, wanted, ("L-BFGS-B",)))
     error = {row["method"]: row["error_m"] for row in rows}
-    assert error["modal"] < error["Graph Follower, improved"] < error["vertex"]
+    assert error["modal"] < error["Graph Follower, improved"] < error["transformation, general"] < error["vertex"]
+    assert error["SciPy L-BFGS-B"] < 1e-4
+    assert set(error) <= set(frame_envelopes.LOOKS)
     frame_envelopes.draw(rows, tmp_path / "figure.svg")
     assert (tmp_path / "figure.svg").stat().st_size > 1000
 
