@@ -29,7 +29,8 @@ def over_time(found: xarray.Dataset) -> Figure:
     grid[0].fill_between(time, 0, width, color="#cfe3f0", lw=0)
     grid[0].plot(time, width, color=BLUE, lw=1)
     grid[0].set_ylim(bottom=0)
-    prefix_axis(grid[0], f"width of {output}", output_unit(output))
+    prefix_axis(grid[0], "width", output_unit(output))
+    grid[0].set_title(f"width of {output} at the lowest α, and shares of it", loc="left", fontsize=10)
     for index, name in enumerate(found["input"].values):
         colour, dashes = COLOURS[index % len(COLOURS)], STYLES[(index // len(COLOURS)) % len(STYLES)]
         share = found["share"].sel(output=output, input=name).where(width > SEEN * width.max())

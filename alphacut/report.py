@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import html
 import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from string import Template
@@ -41,7 +42,7 @@ def page(summary: Mapping[str, Any], folder: Path) -> str:
     return Template(text["html"]).substitute(
         title=html.escape(summary["title"]),
         name=html.escape(summary["case"]),
-        about=html.escape(" ".join(summary.get("about", "").split())),
+        about=re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(" ".join(summary.get("about", "").split()))),
         banner=f'<p class="banner">{html.escape(banner(summary["quick"]))}.</p>' if "quick" in summary else "",
         css=text["css"],
         js=text["js"],
