@@ -39,6 +39,7 @@ charts:
 	$(IN) python -m benchmarks.cell_charts
 	$(IN) python -m benchmarks.frame_integrators
 	$(IN) python -m benchmarks.frame_envelopes
+	$(IN) python -m benchmarks.frame_failures
 
 stability:
 	$(IN) python -m benchmarks.cell_stability

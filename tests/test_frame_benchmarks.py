@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import frame_certificate, frame_envelopes, frame_integrators, frame_tower
+from benchmarks import frame_certificate, frame_envelopes, frame_failures, frame_integrators, frame_tower
 from frame import INTEGRATORS
 from frame.beam_frame import BeamFrame
 
@@ -48,3 +48,13 @@ def test_certificate_benchmark_finds_no_trajectory_outside() -> None:
     assert row["gap"] <= 1.001e-6
     assert row["outside"] < 0
     assert row["beyond_inner"] < 1e-6
+
+
+def test_failures_grow_with_the_width_of_the_supports(tmp_path: Path) -> None:
+    rows = list(frame_failures.measured([(2, 0.02), (2, 0.2)], duration=4.0, every=1.0))
+    assert {row["method"] for row in rows} == set(frame_failures.METHODS)
+    assert len(rows) == 2 * 2 * 5
+    assert max(row["error_m"] for row in rows) < 0.05
+    assert frame_failures.inputs(16, 0.1)["v1_0"].cut(0) == pytest.approx((-0.05, 0.05))
+    frame_failures.draw(rows, rows, tmp_path / "figure.png")
+    assert (tmp_path / "figure.png").stat().st_size > 1000
