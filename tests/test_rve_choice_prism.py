@@ -14,7 +14,7 @@ PAPER, MATRIX, INCLUSION = HermiteMap(0.1337, 0.1, 0.8663, 0.1692), Phase(20e9, 
 def test_the_estimate_is_below_the_tolerance_and_above_the_error(tolerance):
     (found,) = refined_prism(PAPER, MATRIX, [INCLUSION], tolerance=tolerance)
     (exact,) = SeriesModel().solve(PAPER, MATRIX, [INCLUSION])
-    assert abs(found .modulus / exact.modulus - 1) <= found.estimated_error <= tolerance
+    assert abs(found.modulus / exact.modulus - 1) <= found.estimated_error <= tolerance
     assert "mesh size" in found.reason
 
 
