@@ -38,7 +38,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     for warning in warnings:
         say(warning)
     if options.json != "-" and not options.quiet:
-        period = f"; first natural period {found.period:.3g} s" if found.period else ""
+        about = "about " if "modulus" in case.stages else ""  # the modulus is yet to be computed
+        period = f"; first natural period {about}{found.period:.3g} s" if found.period else ""
         out.write(f"{options.case}: no problems; stages {', '.join(case.stages)}; {case.text('title')}{period}\n")
     return 0
 
