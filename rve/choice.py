@@ -97,7 +97,7 @@ class AutoModel:
             from rve.choice_prism import refined_prism
 
             results = refined_prism(radius_map, matrix, inclusions, tolerance=self.tolerance)
-        worst = max(r.estimated_error for r in results)
+        worst = max((r.estimated_error for r in results), default=0.0)
         if not worst <= self.tolerance:
             raise ChoiceError(f"its estimated error is {worst:.1e}")
         return results

@@ -81,6 +81,10 @@ def test_reason_names_model_tolerance_and_what_was_excluded():
     assert AutoModel(1e-3).solve(PAPER, MATRIX, [Phase(80e9)])[0].method == "series"
 
 
+def test_no_inclusions_give_no_results():
+    assert AutoModel(1e-3).solve(PAPER, MATRIX, []) == []
+
+
 class Touching:
     """Particles that all but touch at every θ."""
 
