@@ -65,6 +65,8 @@ class AutoModel:
         Raises:
             ChoiceError: No model left reaches the tolerance.
         """
+        if not inclusions:
+            return []
         refusals: list[str] = []
         for name in ORDER:
             if name in self.exclude:
@@ -97,7 +99,7 @@ class AutoModel:
             from rve.choice_prism import refined_prism
 
             results = refined_prism(radius_map, matrix, inclusions, tolerance=self.tolerance)
-        worst = max((r.estimated_error for r in results), default=0.0)
+        worst = max(r.estimated_error for r in results)
         if not worst <= self.tolerance:
             raise ChoiceError(f"its estimated error is {worst:.1e}")
         return results
