@@ -74,8 +74,10 @@ def summary(result: Homogenised) -> str:
     """The result in a few lines for people."""
     s11, s12 = (stress / cell.GPA for stress in result.curve.mean)
     seconds = ", ".join(f"{name} {value:.3f}" for name, value in result.seconds.items())
+    parts = ", ".join(f"{name} {value:.1e}" for name, value in result.error.items())
+    error = f"estimated relative error of E: {result.estimated_error:.1e} ({parts})\n" if parts else ""
     return (
-        f"E = {result.modulus / cell.GPA:.6f} GPa, nu = {result.poisson:.6f} (eq. 16)\n"
+        f"E = {result.modulus / cell.GPA:.6f} GPa, nu = {result.poisson:.6f} (eq. 16)\n{error}"
         f"mean s11 = {s11:.9f} GPa, mean s12 = {s12:.9f} GPa\n"
         f"{result.method}, {result.unknowns} unknowns, {result.solver}, iterations {', '.join(map(str, result.iterations)) or 'none'}\n"
         f"seconds: {seconds}\n"

@@ -150,7 +150,9 @@ def summary(found: Envelope) -> str:
     from frame.outcomes import peaks
 
     of = peaks(found)
-    ends = zip(found.outputs, found.minimum[0], found.maximum[0], of.lower[0], of.upper[0], strict=True)
+    low = found.lower if found.outer_lower is None else found.outer_lower  # what is proved, where there is a proof
+    high = found.upper if found.outer_upper is None else found.outer_upper
+    ends = zip(found.outputs, low[0].min(0), high[0].max(0), of.lower[0], of.upper[0], strict=True)
     rows = [(name, *(engineering(float(value), output_unit(name)) for value in values)) for name, *values in ends]
     lines = [f"{name:>14}  {low:>12}  {high:>12}   {least} … {most}\n" for name, low, high, least, most in rows]
     effort = "eigen-analyses" if found.method == "modal" else "trajectories"

@@ -118,7 +118,8 @@ ENVELOPE = Section(
         ),
         "relative_tolerance": Key("the same as a share of each output's peak, in place of tolerance", "number", allowed=UNIT),
         "certify": Key(
-            "gap within which the bounds of a linear structure, up to six inputs fuzzy, are enclosed and proved; no proof if left out",
+            "gap within which the bounds of a linear structure, up to six inputs fuzzy, are enclosed and proved, of the first output; "
+            "for outputs of other units the same share of their peaks; minutes of computing; no proof if left out",
             "number",
             "m",
             allowed=POSITIVE,

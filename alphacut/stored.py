@@ -39,7 +39,7 @@ def require_known(version: object, path: Path, *, key: str, maker: str = "") -> 
         raise BadInput(Problem(key, f"{path} has format {whole}{made}; this program reads formats up to {FORMAT}", allowed=cure))
 
 
-def read_dataset(path: Path, *, key: str = "file") -> xarray.Dataset:
+def read_dataset(path: Path | str, *, key: str = "file") -> xarray.Dataset:
     """A NetCDF file of this program, whole in memory.
 
     Raises:
@@ -47,6 +47,7 @@ def read_dataset(path: Path, *, key: str = "file") -> xarray.Dataset:
     """
     import xarray
 
+    path = Path(path)
     if not path.is_file():
         raise BadInput(Problem(key, "there is no such file", str(path), hint(path)))
     try:

@@ -27,6 +27,8 @@ PORTION = 0.2
 """Share of the gap that the error of the modal model may take on either side."""
 ATTEMPTS = 5
 """Models of rising degree that are tried before the error is sampled instead of proved."""
+SEARCHED = 0.1
+"""Share of the time that the search takes before the proof begins, for the progress alone."""
 PROVED = "the error of its polynomials is bounded over the whole box by the energy of what they miss in the equations of motion"
 
 
@@ -89,7 +91,9 @@ def _certified(flow: UnitFlow, method: Modal, gap: float, begun: float, progress
     assert isinstance(flow.flow, LinearFlow)
     require_certifiable(len(flow.boxes.names))
     model, error, unproved = _model_with_error(flow.flow, flow, method, gap)
-    bounds, at = search_levels(model, ModalSearch(seed=method.seed), None)
+    searched = progress and (lambda share: progress(SEARCHED * share))
+    proved = progress and (lambda share: progress(SEARCHED + (1 - SEARCHED) * share))
+    bounds, at = search_levels(model, ModalSearch(seed=method.seed), searched)
     proof = certify(
         model,
         bounds,
@@ -99,7 +103,7 @@ def _certified(flow: UnitFlow, method: Modal, gap: float, begun: float, progress
         scale=flow.scale,
         workers=method.workers,
         budget=method.boxes,
-        progress=progress,
+        progress=proved,
     )
     facts: dict[str, float | str] = {"model_error": float((error / flow.scale).max()), "degree": model.degree, "gap": proof.gap}
     facts |= {

@@ -40,7 +40,7 @@ def degrees(system: LinearSystem, box: Box) -> dict[str, int]:
 
 @degrees.register
 def _(system: StoreyFrame, box: Box) -> dict[str, int]:
-    if getattr(system, "ratios", ()):
+    if system.damping_ratio:
         raise UnprovedError("damping by modal ratios is no polynomial in the parameters")
     for name, (lower, _) in box.items():
         if (name[0] == "d" or name.startswith("rayleigh")) and lower < 0:

@@ -121,6 +121,14 @@ class FuzzyResult:
         notes = tuple(f"the samples contradict what is stated of {name}: its bounds are inner only" for name in refuted)
         return replace(self, proved=self.proved | (proved & ~self.enforced.any(axis=0)), notes=(*self.notes, *notes))
 
+    def __str__(self) -> str:
+        """The bounds of every output, a line for each level, with what they are worth and what they cost."""
+        lines = [f"{self.nature} bounds by the plan {self.plan}, {self.runs} runs"]
+        for column, name in enumerate(self.outputs):
+            cuts = zip(self.domain.alpha, self.lower[:, column], self.upper[:, column], strict=True)
+            lines += [f"{name}, α = {alpha:g}: {low:.6g} … {high:.6g}" for alpha, low, high in cuts]
+        return "\n".join([*lines, *self.notes])
+
     @property
     def nature(self) -> Nature:
         """What the bounds are worth: the weakest over all levels and outputs."""

@@ -97,6 +97,9 @@ def test_structures_that_may_gain_energy_or_are_no_polynomials_are_refused() -> 
         degrees(CHAIN, {"d": (-0.1, 0.1)})
     with pytest.raises(UnprovedError, match="symmetric"):
         degrees(replace(CHAIN, stiffness=[("k", np.array([[2.0, 1.0], [0.0, 1.0]]))]), box)
+    for damped in (replace(CHAIN, ratios=(0.05,)), replace(FRAME, damping_ratio=0.05)):
+        with pytest.raises(UnprovedError, match="modal ratios"):
+            degrees(damped, {})
     with pytest.raises(UnprovedError, match="nothing is known"):
         degrees(object(), box)  # type: ignore[arg-type]
 
