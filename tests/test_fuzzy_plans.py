@@ -84,16 +84,6 @@ def truth():
 
 @pytest.mark.parametrize("problem", PROBLEMS)
 @pytest.mark.parametrize("plan", EXACT)
-def test_a_result_prints_a_line_for_each_level_and_what_they_are_worth():
-    found = propagate(lambda a: 2 * a, {"a": Triangular(1, 2, 4)}, alpha=[0.0, 0.5, 1.0])
-    assert str(found).splitlines() == [
-        f"inner bounds by the plan general, {found.runs} runs",
-        "y, α = 0: 2 … 8",
-        "y, α = 0.5: 3 … 6",
-        "y, α = 1: 4 … 4",
-    ]
-
-
 def test_searching_plans_find_the_brute_force_bounds(problem, plan, truth):
     function, inputs = PROBLEMS[problem]
     result = propagate(function, inputs, EXACT[plan], vectorised=True)
@@ -269,3 +259,13 @@ def test_a_campaign_beyond_memory_is_refused_before_it_starts():
     message = r"samples of 20 inputs and outputs need [\d.e+]+ GB of memory and [\d.]+ GB are free; take fewer levels"
     with pytest.raises(ValueError, match=message):
         propagate(lambda **x: 0.0, inputs, General())
+
+
+def test_a_result_prints_a_line_for_each_level_and_what_they_are_worth():
+    found = propagate(lambda a: 2 * a, {"a": Triangular(1, 2, 4)}, alpha=[0.0, 0.5, 1.0])
+    assert str(found).splitlines() == [
+        f"inner bounds by the plan general, {found.runs} runs",
+        "y, α = 0: 2 … 8",
+        "y, α = 0.5: 3 … 6",
+        "y, α = 1: 4 … 4",
+    ]
