@@ -73,6 +73,23 @@ def study_of(case: Case) -> Study:
         raise BadInput(Problem("microstructure", str(error), file=str(case.path))) from None
 
 
+def require_readable(case: Case) -> None:
+    """Read the file of circles that a case names, if it does.
+
+    Raises:
+        BadInput: It cannot be read, or holds what makes no sense.
+    """
+    from stochastic.sections import Measured
+
+    given = source(case)
+    if not (isinstance(given, Measured) and case.has("microstructure.circles.file")):
+        return
+    try:
+        given.file.read()
+    except ValueError as error:
+        raise BadInput(Problem("microstructure.circles.file", str(error), file=str(case.path))) from None
+
+
 def compute(case: Case, *, workers: int = 1, progress: Tick | None = None) -> Microstructure:
     """From particles to the fuzzy radius map; the same for any number of workers.
 

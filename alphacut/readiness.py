@@ -42,9 +42,10 @@ def ready(case: Case) -> Readiness:
         BadInput: It cannot: a stage lacks what it needs, a file is broken, an input named as fuzzy is crisp.
     """
     if "microstructure" in case.stages:
-        from alphacut.microstructure import study_of
+        from alphacut.microstructure import require_readable, study_of
 
         study_of(case)
+        require_readable(case)
     stand_in = modulus.stand_in(case) if "modulus" in case.stages or replaced(case) else None
     if "envelope" not in case.stages:
         return Readiness()

@@ -133,9 +133,8 @@ def _columns(header: list[str], unit: str, path: Path) -> list[tuple[int, float]
             named["r" if name == "d" else name] = (place, factor)
     missing = [name for name in COLUMNS if name not in named]
     if missing:
-        raise ValueError(
-            f"{path}: the header {', '.join(map(str.strip, header))!r} has no column {', '.join(missing)}; it needs x, y and r (or d)"
-        )
+        told = f"the header {', '.join(map(str.strip, header))!r} has no column {', '.join(missing)}"
+        raise ValueError(f"{path}: {told}; it needs x, y and r (or d), with units: 'x [mm], y [mm], d [mm]'")
     return [named[name] for name in COLUMNS]
 
 

@@ -92,3 +92,20 @@ def test_a_coarse_step_is_warned_of(tmp_path, capfd):
 @pytest.mark.parametrize("path", [path for path in sorted(CASES.glob("*.toml")) if ".quoted" not in path.name], ids=lambda path: path.stem)
 def test_the_shipped_cases_are_ready(path, capfd):
     assert warnings(path, capfd=capfd) == []
+
+
+@pytest.mark.parametrize("command", ["check", "run"])
+def test_a_file_of_circles_is_read_before(command, tmp_path, capfd):
+    text = (CASES / "concrete.toml").read_text(encoding="utf-8")
+    start = text.index("[microstructure.packing]")
+    end = text.index("\n[", start)
+    circles = '[microstructure.circles]\nfile = "d.csv"\nsize = ["50 mm", "50 mm"]\n'
+    path = tmp_path / "own.toml"
+    path.write_text(text[:start] + circles + text[end:], encoding="utf-8")
+    (tmp_path / "d.csv").write_text("d [mm]\n3\n4\n", encoding="utf-8")
+    more = ["--out", str(tmp_path / "results")] if command == "run" else []
+    assert main([command, str(path), *more]) == 2
+    told = capfd.readouterr().err
+    assert "microstructure.circles.file" in told
+    assert "has no column x, y" in told
+    assert "'x [mm], y [mm], d [mm]'" in told
