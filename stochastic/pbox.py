@@ -167,7 +167,6 @@ def _least_breach(matrix: Array, right: Array, monotone: Array, rising: Array, c
         bounds=[*core, (0, None)],
     )
     if result.status != 0:
-        raise RefusedError(
-            "the slopes that the supports must hold make maps that are not monotone; use more data, or hold less: a lower confidence of the band"
-        )
+        cure = "use more data, or hold less: a lower confidence of the band"
+        raise RefusedError(f"the slopes that the supports must hold make maps that are not monotone; {cure}")
     return int(np.argmax(matrix @ result.x[:4] - right)), float(result.x[4])
