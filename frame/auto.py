@@ -72,7 +72,7 @@ def auto(
 
 def _followed(flow: UnitFlow, tolerance: float, budget: int, progress: Progress | None) -> Envelope | None:
     """The Graph Follower, begun with more points until an independent sample agrees."""
-    spread, strict, used = 64, tolerance / 3, 0
+    spread, strict, used = 256, tolerance / 4, 0
     for attempt in range(4):
         found = pursue(flow, progress, tolerance=strict, budget=budget, spread=spread)
         used += found.trajectories
