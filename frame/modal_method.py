@@ -80,7 +80,7 @@ def modal(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> E
     if method.certify is not None:
         return _certified(flow, method, method.certify, begun, progress)
     model = fit_modes(flow.flow, flow.boxes, tolerance=method.tolerance, budget=method.budget, scale=flow.scale)
-    bounds, at = search_levels(model, ModalSearch(seed=method.seed), progress)
+    bounds, at = search_levels(model, ModalSearch.suited(model, method.seed), progress)
     facts: dict[str, float | str] = {"model_error": float(model.error.max()), "degree": model.degree}
     error = np.broadcast_to(2 * model.error, bounds.shape[:-1]).copy()
     cost = {"trajectories": model.analyses, "seconds": time.perf_counter() - begun}
@@ -93,7 +93,7 @@ def _certified(flow: UnitFlow, method: Modal, gap: float, begun: float, progress
     model, error, unproved = _model_with_error(flow.flow, flow, method, gap)
     searched = progress and (lambda share: progress(SEARCHED * share))
     proved = progress and (lambda share: progress(SEARCHED + (1 - SEARCHED) * share))
-    bounds, at = search_levels(model, ModalSearch(seed=method.seed), searched)
+    bounds, at = search_levels(model, ModalSearch.suited(model, method.seed), searched)
     proof = certify(
         model,
         bounds,

@@ -19,6 +19,8 @@ RIVAL = 0.05
 """Share of the largest bound by which a rival basin may lie behind and still be followed."""
 
 
+CALM = 20.0
+"""Change of phase (rad) over the box up to which the least effort finds the basins."""
 PIECE = 2000
 """Problems treated together; more would leave the cache."""
 
@@ -73,6 +75,15 @@ class ModalSearch:
     iterations: int = 10
     resolution: float = 0.25
     seed: int = 0
+
+    @classmethod
+    def suited(cls, model: ModalModel, seed: int = 0) -> ModalSearch:
+        """More samples and starts where phases vary much over the box: the more turns, the more basins."""
+        middle, rest = model.eigenvalue.coefficients[0], model.eigenvalue.coefficients[1:]
+        lasting = np.minimum(model.time[-1], 5 / np.maximum(-middle.real, 1e-300))  # a mode that has died down has no basins
+        turned = float((np.abs(rest).sum(0) * lasting).max())  # rad
+        more = int(np.clip(np.log2(max(turned, 1.0) / CALM), 0, 2))
+        return cls(samples=512 * 2**more, starts=2 + more, seed=seed)
 
     def run(self, model: ModalModel, lower: Array, upper: Array, extra: Array) -> tuple[Array, Array]:
         """Upper bounds of (−output, output) and their unit coordinates.
