@@ -33,6 +33,8 @@ def cell_model(choice: CellChoice) -> CellModel:
     module, maker = MODELS[choice.method]
     try:
         known = {field.name for field in fields(getattr(import_module(module), maker))}
+        if choice.method in ("slices", "prism") or (choice.method == "auto" and "series" in choice.exclude):
+            import_module("rve.planar")  # DOLFINx is loaded before the clock starts: times are those of computing
     except ImportError as error:
         what = f"this model cannot be loaded ({error}); ./enter brings an environment that has everything"
         raise BadInput(Problem("modulus.method", what, choice.method, "series needs NumPy and SciPy alone")) from None
