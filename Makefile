@@ -9,7 +9,10 @@ WORKERS ?= 2
 OUT ?= results/$(basename $(notdir $(CASE)))
 IN = ./enter
 
-.PHONY: run test test-slow coverage lint charts bench-solver bench-scaling stability docs pictures clean clean-env
+help:
+	@sed -n 's/^# //p' Makefile
+
+.PHONY: help run test test-slow coverage lint charts bench-solver bench-scaling stability docs pictures clean clean-env
 
 run:
 	$(IN) python -m alphacut run $(CASE) --out $(OUT) --workers $(WORKERS) $(if $(FRESH),--fresh)

@@ -61,7 +61,10 @@ class Case:
         """The value of a key that this command cannot do without."""
         if not self.has(key):
             section = key.rpartition(".")[0]
-            raise BadInput(Problem(key, f"missing; this command needs section [{section}]", file=str(self.path)))
+            what = f"missing; this command needs section [{section}]"
+            if section == "radius" and "microstructure" in self.stages:
+                what += f": alphacut microstructure {self.path.name} --out FOLDER makes it from the particles, in FOLDER/radius.toml"
+            raise BadInput(Problem(key, what, file=str(self.path)))
         return self.values[key]
 
     def fuzzy(self, key: str) -> FuzzyNumber:

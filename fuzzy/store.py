@@ -55,6 +55,8 @@ class Store:
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self._database: sqlite3.Connection | None = None
+        if self.path.is_dir():
+            raise ValueError(f"{self.path} is a folder; give the store a file in it, such as {self.path / 'samples.db'}")
         with self.reported():
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._database = sqlite3.connect(self.path, timeout=_PATIENCE, isolation_level=None)

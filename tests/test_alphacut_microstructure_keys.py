@@ -4,11 +4,17 @@ from pathlib import Path
 
 import pytest
 
+from alphacut.entry import main
 from alphacut.loading import load
 from alphacut.microstructure import study_of
 from alphacut.problem import BadInput
 
 CONCRETE = Path(__file__).parent.parent / "cases" / "concrete.toml"
+
+
+def test_a_cell_without_a_radius_map_tells_where_it_comes_from(capfd):
+    assert main(["cell", str(CONCRETE), "--set", "modulus.method=series"]) == 2
+    assert "alphacut microstructure concrete.toml --out FOLDER makes it from the particles" in capfd.readouterr().err
 
 
 def test_band_and_sampling_reach_the_study():

@@ -249,6 +249,11 @@ def test_interrupting_keeps_what_is_done(tmp_path):
     assert propagate(model, INPUTS, store=tmp_path / "s.db", identity=IDENTITY).reused == 20
 
 
+def test_a_folder_is_no_store(tmp_path):
+    with pytest.raises(ValueError, match="is a folder; give the store a file in it"):
+        Store(tmp_path)
+
+
 def test_foreign_and_future_files_are_refused(tmp_path):
     (tmp_path / "text").write_text("no database at all, but long enough to be read as one" * 20)
     with pytest.raises(ValueError, match="text is no store of samples"):
