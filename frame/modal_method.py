@@ -140,6 +140,10 @@ def _model_with_error(linear: LinearFlow, flow: UnitFlow, method: Modal, gap: fl
     model = first = fitted(min(method.tolerance, gap / 30))
     reason = ""
     for _ in range(ATTEMPTS):
+        sampled = float((model.error / flow.scale).max())
+        if sampled > PORTION * gap:  # no bound can be less
+            reason = f"its sampled part alone, {sampled:.2g}, takes too much of the gap {gap:g}"
+            break
         try:
             error = proved_error(model)
         except UnprovedError as unknown:
@@ -149,8 +153,10 @@ def _model_with_error(linear: LinearFlow, flow: UnitFlow, method: Modal, gap: fl
         if largest <= PORTION * gap:
             return model, error, ""
         reason = f"its bound, {largest:.2g}, takes too much of the gap {gap:g}"
-        sampled = float((model.error / flow.scale).max())
-        model = fitted(sampled * min(0.99, 4 * PORTION * gap / largest))  # a degree more divides the bound by ten or so
+        finer = fitted(sampled * min(0.99, 4 * PORTION * gap / largest))  # a degree more divides the bound by ten or so
+        if finer.degree <= model.degree:
+            break
+        model = finer
     return first, SAFETY * first.error, reason
 
 
