@@ -74,7 +74,7 @@ def _followed(flow: UnitFlow, tolerance: float, budget: int, progress: Progress 
     """The Graph Follower, begun with more points until an independent sample agrees."""
     spread, strict, used = 256, tolerance / 4, 0
     for attempt in range(4):
-        found = pursue(flow, progress, tolerance=strict, budget=budget, spread=spread)
+        found = pursue(flow, progress, tolerance=strict, budget=budget, spread=spread, contests=3)
         used += found.trajectories
         if "reason" in found.facts:
             return None

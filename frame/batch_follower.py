@@ -35,6 +35,7 @@ class BatchFollower:
         batch: Graphs computed together.
         reach: Trust region of a Taylor model, as a share of the half width of the box.
         order: Degree κ of the Taylor models, which must be 2.
+        contests: How often, when no model promises more, those of neighbouring nodes are asked where the optimum jumps in between.
 
     Raises:
         ValueError: A switch is out of its range.
@@ -46,6 +47,7 @@ class BatchFollower:
     batch: int = 32
     reach: float = 0.6
     order: int = 2
+    contests: int = 0
 
     def __post_init__(self) -> None:
         if not (self.tolerance > 0 and np.isfinite(self.tolerance)):
@@ -63,13 +65,17 @@ class BatchFollower:
             lower, upper = flow.boxes.unit(level)
             out.enter(level, lower, upper, self)
             limit = self.budget * (done + 1) // levels
-            points = self._start(flow, lower, upper, out)[: max(1, limit - len(out.points))]
+            points, contests = self._start(flow, lower, upper, out)[: max(1, limit - len(out.points))], self.contests
             while len(points):
                 for chunk in np.array_split(points, -(-len(points) // self.batch)):
                     out.take(chunk, self)
                 if progress:
                     progress(min(1.0, len(out.points) / self.budget))
                 points = out.proposals(self, min(self.batch, limit - len(out.points)))
+                while not len(points) and contests and len(out.points) < limit:
+                    out.contest(self)
+                    contests -= 1
+                    points = out.proposals(self, min(self.batch, limit - len(out.points)))
             out.leave(level)
         return out
 
@@ -154,13 +160,40 @@ class Pursuit:
             signed = np.stack([-jet.value[s], jet.value[s]], -1)
             better = signed > self.value
             self.value[better], self.at[better] = signed[better], point
-            self._propose(point, jet, s, signed, signed >= self.value)
+            self._propose(point, jet, s, signed >= self.value)
 
-    def _propose(self, point: Array, jet: Jet, s: int, signed: Array, close: Array) -> None:
+    def contest(self, method: BatchFollower) -> None:
+        """Asks the models of the graphs that hold a bound at one node about the next node, where another basin holds it."""
+        rivals: dict[bytes, list[tuple[int, int, int]]] = {}
+        for here, there in ((slice(1, None), slice(None, -1)), (slice(None, -1), slice(1, None))):
+            jumps = np.abs(self.at[here] - self.at[there]).max(-1) > JUMP * (self.upper - self.lower).max()
+            for t, o, side in np.argwhere(jumps):
+                place = (int(t) + (here.start or 0), int(o), int(side))
+                rivals.setdefault(self.at[there][t, o, side].tobytes(), []).append(place)
+        points = np.array([np.frombuffer(key) for key in rivals]).reshape(-1, self.at.shape[-1])
+        for chunk, keys in zip(_batches(points, method.batch), _batches(np.array(list(rivals), object), method.batch), strict=True):
+            jet = self.flow.taylor(chunk)
+            self.points = np.vstack([self.points, chunk])
+            for s, key in enumerate(keys):
+                self._challenge(chunk[s], jet, s, np.array(rivals[key]))
+
+    def _challenge(self, point: Array, jet: Jet, s: int, places: Array) -> None:
+        """Lets the model of one graph promise at `places` (K, 3), where that is more than is promised there."""
+        t, o, side = places.T
+        promised, target = self._optima(point, jet, s, (t, o, side))
+        more = promised > self.promise[t, o, side]
+        self.promise[t[more], o[more], side[more]], self.target[t[more], o[more], side[more]] = promised[more], target[more]
+
+    def _propose(self, point: Array, jet: Jet, s: int, close: Array) -> None:
         """Optima of the model of one graph where it is best; they replace what the model of the former best promised."""
         t, o, side = np.nonzero(close)
         if not len(t) or not (self.upper > self.lower).any():
             return
+        self.promise[t, o, side], self.target[t, o, side] = self._optima(point, jet, s, (t, o, side))
+
+    def _optima(self, point: Array, jet: Jet, s: int, places: tuple[Array, Array, Array]) -> tuple[Array, Array]:
+        """What the model of one graph promises at K places, shape (K,), and where, shape (K, d)."""
+        t, o, side = places
         sign = 2.0 * side - 1
         g = (jet.first[:, s, t, o] * sign).T
         H = np.moveaxis(jet.second[:, :, s, t, o] * sign, -1, 0)
@@ -170,8 +203,7 @@ class Pursuit:
         rows = (len(t), len(point))
         maximise = global_maximum if len(point) <= 4 else local_maximum
         x = maximise(g, H, np.broadcast_to(low, rows), np.broadcast_to(high, rows))
-        promised = signed[t, o, side] + gain(g, H, x)
-        self.promise[t, o, side], self.target[t, o, side] = promised, point + x
+        return jet.value[s, t, o] * sign + gain(g, H, x), point + x
 
     def proposals(self, method: BatchFollower, count: int) -> Array:
         """The most promising point of every window of time, apart from the others and from all graphs computed, shape (≤ count, d)."""
@@ -192,6 +224,12 @@ class Pursuit:
         return np.array(chosen)[:count].reshape(-1, len(self.lower))
 
 
+def _batches(array: Array, size: int) -> list[Array]:
+    return [array[k : k + size] for k in range(0, len(array), size)]
+
+
+JUMP = 0.05
+"""Share of the box's width from which on optima of neighbouring nodes lie in different basins."""
 TRIES = 40
 """Proposals looked at per window of time."""
 SPACING = 0.02

@@ -154,3 +154,16 @@ def test_outputs_of_different_units_get_their_own_tolerance() -> None:
     alone = envelope(replace(FRAME, outputs=("q3",)), E, duration=4, step=0.05, alpha=(0,), method="graph-follower")
     assert mixed.trajectories < 6 * alone.trajectories
     assert mixed.to_dataset()["lower"].attrs["units"] == "SI, by output"
+
+
+def test_a_contest_between_neighbouring_nodes_finds_a_basin_that_every_model_missed() -> None:
+    from benchmarks.frame_random import TIME, random_frame
+
+    frame, inputs = random_frame(12)
+    short = {**TIME, "duration": 9.6}  # the node that was missed is at 9.5 s
+    truth = envelope(frame, inputs, method="modal", tolerance=1e-6, **short)
+    common = {"method": "improved-graph-follower", "integrator": "exact", "tolerance": 2.5e-5, "spread": 256, **short}
+    plain, contested = (envelope(frame, inputs, contests=n, **common) for n in (0, 3))
+    errors = [max(np.abs(e.upper - truth.upper).max(), np.abs(e.lower - truth.lower).max()) for e in (plain, contested)]
+    assert errors[0] > 2e-4
+    assert errors[1] < 5e-5
