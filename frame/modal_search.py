@@ -128,7 +128,7 @@ class ModalSearch:
             changed = np.zeros(len(found.value), bool)
             for shift in (1, 2, 4, 8, 16, 32):
                 for here, there in ((grid[shift:], grid[:-shift]), (grid[:-shift], grid[shift:])):
-                    new = fresh[there.ravel()]
+                    new = (fresh | changed)[there.ravel()]
                     changed[found.offer(model, found.point[there.ravel()[new]], here.ravel()[new])] = True
             again = np.flatnonzero(changed)
             if not len(again):

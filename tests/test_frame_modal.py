@@ -162,3 +162,27 @@ def test_step_error_is_kept_apart() -> None:
     assert float(found.facts["step_error"]) == pytest.approx(0.51e-3, abs=0.02e-3)
     assert "time stepping" in str(found.facts["dominant_error"])
     assert frame.envelope(FRAME, INPUTS, duration=3, step=0.01, alpha=(1,)).facts["step_error"] == 0
+
+
+def test_what_one_node_finds_reaches_all_others(monkeypatch) -> None:
+    from frame import modal_search
+
+    monkeypatch.setattr(modal_search, "refine", lambda *_: None)
+    offered: list[int] = []
+
+    class Flat:
+        """The same number of one parameter at every node: highest at 0.7."""
+
+        def value_at(self, unit, node, output):
+            offered.append(len(unit))
+            return -np.abs(unit[:, 0] - 0.7)
+
+    count = 400
+    found = modal_search.problems(np.arange(count), 1, 1)
+    found.value[:] = np.where(found.side > 0, -0.7, -1e9)
+    found.point[found.side > 0] = 0.0
+    first = np.flatnonzero(found.side > 0)[0]
+    found.point[first], found.value[first] = 0.7, 0.0
+    modal_search.ModalSearch()._follow(Flat(), found, count, np.array([-1.0]), np.array([1.0]))
+    assert (found.point[found.side > 0] == 0.7).all()
+    assert sum(offered) < 0.6 * len(offered) * len(found.value)  # only what changed is tried again
