@@ -54,7 +54,7 @@ class LoadTable:
         starts = np.arange(0, len(time) - 1, length)
         window = length * (time[1] - time[0])
         order = max(6, ceil(2.72 * spread * window + 18))
-        left = exp(order * log(max(spread * window, 1e-300)) - lgamma(order + 1) + 2 * spread * window)
+        left = left_out(spread * window, order)
         return cls(middle, 1 / window, _moments(ground, middle, time, starts, window, order), starts, time, share, left)
 
     def values(self, unit: Array, rate: Array) -> Array:
@@ -187,6 +187,11 @@ class LoadTables:
         for table, own in zip(self.tables, self.members, strict=True):
             R[:, own] = table.response_alone(rate[:, own], node)
         return R
+
+
+def left_out(phase: float, order: int) -> float:
+    """Bound of |exp(x τ) − its series of `order` terms| for |x| τ up to `phase`, and of what grows of it until the window's end."""
+    return exp(order * log(max(phase, 1e-300)) - lgamma(order + 1) + 2 * phase)
 
 
 def _divided(share: Polynomial, scale: Array) -> Polynomial:

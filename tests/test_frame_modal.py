@@ -186,3 +186,18 @@ def test_what_one_node_finds_reaches_all_others(monkeypatch) -> None:
     modal_search.ModalSearch()._follow(Flat(), found, count, np.array([-1.0]), np.array([1.0]))
     assert (found.point[found.side > 0] == 0.7).all()
     assert sum(offered) < 0.6 * len(offered) * len(found.value)  # only what changed is tried again
+
+
+def test_wide_boxes_are_searched_with_more_effort() -> None:
+    from frame.modal_search import ModalSearch
+
+    def effort(share: float) -> tuple[int, int]:
+        cuts = boxes({name: Triangular((1 - share) * x, x, (1 + share) * x) for name, x in (("E", 24.7561e9), ("m1", 20e3))}, (0,))
+        suited = ModalSearch.suited(
+            fit_modes(LinearFlow(FRAME, cuts.names, 30 if share < 0.1 else 120, 0.25, Exact()), cuts, tolerance=0.05)
+        )
+        return suited.samples, suited.starts
+
+    assert effort(0.05) == (ModalSearch().samples, ModalSearch().starts)
+    assert effort(0.5)[0] >= 2 * effort(0.05)[0]
+    assert effort(0.5)[1] > effort(0.05)[1]

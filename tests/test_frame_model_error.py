@@ -12,6 +12,7 @@ from frame import Accelerogram, Exact, LinearFlow, MatrixStructure, Midpoint, St
 from frame.box import UnitFlow, boxes
 from frame.chebyshev_grid import ChebyshevGrid
 from frame.modal import ModalModel, fit_modes
+from frame.modal_load import left_out
 from frame.model_error import Comparison, proved_error
 from frame.polynomial import Polynomial
 from frame.polynomial_structure import UnprovedError, degrees, inverse_cube_degree
@@ -212,6 +213,14 @@ def test_waves_and_their_derivatives_stay_below_their_bounds() -> None:
     assert (walked.max(0) <= 1.02 * forced.elapsed + 1e-12).all()
 
 
+@pytest.mark.parametrize(("phase", "order"), [(0.01, 4), (1.0, 8), (6.0, 20), (6.0, 35)])
+def test_remainder_of_the_exponential_series_is_bounded(phase, order) -> None:
+    x = phase * np.exp(1j * np.linspace(0, 2 * np.pi, 25))
+    terms = np.cumprod(np.concatenate([np.ones((1, 25)), x / np.arange(order, order + 40)[:, None]]), axis=0).sum(0) * x**order
+    remainder = np.abs(terms).max() / np.prod(np.arange(1.0, order + 1))
+    assert remainder <= left_out(phase, order) < 1e7 * remainder
+
+
 def test_series_leave_out_of_the_load_response_no_more_than_they_say() -> None:
     found = model(SHAKEN, {"E": Interval(20e9, 30e9)})
     assert found.load is not None
@@ -220,6 +229,7 @@ def test_series_leave_out_of_the_load_response_no_more_than_they_say() -> None:
     every = SHAKEN.ground.intervals(found.flow.step)
     h = found.flow.step / every
     truth = responses(rate, SHAKEN.ground.at(np.arange((len(found.time) - 1) * every + 1) * h), h, every=every)[0]
+    assert found.load.truncation.max() > 0
     bound = found.load.truncation * parts(found, largest_growth(found.eigenvalue, np.ones(1)))[1].waves[0]
     for node in (20, 60, 100):
         got = found.load.response(rate, np.full(len(unit), node))[0]
