@@ -7,7 +7,6 @@ climbed further by exact gradients. Bounds are also computed anew at the paramet
 from __future__ import annotations
 
 import argparse
-import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from scipy.optimize import minimize
 
 from benchmarks.frame_envelopes import RESULTS
 from benchmarks.frame_tower import recorded
+from benchmarks.rows import write
 from frame import Envelope, Exact, LinearFlow, StoreyFrame, envelope
 from frame.box import UnitFlow, boxes
 from frame.jet import Array
@@ -113,10 +113,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             flush=True,
         )
     options.out.mkdir(parents=True, exist_ok=True)
-    with (options.out / "frame_building.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
+    write(rows, options.out / "frame_building.csv")
 
 
 if __name__ == "__main__":

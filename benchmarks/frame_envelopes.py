@@ -6,7 +6,6 @@ Run `python -m benchmarks.frame_envelopes --help`, or from `make charts`.
 from __future__ import annotations
 
 import argparse
-import csv
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.rows import write
 from frame import Envelope, Exact, LinearFlow, StoreyFrame, envelope
 from frame.box import UnitFlow, boxes
 from frame.cut_optimisation import CutOptimisation
@@ -140,10 +140,7 @@ def main() -> None:
     for row in measured(options.duration, options.step, options.gap, METHODS):
         rows.append(row)
         print(f"{row['method']:28s} {row['trajectories']:8d} runs {row['seconds']:8.2f} s  error {row['error_m']:.2e} m", flush=True)
-    with (RESULTS / "frame_envelopes.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
+    write(rows, RESULTS / "frame_envelopes.csv")
     draw(rows, RESULTS / "frame_envelopes.svg")
 
 

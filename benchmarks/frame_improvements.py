@@ -7,13 +7,13 @@ envelope of the same exact trajectories.
 from __future__ import annotations
 
 import argparse
-import csv
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from benchmarks.frame_envelopes import FRAME, INPUTS, RESULTS, worst
+from benchmarks.rows import write
 from frame import envelope
 
 FAITHFUL: Mapping[str, Any] = {"method": "graph-follower", "tolerance": 1e-4}
@@ -67,10 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for row in measured(options.duration, options.step):
         rows.append(row)
         print(f"{row['variant']:26s} {row['graphs']:6d} graphs {row['seconds']:8.2f} s  error {row['error_m']:.2e} m", flush=True)
-    with (options.out / "frame_improvements.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
+    write(rows, options.out / "frame_improvements.csv")
     draw(rows, options.out / "frame_improvements.png")
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import csv
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.frame_envelopes import FRAME, RESULTS
+from benchmarks.rows import write
 from frame import INTEGRATORS, Exact, LinearFlow, StoreyFrame
 from frame.jet import Array
 from frame.linear import evaluate
@@ -120,22 +120,14 @@ def main() -> None:
     drifts, limits = drift(options.steps, 0.01), stability_limits()
     for name, change in drifts.items():
         print(f"{name:10s} energy drift over {options.steps} steps: {change[-1]:.2e}, stable up to ω h = {limits[name]:.3g}")
-    write(RESULTS / "frame_integrators.csv", rows)
+    write(rows, RESULTS / "frame_integrators.csv")
     drifted = [
         {"integrator": n, "steps": int(k), "energy_change": x}
         for n, change in drifts.items()
         for k, x in zip(counts(options.steps), change, strict=True)
     ]
-    write(RESULTS / "frame_integrators_energy.csv", drifted)
+    write(drifted, RESULTS / "frame_integrators_energy.csv")
     draw(rows, drifts, options.steps, RESULTS / "frame_integrators.png")
-
-
-def write(path: Path, rows: list[dict[str, Any]]) -> None:
-    """Rows as CSV."""
-    with path.open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
 
 
 if __name__ == "__main__":

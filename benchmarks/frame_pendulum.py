@@ -16,6 +16,7 @@ import numpy as np
 
 from benchmarks.frame_pendulum_reference import PARAMETERS, Swing
 from benchmarks.frame_reference import PolishedSearch
+from benchmarks.rows import write
 from frame import Envelope, envelope, pendulum
 from frame.jet import Array
 from fuzzy import Triangular
@@ -105,10 +106,7 @@ def main() -> None:
             rows.append(row)
             cost = f"{row['trajectories']:6d} runs {row['seconds']:7.1f} s"
             print(f"{support:7s} {row['method']:26s} {cost}  error {row['error_N']:.2e} N", flush=True)
-    with (RESULTS / "frame_pendulum.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+    write(rows, RESULTS / "frame_pendulum.csv")
 
 
 if __name__ == "__main__":

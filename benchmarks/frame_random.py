@@ -6,7 +6,6 @@ Run `python -m benchmarks.frame_random --help`.
 from __future__ import annotations
 
 import argparse
-import csv
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.frame_reference import true_envelope
+from benchmarks.rows import write
 from frame import Envelope, Exact, LinearFlow, StoreyFrame, envelope
 from frame.box import UnitFlow, boxes
 from fuzzy import FuzzyNumber, Triangular
@@ -115,10 +115,7 @@ def main() -> None:
         )
     kept = [row for row in rows if row["error_m"] <= row["tolerance_m"]]
     print(f"{len(kept)} of {len(rows)} within the tolerance")
-    with (RESULTS / "frame_random.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+    write(rows, RESULTS / "frame_random.csv")
 
 
 if __name__ == "__main__":

@@ -6,13 +6,13 @@ Run `python -m benchmarks.frame_tower --help`.
 from __future__ import annotations
 
 import argparse
-import csv
 import time
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.frame_envelopes import RESULTS
+from benchmarks.rows import write
 from frame import Accelerogram, envelope
 from frame.beam_frame import BeamFrame
 from frame.jet import Array
@@ -92,10 +92,7 @@ def main() -> None:
             f"structure outside by {row['outside']:.2e}, at the bounds off by {row['at_bounds']:.2e} of the peak",
             flush=True,
         )
-    with (RESULTS / "frame_tower.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
+    write(rows, RESULTS / "frame_tower.csv")
 
 
 if __name__ == "__main__":

@@ -6,7 +6,6 @@ Run `python -m benchmarks.frame_wide --help`.
 from __future__ import annotations
 
 import argparse
-import csv
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +15,7 @@ import numpy as np
 
 from benchmarks.frame_envelopes import FRAME, INPUTS
 from benchmarks.frame_reference import TrueEnvelope, true_envelope
+from benchmarks.rows import write
 from frame import Envelope, Exact, LinearFlow, StoreyFrame, envelope
 from frame.box import UnitFlow, boxes
 from fuzzy import FuzzyNumber, Triangular
@@ -96,10 +96,7 @@ def main() -> None:
             f"estimate (median) {row['median_estimate_m']:.2e} m, covers {row['covered']:.1%} of the nodes",
             flush=True,
         )
-    with (RESULTS / "frame_wide.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+    write(rows, RESULTS / "frame_wide.csv")
 
 
 if __name__ == "__main__":
