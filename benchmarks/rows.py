@@ -1,4 +1,4 @@
-"""Tables of results: rows of equal keys to a CSV file."""
+"""Tables of results: rows to a CSV file."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Any
 
 
 def write(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """The rows as CSV, in UTF-8, whole or not at all; makes the folder."""
+    """The rows as CSV, in UTF-8, whole or not at all, a key that a row lacks left empty; makes the folder."""
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_suffix(".partial")
     with partial.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer = csv.DictWriter(file, list(dict.fromkeys(key for row in rows for key in row)), lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
     partial.replace(path)
