@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import cumulative_trapezoid
+from scipy.integrate import cumulative_trapezoid, solve_ivp
 
-from frame import Accelerogram, Exact, LinearFlow, MatrixStructure, Midpoint, StoreyFrame, envelope
+from frame import Accelerogram, Exact, LinearFlow, MatrixStructure, Midpoint, StoreyFrame, envelope, model_error
 from frame.box import UnitFlow, boxes
 from frame.chebyshev_grid import ChebyshevGrid
+from frame.linear import evaluate
 from frame.modal import ModalModel, fit_modes
 from frame.modal_load import left_out
 from frame.model_error import Comparison, proved_error
@@ -234,3 +235,32 @@ def test_series_leave_out_of_the_load_response_no_more_than_they_say() -> None:
     for node in (20, 60, 100):
         got = found.load.response(rate, np.full(len(unit), node))[0]
         assert (np.abs(got - truth[:, node]) <= bound[node] + 1e-13).all()
+
+
+@pytest.mark.parametrize("kind", ["kinematic", "dynamic"])
+def test_each_of_the_two_defects_counts(kind, monkeypatch) -> None:
+    """A defect 2 Re d exp(λ t) in one of the two equations alone deviates as the integrated equations say, and not beyond the bound."""
+    found = model(FRAME, {"E": Interval(24.9e9, 25.1e9)}, 1e-7)
+    unit = np.zeros((1, 1))
+    matrices, rows = evaluate(found.flow.system, found.flow.names, found.boxes.to_physical(unit), derivatives=False)
+    M, D, K = (part.value[0] for part in (matrices.mass, matrices.damping, matrices.stiffness))
+    strange = np.array([1e-6, -2e-6, 1e-6]) * (1.0 if kind == "kinematic" else 1e3)
+    true = model_error._defects
+
+    def only(*args):
+        defects = {name: np.zeros_like(values) for name, values in true(*args).items()}
+        defects[kind][:, 1] = strange
+        return defects
+
+    monkeypatch.setattr(model_error, "_defects", only)
+    bound = proved_error(found)
+    rate = found.eigenvalue(unit)[0, 1]
+    inverse, zero = np.linalg.inv(M), np.zeros(3)
+    pushed = np.concatenate((strange, zero) if kind == "kinematic" else (zero, inverse @ strange))
+    matrix = np.block([[np.zeros((3, 3)), np.eye(3)], [-inverse @ K, -inverse @ D]])
+    moved = solve_ivp(
+        lambda t, x: matrix @ x + 2 * (pushed * np.exp(rate * t)).real, (0, 10), np.zeros(6), t_eval=found.time, rtol=1e-8, atol=1e-14
+    )
+    deviation = np.abs(moved.y.T @ rows.value[0].T)
+    assert (deviation <= bound + 1e-15).all()
+    assert deviation.max() > bound.max() / 50
