@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
+from typing import Any
 
 FIGURES = {
     "radii": "Distribution of the particles' radii",
@@ -73,3 +75,11 @@ def figure_words(name: str) -> str:
     if match := re.fullmatch(r"envelope-(.+)-([^-]+)", name):
         return f"Envelope of {match[2]}" + ("" if match[1] == "all" else f", study {match[1]}")
     return FIGURES.get(name, name.replace("-", " "))
+
+
+def core(modulus: Mapping[str, Any]) -> str:
+    """The modal value of a summary's fuzzy modulus in GPa; where its cut at the highest level is an interval, that interval."""
+    low, high = (float(modulus["E_GPa"][side][-1]) for side in ("lower", "upper"))
+    if high - low <= 1e-9 * abs(high):
+        return f"{modulus['modal_GPa']:.4f} GPa"
+    return f"[{low:.4f}, {high:.4f}] GPa at α = {modulus['alpha'][-1]:g}"

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TextIO
 
+import numpy as np
+
 from alphacut import envelope, outcomes, quantity
 from alphacut.case import Case
 from alphacut.loading import load
@@ -18,7 +20,7 @@ from alphacut.progress import progress
 from alphacut.provenance import fingerprint
 from alphacut.reading import nearest
 from alphacut.schema import ENVELOPE_METHODS
-from alphacut.units import engineering
+from alphacut.units import engineering, largest_by_unit
 from fuzzy import FuzzyNumber
 
 if TYPE_CHECKING:
@@ -152,8 +154,11 @@ def summary(found: Envelope) -> str:
     of = peaks(found)
     low = found.lower if found.outer_lower is None else found.outer_lower  # what is proved, where there is a proof
     high = found.upper if found.outer_upper is None else found.outer_upper
-    ends = zip(found.outputs, low[0].min(0), high[0].max(0), of.lower[0], of.upper[0], strict=True)
-    rows = [(name, *(engineering(float(value), output_unit(name)) for value in values)) for name, *values in ends]
+    units = [output_unit(name) for name in found.outputs]
+    columns = np.stack([low[0].min(0), high[0].max(0), of.lower[0], of.upper[0]], axis=1).tolist()
+    largest = largest_by_unit((value, unit) for unit, values in zip(units, columns, strict=True) for value in values)
+    shown = [[engineering(value, unit, beside=largest[unit]) for value in values] for unit, values in zip(units, columns, strict=True)]
+    rows = [(name, *values) for name, values in zip(found.outputs, shown, strict=True)]
     lines = [f"{name:>14}  {low:>12}  {high:>12}   {least} … {most}\n" for name, low, high, least, most in rows]
     effort = "eigen-analyses" if found.method == "modal" else "trajectories"
     cost = f"{found.method}: {found.trajectories} {effort}, {found.seconds:.1f} s, bounds {found.nature}{error_in_words(found)}"

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from alphacut import figures, shares, summary
+from alphacut.captions import core
 from alphacut.chain import Chain, Results
 from alphacut.destination import unwritable
 from alphacut.loading import load
@@ -18,7 +19,7 @@ from alphacut.problem import BadInput
 from alphacut.provenance import attributes, door, fingerprint
 from alphacut.quick import banner, quick, settings
 from alphacut.readiness import ready
-from alphacut.units import engineering
+from alphacut.units import engineering, largest_by_unit
 
 ABOUT = "run every stage of a case: files, figures, summary, and the comparison with the paper where the case has one"
 
@@ -82,10 +83,12 @@ def main_numbers(found: Mapping[str, Any]) -> str:
 
     lines = []
     if cell := found.get("modulus"):
-        lines.append(f"E = {cell['modal_GPa']:.4f} GPa, support [{cell['lower_GPa']:.4f}, {cell['upper_GPa']:.4f}] GPa")
+        lines.append(f"E = {core(cell)}, support [{cell['lower_GPa']:.4f}, {cell['upper_GPa']:.4f}] GPa")
     for name, study in found.get("envelopes", {}).items():
-        for output, low in study["min"].items():
-            low, high = (engineering(float(value), output_unit(output)) for value in (low, study["max"][output]))
+        ends = [(output, output_unit(output), float(low), float(study["max"][output])) for output, low in study["min"].items()]
+        largest = largest_by_unit((value, unit) for _, unit, *values in ends for value in values)
+        for output, unit, *values in ends:
+            low, high = (engineering(value, unit, beside=largest[unit]) for value in values)
             lines.append(f"{output} from {low} to {high} at the lowest α (study {name})")
     return "".join(f"{line}\n" for line in lines)
 

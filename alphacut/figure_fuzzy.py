@@ -29,7 +29,13 @@ def membership(dataset: xarray.Dataset) -> Figure:
     axes.annotate(
         f"α-cut at {SHOWN_LEVEL:g}: {lower:.2f} … {upper:.2f}", ((lower + upper) / 2, SHOWN_LEVEL + 0.03), ha="center", color=ORANGE
     )
-    axes.annotate("modal value", (ends[-1].mean(), 1.0), xytext=(8, -2), textcoords="offset points", va="center")
+    axes.annotate(
+        "modal value" if np.ptp(ends[-1]) <= 1e-9 * ends[-1].max() else "core",
+        (ends[-1].mean(), 1.0),
+        xytext=(8, -2),
+        textcoords="offset points",
+        va="center",
+    )
     membership_axes(axes, "fuzzy parameter, here E in GPa")
     return drawn
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from alphacut import outcomes
 from alphacut.report_table import section, table
-from alphacut.units import engineering
+from alphacut.units import engineering, largest_by_unit
 
 
 def envelopes(summary: Mapping[str, Any]) -> str:
@@ -23,21 +23,25 @@ def envelopes(summary: Mapping[str, Any]) -> str:
         '<p class="hint">The shaded bands are the computed α-cuts, the darker the higher α; the orange line is the cut at the slider\'s α, '
         "between computed levels by linear interpolation. Drag or turn the wheel to zoom, double click to see everything.</p>"
     )
-    from frame.envelope import output_unit
-
-    rows: list[tuple[str, ...]] = []
-    for name, study in summary["envelopes"].items():
-        for output in study["min"]:
-            ends = (engineering(study[side][output], output_unit(output)) for side in ("min", "max"))
-            error = study.get("error", {}).get(output)
-            rows.append((name, output, *ends, "not estimated" if error is None else engineering(error, output_unit(output), digits=2)))
-    if not any(study.get("error") for study in summary["envelopes"].values()):
-        rows = [row[:-1] for row in rows]
+    rows = extremes(summary["envelopes"])
     svg = '<svg id="plot" role="img" aria-label="Envelopes over time"></svg><div id="readout"></div>'
     lowest = f"{min(study['alpha'][0] for study in summary['envelopes'].values()):g}"
     head = ("study", "output", f"least at α = {lowest}", f"greatest at α = {lowest}", "error up to")
-    extremes = table(head[: len(rows[0])], rows, numbers=2)
-    return section("Envelopes", natural(summary), controls, svg, hint, extremes, peaks(summary))
+    return section("Envelopes", natural(summary), controls, svg, hint, table(head[: len(rows[0])], rows, numbers=2), peaks(summary))
+
+
+def extremes(studies: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    """Least and greatest value of each output, all of one unit with one prefix; the error where any study estimated it."""
+    from frame.envelope import output_unit
+
+    each = [(name, study, output, output_unit(output)) for name, study in studies.items() for output in study["min"]]
+    largest = largest_by_unit((study[side][output], unit) for _, study, output, unit in each for side in ("min", "max"))
+    rows: list[tuple[str, ...]] = []
+    for name, study, output, unit in each:
+        ends = (engineering(study[side][output], unit, beside=largest[unit]) for side in ("min", "max"))
+        error = study.get("error", {}).get(output)
+        rows.append((name, output, *ends, "not estimated" if error is None else engineering(error, unit, digits=2)))
+    return rows if any(study.get("error") for study in studies.values()) else [row[:-1] for row in rows]
 
 
 def natural(summary: Mapping[str, Any]) -> str:
@@ -53,11 +57,16 @@ def peaks(summary: Mapping[str, Any]) -> str:
     """Fuzzy peaks of every study, and the fuzzy probability of exceeding the case's limit."""
     from frame.envelope import output_unit
 
-    rows = []
-    for name, study in summary["envelopes"].items():
-        for output, of in study.get("peak", {}).items():
-            unit = output_unit(output)
-            rows.append((name, output, *(between(of["lower"][level], of["upper"][level], unit) for level in (0, -1))))
+    each = [
+        (name, output, output_unit(output), of)
+        for name, study in summary["envelopes"].items()
+        for output, of in study.get("peak", {}).items()
+    ]
+    largest = largest_by_unit((of["upper"][0], unit) for _, _, unit, of in each)
+    rows = [
+        (name, output, *(between(of["lower"][level], of["upper"][level], unit, largest[unit]) for level in (0, -1)))
+        for name, output, unit, of in each
+    ]
     words = (
         "<p>Fuzzy peak of each output's magnitude over time, on the lowest and the highest level; the lower end is a bound from below.</p>"
     )
@@ -65,7 +74,7 @@ def peaks(summary: Mapping[str, Any]) -> str:
     return "<h3>Peaks</h3>" + words + table(("study", "output", "lowest α", "highest α"), rows, numbers=2) + limit if rows else limit
 
 
-def between(lower: float, upper: float, unit: str) -> str:
-    """An interval, or the one value where both ends are shown alike."""
-    ends = dict.fromkeys((engineering(lower, unit), engineering(upper, unit)))
+def between(lower: float, upper: float, unit: str, largest: float) -> str:
+    """An interval, or the one value where both ends are shown alike; with the prefix of the largest in the table."""
+    ends = dict.fromkeys((engineering(lower, unit, beside=largest), engineering(upper, unit, beside=largest)))
     return " … ".join(ends)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from alphacut import response
-from alphacut.captions import caption, in_words
+from alphacut.captions import caption, core, in_words
 from alphacut.command_cite import citation
 from alphacut.differences import differences
 from alphacut.report_envelopes import envelopes
@@ -64,7 +64,8 @@ def modulus(found: Mapping[str, Any], folder: Path, *, paper: bool) -> str:
     cuts = zip(found["alpha"], found["E_GPa"]["lower"], found["E_GPa"]["upper"], strict=True)
     rows = [(f"{alpha:g}", f"{low:.4f}", f"{high:.4f}") for alpha, low, high in cuts]
     words = (
-        f"<p>Modal value <strong>{found['modal_GPa']:.4f} GPa</strong>, support [{found['lower_GPa']:.4f}, {found['upper_GPa']:.4f}] GPa; "
+        f"<p>{'Core' if '[' in core(found) else 'Modal value'} <strong>{core(found)}</strong>, "
+        f"support [{found['lower_GPa']:.4f}, {found['upper_GPa']:.4f}] GPa; "
         f"Poisson's ratio {found['nu']:.4f}. E is the modulus of eq. 16, the paper's convention: a square array is not isotropic. "
         f"{found['samples']} samples, {found['solves']} linear systems, {found['seconds']:.1f} s. "
         f"{html.escape(sentence(found.get('reason', '')))}</p>"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from decimal import Decimal
 from functools import cache
 from typing import TYPE_CHECKING
@@ -93,15 +94,27 @@ MINUS = "\u2212"
 PREFIXED = ("m", "m/s", "m/s^2", "N", "Pa", "s", "rad", "W", "J")
 
 
-def engineering(value: float, si: str, *, digits: int = 4) -> str:
-    """A value in `si` for people: ``−3.590 MN``; a unit that takes no prefix stands as it is."""
-    if si not in PREFIXED or not value or not math.isfinite(value):
+def engineering(value: float, si: str, *, digits: int = 4, beside: float = 0.0) -> str:
+    """A value in `si` for people: ``−3.590 MN``; with the prefix of `beside` where that is larger, so that a column has one unit.
+
+    A unit that takes no prefix stands as it is.
+    """
+    if si not in PREFIXED or not math.isfinite(value) or not (value or beside):
         return f"{value:.{digits}g} {si}".strip().replace("-", MINUS)
-    rounded = float(f"{value:.{digits}g}")
-    exponent = min(9, max(-9, 3 * math.floor(math.log10(abs(rounded)) / 3)))
-    scaled = rounded / 10.0**exponent
-    places = max(0, digits - 1 - math.floor(math.log10(abs(scaled))))
-    return f"{'-' if value < 0 else ''}{abs(scaled):.{places}f} {PREFIXES[exponent]}{si}".replace("-", MINUS)
+    largest = float(f"{max(abs(value), abs(beside)):.{digits}g}")
+    exponent = min(9, max(-9, 3 * math.floor(math.log10(largest) / 3)))
+    scaled = float(f"{value:.{digits}g}") / 10.0**exponent
+    places = max(0, digits - 1 - math.floor(math.log10(abs(scaled)))) if scaled else 0
+    number = f"{scaled:.{places}f}" if places < digits + 3 else f"{scaled:.{digits}g}"
+    return f"{number} {PREFIXES[exponent]}{si}".replace("-", MINUS)
+
+
+def largest_by_unit(values: Iterable[tuple[float, str]]) -> dict[str, float]:
+    """The largest magnitude among values of the same unit: what `engineering` takes as `beside` to show them alike."""
+    found: dict[str, float] = {}
+    for value, si in values:
+        found[si] = max(found.get(si, 0.0), abs(value))
+    return found
 
 
 def axis_prefix(largest: float, si: str) -> tuple[float, str]:

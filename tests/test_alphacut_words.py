@@ -2,14 +2,18 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from alphacut.captions import FIGURES, caption, figure_words
+from alphacut.captions import FIGURES, caption, core, figure_words
+from alphacut.command_envelope import summary
 from alphacut.differences import differences
 from alphacut.entry import main
-from alphacut.units import engineering
+from alphacut.units import engineering, largest_by_unit
+from frame import Envelope
 
 CASES = Path(__file__).parent.parent / "cases"
 
@@ -79,6 +83,27 @@ def test_every_figure_has_a_caption():
 )
 def test_engineering_prefixes(value, unit, text):
     assert engineering(value, unit) == text
+
+
+def test_a_column_has_one_prefix():
+    column = [(0.5807, "m"), (-0.00214, "m"), (0.0, "m"), (12e3, "N"), (1e-12, "m")]
+    largest = largest_by_unit(column)
+    shown = [engineering(value, unit, beside=largest[unit]) for value, unit in column]
+    assert shown == ["580.7 mm", "−2.140 mm", "0 mm", "12.00 kN", "1e−09 mm"]
+
+
+def test_the_core_is_one_value_or_said_to_be_an_interval():
+    ends = {"E_GPa": {"lower": [20.0, 24.0], "upper": [30.0, 26.0]}, "alpha": [0.0, 1.0], "modal_GPa": 25.0}
+    assert core(ends) == "[24.0000, 26.0000] GPa at α = 1"
+    assert core({**ends, "E_GPa": {"lower": [20.0, 25.0], "upper": [30.0, 25.0]}}) == "25.0000 GPa"
+
+
+def test_proved_bounds_are_printed_where_there_are_any():
+    low, high = np.array([[[-0.1], [-0.2]], [[-0.05], [-0.1]]]), np.array([[[0.1], [0.3]], [[0.05], [0.1]]])
+    at, ends = np.zeros((2, 2, 1, 1)), np.array([0.0, 1.0])
+    found = Envelope(ends, ends, ("q1",), ("E",), low, high, at, at, "modal", "inner", 7, 0.1)
+    assert "−200.0 mm      300.0 mm" in summary(found)
+    assert "−201.0 mm      302.0 mm" in summary(replace(found, outer_lower=low - 1e-3, outer_upper=high + 2e-3))
 
 
 def test_only_what_a_run_used_differs_from_the_paper():

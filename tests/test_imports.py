@@ -56,3 +56,11 @@ def test_a_package_imports_fast_and_without_dolfinx(package):
     runs = [subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split() for _ in range(2)]
     assert not HEAVY & set(runs[0])
     assert min(float(run[0]) for run in runs) < SECONDS
+
+
+@pytest.mark.parametrize(("method", "exclude", "loaded"), [("auto", (), False), ("auto", ("series",), True), ("prism", (), True)])
+def test_what_a_model_may_need_is_loaded_before_its_clock_starts(method, exclude, loaded):
+    choice = f"CellChoice({method!r}, exclude={exclude!r})"
+    program = f"import sys; from alphacut.cell import CellChoice; from alphacut.models import cell_model; cell_model({choice})"
+    told = subprocess.run([sys.executable, "-c", f"{program}; print('dolfinx' in sys.modules)"], capture_output=True, text=True, check=True)
+    assert told.stdout.split() == [str(loaded)]
