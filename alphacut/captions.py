@@ -22,6 +22,7 @@ FIGURES = {
     "tower": "The tower, to scale",
     "chain": "The frame as masses, springs and dampers",
     "response": "Random and fuzzy stress: its distribution between two bounds, and its fuzzy quantiles",
+    "exceedance": "Fuzzy probability of exceeding a limit, over the limit",
     "shares-modulus": "Share of each input in the width of the modulus",
     "shares-over-time": "Share of each input in the width of the vibration over time",
     "two-point": "Why two points do not describe particles: equal discs of the same area fraction, for illustration",

@@ -9,6 +9,7 @@ import numpy as np
 from alphacut.case import Case
 from alphacut.figure_style import BLUE, GREY, INK, ORANGE, PURPLE, figure
 from alphacut.structure import per_floor
+from alphacut.structure_words import spread_damping
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -99,6 +100,8 @@ def chain(case: Case) -> Figure:
     if placement == "ground":
         axes.plot([-0.12, 1.6 * floors + 0.2], [-0.9, -0.9], color=INK, lw=1)
         axes.fill_between([-0.12, 1.6 * floors + 0.2], [-1.02] * 2, [-0.9] * 2, hatch="////", facecolor="white", edgecolor=GREY, lw=0)
+    if words := "; ".join(spread_damping(case)):
+        axes.annotate(f"damping besides: {words}" if damped else f"damping: {words}", (0.1, foot), va="top", fontsize=9)
     axes.set_xlim(-0.2, 1.6 * floors + 0.3)
     axes.set_ylim(-1.1 if placement == "ground" else -0.7, 1.05)
     axes.set_aspect("equal")

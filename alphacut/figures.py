@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from alphacut import (
     figure_envelope,
+    figure_exceedance,
     figure_follower,
     figure_frame,
     figure_fuzzy,
@@ -54,6 +55,8 @@ def drawings(results: Results) -> Iterator[Drawing]:
     if results.case.has("envelope.method") and results.case.text("envelope.method") == "graph-follower" and results.envelopes:
         richest = max(results.studies, key=lambda study: len(study.task.fuzzy))
         yield "fig21-25-graph-follower", lambda: figure_follower.follower(results, richest)
+    if (limited := results.exceedance) is not None:
+        yield "exceedance", lambda: figure_exceedance.exceedance(limited)
     for study in results.studies:
         yield from figure_envelope.drawings(study, results.envelopes[study.name])
 

@@ -74,9 +74,10 @@ def known_output(case: Case, floors: int) -> Iterator[Problem]:
         drawn = str(case.values.get(f"study[{index}].output", ""))
         if drawn and drawn not in outputs:
             yield Problem(f"study[{index}].output", f"there is no output {drawn}", drawn, ", ".join(outputs))
-    limited = case.text("exceedance.output") if case.has("exceedance.output") else outputs[0]
-    if limited not in outputs:
-        yield Problem("exceedance.output", f"there is no output {limited}", limited, ", ".join(outputs), nearest(limited, outputs))
+    limited = case.text("exceedance.output") if case.has("exceedance.output") else possible[0]
+    if limited not in possible:
+        allowed = f"q, v, drift or shear with a floor, base_shear: {', '.join(possible[:floors])} …"
+        yield Problem("exceedance.output", f"there is no output {limited}", limited, allowed, nearest(limited, possible))
 
 
 def known_input(key: str, name: str, count: int) -> Iterator[Problem]:

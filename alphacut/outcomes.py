@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -57,21 +58,36 @@ def shaped_like(number: FuzzyNumber) -> Sampler:
 
 
 def limit_of(case: Case) -> float:
-    """The limit in the SI unit of its output.
+    """The limit in the SI unit of its output; for the drift of a storey also as a share of that storey's modal height.
 
     Raises:
         BadInput: It is no positive quantity of that unit.
     """
     from frame.envelope import output_unit
 
-    unit = output_unit(case.text("exceedance.output"))
+    name, text = case.text("exceedance.output"), case.text("exceedance.limit")
+    unit, height = output_unit(name), storey_height(case, name)
     try:
-        limit = quantity.number(case.text("exceedance.limit"), unit)
+        share = height is not None and text.rstrip().endswith("%")
+        limit = height * quantity.number(text, "") if share and height else quantity.number(text, unit)
     except ValueError as error:
-        raise case.refuse("exceedance.limit", str(error), f"a quantity in {unit}, as the output is") from None
+        kind = f"a quantity in {unit}, as the output is" + (", or a share of the storey's height such as 0.5 %" if height else "")
+        raise case.refuse("exceedance.limit", str(error), kind) from None
     if not limit > 0:
         raise case.refuse("exceedance.limit", "out of range", "greater than 0")
     return limit
+
+
+def storey_height(case: Case, output: str) -> float | None:
+    """The height in m of the storey whose drift an output is; None for any other output."""
+    kind, floor = output.rstrip("0123456789"), output.lstrip("abcdefghijklmnopqrstuvwxyz_")
+    if kind != "drift":
+        return None
+    if case.has("tower.height"):
+        return case.number("tower.height")
+    lengths = case.fuzzies("frame.lengths") if case.has("frame.lengths") else ()
+    index = 0 if len(lengths) == 1 else int(floor or 1) - 1
+    return lengths[index].modal if 0 <= index < len(lengths) else None
 
 
 def split_inputs(case: Case, wanted: Structure) -> tuple[dict[str, FuzzyNumber], dict[str, Sampler]]:
@@ -96,19 +112,21 @@ def exceedance(case: Case, handed: FuzzyNumber | None, progress: Tick | None = N
     import xarray
 
     import frame.outcomes
+    from frame.envelope import output_unit
 
     wanted, output = structure(case, handed), case.text("exceedance.output")
-    if output not in wanted.outputs:
+    model = wanted.model if wanted.frame is None else replace(wanted.frame, outputs=(output,))
+    if output not in model.outputs:
         raise case.refuse("exceedance.output", "the structure has no such output", ", ".join(wanted.outputs))
     fuzzy, random = split_inputs(case, wanted)
     found = frame.outcomes.exceedance(
-        wanted.model,
+        model,
         fuzzy,
         random,
         limit=limit_of(case),
         duration=case.number("envelope.duration"),
         step=case.number("envelope.step"),
-        output=wanted.outputs.index(output),
+        output=model.outputs.index(output),
         alpha=case.numbers("envelope.alpha"),
         samples=case.integer("exceedance.samples"),
         rng=np.random.default_rng(case.integer("exceedance.seed")),
@@ -118,7 +136,9 @@ def exceedance(case: Case, handed: FuzzyNumber | None, progress: Tick | None = N
     ends = (("alpha", "bound"), np.column_stack([found.lower, found.upper]), about)
     facts = {"output": output, "limit": limit_of(case), "deviation": found.deviation, "trajectories": found.trajectories, "nature": NATURE}
     names = {"fuzzy": ", ".join(fuzzy), "random": ", ".join(random)}
-    return xarray.Dataset({"exceedance": ends}, {"alpha": found.alpha, "bound": ["lower", "upper"]}, {**facts, **names})
+    curve = (("alpha", "bound", "limit"), np.stack([found.curve_lower, found.curve_upper], axis=1), about)
+    axes = {"alpha": found.alpha, "bound": ["lower", "upper"], "limit": ("limit", found.limits, {"units": output_unit(output)})}
+    return xarray.Dataset({"exceedance": ends, "curve": curve}, axes, {**facts, **names})
 
 
 def exceedance_document(found: xarray.Dataset) -> dict[str, Any]:

@@ -12,8 +12,8 @@ from alphacut.report_table import section, table
 from alphacut.units import engineering, largest_by_unit
 
 
-def envelopes(summary: Mapping[str, Any]) -> str:
-    """The interactive plot and the extremes."""
+def envelopes(summary: Mapping[str, Any], exceedance: str = "") -> str:
+    """The interactive plot and the extremes; the picture of the exceedance where there is one."""
     controls = (
         '<div class="controls"><label>study <select id="study"></select></label><label>output <select id="output"></select></label>'
         '<label>α <input type="range" id="alpha" min="0" max="1" step="0.01" value="0.5"><output id="alpha-shown">0.50</output></label>'
@@ -27,7 +27,7 @@ def envelopes(summary: Mapping[str, Any]) -> str:
     svg = '<svg id="plot" role="img" aria-label="Envelopes over time"></svg><div id="readout"></div>'
     lowest = f"{min(study['alpha'][0] for study in summary['envelopes'].values()):g}"
     head = ("study", "output", f"least at α = {lowest}", f"greatest at α = {lowest}", "error up to")
-    return section("Envelopes", natural(summary), controls, svg, hint, table(head[: len(rows[0])], rows, numbers=2), peaks(summary))
+    return section("Envelopes", controls, svg, hint, table(head[: len(rows[0])], rows, numbers=2), peaks(summary), exceedance)
 
 
 def extremes(studies: Mapping[str, Any]) -> list[tuple[str, ...]]:
@@ -70,7 +70,7 @@ def peaks(summary: Mapping[str, Any]) -> str:
     words = (
         "<p>Fuzzy peak of each output's magnitude over time, on the lowest and the highest level; the lower end is a bound from below.</p>"
     )
-    limit = f"<p>{html.escape(outcomes.sentence(summary['exceedance']))}</p>" if "exceedance" in summary else ""
+    limit = f"<p>P{html.escape(outcomes.sentence(summary['exceedance'])[1:].rstrip())}.</p>" if "exceedance" in summary else ""
     return "<h3>Peaks</h3>" + words + table(("study", "output", "lowest α", "highest α"), rows, numbers=2) + limit if rows else limit
 
 

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from alphacut import response
-from alphacut.captions import caption, core, in_words
+from alphacut.captions import caption, core, figure_words, in_words
 from alphacut.command_cite import citation
 from alphacut.differences import differences
-from alphacut.report_envelopes import envelopes
+from alphacut.report_envelopes import envelopes, natural
 from alphacut.report_table import section, table
 
 NATURES = {
@@ -22,6 +22,7 @@ NATURES = {
     "verified by sampling": "Verified by sampling: the search is proved to leave nothing out, the error of its model is sampled.",
     "guaranteed": "Guaranteed bounds are proved to hold the true range.",
 }
+ELSEWHERE = ("fig18-modulus", "modulus", "response", "exceedance")  # figures that stand in the section they belong to
 SVG_LIMIT = 200_000  # bytes; a heavier figure goes into the page as PNG
 
 
@@ -33,8 +34,10 @@ def sections(summary: Mapping[str, Any], folder: Path) -> Iterator[str]:
         yield modulus(summary["modulus"], folder, paper=bool(summary.get("paper")))
     if "response" in summary:
         yield stress(summary["response"], folder)
+    if words := summary.get("structure", {}).get("words"):
+        yield built(words, natural(summary))
     if summary.get("envelopes"):
-        yield envelopes(summary)
+        yield envelopes(summary, picture(folder / "figures" / "exceedance.svg", figure_words("exceedance")))
     if summary.get("shares"):
         yield shares(summary["shares"])
     if summary.get("paper"):
@@ -95,13 +98,24 @@ def stress(found: Mapping[str, Any], folder: Path) -> str:
     return section("Random and fuzzy stress", words, drawn, table(head, response.table(found)))
 
 
+def built(words: Mapping[str, Any], periods: str) -> str:
+    """The structure: what it is, its floors or inputs, its first periods."""
+    sentences = "".join(f"<p>{html.escape(text)}</p>" for text in words["sentences"])
+    return section("Structure", sentences, table(words["head"], words["rows"]), periods)
+
+
 def shares(found: Mapping[str, Any]) -> str:
     """What drives the width."""
     from alphacut.figure_envelope import WORDS
 
-    rows = [(of, WORDS.get(name) or in_words(name), f"{share:.1%}") for of, entry in found.items() for name, share in entry.items()]
     words = "<p>Share of the width at α = 0 that is lost when an input is fixed at its modal value and all others are kept.</p>"
-    return section("What drives the width", words, table(("quantity", "input", "share"), rows, numbers=2))
+    kinds = dict.fromkeys(tuple(entry) for entry in found.values())  # quantities that depend on the same inputs share a table
+    tables = []
+    for inputs in kinds:
+        of = [name for name, entry in found.items() if tuple(entry) == inputs]
+        rows = [(WORDS.get(name) or in_words(name), *(f"{found[quantity][name]:.1%}" for quantity in of)) for name in inputs]
+        tables.append(table(("input", *of), rows))
+    return section("What drives the width", words, *tables)
 
 
 def comparison(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -150,8 +164,8 @@ def effort(study: Mapping[str, Any]) -> str:
 
 
 def gallery(summary: Mapping[str, Any], folder: Path) -> str:
-    """Every figure of the run."""
-    names = [name for name in summary.get("figures", []) if name.endswith(".png")]
+    """Every figure of the run that no other section shows."""
+    names = [name for name in summary.get("figures", []) if name.endswith(".png") and Path(name).stem not in ELSEWHERE]
     paper = bool(summary.get("paper"))
     figures = [picture((folder / name).with_suffix(".svg"), caption(Path(name).stem, paper=paper)) for name in names]
     return section("Figures", '<div class="gallery">' + "\n".join(figures) + "</div>") if figures else ""

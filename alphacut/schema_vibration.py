@@ -133,7 +133,11 @@ EXCEEDANCE = Section(
     "Fuzzy probability that an output exceeds a limit within [envelope]'s duration; what is not random stays fuzzy.",
     {
         "output": Key("the output: q3, drift1, base_shear …; of a tower roof or drift, of a pendulum force", "text", required=True),
-        "limit": Key("magnitude it must not exceed, with the output's unit", "text", required=True),
+        "limit": Key(
+            "magnitude it must not exceed, with the output's unit; of a drift also a share of the storey's height: 0.5 %",
+            "text",
+            required=True,
+        ),
         "random": Key("inputs that are random, with a density of the shape of their membership", "choices", default=()),
         "samples": Key("random draws at each fuzzy point", "integer", default=200, allowed=COUNT),
         "seed": Key("seed of the draws", "integer", default=0, allowed=Range("0 or more", 0.0, closed=True)),

@@ -15,6 +15,7 @@ from alphacut.cell import GPA, SHARED, key_of, parts
 from alphacut.chain import Results
 from alphacut.provenance import FORMAT, command, versions
 from alphacut.structure import structure
+from alphacut.structure_words import structure_words
 
 if TYPE_CHECKING:
     import xarray
@@ -78,15 +79,16 @@ def listed(dataset: xarray.Dataset, kind: str) -> dict[str, float]:
 
 
 def structure_numbers(results: Results) -> dict[str, Any]:
-    """Natural frequencies at the modal values."""
+    """The structure in words, and natural frequencies at the modal values where it has any."""
     from frame.linear import frequencies
 
-    model = structure(results.case, results.handed).linear
-    if model is None:
-        return {}
-    omega = frequencies(model)
+    wanted = structure(results.case, results.handed)
+    words = {"words": structure_words(results.case, wanted)}
+    if wanted.linear is None:
+        return words
+    omega = frequencies(wanted.linear)
     period = 2 * np.pi / omega[0]
-    return {"omega_rad_per_s": omega, "period_s": period, "two_periods_s": 2 * period, "parameters": counted(model)}
+    return {"omega_rad_per_s": omega, "period_s": period, "two_periods_s": 2 * period, "parameters": counted(wanted.linear), **words}
 
 
 def counted(model: LinearSystem) -> int:

@@ -119,7 +119,7 @@ def largest_by_unit(values: Iterable[tuple[float, str]]) -> dict[str, float]:
 
 def axis_prefix(largest: float, si: str) -> tuple[float, str]:
     """Factor and unit for an axis whose values reach `largest`: with a prefix where plain numbers would be long."""
-    if si not in PREFIXED or not math.isfinite(largest) or largest <= 0 or 0.01 <= largest < 1000:
+    if si not in PREFIXED or not math.isfinite(largest) or largest <= 0 or 0.1 <= largest < 1000:
         return 1.0, si
     exponent = min(9, max(-9, 3 * math.floor(math.log10(largest) / 3)))
     return 10.0**-exponent, f"{PREFIXES[exponent]}{si}"

@@ -18,6 +18,8 @@ from frame.linear import LinearSystem
 from frame.nonlinear_flow import LagrangianFlow
 from fuzzy import FuzzyNumber
 
+LIMITS = 201  # for which the probability is told besides
+
 
 @dataclass(frozen=True, eq=False)
 class FuzzyPeaks:
@@ -54,6 +56,9 @@ class FuzzyProbability:
         upper: Greatest probability, shape (A,).
         deviation: Largest standard deviation of the estimates.
         trajectories: Trajectories computed.
+        limits: Other limits, from below the least peak to above the greatest, shape (L,), in the output's unit.
+        curve_lower: Least probability of exceeding each of them, shape (A, L).
+        curve_upper: Greatest probability, shape (A, L).
     """
 
     alpha: Array
@@ -61,6 +66,9 @@ class FuzzyProbability:
     upper: Array
     deviation: float
     trajectories: int
+    limits: Array
+    curve_lower: Array
+    curve_upper: Array
 
 
 def exceedance(
@@ -108,18 +116,25 @@ def exceedance(
     draws = np.column_stack([sampler(rng, samples) for sampler in random.values()]) if random else np.zeros((1, 0))
     flow = _flow(system, (*cuts.names, *random), duration, step)
     tried = [_tried(cuts, level, spread) for level in range(len(cuts.alpha))]
-    low, high, runs, total = np.empty(len(tried)), np.empty(len(tried)), 0, sum(map(len, tried)) * len(draws)
-    least, most = 1.0, 0.0
-    for level in reversed(range(len(tried))):
-        for point in tried[level]:
-            values = flow.values(np.hstack([np.tile(point, (len(draws), 1)), draws]))[:, :, output]
-            share = float((np.abs(values).max(1) > limit).mean())
-            least, most, runs = min(least, share), max(most, share), runs + len(draws)
-            if progress:
-                progress(runs / total)
-        low[level], high[level] = least, most
-    deviation = float(np.sqrt(np.max([low * (1 - low), high * (1 - high)]) / len(draws)))
-    return FuzzyProbability(cuts.alpha, low, high, deviation, runs)
+    total, found = sum(map(len, tried)), []
+    for point in np.concatenate(tried):
+        values = flow.values(np.hstack([np.tile(point, (len(draws), 1)), draws]))[:, :, output]
+        found.append(np.abs(values).max(1))
+        if progress:
+            progress(len(found) / total)
+    peak = np.sort(found, axis=1)
+    limits = np.linspace(0.95 * peak.min(), 1.05 * peak.max(), LIMITS)
+    of = np.repeat(np.arange(len(tried)), [len(points) for points in tried])
+    low, high = _bounds(peak, of, np.append(limits, limit))
+    deviation = float(np.sqrt(np.max([low[:, -1] * (1 - low[:, -1]), high[:, -1] * (1 - high[:, -1])]) / len(draws)))
+    return FuzzyProbability(cuts.alpha, low[:, -1], high[:, -1], deviation, total * len(draws), limits, low[:, :-1], high[:, :-1])
+
+
+def _bounds(peak: Array, of: Array, limits: Array) -> tuple[Array, Array]:
+    """Least and greatest share of peaks above each limit, on each level, every level holding the points of those above it."""
+    share = np.array([1 - np.searchsorted(row, limits, side="right") / len(row) for row in peak])
+    levels = range(of.max() + 1)
+    return np.array([share[of >= k].min(0) for k in levels]), np.array([share[of >= k].max(0) for k in levels])
 
 
 def _flow(system: LinearSystem | LagrangianSystem, names: tuple[str, ...], duration: float, step: float) -> Flow:

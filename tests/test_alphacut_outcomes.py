@@ -9,7 +9,7 @@ import xarray
 
 from alphacut.entry import main
 from alphacut.loading import load
-from alphacut.outcomes import exceedance, shaped_like
+from alphacut.outcomes import exceedance, limit_of, shaped_like
 from alphacut.problem import BadInput
 from alphacut.structure import structure
 from fuzzy import Interval, Trapezoidal, Triangular
@@ -71,7 +71,7 @@ def test_a_run_keeps_peaks_and_probability(tmp_path, capfd):
     assert main(["report", str(tmp_path), "--quiet"]) == 0
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "<h3>Peaks</h3>" in page
-    assert "probability of |q3| &gt; 90.00 mm" in page
+    assert "Probability of |q3| &gt; 90.00 mm" in page
 
 
 @pytest.mark.parametrize(
@@ -108,3 +108,39 @@ def test_a_pendulum_may_exceed_a_force():
     assert (low, high) == pytest.approx((least, most), abs=0.1)
     assert low < high
     assert found.attrs["random"] == "phi_0"
+
+
+@pytest.mark.parametrize(("limit", "meters"), [("1 %", 0.04), ("0.5 %", 0.02), ("20 mm", 0.02)])
+def test_a_drift_may_be_limited_by_a_share_of_the_storey_height(limit, meters):
+    case = load(CASES / "building.toml", ["exceedance.output=drift1", f"exceedance.limit={limit}"])
+    assert limit_of(case) == pytest.approx(meters)
+    assert limit_of(load(CASES / "building.toml", ["exceedance.output=drift2", "exceedance.limit=1 %"])) == pytest.approx(0.032)
+    assert limit_of(load(CASES / "tower.toml", ["exceedance.output=drift", "exceedance.limit=1 %"])) == pytest.approx(0.03)
+
+
+@pytest.mark.parametrize("output", ["q8", "shear3", "drift9"])
+def test_a_share_limits_nothing_else_than_a_drift(output):
+    with pytest.raises(BadInput, match=r"exceedance\.(limit|output)"):
+        load(CASES / "building.toml", [f"exceedance.output={output}", "exceedance.limit=1 %"])
+
+
+def test_the_limited_output_need_not_be_observed_besides():
+    changes = [*SHORT[:2], "envelope.fuzzy=E", "exceedance.output=drift2", "exceedance.limit=1 %"]
+    bare, observed = (exceedance(load(PAPER, [*changes, *more]), None) for more in ((), ["frame.outputs=q1,q2,q3,drift2"]))
+    assert bare["curve"].equals(observed["curve"])
+    assert 0 < float(bare["limit"][0]) < float(bare["limit"][-1])
+
+
+def test_the_probability_over_the_limit_falls_from_one_to_zero_and_meets_the_limit_s():
+    changes = [*SHORT, "envelope.fuzzy=E,m3", "exceedance.random=E"]
+    found = exceedance(load(PAPER, [*changes, "exceedance.limit=0.19 m"]), None)
+    curve = found["curve"].transpose("alpha", "bound", "limit").values
+    assert (curve[:, :, 0] == 1).all()
+    assert (curve[:, :, -1] == 0).all()
+    assert (np.diff(curve, axis=2) <= 0).all()
+    assert (curve[0, 0] <= curve[1, 0]).all()
+    assert (curve[0, 1] >= curve[1, 1]).all()
+    for index in (60, 100, 140):
+        limit = float(found["limit"][index]) + 1e-12
+        there = exceedance(load(PAPER, [*changes, f"exceedance.limit={limit!r} m"]), None)["exceedance"].transpose("alpha", "bound")
+        assert there.values == pytest.approx(curve[:, :, index])
