@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 from alphacut.case import Case
@@ -15,6 +16,8 @@ from alphacut.problem import BadInput, Problem
 from alphacut.reading import nearest
 from alphacut.schema import ENVELOPE_METHODS, INTEGRATORS, NEEDED, NONLINEAR, STAGES
 from stochastic import HermiteMap, TruncatedNormal
+
+Check = Callable[[Case], Iterator[Problem]]
 
 MOST_STEPS = 1_000_000  # more would not fit into memory, and no figure could show them
 SLOPES = ("a1", "a2", "a3", "a4")
@@ -28,41 +31,58 @@ FILES = (
 )
 
 
-def inconsistencies(case: Case, *, modal: bool = False) -> Iterator[Problem]:
-    """Every problem of a case whose single values are all right."""
-    yield from order_of_stages(case)
-    yield from missing_sections(case)
-    yield from files(case)
-    yield from incomplete(case)
-    if case.has("microstructure.seed"):
-        yield from particles(case)
-    if case.has("radius.a1"):
-        yield from radius(case, 1.0 if modal else 0.0)
-    if case.has("response.quantity"):
-        yield from stress_curves(case)
+def checks(*, modal: bool = False) -> Iterator[Check]:
+    """Every check of a case whose single values are all right; each finds problems of its own."""
+    yield order_of_stages
+    yield missing_sections
+    yield files
+    yield incomplete
+    yield where("microstructure.seed", particles)
+    yield where("radius.a1", partial(radius, alpha=1.0 if modal else 0.0))
+    yield where("response.quantity", stress_curves)
+    yield one_modulus
+    for section in ("modulus", "envelope"):
+        yield where(f"{section}.alpha", partial(levels, key=f"{section}.alpha"))
+    yield where("frame.masses", floors)
+    yield other_structures
+    yield one_structure
+    yield where("envelope.step", times)
+    yield tolerances
+    yield where("envelope.method", methods)
+    yield where("exceedance.output", exceedance)
+
+
+def where(key: str, check: Check) -> Check:
+    """The check, of cases that hold the key."""
+    return lambda case: check(case) if case.has(key) else iter(())
+
+
+def one_modulus(case: Case) -> Iterator[Problem]:
+    """At most one thing stands in for the computed modulus."""
     if len(stand_ins(case)) > 1:
         yield Problem(stand_ins(case)[1], "more than one modulus is given", ", ".join(stand_ins(case)), "one of them")
-    for section in ("modulus", "envelope"):
-        if case.has(f"{section}.alpha"):
-            yield from levels(case, f"{section}.alpha")
-    if case.has("frame.masses"):
-        yield from floors(case)
+
+
+def other_structures(case: Case) -> Iterator[Problem]:
+    """The inputs of structures beside the storey frame."""
     for section, names in OTHERS.items():
         if any(key.startswith(f"{section}.") for key in case.values):
             yield from named_inputs(case, section, names)
+
+
+def one_structure(case: Case) -> Iterator[Problem]:
+    """Exactly one structure vibrates."""
     found = [name for name in ("frame", *OTHERS) if any(key.startswith(f"{name}.") for key in case.values)]
     if "envelope" in case.stages and len(found) != 1:
         yield Problem("frame", f"stage envelope needs one structure, got {len(found)}", ", ".join(found), "[frame], [pendulum] or [tower]")
-    if case.has("envelope.step"):
-        yield from times(case)
+
+
+def tolerances(case: Case) -> Iterator[Problem]:
+    """One tolerance, in the unit of the output."""
     if case.has("envelope.relative_tolerance") and any(f"{name}.tolerance" in case.written for name in ("envelope", "pendulum")):
         yield Problem("envelope.relative_tolerance", "there is a tolerance besides", allowed="one of tolerance and relative_tolerance")
     if case.has("pendulum.mass") and "envelope.tolerance" in case.written:
         yield Problem("envelope.tolerance", "a pendulum's output is a force", allowed="pendulum.tolerance, or envelope.relative_tolerance")
-    if case.has("envelope.method"):
-        yield from methods(case)
-    if case.has("exceedance.output"):
-        yield from exceedance(case)
 
 
 def order_of_stages(case: Case) -> Iterator[Problem]:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from alphacut.case import Case
 from alphacut.changes import Raw, apply_change, table_of
-from alphacut.consistency import inconsistencies
+from alphacut.consistency import checks
 from alphacut.destination import hint
+from alphacut.doubt import undoubted
 from alphacut.key import Key, Section
 from alphacut.position import key_at, lines_of_keys
 from alphacut.problem import BadInput, Problem
@@ -39,13 +41,22 @@ def load(path: Path | str, changes: Sequence[str] = (), *, modal: bool = False, 
     changed = {apply_change(raw, change) for change in changes}
     values: dict[str, object] = {}
     written: dict[str, object] = {}
-    problems = [located(problem, path, lines, changed) for problem in checked(raw, values, written)]
+    single = list(checked(raw, values, written))
     case = Case(path, values, written, lines)
-    if not problems:
-        problems = [located(problem, path, lines, changed) for problem in inconsistencies(case, modal=modal)]
+    problems = [*single, *together(case, single, modal=modal)]
     if problems:
-        raise BadInput(sorted(problems, key=lambda problem: problem.line))
+        raise BadInput(sorted((located(problem, path, lines, changed) for problem in problems), key=lambda problem: problem.line))
     return case
+
+
+def together(case: Case, single: Sequence[Problem], *, modal: bool) -> Iterator[Problem]:
+    """The problems of a case as a whole, where single values are wrong those that do not rest on them."""
+    if any("." not in problem.key for problem in single):  # a section or the stages: there is no telling what was meant
+        return
+    broken = {problem.key for problem in single}
+    broken |= {dotted(problem.key.rpartition(".")[0], problem.nearest) for problem in single if problem.nearest}
+    for check in checks(modal=modal):
+        yield from undoubted(check, case, broken)
 
 
 def contents(path: Path) -> str:
@@ -147,6 +158,9 @@ def checked_section(
 ) -> Iterator[Problem]:
     """Check the keys of one table, and that none is missing."""
     strangers = [unknown(key, name, value) for key, value in table.items() if key not in section.keys]
+    if len(strangers) == 1 and not strangers[0].nearest:
+        missing = [key for key, entry in section.keys.items() if entry.required and key not in table]
+        strangers = [replace(strangers[0], nearest=missing[0])] if len(missing) == 1 else strangers
     yield from strangers
     meant = {problem.nearest for problem in strangers}  # a misspelt key is one problem, not a missing one besides
     for key, entry in section.keys.items():

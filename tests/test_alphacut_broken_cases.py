@@ -6,12 +6,16 @@ from pathlib import Path
 
 import pytest
 
+from alphacut.case import Case
+from alphacut.doubt import undoubted
 from alphacut.entry import main
 from alphacut.loading import load
 from alphacut.position import lines_of_keys
+from alphacut.problem import BadInput, Problem
 from alphacut.schema import every_key
 
-PAPER = (Path(__file__).parent.parent / "cases" / "paper.toml").read_text(encoding="utf-8")
+CASE = Path(__file__).parent.parent / "cases" / "paper.toml"
+PAPER = CASE.read_text(encoding="utf-8")
 LINES = PAPER.splitlines()
 KEYS = {key: line for key, line in lines_of_keys(PAPER).items() if "." in key and "=" in LINES[line - 1]}
 SCHEMA = every_key()
@@ -98,10 +102,48 @@ def test_a_broken_case_exits_2_and_names_the_broken_key(seed, tmp_path, capfd):
     out, err = capfd.readouterr()
     assert (status, out) == (2, ""), f"{way.__name__} of {key} went through"
     assert "Traceback" not in err
-    lines = err.splitlines()
-    assert all(re.match(r"alphacut: \S+case\.toml(:\d+)?: \S", line) for line in lines), err
-    assert any(re.search(rf": {re.escape(key)}\b", line) for line in lines), f"{way.__name__} of {key}:\n{err}"
+    (line,) = err.splitlines()  # one problem, one line: nothing that only follows from it
+    assert re.match(r"alphacut: \S+case\.toml(:\d+)?: \S", line), err
+    assert re.search(rf": {re.escape(key)}\b", line), f"{way.__name__} of {key}:\n{err}"
     assert [file.name for file in tmp_path.iterdir()] == ["case.toml"]
+
+
+def test_problems_of_single_values_hide_none_of_the_case_as_a_whole(tmp_path):
+    text = PAPER
+    for old, new in (
+        ('matrix_modulus = "20 GPa"', 'matrix_modulus = "20 GP"'),
+        ("a2 = [0.001, 0.1, 0.3145]", "a2 = [0.001, 0.1, 90]"),
+        ('step = "0.01 s"', 'step = "0.013 s"'),
+    ):
+        assert old in text
+        text = text.replace(old, new, 1)
+    path = tmp_path / "case.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(BadInput) as caught:
+        load(path)
+    keys = [problem.key for problem in caught.value.problems]
+    assert keys[:2] == ["radius.a2", "cell.matrix_modulus"]
+    assert len(keys) > 2
+    assert all(re.fullmatch(r"(envelope|study\[\d\])\.duration", key) for key in keys[2:])
+
+
+def test_what_rests_on_a_broken_key_is_not_told():
+    case = load(CASE)
+    seen = []
+
+    def check(case):
+        yield Problem("first", "rests on nothing")
+        case.has("frame.masses")
+        yield Problem("second", "rests on the masses")
+        case.numbers("radius.theta")
+        yield Problem("third", "rests on θ")
+        seen.append(case.fuzzies("frame.masses"))
+
+    broken = Case(case.path, {key: value for key, value in case.values.items() if key != "frame.masses"}, case.written, case.lines)
+    assert [problem.key for problem in undoubted(check, broken, {"frame.masses"})] == ["first", "third"]
+    assert seen == []
+    with pytest.raises(BadInput):
+        list(undoubted(check, broken, set()))
 
 
 def shuffled_keys(generator):
