@@ -22,6 +22,7 @@ Check = Callable[[Case], Iterator[Problem]]
 MOST_STEPS = 1_000_000  # more would not fit into memory, and no figure could show them
 SLOPES = ("a1", "a2", "a3", "a4")
 FILES = (
+    "microstructure.packing.file",
     "microstructure.circles.file",
     "microstructure.image.file",
     "modulus.file",
@@ -155,13 +156,28 @@ def particles(case: Case) -> Iterator[Problem]:
             yield Problem(
                 "microstructure.limits", "the limits need two values in rising order", str(list(limits)), "for example [0.13, 0.87]"
             )
-    low, high = (f"microstructure.packing.{end}_radius" for end in ("smallest", "largest"))
-    if case.has(low) and case.number(low) > case.number(high):
-        yield Problem(low, "the smallest radius is greater than the largest", str(case.written[low]))
+    yield from sizes(case)
     for name in ("size", "origin"):
         key = f"microstructure.circles.{name}"
         if case.has(key) and len(case.numbers(key)) != 2:
             yield Problem(key, f"got {len(case.numbers(key))} values", allowed="two: across and up")
+
+
+def sizes(case: Case) -> Iterator[Problem]:
+    """The radii of packed discs: a file of them, or both ends of their law in order."""
+    key = "microstructure.packing"
+    low, high = (f"{key}.{end}_radius" for end in ("smallest", "largest"))
+    ends = [name for name in (low, high) if name in case.written]
+    if not case.has(f"{key}.discs"):
+        return
+    if case.has(f"{key}.file") and ends:
+        yield Problem(ends[0], "the radii come from a file besides", str(case.written[ends[0]]), f"one of {key}.file and the two ends")
+    elif not case.has(f"{key}.file"):
+        for name in (low, high):
+            if name not in ends:
+                yield Problem(name, "missing: the law of the radii needs it", allowed=f'a length such as "1.6 mm", or {key}.file')
+    if len(ends) == 2 and case.number(low) > case.number(high):
+        yield Problem(low, "the smallest radius is greater than the largest", str(case.written[low]))
 
 
 def radius(case: Case, alpha: float) -> Iterator[Problem]:

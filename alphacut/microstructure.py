@@ -15,6 +15,7 @@ from alphacut.schema import RADIUS
 
 if TYPE_CHECKING:
     from stochastic.microstructure import Microstructure, Study
+    from stochastic.radius_law import RadiusLaw
     from stochastic.sections import Measured, Simulated
 
 SOURCES = ("packing", "circles", "image")
@@ -23,7 +24,6 @@ SOURCES = ("packing", "circles", "image")
 def source(case: Case) -> Simulated | Measured:
     """Where the discs come from."""
     from stochastic.circle_file import CircleFile
-    from stochastic.log_normal import LogNormalRadii
     from stochastic.packing import Packing
     from stochastic.section_image import SectionImage
     from stochastic.sections import Measured, Simulated
@@ -31,10 +31,8 @@ def source(case: Case) -> Simulated | Measured:
     key = "microstructure"
     if case.has(f"{key}.packing.discs"):
         key += ".packing"
-        smallest, largest = case.number(f"{key}.smallest_radius"), case.number(f"{key}.largest_radius")
-        radii, fraction = LogNormalRadii(smallest, largest), case.number(f"{key}.area_fraction")
-        gap, method = case.number(f"{key}.gap"), case.text(f"{key}.method")
-        packing = Packing(case.integer(f"{key}.discs"), fraction, radii, gap=gap, method=method)
+        fraction, gap, method = case.number(f"{key}.area_fraction"), case.number(f"{key}.gap"), case.text(f"{key}.method")
+        packing = Packing(case.integer(f"{key}.discs"), fraction, radii_of(case, key), gap=gap, method=method)
         return Simulated(packing, case.integer(f"{key}.packings"))
     if case.has(f"{key}.circles.file"):
         key += ".circles"
@@ -47,6 +45,19 @@ def source(case: Case) -> Simulated | Measured:
         )
     key += ".image"
     return Measured(SectionImage(beside(case, case.text(f"{key}.file")), case.number(f"{key}.pixel"), case.text(f"{key}.particles")))
+
+
+def radii_of(case: Case, key: str) -> RadiusLaw:
+    """The law of the radii of a packing: log-normal between two ends, or that of a list."""
+    from stochastic.log_normal import LogNormalRadii
+    from stochastic.measured_radii import MeasuredRadii
+
+    if not case.has(f"{key}.file"):
+        return LogNormalRadii(case.number(f"{key}.smallest_radius"), case.number(f"{key}.largest_radius"))
+    try:
+        return MeasuredRadii.read(beside(case, case.text(f"{key}.file")))
+    except ValueError as error:
+        raise case.refuse(f"{key}.file", str(error)) from None
 
 
 def study_of(case: Case) -> Study:

@@ -44,13 +44,14 @@ MICROSTRUCTURE = Section(
 )
 
 PACKING = Section(
-    "Discs packed at random in a periodic box, equal or truncated log-normal (eq. 11).",
+    "Discs packed at random in a periodic box: equal, truncated log-normal (eq. 11), or of the radii in a file.",
     {
         "packings": Key("independent packings", "integer", default=20, allowed=Range("5 or more", 5.0, closed=True)),
         "discs": Key("discs in each packing", "integer", required=True, allowed=Range("10 or more", 10.0, closed=True)),
         "area_fraction": Key("share of the area that discs cover", "number", required=True, allowed=Range("inside (0, 0.85)", 0.0, 0.85)),
-        "smallest_radius": Key("smallest radius", "number", "m", required=True, allowed=POSITIVE),
-        "largest_radius": Key("largest radius", "number", "m", required=True, allowed=POSITIVE),
+        "smallest_radius": Key("smallest radius of the log-normal law; needed without a file", "number", "m", allowed=POSITIVE),
+        "largest_radius": Key("largest radius of the log-normal law; needed without a file", "number", "m", allowed=POSITIVE),
+        "file": Key("CSV file of measured radii or diameters, a column r [mm] or d [mm], in place of both", "text"),
         "gap": Key("least gap between surfaces", "number", "m", default=0.0, allowed=NOT_NEGATIVE),
         "method": Key("how they are packed", "choice", default="auto", choices=("auto", "sequential", "relaxed")),
     },

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import re
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -12,6 +9,7 @@ import numpy as np
 
 from stochastic.contacts import close_pairs, surface_distance
 from stochastic.discs import Discs
+from stochastic.length_columns import length_columns
 from stochastic.truncated_normal import Array
 
 COLUMNS = ("x", "y", "r")
@@ -69,19 +67,8 @@ class CircleFile:
 
     def _table(self) -> tuple[Array, Array]:
         """Row numbers as an editor shows them, shape (n,), and x, y, r in m with the origin at the corner, shape (n, 3)."""
-        try:
-            text = self.path.read_text(encoding="utf-8-sig")
-        except (OSError, UnicodeDecodeError) as error:
-            raise ValueError(f"{self.path} cannot be read as text: {error}") from error
-        lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and not line.lstrip().startswith("#")]
-        if not lines:
-            raise ValueError(f"{self.path} is empty; it needs a header x, y, r and one row per circle")
-        separator = ";" if ";" in lines[0][1] else "\t" if "\t" in lines[0][1] else ","
-        columns = _columns(next(csv.reader([lines[0][1]], delimiter=separator)), self.unit, self.path)
-        fields = list(csv.reader([line for _, line in lines[1:]], delimiter=separator))
-        table = np.array([[factor * _number(row[place] if place < len(row) else "") for place, factor in columns] for row in fields], float)
-        table = table.reshape(-1, 3) - (*self.origin, 0.0)
-        return np.array([number for number, _ in lines[1:]], int), table
+        rows, table = length_columns(self.path, COLUMNS, self.unit)
+        return rows, table - (*self.origin, 0.0)
 
     def _nonsense(self, rows: Array, table: Array) -> dict[int, str]:
         reasons: dict[int, str] = {}
@@ -120,40 +107,3 @@ class MeasuredCircles:
 
     discs: Discs
     rejected: dict[int, str] = field(default_factory=dict)
-
-
-def _columns(header: list[str], unit: str, path: Path) -> list[tuple[int, float]]:
-    """Place of x, y, r in a row and the factor that makes metres of them."""
-    named: dict[str, tuple[int, float]] = {}
-    for place, cell in enumerate(header):
-        match = re.fullmatch(r"\s*(\w+)\s*(?:[\[(]\s*([^\])]+?)\s*[\])])?\s*", cell)
-        name = match[1].lower() if match else ""
-        if match and name in ("x", "y", "r", "d"):
-            factor = _metres(match[2] or unit, cell.strip(), path) * (0.5 if name == "d" else 1.0)
-            named["r" if name == "d" else name] = (place, factor)
-    missing = [name for name in COLUMNS if name not in named]
-    if missing:
-        told = f"the header {', '.join(map(str.strip, header))!r} has no column {', '.join(missing)}"
-        raise ValueError(f"{path}: {told}; it needs x, y and r (or d), with units: 'x [mm], y [mm], d [mm]'")
-    return [named[name] for name in COLUMNS]
-
-
-def _metres(unit: str, column: str, path: Path) -> float:
-    """Metres in one `unit` of length."""
-    from pint import UnitRegistry
-    from pint.errors import PintError
-
-    if not unit:
-        raise ValueError(f"{path}: column {column!r} has no unit; write it in the header, such as 'r [mm]', or give a unit for all")
-    registry: Callable[[str], object] = UnitRegistry().Quantity
-    try:
-        return float(registry(f"1 {unit}").to("m").magnitude)  # type: ignore[attr-defined]
-    except (PintError, AttributeError, ValueError) as error:
-        raise ValueError(f"{path}: column {column!r} has the unit {unit!r}, which is not a length; take mm, cm, m, …") from error
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return float("nan")

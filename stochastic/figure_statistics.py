@@ -14,22 +14,21 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from stochastic.apollonius import Apollonius
-    from stochastic.log_normal import LogNormalRadii
     from stochastic.microstructure import Microstructure
     from stochastic.neighbours import Neighbours
+    from stochastic.radius_law import RadiusLaw
 
 
-def draw_radii(radii: Array, law: LogNormalRadii | None) -> Figure:
+def draw_radii(radii: Array, law: RadiusLaw | None) -> Figure:
     """Distribution function of the radii, measured or packed, and their law if there is one (Fig. 11)."""
     import matplotlib.pyplot as plt
 
     drawn, axes = plt.subplots(figsize=(6.4, 3.8))
     values = 1e3 * np.sort(radii)
     axes.step(values, np.arange(1, len(values) + 1) / len(values), color=BLUE, where="post", label=f"{len(values)} discs")
-    if law is not None and law.sigma > 0:
+    if law is not None and law.smallest < law.largest:
         grid = np.linspace(law.smallest, law.largest, 400)
-        label = f"log-normal, σ_r = {law.sigma:.4f}"
-        axes.plot(1e3 * grid, law.cdf(grid), color=ORANGE, ls="--", label=label)
+        axes.plot(1e3 * grid, law.cdf(grid), color=ORANGE, ls="--", label=law.label)
     axes.set(xlabel="radius [mm]", ylabel="share of discs", ylim=(0, 1.02))
     axes.legend()
     return drawn

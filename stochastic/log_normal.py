@@ -33,6 +33,11 @@ class LogNormalRadii:
             raise ValueError(f"the radii go from {self.smallest:g} to {self.largest:g} m; they need 0 < smallest <= largest, both finite")
 
     @property
+    def label(self) -> str:
+        """The law in words."""
+        return f"log-normal, σ_r = {self.sigma:.4f}"
+
+    @property
     def sigma(self) -> float:
         """Scale parameter σ_r; ln 10/6 for a factor of ten on [-3, 3]."""
         return float(np.log(self.largest / self.smallest)) / (self.distribution.upper - self.distribution.lower)

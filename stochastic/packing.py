@@ -10,7 +10,7 @@ import numpy as np
 
 from stochastic.contacts import smallest_gap
 from stochastic.discs import Discs
-from stochastic.log_normal import LogNormalRadii
+from stochastic.radius_law import RadiusLaw
 from stochastic.refused import RefusedError
 from stochastic.relaxed import relaxed
 from stochastic.sequential import random_sequential
@@ -38,7 +38,7 @@ class Packing:
 
     discs: int
     area_fraction: float
-    radii: LogNormalRadii
+    radii: RadiusLaw
     gap: float = 0.0
     method: str = "auto"
 
@@ -115,11 +115,11 @@ def _one(wish: Packing, seed: np.random.SeedSequence) -> Discs:
     return wish.make(np.random.default_rng(seed))
 
 
-def _law_test(radii: Array, law: LogNormalRadii) -> tuple[float, float]:
+def _law_test(radii: Array, law: RadiusLaw) -> tuple[float, float]:
     """Kolmogorov–Smirnov distance and the probability of a greater one."""
     from scipy.stats import kstest
 
-    if law.sigma == 0:
+    if law.smallest == law.largest:
         same = bool((np.abs(radii - law.smallest) <= 1e-12 * law.smallest).all())
         return float(not same), float(same)
     result = kstest(radii, law.cdf)
