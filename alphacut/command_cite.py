@@ -19,17 +19,29 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def citation() -> str:
-    """The citation in BibTeX, from CITATION.cff where that is at hand."""
+    """The citations in BibTeX, from CITATION.cff where that is at hand."""
     file = Path(__file__).resolve().parent.parent / "CITATION.cff"
-    text = file.read_text(encoding="utf-8") if file.is_file() else ""
-    found = dict(re.findall(r'^(title|date-released): *"?([^"\n]+)"?', text, flags=re.MULTILINE))
-    title = found.get("title", "alphacut: from an uncertain microstructure to the fuzzy vibration of a structure")
-    year = found.get("date-released", "")[:4]
-    return (
-        f"@software{{alphacut,\n  title = {{{title}}},\n  version = {{{own_version()}}},\n"
-        + (f"  year = {{{year}}},\n" if year else "")
-        + "}\n"
-    )
+    own, _, paper = file.read_text(encoding="utf-8").partition("references:") if file.is_file() else ("", "", "")
+    program = told(own, "title", "date-released", "name")
+    entry = {
+        "author": f"{{{program.get('name', 'The alphacut developers')}}}",
+        "title": program.get("title", "alphacut: from an uncertain microstructure to the fuzzy vibration of a structure"),
+        "version": own_version(),
+        "year": program.get("date-released", "")[:4],
+    }
+    return bibtex("software", "alphacut", entry) + bibtex("article", "alphacut-paper", told(paper, "title", "journal", "year", "doi"))
+
+
+def told(text: str, *names: str) -> dict[str, str]:
+    """The values of some keys of a piece of CITATION.cff."""
+    found = dict(re.findall(r'^[\s-]*([\w-]+): *"?([^"\n]+)"?', text, flags=re.MULTILINE))
+    return {name: found[name] for name in names if name in found}
+
+
+def bibtex(kind: str, name: str, entry: Mapping[str, str]) -> str:
+    """An entry; empty where nothing is known."""
+    lines = "".join(f"  {key} = {{{value}}},\n" for key, value in entry.items() if value)
+    return f"@{kind}{{{name},\n{lines}}}\n" if lines else ""
 
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:

@@ -4,10 +4,12 @@ import re
 import shlex
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
+from alphacut import library_page
 from alphacut.case_format import commands, page
 from alphacut.entry import COMMANDS, main, parsers
 from alphacut.options import split_petsc
@@ -100,3 +102,7 @@ def test_generated_pages_are_up_to_date():
     assert stored == page(), "make it anew: python -m alphacut.case_format > docs/case-format.md"
     text = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
     assert text == commands(), "make it anew: python -m alphacut.case_format commands > docs/commands.md"
+    text = (ROOT / "docs" / "library.md").read_text(encoding="utf-8")
+    assert text == library_page.page(), "make it anew: python -m alphacut.library_page > docs/library.md"
+    names = [name for package in ("fuzzy", "stochastic", "rve", "frame") for name in import_module(package).__all__ if name[1:].islower()]
+    assert all(f"| `{name}()` |" in text for name in names)

@@ -114,3 +114,10 @@ def test_only_what_a_run_used_differs_from_the_paper():
     assert len(list(differences({"envelopes": {"all": {"method": "graph-follower"}}}))) == 1
     assert len(list(differences({"microstructure": {}}))) > 1
     assert list(differences({})) == []
+
+
+def test_citations_have_authors_years_and_places(capfd):
+    assert main(["cite"]) == 0
+    out = capfd.readouterr().out
+    assert re.search(r"@software\{alphacut,\n  author = \{\{.+\}\},\n  title = .+\n  version = \{[\d.]+\},\n  year = \{20\d\d\},", out)
+    assert re.search(r"@article\{.*\n  title = \{Fuzzy dynamics.*\n  journal = .*\n  year = .*\n  doi = \{10\.\d+/", out)
