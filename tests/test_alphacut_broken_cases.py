@@ -2,6 +2,9 @@
 
 import random
 import re
+import shutil
+import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -12,6 +15,7 @@ from alphacut.entry import main
 from alphacut.loading import load
 from alphacut.position import lines_of_keys
 from alphacut.problem import BadInput, Problem
+from alphacut.readiness import ready
 from alphacut.schema import every_key
 
 CASE = Path(__file__).parent.parent / "cases" / "paper.toml"
@@ -106,6 +110,41 @@ def test_a_broken_case_exits_2_and_names_the_broken_key(seed, tmp_path, capfd):
     assert re.match(r"alphacut: \S+case\.toml(:\d+)?: \S", line), err
     assert re.search(rf": {re.escape(key)}\b", line), f"{way.__name__} of {key}:\n{err}"
     assert [file.name for file in tmp_path.iterdir()] == ["case.toml"]
+
+
+def meant_otherwise(text, broken):
+    """Whether a change of a case changed what it says; a flag that became another flag is fine."""
+    try:
+        before, after = tomllib.loads(text), tomllib.loads(broken)
+    except (tomllib.TOMLDecodeError, TypeError):
+        return True
+    return before != after and str(before).replace("False", "True") != str(after).replace("False", "True")
+
+
+@pytest.mark.parametrize("name", ["building", "concrete", "porous", "tower", "pendulum", "paper-literal"])
+def test_a_break_of_any_shipped_case_is_one_line(name, tmp_path, monkeypatch):
+    text = CASE.with_stem(name).read_text(encoding="utf-8")
+    lines = text.splitlines()
+    keys = {key: line for key, line in lines_of_keys(text).items() if "." in key and "=" in lines[line - 1]}
+    for variable, value in (("PAPER", text), ("LINES", lines), ("KEYS", keys)):
+        monkeypatch.setattr(sys.modules[__name__], variable, value)
+    for file in CASE.parent.glob("*.csv"):
+        shutil.copy(file, tmp_path)
+    path, tried = tmp_path / "case.toml", 0
+    for seed in range(60):
+        try:
+            key, broken = WAYS[seed % len(WAYS)](random.Random(seed))
+        except (IndexError, KeyError):  # this case has no such key
+            continue
+        if not meant_otherwise(text, broken):
+            continue
+        path.write_bytes(broken if isinstance(broken, bytes) else broken.encode())
+        with pytest.raises(BadInput) as caught:
+            ready(load(path))
+        (problem,) = caught.value.problems
+        assert key.rpartition(".")[2] in problem.key, f"{key}: {problem}"
+        tried += 1
+    assert tried > 35
 
 
 def test_problems_of_single_values_hide_none_of_the_case_as_a_whole(tmp_path):
