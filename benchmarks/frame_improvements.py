@@ -40,18 +40,24 @@ def measured(duration: float, step: float, *, gap: float = 1e-6) -> Iterator[dic
 
 
 def draw(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """Error over graphs, every variant named beside its point."""
+    """A row for each variant: its error to the left, its graphs to the right."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7.5, 4.2), layout="constrained")
-    axes = figure.subplots()
-    for row in rows:
-        plain = row["variant"].startswith("faithful")
-        axes.loglog(row["graphs"], row["error_m"], "o", color="#D55E00" if plain else "#0072B2")
-        axes.annotate(row["variant"], (row["graphs"], row["error_m"]), (6, 3), textcoords="offset points", fontsize=9)
-    axes.set(xlabel="graphs computed", ylabel="largest error of the envelope in m")
-    axes.set_xlim(right=2.5 * max(row["graphs"] for row in rows))
-    axes.grid(alpha=0.25)
+    figure = Figure(figsize=(7.5, 3.4), layout="constrained")
+    both = figure.subplots(1, 2, sharey=True)
+    names = [row["variant"] for row in rows]
+    colours = ["#D55E00" if name.startswith("faithful") else "#0072B2" for name in names]
+    for axes, key, label in zip(both, ("error_m", "graphs"), ("largest error of the envelope, m", "graphs computed"), strict=True):
+        values = [row[key] for row in rows]
+        axes.hlines(names, min(values) / 3, values, color="#d9d9d9", zorder=1)
+        axes.scatter(values, names, color=colours, zorder=2)
+        for name, value in zip(names, values, strict=True):
+            axes.annotate(
+                f"{value:.2g}" if key == "error_m" else f"{value}", (value, name), (7, -3), textcoords="offset points", fontsize=8
+            )
+        axes.set(xlabel=label, xscale="log", xlim=(min(values) / 3, max(values) * 6))
+        axes.grid(axis="x", alpha=0.25)
+    both[0].invert_yaxis()
     figure.savefig(path, dpi=150)
 
 
