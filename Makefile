@@ -39,10 +39,7 @@ lint:
 	$(IN) mypy --strict alphacut stochastic rve fuzzy frame
 
 charts:
-	$(IN) python -m benchmarks.cell_charts
-	$(IN) python -m benchmarks.frame_integrators
-	$(IN) python -m benchmarks.frame_envelopes
-	$(IN) python -m benchmarks.frame_failures
+	$(IN) python -m alphacut charts
 
 stability:
 	$(IN) python -m benchmarks.cell_stability

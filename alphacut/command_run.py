@@ -29,7 +29,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
     add_workers(parser)
     parser.add_argument("--out", metavar="FOLDER", help="where results go (default: results/NAME-OF-THE-CASE)")
-    parser.add_argument("--fresh", action="store_true", help="compute everything anew instead of taking what is up to date")
+    again = parser.add_mutually_exclusive_group()
+    again.add_argument("--resume", action="store_true", help="go on from what an earlier run has left, where nothing changed: the default")
+    again.add_argument("--fresh", action="store_true", help="compute everything anew instead of taking what is up to date")
     parser.add_argument("--strict", action="store_true", help="refuse a time step or tolerance too coarse for the motion")
     parser.add_argument(
         "--quick", action="store_true", help="the quick form: same stages in seconds on coarse meshes; numbers mean nothing"

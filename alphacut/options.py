@@ -52,7 +52,8 @@ class Parser(argparse.ArgumentParser):
         here, what = self.prog.removeprefix("alphacut "), f"there is no such option: {word}"
         if re.match(r"-(ksp|pc|mat|snes|mg|sub|log|options)_", word):
             return Problem(here, what, allowed=f"PETSc's options with their prefix: {PETSC_PREFIX}{word[1:]}")
-        return Problem(here, what, nearest=nearest(word.partition("=")[0], known))
+        close = nearest(word.partition("=")[0], known)
+        return Problem(here, what, allowed="" if close else ", ".join(known), nearest=close)
 
     def refuse(self, words: Sequence[str]) -> NoReturn:
         """Complain about words that are no options of this command, with the nearest that is."""

@@ -47,7 +47,8 @@ def test_charts_run_what_is_named_and_say_which(monkeypatch, tmp_path, capfd):
         return SimpleNamespace(returncode=0 if command[-1] != "benchmarks.cell_sweep" else 3)
 
     monkeypatch.setattr(subprocess, "run", pretend)
-    assert {"cell_sweep", "frame_tower"} <= set(command_charts.programs())
+    assert {"cell_sweep", "frame_tower", *command_charts.CHARTS} <= set(command_charts.programs())
+    assert not {"rows", "frame_reference", "cell_methods"} & set(command_charts.programs())
     assert main(["charts", "frame_tower", "frame_integrators", "--json", str(tmp_path / "run.json")]) == 0
     assert called == ["benchmarks.frame_tower", "benchmarks.frame_integrators"]
     assert json.loads((tmp_path / "run.json").read_text())["run"] == ["frame_tower", "frame_integrators"]
