@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alphacut.case import Case
-from alphacut.consistency import SLOPES
+from alphacut.consistency_material import SLOPES
 from alphacut.figure_style import BLUE, GREY, INK, PURPLE, figure
 from stochastic import HermiteMap, TruncatedNormal
 from stochastic.truncated_normal import Array
