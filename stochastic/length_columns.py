@@ -50,7 +50,7 @@ def _places(header: list[str], columns: Sequence[str], unit: str, path: Path) ->
     if missing:
         told = f"the header {', '.join(map(str.strip, header))!r} has no column {', '.join(missing)}"
         wanted = ", ".join(f"{name} [mm]" for name in columns)
-        raise ValueError(f"{path}: {told}; it needs {wanted} with their units; d for diameters may stand in for r")
+        raise ValueError(f"{path}: {told}; it needs '{wanted}', units in the header; d for diameters may stand in for r")
     return [named[name] for name in columns]
 
 
