@@ -152,10 +152,8 @@ def summary(found: Envelope) -> str:
     from frame.outcomes import peaks
 
     of = peaks(found)
-    low = found.lower if found.outer_lower is None else found.outer_lower  # what is proved, where there is a proof
-    high = found.upper if found.outer_upper is None else found.outer_upper
     units = [output_unit(name) for name in found.outputs]
-    columns = [list(map(float, row)) for row in np.stack([low[0].min(0), high[0].max(0), of.lower[0], of.upper[0]], axis=1)]
+    columns = [list(map(float, row)) for row in np.stack([found.minimum[0], found.maximum[0], of.lower[0], of.upper[0]], axis=1)]
     largest = largest_by_unit((value, unit) for unit, values in zip(units, columns, strict=True) for value in values)
     shown = [[engineering(value, unit, beside=largest[unit]) for value in values] for unit, values in zip(units, columns, strict=True)]
     rows = [(name, *values) for name, values in zip(found.outputs, shown, strict=True)]

@@ -25,8 +25,6 @@ def measured(duration: float, step: float, gap: float, trajectories: int, worker
         when they do not), "beyond_inner": by how much they pass the attained bounds (m).
     """
     found = envelope(FRAME, INPUTS, duration=duration, step=step, alpha=(0,), method="modal", certify=gap, workers=workers)
-    assert found.outer_lower is not None
-    assert found.outer_upper is not None
     flow = LinearFlow(FRAME, found.parameters, duration, step, Exact())
     low, high = np.array([number.cut(0) for number in INPUTS.values()]).T
     rng = np.random.default_rng(11)
@@ -35,7 +33,7 @@ def measured(duration: float, step: float, gap: float, trajectories: int, worker
     while tried < trajectories:
         values = flow.values(points)
         top, bottom = values.max(0), values.min(0)
-        outside = max(outside, float(np.maximum(top - found.outer_upper[0], found.outer_lower[0] - bottom).max()))
+        outside = max(outside, float(np.maximum(top - found.upper[0], found.lower[0] - bottom).max()))
         beyond = max(beyond, float(np.maximum(top - found.upper[0], found.lower[0] - bottom).max()))
         tried += len(points)
         share = rng.random((min(CHUNK, max(1, trajectories - tried)), len(low)))

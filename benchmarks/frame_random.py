@@ -67,11 +67,11 @@ def true_errors(frame: StoreyFrame, inputs: Mapping[str, FuzzyNumber], found: Se
         flow = UnitFlow(LinearFlow(frame, cuts.names, TIME["duration"], 20 * TIME["step"], Exact()), cuts)
         polished = true_envelope(flow, samples=2**12, candidates=min(8, 2 ** len(inputs)))
         return [float(polished.errors(envelope).max()) for envelope in found]
-    assert truth.outer_lower is not None
-    assert truth.outer_upper is not None
+    assert truth.inner_lower is not None
+    assert truth.inner_upper is not None
     errors = []
     for e in found:
-        beyond = (truth.outer_lower - e.lower, e.lower - truth.lower, e.upper - truth.outer_upper, truth.upper - e.upper)
+        beyond = (truth.lower - e.lower, e.lower - truth.inner_lower, e.upper - truth.upper, truth.inner_upper - e.upper)
         errors.append(float(max(0.0, *(x.max() for x in beyond))))
     return errors
 

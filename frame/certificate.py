@@ -94,6 +94,7 @@ def certify(
         inner[level], points[level] = found.value.reshape(inner[level].shape), found.point.reshape(points[level].shape)
         outer[level], boxes = found.proved.reshape(outer[level].shape), boxes + found.boxes
     wide = margin[None, :, :, None]
+    outer = np.minimum.accumulate(outer, axis=0)  # what holds on a wider box holds on those inside it
     return Certificate((inner - wide) * unit, points, (outer + wide) * unit, _between(model), boxes, scale)
 
 

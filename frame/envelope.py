@@ -43,17 +43,18 @@ class Envelope:
         time: Nodes, shape (T,), in s.
         outputs: Names of the observed quantities, m of them.
         parameters: Names of the uncertain parameters, d of them.
-        lower: Lower bounds, shape (A, T, m), in SI units.
+        lower: Lower bounds of the nature stated below, shape (A, T, m), in SI units; of a certified envelope the proved ones.
         upper: Upper bounds, shape (A, T, m).
-        lower_at: Parameters that reach the lower bounds, shape (A, T, m, d), in SI units.
+        lower_at: Parameters that reach the lower bounds, of a certified envelope `inner_lower`, shape (A, T, m, d), in SI units.
         upper_at: Parameters that reach the upper bounds, shape (A, T, m, d).
         method: Name of the method.
         nature: "inner": attained by the given parameters; "estimated": with `error`; "verified by sampling" or "guaranteed": certified.
         trajectories: Number of trajectories (or eigen-analyses) computed.
         seconds: Wall time of computing.
         error: Estimated envelope error, shape (A, T, m), in the units of the outputs; None where none was made.
-        outer_lower: Certified bound below `lower`, shape (A, T, m), or None.
-        outer_upper: Certified bound above `upper`, or None.
+        inner_lower: Of a certified envelope what `lower_at` attains at most, less what the model of the motion may be wrong by, so that the
+            true lower bound lies between `lower` and this; shape (A, T, m). None without a certificate.
+        inner_upper: The same for the upper bound. Where it lies below `inner_lower`, no width is proved.
         facts: Further numbers and words: step error, reason of a choice, counts.
     """
 
@@ -70,8 +71,8 @@ class Envelope:
     trajectories: int
     seconds: float
     error: Array | None = None
-    outer_lower: Array | None = None
-    outer_upper: Array | None = None
+    inner_lower: Array | None = None
+    inner_upper: Array | None = None
     facts: Mapping[str, float | str] = field(default_factory=dict)
 
     @property
@@ -99,7 +100,7 @@ class Envelope:
         band, at = ("alpha", "time", "output"), ("alpha", "time", "output", "parameter")
         data: dict[str, Any] = {name: (band, getattr(self, name)) for name in ("lower", "upper")}
         data |= {name: (at, getattr(self, name)) for name in ("lower_at", "upper_at")}
-        data |= {name: (band, getattr(self, name)) for name in ("error", "outer_lower", "outer_upper") if getattr(self, name) is not None}
+        data |= {name: (band, getattr(self, name)) for name in ("error", "inner_lower", "inner_upper") if getattr(self, name) is not None}
         axes = {"alpha": self.alpha, "time": self.time, "output": list(self.outputs), "parameter": list(self.parameters)}
         counts = {"trajectories": self.trajectories, "seconds": self.seconds}
         dataset = xarray.Dataset(data, axes, {"method": self.method, "nature": self.nature, **counts, **self.facts})

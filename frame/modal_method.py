@@ -118,7 +118,7 @@ def _certified(flow: UnitFlow, method: Modal, gap: float, begun: float, progress
         facts["proof"] = f"the branch and bound is rigorous for the modal model; {sampled}: {unproved}"
     envelope = signed_envelope(
         flow,
-        proof.bounds,
+        proof.outer,
         proof.at,
         method="modal",
         nature="verified by sampling" if unproved else "guaranteed",
@@ -127,7 +127,7 @@ def _certified(flow: UnitFlow, method: Modal, gap: float, begun: float, progress
         seconds=time.perf_counter() - begun,
         facts=facts,
     )
-    return replace(envelope, outer_lower=-proof.outer[..., 0], outer_upper=proof.outer[..., 1])
+    return replace(envelope, inner_lower=-proof.bounds[..., 0], inner_upper=proof.bounds[..., 1])
 
 
 def _model_with_error(linear: LinearFlow, flow: UnitFlow, method: Modal, gap: float) -> tuple[ModalModel, Array, str]:

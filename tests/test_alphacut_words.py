@@ -98,12 +98,14 @@ def test_the_core_is_one_value_or_said_to_be_an_interval():
     assert core({**ends, "E_GPa": {"lower": [20.0, 25.0], "upper": [30.0, 25.0]}}) == "25.0000 GPa"
 
 
-def test_proved_bounds_are_printed_where_there_are_any():
+def test_the_bounds_of_the_stated_nature_are_printed():
     low, high = np.array([[[-0.1], [-0.2]], [[-0.05], [-0.1]]]), np.array([[[0.1], [0.3]], [[0.05], [0.1]]])
     at, ends = np.zeros((2, 2, 1, 1)), np.array([0.0, 1.0])
     found = Envelope(ends, ends, ("q1",), ("E",), low, high, at, at, "modal", "inner", 7, 0.1)
     assert "−200.0 mm      300.0 mm" in summary(found)
-    assert "−201.0 mm      302.0 mm" in summary(replace(found, outer_lower=low - 1e-3, outer_upper=high + 2e-3))
+    certified = replace(found, lower=low - 1e-3, upper=high + 2e-3, inner_lower=low, inner_upper=high, nature="guaranteed")
+    assert "−201.0 mm      302.0 mm" in summary(certified)
+    assert "−200.0" not in summary(certified)
 
 
 def test_only_what_a_run_used_differs_from_the_paper():

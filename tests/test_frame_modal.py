@@ -86,42 +86,41 @@ def test_default_method_is_modal_and_meets_the_certified_envelope(certified: Env
     found = envelope(FRAME, INPUTS, duration=6, step=0.1, alpha=(0, 0.5, 1))
     assert found.method == "modal"
     assert found.trajectories < 60
-    assert certified.outer_upper is not None
-    assert certified.outer_lower is not None
-    assert (certified.outer_upper - found.upper).max() < 5e-6
-    assert (found.lower - certified.outer_lower).max() < 5e-6
-    assert (found.upper - certified.outer_upper).max() < 0
+    assert (certified.upper - found.upper).max() < 5e-6
+    assert (found.lower - certified.lower).max() < 5e-6
+    assert (found.upper - certified.upper).max() < 0
 
 
 def test_certificate_has_the_gap_asked_for_and_contains_sampled_trajectories(certified: Envelope) -> None:
     assert certified.nature == "guaranteed"
     assert float(certified.facts["gap"]) <= 1e-6
-    assert certified.outer_upper is not None
-    assert certified.outer_lower is not None
-    assert (certified.outer_upper - certified.upper).min() > 0
-    assert (certified.outer_upper - certified.upper).max() <= 1.001e-6
-    assert (certified.lower - certified.outer_lower).max() <= 1.001e-6
+    assert certified.inner_upper is not None
+    assert certified.inner_lower is not None
+    assert (certified.upper - certified.inner_upper).min() > 0
+    assert (certified.upper - certified.inner_upper).max() <= 1.001e-6
+    assert (certified.inner_lower - certified.lower).max() <= 1.001e-6
     sampled = envelope(
         FRAME, INPUTS, duration=6, step=0.1, alpha=certified.alpha, method="quasi-monte-carlo", integrator="exact", samples=4096
     )
-    assert (sampled.upper <= certified.outer_upper).all()
-    assert (sampled.lower >= certified.outer_lower).all()
-    assert (sampled.upper - certified.upper).max() <= 1e-6
+    assert (sampled.upper <= certified.upper).all()
+    assert (sampled.lower >= certified.lower).all()
+    assert (sampled.upper - certified.inner_upper).max() <= 1e-6
 
 
 def test_attained_bounds_belong_to_their_parameters(certified: Envelope) -> None:
     flow = LinearFlow(FRAME, CUTS.names, 6, 0.1, Exact())
     for node, output in ((17, 0), (44, 1), (60, 2)):
         value = flow.values(certified.upper_at[1, node, output][None])[0, node, output]
-        assert certified.upper[1, node, output] <= value <= certified.upper[1, node, output] + 1e-6
+        assert certified.inner_upper is not None
+        assert certified.inner_upper[1, node, output] <= value <= certified.upper[1, node, output]
 
 
 def test_budget_that_ends_leaves_an_honest_gap() -> None:
     short = envelope(FRAME, INPUTS, duration=12, step=0.5, alpha=(0,), method="modal", certify=1e-6, boxes=6)
     full = envelope(FRAME, INPUTS, duration=12, step=0.5, alpha=(0,), method="modal", certify=1e-6)
     assert float(short.facts["gap"]) > 1e-4
-    assert short.outer_upper is not None
-    assert (short.outer_upper >= full.upper).all()
+    assert full.inner_upper is not None
+    assert (short.upper >= full.inner_upper).all()
 
 
 def test_third_derivatives_stay_below_their_bound() -> None:
