@@ -20,6 +20,7 @@ from alphacut.progress import progress
 from alphacut.provenance import fingerprint
 from alphacut.reading import nearest
 from alphacut.schema import ENVELOPE_METHODS
+from alphacut.structure import structure
 from alphacut.units import engineering, largest_by_unit
 from fuzzy import FuzzyNumber
 
@@ -66,6 +67,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     handed = given_modulus(options.modulus) or stand_in(case)
     task = replace(envelope.task_of(case), exclude=excluded(options.exclude))
     contradictions(options, case, task)
+    if case.has("exceedance.output"):
+        outcomes.require_random(case, structure(case, handed))  # before anything is computed
     with progress("Envelopes", quiet=options.quiet) as tick:
         found = envelope.compute(case, task, modulus=handed, strict=options.strict, workers=options.workers, progress=tick)
     if options.out:
@@ -179,5 +182,6 @@ def proved(found: Envelope) -> str:
 
     if "gap" not in found.facts:
         return ""
-    gap = engineering(float(found.facts["gap"]), output_unit(found.outputs[0]))
-    return f"every node's bounds enclosed to within {gap} of {found.outputs[0]}; {found.facts['proof']}\n"
+    of = str(found.facts["gap_output"])
+    gap, between = (engineering(float(found.facts[name]), output_unit(of)) for name in ("gap", "between_nodes"))
+    return f"every node's bounds enclosed to within {gap} of {of}, up to {between} beyond them between nodes; {found.facts['proof']}\n"

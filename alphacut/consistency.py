@@ -81,8 +81,23 @@ def tolerances(case: Case) -> Iterator[Problem]:
     """One tolerance, in the unit of the output."""
     if case.has("envelope.relative_tolerance") and any(f"{name}.tolerance" in case.written for name in ("envelope", "pendulum")):
         yield Problem("envelope.relative_tolerance", "there is a tolerance besides", allowed="one of tolerance and relative_tolerance")
+    if case.has("frame.masses") and case.names("frame.outputs") and not displacements(case):
+        for name in ("tolerance", "certify"):
+            if f"envelope.{name}" in case.written:
+                allowed = "envelope.relative_tolerance, or an output such as q1 or drift1 besides"
+                yield Problem(f"envelope.{name}", "this is a length, and no output is a displacement", as_text(case, name), allowed)
     if case.has("pendulum.mass") and "envelope.tolerance" in case.written:
         yield Problem("envelope.tolerance", "a pendulum's output is a force", allowed="pendulum.tolerance, or envelope.relative_tolerance")
+
+
+def displacements(case: Case) -> list[str]:
+    """The outputs of a frame that are displacements."""
+    return [name for name in case.names("frame.outputs") if name.startswith(("q", "drift"))]
+
+
+def as_text(case: Case, name: str) -> str:
+    """A key of [envelope] as it is written."""
+    return str(case.written[f"envelope.{name}"])
 
 
 def order_of_stages(case: Case) -> Iterator[Problem]:
@@ -157,6 +172,9 @@ def methods(case: Case) -> Iterator[Problem]:
     if case.has("envelope.certify") and (case.has("pendulum.mass") or case.text("envelope.method") not in ("auto", "modal")):
         found = "a pendulum cannot be certified" if case.has("pendulum.mass") else f"method {case.text('envelope.method')} cannot certify"
         yield Problem("envelope.certify", found, allowed="a linear structure with method modal or auto")
+    if case.has("envelope.certify") and case.has("envelope.integrator") and case.text("envelope.integrator") != "exact":
+        scheme = case.text("envelope.integrator")
+        yield Problem("envelope.integrator", "a certificate is of the exact motion", scheme, "exact, or no integrator, beside certify")
     if case.has("envelope.integrator"):
         known = NONLINEAR if case.has("pendulum.mass") else tuple(x for x in INTEGRATORS if x != "composition4")
         if (scheme := case.text("envelope.integrator")) not in known:

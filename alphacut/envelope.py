@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from alphacut.case import Case
+from alphacut.consistency import displacements
 from alphacut.output import whole_file
 from alphacut.problem import BadInput, Problem
 from alphacut.progress import Tick
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     import xarray
 
     from frame import Envelope
+
+SHARE = 1e-3  # the tolerance where no output is a displacement: of their peaks
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,7 @@ def task_of(case: Case, *, fuzzy: Sequence[str] | None = None, duration: float |
     """The envelope that [envelope] asks for, with other fuzzy inputs or another duration if given."""
     tolerance = "pendulum.tolerance" if case.has("pendulum.mass") else "envelope.tolerance"
     relative, method = case.has("envelope.relative_tolerance"), case.text("envelope.method")
+    forces = case.has("frame.masses") and bool(case.names("frame.outputs")) and not displacements(case)
     certify = case.number("envelope.certify") if case.has("envelope.certify") else None
     return EnvelopeTask(
         tuple(fuzzy) if fuzzy else case.names("envelope.fuzzy"),
@@ -71,9 +75,9 @@ def task_of(case: Case, *, fuzzy: Sequence[str] | None = None, duration: float |
         "modal" if certify is not None and method == "auto" else method,
         case.text("envelope.integrator") if case.has("envelope.integrator") else None,
         case.integer("envelope.order"),
-        case.number("envelope.relative_tolerance" if relative else tolerance),
+        case.number("envelope.relative_tolerance") if relative else SHARE if forces else case.number(tolerance),
         certify=certify,
-        relative=relative,
+        relative=relative or forces,
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from alphacut import quantity
 from alphacut.case import Case
+from alphacut.problem import BadInput, Problem
 from alphacut.progress import Tick
 from alphacut.structure import Structure, structure
 from alphacut.units import engineering
@@ -88,6 +89,20 @@ def storey_height(case: Case, output: str) -> float | None:
     lengths = case.fuzzies("frame.lengths") if case.has("frame.lengths") else ()
     index = 0 if len(lengths) == 1 else int(floor or 1) - 1
     return lengths[index].modal if 0 <= index < len(lengths) else None
+
+
+def require_random(case: Case, wanted: Structure) -> None:
+    """Whether the inputs named as random can be.
+
+    Raises:
+        BadInput: One is crisp, or unknown.
+    """
+    for name in case.names("exceedance.random"):
+        try:
+            wanted.members(name)
+        except BadInput as error:
+            (problem,) = error.problems
+            raise BadInput(Problem("exceedance.random", problem.what, name, problem.allowed, file=str(case.path))) from None
 
 
 def split_inputs(case: Case, wanted: Structure) -> tuple[dict[str, FuzzyNumber], dict[str, Sampler]]:

@@ -15,6 +15,7 @@ from alphacut.command_cite import citation
 from alphacut.differences import differences
 from alphacut.report_envelopes import envelopes, natural
 from alphacut.report_table import section, table
+from alphacut.units import engineering
 
 NATURES = {
     "inner": "Inner bounds are attained by the parameters stored with them; the true range may be wider, never narrower.",
@@ -153,9 +154,16 @@ def explained(rows: Sequence[tuple[object, ...]]) -> Iterator[str]:
 
 def proofs(summary: Mapping[str, Any]) -> Iterator[str]:
     """How narrowly each certified envelope is enclosed, and what that rests on."""
+    from frame.envelope import output_unit
+
     for name, study in summary.get("envelopes", {}).items():
         if "gap" in study:
-            yield f"Envelope {name} is enclosed to within {float(study['gap']):.3g} m at every node: {study['proof']}."
+            of = str(study.get("gap_output", next(iter(study.get("min", {"q": 0})))))
+            gap, between = (engineering(float(study.get(key, 0.0)), output_unit(of), digits=2) for key in ("gap", "between_nodes"))
+            yield (
+                f"The bounds of envelope {name} are proved at every node, and no wider than {gap} of {of} beyond what is attained; "
+                f"between nodes the motion leaves a straight line by {between} at most. {sentence(study['proof'])}"
+            )
 
 
 def effort(study: Mapping[str, Any]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import acos, cos, pi
 from typing import TYPE_CHECKING
 
 from alphacut.output import say
@@ -12,6 +13,7 @@ from alphacut.structure import Structure
 if TYPE_CHECKING:
     from alphacut.envelope import EnvelopeTask
 
+MISSED = 0.01  # of a peak, between two nodes
 WITH_TOLERANCE = ("auto", "modal", "graph-follower", "improved-graph-follower")
 
 
@@ -19,6 +21,7 @@ def rough(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
     """What is coarse about an envelope."""
     yield from coarse_step(wanted, task)
     yield from coarse_tolerance(wanted, task)
+    yield from coarse_nodes(wanted, task)
 
 
 def coarse_step(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
@@ -33,7 +36,7 @@ def coarse_step(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
 
 
 def coarse_tolerance(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
-    """A tolerance that is more than a hundredth of the peak of an output."""
+    """A tolerance, or the gap of a certificate, that is more than a hundredth of the peak of an output."""
     from frame.box import UnitFlow, boxes
     from frame.tolerance_guard import tolerance_guard
 
@@ -41,10 +44,31 @@ def coarse_tolerance(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]
         return
     inputs = wanted.inputs(task.fuzzy)
     flow = wanted.flow(tuple(inputs), task.duration, task.step, "exact" if wanted.linear is not None else task.integrator)
+    if task.certify is not None:
+        gap = tolerance_guard(UnitFlow(flow, boxes(inputs, (0.0,))), task.certify)
+        if not gap.ok:
+            yield Problem("envelope.certify", gap.message.removeprefix("tolerance: ").partition(", or a relative")[0])
+        return
     found = tolerance_guard(UnitFlow(flow, boxes(inputs, (0.0,)), task.relative), task.tolerance)
     if not found.ok:
         key = "envelope.relative_tolerance" if task.relative else "envelope.tolerance" if wanted.linear else "pendulum.tolerance"
         yield Problem(key, found.message.removeprefix("tolerance: "))
+
+
+def coarse_nodes(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
+    """Nodes so far apart that the peaks of the slowest mode may lie between them, by more than a hundredth."""
+    from frame.linear import frequencies
+
+    if wanted.linear is None:
+        return
+    slowest = float(frequencies(wanted.linear)[0])
+    missed = 1 - cos(min(pi, slowest * task.step) / 2)  # of a cosine whose peak lies in the middle between two nodes
+    if missed > MISSED:
+        what = (
+            f"{task.step:g} s between nodes and a first natural period of {2 * pi / slowest:.3g} s: up to "
+            f"{100 * missed:.0f} % of a peak may lie between two nodes; take at most {2 * acos(1 - MISSED) / slowest:.2g} s"
+        )
+        yield Problem("envelope.step", what)
 
 
 def guard_against(wanted: Structure, task: EnvelopeTask, *, strict: bool) -> None:

@@ -110,7 +110,8 @@ ENVELOPE = Section(
         "integrator": Key("time stepping; by the method if left out: exact for modal, else midpoint", "choice", choices=INTEGRATORS),
         "order": Key("order κ of the Taylor models", "integer", default=2, allowed=Range("1 or 2", 1, 2, closed=True)),
         "tolerance": Key(
-            "wanted error of a frame's displacements; for graph-follower the gain that is worth a new trajectory",
+            "wanted error of displacements; of other outputs the same share of their peaks as of the first displacement's; for "
+            "graph-follower the gain that is worth a new trajectory",
             "number",
             "m",
             default=1e-4,
@@ -118,8 +119,9 @@ ENVELOPE = Section(
         ),
         "relative_tolerance": Key("the same as a share of each output's peak, in place of tolerance", "number", allowed=UNIT),
         "certify": Key(
-            "gap within which the bounds of a linear structure, up to six inputs fuzzy, are enclosed and proved, of the first output; "
-            "for outputs of other units the same share of their peaks; minutes of computing; no proof if left out",
+            "gap within which the bounds of displacements of a linear structure, up to six inputs fuzzy, are enclosed and proved; for "
+            "outputs of other units the same share of their peaks as of the first displacement's; minutes of computing; no proof if left "
+            "out; with a damping ratio the error of the model can only be sampled",
             "number",
             "m",
             allowed=POSITIVE,

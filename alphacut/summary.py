@@ -109,7 +109,7 @@ def envelope_numbers(dataset: xarray.Dataset) -> dict[str, Any]:
     columns = {"min": low, "max": high, "mean_width": width}
     numbers = {key: dict(zip(names, map(float, column), strict=True)) for key, column in columns.items()}
     if "gap" in dataset.attrs:
-        cost |= {"gap": dataset.attrs["gap"], "proof": dataset.attrs["proof"]}
+        cost |= {name: dataset.attrs[name] for name in ("gap", "gap_output", "between_nodes", "proof") if name in dataset.attrs}
     if "error" in dataset:
         numbers["error"] = dict(zip(names, map(float, lowest["error"].max("time").values), strict=True))
     return numbers | {"alpha": dataset["alpha"].values, "peak": outcomes.peak_document(dataset)} | cost

@@ -113,16 +113,21 @@ class UnitFlow:
         """Names of the observed quantities."""
         return self.flow.outputs
 
+    @property
+    def reference(self) -> int:
+        """Index of the output that a tolerance is meant for: the first displacement, whatever stands before it; else the first."""
+        return next((index for index, name in enumerate(self.outputs) if output_unit(name) == "m"), 0)
+
     @cached_property
     def scale(self) -> Array:
         """Factor on a tolerance for each output, shape (m,).
 
-        Relative: the modal peaks. Else 1 when all outputs share a unit, or their modal peaks by the first one's.
+        Relative: the modal peaks. Else 1 when all outputs share a unit, or their modal peaks by that of `reference`.
         """
         if not self.relative and len({output_unit(name) for name in self.outputs}) == 1:
             return np.ones(len(self.outputs))
         peak = np.abs(self.flow.values(self.boxes.modal[None])[0]).max(0)
-        shares: Array = np.where(peak > 0, peak, peak.max() or 1.0) / (1.0 if self.relative else peak[0] or 1.0)
+        shares: Array = np.where(peak > 0, peak, peak.max() or 1.0) / (1.0 if self.relative else peak[self.reference] or 1.0)
         return shares
 
     def values(self, unit: Array) -> Array:

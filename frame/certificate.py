@@ -27,7 +27,7 @@ class Certificate:
         bounds: Attained upper bounds of (−output, output), less the model error, shape (A, T, m, 2).
         at: Their unit coordinates, shape (A, T, m, 2, d).
         outer: Proved upper bounds, shape (A, T, m, 2).
-        between: Bound of what the outputs do between nodes beyond a straight line, in units of the first output.
+        between: Bound of what the outputs do between nodes beyond a straight line, in units of the reference output.
         boxes: Boxes of parameters looked at.
         scale: Size of each output beside the first, shape (m,).
     """
@@ -41,7 +41,7 @@ class Certificate:
 
     @property
     def gap(self) -> float:
-        """Largest difference between proved and attained bound, in units of the first output."""
+        """Largest difference between proved and attained bound, in units of the reference output."""
         return float(((self.outer - self.bounds) / self.scale[:, None]).max())
 
 
@@ -63,7 +63,7 @@ def certify(
         model: The modal model.
         bounds: Upper bounds of (−output, output), shape (A, T, m, 2).
         at: Their unit coordinates, shape (A, T, m, 2, d).
-        gap: Wanted difference between proved and attained bound, in units of the first output.
+        gap: Wanted difference between proved and attained bound, in units of the reference output.
         model_error: Bound of the difference between the modal model and the trajectories, shape (T, m).
         scale: Factor on the gap for each output, shape (m,); ones if not given.
         workers: Processes.

@@ -109,6 +109,7 @@ def _certified(flow: UnitFlow, method: Modal, gap: float, begun: float, progress
     )
     facts: dict[str, float | str] = {"model_error": float((error / flow.scale).max()), "degree": model.degree, "gap": proof.gap}
     facts |= {
+        "gap_output": flow.outputs[flow.reference],
         "between_nodes": proof.between,
         "boxes": proof.boxes,
         "proof": f"the branch and bound is rigorous for the modal model; {PROVED}",

@@ -1,5 +1,7 @@
 """Every kind of bad input ends in one clear line for each problem, exit status 2, no traceback, nothing written."""
 
+import json
+import re
 from pathlib import Path
 
 import pytest
@@ -50,8 +52,6 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_a_bad_case_is_one_line_per_problem_and_status_2(name, tmp_path, capfd):
-    import re
-
     old, new, pattern = CASES[name]
     path = edited(tmp_path, old, new)
     before = set(tmp_path.iterdir())
@@ -92,8 +92,6 @@ def test_a_bad_case_is_one_line_per_problem_and_status_2(name, tmp_path, capfd):
     ],
 )
 def test_a_bad_command_line_is_one_line_and_status_2(arguments, pattern, capfd):
-    import re
-
     status = main(arguments)
     out, err = capfd.readouterr()
     assert status == 2
@@ -126,3 +124,49 @@ def test_bytes_that_are_not_utf8_name_key_and_line(tmp_path, capfd):
     assert main(["cell", str(path)]) == 2
     line = PAPER.read_text(encoding="utf-8").partition("matrix_modulus")[0].count("\n") + 1
     assert f"case.toml:{line}: cell.matrix_modulus: byte 0xff is not UTF-8" in capfd.readouterr().err
+
+
+BUILDING = str(PAPER.with_stem("building"))
+KNOWN = ["--modulus", "[24, 25, 26] GPa", "--fuzzy", "m8"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "pattern"),
+    [
+        (
+            ["--step", "1 s", "--strict"],
+            2,
+            r"envelope.step: 1 s between nodes and a first natural period of 0.96 s: up to \d+ %",
+        ),
+        (["--certify", "1 mm", "--integrator", "newmark"], 2, "envelope.integrator = newmark: a certificate is of the exact motion"),
+        (["--certify", "1 km", "--strict"], 2, r"envelope.certify: .* of the peak"),
+        (
+            ["--tolerance", "1 mm", "--set", 'frame.outputs=["base_shear"]'],
+            2,
+            "tolerance = 1 mm: this is a length, and no",
+        ),
+        (
+            ["--certify", "1 mm", "--set", 'frame.outputs=["shear1"]'],
+            2,
+            "certify = 1 mm: this is a length, and no",
+        ),
+        (["--set", "exceedance.random=m3"], 2, "exceedance.random = m3: .*crisp"),
+    ],
+)
+def test_what_makes_an_envelope_worthless_is_said_before_it_is_computed(arguments, status, pattern, capfd):
+    assert main(["envelope", BUILDING, *KNOWN, *arguments]) == status
+    err = capfd.readouterr().err
+    assert re.search(pattern, err.splitlines()[0]), err
+
+
+def test_a_gap_is_meant_for_displacements_whatever_output_stands_first(capfd):
+    gaps = []
+    for outputs in ('["base_shear", "q8"]', '["q8", "base_shear"]'):
+        asked = ["--certify", "0.1 mm", "--duration", "2 s", "--step", "0.02 s", "--alpha", "[0, 1]", "--json", "-"]
+        assert main(["envelope", BUILDING, *KNOWN, *asked, "--set", f"frame.outputs={outputs}", "--set", "exceedance.random=[]"]) == 0
+        found = json.loads(capfd.readouterr().out)
+        assert found["facts"]["gap_output"] == "q8"
+        assert found["nature"] == "guaranteed"
+        gaps.append(found["facts"]["gap"])
+    assert gaps[0] == pytest.approx(gaps[1], rel=0.2)
+    assert max(gaps) <= 1e-4

@@ -91,7 +91,9 @@ def test_a_certificate_is_told_with_its_gap_and_what_it_rests_on():
     from alphacut.report_sections import methods
 
     study = {"method": "modal", "nature": "guaranteed", "trajectories": 52, "seconds": 3.0, "gap": 1e-6, "proof": "bounded by <energy>"}
+    study |= {"gap_output": "q2", "between_nodes": 3e-5}
     page = methods({"envelopes": {"E": study}})
-    assert "Envelope E is enclosed to within 1e-06 m at every node: bounded by &lt;energy&gt;." in page
+    assert "envelope E are proved at every node, and no wider than 1.0 µm of q2" in page
+    assert "by 30 µm at most. Bounded by &lt;energy&gt;." in page
     assert "Guaranteed bounds are proved" in page
-    assert "enclosed" not in methods({"envelopes": {"E": {k: v for k, v in study.items() if k not in ("gap", "proof")}}})
+    assert "proved at" not in methods({"envelopes": {"E": {k: v for k, v in study.items() if k not in ("gap", "proof")}}})
