@@ -20,7 +20,7 @@ from fuzzy.shelf import shelf
 from fuzzy.store import Identity, Store
 from fuzzy.transformation import General
 from fuzzy.vetting import fuzzy_inputs, require_callable, require_plan
-from fuzzy.workers import pool
+from fuzzy.workers import pool, require_workers
 
 
 def propagate(
@@ -51,7 +51,8 @@ def propagate(
         interactions: Constraints between the inputs; plans that cannot respect them refuse.
         shared: Inputs whose equality lets samples share one call.
         vectorised: Whether the function takes arrays.
-        workers: Processes of this machine; the result is the same for any number. The function must be importable by them.
+        workers: Processes of this machine; the result is the same for any number. They import the main script, so its calls must stand
+            under `if __name__ == "__main__":` and the function in a file.
         executor: Any `concurrent.futures` executor, instead of `workers`.
         known: Facts about the function, such as the signs of its effects, on which guaranteed bounds rest.
         store: Where samples are kept (or its path): a campaign that was stopped, however, resumes from it.
@@ -62,12 +63,14 @@ def propagate(
         ValueError: An argument is wrong.
         CampaignError: Samples failed; the others were run first.
         StoreError: The store cannot be written.
+        RuntimeError: The workers cannot start.
     """
     domain = Domain(fuzzy_inputs(inputs), levels(4) if alpha is None else alpha, interactions)
     known = known or Known()
     known.check(domain.names)
     plan = plan or General()
     require_plan(plan)
+    require_workers(workers)
     require_callable(function, domain.names, by_name=not shared, sent=workers > 1)
     call = Call(function, domain.names, tuple(shared), vectorised)
     start = perf_counter()

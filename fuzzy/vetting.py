@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import pickle
+import sys
 from collections.abc import Mapping, Sequence
 from numbers import Real
 from typing import Any
@@ -58,6 +59,10 @@ def require_callable(function: Any, names: Sequence[str], *, by_name: bool, sent
         except ValueError:
             pass  # a function of C without a signature
     if sent:
+        main = sys.modules["__main__"]
+        if getattr(function, "__module__", None) == "__main__" and not (getattr(main, "__file__", None) or getattr(main, "__spec__", None)):
+            cure = "define it in a file that is imported, or take workers=1"
+            raise ValueError(f"the function cannot be sent to worker processes (it was typed in, not read from a file): {cure}")
         try:
             pickle.dumps(function)
         except Exception as failure:

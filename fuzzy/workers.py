@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import contextmanager, suppress
 from itertools import islice
+from numbers import Integral
 from typing import Any
 
 from fuzzy.call import Call, Failure, Outcome
@@ -28,15 +29,34 @@ class ProcessPool(Executor):
     def __init__(self, workers: int) -> None:
         self._max_workers = workers
         self._inner = _processes(workers)
+        self._started = False
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Run a call in one of the processes, new ones if one of them has died."""
+        """Run a call in one of the processes, new ones if one of them has died.
+
+        Raises:
+            RuntimeError: The processes end while they start, as new ones would.
+        """
+        if not self._started:
+            self._start()
         try:
             return self._inner.submit(fn, *args, **kwargs)
         except BrokenExecutor:
             self._inner.shutdown(wait=False, cancel_futures=True)
             self._inner = _processes(self._max_workers)
             return self._inner.submit(fn, *args, **kwargs)
+
+    def _start(self) -> None:
+        """Start all processes and wait for the first that is ready."""
+        from fuzzy.pool_worker import GUARD
+
+        try:
+            ready = [self._inner.submit(os.getpid) for _ in range(self._max_workers)]
+            next(iter(wait(ready, return_when=FIRST_COMPLETED).done)).result()
+        except (BrokenExecutor, OSError, EOFError):
+            reason = "the worker processes ended before their first sample: each of them imports the main script"
+            raise RuntimeError(f"{reason}; {GUARD}") from None
+        self._started = True
 
     def alone(self, call: Call, points: Array) -> list[Outcome]:
         """Run one call in a process of its own, which may die."""
@@ -61,9 +81,10 @@ class ProcessPool(Executor):
 
 def _processes(workers: int) -> Executor:
     from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
 
-    return ProcessPoolExecutor(workers, mp_context=get_context("forkserver"), initializer=_end_with_parent)
+    from fuzzy.pool_worker import PoolContext
+
+    return ProcessPoolExecutor(workers, mp_context=PoolContext(), initializer=_end_with_parent)
 
 
 @contextmanager
@@ -73,10 +94,9 @@ def pool(workers: int) -> Iterator[Executor | None]:
     Under `python -m mpi4py.futures` it is the pool of all MPI processes instead, whatever `workers` says.
 
     Raises:
-        ValueError: `workers` is below 1.
+        ValueError: `workers` is no whole number from 1, or the main script came from standard input.
     """
-    if workers < 1:
-        raise ValueError(f"the number of workers is {workers}; it must be 1 or more")
+    require_workers(workers)
     if {"mpi4py.run", "mpi4py.futures"} <= sys.modules.keys():
         from mpi4py.futures import MPIPoolExecutor
 
@@ -85,7 +105,11 @@ def pool(workers: int) -> Iterator[Executor | None]:
     elif workers == 1:
         yield None
     else:
-        processes = ProcessPool(workers)
+        from fuzzy.pool_worker import refuse_in_import, require_script
+
+        refuse_in_import()
+        require_script()
+        processes = ProcessPool(int(workers))
         try:
             yield processes
         except BaseException:
@@ -93,6 +117,16 @@ def pool(workers: int) -> Iterator[Executor | None]:
             raise
         finally:
             processes.shutdown(wait=True, cancel_futures=True)
+
+
+def require_workers(workers: object) -> None:
+    """Workers are a number of processes.
+
+    Raises:
+        ValueError: It is no whole number from 1.
+    """
+    if not isinstance(workers, Integral) or workers < 1:
+        raise ValueError(f"the number of workers is {workers!r}; it must be a whole number, 1 or more")
 
 
 def _end_with_parent() -> None:
