@@ -141,3 +141,8 @@ def test_log_normal_law():
     assert TENFOLD.cdf([0.0, 5e-4, 2e-2]).tolist() == [0, 0, 1]
     with pytest.raises(ValueError, match="smallest <= largest"):
         LogNormalRadii(2.0, 1.0)
+
+
+def test_a_gap_wider_than_the_square_is_named_as_the_culprit():
+    with pytest.raises(RefusedError, match=r"gap 1 m does not fit.*smaller gap"):
+        Packing(50, 0.2, LogNormalRadii(1e-3, 2e-3), gap=1.0).make(np.random.default_rng(1))
