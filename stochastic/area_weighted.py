@@ -105,8 +105,12 @@ class AreaWeighted:
         Raises:
             RefusedError: There are fewer than five groups to draw from.
         """
-        if self.groups.max() < 4:
-            raise RefusedError(f"a bootstrap over {int(self.groups.max()) + 1} groups says nothing; it needs five packings (or patches)")
+        groups = int(self.groups.max()) + 1
+        if groups < 5:
+            raise RefusedError(
+                f"a bootstrap needs five packings, or cells in five patches of a section; these lie in {groups} of the 25 patches: is the "
+                f"size of the section that of its particles, in their unit? If so, take more particles"
+            )
         step = np.append(np.diff(self.values) > 0, True)
         farthest = [np.abs((np.cumsum(w) - self.cumulated)[step]).max() for w in self.resampled(number, generator)]
         return float(np.quantile(farthest, level))

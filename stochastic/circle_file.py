@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from stochastic.length_columns import length_columns
 from stochastic.truncated_normal import Array
 
 COLUMNS = ("x", "y", "r")
+Told = Callable[..., str]  # a length in m, in words of the file
 
 
 @dataclass(frozen=True)
@@ -53,38 +55,37 @@ class CircleFile:
         Raises:
             ValueError: The file cannot be read, or a row makes no sense (row and reason; all of them, the first ten in words).
         """
-        rows, table = self._table()
-        reasons = self._nonsense(rows, table)
+        found = length_columns(self.path, COLUMNS, self.unit)
+        rows, table = found.rows, found.values - (*self.origin, 0.0)
+        reasons = self._nonsense(rows, table, found.told)
         good = np.array([row not in reasons for row in rows], bool)
-        reasons |= self._overlaps(rows[good], table[good])
+        overlaps = self._overlaps(rows[good], table[good], found.told)
+        reasons |= overlaps
         if reasons and not self.drop:
             told = "; ".join(f"row {row} {reason}" for row, reason in sorted(reasons.items())[:10])
-            raise ValueError(f"{self.path}: {len(reasons)} rows make no sense: {told}; mend them, or drop them (drop = true)")
+            cure = "mend them, or drop them (drop = true)" + (", or allow a small overlap (overlap = 0.02)" if overlaps else "")
+            raise ValueError(f"{self.path}: {_counted(len(reasons))} no sense: {told}; {cure}")
         good = np.array([row not in reasons for row in rows], bool)
         if not good.any():
             raise ValueError(f"{self.path}: no row holds a circle; it takes at least one")
         return MeasuredCircles(Discs(table[good, :2], table[good, 2], np.array(self.size), self.periodic), dict(sorted(reasons.items())))
 
-    def _table(self) -> tuple[Array, Array]:
-        """Row numbers as an editor shows them, shape (n,), and x, y, r in m with the origin at the corner, shape (n, 3)."""
-        rows, table = length_columns(self.path, COLUMNS, self.unit)
-        return rows, table - (*self.origin, 0.0)
-
-    def _nonsense(self, rows: Array, table: Array) -> dict[int, str]:
+    def _nonsense(self, rows: Array, table: Array, told: Told) -> dict[int, str]:
         reasons: dict[int, str] = {}
         for row, circle in zip(rows, table, strict=True):
             row, (x, y, r) = int(row), (float(value) for value in circle)
             if not np.isfinite([x, y, r]).all():
                 reasons[row] = "lacks a finite number"
             elif r <= 0:
-                reasons[row] = f"has the radius {r:g} m, which must be positive"
+                reasons[row] = f"has the radius {told(r)}, which must be positive"
             elif not (0 <= x <= self.size[0] and 0 <= y <= self.size[1]):
-                reasons[row] = f"has its centre ({x:g}, {y:g}) m outside the section of {self.size[0]:g} × {self.size[1]:g} m"
+                section = f"the section of {told(self.size[0])} × {told(self.size[1])}"
+                reasons[row] = f"has its centre ({told(x)}, {told(y)} from the corner) outside {section}"
             elif self.periodic and 2 * r > min(self.size):
-                reasons[row] = f"has the radius {r:g} m and overlaps its own periodic image"
+                reasons[row] = f"has the radius {told(r)} and overlaps its own periodic image"
         return reasons
 
-    def _overlaps(self, rows: Array, table: Array) -> dict[int, str]:
+    def _overlaps(self, rows: Array, table: Array, told: Told) -> dict[int, str]:
         """The later row of every pair that overlaps."""
         if len(table) < 2:
             return {}
@@ -92,8 +93,17 @@ class CircleFile:
         first, second = np.sort(np.stack(close_pairs(discs, 0.0)), axis=0)
         depth = -surface_distance(discs, first, second)
         wrong = depth > np.maximum(self.overlap, 1e-9) * np.minimum(discs.radii[first], discs.radii[second])
-        pairs = zip(rows[first[wrong]].tolist(), rows[second[wrong]].tolist(), depth[wrong].tolist(), strict=True)
-        return {late: f"overlaps the circle of row {early} by {by:.3g} m" for early, late, by in sorted(pairs, reverse=True)}
+        first, second, depth = first[wrong], second[wrong], depth[wrong]
+        across = np.hypot(*(table[first, :2] - table[second, :2]).T) >= discs.radii[first] + discs.radii[second]
+        edge = np.where(across, " across the periodic edge (is the section periodic?)", "")
+        pairs = zip(rows[first].tolist(), rows[second].tolist(), depth.tolist(), edge.tolist(), strict=True)
+        return {
+            late: f"overlaps the circle of row {early} by {told(by, 3)}{where}" for early, late, by, where in sorted(pairs, reverse=True)
+        }
+
+
+def _counted(number: int) -> str:
+    return "1 row makes" if number == 1 else f"{number} rows make"
 
 
 @dataclass(frozen=True, eq=False)

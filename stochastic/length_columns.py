@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,29 @@ import numpy as np
 from stochastic.truncated_normal import Array
 
 
-def length_columns(path: Path, columns: Sequence[str], unit: str = "") -> tuple[Array, Array]:
-    """Row numbers as an editor shows them, shape (n,), and the columns in m, shape (n, len(columns)); NaN where there is no number.
+@dataclass(frozen=True, eq=False)
+class LengthColumns:
+    """Columns of lengths and the unit that they are written in.
+
+    Args:
+        rows: Row numbers as an editor shows them, shape (n,).
+        values: The columns in m, shape (n, columns); NaN where there is no number.
+        unit: Unit of the first column in the file, for messages.
+        metres: Metres in one such unit.
+    """
+
+    rows: Array
+    values: Array
+    unit: str
+    metres: float
+
+    def told(self, length: float, digits: int = 6) -> str:
+        """A length in m, in words of the file: ``6.59 mm``."""
+        return f"{length / self.metres:.{digits}g} {self.unit}"
+
+
+def length_columns(path: Path, columns: Sequence[str], unit: str = "") -> LengthColumns:
+    """The columns of a file that are wanted.
 
     Args:
         path: The file; separated by commas, semicolons or tabs; empty lines and those behind # are passed over.
@@ -21,8 +43,26 @@ def length_columns(path: Path, columns: Sequence[str], unit: str = "") -> tuple[
         unit: Unit of columns whose header names none; empty if each does.
 
     Raises:
-        ValueError: The file cannot be read, or a column or its unit is missing.
+        ValueError: The file cannot be read, a column or its unit is missing, two give the same, a row has more fields than the header, or
+            a number is written with a decimal comma.
     """
+    lines = _lines(path, columns)
+    separator = ";" if ";" in lines[0][1] else "\t" if "\t" in lines[0][1] else ","
+    split = [(number, next(csv.reader([line], delimiter=separator))) for number, line in lines]
+    places = _places(split[0][1], columns, unit, path)
+    for number, fields in split[1:]:
+        _refuse_surplus(path, number, fields, len(split[0][1]))
+    cells = [(number, [fields[place] if place < len(fields) else "" for place, _, _ in places]) for number, fields in split[1:]]
+    factors = [factor for _, factor, _ in places]
+    table = np.array([[f * _number(text, path, number) for f, text in zip(factors, row, strict=True)] for number, row in cells], float)
+    first = places[0][2]
+    return LengthColumns(
+        np.array([number for number, _ in cells], int), table.reshape(-1, len(columns)), first, _metres(first, columns[0], path)
+    )
+
+
+def _lines(path: Path, columns: Sequence[str]) -> list[tuple[int, str]]:
+    """Numbered lines that are neither empty nor comments, the header first."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
@@ -30,22 +70,36 @@ def length_columns(path: Path, columns: Sequence[str], unit: str = "") -> tuple[
     lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and not line.lstrip().startswith("#")]
     if not lines:
         raise ValueError(f"{path} is empty; it needs a header {', '.join(columns)} and a row for each particle")
-    separator = ";" if ";" in lines[0][1] else "\t" if "\t" in lines[0][1] else ","
-    places = _places(next(csv.reader([lines[0][1]], delimiter=separator)), columns, unit, path)
-    fields = list(csv.reader([line for _, line in lines[1:]], delimiter=separator))
-    table = np.array([[factor * _number(row[place] if place < len(row) else "") for place, factor in places] for row in fields], float)
-    return np.array([number for number, _ in lines[1:]], int), table.reshape(-1, len(columns))
+    return lines
 
 
-def _places(header: list[str], columns: Sequence[str], unit: str, path: Path) -> list[tuple[int, float]]:
-    """Place of each column in a row and the factor that makes metres of it."""
-    named: dict[str, tuple[int, float]] = {}
+def _refuse_surplus(path: Path, number: int, fields: list[str], wanted: int) -> None:
+    """A row with more fields than the header: nearly always numbers with a decimal comma, cut in two."""
+    if any(field.strip() for field in fields[wanted:]):
+        told = ",".join(fields)
+        cure = "write decimals with a point (1.25, not 1,25), or name every column"
+        raise ValueError(
+            f"{path}: row {number} holds {told!r}, {len(fields)} fields where the header has {wanted}: a decimal comma? {cure}"
+        )
+
+
+def _places(header: list[str], columns: Sequence[str], unit: str, path: Path) -> list[tuple[int, float, str]]:
+    """Place of each column in a row, the factor that makes metres of it, and its unit."""
+    if unit:
+        _metres(unit, "unit for all columns", path)
+    named: dict[str, tuple[int, float, str]] = {}
     for place, cell in enumerate(header):
         match = re.fullmatch(r"\s*(\w+)\s*(?:[\[(]\s*([^\])]+?)\s*[\])])?\s*", cell)
         name = match[1].lower() if match else ""
         radius = "r" if name == "d" else name
         if match and radius in columns:
-            named[radius] = (place, _metres(match[2] or unit, cell.strip(), path) * (0.5 if name == "d" else 1.0))
+            if radius in named:
+                first = header[named[radius][0]].strip()
+                raise ValueError(
+                    f"{path}: columns {first!r} and {cell.strip()!r} both give {radius}; it takes one of them: rename the other"
+                )
+            own = match[2] or unit
+            named[radius] = (place, _metres(own, cell.strip(), path) * (0.5 if name == "d" else 1.0), own)
     missing = [name for name in columns if name not in named]
     if missing:
         told = f"the header {', '.join(map(str.strip, header))!r} has no column {', '.join(missing)}"
@@ -60,7 +114,7 @@ def _metres(unit: str, column: str, path: Path) -> float:
     from pint.errors import PintError
 
     if not unit:
-        raise ValueError(f"{path}: column {column!r} has no unit; write it in the header, such as 'r [mm]', or give a unit for all")
+        raise ValueError(f"{path}: column {column!r} has no unit; write it in the header, such as 'r [mm]'")
     registry: Callable[[str], object] = UnitRegistry().Quantity
     try:
         return float(registry(f"1 {unit}").to("m").magnitude)  # type: ignore[attr-defined]
@@ -68,7 +122,11 @@ def _metres(unit: str, column: str, path: Path) -> float:
         raise ValueError(f"{path}: column {column!r} has the unit {unit!r}, which is not a length; take mm, cm, m, …") from error
 
 
-def _number(text: str) -> float:
+def _number(text: str, path: Path, row: int) -> float:
+    """The number in a field; NaN where there is none."""
+    if re.fullmatch(r"\s*[-+]?\d*,\d+\s*", text):
+        point = text.strip().replace(",", ".")
+        raise ValueError(f"{path}: row {row} holds {text.strip()!r}, a decimal comma; write decimals with a point: {point}")
     try:
         return float(text)
     except ValueError:

@@ -42,12 +42,13 @@ class MeasuredRadii:
         Raises:
             ValueError: The file cannot be read, or a row holds no positive number (row and reason).
         """
-        rows, table = length_columns(path, ("r",), unit)
-        wrong = [f"row {row} holds no positive number" for row, (radius,) in zip(rows, table, strict=True) if not 0 < radius < np.inf]
-        if wrong or not len(table):
+        found = length_columns(path, ("r",), unit)
+        rows = zip(found.rows, found.values[:, 0], strict=True)
+        wrong = [f"row {row} holds no positive number" for row, radius in rows if not 0 < radius < np.inf]
+        if wrong or not len(found.rows):
             told = "; ".join(wrong[:10]) or "it holds no row"
             raise ValueError(f"{path}: {told}; it needs a radius or diameter in each row")
-        return cls(tuple(map(float, table[:, 0])), path.name)
+        return cls(tuple(map(float, found.values[:, 0])), path.name)
 
     @property
     def smallest(self) -> float:

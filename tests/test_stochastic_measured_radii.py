@@ -11,7 +11,7 @@ from alphacut.loading import load
 from alphacut.microstructure import source
 from alphacut.problem import BadInput
 from stochastic.measured_radii import MeasuredRadii
-from stochastic.packing import Packing
+from stochastic.packing import Packing, _law_test
 
 CONCRETE = Path(__file__).parent.parent / "cases" / "concrete.toml"
 LIST = "\n".join(["d [mm]", *(f"{x:.4f}" for x in 2 + 6 * np.random.default_rng(4).random(300) ** 2)])
@@ -74,6 +74,10 @@ def test_diameters_and_radii_are_read_with_their_unit(header, factor, tmp_path):
         ("size [mm]\n1\n", "no column r"),
         ("d [mm]\n", "no row"),
         ("", "is empty"),
+        ("d [mm]\n1,25\n1,71\n1,93\n", "row 2 holds '1,25', 2 fields where the header has 1: a decimal comma"),
+        ("d [mm]\n0,8\n", "row 2 holds '0,8'.*decimal comma"),
+        ("name;d [mm]\na;1.5\nb;1,25\n", r"row 3 holds '1,25', a decimal comma; .*1\.25"),
+        ("d [mm],r [mm]\n2,1\n", "'d .mm.' and 'r .mm.' both give r"),
     ],
 )
 def test_a_list_that_makes_no_sense_is_refused(text, pattern, case, capfd):
@@ -84,6 +88,35 @@ def test_a_list_that_makes_no_sense_is_refused(text, pattern, case, capfd):
     assert "microstructure.packing.file" in err
     with pytest.raises(ValueError, match=pattern):
         MeasuredRadii.read(case.parent / "diameters.csv")
+
+
+def test_a_trailing_comma_and_a_stray_quote_are_no_decimal_comma(tmp_path):
+    path = tmp_path / "sizes.csv"
+    path.write_text('name,d [mm]\na",1,\nb,3,\n', encoding="utf-8")
+    assert MeasuredRadii.read(path).values == pytest.approx((0.5e-3, 1.5e-3))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_rounded_diameters_pass_the_test_of_their_own_law(seed):
+    listed = np.round(np.random.default_rng(seed).lognormal(0, 0.4, 300), 1)
+    law = MeasuredRadii(tuple(np.maximum(listed, 0.1) * 1e-3))
+    assert len(np.unique(law.values)) < 40
+    packing = Packing(2000, 0.2, law)
+    packing.check(packing.make(np.random.default_rng(seed)))
+
+
+def test_the_test_of_a_law_with_atoms_still_sees_another_law():
+    law, other = MeasuredRadii((1.0, 1.0, 1.0, 2.0, 2.0)), MeasuredRadii((1.0, 1.0, 2.0, 2.0, 2.0))
+    drawn = other.sample(2000, np.random.default_rng(1))
+    distance, probability = _law_test(drawn, law)
+    assert distance == pytest.approx(0.25, abs=0.05)
+    assert probability < 1e-4
+
+
+def test_a_continuous_law_is_tested_as_scipy_does():
+    law = MeasuredRadii(tuple(np.linspace(1, 2, 50)))
+    drawn = law.sample(500, np.random.default_rng(2))
+    assert _law_test(drawn, law) == pytest.approx(tuple(kstest(drawn, law.cdf))[:2], rel=1e-9)
 
 
 def test_a_case_packs_discs_of_the_listed_sizes(case):

@@ -142,8 +142,8 @@ def test_origin_of_the_section(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (GOOD + "11,11,4\n", r"row 5 overlaps the circle of row 2 by 0\.00659 m"),
-        (GOOD + "35,35,-1\n", "row 5 has the radius -0.001 m"),
+        (GOOD + "11,11,4\n", r"row 5 overlaps the circle of row 2 by 6\.59 mm"),
+        (GOOD + "35,35,-1\n", "row 5 has the radius -1 mm"),
         (GOOD + "35,,1\n", "row 5 lacks a finite number"),
         (GOOD + "35,35,nan\n", "row 5 lacks"),
         (GOOD + "35,85,1\n", "row 5 has its centre .* outside"),
@@ -175,8 +175,25 @@ def test_rows_are_dropped_on_demand_and_listed(tmp_path):
 def test_periodic_overlaps_are_seen_across_the_edge(tmp_path):
     text = "x [mm],y [mm],r [mm]\n1,20,3\n39,20,3\n"
     assert len(circle_file(tmp_path, text).read().discs) == 2
-    with pytest.raises(ValueError, match="overlaps the circle of row 2"):
+    with pytest.raises(ValueError, match=r"overlaps the circle of row 2 by 4 mm across the periodic edge.*periodic.*overlap ="):
         circle_file(tmp_path, text, periodic=True).read()
+
+
+def test_a_unit_for_all_columns_is_a_length_even_where_each_has_its_own(tmp_path):
+    with pytest.raises(ValueError, match=r"unit for all columns.*'GPa', which is not a length"):
+        circle_file(tmp_path, GOOD, unit="GPa").read()
+
+
+def test_decimal_commas_in_a_file_of_circles_are_refused_even_where_rows_may_be_dropped(tmp_path):
+    with pytest.raises(ValueError, match=r"row 5 holds.*decimal comma"):
+        circle_file(tmp_path, GOOD + "35,5,35,5,1,25\n", drop=True).read()
+
+
+def test_a_section_far_larger_than_its_particles_asks_for_its_size(tmp_path):
+    rows = "".join(f"{10 * i + 5},{10 * j + 5},{3 + (i * j) % 2}\n" for i in range(10) for j in range(10))
+    file = circle_file(tmp_path, "x [mm],y [mm],r [mm]\n" + rows, size=(100.0, 100.0))
+    with pytest.raises(RefusedError, match=r"1 of the 25 patches.*size of the section"):
+        study(Study(Measured(file), (0.1, 0.99)))
 
 
 def picture(seed: int, *, noise: float, fraction: float = 0.3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
