@@ -21,8 +21,8 @@ OUTPUTS = {"pendulum": ("force",), "tower": ("roof", "drift")}  # of structures 
 def floors(case: Case) -> Iterator[Problem]:
     """Every array of the frame has one entry for each floor; one entry alone holds for all of them."""
     count = len(case.fuzzies("frame.masses"))
-    for name in ("lengths", "dampers", "displacements", "velocities"):
-        found = len(case.fuzzies(f"frame.{name}"))
+    for name in ("lengths", "dampers", "displacements", "velocities", "second_moment", "columns"):
+        found = len(case.numbers("frame.columns") if name == "columns" else case.fuzzies(f"frame.{name}"))
         if found not in (1, count):
             few = f"{count} value{'s' if count > 1 else ''}"
             words = f"{few}, or one for all floors; the number of floors is that of frame.masses, which has {count}"
@@ -30,6 +30,10 @@ def floors(case: Case) -> Iterator[Problem]:
     if case.has("frame.damping_ratio") and len(case.fuzzies("frame.damping_ratio")) not in (1, count):
         what = f"got {len(case.fuzzies('frame.damping_ratio'))} values for {count} modes"
         yield Problem("frame.damping_ratio", what, allowed=f"one for all modes, or {count}: one for each, by rising frequency")
+    moments = case.fuzzies("frame.second_moment")
+    if len(moments) > 1 and any(moment.support.width > 0 for moment in moments):
+        allowed = "one fuzzy value for all storeys, or crisp ones; what makes a storey uncertain by itself may be its length"
+        yield Problem("frame.second_moment", "one of several values is fuzzy", str(case.written["frame.second_moment"]), allowed)
     yield from known_output(case, count)
     for key in fuzzy_keys(case):
         for name in case.names(key):
@@ -86,5 +90,6 @@ def known_input(key: str, name: str, count: int) -> Iterator[Problem]:
     members += [f"{group}{floor + 1}_0" for group in ("q", "v") for floor in range(count)]
     members += [f"zeta{mode + 1}" for mode in range(count)]
     if name not in GROUPS and name not in members:
-        allowed = f"{', '.join(GROUPS)}, or one floor: m1 to m{count}, l1, d1, q1_0, v1_0 …"
+        each = f"m1 to m{count}" if count > 1 else "m1"
+        allowed = f"{', '.join(GROUPS)}, or one floor: {each}, l1, d1, q1_0, v1_0 …"
         yield Problem(key, f"the frame has no input {name}", name, allowed, nearest(name, members) if re.match("[mldqvz]", name) else "")

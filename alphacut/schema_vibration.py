@@ -16,7 +16,15 @@ FRAME = Section(
         "masses": Key("mass of each floor", "fuzzy list", "kg", required=True, allowed=POSITIVE),
         "lengths": Key("length of the columns below each floor", "fuzzy list", "m", required=True, allowed=POSITIVE, alone=True),
         "modulus": Key("Young's modulus where none is handed on", unit="Pa", allowed=POSITIVE),
-        "second_moment": Key("second moment of area of one column", unit="m^4", required=True, allowed=POSITIVE),
+        "second_moment": Key(
+            "second moment of area of one column; where storeys differ a crisp one for each",
+            "fuzzy list",
+            "m^4",
+            required=True,
+            allowed=POSITIVE,
+            alone=True,
+        ),
+        "columns": Key("columns in each storey, clamped at both ends", "numbers", default=(2.0,), allowed=POSITIVE, alone=True),
         "damping_ratio": Key(
             "viscous damping over the critical one: of all modes, or of each by rising frequency; beside the other damping",
             "fuzzy list",

@@ -140,7 +140,7 @@ def storey_frame(case: Case, modulus: FuzzyNumber) -> Structure:
         modal["masses"],
         modal["lengths"],
         modulus.modal,
-        case.fuzzy("frame.second_moment").modal,
+        case.fuzzies("frame.second_moment")[0].modal,
         dampers=modal["dampers"],
         damper_placement=cast(
             Literal["ground", "storey"], case.text("frame.damper_placement") if case.has("frame.damper_placement") else "ground"
@@ -151,13 +151,14 @@ def storey_frame(case: Case, modulus: FuzzyNumber) -> Structure:
         rayleigh=(case.fuzzy("frame.rayleigh_mass").modal, case.fuzzy("frame.rayleigh_stiffness").modal),
         ground=accelerogram(beside(case, case.text("frame.accelerogram"))) if case.has("frame.accelerogram") else None,
         damping_ratio=tuple(ratio.modal for ratio in ratios(case)),
+        columns=columns(case),
     )
     return Structure(model, numbers)
 
 
 def parameters(case: Case, modulus: FuzzyNumber) -> dict[str, FuzzyNumber]:
     """Every parameter of the frame by the name that `frame` gives it, in SI."""
-    found = {"E": modulus, "I": case.fuzzy("frame.second_moment")}
+    found = {"E": modulus, "I": case.fuzzies("frame.second_moment")[0]}
     found |= {name: case.fuzzy(f"frame.{name}") for name in RAYLEIGH}
     found |= {"zeta" if len(ratios(case)) == 1 else f"zeta{mode}": ratio for mode, ratio in enumerate(ratios(case), start=1)}
     for letter, key in LISTS.items():
@@ -165,6 +166,14 @@ def parameters(case: Case, modulus: FuzzyNumber) -> dict[str, FuzzyNumber]:
     for letter, key in STARTS.items():
         found |= {f"{letter}{floor}_0": value for floor, value in enumerate(per_floor(case, f"frame.{key}"), start=1)}
     return found
+
+
+def columns(case: Case) -> tuple[float, ...]:
+    """Columns of each storey; where second moments differ, as many of the first storey's as are as stiff."""
+    floors = len(case.fuzzies("frame.masses"))
+    number, moments = case.numbers("frame.columns"), [moment.modal for moment in case.fuzzies("frame.second_moment")]
+    count, moment = (values * floors if len(values) == 1 else values for values in (list(number), moments))
+    return tuple(c * i / moments[0] for c, i in zip(count, moment, strict=True))
 
 
 def ratios(case: Case) -> tuple[FuzzyNumber, ...]:

@@ -11,8 +11,9 @@ from alphacut.case import Case
 from alphacut.frame_names import OTHERS
 from alphacut.schema import SECTIONS
 from alphacut.structure import Structure, per_floor, ratios
+from alphacut.structure import columns as count_columns
 from alphacut.units import MINUS, shown
-from fuzzy import FuzzyNumber
+from fuzzy import FuzzyNumber, PiecewiseLinear
 
 if TYPE_CHECKING:
     from frame.linear import Accelerogram
@@ -29,8 +30,11 @@ COLUMNS = {"masses": "mass", "lengths": "storey height", "dampers": "damper", "d
 
 
 def in_unit(number: FuzzyNumber, unit: str, si: str) -> str:
-    """A fuzzy number as it would be written in a case: ``30 t``, ``[28, 30, 34] t``; of many α-cuts its support and modal value."""
+    """A fuzzy number as it would be written in a case: ``30 t``, ``[28, 30, 34] t``; of many α-cuts support and modal value."""
     (low, high), (left, right) = number.support, number.cut(1.0)
+    if isinstance(number, PiecewiseLinear) and low < high:
+        ends = [f"{shown(value, unit, si):.5g}".replace("-", MINUS) for value in (low, high, number.modal)]
+        return f"{ends[0]} … {ends[1]} {unit}, modal {ends[2]} {unit}".strip()
     values = [low] if low == high else [low, high] if (low, high) == (left, right) else list(dict.fromkeys([low, left, right, high]))
     numbers = [f"{shown(value, unit, si):.5g}".replace("-", MINUS) for value in values]
     return f"{numbers[0] if len(numbers) == 1 else '[' + ', '.join(numbers) + ']'} {unit}".strip()
@@ -58,8 +62,11 @@ def frame_sentences(case: Case, wanted: Structure) -> Iterator[str]:
     assert wanted.frame is not None
     modulus, moment = wanted.numbers["E"], wanted.numbers["I"]
     stiffness = f"{modulus.modal * moment.modal / 1e3:.5g} kN m²"
+    alike = len(set(wanted.frame.columns)) == 1
+    number = f"{wanted.frame.columns[0]:g} in each storey" if alike else "c in a storey (in columns as stiff as the first storey's)"
+    formula = f"{12 * wanted.frame.columns[0]:g} E I / l³" if alike else "12 c E I / l³"
     yield (
-        f"{len(wanted.frame.masses)} rigid floors on columns clamped at both ends, two in each storey: stiffness 24 E I / l³. "
+        f"{len(wanted.frame.masses)} rigid floors on columns clamped at both ends, {number}: stiffness {formula}. "
         f"E = {in_unit(modulus, 'GPa', 'Pa')}, I = {in_unit(moment, 'm^4', 'm^4')} of one column; E I = {stiffness} at the modal values."
     )
     yield f"Damping: {'; '.join(damping(case)) or 'none'}."
@@ -106,5 +113,7 @@ def floors(case: Case) -> dict[str, Any]:
     damped = any(number.support.upper > 0 for number in case.fuzzies("frame.dampers"))
     kinds: Sequence[str] = ["masses", "lengths", *(["dampers"] if damped else []), *moves(case)]
     columns = [[in_unit(number, *UNITS[kind]) for number in per_floor(case, f"frame.{kind}")] for kind in kinds]
-    rows = [[str(floor), *row] for floor, row in enumerate(zip(*columns, strict=True), start=1)]
-    return {"head": ["floor", *(COLUMNS[kind] for kind in kinds)], "rows": rows}
+    head = ["floor", *(COLUMNS[kind] for kind in kinds)]
+    if len(set(number := count_columns(case))) > 1:
+        head, columns = [*head, "columns c"], [*columns, [f"{c:.4g}" for c in number]]
+    return {"head": head, "rows": [[str(floor), *row] for floor, row in enumerate(zip(*columns, strict=True), start=1)]}

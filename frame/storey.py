@@ -18,7 +18,7 @@ Entry = Jet | float
 
 @dataclass(frozen=True)
 class StoreyFrame:
-    """A chain of n floors; storey z has the stiffness k_z = 24 E I / l_z³.
+    """A chain of n floors; storey z has the stiffness k_z = 12 c_z E I / l_z³ with c_z columns clamped at both ends, two unless given.
 
     Parameters that can be uncertain: "E", "I", "m1" … "mn", "l1" …, "d1" …, "q1_0" … (initial displacements), "v1_0" … (initial
     velocities), "rayleigh_mass", "rayleigh_stiffness", and "zeta", or "zeta1" … where each mode has its own ratio.
@@ -39,10 +39,12 @@ class StoreyFrame:
         ground: Base excitation, if any; displacements are then relative to the ground.
         damping_ratio: ζ of all modes, or one for each by rising frequency, added to the other damping; it follows the parameters through
             the modes (`frame.damping`).
+        columns: Columns in each storey, each with the second moment I; where a storey's are stiffer, their number times that ratio. Two in
+            each when empty.
 
     Raises:
-        ValueError: A length of the lists differs, a mass, length, modulus or moment is not positive, a damper is negative, or a ratio
-            is outside [0, 1).
+        ValueError: A length of the lists differs, a mass, length, modulus, moment or number of columns is not positive, a damper is
+            negative, or a ratio is outside [0, 1).
     """
 
     masses: Sequence[float]
@@ -57,6 +59,7 @@ class StoreyFrame:
     rayleigh: tuple[float, float] = (0.0, 0.0)
     ground: Accelerogram | None = None
     damping_ratio: float | Sequence[float] = ()
+    columns: Sequence[float] = ()
 
     def __post_init__(self) -> None:
         n = len(self.masses)
@@ -64,15 +67,17 @@ class StoreyFrame:
         object.__setattr__(self, "damping_ratio", (self.damping_ratio,) if single else tuple(cast(Sequence[float], self.damping_ratio)))
         for name in ("dampers", "q0", "v0"):
             object.__setattr__(self, name, tuple(getattr(self, name)) or (0.0,) * n)
+        object.__setattr__(self, "columns", tuple(self.columns) or (2.0,) * n)
         object.__setattr__(self, "outputs", tuple(self.outputs) or tuple(f"q{z + 1}" for z in range(n)))
         self._check()
 
     def _check(self) -> None:
         n = len(self.masses)
-        for name in ("lengths", "dampers", "q0", "v0"):
+        for name in ("lengths", "dampers", "q0", "v0", "columns"):
             if len(getattr(self, name)) != n:
                 raise ValueError(f"{name}: {len(getattr(self, name))} values for {n} floors; give one per floor, from below")
         positive = {"masses": self.masses, "lengths": self.lengths, "modulus": [self.modulus], "second_moment": [self.second_moment]}
+        positive["columns"] = self.columns
         for name, values in positive.items():
             for value in values:
                 if not (value > 0 and np.isfinite(value)):
@@ -157,7 +162,7 @@ class StoreyFrame:
         return stack(rows, p)
 
     def _columns(self, p: Mapping[str, Jet]) -> list[Entry]:
-        return [24 * p["E"] * p["I"] * p[f"l{z + 1}"] ** -3 for z in range(self.floors)]  # k_z, section 6.1
+        return [12 * c * p["E"] * p["I"] * p[f"l{z + 1}"] ** -3 for z, c in enumerate(self.columns)]  # k_z; 24 E I / l³ in section 6.1
 
     def _output(self, name: str) -> tuple[str, int]:
         found = re.fullmatch(r"(q|v|drift|shear)([1-9]\d*)", "shear1" if name == "base_shear" else name)

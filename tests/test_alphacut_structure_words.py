@@ -8,9 +8,11 @@ import pytest
 
 from alphacut.entry import main
 from alphacut.loading import load
+from alphacut.problem import BadInput
 from alphacut.quantity import fuzzy
 from alphacut.structure import structure
 from alphacut.structure_words import in_unit, structure_words
+from frame.linear import frequencies
 from fuzzy import PiecewiseLinear, Triangular
 
 CASES = Path(__file__).parent.parent / "cases"
@@ -23,7 +25,7 @@ def test_a_fuzzy_number_is_written_as_in_a_case(text):
 
 
 def test_many_cuts_are_told_by_support_and_core():
-    assert in_unit(PiecewiseLinear((0, 0.5, 1), (1e9, 2e9, 3e9), (9e9, 5e9, 3e9)), "GPa", "Pa") == "[1, 3, 9] GPa"
+    assert in_unit(PiecewiseLinear((0, 0.5, 1), (1e9, 2e9, 3e9), (9e9, 5e9, 3e9)), "GPa", "Pa") == "1 … 9 GPa, modal 3 GPa"
 
 
 def test_an_eight_storey_frame_in_words():
@@ -68,3 +70,36 @@ def test_the_report_tells_them(tmp_path, capfd):
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "<h2>Structure</h2>" in page
     assert all(f"<td>{row[0]}</td>" in page for row in words["rows"])
+
+
+@pytest.mark.parametrize(
+    ("changes", "stiffness", "words"),
+    [
+        (["frame.columns=4"], [4] * 8, "4 in each storey: stiffness 48 E I / l³"),
+        (["frame.columns=[4,4,4,4,2,2,2,1]"], [4, 4, 4, 4, 2, 2, 2, 1], "c in a storey"),
+        ([f"frame.second_moment={['3.2e-3 m^4'] * 6 + ['1.6e-3 m^4'] * 2}"], [2] * 6 + [1] * 2, "12 c E I / l³"),
+    ],
+)
+def test_storeys_may_differ_in_their_columns(changes, stiffness, words):
+    case = load(CASES / "building.toml", changes)
+    wanted = structure(case, MODULUS)
+    assert wanted.frame.columns == pytest.approx(stiffness)
+    found = structure_words(case, wanted)
+    assert words in found["sentences"][0]
+    assert ("columns c" in found["head"]) == (len(set(stiffness)) > 1)
+    alike = structure(load(CASES / "building.toml"), MODULUS).frame
+    assert frequencies(wanted.frame)[0] != pytest.approx(frequencies(alike)[0], rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("change", "pattern"),
+    [
+        ("frame.columns=[2, 2]", r"frame.columns: got 2 values for 8 floors"),
+        ("frame.columns=0", r"frame.columns = 0: out of range|frame.columns"),
+        (f"frame.second_moment={['3.2e-3 m^4'] * 7 + ['[1, 2] m^4']}", "frame.second_moment.*one of several values is fuzzy"),
+        ("frame.second_moment=[]", "frame.second_moment.*empty"),
+    ],
+)
+def test_columns_that_make_no_sense_are_refused(change, pattern):
+    with pytest.raises(BadInput, match=pattern):
+        load(CASES / "building.toml", [change])
