@@ -11,9 +11,9 @@ from alphacut.fields import cell_fields
 from alphacut.loading import load
 from alphacut.options import CELL_OPTIONS, add_common, add_keys, changes
 from alphacut.output import as_json
-from alphacut.prism_mesh import prism_mesh, write_mesh
+from alphacut.prism_mesh import check_ending, prism_mesh, write_mesh
 
-ABOUT = "write the prism mesh of the cell at modal values: VTU for ParaView, .msh for Gmsh, .inp for Abaqus and CalculiX, …"
+ABOUT = "write the prism mesh of the cell at modal values: VTU for ParaView, .msh for Gmsh, .inp for Abaqus and CalculiX"
 KEYS = {option: key for option, key in CELL_OPTIONS.items() if key.startswith(("radius.", "mesh."))}
 
 
@@ -21,13 +21,18 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_common(parser)
     add_keys(parser, KEYS)
-    parser.add_argument("--fields", action="store_true", help="solve, and write displacements and stresses of both loads as well (VTU)")
-    parser.add_argument("--out", metavar="FILE", required=True, help="the mesh; its ending names the format")
+    parser.add_argument(
+        "--fields", action="store_true", help="solve, and write displacements and stresses of both loads as well (not with .inp)"
+    )
+    parser.add_argument(
+        "--out", metavar="FILE", required=True, help="the mesh; its ending names the format: .vtu, .vtk, .xdmf, .msh or .inp"
+    )
 
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Mesh and write."""
     case = load(options.case, changes(options, KEYS), modal=True)
+    check_ending(Path(options.out), fields=options.fields)
     mesh = cell_fields(case) if options.fields else prism_mesh(case)
     write_mesh(mesh, Path(options.out))
     counts = {"nodes": len(mesh.points), "wedges": len(mesh.cells[0].data), "file": options.out}

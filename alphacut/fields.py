@@ -32,8 +32,8 @@ def cell_fields(case: Case) -> meshio.Mesh:
     """Total displacements and stresses under both loads at modal values.
 
     Stresses are means over the wedges of one phase that meet in a node; nodes on the interface stand twice, once for each phase, since
-    stresses jump there. Point data: ``displacement_1``, ``displacement_2`` in halves of the cell's side, ``stress_1_11`` … in Pa; cell
-    data: ``phase``.
+    stresses jump there. Point data: ``displacement_1_in_half_sides``, ``displacement_2_in_half_sides`` (halves of the cell's side) and
+    ``stress_1_11_Pa`` … under ε11 = ε22 = 0.01 (load 1) and ε12 = 0.01 (load 2); cell data: ``phase``.
 
     Raises:
         BadInput: The mesh does not follow the interface.
@@ -64,8 +64,10 @@ def cell_fields(case: Case) -> meshio.Mesh:
     stiffness = np.array([matrix.stiffness, inclusion.stiffness])[phase][:, None]
     stress = stiffness @ system.slice_stress.strain(system.grid.cells, solved.total, reference_nodes())[0]
     nodes, cells, mean = by_phase(system, phase, stress)
-    data: dict[str, Array] = {f"displacement_{load + 1}": np.pad(solved.total[nodes, :, load], ((0, 0), (0, 1))) for load in (0, 1)}
-    data |= {f"stress_{load + 1}_{name}": mean[:, row, load] for load in (0, 1) for row, name in enumerate(COMPONENTS)}
+    data: dict[str, Array] = {
+        f"displacement_{load + 1}_in_half_sides": np.pad(solved.total[nodes, :, load], ((0, 0), (0, 1))) for load in (0, 1)
+    }
+    data |= {f"stress_{load + 1}_{name}_Pa": mean[:, row, load] for load in (0, 1) for row, name in enumerate(COMPONENTS)}
     topological_dimension.setdefault("wedge15", 3)  # see alphacut.prism_mesh
     return meshio.Mesh(system.positions[nodes], [("wedge15", cells[:, ORDER])], data, {"phase": [phase]})
 

@@ -86,7 +86,7 @@ def stress(file: str, picture: str) -> None:
     import pyvista
 
     grid = pyvista.read(file)
-    grid["stress"] = grid["stress_1_11"] / 1e9
+    grid["stress"] = grid["stress_1_11_Pa"] / 1e9
     parts = [grid.extract_cells(grid.cell_data["phase"] == phase) for phase in (0, 1)]
     low, high = np.quantile(grid["stress"], [0.01, 0.99])
     plotter = pyvista.Plotter(off_screen=True, window_size=list(PIXELS))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from alphacut.entry import main
+from alphacut.loading import load
 
 ROOT = Path(__file__).parent.parent
 PAPER = str(ROOT / "cases" / "paper.toml")
@@ -58,24 +59,72 @@ def test_wedges_stand_the_right_way_round_for_vtk(tmp_path):
 def test_fields_of_a_homogeneous_cell_are_uniform(tmp_path):
     pytest.importorskip("dolfinx")
     from alphacut.fields import cell_fields
-    from alphacut.loading import load
 
     mesh = cell_fields(load(PAPER, ["mesh.size=0.5", "mesh.layers=3", "inclusion_modulus=20 GPa"]))
     lateral = 20e9 / ((1 + 0.3) * (1 - 2 * 0.3)) * 0.01  # plane strain, ε11 = ε22 = 0.01 (eq. 6)
-    assert mesh.point_data["stress_1_11"] == pytest.approx(np.full(len(mesh.points), lateral), rel=1e-8)
-    assert mesh.point_data["displacement_1"][:, 0] == pytest.approx(0.01 * mesh.points[:, 0], abs=1e-10)
+    assert mesh.point_data["stress_1_11_Pa"] == pytest.approx(np.full(len(mesh.points), lateral), rel=1e-8)
+    assert mesh.point_data["displacement_1_in_half_sides"][:, 0] == pytest.approx(0.01 * mesh.points[:, 0], abs=1e-10)
 
 
 def test_stress_jumps_across_the_interface_and_displacement_does_not():
     pytest.importorskip("dolfinx")
     from alphacut.fields import cell_fields
-    from alphacut.loading import load
 
     mesh = cell_fields(load(PAPER, ["mesh.size=0.4", "mesh.layers=3"]))
     _, first, count = np.unique(mesh.points.round(12), axis=0, return_index=True, return_counts=True)
     twice = mesh.points[first[count == 2]].round(12)
     assert len(twice) > 50
     pairs = [np.flatnonzero((mesh.points.round(12) == point).all(axis=1)) for point in twice[:40]]
-    jumps = [abs(np.subtract(*mesh.point_data["stress_2_12"][pair])) for pair in pairs]
+    jumps = [abs(np.subtract(*mesh.point_data["stress_2_12_Pa"][pair])) for pair in pairs]
     assert max(jumps) > 1e7
-    assert all(np.ptp(mesh.point_data["displacement_2"][pair], axis=0).max() < 1e-14 for pair in pairs)
+    assert all(np.ptp(mesh.point_data["displacement_2_in_half_sides"][pair], axis=0).max() < 1e-14 for pair in pairs)
+
+
+COARSE = ["mesh", PAPER, "--mesh-size", "0.5", "--layers", "3", "--quiet"]
+
+
+@pytest.mark.parametrize("ending", [".vtu", ".vtk", ".xdmf", ".msh", ".inp"])
+def test_every_format_gives_points_wedges_and_phase_back(ending, tmp_path):
+    pytest.importorskip("gmsh")
+    meshio = pytest.importorskip("meshio")
+    from alphacut.prism_mesh import MIRRORED, VTK_ORDER, prism_mesh
+
+    wanted = prism_mesh(load(PAPER, ["mesh.size=0.5", "mesh.layers=3"]))
+    assert main([*COARSE, "--out", str(tmp_path / f"cell{ending}")]) == 0
+    assert [path.name for path in tmp_path.iterdir()] == [f"cell{ending}"]
+    found = meshio.read(tmp_path / f"cell{ending}")
+    wedges, phase = wanted.cells[0].data, wanted.cell_data["phase"][0]
+    assert found.points == pytest.approx(wanted.points, abs=1e-14)
+    assert [block.type for block in found.cells] == ["wedge15"]
+    assert (found.cells[0].data == (wedges[:, MIRRORED] if ending in VTK_ORDER else wedges)).all()
+    if ending == ".inp":
+        sets = {name: np.concatenate(parts) for name, parts in found.cell_sets.items()}
+        assert (sets["MATRIX"] == np.flatnonzero(phase == 0)).all()
+        assert (sets["PARTICLE"] == np.flatnonzero(phase == 1)).all()
+    else:
+        assert (found.cell_data["phase"][0] == phase).all()
+
+
+@pytest.mark.parametrize("ending", [".bdf", ".nas", ".e", ".h5m", ".avs", ".mdpa", ".su2", ".ugrid", ".mesh", ".wkt", ".med"])
+def test_formats_that_lose_wedges_or_phases_are_refused_in_one_line(ending, tmp_path, capfd):
+    assert main([*COARSE, "--out", str(tmp_path / f"cell{ending}")]) == 2
+    err = capfd.readouterr().err
+    assert len(err.splitlines()) == 1
+    assert "allowed: .vtu, .vtk, .xdmf, .msh, .inp" in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_fields_are_refused_where_the_format_cannot_hold_them(tmp_path, capfd):
+    assert main([*COARSE, "--fields", "--out", str(tmp_path / "cell.inp")]) == 2
+    assert "cannot hold fields; allowed: .vtu, .vtk, .xdmf, .msh" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("ending", [".vtk", ".xdmf", ".msh"])
+def test_fields_come_back_with_their_units_in_their_names(ending, tmp_path):
+    pytest.importorskip("dolfinx")
+    meshio = pytest.importorskip("meshio")
+    assert main([*COARSE, "--fields", "--out", str(tmp_path / f"cell{ending}")]) == 0
+    found = meshio.read(tmp_path / f"cell{ending}").point_data
+    names = {f"displacement_{load}_in_half_sides" for load in (1, 2)} | {f"stress_{load}_{c}_Pa" for load in (1, 2) for c in (11, 22, 12)}
+    assert names <= set(found)
+    assert found["stress_1_11_Pa"].max() > 1e8
