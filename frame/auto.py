@@ -48,6 +48,13 @@ def auto(
         ValueError: An excluded name is unknown, or the tolerance is not positive.
         ToleranceError: No method left reaches the tolerance.
     """
+    return cheapest(flow, progress, tolerance=tolerance, fitted=tolerance / 8, exclude=exclude, budget=budget)
+
+
+def cheapest(
+    flow: UnitFlow, progress: Progress | None, *, tolerance: float, fitted: float, exclude: Sequence[str] = (), budget: int = 20000
+) -> Envelope:
+    """As `auto`, with `fitted`, the error wanted of the modal model, apart from the tolerance that it must keep."""
     for name in exclude:
         if name not in CANDIDATES:
             raise ValueError(f"exclude: '{name}' is unknown; allowed are {', '.join(CANDIDATES)}")
@@ -56,7 +63,7 @@ def auto(
     begun, refused = time.perf_counter(), [f"{name} excluded" for name in exclude]
     if "modal" not in exclude and isinstance(flow.flow, LinearFlow):
         try:
-            found = _levelled(modal(flow, progress, tolerance=tolerance / 8), flow)
+            found = _levelled(modal(flow, progress, tolerance=fitted), flow)
             if _estimate(found, flow) <= tolerance:
                 return _reported(found, flow, begun, "modal: polynomials of the modes reach the tolerance with the fewest eigen-analyses")
             refused.append(f"modal estimates {_estimate(found, flow):.2g}")

@@ -19,7 +19,7 @@ from frame.integrators import state_matrix
 from frame.jet import Array, Jet
 from frame.linear import evaluate
 from frame.modal_load import LoadTables
-from frame.modes import ModalError, Modes, eigenvectors, modes
+from frame.modes import ModalError, Modes, eigenvectors, modes, require_single
 from frame.polynomial import Polynomial, fit, terms
 
 
@@ -189,7 +189,7 @@ def fit_modes(flow: LinearFlow, boxes: Boxes, *, tolerance: float = 1e-6, budget
         scale: Factor on the tolerance for each output, shape (m,).
 
     Raises:
-        ModalError: No oscillating modes, or modes that cross or veer so that polynomials do not converge.
+        ModalError: No oscillating modes, or double ones whose polynomials do not reach the tolerance.
     """
     d = len(flow.names)
     held = _held_out(d)
@@ -208,6 +208,8 @@ def fit_modes(flow: LinearFlow, boxes: Boxes, *, tolerance: float = 1e-6, budget
             break
     if best is None:
         raise ModalError(f"modal: {d} parameters need more than {budget} eigen-analyses; raise the budget, or use graph-follower")
+    if (best.error / scale).max() > tolerance:
+        require_single(evaluate(flow.system, flow.names, boxes.to_physical(held), derivatives=False)[0], chosen)
     return best
 
 

@@ -1,4 +1,4 @@
-"""Envelopes by modal intervening variables: the default for linear structures."""
+"""Envelopes by modal intervening variables: what is tried first for linear structures."""
 
 from __future__ import annotations
 
@@ -72,6 +72,8 @@ def modal(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> E
         progress: Called with the fraction done.
         options: Fields of `Modal`.
 
+    Where the polynomials do not reach the tolerance, `error` says what they do, and the fact "reason" that it is more.
+
     Raises:
         ModalError: The structure has no smooth oscillating modes over the box.
         ValueError: The flow is not that of a linear structure.
@@ -84,9 +86,20 @@ def modal(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> E
     model = fit_modes(flow.flow, flow.boxes, tolerance=method.tolerance, budget=method.budget, scale=flow.scale)
     bounds, at = search_levels(model, ModalSearch.suited(model, method.seed), progress)
     facts: dict[str, float | str] = {"model_error": float(model.error.max()), "degree": model.degree}
+    if (short := _short_of(model, method.tolerance, flow.scale)) is not None:
+        facts["reason"] = short
     error = np.broadcast_to(2 * model.error, bounds.shape[:-1]).copy()
     cost = {"trajectories": model.analyses, "seconds": time.perf_counter() - begun}
     return signed_envelope(flow, bounds, at, method="modal", nature="estimated", error=error, facts=facts, **cost)
+
+
+def _short_of(model: ModalModel, tolerance: float, scale: Array) -> str | None:
+    """What to say of a model that misses the wanted error; None of one that keeps it."""
+    reached = float((model.error / scale).max())
+    if reached <= tolerance:
+        return None
+    cure = "take the method auto, narrower supports or a larger budget"
+    return f"modal: the polynomials reach {reached:.2g} and not the tolerance {tolerance:.2g}, see the error; {cure}"
 
 
 def _certified(flow: UnitFlow, method: Modal, gap: float, begun: float, progress: Progress | None) -> Envelope:

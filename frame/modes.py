@@ -10,6 +10,9 @@ from frame.integrators import state_matrix
 from frame.jet import Array, Jet, concatenate, inverse
 from frame.linear import Matrices
 
+DOUBLE = 1e-6
+"""Distance of two eigenvalues, as a share of their size, below which they count as one."""
+
 
 class ModalError(RuntimeError):
     """The structure has no smooth set of oscillating modes over the box."""
@@ -57,6 +60,27 @@ def modes(matrices: Matrices, rows: Jet, chosen: Array | None = None) -> Modes:
         return (seen * share).map(lambda x: x.swapaxes(-1, -2))
 
     return Modes(values, through(start), through(kick))
+
+
+def require_single(matrices: Matrices, chosen: Array) -> None:
+    """Refuses modes that share their frequency with another one at all S parameter sets: their shapes are any mixture of both.
+
+    Args:
+        matrices: The structure.
+        chosen: Indices of the modes wanted, by rising |λ|.
+
+    Raises:
+        ModalError: There is such a pair.
+    """
+    rate = eigenvectors(state_matrix(matrices))[0].value
+    size = rate.shape[-1] // 2
+    apart = np.abs(rate[:, :size, None] - rate[:, None, :size]) / np.maximum(np.abs(rate[:, :size, None]), 1e-300)
+    for first, second in np.argwhere((apart < DOUBLE).all(0)):
+        if first < second and np.isin([first, second], chosen).any():
+            raise ModalError(
+                f"modal: modes {first + 1} and {second + 1} have the same frequency, {np.abs(rate[0, first]):.4g} rad/s, and so no smooth "
+                "shapes; take the method auto or improved-graph-follower"
+            )
 
 
 def oscillating(rate: Array) -> Array:

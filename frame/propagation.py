@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 from frame.auto import auto
 from frame.batch_follower import pursue
 from frame.box import ALPHA, UnitFlow, boxes
+from frame.default_method import default
 from frame.envelope import Envelope, signed_envelope
 from frame.flow import LinearFlow
 from frame.graph_follower import Followed, GraphFollower
@@ -19,9 +21,9 @@ from frame.integrators import INTEGRATORS, Exact, Integrator
 from frame.lagrangian import LagrangianSystem
 from frame.linear import LinearSystem
 from frame.modal_method import modal
-from frame.modes import ModalError
 from frame.nonlinear_flow import LagrangianFlow
 from frame.sampling import monte_carlo, quasi_monte_carlo, vertex
+from frame.tolerance_guard import LIMIT
 from fuzzy import FuzzyNumber
 
 Progress = Callable[[float], None]
@@ -48,8 +50,8 @@ def envelope(
         duration: Length of the simulation, in s.
         step: Distance of the nodes and step of the integrator, in s.
         alpha: Levels in [0, 1].
-        method: Name of a method, see `METHODS`; unless given, modal for linear structures and
-            improved-graph-follower for others and where the modes do not allow it.
+        method: Name of a method, see `METHODS`; unless given, auto for linear structures with an error of 1e-4 m, or of a thousandth of
+            each peak where no output is a displacement, and improved-graph-follower for others.
         integrator: Time stepping: a method or its name; exact for the method modal and midpoint for all others unless given.
         relative: Whether the method's tolerance is a share of each output's peak at the modal parameters, instead of a length in SI units.
         progress: Called with the fraction done.
@@ -57,12 +59,17 @@ def envelope(
 
     Raises:
         ValueError: An unknown name, or a value outside its range.
+        ToleranceError: No method reaches the wanted error.
+        ModalError: The method is modal, and the structure has no smooth oscillating modes over the box.
+
+    Warns:
+        UserWarning: The method is modal, and its error passes the tolerance and a hundredth of a peak.
     """
     cuts = boxes(inputs, alpha)
     if isinstance(model, LagrangianSystem):
         flow = LagrangianFlow(model, cuts.names, duration, step, str(integrator or "midpoint"))
         return _method(method or "improved-graph-follower")(UnitFlow(flow, cuts, relative), progress, **options)
-    propagate = _modal_if_possible if method is None else _method(method)
+    propagate = default if method is None else _method(method)
     if integrator is None:
         integrator = "exact" if method is None or method in EXACT_BY_DEFAULT else "midpoint"
     if isinstance(integrator, str) and integrator not in INTEGRATORS:
@@ -76,17 +83,19 @@ def envelope(
         facts["dominant_error"] = (
             f"time stepping: {facts['step_error']:.2g} against {envelope_error:.2g} of the envelope; integrator exact has none"
         )
-    return replace(found, facts=facts)
+    found = replace(found, facts=facts)
+    if method == "modal":
+        warn_of_roughness(found)
+    return found
 
 
-def _modal_if_possible(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> Envelope:
-    try:
-        return modal(flow, progress, **options)
-    except ModalError as error:
-        if options:
-            raise
-        found = pursue(flow, progress)
-        return replace(found, facts={**found.facts, "reason": f"improved-graph-follower, since {error}"})
+def warn_of_roughness(found: Envelope) -> None:
+    """Warns of an estimated envelope whose error passes what was asked for and a hundredth of the output's largest bound."""
+    if "reason" not in found.facts or found.error is None:
+        return
+    peak = np.maximum(np.abs(found.lower), np.abs(found.upper)).max((0, 1))
+    if (found.error.max((0, 1)) > LIMIT * peak).any():
+        warnings.warn(f"envelope: {found.facts['reason']}", stacklevel=3)
 
 
 def _method(name: str) -> Callable[..., Envelope]:
