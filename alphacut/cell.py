@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rve.result import Homogenised
 
 GPA = 1e9
+LEAST_TOLERANCE, MOST_TOLERANCE = 1e-10, 0.1  # of E, see rve.choice.AutoModel
 INPUTS = ("a1", "a2", "a3", "a4", "matrix_modulus", "matrix_poisson", "inclusion_modulus", "inclusion_poisson")
 SHARED = tuple(name for name in INPUTS if name != "inclusion_modulus")  # what samples of one task have in common
 
@@ -73,13 +74,24 @@ class CellChoice:
 
 
 def cell_choice(case: Case, *, exclude: tuple[str, ...] = (), petsc: Mapping[str, str] | None = None) -> CellChoice:
-    """The model that a case asks for."""
+    """The model that a case asks for.
+
+    Raises:
+        BadInput: The case names its model, so that none can be excluded; or auto is asked for what no model reaches.
+    """
+    method, tolerance = case.text("modulus.method"), case.number("modulus.tolerance")
+    if exclude and method != "auto":
+        what = f"the method is {method}, and only method auto leaves a choice"
+        raise BadInput(Problem("--exclude", what, ", ".join(exclude), "beside --method auto"))
+    if method == "auto" and not LEAST_TOLERANCE <= tolerance <= MOST_TOLERANCE:
+        allowed = f"from {LEAST_TOLERANCE:g} to {MOST_TOLERANCE:g} with method auto"
+        raise BadInput(Problem("modulus.tolerance", "out of range", f"{tolerance:g}", allowed, file=str(case.path)))
     return CellChoice(
-        case.text("modulus.method"),
+        method,
         case.integer("mesh.layers"),
         case.number("mesh.size"),
         case.text("mesh.interface"),
-        case.number("modulus.tolerance"),
+        tolerance,
         exclude,
         petsc or {},
     )
@@ -111,8 +123,23 @@ def solve(case: Case, model: CellModel) -> Homogenised:
     return model.solve(radius, matrix, [inclusion])[0]
 
 
+def anisotropy(radius: HermiteMap, matrix: Phase, inclusion: Phase) -> float | None:
+    """Shear ratio of a cell (see `rve.anisotropy.shear_ratio`) by the series, whatever model gives E; None where the series refuses."""
+    from rve.series import SeriesModel
+
+    try:
+        stiffness = SeriesModel(accuracy=1e-4).solve(radius, matrix, [inclusion])[0].stiffness
+    except (RuntimeError, ValueError):
+        return None
+    return None if stiffness is None else shear_ratio(stiffness)
+
+
 def directions(result: Homogenised) -> dict[str, Any] | None:
-    """What eq. 16 hides: plane-strain moduli over the direction, and the anisotropy of the shear modulus; None without the stiffness."""
+    """What eq. 16 hides, over the direction, and the anisotropy of the shear modulus; None without the stiffness.
+
+    "young_GPa" is stress over strain in plane strain with free sides, 1/S11 of the planar compliance: E/(1 − ν²) in an isotropic material,
+    so that E of eq. 16 lies below it.
+    """
     if result.stiffness is None:
         return None
     degrees = np.arange(0, 91, 15)

@@ -11,9 +11,11 @@ from alphacut import cell
 from alphacut.loading import load
 from alphacut.material_card import check_format, export
 from alphacut.options import CELL_OPTIONS, add_common, add_keys, changes
-from alphacut.output import as_json, ranks, write_text
+from alphacut.output import as_json, ranks, say, write_text
 from alphacut.problem import BadInput, Problem
 from alphacut.schema import CELL_METHODS
+from rve.anisotropy import ISOTROPIC_ENOUGH, shear_ratio_in_words
+from rve.cell import STRAIN
 from rve.model import cross_check
 from rve.result import Homogenised
 
@@ -27,7 +29,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--exclude", metavar="NAMES", default="", help="models that method auto must not take, separated by commas")
     parser.add_argument("--stiffness", action="store_true", help="with method prism, solve a third load for the whole planar stiffness")
     parser.add_argument(
-        "--export", metavar="FILE", help="write the material for another program: .inp, .comm, .mac, or .json with the stiffness"
+        "--export", metavar="FILE", help="write the material and its plane-strain stiffness for another program: .inp, .comm, .mac or .json"
     )
     parser.add_argument(
         "--cross-check", metavar="A,B", default="", help="run two models; fail if their moduli differ by more than --tolerance"
@@ -43,31 +45,49 @@ def named_models(option: str, text: str) -> tuple[str, ...]:
     return names
 
 
+def named_pair(text: str) -> tuple[str, ...]:
+    """The two models of ``--cross-check``; none if it is not asked for."""
+    names = named_models("--cross-check", text)
+    if text and (len(names) != 2 or len(set(names)) != 2):
+        raise BadInput(Problem("--cross-check", "this takes two different models", text, "for example series,slices"))
+    return names
+
+
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Solve and report."""
     case = load(options.case, changes(options, CELL_OPTIONS), modal=True)
     if options.export:
         check_format(options.export)
+    pair = named_pair(options.cross_check)
     choice = cell.cell_choice(case, exclude=named_models("--exclude", options.exclude), petsc=petsc)
-    choice = replace(choice, parallel=ranks() > 1, estimate=True, stiffness=options.stiffness)
-    pair = named_models("--cross-check", options.cross_check)
+    choice = replace(choice, parallel=ranks() > 1, estimate=True, stiffness=options.stiffness or bool(options.export))
+    result = cell.solve(case, replace(choice, method=pair[0] if pair else choice.method).model())
+    difference = None
     if pair:
-        first, *others = [cell.solve(case, replace(choice, method=name).model()) for name in pair]
-        for other in others:
-            cross_check([first], [other], tolerance=choice.tolerance)
-        result = first
-    else:
-        result = cell.solve(case, choice.model())
+        difference = cross_check([result], [cell.solve(case, replace(choice, method=pair[1]).model())], tolerance=choice.tolerance)
     if options.export:
         export(result, options.export)
-    document = as_json(cell.document(result), indent=None if options.json == "-" else 2)
+    found = {**cell.document(result), **({} if difference is None else {"difference": difference})}
+    document = as_json(found, indent=None if options.json == "-" else 2)
     if options.json == "-":
         out.write(document)
     elif options.json:
         write_text(options.json, document)
     if options.json != "-" and not options.quiet:
         out.write(summary(result))
+        if difference is not None:
+            out.write(f"{' and '.join(pair)} differ by {difference:.1e} of E; {choice.tolerance:.1e} is allowed\n")
+        out.write(remark(cell.anisotropy(*cell.parts(cell.modal_values(case), case.numbers("radius.theta")))))
     return 0
+
+
+def remark(ratio: float | None) -> str:
+    """The square array's anisotropy as a line; where it matters, a warning besides."""
+    if ratio is None:
+        return ""
+    if abs(ratio - 1) > ISOTROPIC_ENOUGH:
+        say(f"warning: {shear_ratio_in_words(ratio)}; --export and --stiffness give the whole plane-strain stiffness")
+    return f"shear_ratio = {ratio:.4f}: shear modulus along the diagonals over that along the axes, 1 in an isotropic plane\n"
 
 
 def summary(result: Homogenised) -> str:
@@ -78,7 +98,7 @@ def summary(result: Homogenised) -> str:
     error = f"estimated relative error of E: {result.estimated_error:.1e} ({parts})\n" if parts else ""
     return (
         f"E = {result.modulus / cell.GPA:.6f} GPa, nu = {result.poisson:.6f} (eq. 16)\n{error}"
-        f"mean s11 = {s11:.9f} GPa, mean s12 = {s12:.9f} GPa\n"
+        f"mean s11 = {s11:.9f} GPa under ε11 = ε22 = {STRAIN:g}, mean s12 = {s12:.9f} GPa under ε12 = {STRAIN:g}\n"
         f"{result.method}, {result.unknowns} unknowns, {result.solver}, iterations {', '.join(map(str, result.iterations)) or 'none'}\n"
         f"seconds: {seconds}\n"
     )

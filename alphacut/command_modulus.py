@@ -11,10 +11,11 @@ from alphacut import modulus, response
 from alphacut.campaign import campaign
 from alphacut.case import Case
 from alphacut.cell import GPA
-from alphacut.command_cell import named_models
+from alphacut.command_cell import named_models, remark
 from alphacut.loading import load
 from alphacut.options import CELL_OPTIONS, add_common, add_keys, add_workers, changes, check_workers
 from alphacut.output import as_json, say, write_text
+from alphacut.problem import BadInput, Problem
 from alphacut.progress import progress
 from alphacut.provenance import fingerprint
 from fuzzy import Explanation
@@ -64,10 +65,18 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
 
 
 def store_of(options: argparse.Namespace, case: Case) -> Path | None:
-    """The file that keeps the samples, if one is wanted."""
+    """The file that keeps the samples, if one is wanted.
+
+    Raises:
+        BadInput: There is such a file, and it holds something else.
+    """
     if not (options.store or options.resume):
         return None
     path = Path(options.store or f"results/{case.name}/samples.db")
+    if path.is_file() and path.stat().st_size and not path.read_bytes()[:15] == b"SQLite format 3":
+        raise BadInput(
+            Problem("--store", "this file holds something else than samples", str(path), "a new file, or a store of this program")
+        )
     path.parent.mkdir(parents=True, exist_ok=True)
     return path
 
@@ -82,4 +91,4 @@ def summary(found: modulus.FuzzyModulus) -> str:
     lower, upper = (ends / GPA for ends in found.result.bounds("E"))
     rows = "".join(f"{a:5.2f}  {low:10.5f}  {high:10.5f}\n" for a, low, high in zip(found.result.alpha, lower, upper, strict=True))
     cost = f"{found.result.runs} samples, {found.solves} linear systems, {found.result.seconds:.1f} s, {found.choice.method}"
-    return f"alpha  lower GPa   upper GPa   (E of eq. 16)\n{rows}{cost}\n"
+    return f"alpha  lower GPa   upper GPa   (E of eq. 16)\n{rows}{cost}\n{found.worth}\n{remark(found.shear_ratio)}"

@@ -10,7 +10,7 @@ import numpy as np
 
 from alphacut.campaign import Campaign, theta_shown
 from alphacut.case import Case
-from alphacut.cell import GPA, CellChoice
+from alphacut.cell import GPA, CellChoice, anisotropy, parts
 from alphacut.measured import measured_modulus
 from alphacut.output import whole_file
 from alphacut.problem import BadInput, Problem
@@ -28,6 +28,11 @@ if TYPE_CHECKING:
 QUANTITIES = {"E": ("Pa", "effective Young's modulus, eq. 16"), "nu": ("1", "effective Poisson's ratio, eq. 16")}
 STRESSES = {"s11": ("Pa", "mean homogenised stress 11 under load 1"), "s12": ("Pa", "mean homogenised stress 12 under load 2")}
 BOUNDS = QUANTITIES | STRESSES
+MEANING = {
+    "inner": "attained by samples, between which E may go further",
+    "estimated": "those of samples and of a model between them",
+    "guaranteed": "no value within the supports goes further",
+}
 
 
 @dataclass(frozen=True)
@@ -39,12 +44,14 @@ class FuzzyModulus:
         choice: Model of the cell that was used.
         theta: Support of θ.
         judged: The modal sample once more, with its estimated error and auto's reason; None for models that give both with every sample.
+        shear_ratio: Anisotropy of the modal cell, see `rve.anisotropy`; None where it could not be had.
     """
 
     result: FuzzyResult
     choice: CellChoice
     theta: tuple[float, ...] = (-3.0, 3.0)
     judged: Homogenised | None = None
+    shear_ratio: float | None = None
 
     @property
     def number(self) -> PiecewiseLinear:
@@ -66,6 +73,14 @@ class FuzzyModulus:
     def error(self) -> dict[str, float]:
         """Estimated relative error of E by source: the largest of all samples, or that of the modal one where each would cost too much."""
         return self.largest("error") or (dict(self.judged.error) if self.judged else {})
+
+    @property
+    def worth(self) -> str:
+        """One line: what the bounds of E are worth, and the error of the model, which they do not count."""
+        parts = ", ".join(f"{name} {value:.1e}" for name, value in self.error.items())
+        whose = "modal sample" if self.judged and not self.largest("error") else "largest of all samples"
+        error = f"estimated at {sum(self.error.values()):.1e} of E ({parts}; {whose})" if parts else "not estimated"
+        return f"bounds {self.nature}: {MEANING.get(self.nature, '')}; the error of the cell's model comes on top, {error}"
 
     @property
     def solves(self) -> int:
@@ -97,6 +112,7 @@ class FuzzyModulus:
             "method": self.choice.method,
             "reason": self.reason,
             "error": self.error,
+            "shear_ratio": self.shear_ratio,
             "checks": self.largest("check"),
             "versions": versions(),
         }
@@ -157,7 +173,8 @@ def compute(wanted: Campaign, *, workers: int = 1, progress: Tick | None = None)
         identity=wanted.identity,
     )
     modal = {name: number.modal for name, number in wanted.inputs.items()}
-    return FuzzyModulus(result, wanted.task.choice, wanted.task.theta, wanted.task.judged(modal))
+    cell = parts({**wanted.task.crisp, **modal}, wanted.task.theta)
+    return FuzzyModulus(result, wanted.task.choice, wanted.task.theta, wanted.task.judged(modal), anisotropy(*cell))
 
 
 def explain(wanted: Campaign) -> Explanation:

@@ -1,6 +1,7 @@
 """What goes to other programs: material cards, and meshes that other programs read the right way round."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,60 @@ def test_a_material_card_holds_the_modulus(ending, tmp_path, capfd):
     written = json.loads(text)["E_Pa"] if ending == ".json" else float(f"{found['E_GPa'] * 1e9:.9e}")
     assert written == pytest.approx(found["E_GPa"] * 1e9, rel=1e-9)
     assert ending == ".json" or f"{written:.9e}" in text
+
+
+def plane_stiffness(values: list[float]) -> np.ndarray:
+    """Plane-strain stiffness of orthotropic constants E1, E2, E3, ν12, ν13, ν23, G12 as the other programs read them."""
+    e1, e2, e3, nu12, nu13, nu23, g12 = values[:7]
+    give = np.array([[1 / e1, -nu12 / e1, -nu13 / e1], [-nu12 / e1, 1 / e2, -nu23 / e2], [-nu13 / e1, -nu23 / e2, 1 / e3]])
+    normal = np.linalg.inv(give)
+    assert np.linalg.eigvalsh(normal).min() > 0
+    stiffness = np.diag([0, 0, g12])
+    stiffness[:2, :2] = normal[:2, :2]
+    return stiffness
+
+
+@pytest.mark.parametrize("ending", [".inp", ".comm", ".mac", ".json"])
+@pytest.mark.parametrize("method", [["series"], ["prism", "--mesh-size", "0.5", "--layers", "3"]])
+def test_a_material_card_holds_the_plane_stiffness_without_being_asked(ending, method, tmp_path, capfd):
+    pytest.importorskip("dolfinx") if method[0] == "prism" else None
+    path = tmp_path / f"material{ending}"
+    assert main(["cell", PAPER, "--method", *method, "--export", str(path), "--json", "-"]) == 0
+    wanted = np.array(json.loads(capfd.readouterr().out)["stiffness_GPa"]) * 1e9
+    text = path.read_text(encoding="utf-8")
+    if ending == ".json":
+        values = list(json.loads(text)["plane_constants"].values())
+        assert json.loads(text)["stiffness"]["plane_strain"] == pytest.approx(wanted)
+    elif ending == ".inp":
+        values = [float(word) for word in text.split("CONSTANTS\n")[1].replace("\n", ",").split(",") if word.strip()]
+    elif ending == ".comm":
+        values = [float(word) for word in re.findall(r"\w+=([\d.e+-]+)", text.split("ELAS_ORTH")[1])]
+    else:
+        values = [float(word) for word in re.findall(r"^MP,\w+,2,(.*)$", text, re.MULTILINE)]
+    assert len(values) == 9
+    assert plane_stiffness(values) == pytest.approx(wanted, rel=1e-6, abs=1e-4 * wanted.max())
+
+
+@pytest.mark.parametrize(("ending", "mark"), [(".inp", "**"), (".comm", "#"), (".mac", "!")])
+def test_an_isotropic_card_says_how_isotropic_it_is(ending, mark, tmp_path):
+    path = tmp_path / f"material{ending}"
+    stiff = ["--inclusion-modulus", "70 GPa", "--matrix-modulus", "3 GPa", "--a1", "0.79", "--a2", "0.02", "--a3", "0.81", "--a4", "0.02"]
+    assert main(["cell", PAPER, "--method", "series", *stiff, "--quiet", "--export", str(path)]) == 0
+    (line,) = [line for line in path.read_text(encoding="utf-8").splitlines() if "1 in an isotropic plane" in line]
+    assert line.startswith(f"{mark} ")
+    assert ": 1.499 (" in line
+    assert "can lie below that of any isotropic composite" in line
+
+
+def test_a_card_without_a_stiffness_leaves_it_out():
+    from alphacut.material_card import FORMATS
+    from rve.result import Homogenised, StressCurve
+
+    bare = Homogenised(StressCurve(np.zeros(1), np.ones(1), np.array([4e8]), np.array([1e8])), "prism")
+    for write in FORMATS.values():
+        text = write(bare)
+        assert "strain" not in text
+        assert "PLANE" not in text
 
 
 def test_an_ending_without_a_format_is_refused_before_computing(tmp_path, capfd):
