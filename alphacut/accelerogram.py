@@ -39,6 +39,8 @@ def accelerogram(path: Path, key: str = "frame.accelerogram") -> Accelerogram:
         times.append(time * scales[0])
         values.append(value * scales[1])
         lines.append(line)
+    if not any(values):
+        raise BadInput(Problem(key, "the acceleration is zero throughout", str(path), "a record that moves the ground"))
     return Accelerogram(even_step(times, lines, path, key), np.array(values))
 
 

@@ -61,6 +61,8 @@ def shown(value: object) -> str:
     """A default as a user would write it."""
     if isinstance(value, bool):
         return str(value).lower()
+    if isinstance(value, tuple) and len(value) == 1:
+        return shown(value[0])
     if isinstance(value, tuple):
         return f"[{', '.join(f'{entry:g}' if isinstance(entry, float) else str(entry) for entry in value)}]"
     value = getattr(value, "value", value)

@@ -27,7 +27,7 @@ def apply_change(raw: Raw, change: str) -> str:
     if re.match(r"study\b", name):
         raise BadInput(Problem("--set", "a [[study]] is changed in the case file", change, "keys of the other sections"))
     if not full:
-        raise BadInput(no_key(name, change))
+        raise BadInput(no_key(name, change, raw))
     present = [key for key in full if key.rpartition(".")[2] in (table_of(raw, key.rpartition(".")[0]) or {})] if len(full) > 1 else full
     present = [key for key in present if not key.startswith("study.")]
     if len(present) != 1:
@@ -39,13 +39,14 @@ def apply_change(raw: Raw, change: str) -> str:
     return present[0]
 
 
-def no_key(name: str, change: str) -> Problem:
+def no_key(name: str, change: str, raw: Raw) -> Problem:
     """The problem of a change of what is no key: nothing at all, a section, a misspelling."""
     if not name:
         return Problem("--set", "there is no key before the =", change, "any key of the case")
     if name in SECTIONS:
         return Problem("--set", f"{name} is a section", change, ", ".join(f"{name}.{key}" for key in SECTIONS[name].keys))
-    return Problem("--set", f"there is no key {name}", change, "any key of the case", nearest(name, every_key()))
+    here = [key for key in every_key() if table_of(raw, key.rpartition(".")[0]) is not None]  # keys of the case's own sections come first
+    return Problem("--set", f"there is no key {name}", change, "any key of the case", nearest(name, here) or nearest(name, every_key()))
 
 
 def table_of(raw: Raw, section: str, *, make: bool = False) -> Raw | None:

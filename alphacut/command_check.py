@@ -40,7 +40,9 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     if options.json != "-" and not options.quiet:
         about = "about " if "modulus" in case.stages else ""  # the modulus is yet to be computed
         period = f"; first natural period {about}{found.period:.3g} s" if found.period else ""
-        out.write(f"{options.case}: no problems; stages {', '.join(case.stages)}; {case.text('title')}{period}\n")
+        passed = "modulus" in case.stages and "frame.modulus" in case.written
+        over = "; frame.modulus is passed over, stage modulus hands its own on" if passed else ""
+        out.write(f"{options.case}: no problems; stages {', '.join(case.stages)}; {case.text('title')}{period}{over}\n")
     return 0
 
 

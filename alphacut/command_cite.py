@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TextIO
 
+from alphacut.output import as_json, write_text
 from alphacut.provenance import own_version
 
 ABOUT = "how to cite this program"
@@ -15,6 +16,7 @@ ABOUT = "how to cite this program"
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
+    parser.add_argument("--json", metavar="FILE", help="write the citation as JSON; - for standard output")
     parser.add_argument("--quiet", action="store_true", help="no difference here; every command takes it")
 
 
@@ -46,5 +48,8 @@ def bibtex(kind: str, name: str, entry: Mapping[str, str]) -> str:
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Print."""
-    out.write(citation())
+    document = as_json({"bibtex": citation(), "version": own_version()})
+    if options.json not in (None, "-"):
+        write_text(options.json, document)
+    out.write(document if options.json == "-" else citation())
     return 0

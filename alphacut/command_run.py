@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -75,7 +76,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         out.write(summary.table(found["paper"]) if found["paper"] else "")
         out.write(main_numbers(found))
         say(f"results are in {folder}, {len(drawn)} figures among them, after {found['seconds']:.0f} s")
-        say(f"next: {door()} report {folder}")
+        say(f"next: {door()} report {shlex.quote(str(folder))}")
     return 0
 
 

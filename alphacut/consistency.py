@@ -60,7 +60,7 @@ def where(key: str, check: Check) -> Check:
 def one_modulus(case: Case) -> Iterator[Problem]:
     """At most one thing stands in for the computed modulus."""
     if len(stand_ins(case)) > 1:
-        yield Problem(stand_ins(case)[1], "more than one modulus is given", ", ".join(stand_ins(case)), "one of them")
+        yield Problem(stand_ins(case)[1], f"more than one modulus is given: {', '.join(stand_ins(case))}", allowed="one of them")
 
 
 def other_structures(case: Case) -> Iterator[Problem]:
@@ -142,7 +142,11 @@ def missing_sections(case: Case) -> Iterator[Problem]:
             if section == "radius" and "microstructure" in case.stages:
                 continue
             if not any(key.startswith(f"{section}.") for key in case.values) and not (stage == "modulus" and replaced(case)):
-                yield Problem(section, f"section [{section}] is missing; stage {stage} needs it")
+                made = section == "radius" and any(key.startswith("microstructure.") for key in case.values)
+                cure = 'or "microstructure" among the stages, which makes it from the particles' if made else ""
+                yield Problem(section, f"section [{section}] is missing; stage {stage} needs it", allowed=cure)
+    if "microstructure" in case.stages and any(key.startswith("radius.") and key != "radius.theta" for key in case.written):
+        yield Problem("radius", "stage microstructure makes this section from the particles", allowed="one of section and stage")
 
 
 def files(case: Case) -> Iterator[Problem]:

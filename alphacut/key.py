@@ -32,7 +32,7 @@ NOT_NEGATIVE = Range("0 or greater", lower=0.0, upper=float("inf"), closed=True)
 POISSON = Range("inside (-1, 0.5)", lower=-1.0, upper=0.5)
 UNIT = Range("inside (0, 1)", lower=0.0, upper=1.0)
 MEMBERSHIP = Range("from 0 to 1", lower=0.0, upper=1.0, closed=True)
-RATIO = Range("0 or greater and below 1", lower=0.0, upper=1.0, closed=True, below=True)
+RATIO = Range('0 or greater and below 1, such as 0.05 or "5 %"', lower=0.0, upper=1.0, closed=True, below=True)
 COUNT = Range("from 1 to 10000", lower=1.0, upper=1e4, closed=True)
 DEVIATIONS = Range("from -10 to 10", lower=-10.0, upper=10.0, closed=True)
 

@@ -12,6 +12,7 @@ from alphacut.units import factor
 from fuzzy import FuzzyNumber
 
 HEADER = "E [GPa]"
+NAMES = r"E|E_?c?m?|E_?mod(ul(us)?)?|(young'?s?[\s_-]*)?modul(us|i)|elastic[\s_-]modulus"
 
 
 def measured_modulus(path: Path, key: str = "modulus.measured") -> FuzzyNumber:
@@ -32,16 +33,21 @@ def measured_modulus(path: Path, key: str = "modulus.measured") -> FuzzyNumber:
     if len(rows) < 2:
         raise BadInput(Problem(key, "the file needs a header and one value or more", str(path), HEADER))
     scale = unit_of(rows[0][1], path, key)
-    return from_data([scale * positive(text, path, number, key) for number, text in rows[1:]])
+    values = [scale * positive(text, path, number, key) for number, text in rows[1:]]
+    if len(values) == 1:
+        raise BadInput(Problem(key, "the file holds one value, which has no spread", rows[1][1], "two values or more; or modulus.value"))
+    return from_data(values)
 
 
 def unit_of(header: str, path: Path, key: str) -> float:
     """Pascals in the header's unit."""
-    match = re.fullmatch(r"\w+\s*\[([^\]]+)\]", header)
+    match = re.fullmatch(r"(.+?)\s*\[([^\]]+)\]", header)
     try:
         if match is None:
             raise ValueError(f"the header {header!r} has no unit")
-        return float(factor(match[1], "Pa"))
+        if not re.fullmatch(NAMES, match[1], flags=re.IGNORECASE):
+            raise ValueError(f"the column {match[1]!r} is not named as a modulus")
+        return float(factor(match[2], "Pa"))
     except ValueError as error:
         raise BadInput(Problem(key, str(error), file=str(path), line=1, allowed=HEADER)) from None
 

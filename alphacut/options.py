@@ -50,6 +50,8 @@ class Parser(argparse.ArgumentParser):
     def stranger(self, word: str, known: Sequence[str]) -> Problem:
         """The problem of a word that is no option, with what was meant."""
         here, what = self.prog.removeprefix("alphacut "), f"there is no such option: {word}"
+        if not word.startswith("-"):
+            return Problem(here, "there is one argument too many", word, "one case; other values stand behind their options")
         if re.match(r"-(ksp|pc|mat|snes|mg|sub|log|options)_", word):
             return Problem(here, what, allowed=f"PETSc's options with their prefix: {PETSC_PREFIX}{word[1:]}")
         close = nearest(word.partition("=")[0], known)

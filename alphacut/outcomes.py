@@ -171,7 +171,8 @@ def exceedance_document(found: xarray.Dataset) -> dict[str, Any]:
 
 def sentence(found: Mapping[str, Any]) -> str:
     """The probability in words, at the lowest and the highest level."""
-    cuts = (f"[{found['lower'][k]:.3g}, {found['upper'][k]:.3g}] at α = {found['alpha'][k]:g}" for k in (0, -1))
+    levels = dict.fromkeys((0, len(found["alpha"]) - 1))
+    cuts = (f"[{found['lower'][k]:.3g}, {found['upper'][k]:.3g}] at α = {found['alpha'][k]:g}" for k in levels)
     random = f" with random {found['random']}" if found["random"] else ""
     worth = f"; standard deviation of the estimates up to {found['deviation']:.2g}" if found["random"] else ""
     return f"probability of |{found['output']}| > {engineering(found['limit'], found['unit'])}{random}: {', '.join(cuts)}{worth}\n"

@@ -10,13 +10,15 @@ from alphacut import modulus
 from alphacut.accelerogram import accelerogram
 from alphacut.case import Case
 from alphacut.chain import studies
-from alphacut.consistency import beside, replaced
+from alphacut.consistency import beside, replaced, stand_ins
 from alphacut.frame_names import fuzzy_keys
 from alphacut.problem import BadInput, Problem
 from alphacut.roughness import rough
 from alphacut.structure import Structure, structure
 from fuzzy import FuzzyNumber, Triangular
 
+PERIODS = (0.02, 30.0)  # s, from a stiff machine frame to the slenderest towers
+STRONGEST = 50.0  # m/s², more than any ground acceleration recorded
 RECORDS = ("frame.accelerogram", "tower.accelerogram")
 
 
@@ -48,6 +50,9 @@ def ready(case: Case) -> Readiness:
         require_readable(case)
     stand_in = modulus.stand_in(case) if "modulus" in case.stages or replaced(case) else None
     if "envelope" not in case.stages:
+        if "modulus" in case.stages and replaced(case):
+            what = f"there is nothing to compute: {', '.join(stand_ins(case))} stands in for stage modulus"
+            raise BadInput(Problem("stages", what, str(list(case.stages)), 'stages = ["modulus", "envelope"], with a structure'))
         return Readiness()
     if problems := list(lacking(case)):
         raise BadInput(problems)
@@ -55,7 +60,8 @@ def ready(case: Case) -> Readiness:
     if problems := list(crisp_names(case, wanted)):
         raise BadInput(problems)
     found = dict.fromkeys(problem for study in studies(case) for problem in rough(wanted, study.task))
-    return Readiness(tuple(outlasted(case)), tuple(found), first_period(wanted))
+    period = first_period(wanted)
+    return Readiness((*outlasted(case), *unlikely(case, period)), tuple(found), period)
 
 
 def first_period(wanted: Structure) -> float | None:
@@ -63,6 +69,17 @@ def first_period(wanted: Structure) -> float | None:
     from frame.linear import frequencies
 
     return None if wanted.linear is None else 2 * math.pi / float(frequencies(wanted.linear)[0])
+
+
+def unlikely(case: Case, period: float | None) -> Iterator[str]:
+    """Remarks on values of which one has most likely the wrong unit."""
+    if period is not None and not PERIODS[0] <= period <= PERIODS[1]:
+        yield f"a first natural period of {period:.3g} s is unusual for a structure; check the units of masses, lengths and moduli"
+    for key in RECORDS:
+        if case.has(key):
+            peak = float(abs(accelerogram(beside(case, case.text(key)), key).acceleration).max())
+            if peak > STRONGEST:
+                yield f"{key}: a peak of {peak:.3g} m/s² is above any earthquake recorded; check the unit in its header"
 
 
 def lacking(case: Case) -> Iterator[Problem]:

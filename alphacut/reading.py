@@ -126,7 +126,7 @@ def read_names(value: object, key: Key) -> tuple[str, ...]:
     if len(set(names)) < len(names):
         raise Unfit("a name stands there twice", allowed(key))
     if key.required and not names:
-        raise Unfit("the array is empty", allowed(key))
+        raise Unfit("the array is empty", f"{allowed(key)}, one name or more")
     return names
 
 

@@ -49,7 +49,12 @@ FRAME = Section(
         "rayleigh_mass": Key("factor a of Rayleigh damping a M + b K", unit="1/s", default=Crisp(0.0), allowed=NOT_NEGATIVE),
         "rayleigh_stiffness": Key("factor b of Rayleigh damping a M + b K", unit="s", default=Crisp(0.0), allowed=NOT_NEGATIVE),
         "accelerogram": Key("CSV file of the ground's acceleration; displacements are then relative to the ground", "text"),
-        "outputs": Key("observed quantities: q1, v1, drift1, shear1 …, base_shear; all displacements if left out", "choices", default=()),
+        "outputs": Key(
+            "observed quantities: q1, v1 (m/s), drift1, shear1 … (in the columns of a storey; dampers excluded), base_shear (that of the "
+            "lowest storey); all displacements if left out",
+            "choices",
+            default=(),
+        ),
     },
 )
 
@@ -96,7 +101,7 @@ PENDULUM = Section(
 STUDY = Section(
     "One envelope that `alphacut run` computes; what it leaves out is taken from [envelope].",
     {
-        "name": Key("name of the study and of its file envelope_NAME.nc", "text", required=True),
+        "name": Key("name of the study and of its file envelope_NAME.nc: letters, digits and . _ + -", "text", required=True),
         "fuzzy": Key("inputs that are fuzzy; all others take their modal value", "choices", required=True),
         "duration": Key("length of the simulation", "number", "s", required=True, allowed=POSITIVE),
         "figures": Key("figure of the paper for each output, or for one", "choices", default=()),
@@ -144,7 +149,7 @@ EXCEEDANCE = Section(
     {
         "output": Key("the output: q3, drift1, base_shear …; of a tower roof or drift, of a pendulum force", "text", required=True),
         "limit": Key(
-            "magnitude it must not exceed, with the output's unit; of a drift also a share of the storey's height: 0.5 %",
+            "magnitude it must not exceed, with the output's unit; of a drift also a share of the storey's modal height: 0.5 %",
             "text",
             required=True,
         ),

@@ -54,6 +54,9 @@ ACCEPTED = {  # units that the page on the case format lists; any other of the s
 }
 
 
+MEANT = {("m/s^2", "g"): "g_0", ("s", "m"): "min", ("kg", "T"): "t", ("Pa", "g"): "GPa"}  # units that are others than were meant
+
+
 @cache
 def registry() -> pint.UnitRegistry:
     """The one unit registry; decimals, so that 250 cm and 2.5 m become the same float."""
@@ -79,11 +82,13 @@ def factor(unit: str, si: str) -> Decimal:
         raise ValueError(f'the unit "{unit}" is wrong')
     if not unit:
         raise ValueError("the unit is missing")
+    if re.search(r"\btons?\b", unit):
+        raise ValueError(f'the unit "{unit}" means several things; write t for 1000 kg, or lb')
     try:
         one = registry().Quantity(Decimal(1), registry().parse_units(re.sub(r"([A-Za-z])([234])(?!\w)", r"\1^\2", unit)))
         return Decimal(one.to(si).magnitude)
     except (pint.UndefinedUnitError, pint.DimensionalityError):
-        close = next((name for name in ACCEPTED.get(si, ()) if name.lower() == unit.lower()), "")
+        close = next((name for name in ACCEPTED.get(si, ()) if name.lower() == unit.lower()), MEANT.get((si, unit), ""))
         raise ValueError(f'the unit "{unit}" is wrong' + (f"; did you mean {close}?" if close else "")) from None
     except Exception:  # pint's tokeniser raises whatever Python's does on text that is not a unit at all
         raise ValueError(f'the unit "{unit}" cannot be read') from None

@@ -91,7 +91,10 @@ def test_a_coarse_step_is_warned_of(tmp_path, capfd):
 
 @pytest.mark.parametrize("path", [path for path in sorted(CASES.glob("*.toml")) if ".quoted" not in path.name], ids=lambda path: path.stem)
 def test_the_shipped_cases_are_ready(path, capfd):
-    assert warnings(path, capfd=capfd) == []
+    told = warnings(path, capfd=capfd)
+    if path.stem == "paper-literal":  # the table read literally is no building
+        assert "first natural period of 0.00221 s is unusual" in told.pop()
+    assert told == []
 
 
 @pytest.mark.parametrize("command", ["check", "run"])
