@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
@@ -35,7 +34,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     case = load(options.case, options.set)
     case.need("microstructure.seed")
     with progress("Microstructure", quiet=options.quiet) as tick:
-        found = microstructure.compute(case, workers=options.workers, progress=tick)
+        found = microstructure.compute(case, workers=options.workers, progress=tick, quiet=True)
     written: list[str] = []
     if options.out:
         key = fingerprint(case.values, ("stochastic",))
@@ -45,6 +44,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         out.write(as_json(document))
     elif options.json:
         write_text(options.json, as_json(document, indent=2))
+    for remark in microstructure.left_out(found):
+        say(remark)
     if options.json != "-" and not options.quiet:
         out.write(found.fragment())
         advise(found.fragment(), options.out)
@@ -53,11 +54,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
 
 def advise(fragment: str, folder: str | None) -> None:
     """Say what the fragment is for, and warn of a slope that came out crisp."""
-    radius = tomllib.loads(fragment)["radius"]
-    for name in ("a2", "a4"):
-        ends = radius[name] if isinstance(radius[name], list) else [radius[name]]
-        if len(set(ends)) == 1:
-            say(f"warning: {name} came out crisp: the particles leave its slope no room within the band; microstructure.sampling widens it")
+    for remark in microstructure.crisp_slopes(fragment):
+        say(remark)
     place = f"{folder}/radius.toml" if folder else "this section (--out FOLDER keeps it as radius.toml)"
     say(f"next: put {place} in place of [radius] of a case with [cell] and [mesh], then {door()} modulus CASE")
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
+from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from alphacut.case import Case
 from alphacut.consistency import beside
+from alphacut.output import say
 from alphacut.problem import BadInput, Problem
 from alphacut.progress import Tick
 from alphacut.reading import read
@@ -101,8 +105,14 @@ def require_readable(case: Case) -> None:
         raise BadInput(Problem("microstructure.circles.file", str(error), file=str(case.path))) from None
 
 
-def compute(case: Case, *, workers: int = 1, progress: Tick | None = None) -> Microstructure:
+def compute(case: Case, *, workers: int = 1, progress: Tick | None = None, quiet: bool = False) -> Microstructure:
     """From particles to the fuzzy radius map; the same for any number of workers.
+
+    Args:
+        case: The case.
+        workers: Processes that share the packings.
+        progress: Told the share done.
+        quiet: Leave it to the caller to say what was left out and which slope came out crisp.
 
     Raises:
         BadInput: Measured data make no sense.
@@ -113,9 +123,37 @@ def compute(case: Case, *, workers: int = 1, progress: Tick | None = None) -> Mi
     wanted = study_of(case)
     with pool(workers) as executor:
         try:
-            return study(wanted, executor=executor, progress=progress)
+            found = study(wanted, executor=executor, progress=progress)
         except ValueError as error:
             raise BadInput(Problem("microstructure", str(error), file=str(case.path))) from None
+    for remark in () if quiet else (*left_out(found), *crisp_slopes(found.fragment())):
+        say(remark)
+    return found
+
+
+def left_out(found: Microstructure) -> Iterator[str]:
+    """One line on the measured particles that were not taken, by reason, if there are any."""
+    reasons = [reason for section in found.sections for reason in section.rejected.values()]
+    if reasons:
+        told = ", ".join(f"{count} {reason}" for reason, count in Counter(map(without_numbers, reasons)).most_common(4))
+        taken = sum(len(section.discs) for section in found.sections)
+        yield f"warning: {len(reasons)} of {taken + len(reasons)} particles were left out (number and why): {told}"
+
+
+def without_numbers(reason: str) -> str:
+    """The kind of a reason: each of its numbers an ellipsis."""
+    return re.sub(r"-?\d[\d.e+-]*", "…", reason)
+
+
+def crisp_slopes(fragment: str) -> Iterator[str]:
+    """A warning for each slope that came out crisp: a band so wide that one map lies within it needs no width."""
+    radius = tomllib.loads(fragment)["radius"]
+    for name in ("a2", "a4"):
+        ends = radius[name] if isinstance(radius[name], list) else [radius[name]]
+        if len(set(ends)) == 1:
+            why = "the band around the particles' distribution is so wide that no width of this slope is needed to reach into it"
+            cure = "microstructure.sampling = true adds the slope's own uncertainty, a smaller microstructure.band asks for a closer fit"
+            yield f"warning: {name} came out crisp: {why}; {cure}"
 
 
 def with_radius(case: Case, fragment: str) -> Case:

@@ -92,8 +92,11 @@ def fragment(found: Microstructure) -> str:
     def triangle(ends: tuple[float, float, float]) -> str:
         return "[" + ", ".join(f"{end:.8g}" for end in ends) + "]"
 
+    discs = float(np.mean([section.discs.area_fraction for section in found.sections]))
     return (
         f"[radius]  # from {len(found.sample.values)} cells; the limits keep {found.share_kept:.4%} of their area\n"
+        f"# area fraction of the discs {discs:.4f}, of the cells {found.sample.area_fraction:.4f}, "
+        f"of this map at its modal values, which the modulus uses, {_mean_area_fraction(found):.4f}\n"
         f"theta = [{law.lower:g}, {law.upper:g}]\n"
         f"a1 = {box.fit.a1:.10g}\n"
         f"a2 = {triangle(box.a2)}\n"

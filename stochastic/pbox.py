@@ -151,7 +151,8 @@ def _solve(fit: HermiteFit, core: list[tuple[float, float | None]], wish: _Conta
     least = _least_breach(matrix, right, np.concatenate(monotone), np.tile(fit.rising + 1e-9, 4), core)
     raise RefusedError(
         f"no p-box of monotone cubics from {fit.a1:g} to {fit.a3:g} contains the distribution: the best leaves r_n = "
-        f"{wish.values[chosen[least[0]]]:.4g} outside by {least[1]:.2g}; widen the limits, or the band by more confidence"
+        f"{wish.values[chosen[least[0]]]:.4g} outside by {least[1]:.2g}; "
+        f"widen the limits, or the band (where none is given, by more confidence)"
     )
 
 
@@ -167,6 +168,6 @@ def _least_breach(matrix: Array, right: Array, monotone: Array, rising: Array, c
         bounds=[*core, (0, None)],
     )
     if result.status != 0:
-        cure = "use more data, or hold less: a lower confidence of the band"
-        raise RefusedError(f"the slopes that the supports must hold make maps that are not monotone; {cure}")
+        cure = "use more particles, or leave that uncertainty out (sampling = false)"
+        raise RefusedError(f"the slopes' own bootstrap band, which the supports must hold, reaches maps that are not monotone: {cure}")
     return int(np.argmax(matrix @ result.x[:4] - right)), float(result.x[4])
