@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import isqrt
-from typing import Protocol
+from typing import NoReturn, Protocol
 
 import numpy as np
 
@@ -52,8 +52,17 @@ def nodes(duration: float, step: float) -> Array:
     return np.arange(count + 1) * step
 
 
+WITHIN = "keep the parameters where the motion exists, such as positive masses"
+
+
+class StepError(RuntimeError):
+    """A step of the integrator did not converge."""
+
+
 class March(ABC):
     """What flows that march from node to node share."""
+
+    names: tuple[str, ...]
 
     duration: float
     step: float
@@ -64,12 +73,46 @@ class March(ABC):
         return nodes(self.duration, self.step)
 
     def values(self, points: Array) -> Array:
-        """Trajectories at `points` (S, d), shape (S, T, outputs)."""
-        return self._march(points, derivatives=False).value
+        """Trajectories at `points` (S, d), shape (S, T, outputs).
+
+        Raises:
+            ValueError: A trajectory does not exist, or leaves the range of floating-point numbers.
+            StepError: A step did not converge.
+        """
+        return self._finite(points, derivatives=False).value
 
     def taylor(self, points: Array) -> Jet:
-        """Trajectories with first and second derivatives of the scheme, V = (S, T, outputs)."""
-        return self._march(points, derivatives=True)
+        """Trajectories with first and second derivatives of the scheme, V = (S, T, outputs); raises as `values`."""
+        return self._finite(points, derivatives=True)
+
+    def _finite(self, points: Array, *, derivatives: bool) -> Jet:
+        try:
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+                found = self._march(points, derivatives=derivatives)
+        except (np.linalg.LinAlgError, StepError) as failure:
+            self._locate(points, failure)
+        if not np.isfinite(found.value).all():
+            bad, node = np.argwhere(~np.isfinite(found.value).all(-1))[0]
+            when = f"not finite from t = {self.time[node]:g} s on"
+            raise ValueError(f"trajectory: {when} at {self._named(points[bad])}; {WITHIN}, or take a smaller step")
+        return found
+
+    def _locate(self, points: Array, failure: Exception) -> NoReturn:
+        """Raises what failed with the parameters at which it does, found by halving the set of points."""
+        while len(points) > 1:
+            half = points[: len(points) // 2]
+            try:
+                self._march(half, derivatives=False)
+                points = points[len(half) :]
+            except (np.linalg.LinAlgError, StepError):
+                points = half
+        where = f"at {self._named(points[0])}"
+        if isinstance(failure, StepError):
+            raise StepError(f"{failure}; it failed {where}") from None
+        raise ValueError(f"trajectory: a matrix is singular {where}; {WITHIN}") from None
+
+    def _named(self, point: Array) -> str:
+        return ", ".join(f"{name} = {value:g}" for name, value in zip(self.names, point, strict=True)) or "the modal parameters"
 
     @abstractmethod
     def _march(self, points: Array, *, derivatives: bool) -> Jet:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from frame.flow import March, nodes
+from frame.flow import March, StepError, nodes
 from frame.jet import Array, Jet, concatenate
 from frame.lagrangian import LagrangianSystem
 from frame.symbolic import Compiled, compiled
@@ -18,10 +18,6 @@ TRIPLE_JUMP = (1 / (2 - 2 ** (1 / 3)), -(2 ** (1 / 3)) / (2 - 2 ** (1 / 3)), 1 /
 """Lengths of three symmetric steps of order 2 that make one of order 4 (Yoshida 1990)."""
 SCHEMES = {"midpoint": 2, "composition4": 4, "rk4": 4}
 """Schemes with their orders: the midpoint variational integrator, its composition of order 4, and the Runge–Kutta method."""
-
-
-class StepError(RuntimeError):
-    """A step of the integrator did not converge."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +58,12 @@ class LagrangianFlow(March):
     def outputs(self) -> tuple[str, ...]:
         """Names of the observed quantities."""
         return self.observe or self.system.outputs
+
+    def halved(self) -> LagrangianFlow:
+        """The same with half the step; what is compiled is shared."""
+        fine = replace(self, step=self.step / 2)
+        fine.__dict__.update({"_stepper": self._stepper, "_observation": self._observation})
+        return fine
 
     @cached_property
     def _stepper(self) -> Callable[[Jet, Jet, tuple[Array, ...], float], Jet]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,12 +16,13 @@ from frame.default_method import default
 from frame.envelope import Envelope, signed_envelope
 from frame.flow import LinearFlow
 from frame.graph_follower import Followed, GraphFollower
-from frame.integrators import INTEGRATORS, Exact, Integrator
+from frame.integrators import INTEGRATORS, Integrator
 from frame.lagrangian import LagrangianSystem
 from frame.linear import LinearSystem
 from frame.modal_method import modal
 from frame.nonlinear_flow import LagrangianFlow
 from frame.sampling import monte_carlo, quasi_monte_carlo, vertex
+from frame.step_error import require_stable, step_error, with_step_error
 from frame.tolerance_guard import LIMIT
 from fuzzy import FuzzyNumber
 
@@ -67,26 +67,28 @@ def envelope(
     """
     cuts = boxes(inputs, alpha)
     if isinstance(model, LagrangianSystem):
-        flow = LagrangianFlow(model, cuts.names, duration, step, str(integrator or "midpoint"))
-        return _method(method or "improved-graph-follower")(UnitFlow(flow, cuts, relative), progress, **options)
-    propagate = default if method is None else _method(method)
-    if integrator is None:
-        integrator = "exact" if method is None or method in EXACT_BY_DEFAULT else "midpoint"
-    if isinstance(integrator, str) and integrator not in INTEGRATORS:
-        raise ValueError(f"integrator: '{integrator}' is unknown; allowed are {', '.join(INTEGRATORS)}")
-    scheme = INTEGRATORS[integrator] if isinstance(integrator, str) else integrator
-    linear = LinearFlow(model, cuts.names, duration, step, scheme)
-    found = propagate(UnitFlow(linear, cuts, relative), progress, **options)
-    facts: dict[str, float | str] = {"integrator": scheme.name, "step_error": step_error(linear), **found.facts}
-    envelope_error = float(found.facts.get("tolerance", 0.0)) if found.error is None else float(found.error.max())
-    if float(facts["step_error"]) > envelope_error > 0:
-        facts["dominant_error"] = (
-            f"time stepping: {facts['step_error']:.2g} against {envelope_error:.2g} of the envelope; integrator exact has none"
-        )
-    found = replace(found, facts=facts)
+        scheme = str(integrator or "midpoint")
+        flow = UnitFlow(LagrangianFlow(model, cuts.names, duration, step, scheme), cuts, relative)
+        propagate = _method(method or "improved-graph-follower")
+    else:
+        linear = LinearFlow(model, cuts.names, duration, step, _integrator(integrator, method))
+        require_stable(linear, cuts)
+        flow, scheme = UnitFlow(linear, cuts, relative), linear.integrator.name
+        propagate = default if method is None else _method(method)
+    steps = step_error(flow)
+    found = with_step_error(propagate(flow, progress, **options), flow, scheme, steps)
     if method == "modal":
         warn_of_roughness(found)
     return found
+
+
+def _integrator(given: str | Integrator | None, method: str | None) -> Integrator:
+    """The time stepping of a linear structure."""
+    if given is None:
+        given = "exact" if method is None or method in EXACT_BY_DEFAULT else "midpoint"
+    if isinstance(given, str) and given not in INTEGRATORS:
+        raise ValueError(f"integrator: '{given}' is unknown; allowed are {', '.join(INTEGRATORS)}")
+    return INTEGRATORS[given] if isinstance(given, str) else given
 
 
 def warn_of_roughness(found: Envelope) -> None:
@@ -102,14 +104,6 @@ def _method(name: str) -> Callable[..., Envelope]:
     if name not in METHODS:
         raise ValueError(f"method: '{name}' is unknown; allowed are {', '.join(METHODS)}")
     return METHODS[name]
-
-
-def step_error(flow: LinearFlow) -> float:
-    """Largest deviation of the modal trajectory from the exact solution: what the integrator adds to the envelope error."""
-    if isinstance(flow.integrator, Exact):
-        return 0.0
-    point = np.array([[flow.system.parameters[name] for name in flow.names]])
-    return float(np.abs(flow.values(point) - replace(flow, integrator=Exact()).values(point)).max())
 
 
 def follow(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> Envelope:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import atan, pi
 
+from frame.flow import nodes
 from frame.linear import LinearSystem, frequencies
 
 LIMIT = 0.5
@@ -42,15 +43,28 @@ class StepGuard:
 
     @property
     def message(self) -> str:
-        """One sentence for a warning or an error."""
-        cure = LIMIT / self.frequency
-        return (
-            f"step: {self.step:g} s gives omega_max h = {self.resolution:.3g} with omega_max = {self.frequency:.4g} rad/s; above {LIMIT:g} "
-            f"the fastest mode lags by {self.phase_error:.3g} rad ({self.phase_error / (2 * pi):.3g} cycles) after {self.duration:g} s; "
-            f"take a step of at most {cure:.2g} s, or check the units of masses and stiffness"
-        )
+        """One sentence, for a warning or an error where the step is too long."""
+        found = f"step: {self.step:g} s gives omega_max h = {self.resolution:.3g} with omega_max = {self.frequency:.4g} rad/s; "
+        lag = f"lags by {self.phase_error:.3g} rad ({self.phase_error / (2 * pi):.3g} cycles) after {self.duration:g} s"
+        if self.ok:
+            return f"{found}not above {LIMIT:g}, so that the step is short enough: by the midpoint rule the fastest mode {lag}"
+        cure = f"take a step of at most {LIMIT / self.frequency:.2g} s, or check the units of masses and stiffness"
+        return f"{found}above {LIMIT:g} the fastest mode {lag}; {cure}"
 
 
 def guard(system: LinearSystem, step: float, duration: float) -> StepGuard:
-    """The guard of a structure at its modal parameters."""
+    """The guard of a structure at its modal parameters.
+
+    Args:
+        system: A linear structure.
+        step: Step, in s.
+        duration: Length of the simulation, in s.
+
+    Raises:
+        ValueError: The system is not linear, or the step or the duration is not positive.
+    """
+    if not hasattr(system, "matrices"):
+        what = f"a {type(system).__name__} has no fixed frequencies"
+        raise ValueError(f"guard: {what}; take a linear structure, or read the fact step_error of envelope()")
+    nodes(duration, step)
     return StepGuard(float(frequencies(system)[-1]), step, duration)
