@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fuzzy.contradiction import contradictions, negligible
 from fuzzy.design import Design
 from fuzzy.domain import Domain
 from fuzzy.known import Known, Signs
@@ -185,12 +186,25 @@ def verified(result: FuzzyResult, memo: Memo, effects: Effects) -> FuzzyResult:
         effects: The signs.
     """
     every = Design.from_samples(result.domain, memo.points).bounds(memo.values, plan=result.plan)
-    beyond = (every.lower < result.lower) | (every.upper > result.upper) | result.enforced
-    refuted = (beyond & effects.table(result, effects.signs != 0)).any(axis=0)
+    small = negligible(memo.values.array)
+    beyond = (every.lower < result.lower - small) | (every.upper > result.upper + small)
+    refuted = (beyond & effects.table(result, effects.signs != 0)).any(axis=0) | _contradicted(result, memo, effects)
     notes = tuple(f"a sample lies beyond the corners of {result.outputs[i]}: the signs do not hold" for i in np.flatnonzero(refuted))
     proved = effects.table(result, effects.proved) & ~refuted
     spent = len(memo) - result.runs
     return replace(every, proved=proved, runs=result.runs, verification_runs=spent, notes=(*effects.notes(result.domain), *notes))
+
+
+def _contradicted(result: FuzzyResult, memo: Memo, effects: Effects) -> Mask:
+    """Outputs (columns,) whose samples in some cut go against their signs, where these rest on a gradient or a level missed an extreme."""
+    columns = np.array([result.column(name) for name in effects.outputs])
+    looked_at = result.enforced[:, columns].any(axis=0) | (memo.known.gradient_range is not None)
+    refuted = np.zeros(len(result.outputs), bool)
+    for inside, signs in zip(result.domain.inside(memo.points), effects.signs, strict=True) if looked_at.any() else ():
+        relevant = np.where(looked_at.reshape(-1, 1), signs, 0)
+        found = contradictions(memo.points[inside], memo.values.array[inside][:, columns], relevant)
+        refuted[columns[list(found)]] = True
+    return refuted & effects.table(result, effects.signs != 0).any(axis=0)
 
 
 def require_few(size: int, limit: int, notes: Sequence[str]) -> None:

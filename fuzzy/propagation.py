@@ -77,5 +77,6 @@ def propagate(
     with nullcontext(executor) if executor else pool(workers) as running, shelf(store, identity, domain.names) as samples:
         campaign = Campaign(call, running, progress, known, samples, stepwise=plan.stepwise)
         result = plan.run(campaign, domain)
+        result = result.confronted(known.stated(domain.names, result.outputs))
         campaign.report(1.0)
     return result.charged(calls=campaign.calls, reused=campaign.reused, seconds=perf_counter() - start)

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from fuzzy.contradiction import contradictions
 from fuzzy.domain import Domain
+from fuzzy.known import Signs
 from fuzzy.model import Values
 from fuzzy.numbers import Array, Mask, PiecewiseLinear
 from fuzzy.response_surface import ResponseSurface
@@ -120,6 +122,14 @@ class FuzzyResult:
         refuted = [self.outputs[column] for column in np.flatnonzero((proved & self.enforced).any(axis=0))]
         notes = tuple(f"the samples contradict what is stated of {name}: its bounds are inner only" for name in refuted)
         return replace(self, proved=self.proved | (proved & ~self.enforced.any(axis=0)), notes=(*self.notes, *notes))
+
+    def confronted(self, signs: Signs) -> FuzzyResult:
+        """The same bounds, proved only where the samples do not contradict stated signs, shape (outputs, inputs), 0 where none is."""
+        relevant = np.where(self.proved.any(axis=0).reshape(-1, 1), signs, 0)
+        found = contradictions(self.points, self.values.array, relevant)
+        notes = tuple(f"{against.told(self.outputs[i], self.inputs)}; its bounds are inner only" for i, against in found.items())
+        kept = self.proved & ~np.isin(np.arange(len(self.outputs)), list(found))
+        return replace(self, proved=kept, notes=(*self.notes, *notes)) if found else self
 
     def __str__(self) -> str:
         """The bounds of every output, a line for each level, with what they are worth and what they cost."""

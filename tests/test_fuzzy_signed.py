@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fuzzy import Crisp, Extended, General, Known, Nature, Reduced, Signed, Triangular, Verification, propagate
+from fuzzy import Crisp, Extended, General, Interval, Known, Nature, Reduced, Signed, Triangular, Verification, propagate
 
 PAPER = {
     "a2": Triangular(0.001, 0.1, 0.3145),
@@ -112,3 +112,31 @@ def test_wrong_statements_are_refused_by_name():
         Verification(step=0.0)
     with pytest.raises(ValueError, match="no output F; there are y"):
         propagate(modulus, PAPER, Signed(outputs=("F",)))
+
+
+WRONG = {"x": Triangular(-1, 0.3, 2), "y": Interval(0.5, 1.5)}
+
+
+@pytest.mark.parametrize("plan", [Signed(), Reduced(), Extended(), General()])
+def test_signs_that_the_corners_contradict_prove_nothing(plan):
+    result = propagate(lambda x, y: -x * y, WRONG, plan, known=Known({"x": 1, "y": 1}))
+    assert result.nature is Nature.INNER
+    assert "samples contradict the signs stated of output y: it falls from" in result.notes[-1]
+
+
+def test_a_wrong_range_of_the_gradient_proves_nothing():
+    def ranges(lower, upper):
+        return {"y": (np.array([0.5, 0.5]), np.array([1.5, 1.5]))}
+
+    result = propagate(lambda x, y: -x * y, WRONG, Signed(), known=Known(gradient_range=ranges))
+    assert result.nature is Nature.INNER
+    assert "the signs do not hold" in result.notes[0]
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("plan", [Signed(), Extended()])
+def test_round_off_contradicts_no_sign(plan, seed):
+    x, y = np.sort(np.random.default_rng(seed).random((2, 3)))
+    inputs = {"x": Triangular(*(1e-12 * (1 + x))), "y": Triangular(*(1e12 * (1 + y)))}
+    result = propagate(lambda x, y: x * y, inputs, plan, known=Known({"x": 1, "y": 1}), alpha=np.linspace(0, 1, 8))
+    assert (result.nature, result.notes) == (Nature.GUARANTEED, ())
