@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 MATRIX, PARTICLE = "#f0a860", "#b79ad9"  # orange and lilac, as in the paper
 PIXELS = (1000, 1100)
-SHEETS, APART = 5, 1.0  # slices in the picture of stress, and the scale of its θ-axis
+SHEETS, HEIGHT = 5, 6.9  # slices in the picture of stress, and their stack's height in halves of the cell: no slice hides another
 FLATTENED = 0.6  # scale of the θ-axis in the picture
 EDGES = [[0, 6, 1], [1, 7, 2], [2, 8, 0], [3, 9, 4], [4, 10, 5], [5, 11, 3], [0, 12, 3], [1, 13, 4], [2, 14, 5]]  # end, middle, end
 
@@ -91,18 +91,28 @@ def stress(file: str, picture: str) -> None:
     low, high = np.quantile(grid["stress"], [0.01, 0.99])
     plotter = pyvista.Plotter(off_screen=True, window_size=list(PIXELS))
     plotter.set_background("white")
-    bar = {"title": "stress 11 under load 1, GPa\n", "color": "black", "vertical": False, "fmt": "%.2f", "position_x": 0.2, "width": 0.6}
+    bar = {
+        "title": "stress 11 under strain 11 = 22 = 0.01, GPa\n",
+        "color": "black",
+        "vertical": False,
+        "fmt": "%.2f",
+        "position_x": 0.2,
+        "width": 0.6,
+    }
     bottom, top = grid.bounds[4:6]
+    apart = HEIGHT / (top - bottom)
     for theta in np.linspace(bottom + 1e-6, top - 1e-6, SHEETS):
         for part in parts:  # each phase by itself: slicing both at once would blend the stresses across the interface
             sheet = part.slice(normal="z", origin=(0, 0, theta))
             plotter.add_mesh(sheet, scalars="stress", clim=(low, high), cmap="cividis", scalar_bar_args=bar, lighting=False)
             plotter.add_mesh(sheet.extract_feature_edges(feature_edges=False, manifold_edges=False), color="#222222", line_width=1.5)
         label = {"font_size": 26, "text_color": "black", "shape": None, "show_points": False, "always_visible": True}
-        plotter.add_point_labels(np.array([[1.15, 1.0, theta * APART]]), [f"theta = {theta:.1f}"], **label)
-    plotter.set_scale(zscale=APART)
-    plotter.camera_position = [(6.5, -11.0, 10.5), (0.0, 0.0, -0.3), (0, 0, 1)]
-    plotter.camera.zoom(1.15)
+        plotter.add_point_labels(np.array([[1.15, 1.0, theta * apart]]), [f"theta = {theta:.1f}"], **label)
+    plotter.set_scale(zscale=apart)
+    middle = apart * (bottom + top) / 2
+    plotter.camera_position = [(6.8, -11.0, middle + 6.8), (0.3, 0.0, middle - 0.7), (0, 0, 1)]
+    plotter.enable_parallel_projection()
+    plotter.camera.parallel_scale = 4.7  # half the picture's height
     plotter.enable_anti_aliasing("ssaa")
     plotter.screenshot(picture)
 

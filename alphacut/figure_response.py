@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MARKS = (BLUE, ORANGE, PURPLE, INK)
+UNSEEN = 0.004  # width of a band, in probability, that hides behind the line of the highest level
 NAMES = {"s11": "σ$_{11}$(ε$^{(1)}$)", "s12": "σ$_{12}$(ε$^{(2)}$)"}
 
 
@@ -42,12 +43,12 @@ def boxes(axes: Axes, found: xarray.Dataset) -> None:
     if "exceedance" in found:
         limit = found["exceedance"].attrs["limit"] / GPA
         axes.axvline(limit, color=ORANGE, lw=1.2, ls="--")
-        axes.annotate(
-            f"limit {limit:g} GPa", (limit, 0.02), xytext=(4, 0), textcoords="offset points", color=ORANGE, fontsize=8, clip_on=False
-        )
+        place = axes.get_xaxis_transform()  # above the axes, where no curve goes
+        axes.text(limit, 1.02, f"limit {limit:g} GPa", color=ORANGE, fontsize=8, ha="center", transform=place)
     axes.set_ylabel("distribution function")
     axes.set_ylim(0, 1)
-    alpha_legend(axes, alpha, loc="lower right", bbox_to_anchor=(1.0, 0.12))
+    seen = np.append((cdf[:-1, 1] - cdf[:-1, 0]).max(axis=1) > UNSEEN, True)
+    alpha_legend(axes, alpha[seen], loc="lower right", bbox_to_anchor=(1.0, 0.12))
 
 
 def quantiles(axes: Axes, found: xarray.Dataset) -> None:
