@@ -17,49 +17,58 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def plot_discs(axes: Axes, discs: Discs, colour: str = BLUE) -> None:
-    """Discs in their rectangle, with the images that show in it, in mm."""
+def plot_discs(axes: Axes, discs: Discs, colour: str = BLUE, view: Array | None = None) -> None:
+    """Discs in their rectangle, or in its corner `view` (width, height, in m), with the images that show in it, in mm."""
     from matplotlib.collections import EllipseCollection
 
-    shifts = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)] if discs.periodic else [(0, 0)]
-    centres = np.concatenate([discs.centres + discs.size * shift for shift in shifts])
-    width = np.tile(2e3 * discs.radii, len(shifts))
+    view = discs.size if view is None else view
+    centres, radii = np.concatenate([discs.centres + shift for shift in _shifts(discs)]), np.tile(discs.radii, len(_shifts(discs)))
+    seen = ((centres > -radii[:, None]) & (centres < view + radii[:, None])).all(axis=1)
+    centres, width = centres[seen], 2e3 * radii[seen]
     place = {"offsets": 1e3 * centres, "offset_transform": axes.transData}
     axes.add_collection(EllipseCollection(width, width, 0 * width, units="xy", color=colour, lw=0, **place))
-    axes.set(xlim=(0, 1e3 * discs.size[0]), ylim=(0, 1e3 * discs.size[1]), aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
+    axes.set(xlim=(0, 1e3 * view[0]), ylim=(0, 1e3 * view[1]), aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
     axes.grid(visible=False)
 
 
-def plot_cells(axes: Axes, diagram: Apollonius, colour: str = INK) -> None:
-    """Walls of the cells, curved as they are, in mm."""
+def plot_cells(axes: Axes, diagram: Apollonius, colour: str = INK, view: Array | None = None) -> None:
+    """Walls of the cells, curved as they are, in mm, with the images that show in the rectangle or its corner `view` (in m)."""
     from matplotlib.collections import LineCollection
 
+    discs = diagram.discs
     angle = np.linspace(diagram.start, diagram.end, 24)
     rho = diagram.radius_at(np.arange(len(diagram.cell)), angle)
-    points = diagram.discs.centres[diagram.cell] + rho[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    axes.add_collection(LineCollection(list(1e3 * points.swapaxes(0, 1)), colors=colour, linewidths=0.8))
+    points = discs.centres[diagram.cell] + rho[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    walls = np.concatenate([points + shift for shift in _shifts(discs)], axis=1)
+    seen = ((walls.max(axis=0) > 0) & (walls.min(axis=0) < (discs.size if view is None else view))).all(axis=1)
+    axes.add_collection(LineCollection(list(1e3 * walls[:, seen].swapaxes(0, 1)), colors=colour, linewidths=0.8))
 
 
-def part(discs: Discs, number: int = 120) -> Discs:
-    """A corner of the section that holds about `number` discs, as a window."""
-    if len(discs) <= number:
-        return discs
-    size = discs.size * np.sqrt(number / len(discs))
-    inside = (discs.centres < size).all(axis=1)
-    return Discs(discs.centres[inside], discs.radii[inside], size, periodic=False)
+def _shifts(discs: Discs) -> list[Array]:
+    """By what the images of a section lie apart from it, in m; the section itself alone where it does not repeat."""
+    return [discs.size * (i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)] if discs.periodic else [np.zeros(2)]
 
 
-def draw_cells(discs: Discs) -> Figure:
-    """Voronoi cells, whose walls cut discs, beside Apollonius cells, whose walls do not (Fig. 10)."""
+def corner(discs: Discs, number: int = 120) -> Array:
+    """Width and height, in m, of a corner of the section that holds about `number` discs; all of it if there are fewer."""
+    return np.asarray(discs.size * min(1.0, float(np.sqrt(number / len(discs)))))
+
+
+def draw_cells(diagram: Apollonius) -> Figure:
+    """Voronoi cells, whose walls cut discs, beside Apollonius cells, whose walls do not (Fig. 10); a corner of a large section."""
     import matplotlib.pyplot as plt
 
-    shown = part(discs)
-    drawn, both = plt.subplots(1, 2, figsize=(9.6, 4.8))
-    bare = Discs(shown.centres, np.zeros(len(shown)), shown.size, shown.periodic)
-    for axes, diagram, title in zip(both, (apollonius(bare), apollonius(shown)), ("Voronoi cells", "Apollonius cells"), strict=True):
-        plot_discs(axes, shown, PALE if title.startswith("V") else "#9ecae1")
-        plot_cells(axes, diagram)
+    discs = diagram.discs
+    view = corner(discs)
+    drawn, both = plt.subplots(1, 2, figsize=(9.6, 5.0))
+    bare = apollonius(Discs(discs.centres, np.zeros(len(discs)), discs.size, discs.periodic))
+    for axes, shown, title in zip(both, (bare, diagram), ("Voronoi cells", "Apollonius cells"), strict=True):
+        plot_discs(axes, discs, PALE if title.startswith("V") else "#9ecae1", view)
+        plot_cells(axes, shown, view=view)
         axes.set_title(title)
+    width, height = 1e3 * discs.size
+    whole = f"one section of {width:.4g} × {height:.4g} mm with {len(discs)} discs"
+    drawn.suptitle(whole if (view == discs.size).all() else f"a corner of {whole}", fontsize=10)
     return drawn
 
 
@@ -68,12 +77,13 @@ def draw_neighbours(discs: Discs) -> Figure:
     import matplotlib.pyplot as plt
     from matplotlib.collections import LineCollection
 
-    drawn, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.8))
+    drawn, (left, right) = plt.subplots(1, 2, figsize=(9.6, 5.0))
     direct = neighbours(discs)
     start = discs.centres[direct.first]
     for axes in (left, right):
         plot_discs(axes, discs, "#9ecae1")
     left.add_collection(LineCollection(list(1e3 * np.stack([start, start + direct.apart], axis=1)), colors=ORANGE, linewidths=0.8))
+    drawn.suptitle(f"{len(discs)} equal discs of the same area fraction, not those of the section", fontsize=10)
     left.set_title("Delaunay triangulation: the direct neighbours")
     plot_cells(right, apollonius(discs))
     right.set_title("Voronoi cells, its dual")
@@ -94,7 +104,8 @@ def draw_two_point(discs: Discs, generator: np.random.Generator) -> Figure:
     near = np.flatnonzero((np.hypot(*apart.T) < reach) & (np.arange(len(discs)) != centre))
     direct = neighbours(discs)
     touching = {tuple(np.round(v, 12)) for v in direct.apart[direct.first == centre]}
-    drawn, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.8))
+    drawn, (left, right) = plt.subplots(1, 2, figsize=(9.6, 5.0))
+    drawn.suptitle(f"{len(discs)} equal discs of the same area fraction, not those of the section", fontsize=10)
     fake = _from_pair_distances(discs, len(near), reach, generator)
     _around(left, fake, float(discs.radii[centre]), reach, ["#9ecae1"] * len(fake))
     left.set_title(f"pair distances alone: {_overlaps(fake, discs.radii[centre])} of {len(fake)} overlap")

@@ -38,7 +38,9 @@ def draw_neighbour_statistics(direct: list[Neighbours], diameter: float) -> Figu
     """Distances between direct neighbours (Fig. 6) and their number (Fig. 7), for discs of one diameter (m)."""
     import matplotlib.pyplot as plt
 
-    drawn, (left, right) = plt.subplots(1, 2, figsize=(9.6, 3.8))
+    drawn, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.0))
+    discs = sum(len(one.number) for one in direct)
+    drawn.suptitle(f"{discs} equal discs of the same area fraction, not those of the section", fontsize=10)
     distance = np.concatenate([one.distances for one in direct]) / diameter
     number = np.concatenate([one.number for one in direct])
     left.hist(distance, bins=80, density=True, color=BLUE)

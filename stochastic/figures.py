@@ -31,7 +31,6 @@ def draw(found: Microstructure, folder: Path) -> dict[str, list[Path]]:
     """
     source = found.study.source
     law = source.packing.radii if isinstance(source, Simulated) else None
-    discs = found.sections[0].discs
     equal, many = _equal_discs(found, 120), _equal_discs(found, 4000)
     radii = np.concatenate([section.discs.radii for section in found.sections])
     generator = np.random.default_rng(found.study.seed)
@@ -40,7 +39,7 @@ def draw(found: Microstructure, folder: Path) -> dict[str, list[Path]]:
         "05-08_neighbours": lambda: draw_neighbours(equal),
         "06-07_neighbour_statistics": lambda: draw_neighbour_statistics([neighbours(many)], 2 * float(many.radii[0])),
         "09_correlation": lambda: draw_correlation(found, apollonius(many)),
-        "10_cells": lambda: draw_cells(discs),
+        "10_cells": lambda: draw_cells(found.sections[0].diagram),
         "11_radii": lambda: draw_radii(radii, law),
         "12_areas": lambda: draw_areas(found),
         "13_pbox": lambda: draw_pbox(found),
