@@ -17,6 +17,7 @@ from alphacut.output import say, whole_file
 from alphacut.progress import progress
 from alphacut.provenance import attributes, fingerprint
 from alphacut.stored import require_known
+from alphacut.structure import structure
 from fuzzy import FuzzyNumber
 
 if TYPE_CHECKING:
@@ -133,12 +134,13 @@ class Chain:
 
     def envelope(self, study: Study, handed: FuzzyNumber | None) -> xarray.Dataset:
         """One study's envelope, in envelope_NAME.nc."""
-        key = self.vibration({"task": study.task, "holds": ("bounds", "peaks")}, handed)
+        key = self.vibration({"task": study.task, "holds": ("bounds", "peaks", "tried")}, handed)
 
         def compute(path: Path) -> None:
             with progress(f"Envelope {study.name}", quiet=self.quiet) as tick:
                 found = envelope.compute(self.case, study.task, modulus=handed, strict=self.strict, workers=self.workers, progress=tick)
-            envelope.write(outcomes.with_peaks(found), path, case_text=self.case.text_of_file, key=key)
+            dataset = outcomes.with_peaks(found, structure(self.case, handed), study.task)
+            envelope.write(dataset, path, case_text=self.case.text_of_file, key=key)
 
         return self.stored(f"envelope_{study.name}.nc", key, compute)
 

@@ -23,6 +23,7 @@ from alphacut.schema import ENVELOPE_METHODS
 from alphacut.structure import structure
 from alphacut.units import engineering, largest_by_unit
 from fuzzy import FuzzyNumber
+from stochastic.truncated_normal import Array
 
 if TYPE_CHECKING:
     from frame import Envelope
@@ -71,17 +72,21 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         outcomes.require_random(case, structure(case, handed))  # before anything is computed
     with progress("Envelopes", quiet=options.quiet) as tick:
         found = envelope.compute(case, task, modulus=handed, strict=options.strict, workers=options.workers, progress=tick)
+    dataset = outcomes.with_peaks(found, structure(case, handed), task)
     if options.out:
         key = fingerprint({"case": case.values, "task": task, "modulus": handed}, ("fuzzy", "frame"))
-        envelope.write(outcomes.with_peaks(found), options.out, case_text=case.text_of_file, key=key)
+        envelope.write(dataset, options.out, case_text=case.text_of_file, key=key)
     limit = exceeded(options, case, handed)
-    document = as_json({**envelope.document(found), **({"exceedance": limit} if limit else {})}, indent=None if options.json == "-" else 2)
+    document = as_json(
+        {**envelope.document(found, dataset["peak_tried"].values), **({"exceedance": limit} if limit else {})},
+        indent=None if options.json == "-" else 2,
+    )
     if options.json == "-":
         out.write(document)
     elif options.json:
         write_text(options.json, document)
     if options.json != "-" and not options.quiet:
-        out.write(summary(found) + (outcomes.sentence(limit) if limit else ""))
+        out.write(summary(found, dataset["peak_tried"].values[0]) + (outcomes.sentence(limit) if limit else ""))
     return 0
 
 
@@ -149,21 +154,22 @@ def given_modulus(text: str | None) -> FuzzyNumber | None:
     return number
 
 
-def summary(found: Envelope) -> str:
-    """Extremes and fuzzy peaks at the lowest level as a small table."""
+def summary(found: Envelope, tried: Array | None = None) -> str:
+    """Extremes and fuzzy peaks at the lowest level as a small table; the lower ends of the peaks those tried, shape (m,), where known."""
     from frame.envelope import output_unit
     from frame.outcomes import peaks
 
     of = peaks(found)
     units = [output_unit(name) for name in found.outputs]
-    columns = [list(map(float, row)) for row in np.stack([found.minimum[0], found.maximum[0], of.lower[0], of.upper[0]], axis=1)]
+    least = of.lower[0] if tried is None else tried
+    columns = [list(map(float, row)) for row in np.stack([found.minimum[0], found.maximum[0], least, of.upper[0]], axis=1)]
     largest = largest_by_unit((value, unit) for unit, values in zip(units, columns, strict=True) for value in values)
     shown = [[engineering(value, unit, beside=largest[unit]) for value in values] for unit, values in zip(units, columns, strict=True)]
     rows = [(name, *values) for name, values in zip(found.outputs, shown, strict=True)]
     lines = [f"{name:>14}  {low:>12}  {high:>12}   {least} … {most}\n" for name, low, high, least, most in rows]
     effort = "eigen-analyses" if found.method == "modal" else "trajectories"
     cost = f"{found.method}: {found.trajectories} {effort}, {found.seconds:.1f} s, bounds {found.nature}{error_in_words(found)}"
-    return f"        output           min           max   peak   (α = {found.alpha[0]:g})\n{''.join(lines)}{cost}\n{proved(found)}"
+    return f"        output           min           max   peak: least tried … greatest   (α = {found.alpha[0]:g})\n{''.join(lines)}{cost}\n{proved(found)}"
 
 
 def error_in_words(found: Envelope) -> str:

@@ -16,6 +16,7 @@ from alphacut.provenance import attributes, versions
 from alphacut.roughness import guard_against
 from alphacut.structure import structure
 from fuzzy import FuzzyNumber
+from stochastic.truncated_normal import Array
 
 if TYPE_CHECKING:
     import xarray
@@ -141,8 +142,13 @@ def method_options(task: EnvelopeTask) -> dict[str, Any]:
     return {name: value for name, value in offered.items() if name in taken}
 
 
-def document(found: Envelope) -> dict[str, Any]:
-    """The result as it is printed with ``--json``: extremes over time, one row for each α, one column for each output, in SI."""
+def document(found: Envelope, tried: Array) -> dict[str, Any]:
+    """The result as it is printed with ``--json``: extremes over time, one row for each α, one column for each output, in SI.
+
+    Args:
+        found: The envelope.
+        tried: Least peak among trajectories tried, shape (A, m).
+    """
     from frame.outcomes import peaks
 
     of = peaks(found)
@@ -152,7 +158,7 @@ def document(found: Envelope) -> dict[str, Any]:
         "parameters": list(found.parameters),
         "min": found.minimum,
         "max": found.maximum,
-        "peak": {"lower": of.lower, "upper": of.upper},
+        "peak": {"lower": of.lower, "tried": tried, "upper": of.upper},
         "trajectories": found.trajectories,
         "seconds": found.seconds,
         "method": found.method,

@@ -20,40 +20,54 @@ from stochastic.truncated_normal import Array
 if TYPE_CHECKING:
     import xarray
 
+    from alphacut.envelope import EnvelopeTask
     from frame import Envelope
 
 Sampler = Callable[[np.random.Generator, int], Array]
-FACTS = ("output", "limit", "fuzzy", "random", "deviation", "trajectories", "nature")
+FACTS = ("output", "limit", "fuzzy", "random", "deviation", "samples", "trajectories", "nature")
 NATURE = "inner: attained at the fuzzy points tried, with the sampling deviation given"
 
 
-def with_peaks(found: Envelope) -> xarray.Dataset:
-    """The envelope's dataset with the fuzzy peak of each output's magnitude, ``peak`` (alpha, bound, output)."""
-    from frame.outcomes import peaks
+def with_peaks(found: Envelope, wanted: Structure, task: EnvelopeTask) -> xarray.Dataset:
+    """The envelope's dataset with the fuzzy peak of each output's magnitude.
 
-    of = peaks(found)
+    ``peak`` (alpha, bound, output) holds bounds of it, ``peak_tried`` (alpha, output) the least peak among some trajectories.
+    """
+    from frame.box import boxes
+    from frame.outcomes import peaks, tried_peaks
+
+    of, cuts = peaks(found), boxes(wanted.inputs(task.fuzzy), task.alpha)
+    tried = tried_peaks(wanted.flow(cuts.names, task.duration, task.step, task.scheme if wanted.linear else task.integrator), cuts)
     words = {"units": "SI, by output", "long_name": "largest magnitude over time; the lower end is a bound from below"}
     dataset = found.to_dataset().assign(peak=(("alpha", "bound", "output"), np.stack([of.lower, of.upper], axis=1), words))
-    return dataset.assign_coords(bound=["lower", "upper"])
+    least = {"units": "SI, by output", "long_name": "least peak among trajectories tried; the true one lies between the bound and this"}
+    return dataset.assign(peak_tried=(("alpha", "output"), tried, least)).assign_coords(bound=["lower", "upper"])
 
 
 def peak_document(dataset: xarray.Dataset) -> dict[str, dict[str, Array]]:
-    """The fuzzy peak of each output: lower and upper ends by level, in SI."""
-    return {
-        str(name): {side: dataset["peak"].sel(bound=side, output=name).values for side in ("lower", "upper")}
-        for name in dataset["output"].values
-    }
+    """The fuzzy peak of each output: lower and upper ends and the least one tried, by level, in SI."""
+    found = {}
+    for name in dataset["output"].values:
+        found[str(name)] = {side: dataset["peak"].sel(bound=side, output=name).values for side in ("lower", "upper")}
+        if "peak_tried" in dataset:
+            found[str(name)]["tried"] = dataset["peak_tried"].sel(output=name).values
+    return found
 
 
 def shaped_like(number: FuzzyNumber) -> Sampler:
-    """Random values whose density is proportional to the membership: a triangle's is triangular, an interval's uniform."""
+    """Random values whose density is proportional to the membership: a triangle's is triangular, an interval's uniform.
+
+    One value from each of `count` equally likely pieces, in random order (a Latin hypercube where several inputs are random): means over
+    them scatter less than those of independent draws.
+    """
+    grid = np.unique(np.concatenate([np.linspace(*number.support, 4001), *number.cuts[1:]]))
+    density = number.membership(grid)
+    share = np.concatenate([[0.0], np.cumsum(np.diff(grid) * (density[1:] + density[:-1]) / 2)])
 
     def draw(rng: np.random.Generator, count: int) -> Array:
-        kept: Array = np.empty(0)
-        while len(kept) < count:
-            values = rng.uniform(*number.support, size=2 * count)
-            kept = np.concatenate([kept, values[rng.random(2 * count) <= number.membership(values)]])
-        return kept[:count]
+        pieces = (rng.permutation(count) + rng.random(count)) / count
+        values: Array = np.interp(pieces * share[-1], share, grid)
+        return values
 
     return draw
 
@@ -149,7 +163,8 @@ def exceedance(case: Case, handed: FuzzyNumber | None, progress: Tick | None = N
     )
     about = {"long_name": f"probability that |{output}| exceeds the limit", "units": "1"}
     ends = (("alpha", "bound"), np.column_stack([found.lower, found.upper]), about)
-    facts = {"output": output, "limit": limit_of(case), "deviation": found.deviation, "trajectories": found.trajectories, "nature": NATURE}
+    counts = {"samples": case.integer("exceedance.samples"), "trajectories": found.trajectories}
+    facts = {"output": output, "limit": limit_of(case), "deviation": found.deviation, "nature": NATURE, **counts}
     names = {"fuzzy": ", ".join(fuzzy), "random": ", ".join(random)}
     curve = (("alpha", "bound", "limit"), np.stack([found.curve_lower, found.curve_upper], axis=1), about)
     axes = {"alpha": found.alpha, "bound": ["lower", "upper"], "limit": ("limit", found.limits, {"units": output_unit(output)})}
@@ -174,5 +189,6 @@ def sentence(found: Mapping[str, Any]) -> str:
     levels = dict.fromkeys((0, len(found["alpha"]) - 1))
     cuts = (f"[{found['lower'][k]:.3g}, {found['upper'][k]:.3g}] at α = {found['alpha'][k]:g}" for k in levels)
     random = f" with random {found['random']}" if found["random"] else ""
-    worth = f"; standard deviation of the estimates up to {found['deviation']:.2g}" if found["random"] else ""
+    drawn = f"{found['samples']} random draws at each fuzzy point tried" if "samples" in found else "random draws"
+    worth = f" (inner bounds: {drawn}; standard deviation up to {found['deviation']:.2g})" if found["random"] else " (inner bounds)"
     return f"probability of |{found['output']}| > {engineering(found['limit'], found['unit'])}{random}: {', '.join(cuts)}{worth}\n"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from alphacut import outcomes
@@ -63,15 +63,22 @@ def peaks(summary: Mapping[str, Any]) -> str:
         for output, of in study.get("peak", {}).items()
     ]
     largest = largest_by_unit((of["upper"][0], unit) for _, _, unit, of in each)
-    rows = [
-        (name, output, *(between(of["lower"][level], of["upper"][level], unit, largest[unit]) for level in (0, -1)))
-        for name, output, unit, of in each
-    ]
+    rows = [(name, output, *peak_row(of, unit, largest[unit])) for name, output, unit, of in each]
     words = (
-        "<p>Fuzzy peak of each output's magnitude over time, on the lowest and the highest level; the lower end is a bound from below.</p>"
+        "<p>Fuzzy peak of each output's magnitude over time. On the lowest level no trajectory peaks below the first value or above the "
+        "last; the second is the least peak among some tried, so the least of all lies between the first two.</p>"
     )
     limit = f"<p>P{html.escape(outcomes.sentence(summary['exceedance'])[1:].rstrip())}.</p>" if "exceedance" in summary else ""
-    return "<h3>Peaks</h3>" + words + table(("study", "output", "lowest α", "highest α"), rows, numbers=2) + limit if rows else limit
+    head = ("study", "output", "not below", "least tried", "greatest", "highest α")
+    return "<h3>Peaks</h3>" + words + table(head, rows, numbers=2) + limit if rows else limit
+
+
+def peak_row(of: Mapping[str, Any], unit: str, largest: float) -> Iterator[str]:
+    """One peak: its bounds and the least one tried on the lowest level, and its interval on the highest."""
+    yield engineering(of["lower"][0], unit, beside=largest)
+    yield engineering(of["tried"][0], unit, beside=largest) if "tried" in of else "not tried"
+    yield engineering(of["upper"][0], unit, beside=largest)
+    yield between(of["tried" if "tried" in of else "lower"][-1], of["upper"][-1], unit, largest)
 
 
 def between(lower: float, upper: float, unit: str, largest: float) -> str:

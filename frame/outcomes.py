@@ -46,6 +46,19 @@ def peaks(envelope: Envelope) -> FuzzyPeaks:
     return FuzzyPeaks(envelope.alpha, lower, upper)
 
 
+def tried_peaks(flow: Flow, cuts: Boxes, *, spread: int = 32) -> Array:
+    """The least peak of |output| over time among points tried on each level, shape (A, m): corners, up to five parameters, and a spread.
+
+    The true lower end of the fuzzy peak lies between that of `peaks` and this.
+    """
+    least, found = np.full(len(flow.outputs), np.inf), []
+    for level in reversed(range(len(cuts.alpha))):
+        peak = np.abs(flow.values(_tried(cuts, level, spread, corner=5))).max(1)
+        least = np.minimum(least, peak.min(0))
+        found.append(least)
+    return np.array(found[::-1])
+
+
 @dataclass(frozen=True, eq=False)
 class FuzzyProbability:
     """Probability that |output| exceeds a limit within the duration, as intervals by level.
@@ -54,7 +67,7 @@ class FuzzyProbability:
         alpha: Levels, shape (A,).
         lower: Least probability over the fuzzy inputs, shape (A,).
         upper: Greatest probability, shape (A,).
-        deviation: Largest standard deviation of the estimates.
+        deviation: Largest standard deviation of the estimates; with few draws it stays large where none or all of them exceed the limit.
         trajectories: Trajectories computed.
         limits: Other limits, from below the least peak to above the greatest, shape (L,), in the output's unit.
         curve_lower: Least probability of exceeding each of them, shape (A, L).
@@ -126,8 +139,14 @@ def exceedance(
     limits = np.linspace(0.95 * peak.min(), 1.05 * peak.max(), LIMITS)
     of = np.repeat(np.arange(len(tried)), [len(points) for points in tried])
     low, high = _bounds(peak, of, np.append(limits, limit))
-    deviation = float(np.sqrt(np.max([low[:, -1] * (1 - low[:, -1]), high[:, -1] * (1 - high[:, -1])]) / len(draws)))
+    deviation = max(_deviation(share, len(draws)) for share in (*low[:, -1], *high[:, -1])) if random else 0.0
     return FuzzyProbability(cuts.alpha, low[:, -1], high[:, -1], deviation, total * len(draws), limits, low[:, :-1], high[:, :-1])
+
+
+def _deviation(share: float, draws: int) -> float:
+    """Standard deviation of a probability known by the share of some draws, before which any value was as likely (Laplace's rule)."""
+    mean = (share * draws + 1) / (draws + 2)
+    return float(np.sqrt(mean * (1 - mean) / (draws + 3)))
 
 
 def _bounds(peak: Array, of: Array, limits: Array) -> tuple[Array, Array]:
@@ -143,12 +162,12 @@ def _flow(system: LinearSystem | LagrangianSystem, names: tuple[str, ...], durat
     return LinearFlow(system, names, duration, step, Exact())
 
 
-def _tried(cuts: Boxes, level: int, spread: int) -> Array:
+def _tried(cuts: Boxes, level: int, spread: int, *, corner: int = 8) -> Array:
     from frame.sampling import corners
 
     lower, upper = cuts.unit(level)
     if not (upper > lower).any():
         return cuts.modal[None]
     inner = (lower + upper) / 2 + (upper - lower) / 2 * chebyshev_points(len(lower), spread)
-    points = np.vstack([corners(lower, upper), inner]) if len(lower) <= 8 else inner
+    points = np.vstack([corners(lower, upper), inner]) if len(lower) <= corner else inner
     return cuts.to_physical(points)
