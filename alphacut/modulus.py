@@ -26,7 +26,10 @@ if TYPE_CHECKING:
     from rve.result import Homogenised
 
 QUANTITIES = {"E": ("Pa", "effective Young's modulus, eq. 16"), "nu": ("1", "effective Poisson's ratio, eq. 16")}
-STRESSES = {"s11": ("Pa", "mean homogenised stress 11 under load 1"), "s12": ("Pa", "mean homogenised stress 12 under load 2")}
+STRESSES = {
+    "s11": ("Pa", "mean homogenised stress 11 under ε11 = ε22 = 0.01"),
+    "s12": ("Pa", "mean homogenised stress 12 under ε12 = 0.01"),
+}
 BOUNDS = QUANTITIES | STRESSES
 MEANING = {
     "inner": "attained by samples, between which E may go further",
@@ -135,7 +138,7 @@ class FuzzyModulus:
             )
             variables[f"{name}_sample"] = (("sample",), result.values.output(name), {"units": unit, "long_name": about})
         variables["point"] = (("sample", "parameter"), result.points, {"long_name": "inputs of each sample, in SI"})
-        for name, about in (("curve11", "stress 11 under load 1"), ("curve12", "stress 12 under load 2")):
+        for name, about in (("curve11", "stress 11 under ε11 = ε22 = 0.01"), ("curve12", "stress 12 under ε12 = 0.01")):
             variables[name] = (("sample", "theta"), result.values.output(name), {"units": "Pa", "long_name": f"homogenised {about}"})
         for kind in ("error", "check"):
             largest = self.error if kind == "error" else self.largest(kind)
@@ -148,6 +151,7 @@ class FuzzyModulus:
             "parameter": list(result.inputs),
         }
         numbers = {"samples": result.runs, "solves": self.solves, "seconds": result.seconds, "nature": self.nature}
+        numbers |= {} if self.shear_ratio is None else {"shear_ratio": self.shear_ratio}
         return xarray.Dataset(variables, coordinates, {"method": self.choice.method, "reason": self.reason, "plan": result.plan, **numbers})
 
 
