@@ -169,7 +169,8 @@ def summary(found: Envelope, tried: Array | None = None) -> str:
     lines = [f"{name:>14}  {low:>12}  {high:>12}   {least} … {most}\n" for name, low, high, least, most in rows]
     effort = "eigen-analyses" if found.method == "modal" else "trajectories"
     cost = f"{found.method}: {found.trajectories} {effort}, {found.seconds:.1f} s, bounds {found.nature}{error_in_words(found)}"
-    return f"        output           min           max   peak: least tried … greatest   (α = {found.alpha[0]:g})\n{''.join(lines)}{cost}\n{proved(found)}"
+    head = f"        output           min           max   peak: least tried … greatest   (α = {found.alpha[0]:g})\n"
+    return f"{head}{''.join(lines)}{cost}\n{proved(found)}"
 
 
 def error_in_words(found: Envelope) -> str:

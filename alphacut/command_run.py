@@ -62,6 +62,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         **summary.summary(results),
         **({"quick": settings(results.case)} if options.quick else {}),
         "shares": shares.mean_shares(driving),
+        **({"changes": options.set} if options.set else {}),
         "figures": drawn,
         "seconds": time.perf_counter() - start,
     }

@@ -15,12 +15,14 @@ from alphacut import (
     figure_fuzzy,
     figure_modulus,
     figure_radius,
+    figure_record,
     figure_response,
     figure_shares,
 )
 from alphacut.chain import Results
 from alphacut.figure_style import save, style
 from alphacut.progress import progress
+from alphacut.structure import structure
 
 if TYPE_CHECKING:
     import xarray
@@ -52,6 +54,9 @@ def drawings(results: Results) -> Iterator[Drawing]:
         yield "fig27-chain", lambda: figure_frame.chain(results.case)
     if results.envelopes and results.case.has("tower.storeys"):
         yield "tower", lambda: figure_frame.tower(results.case)
+    model = structure(results.case, results.handed).linear if results.envelopes else None
+    if model is not None and (shaken := model.ground) is not None:
+        yield "record", lambda: figure_record.record(shaken)
     if results.case.has("envelope.method") and results.case.text("envelope.method") == "graph-follower" and results.envelopes:
         richest = max(results.studies, key=lambda study: len(study.task.fuzzy))
         yield "fig21-25-graph-follower", lambda: figure_follower.follower(results, richest)

@@ -135,7 +135,7 @@
   function fillOutputs() {
     const before = output.value;
     output.replaceChildren(...chosen().outputs.map((label) => new Option(label, label)));
-    output.value = chosen().outputs.includes(before) ? before : chosen().outputs[chosen().outputs.length - 1];
+    output.value = chosen().outputs.includes(before) ? before : chosen().outputs[0];
   }
   study.addEventListener("change", () => { fillOutputs(); view = null; draw(); });
   output.addEventListener("change", () => { view = null; draw(); });

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from alphacut import response
-from alphacut.captions import caption, core, figure_words, in_words
+from alphacut.captions import caption, core, in_words
 from alphacut.command_cite import citation
 from alphacut.differences import differences
 from alphacut.report_envelopes import envelopes, natural
@@ -18,12 +18,13 @@ from alphacut.report_table import section, table
 from alphacut.units import engineering
 
 NATURES = {
-    "inner": "Inner bounds are attained by the parameters stored with them; the true range may be wider, never narrower.",
+    "inner": "Inner bounds are attained by the parameters stored with them, up to the error of the model; a search may have missed more.",
     "estimated": "Estimated bounds come from a model of the motion whose error was estimated, not proved.",
     "verified by sampling": "Verified by sampling: the search is proved to leave nothing out, the error of its model is sampled.",
     "guaranteed": "Guaranteed bounds are proved to hold the true range.",
 }
 ELSEWHERE = ("fig18-modulus", "modulus", "response", "exceedance")  # figures that stand in the section they belong to
+WIDE = re.compile(r"envelope-|chain|record|shares-over-time|graph-follower")  # figures that need the page's whole width
 SVG_LIMIT = 200_000  # bytes; a heavier figure goes into the page as PNG
 
 
@@ -32,13 +33,13 @@ def sections(summary: Mapping[str, Any], folder: Path) -> Iterator[str]:
     if "microstructure" in summary:
         yield microstructure(summary["microstructure"])
     if "modulus" in summary:
-        yield modulus(summary["modulus"], folder, paper=bool(summary.get("paper")))
+        yield modulus(summary["modulus"], listed(summary, folder, "modulus"))
     if "response" in summary:
-        yield stress(summary["response"], folder)
+        yield stress(summary["response"], listed(summary, folder, "response"))
     if words := summary.get("structure", {}).get("words"):
         yield built(words, natural(summary))
     if summary.get("envelopes"):
-        yield envelopes(summary, picture(folder / "figures" / "exceedance.svg", figure_words("exceedance")))
+        yield envelopes(summary, listed(summary, folder, "exceedance"))
     if summary.get("shares"):
         yield shares(summary["shares"])
     if summary.get("paper"):
@@ -63,7 +64,15 @@ def microstructure(found: Mapping[str, Any]) -> str:
     return section("Microstructure", words, table(("parameter of the radius map", "fuzzy value"), rows))
 
 
-def modulus(found: Mapping[str, Any], folder: Path, *, paper: bool) -> str:
+def listed(summary: Mapping[str, Any], folder: Path, name: str) -> str:
+    """A figure by its name without the paper's number, if this run has drawn it; an older one in the folder is passed over."""
+    for file in summary.get("figures", []):
+        if re.fullmatch(rf"(fig\d+-)?{name}", Path(file).stem) and file.endswith(".svg"):
+            return picture(folder / file, caption(Path(file).stem, paper=bool(summary.get("paper"))))
+    return ""
+
+
+def modulus(found: Mapping[str, Any], drawn: str) -> str:
     """The fuzzy modulus with its α-cuts, error budget and certificate."""
     cuts = zip(found["alpha"], found["E_GPa"]["lower"], found["E_GPa"]["upper"], strict=True)
     rows = [(f"{alpha:g}", f"{low:.4f}", f"{high:.4f}") for alpha, low, high in cuts]
@@ -74,8 +83,6 @@ def modulus(found: Mapping[str, Any], folder: Path, *, paper: bool) -> str:
         f"{found['samples']} samples, {found['solves']} linear systems, {found['seconds']:.1f} s. "
         f"{html.escape(sentence(found.get('reason', '')))}</p>"
     )
-    stem = "fig18-modulus" if paper else "modulus"
-    drawn = picture(folder / "figures" / f"{stem}.svg", caption(stem, paper=paper))
     budget = [(in_words(name), f"{value:.2g}") for name, value in found.get("error", {}).items()]
     checks = [(in_words(name), f"{value:.2g}") for name, value in found.get("checks", {}).items()]
     return section(
@@ -88,14 +95,13 @@ def modulus(found: Mapping[str, Any], folder: Path, *, paper: bool) -> str:
     )
 
 
-def stress(found: Mapping[str, Any], folder: Path) -> str:
+def stress(found: Mapping[str, Any], drawn: str) -> str:
     """The random and fuzzy stress of the cell."""
     words = (
         f"<p>Homogenised stress {found['quantity']}, random with θ at every fuzzy sample: intervals of its mean, its quantiles and of "
         f"the probability of exceeding a limit. Bounds are {found['nature']}; {html.escape(found['note'])}.</p>"
     )
     head = ("quantity", f"cut at α = {found['alpha'][0]:g}", f"cut at α = {found['alpha'][-1]:g}")
-    drawn = picture(folder / "figures" / "response.svg", "Distribution between its bounds, and fuzzy quantiles.")
     return section("Random and fuzzy stress", words, drawn, table(head, response.table(found)))
 
 
@@ -175,7 +181,10 @@ def gallery(summary: Mapping[str, Any], folder: Path) -> str:
     """Every figure of the run that no other section shows."""
     names = [name for name in summary.get("figures", []) if name.endswith(".png") and Path(name).stem not in ELSEWHERE]
     paper = bool(summary.get("paper"))
-    figures = [picture((folder / name).with_suffix(".svg"), caption(Path(name).stem, paper=paper)) for name in names]
+    figures = []
+    for name in names:
+        drawn = picture((folder / name).with_suffix(".svg"), caption(Path(name).stem, paper=paper))
+        figures.append(drawn.replace("<figure>", '<figure class="wide">', 1) if WIDE.search(name) else drawn)
     return section("Figures", '<div class="gallery">' + "\n".join(figures) + "</div>") if figures else ""
 
 
@@ -205,9 +214,11 @@ def unique_ids(svg: str, prefix: str) -> str:
 
 
 def case_text(summary: Mapping[str, Any]) -> str:
-    """The case file as it was."""
+    """The case file as it was, and what the command line changed."""
+    changes = "".join(f"<li><code>{html.escape(change)}</code></li>" for change in summary.get("changes", ()))
     return section(
         "The case",
+        f"<p>Changed on the command line:</p><ul>{changes}</ul>" if changes else "",
         f"<details><summary>{html.escape(summary['case'])}.toml</summary><pre>{html.escape(summary['case_text'])}</pre></details>",
     )
 

@@ -21,4 +21,4 @@ def table(head: Sequence[str], rows: Sequence[Sequence[object]], *, numbers: int
 
     top = "".join(cell("th", column, name) for column, name in enumerate(head))
     body = "".join("<tr>" + "".join(cell("td", column, entry) for column, entry in enumerate(row)) + "</tr>\n" for row in rows)
-    return f"<table><thead><tr>{top}</tr></thead><tbody>\n{body}</tbody></table>"
+    return f'<div class="scroll"><table><thead><tr>{top}</tr></thead><tbody>\n{body}</tbody></table></div>'

@@ -97,3 +97,20 @@ def test_a_certificate_is_told_with_its_gap_and_what_it_rests_on():
     assert "by 30 µm at most. Bounded by &lt;energy&gt;." in page
     assert "Guaranteed bounds are proved" in page
     assert "proved at" not in methods({"envelopes": {"E": {k: v for k, v in study.items() if k not in ("gap", "proof")}}})
+
+
+def test_only_what_the_run_drew_is_shown_and_what_the_command_line_changed_is_told(tmp_path, capfd):
+    case = str(Path(__file__).parent.parent / "cases" / "building.toml")
+    quick = ["run", case, "--quick", "--quiet", "--out", str(tmp_path)]
+    assert main(quick) == 0, capfd.readouterr().err
+    assert (tmp_path / "figures" / "record.svg").is_file()
+    assert main(["report", str(tmp_path), "--quiet"]) == 0
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert page.count("<figure") > 5
+    assert "Acceleration of the ground" in page
+    assert "Changed on the command line" not in page
+    assert main([*quick, "--no-figures", "--set", "exceedance.limit=1 %"]) == 0
+    assert main(["report", str(tmp_path), "--quiet"]) == 0
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<figure" not in page
+    assert "<code>exceedance.limit=1 %</code>" in page
