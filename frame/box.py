@@ -8,10 +8,12 @@ from functools import cached_property
 
 import numpy as np
 
+from frame.checks import require_numbers
 from frame.envelope import output_unit
 from frame.flow import Flow
 from frame.jet import Array, Jet
 from fuzzy import FuzzyNumber
+from fuzzy.vetting import fuzzy_inputs
 
 ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)
 
@@ -77,16 +79,29 @@ class Boxes:
         return self.to_unit(self.lower[level]), self.to_unit(self.upper[level])
 
 
-def boxes(inputs: Mapping[str, FuzzyNumber], alpha: Sequence[float] = ALPHA) -> Boxes:
+def boxes(inputs: Mapping[str, FuzzyNumber | float], alpha: Sequence[float] = ALPHA) -> Boxes:
     """The α-cuts of `inputs` as boxes.
 
+    Args:
+        inputs: Fuzzy numbers by name, in SI units; a plain number is a crisp one.
+        alpha: Levels, rising within [0, 1].
+
     Raises:
-        ValueError: As `Boxes`.
+        ValueError: An input is no number, or as `Boxes`.
     """
-    levels = np.asarray(sorted(alpha), float)
-    cuts = np.array([[number.cut(a) for number in inputs.values()] for a in levels], float).reshape(len(levels), len(inputs), 2)
-    modal = np.array([number.modal for number in inputs.values()])
-    return Boxes(tuple(inputs), levels, cuts[..., 0], cuts[..., 1], modal)
+    levels = _levels(alpha)
+    numbers = fuzzy_inputs(inputs)
+    cuts = np.array([[number.cut(a) for number in numbers.values()] for a in levels], float).reshape(len(levels), len(numbers), 2)
+    modal = np.array([number.modal for number in numbers.values()])
+    return Boxes(tuple(numbers), levels, cuts[..., 0], cuts[..., 1], modal)
+
+
+def _levels(alpha: Sequence[float]) -> Array:
+    require_numbers("alpha", alpha, "[0, 1]")
+    levels = np.asarray(alpha, float)
+    if not len(levels) or levels.min() < 0 or levels.max() > 1 or (np.diff(levels) <= 0).any():
+        raise ValueError(f"alpha: {levels.tolist()} must rise within [0, 1]")
+    return levels
 
 
 @dataclass(frozen=True, eq=False)

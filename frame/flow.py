@@ -10,6 +10,7 @@ from typing import NoReturn, Protocol
 
 import numpy as np
 
+from frame.checks import require_number
 from frame.integrators import Exact, Integrator, Midpoint, StepMap
 from frame.jet import Array, Jet, concatenate
 from frame.linear import LinearSystem, check_names, evaluate
@@ -42,8 +43,10 @@ def nodes(duration: float, step: float) -> Array:
     """Time nodes from 0 to `duration` in s.
 
     Raises:
-        ValueError: The step is not positive, or the duration is not a positive multiple of it.
+        ValueError: One is no number, the step is not positive, or the duration is not a positive multiple of it.
     """
+    require_number("step", step, "s")
+    require_number("duration", duration, "s")
     if not (np.isfinite(step) and step > 0):
         raise ValueError(f"step: {step:g} s is not allowed; it must be positive")
     count = round(duration / step) if np.isfinite(duration) else 0

@@ -119,7 +119,17 @@ def check_names(system: LinearSystem, names: Sequence[str]) -> None:
     """Raises ValueError when a name is no parameter of `system`."""
     for name in names:
         if name not in system.parameters:
-            raise ValueError(f"uncertain parameter '{name}' is unknown; known are {', '.join(system.parameters)}")
+            known = ", ".join(system.parameters)
+            raise ValueError(f"uncertain parameter '{name}' is unknown; known are {known}{_members(system, name)}")
+
+
+def _members(system: LinearSystem, name: str) -> str:
+    """What to add where a name is short for several parameters, as of a storey frame."""
+    try:
+        group = getattr(system, "group", lambda _: ())(name)
+    except ValueError:
+        return ""
+    return f"; it is short for {', '.join(group)}: give each a number, as {{name: … for name in frame.group('{name}')}}" if group else ""
 
 
 def frequencies(system: LinearSystem) -> Array:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from frame.checks import require_number, require_numbers
 from frame.damping import modal_damping
 from frame.jet import Array, Jet
 from frame.linear import Accelerogram, Matrices
@@ -37,8 +38,8 @@ class MatrixStructure:
             follow the parameters through the modes (`frame.damping`).
 
     Raises:
-        ValueError: A shape does not fit, a factor names no parameter, the modal mass matrix is not positive definite, or a modal ratio
-            is outside [0, 1).
+        ValueError: A shape does not fit, a number is not finite, a factor names no parameter, the modal mass matrix is not symmetric and
+            positive definite, or a modal ratio is outside [0, 1).
     """
 
     parameters: Mapping[str, float]
@@ -56,21 +57,37 @@ class MatrixStructure:
     def __post_init__(self) -> None:
         if not self.mass or not self.stiffness or not self.observed:
             raise ValueError("mass, stiffness and observed: each needs at least one entry")
+        for name, value in self.parameters.items():
+            require_number(f"parameter {name}", value, "SI units")
         n = len(self.mass[0][1])
         object.__setattr__(self, "size", n)
         for kind in ("mass", "damping", "stiffness"):
             for factor, array in getattr(self, kind):
                 if np.shape(array) != (n, n):
                     raise ValueError(f"{kind}: an array has shape {np.shape(array)}; all must be ({n}, {n})")
+                require_numbers(kind, np.asarray(array), "SI units")
                 if isinstance(factor, str) and factor not in self.parameters:
                     raise ValueError(f"{kind}: factor '{factor}' is no parameter; known are {', '.join(self.parameters)}")
+        self._check_vectors()
+        self._check_ratios()
+        self._check_mass()
+
+    def _check_vectors(self) -> None:
+        n = self.size
         for name in ("q0", "v0", "pattern"):
             if getattr(self, name) is not None and np.shape(getattr(self, name)) != (n,):
                 raise ValueError(f"{name}: shape {np.shape(getattr(self, name))} does not fit; it must be ({n},)")
+            require_numbers(name, () if getattr(self, name) is None else getattr(self, name), "SI units")
         for name, row in self.observed.items():
             if np.shape(row) not in ((n,), (2 * n,)):
                 raise ValueError(f"observed: '{name}' has shape {np.shape(row)}; it must be ({n},) or ({2 * n},)")
-        self._check_ratios()
+            require_numbers(f"observed: '{name}'", row, "SI units")
+
+    def _check_mass(self) -> None:
+        for _, array in self.mass:
+            uneven = np.abs(np.asarray(array, float) - np.transpose(array)).max()
+            if uneven > 1e-9 * np.abs(array).max():
+                raise ValueError(f"mass: an array is not symmetric, by {uneven:.2g}; a mass matrix is")
         modal = sum(float(_value(f, self.parameters)) * np.asarray(A, float) for f, A in self.mass)
         if not np.linalg.eigvalsh(modal).min() > 0:
             raise ValueError("mass: the matrix at the modal parameters is not positive definite; every unknown needs a mass")

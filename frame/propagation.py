@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from frame.admissible import require_admissible
 from frame.auto import auto
 from frame.batch_follower import pursue
 from frame.box import ALPHA, UnitFlow, boxes
@@ -19,6 +20,7 @@ from frame.graph_follower import Followed, GraphFollower
 from frame.integrators import INTEGRATORS, Integrator
 from frame.lagrangian import LagrangianSystem
 from frame.linear import LinearSystem
+from frame.method_options import require_options
 from frame.modal_method import modal
 from frame.nonlinear_flow import LagrangianFlow
 from frame.sampling import monte_carlo, quasi_monte_carlo, vertex
@@ -31,7 +33,7 @@ Progress = Callable[[float], None]
 
 def envelope(
     model: LinearSystem | LagrangianSystem,
-    inputs: Mapping[str, FuzzyNumber],
+    inputs: Mapping[str, FuzzyNumber | float],
     *,
     duration: float,
     step: float,
@@ -65,18 +67,23 @@ def envelope(
     Warns:
         UserWarning: The method is modal, and its error passes the tolerance and a hundredth of a peak.
     """
+    if method is None and isinstance(model, LagrangianSystem):
+        method = "improved-graph-follower"
+    propagate = default if method is None else _method(method)
+    require_options(method, auto if method is None else propagate, options)
     cuts = boxes(inputs, alpha)
+    flow: LagrangianFlow | LinearFlow
     if isinstance(model, LagrangianSystem):
         scheme = str(integrator or "midpoint")
-        flow = UnitFlow(LagrangianFlow(model, cuts.names, duration, step, scheme), cuts, relative)
-        propagate = _method(method or "improved-graph-follower")
+        flow = LagrangianFlow(model, cuts.names, duration, step, scheme)
     else:
-        linear = LinearFlow(model, cuts.names, duration, step, _integrator(integrator, method))
-        require_stable(linear, cuts)
-        flow, scheme = UnitFlow(linear, cuts, relative), linear.integrator.name
-        propagate = default if method is None else _method(method)
-    steps = step_error(flow)
-    found = with_step_error(propagate(flow, progress, **options), flow, scheme, steps)
+        flow = LinearFlow(model, cuts.names, duration, step, _integrator(integrator, method))
+        scheme = flow.integrator.name
+    require_admissible(model, cuts)
+    require_stable(flow, cuts)
+    over = UnitFlow(flow, cuts, relative)
+    steps = step_error(over)
+    found = with_step_error(propagate(over, progress, **options), over, scheme, steps)
     if method == "modal":
         warn_of_roughness(found)
     return found

@@ -7,11 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from frame.admissible import require_admissible
 from frame.box import UnitFlow, boxes
 from frame.flow import LinearFlow
 from frame.graph_follower import FollowerStep, GraphFollower
 from frame.jet import Array
+from frame.lagrangian import LagrangianSystem
 from frame.linear import LinearSystem
+from frame.nonlinear_flow import LagrangianFlow
 from fuzzy import FuzzyNumber
 
 
@@ -41,8 +44,8 @@ class FollowerRecord:
 
 
 def record(
-    model: LinearSystem,
-    inputs: Mapping[str, FuzzyNumber],
+    model: LinearSystem | LagrangianSystem,
+    inputs: Mapping[str, FuzzyNumber | float],
     *,
     duration: float,
     step: float,
@@ -60,14 +63,23 @@ def record(
         alpha: The level.
         tolerance: Predicted gain above which a new graph is computed.
         output: Index of the output in `model.outputs`.
+
+    Raises:
+        ValueError: There is no such output, or a value is outside its range.
     """
     cuts = boxes(inputs, (alpha,))
-    flow = UnitFlow(LinearFlow(model, cuts.names, duration, step), cuts)
+    require_admissible(model, cuts)
+    if isinstance(model, LagrangianSystem):
+        flow = UnitFlow(LagrangianFlow(model, cuts.names, duration, step), cuts)
+    else:
+        flow = UnitFlow(LinearFlow(model, cuts.names, duration, step), cuts)
     return record_flow(flow, output=output, tolerance=tolerance)
 
 
 def record_flow(flow: UnitFlow, *, output: int = 0, tolerance: float = 1e-4) -> FollowerRecord:
     """As `record`, on the first level of any flow."""
+    if output not in range(len(flow.outputs)):
+        raise ValueError(f"output: {output!r} is not allowed; it must be from 0 to {len(flow.outputs) - 1}, for {', '.join(flow.outputs)}")
     followed = GraphFollower(tolerance=tolerance, record=True).run(flow)
     steps = tuple(step for step in followed.steps if step.output == output and step.level == 0)
     graphs = followed.storage.values[:, output].T

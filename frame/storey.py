@@ -9,11 +9,14 @@ from typing import Literal, cast
 
 import numpy as np
 
+from frame.checks import require_number, require_numbers
 from frame.damping import modal_damping
 from frame.jet import Jet, stack
 from frame.linear import Accelerogram, Matrices
 
 Entry = Jet | float
+UNITS = {"masses": "kg", "lengths": "m", "modulus": "Pa", "second_moment": "m⁴", "dampers": "N s/m", "q0": "m", "v0": "m/s"}
+UNITS |= {"rayleigh": "1/s and s", "damping_ratio": "shares of the critical damping", "columns": "columns of each storey"}
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,7 @@ class StoreyFrame:
     columns: Sequence[float] = ()
 
     def __post_init__(self) -> None:
+        self._check_numbers()
         n = len(self.masses)
         single = np.ndim(self.damping_ratio) == 0
         object.__setattr__(self, "damping_ratio", (self.damping_ratio,) if single else tuple(cast(Sequence[float], self.damping_ratio)))
@@ -70,6 +74,12 @@ class StoreyFrame:
         object.__setattr__(self, "columns", tuple(self.columns) or (2.0,) * n)
         object.__setattr__(self, "outputs", tuple(self.outputs) or tuple(f"q{z + 1}" for z in range(n)))
         self._check()
+
+    def _check_numbers(self) -> None:
+        for name, unit in UNITS.items():
+            value = getattr(self, name)
+            single = name in ("modulus", "second_moment") or (name == "damping_ratio" and np.ndim(value) == 0)
+            (require_number if single else require_numbers)(name, value, unit)
 
     def _check(self) -> None:
         n = len(self.masses)
