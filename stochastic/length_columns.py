@@ -6,6 +6,7 @@ import csv
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -50,8 +51,9 @@ def length_columns(path: Path, columns: Sequence[str], unit: str = "") -> Length
     separator = ";" if ";" in lines[0][1] else "\t" if "\t" in lines[0][1] else ","
     split = [(number, next(csv.reader([line], delimiter=separator))) for number, line in lines]
     places = _places(split[0][1], columns, unit, path)
+    named = max(place for place, cell in enumerate(split[0][1], 1) if cell.strip())
     for number, fields in split[1:]:
-        _refuse_surplus(path, number, fields, len(split[0][1]))
+        _refuse_surplus(path, number, fields, named)
     cells = [(number, [fields[place] if place < len(fields) else "" for place, _, _ in places]) for number, fields in split[1:]]
     factors = [factor for _, factor, _ in places]
     table = np.array([[f * _number(text, path, number) for f, text in zip(factors, row, strict=True)] for number, row in cells], float)
@@ -110,21 +112,28 @@ def _places(header: list[str], columns: Sequence[str], unit: str, path: Path) ->
 
 def _metres(unit: str, column: str, path: Path) -> float:
     """Metres in one `unit` of length."""
-    from pint import UnitRegistry
     from pint.errors import PintError
 
     if not unit:
         raise ValueError(f"{path}: column {column!r} has no unit; write it in the header, such as 'r [mm]'")
-    registry: Callable[[str], object] = UnitRegistry().Quantity
     try:
-        return float(registry(f"1 {unit}").to("m").magnitude)  # type: ignore[attr-defined]
+        return float(_units()(f"1 {unit}").to("m").magnitude)  # type: ignore[attr-defined]
     except (PintError, AttributeError, ValueError) as error:
         raise ValueError(f"{path}: column {column!r} has the unit {unit!r}, which is not a length; take mm, cm, m, …") from error
 
 
+@cache
+def _units() -> Callable[[str], object]:
+    """Pint's reader of quantities, which takes long to make."""
+    from pint import UnitRegistry
+
+    registry: Callable[[str], object] = UnitRegistry().Quantity
+    return registry
+
+
 def _number(text: str, path: Path, row: int) -> float:
     """The number in a field; NaN where there is none."""
-    if re.fullmatch(r"\s*[-+]?\d*,\d+\s*", text):
+    if re.fullmatch(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*", text):
         point = text.strip().replace(",", ".")
         raise ValueError(f"{path}: row {row} holds {text.strip()!r}, a decimal comma; write decimals with a point: {point}")
     try:

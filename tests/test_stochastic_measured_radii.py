@@ -76,6 +76,8 @@ def test_diameters_and_radii_are_read_with_their_unit(header, factor, tmp_path):
         ("", "is empty"),
         ("d [mm]\n1,25\n1,71\n1,93\n", "row 2 holds '1,25', 2 fields where the header has 1: a decimal comma"),
         ("d [mm]\n0,8\n", "row 2 holds '0,8'.*decimal comma"),
+        ("d [mm],\n1,25\n", "row 2 holds '1,25'.*decimal comma"),
+        ("d [m];n\n1,25e-3;1\n", r"row 2 holds '1,25e-3', a decimal comma; .*1\.25e-3"),
         ("name;d [mm]\na;1.5\nb;1,25\n", r"row 3 holds '1,25', a decimal comma; .*1\.25"),
         ("d [mm],r [mm]\n2,1\n", "'d .mm.' and 'r .mm.' both give r"),
     ],
