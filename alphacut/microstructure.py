@@ -135,9 +135,9 @@ def left_out(found: Microstructure) -> Iterator[str]:
     """One line on the measured particles that were not taken, by reason, if there are any."""
     reasons = [reason for section in found.sections for reason in section.rejected.values()]
     if reasons:
-        told = ", ".join(f"{count} {reason}" for reason, count in Counter(map(without_numbers, reasons)).most_common(4))
+        told = ", ".join(f"{reason} ({count})" for reason, count in Counter(map(without_numbers, reasons)).most_common(4))
         taken = sum(len(section.discs) for section in found.sections)
-        yield f"warning: {len(reasons)} of {taken + len(reasons)} particles were left out (number and why): {told}"
+        yield f"warning: {len(reasons)} of {taken + len(reasons)} particles were left out: {told}"
 
 
 def without_numbers(reason: str) -> str:

@@ -47,20 +47,27 @@ def length_columns(path: Path, columns: Sequence[str], unit: str = "") -> Length
         ValueError: The file cannot be read, a column or its unit is missing, two give the same, a row has more fields than the header, or
             a number is written with a decimal comma.
     """
+    header, rows = _fields(path, columns)
+    places = _places(header, columns, unit, path)
+    wanted = max(place for place, cell in enumerate(header, 1) if cell.strip())
+    table = []
+    for number, fields in rows:
+        _refuse_surplus(path, number, fields, wanted)
+        table.append([factor * _number(fields[k] if k < len(fields) else "", path, number) for k, factor, _ in places])
+    first = places[0][2]
+    values = np.array(table, float).reshape(-1, len(columns))
+    return LengthColumns(np.array([number for number, _ in rows], int), values, first, _metres(first, columns[0], path))
+
+
+def _fields(path: Path, columns: Sequence[str]) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """Fields of the header, and of the rows with their numbers."""
     lines = _lines(path, columns)
     separator = ";" if ";" in lines[0][1] else "\t" if "\t" in lines[0][1] else ","
-    split = [(number, next(csv.reader([line], delimiter=separator))) for number, line in lines]
-    places = _places(split[0][1], columns, unit, path)
-    named = max(place for place, cell in enumerate(split[0][1], 1) if cell.strip())
-    for number, fields in split[1:]:
-        _refuse_surplus(path, number, fields, named)
-    cells = [(number, [fields[place] if place < len(fields) else "" for place, _, _ in places]) for number, fields in split[1:]]
-    factors = [factor for _, factor, _ in places]
-    table = np.array([[f * _number(text, path, number) for f, text in zip(factors, row, strict=True)] for number, row in cells], float)
-    first = places[0][2]
-    return LengthColumns(
-        np.array([number for number, _ in cells], int), table.reshape(-1, len(columns)), first, _metres(first, columns[0], path)
-    )
+    try:
+        split = [(number, next(csv.reader([line], delimiter=separator))) for number, line in lines]
+    except csv.Error as error:
+        raise ValueError(f"{path} cannot be read as rows of numbers: {error}") from error
+    return split[0][1], split[1:]
 
 
 def _lines(path: Path, columns: Sequence[str]) -> list[tuple[int, str]]:
@@ -112,13 +119,11 @@ def _places(header: list[str], columns: Sequence[str], unit: str, path: Path) ->
 
 def _metres(unit: str, column: str, path: Path) -> float:
     """Metres in one `unit` of length."""
-    from pint.errors import PintError
-
     if not unit:
         raise ValueError(f"{path}: column {column!r} has no unit; write it in the header, such as 'r [mm]'")
     try:
         return float(_units()(f"1 {unit}").to("m").magnitude)  # type: ignore[attr-defined]
-    except (PintError, AttributeError, ValueError) as error:
+    except Exception as error:  # the reader raises what it likes
         raise ValueError(f"{path}: column {column!r} has the unit {unit!r}, which is not a length; take mm, cm, m, …") from error
 
 

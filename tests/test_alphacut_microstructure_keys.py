@@ -62,7 +62,7 @@ def test_both_area_fractions_and_what_was_left_out_are_told(section, capfd):
     out, err = capfd.readouterr()
     told = re.search(r"area fraction of the discs 0\.2500, of the cells 0\.2\d+, of this map at its modal values.* (0\.2\d+)", out)
     assert told
-    assert "warning: 2 of 402 particles were left out (number and why): 2 lacks a finite number" in err
+    assert "warning: 2 of 402 particles were left out: lacks a finite number (2)" in err
 
 
 def test_a_run_warns_of_what_was_left_out_as_well(section, tmp_path, capfd):
