@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from frame.jet import cos
+from frame.lagrangian_check import called, expression, listed, require_dimensions
 
 Symbols = Sequence[Any]
 Named = Mapping[str, Any]
@@ -18,18 +19,20 @@ Function = Callable[[Symbols, Symbols, Named], Any]
 class LagrangianSystem:
     """A system with n coordinates, given by plain Python functions of (q, v, p).
 
-    The functions must use arithmetic and `frame.jet.sin`, `cos`, `exp` only: they are called once, with symbols.
+    The functions must use arithmetic and `frame.jet.sin`, `cos`, `exp` only: they are called with symbols. Whole and fractional powers
+    are arithmetic; other functions of SymPy go where they are smooth (`sympy.tan`, `sympy.log`); those of `math` and NumPy do not.
 
     Args:
         coordinates: Number of coordinates n.
         parameters: All parameters with their modal values, in SI units.
         lagrangian: L(q, v, p), with q and v sequences of n and p a mapping from names.
-        initial: The initial state (q0, v0) from p.
+        initial: The initial state (q0, v0) from p, n numbers each.
         observed: Outputs by name, each a function of (q, v, p).
         force: Generalised forces F(q, v, p), n of them; None for none.
 
     Raises:
-        ValueError: L is not quadratic in v, so that momenta cannot be turned back into velocities.
+        ValueError: L is not quadratic in v, so that momenta cannot be turned back into velocities, some coordinate has no inertia, a
+            function asks for what is not there or is not smooth, or gives a list of another length.
     """
 
     coordinates: int
@@ -40,10 +43,35 @@ class LagrangianSystem:
     force: Function | None = None
 
     def __post_init__(self) -> None:
+        require_dimensions(self)
         for row in self.symbols.mass.tolist():
             for entry in row:
                 if entry.free_symbols & set(self.symbols.v):
                     raise ValueError(f"lagrangian: the mass matrix holds velocities ({entry}); L must be quadratic in v")
+        eq = self.symbols
+        for name in self.observed:
+            self.output(name, eq.v)
+        start = dict(zip([*eq.q, *eq.v], [x for part in self.start() for x in part], strict=True))
+        modal = {eq.p[name]: value for name, value in self.parameters.items()}
+        if abs(eq.mass.subs(start).subs(modal).evalf().det()) < 1e-300:
+            raise ValueError("lagrangian: the mass matrix is singular at the start of the modal motion; give every coordinate inertia")
+
+    def start(self) -> tuple[list[Any], list[Any]]:
+        """The initial state (q0, v0) in symbols.
+
+        Raises:
+            ValueError: It does not consist of one number for each coordinate.
+        """
+        given = called("initial", self.initial, self.symbols.p)
+        if not isinstance(given, Sequence) or len(given) != 2:
+            raise ValueError(f"initial: {given} is not allowed; it must be two lists, the displacements and the velocities")
+        q0, v0 = (listed(f"initial: {part}", x, self.coordinates) for part, x in zip(("q0", "v0"), given, strict=True))
+        return [expression("initial: q0", x) for x in q0], [expression("initial: v0", x) for x in v0]
+
+    def output(self, name: str, velocity: Symbols) -> Any:
+        """An observed quantity in symbols, for velocities in any symbols."""
+        eq = self.symbols
+        return expression(f"observed: {name}", called(f"observed: {name}", self.observed[name], list(eq.q), list(velocity), eq.p))
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -79,16 +107,17 @@ class Equations:
     @classmethod
     def derive(cls, system: LagrangianSystem) -> Equations:
         """Differentiates the Lagrangian."""
-        import sympy  # type: ignore[import-untyped]
+        import sympy
 
         n = system.coordinates
         q, v = (sympy.Matrix(sympy.symbols(f"{x}:{n}", real=True)) for x in ("q", "v"))
         p = {name: sympy.Symbol(f"p_{name}", real=True) for name in system.parameters}
-        L = sympy.sympify(system.lagrangian(list(q), list(v), p))
+        L = expression("lagrangian", called("lagrangian", system.lagrangian, list(q), list(v), p))
         momentum = sympy.Matrix([sympy.diff(L, x) for x in v])
         push = sympy.Matrix([sympy.diff(L, x) for x in q])
         if system.force is not None:
-            push += sympy.Matrix(list(system.force(list(q), list(v), p)))
+            force = listed("force", called("force", system.force, list(q), list(v), p), n)
+            push += sympy.Matrix([expression("force", x) for x in force])
         return cls(q, v, p, momentum, push, momentum.jacobian(v))
 
     def velocity(self, momentum: Any) -> Any:

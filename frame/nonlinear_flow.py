@@ -19,6 +19,8 @@ TRIPLE_JUMP = (1 / (2 - 2 ** (1 / 3)), -(2 ** (1 / 3)) / (2 - 2 ** (1 / 3)), 1 /
 SCHEMES = {"midpoint": 2, "composition4": 4, "rk4": 4}
 """Schemes with their orders: the midpoint variational integrator, its composition of order 4, and the Runge–Kutta method."""
 
+OF_SYSTEM = " to a general Lagrangian system"
+
 
 @dataclass(frozen=True, eq=False)
 class LagrangianFlow(March):
@@ -47,11 +49,11 @@ class LagrangianFlow(March):
         for kind, wanted, known in (
             ("uncertain parameter", self.names, self.system.parameters),
             ("output", self.observe, self.system.outputs),
-            ("scheme", (self.scheme,), SCHEMES),
+            ("integrator", (self.scheme,), SCHEMES),
         ):
             for name in wanted:
                 if name not in known:
-                    raise ValueError(f"{kind} '{name}' is unknown; known are {', '.join(known)}")
+                    raise ValueError(f"{kind} '{name}' is unknown{OF_SYSTEM if known is SCHEMES else ''}; known are {', '.join(known)}")
         nodes(self.duration, self.step)
 
     @property
@@ -76,8 +78,8 @@ class LagrangianFlow(March):
         own = [eq.p[name] for name in self.names]
         rest = [symbol for name, symbol in eq.p.items() if name not in self.names]
         state, velocity = _state_symbols(eq, self.scheme)
-        seen = [self.system.observed[name](list(eq.q), list(velocity), eq.p) for name in self.outputs]
-        q0, v0 = self.system.initial(eq.p)
+        seen = [self.system.output(name, velocity) for name in self.outputs]
+        q0, v0 = self.system.start()
         second = list(v0) if self.scheme == "rk4" else list(eq.momentum.subs(dict(zip([*eq.q, *eq.v], [*q0, *v0], strict=True))))
         return compiled(seen, [*state, *own], rest), compiled([*q0, *second], own, rest)
 
