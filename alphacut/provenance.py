@@ -15,7 +15,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-FORMAT = 1  # of the NetCDF files and of summary.json
+FORMAT = 2  # 2: the bounds of a certified envelope are the proved ones; of the NetCDF files and of summary.json
 PACKAGES = {
     "dolfinx": "fenics-dolfinx",
     "basix": "fenics-basix",

@@ -61,7 +61,7 @@ def ready(case: Case) -> Readiness:
         raise BadInput(problems)
     found = dict.fromkeys(problem for study in studies(case) for problem in rough(wanted, study.task))
     period = first_period(wanted)
-    return Readiness((*outlasted(case), *unlikely(case, period)), tuple(found), period)
+    return Readiness((*outlasted(case), *unlikely(case, period), *unproved(case)), tuple(found), period)
 
 
 def first_period(wanted: Structure) -> float | None:
@@ -69,6 +69,16 @@ def first_period(wanted: Structure) -> float | None:
     from frame.linear import frequencies
 
     return None if wanted.linear is None else 2 * math.pi / float(frequencies(wanted.linear)[0])
+
+
+def unproved(case: Case) -> Iterator[str]:
+    """A remark where a certificate is wanted that cannot become a guarantee."""
+    ratio = any(case.has(f"{section}.damping_ratio") for section in ("frame", "tower"))
+    if case.has("envelope.certify") and ratio:
+        yield (
+            "envelope.certify: with a damping ratio the error of the modal model is verified by sampling, not proved; dampers and Rayleigh's "
+            "factors allow a guarantee"
+        )
 
 
 def unlikely(case: Case, period: float | None) -> Iterator[str]:

@@ -57,7 +57,15 @@ def read_dataset(path: Path | str, *, key: str = "file") -> xarray.Dataset:
         raise BadInput(Problem(key, what, str(path), "a file of this program, such as modulus.nc of a run")) from error
     version = found.attrs.get("format_version")
     require_known(None if version is None else str(version), path, key=key, maker=str(found.attrs.get("created_by", "")))
-    return found
+    return upgraded(found)
+
+
+def upgraded(found: xarray.Dataset) -> xarray.Dataset:
+    """A dataset of format 1 as one of format 2: there the proved bounds of a certified envelope stood beside the attained ones."""
+    if "outer_lower" not in found:
+        return found
+    turned = found.rename({"lower": "inner_lower", "upper": "inner_upper"})
+    return turned.rename({"outer_lower": "lower", "outer_upper": "upper"})
 
 
 def damaged(path: Path, why: str) -> BadInput:

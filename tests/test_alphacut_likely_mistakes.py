@@ -115,3 +115,16 @@ def test_one_argument_too_many_is_called_so(capfd):
 def test_citations_come_as_json_too(capfd):
     assert main(["cite", "--json", "-"]) == 0
     assert json.loads(capfd.readouterr().out)["bibtex"].startswith("@software")
+
+
+def test_a_certificate_that_cannot_become_a_guarantee_is_remarked_on(tmp_path, capfd):
+    text = BUILDING.replace('method = "graph-follower"\ntolerance = "0.2 mm"', 'certify = "0.1 mm"')
+    assert 'certify = "0.1 mm"' in text
+    assert "verified by sampling" not in told(text, tmp_path, capfd, status=0)
+    damped = text.replace(
+        'rayleigh_mass = "[0.40, 0.50, 0.60] 1/s"\nrayleigh_stiffness = "[2.0, 2.5, 3.0] ms"', 'damping_ratio = "[4, 5, 6] %"'
+    )
+    damped = damped.replace('"rayleigh_mass", "rayleigh_stiffness"', '"zeta"')
+    assert "envelope.certify: with a damping ratio the error of the modal model is verified by sampling" in told(
+        damped, tmp_path, capfd, status=0
+    )

@@ -96,3 +96,14 @@ def test_what_is_no_result_is_refused(tmp_path):
     (tmp_path / "summary.json").write_text("{", encoding="utf-8")
     with pytest.raises(BadInput, match=r"summary\.json: this file is damaged"):
         read_summary(tmp_path)
+
+
+def test_a_certified_envelope_of_format_1_has_its_proved_bounds(copy):
+    path = copy / "envelope_all.nc"
+    old = xarray.load_dataset(path)
+    old.assign(outer_lower=old["lower"] - 1e-3, outer_upper=old["upper"] + 1e-3).to_netcdf(path)
+    found = read_dataset(path)
+    assert found["lower"].equals(old["lower"] - 1e-3)
+    assert found["upper"].equals(old["upper"] + 1e-3)
+    assert found["inner_upper"].equals(old["upper"])
+    assert "outer_upper" not in found
