@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -15,6 +15,7 @@ from fuzzy.numbers import Array, Rows
 from fuzzy.result import FuzzyResult, Nature
 
 _ROUND_OFF = 1 + 1e-12  # more than the round-off of the mean-value form
+_AGREES = 1e-9  # of the values: by so much the model may differ from the function
 _TOGETHER = 256  # boxes that are split at once
 
 
@@ -37,7 +38,7 @@ class BranchAndBound:
         budget: Boxes per bound at which it ends at the latest; the bound is proved all the same, but wider.
 
     Raises:
-        ValueError: A number is not positive.
+        ValueError: A number is not positive, or a sample of the model is not what the function says.
     """
 
     function: Callable[..., Any]
@@ -56,11 +57,17 @@ class BranchAndBound:
     def run(self, model: Model, domain: Domain) -> FuzzyResult:
         """Prove both bounds of every output on every level; the error is the gap to what the model attains."""
         domain.require_free("BranchAndBound")
-        first = model(np.array([[number.modal for number in domain.inputs.values()]], float))
+        tried = _tried(domain)
+        first = model(tried)
         columns = first.columns
+        found = enclose(self.function, domain.names, tried, tried)
+        for name in columns:
+            if name not in found:
+                raise ValueError(f"the function of BranchAndBound has no output {name}, as the model has: give it the model itself")
+            require_agreement(found[name].value, first.select([name])[:, 0], name, domain.names, tried)
         shape = (len(domain.alpha), len(columns), 2)
         proved, attained, places = np.empty(shape), np.empty(shape), np.empty((*shape, len(domain.names)))
-        runs = 1
+        runs = len(tried)
         for level in reversed(range(len(domain.alpha))):
             for column, name in enumerate(columns):
                 for side, sign in enumerate((1.0, -1.0)):
@@ -85,6 +92,30 @@ class BranchAndBound:
             proved=np.ones(shape[:2], bool),
             enforced=np.zeros(shape[:2], bool),
         )
+
+
+def _tried(domain: Domain) -> Array:
+    """Samples at which the function is compared with the model first: modal values, corners and middle of the support, (4, inputs)."""
+    lower, upper = (ends[0] for ends in domain.boxes)
+    modal = np.array([number.modal for number in domain.inputs.values()], float)
+    return np.stack([modal, lower, upper, (lower + upper) / 2])
+
+
+def require_agreement(enclosed: Pair, values: Array, output: str, names: Sequence[str], points: Array) -> None:
+    """The model's values (n,) at points (n, inputs) lie in what the function says of them or of boxes around them, (n,) each.
+
+    Raises:
+        ValueError: One does not: what is proved of the function says nothing of the model.
+    """
+    slack = _AGREES * np.maximum(np.abs(values), np.abs(values).max())
+    apart = np.flatnonzero((values < enclosed[0] - slack) | (values > enclosed[1] + slack))
+    if len(apart):
+        row = apart[0]
+        place = ", ".join(f"{name} = {x:.6g}" for name, x in zip(names, points[row], strict=True))
+        low, high = enclosed[0][row], enclosed[1][row]
+        said = f"{low:.6g}" if high - low <= 2 * slack[row] else f"{low:.6g} … {high:.6g}"
+        got = f"the function of BranchAndBound gives output {output} = {said} where the model gives {values[row]:.6g}, at {place}"
+        raise ValueError(f"{got}: it must be the model itself")
 
 
 class _Search:
@@ -140,7 +171,7 @@ class _Search:
         reach = (np.nan_to_num(steep * half, nan=np.inf) * _ROUND_OFF).sum(axis=0) * _ROUND_OFF
         effect = np.where(half > 0, np.minimum(steep, 1e300) * half + half * 1e-300, -1.0)
         low_end = np.where(slope[0].T >= 0, lower, np.where(slope[1].T <= 0, upper, middle))  # monotone inputs go to their end
-        self._attain(low_end)
+        self._attain(low_end, value)
         mean_value = np.nextafter(about - reach, -np.inf)
         return _Boxes(lower, upper, np.maximum(np.nan_to_num(value[0], nan=-np.inf, neginf=-np.inf), mean_value), effect.T)
 
@@ -150,9 +181,11 @@ class _Search:
         found = found if self.sign > 0 else -found
         return found.value, found.slope
 
-    def _attain(self, points: Array) -> None:
-        """Run the model and remember the least value."""
+    def _attain(self, points: Array, enclosed: Pair) -> None:
+        """Run the model, see that it is what the function encloses around each point, and remember the least value."""
         values = self.sign * self.model(points).select([self.output])[:, 0]
+        seen = enclosed if self.sign > 0 else (-enclosed[1], -enclosed[0])
+        require_agreement(seen, self.sign * values, self.output, self.names, points)
         self.runs += len(points)
         least = int(values.argmin())
         if values[least] < self.best:

@@ -6,7 +6,7 @@ the function takes over a box. Each operation is widened by the round-off that i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -197,7 +197,7 @@ def enclose(function: Callable[..., Any], names: Sequence[str], lower: Array, up
         upper: Upper corners, shape (n, inputs).
 
     Returns:
-        The enclosure of each output by name; `y` where it has none.
+        The enclosure of each output by name; `y` where it has none, `y[0]`, `y[1]`, … where it is a list.
 
     Raises:
         ValueError: The function does something that has no enclosure.
@@ -206,11 +206,20 @@ def enclose(function: Callable[..., Any], names: Sequence[str], lower: Array, up
     inputs = {name: Enclosure((lower[:, i], upper[:, i]), (unit[i], unit[i])) for i, name in enumerate(names)}
     try:
         output = function(**inputs)
+        outputs = dict(output) if isinstance(output, Mapping) else {"y": output}
+        like = next(iter(inputs.values()))
+        return {key: _enclosed(one, like) for name, value in outputs.items() for key, one in _entries(str(name), value)}
     except (TypeError, AttributeError) as error:
         raise ValueError(f"the function cannot be enclosed ({error}); write it in arithmetic and numpy's functions") from error
-    outputs = dict(output) if isinstance(output, Mapping) else {"y": output}
-    like = next(iter(inputs.values()))
-    return {str(name): _enclosed(value, like) for name, value in outputs.items()}
+
+
+def _entries(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """The entries of an output with their names; the output itself where it is no list."""
+    if not isinstance(value, list | tuple | np.ndarray) or np.ndim(value) == 0:
+        yield name, value
+        return
+    for i, entry in enumerate(value):
+        yield from _entries(f"{name}[{i}]", entry)
 
 
 def gradient_range(function: Callable[..., Any], names: Sequence[str]) -> Callable[[Array, Array], Mapping[str, Pair]]:

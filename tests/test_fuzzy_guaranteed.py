@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fuzzy import BranchAndBound, Known, Linear, Nature, Signed, Triangular, gradient_range, levels, propagate
+from fuzzy import BranchAndBound, Interval, Known, Linear, Nature, Signed, Triangular, gradient_range, levels, propagate
 from fuzzy.enclosure import enclose
 from tests.test_fuzzy_plans import PROBLEMS, brute_force, random_problem
 
@@ -125,3 +125,38 @@ def test_wrong_plans_are_refused():
         BranchAndBound(FUNCTIONS["waves"], tolerance=0)
     with pytest.raises(ValueError, match="BranchAndBound plan cannot respect interactions"):
         propagate(lambda x: x, {"x": Triangular(0, 1, 2)}, BranchAndBound(lambda x: x), interactions=[Linear({"x": 1}, 1.0)])
+
+
+POSITIVE = {"x": Triangular(0, 1, 2), "y": Triangular(1, 2, 4)}
+
+
+def late(x, y):
+    """x y, but only below 3.9 in y: where the modal value, the corners and the middle of the support do not lie."""
+    return np.where((np.asarray(y) > 3.5) & (np.asarray(y) < 4), -9.0, 0.0) + x * y
+
+
+@pytest.mark.parametrize("model", [lambda x, y: x * y, lambda x, y: x + 1e-6 * y])
+def test_another_function_than_the_model_proves_nothing(model):
+    with pytest.raises(
+        ValueError, match=r"BranchAndBound gives output y = 1 where the model gives .*, at x = 1, y = 2: it must be the model"
+    ):
+        propagate(model, POSITIVE, BranchAndBound(lambda x, y: x))
+
+
+def test_a_model_that_differs_somewhere_is_seen_at_the_samples_that_are_run():
+    with pytest.raises(ValueError, match=r"where the model gives .*: it must be the model itself"):
+        propagate(late, {"x": Interval(1, 2), "y": Triangular(1, 2, 4)}, BranchAndBound(lambda x, y: x * y), alpha=(0.0, 0.1))
+
+
+def test_outputs_that_the_function_has_not_are_named():
+    with pytest.raises(ValueError, match="the function of BranchAndBound has no output z, as the model has"):
+        propagate(lambda x, y: {"z": x * y}, POSITIVE, BranchAndBound(lambda x, y: x * y))
+
+
+@pytest.mark.parametrize("function", [lambda x, y: [x * y, x - y], lambda x, y: {"v": np.array([x, y]), "w": x}])
+def test_lists_are_enclosed_entry_by_entry(function):
+    result = propagate(function, POSITIVE, BranchAndBound(function))
+    assert result.nature is Nature.GUARANTEED
+    reference = propagate(function, POSITIVE)
+    assert result.outputs == reference.outputs
+    np.testing.assert_allclose(result.upper, reference.upper, atol=2e-3)
