@@ -34,6 +34,10 @@ class Failure(NamedTuple):
 Outcome = Sample | Failure
 
 
+class LengthError(ValueError):
+    """A vectorised function did not return one output for each point; single points could hide that."""
+
+
 @dataclass(frozen=True)
 class Call:
     """A function of named inputs with the way it is called.
@@ -79,6 +83,8 @@ class Call:
         start = perf_counter()
         try:
             outcomes = self._outcomes(points)
+        except LengthError as error:
+            outcomes = [Failure(f"ValueError: {error}")] * len(points)
         except (Exception, SystemExit) as error:  # a model that ends its program ends its sample only
             if len(points) > 1:
                 return [self(point[None])[0] for point in points]
@@ -94,9 +100,30 @@ class Call:
 
     def _outputs(self, points: Array) -> Sequence[Any]:
         if self.vectorised:
-            return _split(self.function(**dict(zip(self.names, points.T, strict=True))), len(points))
+            return self._split(self._arrays(points), points)
         named = [named_point(self.names, point) for point in points]
         return self.function(named) if self.shared else [self.function(**point) for point in named]
+
+    def _arrays(self, points: Array) -> dict[str, Array]:
+        """What a vectorised function returns, by name."""
+        outputs = self.function(**dict(zip(self.names, points.T, strict=True)))
+        named = outputs if isinstance(outputs, Mapping) else {"": outputs}
+        return {str(name): np.asarray(value, float) for name, value in named.items()}
+
+    def _split(self, arrays: dict[str, Array], points: Array) -> Sequence[Any]:
+        """The outputs of a vectorised function, point by point; a number that is the same for single points is a constant."""
+        n = len(points)
+        if any(array.ndim == 0 for array in arrays.values()) and n > 1:
+            single = [self._arrays(points[[row]]) for row in (0, -1)]
+            for name, array in arrays.items():
+                if array.ndim == 0 and all((one[name] == array).all() for one in single):
+                    arrays[name] = np.broadcast_to(array, (n,))
+        rows = {name: np.atleast_1d(array) for name, array in arrays.items()}
+        for name, array in rows.items():
+            if len(array) != n:
+                what = f"output {name!r} of the vectorised function" if name else "what the vectorised function returned"
+                raise LengthError(f"{what} has the length {len(array)} for {n} points; its first axis must be the points")
+        return list(rows[""]) if list(rows) == [""] else [{name: array[row] for name, array in rows.items()} for row in range(n)]
 
 
 def named_point(names: Sequence[str], point: Array) -> dict[str, float]:
@@ -111,16 +138,3 @@ def _outcome(output: Any) -> Outcome:
         return Sample(*flatten(output))
     except (TypeError, ValueError) as error:
         return Failure(f"{type(error).__name__}: {error}")
-
-
-def _split(outputs: Any, n: int) -> Sequence[Any]:
-    """The outputs of a vectorised function, point by point; a constant output is spread over the points."""
-    if isinstance(outputs, Mapping):
-        arrays = {name: _spread(value, n) for name, value in outputs.items()}
-        return [{name: array[row] for name, array in arrays.items()} for row in range(n)]
-    return list(_spread(outputs, n))
-
-
-def _spread(value: Any, n: int) -> Array:
-    array = np.asarray(value, float)
-    return np.broadcast_to(array, (n,)) if array.ndim == 0 else array

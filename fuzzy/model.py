@@ -91,7 +91,7 @@ def flatten(output: Output) -> tuple[Layout, Array]:
         output: A number (named `y`), an array (`y[0]`, …) or a mapping of names to numbers or arrays.
 
     Raises:
-        ValueError: There is no number, or one that is not finite.
+        ValueError: There is no number, one that is not finite, or two of the same name.
     """
     named = output if isinstance(output, Mapping) else {"y": output}
     arrays = {str(name): np.asarray(value, float) for name, value in named.items()}
@@ -101,4 +101,15 @@ def flatten(output: Output) -> tuple[Layout, Array]:
         if not np.isfinite(array).all():
             raise ValueError(f"output {name!r} is {array.ravel()[~np.isfinite(array.ravel())][0]}; every output must be a finite number")
     layout = tuple((name, array.shape) for name, array in arrays.items())
+    if any("[" in name for name in arrays) or len(arrays) < len(named):
+        _require_distinct(layout, named)
     return layout, np.concatenate([array.ravel() for array in arrays.values()])
+
+
+def _require_distinct(layout: Layout, given: Mapping[str, ArrayLike]) -> None:
+    """Refuse outputs that two names of a mapping, such as `a[0]` and the first entry of `a`, would share."""
+    columns = Values(layout, np.zeros((0, 0))).columns
+    spelt = [str(name) for name in given]
+    twice = [name for name in (*columns, *spelt) if columns.count(name) > 1 or spelt.count(name) > 1]
+    if twice:
+        raise ValueError(f"two outputs are named {twice[0]!r}; each needs a name of its own")

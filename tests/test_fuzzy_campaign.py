@@ -162,3 +162,21 @@ def test_dataset_carries_bounds_and_places():
     assert data["lower"].dims == ("alpha", "output")
     assert data["upper_at"].dims == ("alpha", "output", "parameter")
     assert float(data["upper"].sel(alpha=0, output="sum")) == 3
+
+
+@pytest.mark.parametrize("function", [lambda x: x.sum(), lambda x: {"y": x, "z": x.mean()}, lambda x: x[:2], lambda x: {"y": np.r_[x, 1]}])
+def test_a_vectorised_function_returns_one_output_for_each_point(function):
+    with pytest.raises(CampaignError, match=r"of the vectorised function|vectorised function returned.*first axis must be the points"):
+        propagate(function, {"x": Triangular(0, 1, 3)}, vectorised=True)
+
+
+def test_a_constant_output_of_a_vectorised_function_is_spread():
+    result = propagate(lambda x: {"y": x, "z": 3.0}, {"x": Interval(0, 1)}, vectorised=True)
+    assert (result.bounds("z")[0] == 3).all()
+
+
+def test_two_outputs_of_one_name_are_refused():
+    with pytest.raises(CampaignError, match=r"two outputs are named 'a\[0\]'; each needs a name of its own"):
+        propagate(lambda x: {"a[0]": x, "a": [x]}, {"x": Interval(0, 1)})
+    with pytest.raises(CampaignError, match="two outputs are named '1'; each needs a name of its own"):
+        propagate(lambda x: {"1": x, 1: x}, {"x": Interval(0, 1)})
