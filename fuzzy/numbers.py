@@ -70,10 +70,11 @@ class FuzzyNumber(ABC):
         return Cut(float(_interpolate(alpha, levels, lower)), float(_interpolate(alpha, levels, upper)))
 
     def membership(self, x: ArrayLike) -> Array:
-        """Grade of membership μ in [0, 1] at `x`, any shape."""
+        """Grade of membership μ in [0, 1] at `x`, any shape; not a number where `x` is none."""
         levels, lower, upper = map(np.asarray, self.cuts)
         x = np.asarray(x, float)
-        return np.minimum(_highest_level(x, levels, lower), _highest_level(-x, levels, -upper))
+        grade: Array = np.minimum(_highest_level(x, levels, lower), _highest_level(-x, levels, -upper))
+        return np.where(np.isnan(x), np.nan, grade)
 
     def __add__(self, other: FuzzyNumber | float) -> FuzzyNumber:
         return _combine("+", self, other)
@@ -257,7 +258,7 @@ class PiecewiseLinear(FuzzyNumber):
         for name in ("alpha", "lower", "upper"):  # arrays are welcome; tuples are kept
             object.__setattr__(self, name, tuple(float(value) for value in getattr(self, name)))
         if not len(self.alpha) == len(self.lower) == len(self.upper) >= 2:
-            sizes = f"{len(self.alpha)} levels, {len(self.lower)} lower and {len(self.upper)} upper ends"
+            sizes = f"{len(self.alpha)} level{'s' * (len(self.alpha) != 1)}, {len(self.lower)} lower and {len(self.upper)} upper ends"
             raise ValueError(f"the α-cuts have {sizes}; they need as many ends as levels, two levels or more")
         if self.alpha[0] != 0 or self.alpha[-1] != 1 or not all(np.diff(self.alpha) > 0):
             raise ValueError(f"the levels of the α-cuts are {list(self.alpha)}; they must rise from 0 to 1")

@@ -69,3 +69,8 @@ def test_cut_width():
 def test_refusals_name_the_value_and_the_cure(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_what_is_no_number_has_no_grade():
+    assert np.isnan(Triangular(1, 2, 3).membership(np.nan))
+    np.testing.assert_array_equal(Triangular(1, 2, 3).membership([0, 1.5, np.nan, np.inf]), [0, 0.5, np.nan, 0])
