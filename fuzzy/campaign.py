@@ -158,7 +158,9 @@ class _Batch:
     def _aligned(self, outcome: Outcome) -> Outcome:
         """The outcome with its outputs in the order of the first sample's; a failure where they are others."""
         if isinstance(outcome, Sample):
-            self.campaign.layout = self.campaign.layout or outcome.layout
+            if not self.campaign.layout:
+                self.campaign.layout = outcome.layout
+                self.campaign.known.check_outputs(Values(outcome.layout, outcome.row[None]).columns)
             return _in_order(outcome, self.campaign.layout)
         return outcome
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from numbers import Real
 from typing import Protocol
 
 import numpy as np
@@ -39,6 +40,7 @@ class Linear:
     bound: float
 
     def __post_init__(self) -> None:
+        _require_weights(self.weights, self.bound)
         if not np.isfinite([*self.weights.values(), self.bound]).all():
             raise ValueError(f"the linear interaction has weights {dict(self.weights)} and bound {self.bound}; all must be finite")
 
@@ -134,6 +136,12 @@ def _signed_distance(number: FuzzyNumber, x: Array) -> Array:
     outside = np.maximum(np.maximum(lower - x, x - upper), 0) / max(upper - lower, np.finfo(float).tiny)
     distance: Array = np.where(x < number.modal, -1.0, 1.0) * (1 - number.membership(x) + outside)
     return distance
+
+
+def _require_weights(weights: object, bound: object) -> None:
+    numbers = isinstance(weights, Mapping) and all(isinstance(value, Real) for value in (*weights.values(), bound))
+    if not numbers:
+        raise ValueError(f"the linear interaction has weights {weights!r} and bound {bound!r}; it needs numbers by name, and a number")
 
 
 def _require_inputs(kind: str, names: Mapping[str, float] | Sequence[str], inputs: Sequence[str]) -> None:

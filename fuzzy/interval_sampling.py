@@ -20,6 +20,7 @@ from fuzzy.known import Known
 from fuzzy.numbers import Array, FuzzyNumber, PiecewiseLinear
 from fuzzy.plan import Plan
 from fuzzy.transformation import Reduced
+from fuzzy.vetting import fuzzy_inputs, known_facts
 
 
 @dataclass(frozen=True)
@@ -113,7 +114,7 @@ class IntervalQuasiMonteCarlo:
         self,
         function: Function,
         random: Mapping[str, RandomInput],
-        inputs: Mapping[str, FuzzyNumber],
+        inputs: Mapping[str, FuzzyNumber | float],
         *,
         alpha: Sequence[float],
         vectorised: bool = False,
@@ -125,7 +126,7 @@ class IntervalQuasiMonteCarlo:
         Args:
             function: Gets random and fuzzy inputs by name.
             random: The random inputs.
-            inputs: The fuzzy inputs, which may be none.
+            inputs: The fuzzy inputs, which may be none; a plain number is crisp.
             alpha: Rising levels from 0 to 1.
             vectorised: Whether the function takes arrays.
             known: Facts about the function.
@@ -136,18 +137,22 @@ class IntervalQuasiMonteCarlo:
         """
         from scipy.stats import qmc
 
+        fuzzy = fuzzy_inputs(inputs)
+        parameters = {name: fuzzy_inputs(one.parameters) for name, one in random.items()}
+        random = {name: RandomInput(one.quantile, parameters[name]) for name, one in random.items()}
+        facts = known_facts(known, (*random, *fuzzy))
         twice = sorted(set(random) & set(inputs))
         if twice:
             raise ValueError(f"{', '.join(twice)} is named among the random and the fuzzy inputs; each must be one of the two")
         u: Array = qmc.Sobol(len(random), rng=np.random.default_rng(self.seed)).random(self.points)
         ends = {name: [one.interval(u[:, i], level) for level in alpha] for i, (name, one) in enumerate(random.items())}
-        campaign = Campaign(Call(function, (*random, *inputs), vectorised=vectorised), known=known or Known(), stepwise=True)
+        campaign = Campaign(Call(function, (*random, *inputs), vectorised=vectorised), known=facts, stepwise=True)
         rows: list[tuple[Array, Array]] = []
         outputs: tuple[str, ...] = ()
         runs = 0
         for k in range(self.points):
             drawn = {name: _number(alpha, [cut[0][k] for cut in cuts], [cut[1][k] for cut in cuts]) for name, cuts in ends.items()}
-            result = self.plan.run(campaign, Domain({**drawn, **inputs}, alpha))
+            result = self.plan.run(campaign, Domain({**drawn, **fuzzy}, alpha))
             rows.append((result.lower, result.upper))
             outputs, runs = result.outputs, runs + result.runs
             if progress:

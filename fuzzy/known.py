@@ -39,6 +39,8 @@ class Known:
         Raises:
             ValueError: As said.
         """
+        if not isinstance(self.signs, Mapping) or not isinstance(self.derivatives, Mapping):
+            raise ValueError(f"the signs are {self.signs!r} and the derivatives {self.derivatives!r}; both must be mappings, as {{'x': 1}}")
         named = [*self.signs, *self.monotone, *(name for row in self.derivatives.values() for name in row)]
         unknown = sorted(set(named) - set(inputs))
         if unknown:
@@ -47,6 +49,18 @@ class Known:
             for value in sign.values() if isinstance(sign, Mapping) else (sign,):
                 if value not in (-1, 1):
                     raise ValueError(f"the sign of {name} is {value!r}; it must be 1 (outputs rise with it) or -1 (they fall)")
+
+    def check_outputs(self, outputs: Sequence[str]) -> None:
+        """Refuse names that are no output.
+
+        Raises:
+            ValueError: As said.
+        """
+        by_output = [sign for sign in self.signs.values() if isinstance(sign, Mapping)]
+        held = [name for row in self.derivatives.values() for name in row.values()]
+        unknown = sorted({name for sign in by_output for name in sign}.union(self.derivatives, held) - set(outputs))
+        if unknown:
+            raise ValueError(f"what is known of the model names {', '.join(unknown)}; its outputs are {', '.join(outputs)}")
 
     def stated(self, inputs: Sequence[str], outputs: Sequence[str]) -> Signs:
         """Stated signs, 0 where none is, shape (outputs, inputs)."""

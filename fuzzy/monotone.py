@@ -88,7 +88,8 @@ def verify(model: Memo, domain: Domain, rule: Verification, *, outputs: Sequence
     """
     known = model.known
     modal = np.array([[number.modal for number in domain.inputs.values()]], float)
-    names = tuple(outputs) or primary(model(modal).columns, known)
+    columns = model(modal).columns if known.gradient_range or not outputs else ()
+    names = tuple(outputs) or primary(columns, known)
     signs = known.stated(domain.names, names)
     proved = signs != 0
     rows = []
@@ -98,7 +99,11 @@ def verify(model: Memo, domain: Domain, rule: Verification, *, outputs: Sequence
         signs, proved = signs.copy(), proved.copy()
         signs[:, upper == lower], proved[:, upper == lower] = 1, True
         if known.gradient_range:
-            _prove(signs, proved, known.gradient_range(lower, upper), names)
+            ranges = known.gradient_range(lower, upper)
+            unknown = sorted(set(ranges) - set(columns))
+            if unknown:
+                raise ValueError(f"the range of the gradient names {', '.join(unknown)}; the outputs are {', '.join(columns)}")
+            _prove(signs, proved, ranges, names)
         if (signs == 0).any():
             box = _Box(model, domain.names, names, lower=lower, upper=upper, rule=rule)
             signs = np.where(signs == 0, box.seen(modal, signs), signs)

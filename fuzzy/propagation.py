@@ -19,7 +19,7 @@ from fuzzy.result import FuzzyResult
 from fuzzy.shelf import shelf
 from fuzzy.store import Identity, Store
 from fuzzy.transformation import General
-from fuzzy.vetting import fuzzy_inputs, require_callable, require_plan
+from fuzzy.vetting import fuzzy_inputs, interaction_list, known_facts, require_callable, require_plan
 from fuzzy.workers import pool, require_workers
 
 
@@ -65,9 +65,8 @@ def propagate(
         StoreError: The store cannot be written.
         RuntimeError: The workers cannot start.
     """
-    domain = Domain(fuzzy_inputs(inputs), levels(4) if alpha is None else alpha, interactions)
-    known = known or Known()
-    known.check(domain.names)
+    domain = Domain(fuzzy_inputs(inputs), levels(4) if alpha is None else alpha, interaction_list(interactions))
+    known = known_facts(known, domain.names)
     plan = plan or General()
     require_plan(plan)
     require_workers(workers)

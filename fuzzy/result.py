@@ -180,6 +180,9 @@ class FuzzyResult:
             ValueError: The levels do not reach from 0 to 1.
         """
         lower, upper = self.bounds(output)
+        if self.alpha[0] != 0 or self.alpha[-1] != 1:
+            shown = ", ".join(f"{level:g}" for level in self.alpha)
+            raise ValueError(f"the α-levels of the result are {shown}; a fuzzy number needs some from 0 to 1: take alpha=levels(4)")
         return PiecewiseLinear(tuple(self.alpha), tuple(lower), tuple(upper))
 
     def surface(self, output: str = "y") -> ResponseSurface:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from numbers import Integral
 from typing import NoReturn
 
 import numpy as np
@@ -113,8 +114,10 @@ def from_data(values: Sequence[float] | Array, *, levels: int = 10) -> Piecewise
         levels: Steps between the α-levels.
 
     Raises:
-        ValueError: There is no value, or one is not finite.
+        ValueError: There is no value, one is not finite, or there is no step.
     """
+    if not isinstance(levels, Integral) or levels < 1:
+        raise ValueError(f"the number of steps between α-levels is {levels!r}; it must be a whole number, 1 or more")
     data = np.asarray(values, float).ravel()
     if not len(data) or not np.isfinite(data).all():
         finite = int(np.isfinite(data).sum())

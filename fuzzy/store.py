@@ -9,6 +9,7 @@ the store to be read, so it also works where only file locks do, and on a full d
 from __future__ import annotations
 
 import json
+import os
 import sqlite3
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -116,7 +117,15 @@ class Store:
             yield
         except (sqlite3.DatabaseError, OSError) as error:
             cure = "free some space or find what blocks it, and run again: what is stored stays"
+            if not self._writable():
+                cure = "its folder or the file cannot be written: give another path or the right to write there"
             raise StoreError(f"the store {self.path} cannot be used ({error}): {cure}") from error
+
+    def _writable(self) -> bool:
+        """Whether the file, or the nearest folder above that is there, may be written."""
+        there = next((path for path in (self.path, *self.path.absolute().parents) if path.exists()), self.path)
+        folder = self.path.absolute().parent
+        return os.access(there, os.W_OK) and (not folder.exists() or os.access(folder, os.W_OK))
 
     def close(self) -> None:
         """Close the file."""

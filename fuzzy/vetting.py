@@ -5,10 +5,12 @@ from __future__ import annotations
 import inspect
 import pickle
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
 from typing import Any
 
+from fuzzy.interaction import Interaction
+from fuzzy.known import Known
 from fuzzy.numbers import Crisp, FuzzyNumber
 
 
@@ -31,6 +33,32 @@ def _fuzzy(name: str, value: object) -> FuzzyNumber:
     if isinstance(value, Real):
         return Crisp(float(value))
     raise ValueError(f"the input {name!r} is {value!r}; it must be a number or a fuzzy number such as Triangular(24, 25, 26)")
+
+
+def known_facts(known: object, names: Sequence[str]) -> Known:
+    """What is known of the model; nothing if not given.
+
+    Raises:
+        ValueError: It is no `Known`, or names what is no input.
+    """
+    if not isinstance(known, Known | None):
+        raise ValueError(f"known is {known!r}; it must be what is known of the function, as fuzzy.Known(signs={{'x': 1}})")
+    facts = known or Known()
+    facts.check(names)
+    return facts
+
+
+def interaction_list(interactions: object) -> tuple[Interaction, ...]:
+    """The interactions between the inputs.
+
+    Raises:
+        ValueError: They are no list of interactions.
+    """
+    listed = interactions if isinstance(interactions, Iterable) and not isinstance(interactions, str) else (None,)
+    found = tuple(listed)
+    if not all(hasattr(one, "slack") for one in found):
+        raise ValueError(f"the interactions are {interactions!r}; they must be a list such as [fuzzy.Linear({{'x': 1}}, 2)]")
+    return found
 
 
 def require_plan(plan: object) -> None:

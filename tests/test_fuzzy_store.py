@@ -322,3 +322,10 @@ def test_key_is_exact_and_free_of_order(tmp_path):
         assert one.key(np.array([0.1, 1.0])) != one.key(np.array([np.nextafter(0.1, 1), 1.0]))
         one.close()
         other.close()
+
+
+def test_a_store_where_nothing_may_be_written_says_so(tmp_path, monkeypatch):
+    (tmp_path / "text").write_text("x")
+    monkeypatch.setattr("fuzzy.store.os.access", lambda *_: False)  # a test that runs as root may write everywhere
+    with pytest.raises(StoreError, match=r"cannot be used \(.*\): its folder or the file cannot be written: give another path"):
+        Store(tmp_path / "text" / "below")
