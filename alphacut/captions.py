@@ -11,7 +11,7 @@ FIGURES = {
     "p-box": "Random radius of the cell: distribution at the modal values, and its p-box",
     "cone": "Particle in the physical-stochastic domain: every slice at one θ is a cell",
     "prism-mesh": "Prism mesh of the physical-stochastic domain, cut open: the matrix orange, the particle violet",
-    "stress-on-slices": "Stress on slices at several θ",
+    "stress-on-slices": "Stress 11 under ε11 = ε22 = 0.01 on slices at several θ",
     "stress-curves": "Homogenised stress over θ, a curve for each fuzzy sample",
     "mean-stress": "Mean homogenised stress of every sample, rearranged into α-cuts",
     "modulus": "Fuzzy effective modulus",

@@ -12,8 +12,6 @@ from alphacut.problem import BadInput, Problem
 
 INSIDE = "inside ./enter only the project, the current folder, home and the temporary folder are visible"
 ENDINGS = {"FILE.nc": (".nc",), "FILE.html": (".html", ".htm")}
-SURFACES = (".stl", ".obj", ".off", ".ply", ".svg", ".tikz", ".poly", ".node", ".ele", ".smesh")  # formats without quadratic wedges
-MESHES = ".vtu, .vtk (ParaView), .msh (Gmsh), .inp (Abaqus, CalculiX) and others of meshio's that have quadratic wedges"
 OUTPUTS = ("out", "json", "export", "store")
 
 
@@ -31,20 +29,15 @@ def check_destinations(parser: argparse.ArgumentParser, options: argparse.Namesp
         elif action.dest in OUTPUTS and isinstance(given, str) and given != "-":
             option, kind = action.option_strings[-1], str(action.metavar)
             place = list(unwritable(option, Path(given), folder=kind == "FOLDER"))
-            problems += place or unknown_ending(option, kind, given, mesh=parser.prog.endswith(" mesh"))
+            problems += place or unknown_ending(option, kind, given)
     if problems:
         raise BadInput(problems)
 
 
-def unknown_ending(option: str, kind: str, given: str, *, mesh: bool = False) -> Iterator[Problem]:
+def unknown_ending(option: str, kind: str, given: str) -> Iterator[Problem]:
     """The problem of a file name whose ending names no format that this option writes."""
     ending = Path(given).suffix.lower()
-    if option == "--out" and kind == "FILE" and mesh:
-        import meshio
-
-        if ending in SURFACES or ending not in meshio.extension_to_filetypes:
-            yield Problem(option, "this ending names no format that can hold the mesh", given, MESHES)
-    elif option == "--json" and ending not in ("", ".json"):
+    if option == "--json" and ending not in ("", ".json"):
         yield Problem(option, "this ending is not that of JSON", given, ".json, or - for standard output")
     elif option == "--out" and kind in ENDINGS and ending not in ENDINGS[kind]:
         yield Problem(option, "this ending is not known", given, " or ".join(ENDINGS[kind]))

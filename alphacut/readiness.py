@@ -76,8 +76,8 @@ def unproved(case: Case) -> Iterator[str]:
     ratio = any(case.has(f"{section}.damping_ratio") for section in ("frame", "tower"))
     if case.has("envelope.certify") and ratio:
         yield (
-            "envelope.certify: with a damping ratio the error of the modal model is verified by sampling, not proved; dampers and Rayleigh's "
-            "factors allow a guarantee"
+            "envelope.certify: with a damping ratio the error of the modal model is verified by sampling, not proved; dampers and "
+            "Rayleigh's factors allow a guarantee"
         )
 
 

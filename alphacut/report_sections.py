@@ -55,13 +55,19 @@ def microstructure(found: Mapping[str, Any]) -> str:
     """Particles, cells, and the fuzzy radius map."""
     low, high = found["limits"]
     words = (
-        f"<p>{found['discs']} discs in {found['packings']} sections, area fraction {found['area_fraction']:.4f}. The limits "
+        f"<p>{found['discs']} discs in {found['packings']} sections, area fraction {found['area_fraction']:.4f}{of_map(found)}. The limits "
         f"{low:.4g} and {high:.4g} of r/a keep {found['share_kept']:.3%} of the area.</p>"
     )
     rows = [("a1", f"{found['a1']:.5g}")]
     rows += [(name, "[" + ", ".join(f"{end:.5g}" for end in found[name]) + "]") for name in ("a2", "a4")]
     rows.insert(2, ("a3", f"{found['a3']:.5g}"))
     return section("Microstructure", words, table(("parameter of the radius map", "fuzzy value"), rows))
+
+
+def of_map(found: Mapping[str, Any]) -> str:
+    """The area fraction that the modulus gets, where it is known."""
+    name = "mean_area_fraction_of_map"
+    return f"; {found[name]:.4f} by the fitted map at its modal values, which is what the modulus uses" if name in found else ""
 
 
 def listed(summary: Mapping[str, Any], folder: Path, name: str) -> str:
@@ -81,7 +87,7 @@ def modulus(found: Mapping[str, Any], drawn: str) -> str:
         f"support [{found['lower_GPa']:.4f}, {found['upper_GPa']:.4f}] GPa; "
         f"Poisson's ratio {found['nu']:.4f}. E is the modulus of eq. 16, the paper's convention: a square array is not isotropic. "
         f"{found['samples']} samples, {found['solves']} linear systems, {found['seconds']:.1f} s. "
-        f"{html.escape(sentence(found.get('reason', '')))}</p>"
+        f"{html.escape(sentence(found.get('reason', '')))} {html.escape(isotropy(found))}</p>"
     )
     budget = [(in_words(name), f"{value:.2g}") for name, value in found.get("error", {}).items()]
     checks = [(in_words(name), f"{value:.2g}") for name, value in found.get("checks", {}).items()]
@@ -93,6 +99,13 @@ def modulus(found: Mapping[str, Any], drawn: str) -> str:
         "<h3>Error budget</h3>" + table(("source", "estimated relative error of E"), budget) if budget else "",
         "<h3>Certificate</h3>" + table(("property", "measured violation, largest of all samples"), checks) if checks else "",
     )
+
+
+def isotropy(found: Mapping[str, Any]) -> str:
+    """How far the array is from isotropic, in a sentence; empty where it was not computed."""
+    from rve.anisotropy import shear_ratio_in_words
+
+    return sentence(shear_ratio_in_words(float(found["shear_ratio"]))) if found.get("shear_ratio") is not None else ""
 
 
 def stress(found: Mapping[str, Any], drawn: str) -> str:

@@ -19,7 +19,7 @@ from stochastic import TruncatedNormal
 if TYPE_CHECKING:
     import xarray
 
-CURVES = {"s11": ("curve11", "stress 11 under load 1"), "s12": ("curve12", "stress 12 under load 2")}
+CURVES = {"s11": ("curve11", "stress 11 under ε11 = ε22 = 0.01"), "s12": ("curve12", "stress 12 under ε12 = 0.01")}
 GRID = 81  # stresses at which the p-box is stored
 
 

@@ -117,7 +117,9 @@ MODULUS = Section(
         "method": Key("model of the cell", "choice", default="prism", choices=CELL_METHODS),
         "plan": Key("samples of the transformation method", "choice", default="general", choices=PLANS),
         "alpha": Key("α-levels", "numbers", default=ALPHA, allowed=MEMBERSHIP),
-        "tolerance": Key("relative tolerance on E, for method auto", "number", default=1e-4, allowed=POSITIVE),
+        "tolerance": Key(
+            "relative tolerance on E, for method auto", "number", default=1e-4, allowed=Range("from 1e-10 to 0.1", 1e-10, 0.1, closed=True)
+        ),
         "value": Key("a known modulus instead of a computed one", unit="Pa", allowed=POSITIVE),
         "file": Key("α-cuts from a NetCDF file instead of computed ones", "text"),
         "measured": Key("CSV file of measured moduli instead of computed ones", "text"),
@@ -127,7 +129,9 @@ MODULUS = Section(
 RESPONSE = Section(
     "What the random stress of the cell is beside its mean: its p-box, fuzzy quantiles, and the fuzzy probability of exceeding a limit.",
     {
-        "quantity": Key("homogenised stress 11 under load 1, or 12 under load 2", "choice", default="s11", choices=("s11", "s12")),
+        "quantity": Key(
+            "homogenised stress 11 under ε11 = ε22 = 0.01, or 12 under ε12 = 0.01", "choice", default="s11", choices=("s11", "s12")
+        ),
         "quantiles": Key("probabilities whose quantiles are wanted", "numbers", default=(0.05, 0.5, 0.95), allowed=UNIT),
         "limit": Key("stress whose probability of being exceeded is wanted", "number", "Pa", allowed=POSITIVE),
     },

@@ -67,6 +67,7 @@ def modulus_numbers(dataset: xarray.Dataset) -> dict[str, Any]:
     support = {"modal_GPa": ends[-1].mean(), "lower_GPa": ends[0, 0], "upper_GPa": ends[0, 1], "nu": dataset["nu"].values[-1].mean()}
     cost = {name: dataset.attrs[name] for name in ("samples", "solves", "seconds", "method", "plan", "nature")}
     cost["reason"] = dataset.attrs.get("reason", "")
+    cost |= {name: dataset.attrs[name] for name in ("shear_ratio",) if name in dataset.attrs}
     budget = {"error": listed(dataset, "error"), "checks": listed(dataset, "check")}
     return {**cuts, **support, **cost, **budget}
 
