@@ -17,6 +17,7 @@ import numpy as np
 
 from frame.box import UnitFlow
 from frame.box_quadratic import gain, global_maximum, local_maximum
+from frame.corner_check import taken_in
 from frame.envelope import Envelope, signed_envelope
 from frame.halton import chebyshev_points
 from frame.jet import Array, Jet
@@ -230,6 +231,8 @@ def _batches(array: Array, size: int) -> list[Array]:
 
 JUMP = 0.05
 """Share of the box's width from which on optima of neighbouring nodes lie in different basins."""
+SAFETY = 2.0
+"""Factor on what the last models promise: the next ones promise again."""
 TRIES = 40
 """Proposals looked at per window of time."""
 SPACING = 0.02
@@ -239,16 +242,16 @@ SPACING = 0.02
 def pursue(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> Envelope:
     """Envelope by the Graph Follower in rounds, corrected by what the last models still promise; options are the fields of `BatchFollower`.
 
-    The error is what these models promise, below the tolerance, or above it where the budget ended the search.
+    The error is twice what these models promise, below the tolerance, or above it where the budget ended the search, and by how much the
+    corners of the boxes pass the bounds, which then take them in; the fact "corners" counts these, which have no derivatives. A basin that neither a model nor a corner shows is not in it.
     """
     method, begun = BatchFollower(**options), time.perf_counter()
     found = method.run(flow, progress=progress)
-    error = np.maximum(found.correction, found.open_gain).max(-1) + method.tolerance / 2 * flow.scale
-    facts: dict[str, float | str] = {"tolerance": method.tolerance, "order": 2}
+    bounds, where, missed, corners = taken_in(flow, found.bounds + found.correction, found.where)
+    error = SAFETY * (np.maximum(found.correction, found.open_gain).max(-1) + method.tolerance / 2 * flow.scale) + missed[:, None]
+    facts: dict[str, float | str] = {"tolerance": method.tolerance, "order": 2, "corners": corners}
     if found.open_gain.any():
         facts["reason"] = f"stopped at the budget of {method.budget} trajectories; models promise {found.open_gain.max():.2g} more"
     cost = {"trajectories": len(found.points), "seconds": time.perf_counter() - begun}
     name = "improved-graph-follower"
-    return signed_envelope(
-        flow, found.bounds + found.correction, found.where, method=name, nature="estimated", error=error, facts=facts, **cost
-    )
+    return signed_envelope(flow, bounds, where, method=name, nature="estimated", error=error, facts=facts, **cost)

@@ -9,6 +9,7 @@ from functools import singledispatch
 import numpy as np
 
 from frame.box import Boxes, UnitFlow
+from frame.corner_check import signs
 from frame.envelope import Envelope, output_unit
 from frame.flow import Flow, LinearFlow, StepError
 from frame.integrators import Exact, state_matrix
@@ -27,15 +28,8 @@ DIVERGED = 10.0
 
 def probes(cuts: Boxes) -> Array:
     """The modal parameters and corners of the widest box, shape (S, d), in SI units."""
-    d = len(cuts.names)
-    signs = np.array(np.meshgrid(*[(-1.0, 1.0)] * d, indexing="ij")).reshape(d, -1).T if 2**d <= CORNERS else _some_signs(d)
-    points: Array = np.unique(np.vstack([cuts.modal, cuts.to_physical(signs)]), axis=0)
+    points: Array = np.unique(np.vstack([cuts.modal, cuts.to_physical(signs(len(cuts.names), CORNERS))]), axis=0)
     return points
-
-
-def _some_signs(d: int) -> Array:
-    drawn = np.random.default_rng(7).choice([-1.0, 1.0], (CORNERS - 2, d))
-    return np.vstack([-np.ones(d), np.ones(d), drawn])
 
 
 def step_error(flow: UnitFlow) -> Array:
