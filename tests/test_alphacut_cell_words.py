@@ -58,7 +58,7 @@ def test_a_cross_check_prints_the_difference_that_it_found(capfd):
         (["cell", "--cross-check", "series,series"], "two different models"),
         (["cell", "--method", "series", "--exclude", "series"], "--exclude = series: the method is series"),
         (["modulus", "--method", "prism", "--exclude", "series"], "the method is prism, and only method auto leaves a choice"),
-        (["cell", "--method", "auto", "--tolerance", "1e-16"], "modulus.tolerance = 1e-16: 1e-16 is out of range; allowed: a number without a unit from 1e-10 to 0.1"),
+        (["cell", "--method", "auto", "--tolerance", "1e-16"], "1e-16 is out of range; allowed: a number without a unit from 1e-10 to 0.1"),
         (["modulus", "--method", "auto", "--tolerance", "0.2"], "modulus.tolerance = 0.2: 0.2 is out of range"),
     ],
 )
