@@ -15,6 +15,7 @@ from fuzzy.memory import require
 from fuzzy.model import Layout, Values
 from fuzzy.numbers import Array
 from fuzzy.shelf import Shelf
+from fuzzy.spot_check import require_same
 from fuzzy.workers import Task, completed
 
 Progress = Callable[[float], None]
@@ -57,6 +58,7 @@ class Campaign:
         calls: Calls of the function so far.
         stepwise: Whether the plan itself reports the share done, since it asks for its samples batch by batch.
         layout: Names and shapes of the outputs, as the first sample had them.
+        spot_check: Whether the first sample taken from the store is run again to see that it still holds.
     """
 
     call: Call
@@ -69,6 +71,7 @@ class Campaign:
     calls: int = 0
     stepwise: bool = False
     layout: Layout = ()
+    spot_check: bool = False
     _before: float = field(default=0.0, repr=False)
     _told: float = field(default=0.0, repr=False)
 
@@ -137,6 +140,10 @@ class _Batch:
         keys = {shelf.key(self.points[row]): row for row in rows}
         mine, stored = shelf.claim(list(keys))
         for key, sample in stored.items():
+            if self.campaign.spot_check:
+                self.campaign.calls += 1
+                require_same(sample, self.campaign.call(self.points[[keys[key]]])[0], self.campaign.call.names, self.points[keys[key]])
+                self.campaign.spot_check = False
             self._take(keys[key], self._aligned(sample))
             self.campaign.reused += 1
         if stored:

@@ -37,6 +37,7 @@ def propagate(
     known: Known | None = None,
     store: Store | str | Path | None = None,
     identity: Identity | None = None,
+    spot_check: bool = False,
     progress: Progress | None = None,
 ) -> FuzzyResult:
     """Fuzzy outputs of a function of fuzzy inputs.
@@ -56,7 +57,9 @@ def propagate(
         executor: Any `concurrent.futures` executor, instead of `workers`.
         known: Facts about the function, such as the signs of its effects, on which guaranteed bounds rest.
         store: Where samples are kept (or its path): a campaign that was stopped, however, resumes from it.
-        identity: What a sample depends on besides its inputs (case, options, versions), as JSON can say it; a store needs it.
+        identity: What a sample depends on besides its inputs (case, options, versions), as JSON can say it; a store needs it. The store
+            cannot see that the function changed: say so here, by a version or a hash of its text.
+        spot_check: Whether the first sample found in the store is run again, and the store refused if it gives something else.
         progress: Called with the share done, 0 … 1.
 
     Raises:
@@ -74,7 +77,7 @@ def propagate(
     call = Call(function, domain.names, tuple(shared), vectorised)
     start = perf_counter()
     with nullcontext(executor) if executor else pool(workers) as running, shelf(store, identity, domain.names) as samples:
-        campaign = Campaign(call, running, progress, known, samples, stepwise=plan.stepwise)
+        campaign = Campaign(call, running, progress, known, samples, stepwise=plan.stepwise, spot_check=spot_check)
         result = plan.run(campaign, domain)
         result = result.confronted(known.stated(domain.names, result.outputs))
         campaign.report(1.0)

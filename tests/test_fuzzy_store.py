@@ -329,3 +329,23 @@ def test_a_store_where_nothing_may_be_written_says_so(tmp_path, monkeypatch):
     monkeypatch.setattr("fuzzy.store.os.access", lambda *_: False)  # a test that runs as root may write everywhere
     with pytest.raises(StoreError, match=r"cannot be used \(.*\): its folder or the file cannot be written: give another path"):
         Store(tmp_path / "text" / "below")
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        (
+            lambda a, b: {"sum": a + b + 1e-3, "pair": [a, b]},
+            r"holds sum = -1 at a = 0, b = -1 where the function gives -0.999; a function",
+        ),
+        (lambda a, b: {"new": a + b, "pair": [a, b]}, r"holds the outputs sum, pair\[0\], pair\[1\], the function gives new, pair\[0\]"),
+        (lambda a, b: 1 / 0, r"holds a sample at a = 0, b = -1 where the function now fails \(ZeroDivisionError"),
+    ],
+)
+def test_a_spot_check_finds_a_function_that_changed(tmp_path, changed, message):
+    run = {"inputs": INPUTS, "store": tmp_path / "s.db", "identity": IDENTITY}
+    propagate(model, **run)
+    same = propagate(lambda a, b: {"pair": [a, b], "sum": a + b}, **run, spot_check=True)
+    assert (same.calls, same.reused) == (1, 55)
+    with pytest.raises(ValueError, match=message):
+        propagate(changed, **run, spot_check=True)
