@@ -243,7 +243,8 @@ def pursue(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> 
     """Envelope by the Graph Follower in rounds, corrected by what the last models still promise; options are the fields of `BatchFollower`.
 
     The error is twice what these models promise, below the tolerance, or above it where the budget ended the search, and by how much the
-    corners of the boxes pass the bounds, which then take them in; the fact "corners" counts these, which have no derivatives. A basin that neither a model nor a corner shows is not in it.
+    corners of the boxes pass the bounds, which then take them in. A basin that neither a model nor a corner shows is not in it. The fact
+    "corners" counts these, which need no derivatives.
     """
     method, begun = BatchFollower(**options), time.perf_counter()
     found = method.run(flow, progress=progress)

@@ -34,7 +34,7 @@ class Trajectories(Protocol):
         """Names of the observed quantities."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Envelope:
     """Discrete fuzzy mapping of an output quantity (eq. 20).
 
@@ -55,7 +55,23 @@ class Envelope:
         inner_lower: Of a certified envelope what `lower_at` attains at most, less what the model of the motion may be wrong by, so that the
             true lower bound lies between `lower` and this; shape (A, T, m). None without a certificate.
         inner_upper: The same for the upper bound. Where it lies below `inner_lower`, no width is proved.
-        facts: Further numbers and words: step error, reason of a choice, counts.
+        facts: Further numbers and words by name, see below.
+
+    The facts that are there depend on the method. "The unit" is that of the first displacement among the outputs, else of the first output;
+    where the tolerance was relative, it is a share of each output's peak.
+
+    - integrator: Name of the time stepping. step_error: What it is wrong by at most at the modal parameters and the widest box's corners,
+      in the unit of the first displacement; added to `error`, for each output in its own unit, where that was estimated.
+    - dominant_error: Said where time stepping adds more to an output than the search.
+    - tolerance: What the Graph Follower computed a graph for, in the unit. order: Degree of its Taylor models. recomputed: Derivatives
+      computed again. corners: Trajectories at corners, beside `trajectories`.
+    - degree: Of the polynomials of the modes. model_error: What trajectories of theirs are wrong by at most at held-out parameters, over
+      all outputs; of a certified envelope the bound that went into it, in the unit.
+    - estimated_error: Largest error, in the unit. missed_by_sample: By how much independent trajectories passed the bounds, in the unit.
+    - gap: Largest distance of attained and proved bounds, in the unit, which is that of gap_output. between_nodes: How far an output may
+      stray from a straight line between two nodes, in the unit. boxes: Parts of the parameters' box that the proof looked at, a count.
+      proof: What is proved and what sampled.
+    - reason: Why the method was taken, or what it fell short of.
     """
 
     alpha: Array
@@ -74,6 +90,18 @@ class Envelope:
     inner_lower: Array | None = None
     inner_upper: Array | None = None
     facts: Mapping[str, float | str] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """What, over what, how far at the lowest level, by what method and how well, in a few lines."""
+        span = f"{self.time[0]:g} … {self.time[-1]:g} s ({len(self.time)} nodes)"
+        levels = ", ".join(f"{a:g}" for a in self.alpha)
+        lines = [f"Envelope of {', '.join(self.outputs)} over {span}, α = {levels}, uncertain {', '.join(self.parameters)}"]
+        for k, name in enumerate(self.outputs):
+            unit = _unit(name)
+            error = "" if self.error is None else f", error up to {self.error[..., k].max():.2g}{unit}"
+            lines.append(f"  {name}: {self.minimum[0, k]:.6g} … {self.maximum[0, k]:.6g}{unit} at α = {self.alpha[0]:g}{error}")
+        count = f"{self.trajectories} {'eigen-analyses' if self.method == 'modal' else 'trajectories'}"
+        return "\n".join([*lines, f"  {self.method}: {count}, {self.seconds:.2g} s, bounds {self.nature}"])
 
     @property
     def minimum(self) -> Array:
@@ -120,6 +148,12 @@ def signed_envelope(flow: Trajectories, bounds: Array, at: Array, **rest: Any) -
     return Envelope(
         cuts.alpha, flow.time, flow.outputs, cuts.names, -bounds[..., 0], bounds[..., 1], where[..., 0, :], where[..., 1, :], **rest
     )
+
+
+def _unit(name: str) -> str:
+    """The unit after a number; nothing where it is not known."""
+    unit = output_unit(name)
+    return "" if unit == "SI" else f" {unit}"
 
 
 def output_unit(name: str) -> str:

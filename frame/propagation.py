@@ -48,24 +48,40 @@ def envelope(
 
     Args:
         model: A linear structure or a general Lagrangian system.
-        inputs: Fuzzy parameters by name, in SI units.
+        inputs: Fuzzy parameters by name, in SI units; a plain number is a crisp one.
         duration: Length of the simulation, in s.
         step: Distance of the nodes and step of the integrator, in s.
-        alpha: Levels in [0, 1].
+        alpha: Levels, rising within [0, 1].
         method: Name of a method, see `METHODS`; unless given, auto for linear structures with an error of 1e-4 m, or of a thousandth of
             each peak where no output is a displacement, and improved-graph-follower for others.
-        integrator: Time stepping: a method or its name; exact for the method modal and midpoint for all others unless given.
+        integrator: Time stepping. Of linear structures an integrator or its name: exact (of auto and modal unless given), midpoint (of all
+            others), newmark, rk4, gauss4. Of general Lagrangian systems midpoint (unless given), composition4 or rk4.
         relative: Whether the method's tolerance is a share of each output's peak at the modal parameters, instead of a length in SI units.
         progress: Called with the fraction done.
-        options: Options of the method, such as `order`, `tolerance`, `budget` of the Graph Follower.
+        options: Options of the method, see below.
+
+    Options, in SI units; a tolerance is in m, or in the unit of the first output where none is a displacement, others in proportion:
+
+    - auto: `tolerance` (wanted error, 1e-4), `exclude` (of modal and improved-graph-follower), `budget` (most trajectories, 20000).
+    - modal: `tolerance` (of the polynomials of the modes, 1e-6), `budget` (most eigen-analyses, 280), `seed`; `certify` (wanted gap between
+      attained and proved bounds; none), then `boxes` (most boxes for each bound, 4000) and `workers` (processes, 1).
+    - improved-graph-follower: `tolerance` (promised gain worth a trajectory, 7e-5), `budget` (most trajectories, 5000), `spread` (first
+      points on each level, 64), `batch` (computed together, 32), `reach` (trust region, share of the box, 0.6), `order` (2), `contests`.
+    - graph-follower: `order` (of the Taylor models, 1 or 2), `tolerance` (1e-4), `sweeps` (1), `exact` (False), `models` (1), `corrected`
+      (False), `budget` (none), `record` (False); see `GraphFollower`.
+    - vertex: none. monte-carlo, quasi-monte-carlo: `samples` on each level (1000, 1024), `seed`.
+    - Where no method is named: those of auto; `certify`, `seed`, `boxes` or `workers` ask for modal.
 
     Raises:
-        ValueError: An unknown name, or a value outside its range.
+        ValueError: An unknown name or option, a value outside its range, a support that reaches values without a meaning, an unstable
+            step, or a motion that does not exist.
+        StepError: A step did not converge, or leaves the motion.
         ToleranceError: No method reaches the wanted error.
         ModalError: The method is modal, and the structure has no smooth oscillating modes over the box.
 
     Warns:
-        UserWarning: The method is modal, and its error passes the tolerance and a hundredth of a peak.
+        UserWarning: The error of time stepping passes a hundredth of a peak; or the method is modal, and its error passes that and the
+            tolerance.
     """
     if method is None and isinstance(model, LagrangianSystem):
         method = "improved-graph-follower"
