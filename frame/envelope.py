@@ -99,7 +99,9 @@ class Envelope:
         for k, name in enumerate(self.outputs):
             unit = _unit(name)
             error = "" if self.error is None else f", error up to {self.error[..., k].max():.2g}{unit}"
-            lines.append(f"  {name}: {self.minimum[0, k]:.6g} … {self.maximum[0, k]:.6g}{unit} at α = {self.alpha[0]:g}{error}")
+            ends = np.array([self.minimum[0, k], self.maximum[0, k]])
+            low, high = np.where(np.abs(ends) > 1e-9 * np.abs(ends).max(), ends, 0.0)
+            lines.append(f"  {name}: {low:.6g} … {high:.6g}{unit} at α = {self.alpha[0]:g}{error}")
         count = f"{self.trajectories} {'eigen-analyses' if self.method == 'modal' else 'trajectories'}"
         return "\n".join([*lines, f"  {self.method}: {count}, {self.seconds:.2g} s, bounds {self.nature}"])
 
