@@ -14,6 +14,7 @@ from alphacut.case import Case
 from alphacut.cell import INPUTS, SHARED, CellChoice, cell_choice, key_of, parts
 from alphacut.provenance import source_digest, versions
 from fuzzy import Extended, FuzzyNumber, General, Known, Plan, Reduced, Signed
+from stochastic.interpolation import between_nodes
 from stochastic.truncated_normal import Array
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 SOURCES = ("space", "theta", "table")  # of error, see rve.result.Homogenised
 JUDGED = ("prism", "auto")
 TABULATED = ("table", "auto")  # methods whose samples may share a table over the particle's moduli
+OF_CURVES = 1e-9  # relative tolerance on E with which the curve between the nodes is good to 1e-4 or so
 SHOWN = 61  # points of a stored stress curve
 
 
@@ -71,9 +73,7 @@ class CellTask:
 
     def resampled(self, nodes: Array, stress: Array) -> Array:
         """A stress curve at `SHOWN` points over θ, for pictures: models choose their own nodes, and not the same for every sample."""
-        from scipy.interpolate import PchipInterpolator
-
-        return np.asarray(PchipInterpolator(nodes, stress)(theta_shown(self.theta)))
+        return between_nodes(nodes, stress, theta_shown(self.theta))
 
 
 def plan_of(case: Case) -> Plan:
@@ -137,6 +137,8 @@ def campaign(case: Case, *, petsc: Mapping[str, str] | None = None, exclude: tup
     choice = cell_choice(case, exclude=exclude, petsc=petsc)
     if choice.method in TABULATED:  # no other method's samples depend on the range, and a wider one may take them as they are
         choice = replace(choice, moduli=(support.lower, support.upper))
+    if case.has("response.quantity") and choice.method == "auto" and "series" not in choice.exclude:
+        choice = replace(choice, tolerance=min(choice.tolerance, OF_CURVES))  # a curve needs more nodes than its mean, and they cost little
     task = CellTask(choice, crisp, case.numbers("radius.theta"))
     shared = tuple(name for name in inputs if name in SHARED) or ("inclusion_modulus",)
     return Campaign(task, inputs, plan_of(case), case.numbers("modulus.alpha"), shared, known(case, inputs), store)
