@@ -13,7 +13,7 @@ from fuzzy.model import Layout, flatten
 from fuzzy.numbers import Array
 
 Function = Callable[..., Any]
-_BATCH = 1024  # points per call of a vectorised function
+BATCH = 1024  # points per call of a vectorised function
 
 
 class Sample(NamedTuple):
@@ -74,7 +74,7 @@ class Call:
                 groups.setdefault(points[row, columns].tobytes(), []).append(row)
             yield from groups.values()
             return
-        size = _BATCH if self.vectorised else 1
+        size = BATCH if self.vectorised else 1
         for start in range(0, len(points), size):
             yield list(range(start, min(start + size, len(points))))
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
-from fuzzy.call import Call, named_point
-from fuzzy.domain import Domain
+from fuzzy.call import BATCH, Call, Function, named_point
+from fuzzy.domain import Domain, levels
+from fuzzy.interaction import Interaction
 from fuzzy.known import Known
 from fuzzy.memory import needed
 from fuzzy.model import Values
@@ -18,9 +19,11 @@ from fuzzy.numbers import Array
 from fuzzy.plan import Plan
 from fuzzy.shelf import Shelf, shelf
 from fuzzy.store import Identity, Store, Stored
-from fuzzy.vetting import fuzzy_inputs, require_plan
+from fuzzy.transformation import General, Reduced
+from fuzzy.vetting import fuzzy_inputs, interaction_list, known_facts, require_plan
 
 _SHOWN = 5
+_LISTED = 100_000  # samples that are listed at most where nothing is stored
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,7 @@ class Explanation:
         seconds: Time that they would take one after the other, from the mean of those stored; None where nothing tells.
         memory: Bytes that the samples' numbers take.
         reasons: Why they are not there, one sentence each.
+        open_end: What else the number of samples depends on; empty where it is known.
     """
 
     samples: int
@@ -44,12 +48,15 @@ class Explanation:
     seconds: float | None
     memory: int
     reasons: tuple[str, ...]
+    open_end: str = ""
 
     def __str__(self) -> str:
-        head = f"{self.samples} samples: {self.stored} stored, {len(self.missing)} to run in {self.calls} calls"
+        missing = self.samples - self.stored
+        samples = f"the first {self.samples}" if self.open_end else f"{self.samples} samples"
+        head = f"{self.open_end}{samples}: {self.stored} stored, {missing} to run in {self.calls} calls"
         time = "" if self.seconds is None else f", about {self.seconds:.3g} s of work"
         first = [", ".join(f"{name} = {value:.6g}" for name, value in point.items()) for point in self.missing[:_SHOWN]]
-        more = [f"… and {len(self.missing) - _SHOWN} more"] if len(self.missing) > _SHOWN else []
+        more = [f"… and {missing - _SHOWN} more"] if missing > _SHOWN else []
         return "\n".join(
             [f"{head}{time}; {self.memory / 1e6:.3g} MB of memory", *self.reasons, *(f"  would run {row}" for row in first), *more]
         )
@@ -90,48 +97,89 @@ class _Rehearsal:
 
 
 def explain(
-    inputs: Mapping[str, Any],
-    plan: Plan,
+    function: Function | Mapping[str, Any] | None = None,
+    inputs: Mapping[str, Any] | Plan | None = None,
+    plan: Plan | None = None,
     *,
-    alpha: Sequence[float],
+    alpha: Sequence[float] | None = None,
+    interactions: Sequence[Interaction] = (),
     shared: Sequence[str] = (),
+    vectorised: bool = False,
+    workers: int = 1,
+    executor: object = None,
     known: Known | None = None,
     store: Store | str | Path | None = None,
     identity: Identity | None = None,
+    spot_check: bool = False,
+    progress: object = None,
 ) -> Explanation:
     """What `propagate` with the same arguments would run, and why. Nothing is run and no store is made.
 
     Args:
+        function: Not called; may be left out, so that the inputs come first.
         inputs: Fuzzy number of each input; a plain number is crisp.
-        plan: How the boxes of the inputs are searched.
-        alpha: Rising levels.
+        plan: How the boxes of the inputs are searched; the general transformation method if not given.
+        alpha: Rising levels; 0, ¼, ½, ¾, 1 if not given.
+        interactions: Constraints between the inputs.
         shared: Inputs whose equality lets samples share one call.
+        vectorised: Whether the function takes arrays.
+        workers: Changes nothing here.
+        executor: Changes nothing here.
         known: Facts about the model.
         store: Where samples are kept, if there.
         identity: What a sample depends on besides its inputs.
+        spot_check: Changes nothing here.
+        progress: Changes nothing here.
+
+    Raises:
+        ValueError: An argument is wrong.
     """
+    if isinstance(function, Mapping):
+        inputs, plan = function, cast("Plan | None", inputs) or plan
+    plan = plan or General()
     require_plan(plan)
-    domain = Domain(fuzzy_inputs(inputs), alpha)
-    missing: Array
+    domain = Domain(fuzzy_inputs(cast("Mapping[str, Any]", inputs)), levels(4) if alpha is None else alpha, interaction_list(interactions))
+    facts = known_facts(known, domain.names)
+    call = Call(_never, domain.names, tuple(shared), vectorised)
     there = store if isinstance(store, Store) or (store is not None and Path(store).exists()) else None
+    if there is None and isinstance(plan, Reduced | General) and plan.size(domain) > _LISTED:
+        return _counted(plan.size(domain), domain, vectorised)
     with shelf(there, identity, domain.names) as samples:
-        rehearsal = _Rehearsal(samples, known or Known())
-        try:
-            result = plan.run(rehearsal, domain)
-            points, missing = result.points, np.empty((0, len(domain.names)))
-        except _MissingError as stop:
-            points, missing = stop.points, stop.missing
-        reasons = _reasons(samples, identity or {}, domain, missing) if len(missing) else ("everything is stored: nothing would run",)
-    tasks = list(Call(_never, domain.names, tuple(shared)).tasks(missing))
+        return _rehearsed(plan, domain, call, _Rehearsal(samples, facts), identity or {})
+
+
+def _rehearsed(plan: Plan, domain: Domain, call: Call, rehearsal: _Rehearsal, identity: Identity) -> Explanation:
+    """The plan followed through the store."""
+    missing: Array
+    try:
+        points, missing = plan.run(rehearsal, domain).points, np.empty((0, len(domain.names)))
+    except _MissingError as stop:
+        points, missing = stop.points, stop.missing
+    reasons = _reasons(rehearsal.samples, identity, domain, missing) if len(missing) else ("everything is stored: nothing would run",)
     return Explanation(
         samples=len(points),
         stored=len(points) - len(missing),
         missing=tuple(named_point(domain.names, missing[row]) for row in range(len(missing))),
-        calls=len(tasks),
+        calls=len(list(call.tasks(missing))),
         seconds=rehearsal.seconds / rehearsal.seen * len(missing) if rehearsal.seen else None,
         memory=needed(len(points), len(domain.names) + rehearsal.columns),
         reasons=reasons,
+        open_end=_open_end(plan) if plan.stepwise and len(missing) else "",
     )
+
+
+def _counted(size: int, domain: Domain, vectorised: bool) -> Explanation:
+    """So many samples that they are counted, not listed: points that two levels share count twice."""
+    calls = -(-size // BATCH) if vectorised else size
+    few = "too many to list; take Signed, Optimisation or Chebyshev if these are too many to run"
+    return Explanation(size, 0, (), calls, None, needed(size, len(domain.names) + 1), ("there is no store yet: every sample is new", few))
+
+
+def _open_end(plan: Plan) -> str:
+    """What a plan says that goes on from the values of its samples."""
+    most = getattr(plan, "budget", None) or getattr(plan, "limit", None)
+    kind = "budget" if hasattr(plan, "budget") else "limit"
+    return f"how many samples {type(plan).__name__} takes depends on the model{f' ({kind} {most:,})' if most else ''}; "
 
 
 def _never(**_: float) -> float:

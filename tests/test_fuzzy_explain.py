@@ -1,10 +1,25 @@
 """What a campaign would run, and why."""
 
 import os
+from time import perf_counter
 
 import pytest
 
-from fuzzy import CampaignError, Chebyshev, General, Interval, Store, Triangular, explain, levels, propagate
+from fuzzy import (
+    CampaignError,
+    Chebyshev,
+    General,
+    Interval,
+    Known,
+    Optimisation,
+    Reduced,
+    Signed,
+    Store,
+    Triangular,
+    explain,
+    levels,
+    propagate,
+)
 
 INPUTS = {"a": Triangular(0.0, 0.3, 1.0), "b": Triangular(-1.0, 0.0, 2.0)}
 IDENTITY = {"cell": {"mesh": 0.15, "layers": 12}, "version": "1"}
@@ -96,3 +111,26 @@ def test_a_process_that_dies_is_recorded_as_a_failed_sample(tmp_path):
         run(tmp_path / "s.db", function=dies, workers=2, alpha=(0.0, 0.4, 0.7, 1.0))
     assert len(caught.value.failures) == 1
     assert ask(tmp_path / "s.db", alpha=(0.0, 0.4, 0.7, 1.0)).stored == 29
+
+
+def test_an_explanation_takes_the_arguments_of_a_propagation(tmp_path):
+    assert explain(model, INPUTS).samples == explain(INPUTS).samples == explain(inputs=INPUTS).samples == 55
+    options = {"alpha": levels(2), "workers": 2, "progress": print, "store": tmp_path / "s.db", "identity": IDENTITY, "spot_check": True}
+    assert explain(model, INPUTS, General(), **options).samples == explain(INPUTS, General(), alpha=levels(2)).samples
+    assert explain(model, INPUTS, vectorised=True).calls == 1
+    with pytest.raises(ValueError, match="what is known of the model names c"):
+        explain(model, INPUTS, known=Known({"c": 1}))
+
+
+@pytest.mark.parametrize(("plan", "most"), [(Chebyshev(), r"budget 1,000"), (Signed(), r"limit 10,000"), (Optimisation(), r"budget 2,000")])
+def test_a_number_of_samples_that_depends_on_the_model_is_not_named(plan, most):
+    found = str(explain(model, INPUTS, plan))
+    assert found.startswith(f"how many samples {type(plan).__name__} takes depends on the model ({most}); the first 1: 0 stored, 1 to run")
+
+
+def test_too_many_samples_are_counted_without_being_made():
+    start = perf_counter()
+    found = explain({f"x{i}": Triangular(0, 1, 2) for i in range(40)}, Reduced())
+    assert perf_counter() - start < 1
+    assert found.samples == 4 * 2**40 + 1
+    assert "too many to list" in str(found)
