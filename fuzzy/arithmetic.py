@@ -34,7 +34,7 @@ class Expression(FuzzyNumber):
         sources: The numbers that occur in it.
     """
 
-    at: Callable[[float], Cut]
+    at: Callable[[float], Cut] = field(repr=False)
     text: str
     sources: tuple[FuzzyNumber, ...] = field(repr=False)
 

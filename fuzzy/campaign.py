@@ -19,7 +19,7 @@ from fuzzy.spot_check import require_same
 from fuzzy.workers import Task, completed
 
 Progress = Callable[[float], None]
-_SHOWN = 5  # failed samples that a message quotes
+_SHOWN = 5  # causes that a message quotes
 _POLL = 0.1  # seconds between two looks at what another campaign is running
 
 
@@ -34,9 +34,23 @@ class CampaignError(RuntimeError):
     def __init__(self, failures: list[tuple[dict[str, float], str]], total: int) -> None:
         self.failures = failures
         self.total = total
-        shown = "; ".join(f"at {_point(point)}: {error}" for point, error in failures[:_SHOWN])
-        more = f"; and {len(failures) - _SHOWN} more" if len(failures) > _SHOWN else ""
+        causes = _causes(failures)
+        shown = "; ".join(causes[:_SHOWN])
+        more = f"; and {len(causes) - _SHOWN} causes more" if len(causes) > _SHOWN else ""
         super().__init__(f"{len(failures)} of {total} samples failed, the others are done: {shown}{more}")
+
+
+def _causes(failures: list[tuple[dict[str, float], str]]) -> list[str]:
+    """What failed where; a cause of more than two failures is told once."""
+    places: dict[str, list[str]] = {}
+    for point, error in failures:
+        places.setdefault(error, []).append(_point(point))
+    told = []
+    for error, points in places.items():
+        few = points if len(points) <= 2 else points[:1]
+        told += [f"at {point}: {error}" for point in few]
+        told[-1] += f" (the same at {len(points) - 1} more)" if len(points) > 2 else ""
+    return told
 
 
 def _point(point: dict[str, float]) -> str:

@@ -73,7 +73,7 @@ class Effects:
             for column, name in enumerate(domain.names):
                 without = np.flatnonzero(self.signs[:, row, column] == 0)
                 if len(without):
-                    found.append(f"{output} is not monotone in {name}, or not surely, up to α = {domain.alpha[without[-1]]:g}")
+                    found.append(f"output {output} is not monotone in input {name}, or not surely, up to α = {domain.alpha[without[-1]]:g}")
         return tuple(found)
 
 
@@ -194,7 +194,7 @@ def verified(result: FuzzyResult, memo: Memo, effects: Effects) -> FuzzyResult:
     small = negligible(memo.values.array)
     beyond = (every.lower < result.lower - small) | (every.upper > result.upper + small)
     refuted = (beyond & effects.table(result, effects.signs != 0)).any(axis=0) | _contradicted(result, memo, effects)
-    notes = tuple(f"a sample lies beyond the corners of {result.outputs[i]}: the signs do not hold" for i in np.flatnonzero(refuted))
+    notes = tuple(f"a sample lies beyond the corners of output {result.outputs[i]}: the signs do not hold" for i in np.flatnonzero(refuted))
     proved = effects.table(result, effects.proved) & ~refuted
     spent = len(memo) - result.runs
     return replace(every, proved=proved, runs=result.runs, verification_runs=spent, notes=(*effects.notes(result.domain), *notes))

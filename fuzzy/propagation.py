@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
@@ -19,7 +20,7 @@ from fuzzy.result import FuzzyResult
 from fuzzy.shelf import shelf
 from fuzzy.store import Identity, Store
 from fuzzy.transformation import General
-from fuzzy.vetting import fuzzy_inputs, interaction_list, known_facts, require_callable, require_plan
+from fuzzy.vetting import fuzzy_inputs, interaction_list, known_facts, require_callable, require_plan, shared_numbers
 from fuzzy.workers import pool, require_workers
 
 
@@ -46,7 +47,7 @@ def propagate(
         function: Gets the inputs by name and returns a number, an array, or a mapping of names to either. With `shared` it gets a list
             of points (mappings of names to numbers) that agree in those inputs and returns a list of outputs; with `vectorised` it gets
             arrays, shape (n,), and returns arrays whose first axis is n.
-        inputs: Fuzzy number of each input; a plain number is crisp.
+        inputs: Fuzzy number of each input; a plain number is crisp. Inputs are independent, also where one number object stands for two.
         plan: How the boxes of the inputs are searched; the general transformation method if not given.
         alpha: Rising levels; 0, ¼, ½, ¾, 1 if not given.
         interactions: Constraints between the inputs; plans that cannot respect them refuse.
@@ -81,4 +82,5 @@ def propagate(
         result = plan.run(campaign, domain)
         result = result.confronted(known.stated(domain.names, result.outputs))
         campaign.report(1.0)
+    result = replace(result, notes=(*result.notes, *shared_numbers(domain)))
     return result.charged(calls=campaign.calls, reused=campaign.reused, seconds=perf_counter() - start)

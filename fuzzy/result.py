@@ -21,12 +21,20 @@ if TYPE_CHECKING:
     import xarray
 
 
+_PRINTED = 50  # outputs that are printed
+
+
 class Nature(StrEnum):
     """What a bound is worth."""
 
     GUARANTEED = "guaranteed"  # proved: the true range lies inside
     INNER = "inner"  # attained by the model: the true range reaches at least so far
     ESTIMATED = "estimated"  # from a surrogate, with an estimate of its error
+
+
+def _shown(value: float) -> str:
+    """A bound with six digits; 0 where it is less than a normal number."""
+    return f"{0.0 if abs(value) < np.finfo(float).tiny else value:.6g}"
 
 
 @dataclass(frozen=True)
@@ -120,7 +128,7 @@ class FuzzyResult:
         """The same bounds, proved where `holds` says so (shape (levels, outputs)) unless the samples themselves contradict it."""
         proved = holds(self)
         refuted = [self.outputs[column] for column in np.flatnonzero((proved & self.enforced).any(axis=0))]
-        notes = tuple(f"the samples contradict what is stated of {name}: its bounds are inner only" for name in refuted)
+        notes = tuple(f"the samples contradict what is stated of output {name}: its bounds are inner only" for name in refuted)
         return replace(self, proved=self.proved | (proved & ~self.enforced.any(axis=0)), notes=(*self.notes, *notes))
 
     def confronted(self, signs: Signs) -> FuzzyResult:
@@ -132,12 +140,14 @@ class FuzzyResult:
         return replace(self, proved=kept, notes=(*self.notes, *notes)) if found else self
 
     def __str__(self) -> str:
-        """The bounds of every output, a line for each level, with what they are worth and what they cost."""
+        """The bounds of every output (of the first 50), a line for each level, with what they are worth and what they cost."""
         lines = [f"{self.nature} bounds by the plan {self.plan}, {self.runs} runs"]
-        for column, name in enumerate(self.outputs):
+        for column, name in enumerate(self.outputs[:_PRINTED]):
             cuts = zip(self.domain.alpha, self.lower[:, column], self.upper[:, column], strict=True)
-            lines += [f"{name}, α = {alpha:g}: {low:.6g} … {high:.6g}" for alpha, low, high in cuts]
-        return "\n".join([*lines, *self.notes])
+            lines += [f"{name}, α = {alpha:g}: {_shown(low)} … {_shown(high)}" for alpha, low, high in cuts]
+        hidden = len(self.outputs) - _PRINTED
+        more = [f"… and {hidden:,} outputs more: bounds(NAME) has them"] if hidden > 0 else []
+        return "\n".join([*lines, *more, *self.notes])
 
     @property
     def nature(self) -> Nature:

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
 from typing import Any
 
+from fuzzy.domain import Domain
 from fuzzy.interaction import Interaction
 from fuzzy.known import Known
 from fuzzy.numbers import Crisp, FuzzyNumber
@@ -33,6 +34,18 @@ def _fuzzy(name: str, value: object) -> FuzzyNumber:
     if isinstance(value, Real):
         return Crisp(float(value))
     raise ValueError(f"the input {name!r} is {value!r}; it must be a number or a fuzzy number such as Triangular(24, 25, 26)")
+
+
+def shared_numbers(domain: Domain) -> tuple[str, ...]:
+    """A note for each fuzzy number that stands for several inputs: they are independent all the same."""
+    names: dict[int, list[str]] = {}
+    for name, number in domain.inputs.items():
+        if number.support.width > 0:
+            names.setdefault(id(number), []).append(name)
+    cure = "where they are one quantity, make it one input"
+    return tuple(
+        f"inputs {', '.join(same)} share one fuzzy number and vary independently; {cure}" for same in names.values() if len(same) > 1
+    )
 
 
 def known_facts(known: object, names: Sequence[str]) -> Known:

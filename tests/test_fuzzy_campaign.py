@@ -180,3 +180,32 @@ def test_two_outputs_of_one_name_are_refused():
         propagate(lambda x: {"a[0]": x, "a": [x]}, {"x": Interval(0, 1)})
     with pytest.raises(CampaignError, match="two outputs are named '1'; each needs a name of its own"):
         propagate(lambda x: {"1": x, 1: x}, {"x": Interval(0, 1)})
+
+
+def test_a_cause_of_many_failures_is_told_once():
+    with pytest.raises(CampaignError) as caught:
+        propagate(fragile, INPUTS)
+    text = str(caught.value)
+    assert text.count("no convergence") == text.count("must be a finite number") == 1
+    assert "at a = 1, b = -1: RuntimeError: no convergence (the same at 4 more)" in text
+
+
+def test_a_result_is_printed_in_few_lines_and_without_subnormal_numbers():
+    result = propagate(lambda a, b: np.zeros(20_000) - 5e-324, INPUTS, alpha=[0.0, 1.0])
+    lines = str(result).splitlines()
+    assert len(lines) == 102
+    assert lines[1] == "y[0], α = 0: 0 … 0"
+    assert lines[-1] == "… and 19,950 outputs more: bounds(NAME) has them"
+    assert "-0" not in str(propagate(lambda a, b: -0.0 * a, INPUTS))
+
+
+def test_a_number_that_stands_for_two_inputs_is_noted():
+    one = Triangular(0, 1, 2)
+    result = propagate(lambda u, v, w: u - v + w, {"u": one, "v": one, "w": Triangular(0, 1, 2)})
+    assert result.notes == ("inputs u, v share one fuzzy number and vary independently; where they are one quantity, make it one input",)
+    assert result.bounds()[0][0] == -2
+
+
+def test_notes_tell_outputs_from_inputs_of_the_same_name():
+    result = propagate(lambda y: (y - 1) ** 2, {"y": Interval(0, 3)}, Signed())
+    assert result.notes[0].startswith("output y is not monotone in input y")

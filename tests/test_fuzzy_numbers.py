@@ -74,3 +74,8 @@ def test_refusals_name_the_value_and_the_cure(make, message):
 def test_what_is_no_number_has_no_grade():
     assert np.isnan(Triangular(1, 2, 3).membership(np.nan))
     np.testing.assert_array_equal(Triangular(1, 2, 3).membership([0, 1.5, np.nan, np.inf]), [0, 0.5, np.nan, 0])
+
+
+def test_an_expression_is_printed_by_its_text():
+    assert "function" not in repr(Triangular(1, 2, 3) + Interval(0, 1))
+    assert "Triangular(lower=1, modal=2, upper=3) + Interval(lower=0, upper=1)" in str(Triangular(1, 2, 3) + Interval(0, 1))

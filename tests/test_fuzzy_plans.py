@@ -132,7 +132,9 @@ def test_product_of_eight_factors_by_its_corners():
 def test_a_fall_back_that_explodes_is_refused():
     inputs = {f"x{i}": Triangular(-1.0, 0.0, 2.0) for i in range(8)}
     for plan in (Signed(), Extended()):
-        with pytest.raises(ValueError, match=r"the plan would take [\d,]+ samples since y is not monotone in x0.*state the signs"):
+        with pytest.raises(
+            ValueError, match=r"the plan would take [\d,]+ samples since output y is not monotone in input x0.*state the signs"
+        ):
             propagate(lambda **x: sum(value**2 for value in x.values()), inputs, plan)
 
 

@@ -67,7 +67,7 @@ def test_a_range_of_the_gradient_proves_the_signs_box_by_box():
 def test_an_input_without_a_sign_gets_the_points_of_the_general_method():
     result = propagate(wavy, PAPER, Signed())
     general = propagate(wavy, PAPER, General())
-    assert result.notes[0].startswith("y is not monotone in a2, or not surely, up to α = ")
+    assert result.notes[0].startswith("output y is not monotone in input a2, or not surely, up to α = ")
     assert 9 < result.runs < 60
     assert (result.lower <= general.lower + 1e-12).all()
     assert (result.upper >= general.upper - 1e-12).all()
