@@ -19,8 +19,12 @@ from fuzzy.domain import Domain
 from fuzzy.known import Known
 from fuzzy.numbers import Array, FuzzyNumber, PiecewiseLinear
 from fuzzy.plan import Plan
+from fuzzy.result import Nature
 from fuzzy.transformation import Reduced
 from fuzzy.vetting import fuzzy_inputs, known_facts
+
+_NOTES = 5  # of the plan at its many points that are kept
+_INNER = "the bounds are inner: too narrow where the model turns between the samples of a box; take General or Optimisation as plan there"
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,9 @@ class IntervalResponse:
         lower: Lower ends, shape (points, levels, outputs).
         upper: Upper ends, shape (points, levels, outputs).
         runs: Samples of the model.
+        nature: What the bounds at the points are worth: inner where the plan has seen corners or samples only, so that the bounds of a mean
+            or a probability may be too narrow; the averages over the points have the error of quasi-Monte Carlo besides.
+        notes: What the plan found on its way, one sentence each.
     """
 
     alpha: tuple[float, ...]
@@ -59,6 +66,8 @@ class IntervalResponse:
     lower: Array
     upper: Array
     runs: int
+    nature: Nature = Nature.INNER
+    notes: tuple[str, ...] = ()
 
     def mean(self, output: str = "y") -> tuple[Array, Array]:
         """Bounds of the mean on every level, two arrays (levels,)."""
@@ -96,7 +105,8 @@ class IntervalQuasiMonteCarlo:
     Args:
         points: Quasi-random points, best a power of 2.
         seed: Where their scrambling starts from.
-        plan: How the model is bounded over the box of each point; corners are exact where the model is monotone.
+        plan: How the model is bounded over the box of each point; corners, the default, are exact where the model is monotone, and too
+            narrow where it is not.
 
     Raises:
         ValueError: There is no point.
@@ -150,15 +160,23 @@ class IntervalQuasiMonteCarlo:
         rows: list[tuple[Array, Array]] = []
         outputs: tuple[str, ...] = ()
         runs = 0
+        natures: set[Nature] = set()
+        notes: dict[str, None] = {}
         for k in range(self.points):
             drawn = {name: _number(alpha, [cut[0][k] for cut in cuts], [cut[1][k] for cut in cuts]) for name, cuts in ends.items()}
             result = self.plan.run(campaign, Domain({**drawn, **fuzzy}, alpha))
+            result = result.confronted(facts.stated(result.inputs, result.outputs))
+            natures.add(result.nature)
+            notes |= dict.fromkeys(result.notes)
             rows.append((result.lower, result.upper))
             outputs, runs = result.outputs, runs + result.runs
             if progress:
                 progress((k + 1) / self.points)
+        weakest = next(nature for nature in (Nature.ESTIMATED, Nature.INNER, Nature.GUARANTEED) if nature in natures)
+        if weakest is Nature.INNER:
+            notes[_INNER] = None
         table = np.array(rows)
-        return IntervalResponse(tuple(alpha), outputs, table[:, 0], table[:, 1], runs)
+        return IntervalResponse(tuple(alpha), outputs, table[:, 0], table[:, 1], runs, weakest, tuple(notes)[-_NOTES:])
 
 
 def _number(alpha: Sequence[float], lower: Sequence[float], upper: Sequence[float]) -> PiecewiseLinear:

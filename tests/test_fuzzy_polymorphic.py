@@ -11,10 +11,14 @@ from fuzzy import (
     Extended,
     General,
     Interval,
+    IntervalQuasiMonteCarlo,
+    Known,
     Linear,
     MonteCarlo,
+    Nature,
     Optimisation,
     QuasiMonteCarlo,
+    RandomInput,
     Reduced,
     Signed,
     Triangular,
@@ -149,3 +153,13 @@ def test_wrong_interactions_are_refused():
         propagate(lambda a, b: a, SQUARE, MonteCarlo(10), interactions=[Linear({"a": 1}, -0.5)])
     with pytest.raises(ValueError, match="no point of the cut at α = 1 fulfils its interactions"):
         propagate(lambda a, b: a, SQUARE, Optimisation(), interactions=[Linear({"a": 1}, -0.5)])
+
+
+def test_a_response_of_random_inputs_says_what_its_bounds_are_worth():
+    random = {"r": RandomInput(lambda u, m: m + u, {"m": Triangular(-0.6, -0.5, -0.4)})}
+    plan = IntervalQuasiMonteCarlo(8)
+    turning = plan.run(lambda r, x: r + x**2, random, {"x": Interval(-1, 1)}, alpha=levels(1))
+    assert turning.nature is Nature.INNER
+    assert turning.notes[-1].startswith("the bounds are inner: too narrow where the model turns between the samples")
+    rising = plan.run(lambda r, x: r + x, random, {"x": Interval(-1, 1)}, alpha=levels(1), known=Known({"r": 1, "x": 1}))
+    assert (rising.nature, rising.notes) == (Nature.GUARANTEED, ())
