@@ -10,6 +10,7 @@ import numpy as np
 
 from frame.checks import require_number, require_numbers
 from frame.damping import modal_damping
+from frame.factors import require_factors
 from frame.jet import Array, Jet
 from frame.linear import Accelerogram, Matrices
 
@@ -59,15 +60,15 @@ class MatrixStructure:
             raise ValueError("mass, stiffness and observed: each needs at least one entry")
         for name, value in self.parameters.items():
             require_number(f"parameter {name}", value, "SI units")
+        for kind in ("mass", "damping", "stiffness"):
+            require_factors(kind, getattr(self, kind), self.parameters)
         n = len(self.mass[0][1])
         object.__setattr__(self, "size", n)
         for kind in ("mass", "damping", "stiffness"):
-            for factor, array in getattr(self, kind):
+            for _, array in getattr(self, kind):
                 if np.shape(array) != (n, n):
                     raise ValueError(f"{kind}: an array has shape {np.shape(array)}; all must be ({n}, {n})")
                 require_numbers(kind, np.asarray(array), "SI units")
-                if isinstance(factor, str) and factor not in self.parameters:
-                    raise ValueError(f"{kind}: factor '{factor}' is no parameter; known are {', '.join(self.parameters)}")
         self._check_vectors()
         self._check_ratios()
         self._check_mass()
@@ -93,6 +94,8 @@ class MatrixStructure:
             raise ValueError("mass: the matrix at the modal parameters is not positive definite; every unknown needs a mass")
 
     def _check_ratios(self) -> None:
+        if isinstance(self.ratios, str) or not isinstance(self.ratios, Sequence):
+            raise ValueError(f"ratios: {self.ratios!r} is not allowed; it must be a list, as [0.02]")
         if len(self.ratios) not in (0, 1, self.size):
             raise ValueError(f"ratios: got {len(self.ratios)}; give one for all modes, or {self.size}, by rising frequency")
         for ratio in self.ratios:

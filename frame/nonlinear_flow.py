@@ -174,6 +174,8 @@ class Variational:
             J = flat[n:].reshape(n, n, -1)
             residual = flat[:n] - pi
             change = np.linalg.solve(np.moveaxis(J, -1, 0), residual.T[..., None])[..., 0].T
+            if not np.isfinite(change).all():
+                raise StepError("the equations of motion are not finite; keep the start and the parameters where they are")
             new = new - change
             if np.abs(change).max() <= 1e-12 * (1 + np.abs(new).max()):
                 return new, J
