@@ -15,6 +15,9 @@ from frame.modal_method import Modal
 CLASSES: dict[str, type[Any]] = {"modal": Modal, "graph-follower": GraphFollower, "improved-graph-follower": BatchFollower}
 """Methods whose options are the fields of a class."""
 
+COUNTS = {"samples": 1, "seed": 0, "batch": 1, "spread": 1, "workers": 1}
+"""Options that count, with the least that each may be."""
+
 
 def options_of(method: str | None, function: Callable[..., Any]) -> tuple[str, ...]:
     """Names of the options.
@@ -30,6 +33,12 @@ def options_of(method: str | None, function: Callable[..., Any]) -> tuple[str, .
     return tuple(dict.fromkeys([*own, *more]))
 
 
+def _require_count(name: str, value: Any) -> None:
+    least = COUNTS.get(name)
+    if least is not None and (value < least or value != int(value) or isinstance(value, float)):
+        raise ValueError(f"option {name}: {value!r} is not allowed; it must be a whole number, {least} or greater")
+
+
 def require_options(method: str | None, function: Callable[..., Any], given: Mapping[str, Any]) -> None:
     """Refuses options that a method does not have, and texts where numbers are wanted.
 
@@ -41,5 +50,8 @@ def require_options(method: str | None, function: Callable[..., Any], given: Map
         if name not in allowed:
             of = f"the method {method}" if method else "the default method"
             raise ValueError(f"option '{name}' is unknown to {of}; it takes {', '.join(allowed) or 'none'}")
+        if name == "exclude" and isinstance(value, str):
+            raise ValueError(f"exclude: {value!r} is not allowed; it must be a list of names, as [{value!r}]")
         if name != "exclude" and value is not None:
             require_number(f"option {name}", value, "")
+            _require_count(name, value)

@@ -83,6 +83,8 @@ def envelope(
         UserWarning: The error of time stepping passes a hundredth of a peak; or the method is modal, and its error passes that and the
             tolerance.
     """
+    if not isinstance(model, LagrangianSystem) and not hasattr(model, "matrices"):
+        raise ValueError(f"model: {model!r} is no structure; take a StoreyFrame, a MatrixStructure or a LagrangianSystem")
     if method is None and isinstance(model, LagrangianSystem):
         method = "improved-graph-follower"
     propagate = default if method is None else _method(method)
@@ -111,6 +113,8 @@ def _integrator(given: str | Integrator | None, method: str | None) -> Integrato
         given = "exact" if method is None or method in EXACT_BY_DEFAULT else "midpoint"
     if isinstance(given, str) and given not in INTEGRATORS:
         raise ValueError(f"integrator: '{given}' is unknown; allowed are {', '.join(INTEGRATORS)}")
+    if not isinstance(given, str) and not hasattr(given, "step_map"):
+        raise ValueError(f"integrator: {given!r} is none; take an integrator such as Exact(), or a name: {', '.join(INTEGRATORS)}")
     return INTEGRATORS[given] if isinstance(given, str) else given
 
 

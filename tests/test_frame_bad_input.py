@@ -60,6 +60,11 @@ def test_fuzzy_parameters_without_a_meaning(inputs: Any, message: str) -> None:
         ({"method": "vertex", "samples": 5}, "'samples' is unknown to the method vertex; it takes none"),
         ({"method": "auto", "certify": 1e-3}, "to the method auto; it takes tolerance, exclude, budget"),
         ({"smaples": 5}, "unknown to the default method; it takes tolerance, exclude, budget, seed, certify, boxes, workers"),
+        ({"method": "auto", "exclude": "modal"}, r"exclude: 'modal' is not allowed; it must be a list of names, as \['modal'\]"),
+        ({"method": "monte-carlo", "samples": 0}, "option samples: 0 is not allowed; it must be a whole number, 1 or greater"),
+        ({"method": "monte-carlo", "samples": 2.5}, "samples: 2.5 is not allowed"),
+        ({"integrator": 5}, "integrator: 5 is none; take an integrator such as"),
+        ({"model": 5}, "model: 5 is no structure; take a StoreyFrame"),
         ({"tolerance": "1 mm"}, "option tolerance: '1 mm' is not allowed; it must be a number"),
     ],
 )
