@@ -80,8 +80,9 @@ class Ellipsoidal:
 
     def __post_init__(self) -> None:
         for pair, value in self.correlation.items():
-            if not -1 < value < 1:
-                raise ValueError(f"the correlation of {' and '.join(pair)} is {value:g}; it must lie inside (-1, 1)")
+            if not isinstance(value, Real) or not -1 < value < 1:
+                shown = f"{value:g}" if isinstance(value, Real) else repr(value)
+                raise ValueError(f"the correlation of {' and '.join(pair)} is {shown}; it must lie inside (-1, 1)")
             if self.among and not set(pair) <= set(self.among):
                 raise ValueError(f"the correlation of {' and '.join(pair)} names an input that is not among {', '.join(self.among)}")
 

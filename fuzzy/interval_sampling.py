@@ -19,7 +19,7 @@ from fuzzy.domain import Domain
 from fuzzy.known import Known
 from fuzzy.numbers import Array, FuzzyNumber, PiecewiseLinear
 from fuzzy.plan import Plan
-from fuzzy.result import Nature
+from fuzzy.result import FuzzyResult, Nature
 from fuzzy.transformation import Reduced
 from fuzzy.vetting import fuzzy_inputs, known_facts
 
@@ -143,40 +143,60 @@ class IntervalQuasiMonteCarlo:
             progress: Called with the share done, 0 … 1.
 
         Raises:
-            ValueError: An input is named twice, or the levels do not rise from 0 to 1.
+            ValueError: There is no random input, an input is named twice, or the levels do not rise from 0 to 1.
         """
         from scipy.stats import qmc
 
-        fuzzy = fuzzy_inputs(inputs)
-        parameters = {name: fuzzy_inputs(one.parameters) for name, one in random.items()}
-        random = {name: RandomInput(one.quantile, parameters[name]) for name, one in random.items()}
-        facts = known_facts(known, (*random, *fuzzy))
+        fuzzy, random = fuzzy_inputs(inputs), _random_inputs(random)
         twice = sorted(set(random) & set(inputs))
         if twice:
             raise ValueError(f"{', '.join(twice)} is named among the random and the fuzzy inputs; each must be one of the two")
+        facts = known_facts(known, (*random, *fuzzy))
         u: Array = qmc.Sobol(len(random), rng=np.random.default_rng(self.seed)).random(self.points)
         ends = {name: [one.interval(u[:, i], level) for level in alpha] for i, (name, one) in enumerate(random.items())}
         campaign = Campaign(Call(function, (*random, *inputs), vectorised=vectorised), known=facts, stepwise=True)
-        rows: list[tuple[Array, Array]] = []
-        outputs: tuple[str, ...] = ()
-        runs = 0
-        natures: set[Nature] = set()
-        notes: dict[str, None] = {}
+        response = _Gathered()
         for k in range(self.points):
             drawn = {name: _number(alpha, [cut[0][k] for cut in cuts], [cut[1][k] for cut in cuts]) for name, cuts in ends.items()}
-            result = self.plan.run(campaign, Domain({**drawn, **fuzzy}, alpha))
-            result = result.confronted(facts.stated(result.inputs, result.outputs))
-            natures.add(result.nature)
-            notes |= dict.fromkeys(result.notes)
-            rows.append((result.lower, result.upper))
-            outputs, runs = result.outputs, runs + result.runs
+            response.add(self.plan.run(campaign, Domain({**drawn, **fuzzy}, alpha)), facts)
             if progress:
                 progress((k + 1) / self.points)
-        weakest = next(nature for nature in (Nature.ESTIMATED, Nature.INNER, Nature.GUARANTEED) if nature in natures)
-        if weakest is Nature.INNER:
-            notes[_INNER] = None
-        table = np.array(rows)
-        return IntervalResponse(tuple(alpha), outputs, table[:, 0], table[:, 1], runs, weakest, tuple(notes)[-_NOTES:])
+        return response.response(tuple(alpha))
+
+
+@dataclass
+class _Gathered:
+    """What the plan found at the points so far."""
+
+    rows: list[tuple[Array, Array]] = field(default_factory=list)
+    outputs: tuple[str, ...] = ()
+    runs: int = 0
+    natures: set[Nature] = field(default_factory=set)
+    notes: dict[str, None] = field(default_factory=dict)  # each once, in their order
+
+    def add(self, result: FuzzyResult, known: Known) -> None:
+        """Take the bounds at one more point, confronted with what is stated."""
+        result = result.confronted(known.stated(result.inputs, result.outputs))
+        self.rows.append((result.lower, result.upper))
+        self.outputs, self.runs = result.outputs, self.runs + result.runs
+        self.natures.add(result.nature)
+        self.notes |= dict.fromkeys(result.notes)
+
+    def response(self, alpha: tuple[float, ...]) -> IntervalResponse:
+        """The response over all points, with the weakest of what their bounds are worth."""
+        weakest = next(nature for nature in (Nature.ESTIMATED, Nature.INNER, Nature.GUARANTEED) if nature in self.natures)
+        notes = (*tuple(self.notes)[:_NOTES], *((_INNER,) if weakest is Nature.INNER else ()))
+        table = np.array(self.rows)
+        return IntervalResponse(alpha, self.outputs, table[:, 0], table[:, 1], self.runs, weakest, notes)
+
+
+def _random_inputs(random: Mapping[str, RandomInput]) -> dict[str, RandomInput]:
+    """The random inputs, a plain number among their parameters made a crisp one."""
+    wrong = [name for name, one in random.items() if not isinstance(one, RandomInput)]
+    if wrong or not random:
+        got = f"the random input {wrong[0]} is {random[wrong[0]]!r}" if wrong else "there is no random input"
+        raise ValueError(f"{got}; give RandomInput(quantile, parameters), or propagate the fuzzy inputs alone")
+    return {name: RandomInput(one.quantile, fuzzy_inputs(one.parameters)) for name, one in random.items()}
 
 
 def _number(alpha: Sequence[float], lower: Sequence[float], upper: Sequence[float]) -> PiecewiseLinear:

@@ -41,6 +41,10 @@ class Known:
         """
         if not isinstance(self.signs, Mapping) or not isinstance(self.derivatives, Mapping):
             raise ValueError(f"the signs are {self.signs!r} and the derivatives {self.derivatives!r}; both must be mappings, as {{'x': 1}}")
+        if not (self.gradient_range is None or callable(self.gradient_range)):
+            raise ValueError(f"the range of the gradient is {self.gradient_range!r}; it must be a function of the corners of a box")
+        if isinstance(self.monotone, str):
+            raise ValueError(f"the monotone inputs are {self.monotone!r}; they must be a row of names, as ({self.monotone!r},)")
         named = [*self.signs, *self.monotone, *(name for row in self.derivatives.values() for name in row)]
         unknown = sorted(set(named) - set(inputs))
         if unknown:

@@ -9,10 +9,10 @@ the store to be read, so it also works where only file locks do, and on a full d
 from __future__ import annotations
 
 import json
-import os
 import sqlite3
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from errno import ENOSPC
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -117,15 +117,9 @@ class Store:
             yield
         except (sqlite3.DatabaseError, OSError) as error:
             cure = "free some space or find what blocks it, and run again: what is stored stays"
-            if not self._writable():
-                cure = "its folder or the file cannot be written: give another path or the right to write there"
+            if _barred(error):
+                cure = "it cannot be written there: give another path, or the right to write"
             raise StoreError(f"the store {self.path} cannot be used ({error}): {cure}") from error
-
-    def _writable(self) -> bool:
-        """Whether the file, or the nearest folder above that is there, may be written."""
-        there = next((path for path in (self.path, *self.path.absolute().parents) if path.exists()), self.path)
-        folder = self.path.absolute().parent
-        return os.access(there, os.W_OK) and (not folder.exists() or os.access(folder, os.W_OK))
 
     def close(self) -> None:
         """Close the file."""
@@ -144,6 +138,13 @@ class Store:
         query = """SELECT identity, COUNT(outputs), COUNT(error), COALESCE(AVG(seconds), 0)
             FROM model LEFT JOIN sample ON sample.model = model.id GROUP BY model.id"""
         return [Stored(json.loads(identity), *rest) for identity, *rest in self.database.execute(query)]
+
+
+def _barred(error: Exception) -> bool:
+    """Whether the place of a store is the trouble, not its content or the space left."""
+    if isinstance(error, OSError):
+        return error.errno != ENOSPC
+    return any(words in str(error) for words in ("unable to open", "readonly database"))
 
 
 def canonical(identity: Identity) -> str:

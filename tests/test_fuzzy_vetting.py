@@ -2,7 +2,7 @@
 
 import pytest
 
-from fuzzy import Crisp, IntervalQuasiMonteCarlo, Known, Linear, RandomInput, Signed, Triangular, from_data, propagate
+from fuzzy import Crisp, Ellipsoidal, IntervalQuasiMonteCarlo, Known, Linear, RandomInput, Signed, Triangular, from_data, propagate
 
 GOOD = {"a": Triangular(1, 2, 3), "b": Triangular(0, 1, 2)}
 CALLS = []
@@ -53,6 +53,8 @@ def test_a_text_in_a_fuzzy_number_is_named():
         ({"known": {"a": 1}}, r"known is \{'a': 1\}; it must be what is known of the function, as fuzzy.Known"),
         ({"known": Known(signs=["a"])}, r"the signs are \['a'\] and the derivatives \{\}; both must be mappings"),
         ({"interactions": Linear({"a": 1}, 2)}, r"the interactions are Linear.*; they must be a list such as"),
+        ({"known": Known(gradient_range=3)}, "the range of the gradient is 3; it must be a function of the corners"),
+        ({"known": Known(monotone="a")}, r"the monotone inputs are 'a'; they must be a row of names, as \('a',\)"),
         ({"interactions": "ab"}, "the interactions are 'ab'; they must be a list such as"),
         ({"known": Known({"a": {"z": 1}})}, "what is known of the model names z; its outputs are y"),
         ({"known": Known(derivatives={"z": {"a": "y"}})}, "what is known of the model names z; its outputs are y"),
@@ -82,3 +84,16 @@ def test_one_level_is_no_fuzzy_number():
         propagate(total, GOOD, alpha=[0.0]).number()
     with pytest.raises(ValueError, match="number of steps between α-levels is 0; it must be a whole number, 1 or more"):
         from_data([1, 2, 3], levels=0)
+
+
+@pytest.mark.parametrize(
+    ("random", "message"), [({"a": 3.0}, "the random input a is 3.0; give RandomInput"), ({}, "there is no random input")]
+)
+def test_random_inputs_are_some(random, message):
+    with pytest.raises(ValueError, match=message):
+        IntervalQuasiMonteCarlo(4).run(total, random, {"b": 1.0}, alpha=[0, 1])
+
+
+def test_a_correlation_is_a_number():
+    with pytest.raises(ValueError, match="the correlation of a and b is 'x'; it must lie inside"):
+        Ellipsoidal({("a", "b"): "x"})
