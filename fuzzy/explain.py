@@ -19,7 +19,7 @@ from fuzzy.numbers import Array
 from fuzzy.plan import Plan
 from fuzzy.shelf import Shelf, shelf
 from fuzzy.store import Identity, Store, Stored
-from fuzzy.transformation import General, Reduced
+from fuzzy.transformation import Extended, General, Reduced
 from fuzzy.vetting import fuzzy_inputs, interaction_list, known_facts, require_plan
 
 _SHOWN = 5
@@ -142,7 +142,7 @@ def explain(
     facts = known_facts(known, domain.names)
     call = Call(_never, domain.names, tuple(shared), vectorised)
     there = store if isinstance(store, Store) or (store is not None and Path(store).exists()) else None
-    if there is None and isinstance(plan, Reduced | General) and plan.size(domain) > _LISTED:
+    if there is None and isinstance(plan, Reduced | General | Extended) and not plan.stepwise and plan.size(domain) > _LISTED:
         return _counted(plan.size(domain), domain, vectorised)
     with shelf(there, identity, domain.names) as samples:
         return _rehearsed(plan, domain, call, _Rehearsal(samples, facts), identity or {})

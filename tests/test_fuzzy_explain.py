@@ -8,6 +8,7 @@ import pytest
 from fuzzy import (
     CampaignError,
     Chebyshev,
+    Extended,
     General,
     Interval,
     Known,
@@ -128,9 +129,10 @@ def test_a_number_of_samples_that_depends_on_the_model_is_not_named(plan, most):
     assert found.startswith(f"how many samples {type(plan).__name__} takes depends on the model ({most}); the first 1: 0 stored, 1 to run")
 
 
-def test_too_many_samples_are_counted_without_being_made():
+@pytest.mark.parametrize("plan", [Reduced(), Extended(monotone=tuple(f"x{i}" for i in range(40)))])
+def test_too_many_samples_are_counted_without_being_made(plan):
     start = perf_counter()
-    found = explain({f"x{i}": Triangular(0, 1, 2) for i in range(40)}, Reduced())
+    found = explain({f"x{i}": Triangular(0, 1, 2) for i in range(40)}, plan)
     assert perf_counter() - start < 1
     assert found.samples == 4 * 2**40 + 1
     assert "too many to list" in str(found)
