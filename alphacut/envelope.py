@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from alphacut.case import Case
 from alphacut.consistency import displacements
-from alphacut.output import whole_file
+from alphacut.output import say, whole_file
 from alphacut.problem import BadInput, Problem
 from alphacut.progress import Tick
 from alphacut.provenance import attributes, versions
@@ -107,21 +109,32 @@ def compute(
     inputs = wanted.inputs(task.fuzzy)
     guard_against(wanted, task, strict=strict)
     try:
-        return frame.envelope(
-            wanted.model,
-            inputs,
-            alpha=task.alpha,
-            duration=task.duration,
-            step=task.step,
-            method=task.method,
-            integrator=task.integrator,
-            relative=task.relative and task.certify is None,
-            progress=progress,
-            **method_options(task),
-            **({"workers": workers} if task.certify is not None else {}),
-        )
+        with told_once():
+            return frame.envelope(
+                wanted.model,
+                inputs,
+                alpha=task.alpha,
+                duration=task.duration,
+                step=task.step,
+                method=task.method,
+                integrator=task.integrator,
+                relative=task.relative and task.certify is None,
+                progress=progress,
+                **method_options(task),
+                **({"workers": workers} if task.certify is not None else {}),
+            )
     except ValueError as error:
         raise BadInput(Problem("envelope", str(error))) from None
+
+
+@contextmanager
+def told_once() -> Iterator[None]:
+    """Warnings of the library in the words of this program, each once."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield
+    for text in dict.fromkeys(str(warning.message) for warning in caught if issubclass(warning.category, UserWarning)):
+        say(f"warning: {text}")
 
 
 def method_options(task: EnvelopeTask) -> dict[str, Any]:
