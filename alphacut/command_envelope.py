@@ -180,7 +180,8 @@ def error_in_words(found: Envelope) -> str:
     if found.error is None:
         return ""
     largest = zip(found.outputs, found.error.max((0, 1)), strict=True)
-    return ", error up to " + ", ".join(f"{engineering(float(value), output_unit(name), digits=2)} of {name}" for name, value in largest)
+    words = ", attained to within " if "gap" in found.facts else ", error up to "
+    return words + ", ".join(f"{engineering(float(value), output_unit(name), digits=2)} of {name}" for name, value in largest)
 
 
 def proved(found: Envelope) -> str:

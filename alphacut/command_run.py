@@ -9,9 +9,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TextIO
 
-from alphacut import figures, shares, summary
+from alphacut import figures, outcomes, shares, summary
 from alphacut.captions import core
 from alphacut.chain import Chain, Results
+from alphacut.consistency import FILES
 from alphacut.destination import unwritable
 from alphacut.loading import load
 from alphacut.options import add_common, add_workers, check_workers
@@ -94,12 +95,15 @@ def main_numbers(found: Mapping[str, Any]) -> str:
         for output, unit, *values in ends:
             low, high = (engineering(value, unit, beside=largest[unit]) for value in values)
             lines.append(f"{output} from {low} to {high} at the lowest α (study {name})")
-    return "".join(f"{line}\n" for line in lines)
+    limit = outcomes.sentence(found["exceedance"]) if "exceedance" in found else ""
+    return "".join(f"{line}\n" for line in lines) + limit
 
 
 def driven(chain: Chain, results: Results) -> tuple[str, Callable[[Path], None]]:
     """Fingerprint and making of shares.nc, which says what drives the widths."""
-    key = fingerprint({"case": results.case.values, "modulus": results.handed}, ("stochastic", "rve", "fuzzy", "frame", "alphacut"))
+    files = [results.case.digest(key) for key in FILES if results.case.has(key)]
+    content = {"case": results.case.values, "files": files, "modulus": results.handed}
+    key = fingerprint(content, ("stochastic", "rve", "fuzzy", "frame", "alphacut"))
 
     def compute(path: Path) -> None:
         with whole_file(path) as partial:

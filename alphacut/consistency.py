@@ -188,7 +188,7 @@ def methods(case: Case) -> Iterator[Problem]:
 
 def exceedance(case: Case) -> Iterator[Problem]:
     """A limit is for an output of the structure in vibration, and in its unit."""
-    from alphacut.outcomes import limit_of
+    from alphacut.outcomes import limit_of, storey_height
 
     if not case.has("envelope.step"):
         yield Problem("exceedance", "a probability needs the section [envelope]")
@@ -197,7 +197,8 @@ def exceedance(case: Case) -> Iterator[Problem]:
         if any(key.startswith(f"{section}.") for key in case.values) and name not in outputs:
             yield Problem("exceedance.output", f"there is no output {name}", name, ", ".join(outputs), nearest(name, outputs))
     try:
-        limit_of(case)
+        if not (case.text("exceedance.output").startswith("drift") and storey_height(case, case.text("exceedance.output")) is None):
+            limit_of(case)  # of a storey that is not there nothing can be said
     except BadInput as error:
         yield from error.problems
 

@@ -72,6 +72,7 @@ def known_output(case: Case, floors: int) -> Iterator[Problem]:
                 f"there is no output {name}",
                 name,
                 f"q, v, drift or shear with a floor, base_shear: {', '.join(possible[:floors])} …",
+                nearest(name, possible),
             )
     outputs = case.names("frame.outputs") or tuple(possible[:floors])
     for index in range(study_count(case)):

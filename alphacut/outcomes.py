@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from frame import Envelope
 
 Sampler = Callable[[np.random.Generator, int], Array]
-FACTS = ("output", "limit", "fuzzy", "random", "deviation", "samples", "trajectories", "nature")
+FACTS = ("output", "limit", "fuzzy", "random", "deviation", "samples", "step", "trajectories", "nature")
 NATURE = "inner: attained at the fuzzy points tried, with the sampling deviation given"
 
 
@@ -116,7 +116,8 @@ def require_random(case: Case, wanted: Structure) -> None:
             wanted.members(name)
         except BadInput as error:
             (problem,) = error.problems
-            raise BadInput(Problem("exceedance.random", problem.what, name, problem.allowed, file=str(case.path))) from None
+            what = "the modulus that the frame gets is crisp" if name == "E" and name in wanted.numbers else problem.what
+            raise BadInput(Problem("exceedance.random", what, name, problem.allowed, file=str(case.path))) from None
 
 
 def split_inputs(case: Case, wanted: Structure) -> tuple[dict[str, FuzzyNumber], dict[str, Sampler]]:
@@ -163,8 +164,8 @@ def exceedance(case: Case, handed: FuzzyNumber | None, progress: Tick | None = N
     )
     about = {"long_name": f"probability that |{output}| exceeds the limit", "units": "1"}
     ends = (("alpha", "bound"), np.column_stack([found.lower, found.upper]), about)
-    counts = {"samples": case.integer("exceedance.samples"), "trajectories": found.trajectories}
-    facts = {"output": output, "limit": limit_of(case), "deviation": found.deviation, "nature": NATURE, **counts}
+    drawn = {"samples": case.integer("exceedance.samples"), "step": case.number("envelope.step"), "trajectories": found.trajectories}
+    facts = {"output": output, "limit": limit_of(case), "deviation": found.deviation, "nature": NATURE, **drawn}
     names = {"fuzzy": ", ".join(fuzzy), "random": ", ".join(random)}
     curve = (("alpha", "bound", "limit"), np.stack([found.curve_lower, found.curve_upper], axis=1), about)
     axes = {"alpha": found.alpha, "bound": ["lower", "upper"], "limit": ("limit", found.limits, {"units": output_unit(output)})}
@@ -189,6 +190,8 @@ def sentence(found: Mapping[str, Any]) -> str:
     levels = dict.fromkeys((0, len(found["alpha"]) - 1))
     cuts = (f"[{found['lower'][k]:.3g}, {found['upper'][k]:.3g}] at α = {found['alpha'][k]:g}" for k in levels)
     random = f" with random {found['random']}" if found["random"] else ""
+    nodes = f", at nodes every {found['step']:g} s" if "step" in found else ""
     drawn = f"{found['samples']} random draws at each fuzzy point tried" if "samples" in found else "random draws"
-    worth = f" (inner bounds: {drawn}; standard deviation up to {found['deviation']:.2g})" if found["random"] else " (inner bounds)"
+    scatter = f": {drawn}; standard deviation up to {found['deviation']:.2g}" if found["random"] else ""
+    worth = f" (inner bounds{nodes}{scatter})"
     return f"probability of |{found['output']}| > {engineering(found['limit'], found['unit'])}{random}: {', '.join(cuts)}{worth}\n"

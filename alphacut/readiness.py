@@ -95,7 +95,10 @@ def unlikely(case: Case, period: float | None) -> Iterator[str]:
 def lacking(case: Case) -> Iterator[Problem]:
     """A frame needs a modulus from somewhere."""
     if case.has("frame.masses") and not case.has("frame.modulus") and "modulus" not in case.stages and not replaced(case):
-        what = 'missing; stage envelope needs a modulus: give frame.modulus, or compute one with stages = ["modulus", "envelope"]'
+        what = (
+            "missing; stage envelope needs a modulus: give frame.modulus, modulus.value or modulus.measured, or compute one with "
+            'stages = ["modulus", "envelope"]'
+        )
         yield Problem("frame.modulus", what, file=str(case.path), line=case.lines.get("frame", 0))
 
 
@@ -127,4 +130,4 @@ def outlasted(case: Case) -> Iterator[str]:
             end = (len(record.acceleration) - 1) * record.step
             longest = max(study.task.duration for study in studies(case))
             if longest > end + 0.5 * record.step:
-                yield f"{key}: the record ends at {end:g} s and the simulation at {longest:g} s; in between the ground is at rest"
+                yield f"{key}: the record ends at {end:g} s and the simulation at {longest:g} s; afterwards the ground is at rest"

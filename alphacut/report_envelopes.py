@@ -40,7 +40,8 @@ def extremes(studies: Mapping[str, Any]) -> list[tuple[str, ...]]:
     for name, study, output, unit in each:
         ends = (engineering(study[side][output], unit, beside=largest[unit]) for side in ("min", "max"))
         error = study.get("error", {}).get(output)
-        rows.append((name, output, *ends, "not estimated" if error is None else engineering(error, unit, digits=2)))
+        included = " (within the bounds)" if "gap" in study else ""
+        rows.append((name, output, *ends, "not estimated" if error is None else engineering(error, unit, digits=2) + included))
     return rows if any(study.get("error") for study in studies.values()) else [row[:-1] for row in rows]
 
 
@@ -65,8 +66,9 @@ def peaks(summary: Mapping[str, Any]) -> str:
     largest = largest_by_unit((of["upper"][0], unit) for _, _, unit, of in each)
     rows = [(name, output, *peak_row(of, unit, largest[unit])) for name, output, unit, of in each]
     words = (
-        "<p>Fuzzy peak of each output's magnitude over time. On the lowest level no trajectory peaks below the first value or above the "
-        "last; the second is the least peak among some tried, so the least of all lies between the first two.</p>"
+        "<p>Fuzzy peak of each output's magnitude at the nodes; what may lie between them is said under methods where it is known. On the "
+        "lowest level no trajectory peaks below the first value or above the last; the second is the least peak among some tried, so the "
+        "least of all lies between the first two.</p>"
     )
     limit = f"<p>P{html.escape(outcomes.sentence(summary['exceedance'])[1:].rstrip())}.</p>" if "exceedance" in summary else ""
     head = ("study", "output", "not below", "least tried", "greatest", "highest α")

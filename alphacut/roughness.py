@@ -47,7 +47,8 @@ def coarse_tolerance(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]
     if task.certify is not None:
         gap = tolerance_guard(UnitFlow(flow, boxes(inputs, (0.0,))), task.certify)
         if not gap.ok:
-            yield Problem("envelope.certify", gap.message.removeprefix("tolerance: ").partition(", or a relative")[0])
+            what = f"{task.certify:.3g} m lets bounds of {gap.output} be wide by {100 * gap.share:.3g} % of its peak, more than 1 %"
+            yield Problem("envelope.certify", f"{what}; take at most {0.01 * task.certify / gap.share:.2g} m")
         return
     found = tolerance_guard(UnitFlow(flow, boxes(inputs, (0.0,)), task.relative), task.tolerance)
     if not found.ok:

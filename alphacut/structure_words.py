@@ -43,7 +43,7 @@ def in_unit(number: FuzzyNumber, unit: str, si: str) -> str:
 def structure_words(case: Case, wanted: Structure) -> dict[str, Any]:
     """``sentences`` about the structure, ``head`` and ``rows`` of a table of its floors or its inputs."""
     if wanted.frame is not None:
-        return {"sentences": list(frame_sentences(case, wanted)), **floors(case)}
+        return {"sentences": list(frame_sentences(case, wanted)), **floors(case, wanted)}
     ground = None if wanted.linear is None else wanted.linear.ground
     sentences = [motion(case.text("tower.accelerogram"), ground)] if ground is not None else []
     return {"sentences": sentences, "head": ["input", "what it is", "value"], "rows": list(inputs(case))}
@@ -61,13 +61,15 @@ def frame_sentences(case: Case, wanted: Structure) -> Iterator[str]:
     """Stiffness, damping, and what moves the frame."""
     assert wanted.frame is not None
     modulus, moment = wanted.numbers["E"], wanted.numbers["I"]
-    stiffness = f"{modulus.modal * moment.modal / 1e3:.5g} kN m²"
-    alike = len(set(wanted.frame.columns)) == 1
-    number = f"{wanted.frame.columns[0]:g} in each storey" if alike else "c in a storey (in columns as stiff as the first storey's)"
-    formula = f"{12 * wanted.frame.columns[0]:g} E I / l³" if alike else "12 c E I / l³"
+    counts = set(case.numbers("frame.columns"))
+    number = f"{min(counts):g} in each storey" if len(counts) == 1 else "c in a storey"
+    formula = f"{12 * min(counts):g} E I / l³" if len(counts) == 1 else "12 c E I / l³"
+    alike = len(case.fuzzies("frame.second_moment")) == 1
+    section = f"I = {in_unit(moment, 'm^4', 'm^4')} of one column; " if alike else ""
+    rigidity = f"E I = {modulus.modal * moment.modal / 1e6:.4g} MN m² at the modal values" + ("" if alike else ", in the ground storey")
     yield (
         f"{len(wanted.frame.masses)} rigid floors on columns clamped at both ends, {number}: stiffness {formula}. "
-        f"E = {in_unit(modulus, 'GPa', 'Pa')}, I = {in_unit(moment, 'm^4', 'm^4')} of one column; E I = {stiffness} at the modal values."
+        f"E = {in_unit(modulus, 'GPa', 'Pa')}, {section}{rigidity}."
     )
     yield f"Damping: {'; '.join(damping(case)) or 'none'}."
     if wanted.frame.ground is not None:
@@ -108,12 +110,22 @@ def moves(case: Case) -> list[str]:
     return [kind for kind in kinds if any(number.support.upper or number.support.lower for number in case.fuzzies(f"frame.{kind}"))]
 
 
-def floors(case: Case) -> dict[str, Any]:
+def floors(case: Case, wanted: Structure) -> dict[str, Any]:
     """A row for each floor, from the ground up: mass, height of the storey below it, and what else is not zero."""
     damped = any(number.support.upper > 0 for number in case.fuzzies("frame.dampers"))
     kinds: Sequence[str] = ["masses", "lengths", *(["dampers"] if damped else []), *moves(case)]
     columns = [[in_unit(number, *UNITS[kind]) for number in per_floor(case, f"frame.{kind}")] for kind in kinds]
     head = ["floor", *(COLUMNS[kind] for kind in kinds)]
-    if len(set(number := count_columns(case))) > 1:
-        head, columns = [*head, "columns c"], [*columns, [f"{c:.4g}" for c in number]]
+    for name, entries in (("columns c", case.numbers("frame.columns")), ("second moment", case.fuzzies("frame.second_moment"))):
+        if len(entries) > 1:
+            told = [in_unit(x, "m^4", "m^4") if isinstance(x, FuzzyNumber) else f"{x:g}" for x in entries]
+            head, columns = [*head, name], [*columns, told]
+    head, columns = [*head, "stiffness"], [*columns, stiffnesses(case, wanted)]
     return {"head": head, "rows": [[str(floor), *row] for floor, row in enumerate(zip(*columns, strict=True), start=1)]}
+
+
+def stiffnesses(case: Case, wanted: Structure) -> list[str]:
+    """Stiffness of each storey at the modal values, 12 c E I / l³, in MN/m."""
+    rigidity = wanted.numbers["E"].modal * wanted.numbers["I"].modal
+    lengths = [length.modal for length in per_floor(case, "frame.lengths")]
+    return [f"{12e-6 * c * rigidity / length**3:.4g} MN/m" for c, length in zip(count_columns(case), lengths, strict=True)]

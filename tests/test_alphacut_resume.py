@@ -1,6 +1,7 @@
 """A campaign goes on from what is stored: after more levels, after a wider support, after an interrupt."""
 
 import json
+import shutil
 from pathlib import Path
 
 from alphacut.entry import main
@@ -35,3 +36,21 @@ def test_explain_runs_nothing(tmp_path, capfd):
     assert main([*SERIES, "--plan", "reduced", "--store", str(store), "--explain"]) == 0
     assert "33 to run" in capfd.readouterr().out
     assert not store.exists()
+
+
+def test_another_record_of_the_same_name_makes_the_shares_anew(tmp_path, capfd):
+    cases = Path(__file__).parent.parent / "cases"
+    for name in ("building.toml", "building.record.csv"):
+        shutil.copy(cases / name, tmp_path)
+    record = tmp_path / "building.record.csv"
+    asked = ["run", str(tmp_path / "building.toml"), "--quick", "--no-figures", "--out", str(tmp_path / "out")]
+    for change in (False, True):
+        if change:
+            lines = record.read_text(encoding="utf-8").splitlines()
+            record.write_text("\n".join([*lines[:40], "0.38,3.0", *lines[41:]]) + "\n", encoding="utf-8")
+        assert main(asked) == 0, capfd.readouterr().err
+        err = capfd.readouterr().err
+        assert "shares.nc is up to date" not in err
+    assert "modulus.nc is up to date" in err
+    assert main(asked) == 0
+    assert "shares.nc is up to date" in capfd.readouterr().err

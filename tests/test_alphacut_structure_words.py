@@ -33,20 +33,20 @@ def test_an_eight_storey_frame_in_words():
     found = structure_words(case, structure(case, MODULUS))
     first, damping, motion = found["sentences"]
     assert "8 rigid floors" in first
-    assert f"E I = {25e9 * 3.2e-3 / 1e3:.0f} kN m²" in first
+    assert f"E I = {25e9 * 3.2e-3 / 1e6:.0f} MN m²" in first
     assert damping == "Damping: a M + b K with a = [0.4, 0.5, 0.6] 1/s and b = [2, 2.5, 3] ms."
     record = np.loadtxt((CASES / "building.record.csv").read_text(encoding="utf-8").partition("s^2]\n")[2].splitlines(), delimiter=",")
     assert f"{len(record)} values" in motion
     assert f"peak {np.abs(record[:, 1]).max():.3g} m/s²" in motion
-    assert found["head"] == ["floor", "mass", "storey height"]
-    assert found["rows"][0] == ["1", "40 t", "[3.92, 4, 4.08] m"]
-    assert found["rows"][7] == ["8", "[28, 30, 34] t", "3.2 m"]
+    assert found["head"] == ["floor", "mass", "storey height", "stiffness"]
+    assert found["rows"][0] == ["1", "40 t", "[3.92, 4, 4.08] m", f"{24e-6 * 25e9 * 3.2e-3 / 4**3:.4g} MN/m"]
+    assert found["rows"][7] == ["8", "[28, 30, 34] t", "3.2 m", f"{24e-6 * 25e9 * 3.2e-3 / 3.2**3:.4g} MN/m"]
 
 
 def test_dampers_and_starts_are_columns_where_there_are_any():
     case = load(CASES / "paper.toml")
     found = structure_words(case, structure(case, MODULUS))
-    assert found["head"] == ["floor", "mass", "storey height", "damper", "displacement", "velocity"]
+    assert found["head"] == ["floor", "mass", "storey height", "damper", "displacement", "velocity", "stiffness"]
     assert "dashpots from each floor to the ground" in found["sentences"][1]
     ratio = load(CASES / "paper.toml", ["frame.damping_ratio=[3, 5, 7] %"])
     assert (
@@ -77,7 +77,7 @@ def test_the_report_tells_them(tmp_path, capfd):
     [
         (["frame.columns=4"], [4] * 8, "4 in each storey: stiffness 48 E I / l³"),
         (["frame.columns=[4,4,4,4,2,2,2,1]"], [4, 4, 4, 4, 2, 2, 2, 1], "c in a storey"),
-        ([f"frame.second_moment={['3.2e-3 m^4'] * 6 + ['1.6e-3 m^4'] * 2}"], [2] * 6 + [1] * 2, "12 c E I / l³"),
+        ([f"frame.second_moment={['3.2e-3 m^4'] * 6 + ['1.6e-3 m^4'] * 2}"], [2] * 6 + [1] * 2, "24 E I / l³"),
     ],
 )
 def test_storeys_may_differ_in_their_columns(changes, stiffness, words):
@@ -86,7 +86,11 @@ def test_storeys_may_differ_in_their_columns(changes, stiffness, words):
     assert wanted.frame.columns == pytest.approx(stiffness)
     found = structure_words(case, wanted)
     assert words in found["sentences"][0]
-    assert ("columns c" in found["head"]) == (len(set(stiffness)) > 1)
+    told = [float(row[-1].removesuffix(" MN/m")) for row in found["rows"]]
+    lengths = [4, *[3.2] * 7]
+    assert told == pytest.approx([12e-6 * c * 25e9 * 3.2e-3 / length**3 for c, length in zip(stiffness, lengths, strict=True)], rel=1e-3)
+    assert ("columns c" in found["head"]) == ("columns=[" in changes[0])
+    assert ("second moment" in found["head"]) == ("moment" in changes[0])
     alike = structure(load(CASES / "building.toml"), MODULUS).frame
     assert frequencies(wanted.frame)[0] != pytest.approx(frequencies(alike)[0], rel=1e-3)
 
