@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import base64
 import html
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from alphacut import response
-from alphacut.captions import caption, core, in_words
+from alphacut.captions import core, in_words
 from alphacut.command_cite import citation
 from alphacut.differences import differences
 from alphacut.report_envelopes import envelopes, natural
+from alphacut.report_figures import gallery, listed
 from alphacut.report_table import section, table
 from alphacut.units import engineering
 
@@ -23,9 +22,6 @@ NATURES = {
     "verified by sampling": "Verified by sampling: the search is proved to leave nothing out, the error of its model is sampled.",
     "guaranteed": "Guaranteed bounds are proved to hold the true range.",
 }
-ELSEWHERE = ("fig18-modulus", "modulus", "response", "exceedance")  # figures that stand in the section they belong to
-WIDE = re.compile(r"envelope-|chain|record|shares-over-time|graph-follower")  # figures that need the page's whole width
-SVG_LIMIT = 200_000  # bytes; a heavier figure goes into the page as PNG
 
 
 def sections(summary: Mapping[str, Any], folder: Path) -> Iterator[str]:
@@ -68,14 +64,6 @@ def of_map(found: Mapping[str, Any]) -> str:
     """The area fraction that the modulus gets, where it is known."""
     name = "mean_area_fraction_of_map"
     return f"; {found[name]:.4f} by the fitted map at its modal values, which is what the modulus uses" if name in found else ""
-
-
-def listed(summary: Mapping[str, Any], folder: Path, name: str) -> str:
-    """A figure by its name without the paper's number, if this run has drawn it; an older one in the folder is passed over."""
-    for file in summary.get("figures", []):
-        if re.fullmatch(rf"(fig\d+-)?{name}", Path(file).stem) and file.endswith(".svg"):
-            return picture(folder / file, caption(Path(file).stem, paper=bool(summary.get("paper"))))
-    return ""
 
 
 def modulus(found: Mapping[str, Any], drawn: str) -> str:
@@ -190,40 +178,9 @@ def effort(study: Mapping[str, Any]) -> str:
     return f"{study['trajectories']} {'eigen-analyses' if study['method'] == 'modal' else 'trajectories'}"
 
 
-def gallery(summary: Mapping[str, Any], folder: Path) -> str:
-    """Every figure of the run that no other section shows."""
-    names = [name for name in summary.get("figures", []) if name.endswith(".png") and Path(name).stem not in ELSEWHERE]
-    paper = bool(summary.get("paper"))
-    figures = []
-    for name in names:
-        drawn = picture((folder / name).with_suffix(".svg"), caption(Path(name).stem, paper=paper))
-        figures.append(drawn.replace("<figure>", '<figure class="wide">', 1) if WIDE.search(name) else drawn)
-    return section("Figures", '<div class="gallery">' + "\n".join(figures) + "</div>") if figures else ""
-
-
 def sentence(text: str) -> str:
     """Text as a sentence: a capital at its head, a full stop at its end."""
     return f"{text[0].upper()}{text[1:].rstrip('.')}." if text else ""
-
-
-def picture(svg: Path, caption: str) -> str:
-    """A figure: as SVG where that is light, else as PNG; empty where there is none."""
-    png = svg.with_suffix(".png")
-    if svg.is_file() and svg.stat().st_size < SVG_LIMIT:
-        text = re.sub(r"^.*?(?=<svg)", "", svg.read_text(encoding="utf-8"), flags=re.DOTALL)
-        content = unique_ids(re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL), svg.stem + "-")
-    elif png.is_file():
-        content = f'<img alt="{html.escape(caption)}" src="data:image/png;base64,{base64.b64encode(png.read_bytes()).decode()}">'
-    else:
-        return ""
-    return f"<figure>{content}<figcaption>{html.escape(caption)}</figcaption></figure>"
-
-
-def unique_ids(svg: str, prefix: str) -> str:
-    """An SVG whose ids do not clash with another's on the same page."""
-    svg = re.sub(r'\bid="([^"]+)"', rf'id="{prefix}\1"', svg)
-    svg = re.sub(r"url\(#([^)]+)\)", rf"url(#{prefix}\1)", svg)
-    return re.sub(r'href="#([^"]+)"', rf'href="#{prefix}\1"', svg)
 
 
 def case_text(summary: Mapping[str, Any]) -> str:
