@@ -30,6 +30,8 @@ def sections(summary: Mapping[str, Any], folder: Path) -> Iterator[str]:
         yield microstructure(summary["microstructure"])
     if "modulus" in summary:
         yield modulus(summary["modulus"], listed(summary, folder, "modulus"))
+    if "given_modulus" in summary:
+        yield given(summary["given_modulus"])
     if "response" in summary:
         yield stress(summary["response"], listed(summary, folder, "response"))
     if words := summary.get("structure", {}).get("words"):
@@ -87,6 +89,14 @@ def modulus(found: Mapping[str, Any], drawn: str) -> str:
         "<h3>Error budget</h3>" + table(("source", "estimated relative error of E"), budget) if budget else "",
         "<h3>Certificate</h3>" + table(("property", "measured violation, largest of all samples"), checks) if checks else "",
     )
+
+
+def given(found: Mapping[str, Any]) -> str:
+    """The modulus that the case gives instead of having it computed."""
+    cuts = zip(found["alpha"], found["E_GPa"]["lower"], found["E_GPa"]["upper"], strict=True)
+    rows = [(f"{alpha:g}", f"{low:.4f}", f"{high:.4f}") for alpha, low, high in cuts]
+    words = f"<p>Given by the case: <code>{html.escape(found['of'])}</code>.</p>"
+    return section("Fuzzy modulus", words, table(("α", "lower E, GPa", "upper E, GPa"), rows))
 
 
 def isotropy(found: Mapping[str, Any]) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 from alphacut import outcomes, response
 from alphacut.cell import GPA, SHARED, key_of, parts
 from alphacut.chain import Results
+from alphacut.consistency import stand_ins
 from alphacut.provenance import FORMAT, command, versions
 from alphacut.structure import structure
 from alphacut.structure_words import structure_words
@@ -37,6 +38,8 @@ def summary(results: Results) -> dict[str, Any]:
         found["area_fraction"] = area_fraction(results)
     if results.modulus is not None:
         found["modulus"] = modulus_numbers(results.modulus)
+    elif results.handed is not None:
+        found["given_modulus"] = given(results)
     if results.response is not None:
         found["response"] = response.document(results.response)
     if results.envelopes:
@@ -70,6 +73,15 @@ def modulus_numbers(dataset: xarray.Dataset) -> dict[str, Any]:
     cost |= {name: dataset.attrs[name] for name in ("shear_ratio",) if name in dataset.attrs}
     budget = {"error": listed(dataset, "error"), "checks": listed(dataset, "check")}
     return {**cuts, **support, **cost, **budget}
+
+
+def given(results: Results) -> Row:
+    """The modulus that stands in for a computed one: where it comes from, and its α-cuts."""
+    assert results.handed is not None
+    key = next(iter(stand_ins(results.case)), "frame.modulus")
+    alpha = results.case.numbers("envelope.alpha") if results.envelopes else (0.0, 1.0)
+    cuts = np.array([results.handed.cut(level) for level in alpha]) / GPA
+    return {"of": f"{key} = {results.case.written.get(key, '')}", "alpha": alpha, "E_GPa": {"lower": cuts[:, 0], "upper": cuts[:, 1]}}
 
 
 def listed(dataset: xarray.Dataset, kind: str) -> dict[str, float]:

@@ -102,3 +102,18 @@ def test_the_shipped_record_is_the_one_its_program_makes():
     assert stored == pytest.approx(made, abs=2e-5)
     assert np.abs(record.acceleration()).max() == pytest.approx(record.peak)
     assert record.acceleration()[0] == 0
+
+
+def test_the_report_tells_the_measured_modulus_by_its_cuts(tmp_path, capfd):
+    (tmp_path / "cylinders.csv").write_text("E [GPa]\n27.9\n29.4\n30.1\n31.2\n33.0\n", encoding="utf-8")
+    text = (CASES / "building.toml").read_text(encoding="utf-8")
+    text = text.replace('method = "auto"\ntolerance = 1e-5\nplan = "signed"', 'measured = "cylinders.csv"')
+    (tmp_path / "building.record.csv").write_bytes((CASES / "building.record.csv").read_bytes())
+    (tmp_path / "own.toml").write_text(text, encoding="utf-8")
+    folder = tmp_path / "out"
+    assert main(["run", str(tmp_path / "own.toml"), "--quick", "--no-figures", "--quiet", "--out", str(folder)]) == 0, capfd.readouterr().err
+    assert main(["report", str(folder), "--quiet"]) == 0
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "<code>modulus.measured = cylinders.csv</code>" in page
+    assert '<td>0</td><td class="number">27.9000</td><td class="number">33.0000</td>' in page
+    assert '<td>1</td><td class="number">30.1000</td><td class="number">30.1000</td>' in page
