@@ -193,6 +193,6 @@ def exp(x: Any) -> Any:
 def _elementary(name: str, x: Any) -> Any:
     if isinstance(x, float | int | np.ndarray):
         return getattr(np, name)(x)
-    import sympy  # type: ignore[import-untyped]  # only for symbols
+    import sympy  # only for symbols
 
     return getattr(sympy, name)(x)

@@ -53,7 +53,7 @@ class Compiled:
 
 def compiled(expressions: Sequence[Any], active: Sequence[Any], constants: Sequence[Any] = ()) -> Compiled:
     """Compiles SymPy expressions, differentiated by `active`; `constants` are further arguments."""
-    import sympy  # type: ignore[import-untyped]
+    import sympy
 
     arguments = [*active, *constants]
     first = [sympy.diff(e, x) for e in expressions for x in active]

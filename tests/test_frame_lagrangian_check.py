@@ -55,7 +55,7 @@ def test_an_integrator_of_linear_structures_is_refused_with_those_that_go() -> N
 
 
 def test_smooth_functions_beyond_arithmetic_go() -> None:
-    import sympy  # type: ignore[import-untyped]
+    import sympy
 
     system = LagrangianSystem(
         **{**GIVEN, "lagrangian": lambda q, v, p: p["m"] * v[0] ** 2 / 2 - p["k"] * (exp(q[0]) - q[0]) - sympy.log(1 + q[0] ** 2) ** 1.5}
