@@ -29,9 +29,9 @@ FIGURES = {
     "two-point": "Why two points do not describe particles: equal discs of the same area fraction, for illustration",
     "neighbours": "Direct neighbours and cells: equal discs of the same area fraction, for illustration",
     "neighbour-statistics": "Statistics of the direct neighbours",
-    "correlation": "Correlation of the cells with their distance",
+    "correlation": "Reduced radius of a cell against that of its neighbours, with their correlation",
     "cells": "Cells of the particles",
-    "areas": "Share of area by reduced radius, with the limits kept",
+    "areas": "Area of each cell over its reduced radius, and the limits that are kept",
     "pbox": "Measured distribution of the reduced radius, and the p-box of its fuzzy map",
     "radius-map": "Fuzzy map from θ to the reduced radius",
 }
