@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 from alphacut.entry import main
+from alphacut.envelope import task_of
+from alphacut.loading import load
 
 PAPER = Path(__file__).parent.parent / "cases" / "paper.toml"
 
@@ -170,3 +172,16 @@ def test_a_gap_is_meant_for_displacements_whatever_output_stands_first(capfd):
         gaps.append(found["facts"]["gap"])
     assert gaps[0] == pytest.approx(gaps[1], rel=0.2)
     assert max(gaps) <= 1e-4
+
+
+def test_warnings_of_the_library_are_told_once_and_without_python_s_words(capfd):
+    assert main(["envelope", str(PAPER), "--fuzzy", "E", "--duration", "5", "--step", "0.2", "--alpha", "[0, 1]"]) == 0
+    err = capfd.readouterr().err
+    assert err.count("leaves an error of time stepping") == 1
+    assert "UserWarning" not in err
+
+
+def test_without_a_displacement_the_tolerance_is_a_share_of_the_peaks():
+    forces = task_of(load(BUILDING, ['frame.outputs=["base_shear"]'], without=("envelope.tolerance",)))
+    assert (forces.relative, forces.tolerance) == (True, 1e-3)
+    assert not task_of(load(BUILDING, ['frame.outputs=["base_shear", "q1"]'], without=("envelope.tolerance",))).relative

@@ -114,3 +114,18 @@ def test_only_what_the_run_drew_is_shown_and_what_the_command_line_changed_is_to
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "<figure" not in page
     assert "<code>exceedance.limit=1 %</code>" in page
+
+
+def test_the_array_s_shear_ratio_is_told_where_it_is_known():
+    from alphacut.report_sections import isotropy
+
+    assert "1.340 (1 in an isotropic plane); E of eq. 16" in isotropy({"shear_ratio": 1.34})
+    assert isotropy({"shear_ratio": None}) == isotropy({}) == ""
+
+
+def test_the_error_of_a_certified_envelope_is_said_to_be_within_its_bounds():
+    from alphacut.report_envelopes import extremes
+
+    study = {"min": {"q1": -0.2}, "max": {"q1": 0.3}, "error": {"q1": 1e-4}}
+    assert extremes({"E": study}) == [("E", "q1", "−200.0 mm", "300.0 mm", "100 µm")]
+    assert extremes({"E": {**study, "gap": 1e-4}}) == [("E", "q1", "−200.0 mm", "300.0 mm", "100 µm (within the bounds)")]
