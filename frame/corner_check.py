@@ -6,6 +6,7 @@ import numpy as np
 
 from frame.box import UnitFlow
 from frame.jet import Array
+from frame.sampling import corners
 
 CORNERS = 64
 """Corners of each box that are looked at, at most."""
@@ -14,7 +15,7 @@ CORNERS = 64
 def signs(d: int, most: int) -> Array:
     """All corners of [−1, 1]^d, or `most` of them, two opposite ones among them, shape (S, d)."""
     if 2**d <= most:
-        return np.array(np.meshgrid(*[(-1.0, 1.0)] * d, indexing="ij")).reshape(d, -1).T
+        return corners(-np.ones(d), np.ones(d))
     drawn = np.random.default_rng(7).choice([-1.0, 1.0], (most - 2, d))
     return np.vstack([-np.ones(d), np.ones(d), drawn])
 
@@ -36,9 +37,9 @@ def taken_in(flow: UnitFlow, bounds: Array, at: Array) -> tuple[Array, Array, Ar
     top, place = np.full(bounds.shape[1:], -np.inf), np.zeros(at.shape[1:])
     for level in reversed(range(len(bounds))):
         lower, upper = flow.boxes.unit(level)
-        corners = np.unique((lower + upper) / 2 + (upper - lower) / 2 * signs(len(lower), CORNERS), axis=0)
-        runs += len(corners)
-        for point, values in zip(corners, flow.values(corners), strict=True):
+        tried = np.unique((lower + upper) / 2 + (upper - lower) / 2 * signs(len(lower), CORNERS), axis=0)
+        runs += len(tried)
+        for point, values in zip(tried, flow.values(tried), strict=True):
             signed = np.stack([-values, values], -1)
             better = signed > top
             top[better], place[better] = signed[better], point
