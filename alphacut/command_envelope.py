@@ -48,7 +48,7 @@ BARE = {"--duration": "s", "--step": "s", "--tolerance": "m", "--certify": "m"} 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_common(parser)
-    add_keys(parser, KEYS)
+    add_keys(parser, KEYS, BARE)
     parser.add_argument(
         "--modulus", metavar="QUANTITY|FILE.nc", help="Young's modulus: '[22, 24, 26] GPa' or the α-cuts of a file (default: the case's)"
     )

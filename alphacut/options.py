@@ -100,12 +100,13 @@ def add_quiet(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quiet", action="store_true", help="no progress and no table")
 
 
-def add_keys(parser: argparse.ArgumentParser, keys: dict[str, str]) -> None:
-    """Options that stand for keys of the case, with help from the schema."""
+def add_keys(parser: argparse.ArgumentParser, keys: dict[str, str], bare: Mapping[str, str] | None = None) -> None:
+    """Options that stand for keys of the case, with help from the schema; `bare` says in which unit those are that need none."""
     known = every_key()
     for option, key in keys.items():
         entry = known[key]
         example = f", for example '{EXAMPLES.get(key) or QUANTITIES[entry.unit][1]}'" if entry.unit else FORMS.get(entry.kind, "")
+        example += f", or a bare number of {bare[option]}" if bare and option in bare else ""
         choices = f": {', '.join(entry.choices)}" if entry.choices else ""
         metavar = METAVARS.get(entry.kind) or ("QUANTITY" if entry.unit else "NUMBER")
         parser.add_argument(option, metavar=metavar, help=f"{entry.about}{choices}{example} (default: {key} of the case)")
