@@ -55,3 +55,22 @@ def test_many_inputs_have_some_of_their_corners() -> None:
     some = signs(10, 64)
     assert some.shape == (64, 10)
     assert (np.abs(some) == 1).all()
+
+
+@pytest.mark.parametrize("seed", [31, 59])
+def test_the_estimate_holds_where_rounds_end_short_of_the_bounds(seed: int) -> None:
+    """Frames at which half the estimate is exceeded by trajectories that were not computed."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(2, 4))
+    masses, lengths = rng.uniform(8e3, 2e4, n), rng.uniform(2.5, 3.2, n)
+    dampers, q0, v0 = rng.uniform(50, 300, n), rng.uniform(-0.1, 0.1, n), rng.uniform(-0.5, 0.5, n)
+    frame = StoreyFrame(masses, lengths, 25e9, 1e-6, dampers, "ground", q0, v0)
+    inputs = {name: Triangular(0.92 * x, x, 1.08 * x) for name in ("E", "m1", "l1") for x in [frame.parameters[name]]}
+    options = {"method": "improved-graph-follower", "integrator": "exact", "tolerance": 1e-3}
+    found = envelope(frame, inputs, duration=8, step=0.1, alpha=(0,), **options)
+    low, high = np.array([number.cut(0) for number in inputs.values()]).T
+    values = LinearFlow(frame, tuple(inputs), 8, 0.1, Exact()).values(low + (high - low) * rng.random((1500, 3)))
+    missed = np.maximum(values.max(0) - found.upper[0], found.lower[0] - values.min(0))
+    assert found.error is not None
+    assert (missed <= found.error[0]).all()
+    assert (missed > found.error[0] / 2).any()
