@@ -28,21 +28,24 @@ coverage:
 	$(IN) env COVERAGE_CORE=sysmon python -m pytest -m "not slow" --cov --cov-report=term-missing:skip-covered $(PYTEST)
 
 bench-solver:
-	$(IN) python -m benchmarks.cell_solvers
+	$(IN) python -m benchmarks.rve.solvers
 
 bench-scaling:
-	$(IN) python -m benchmarks.cell_scaling
-	$(IN) python -m benchmarks.cell_solvers --mesh-size 0.04 --solvers gamg --out benchmarks/results/cell_solvers_large.csv
+	$(IN) python -m benchmarks.rve.scaling
+	$(IN) python -m benchmarks.rve.solvers --mesh-size 0.04 --solvers gamg --out benchmarks/results/cell_solvers_large.csv
 
 lint:
 	ruff check . && ruff format --check .
-	$(IN) mypy --strict alphacut stochastic rve fuzzy frame
+	$(IN) mypy --strict alphacut
 
 charts:
-	$(IN) python -m alphacut charts
+	$(IN) python -m benchmarks.rve.charts
+	$(IN) python -m benchmarks.frame.integrators
+	$(IN) python -m benchmarks.frame.envelopes
+	$(IN) python -m benchmarks.frame.failures
 
 stability:
-	$(IN) python -m benchmarks.cell_stability
+	$(IN) python -m benchmarks.rve.stability
 
 docs:
 	$(IN) sphinx-build -q docs build/docs

@@ -8,25 +8,21 @@ import sys
 from collections.abc import Mapping, Sequence
 from types import ModuleType
 
-from alphacut import (
-    command_cell,
-    command_charts,
-    command_check,
-    command_cite,
-    command_envelope,
-    command_mesh,
-    command_microstructure,
-    command_modulus,
-    command_report,
-    command_run,
-)
-from alphacut.destination import check_destinations
-from alphacut.options import Parser, refuse_petsc, split_petsc
-from alphacut.output import rank, ranks, say, standard_output
-from alphacut.problem import BadInput
-from alphacut.provenance import own_version
-from fuzzy import CampaignError
-from rve.solver_options import OptionError
+from alphacut.commands import cell as command_cell
+from alphacut.commands import check as command_check
+from alphacut.commands import envelope as command_envelope
+from alphacut.commands import mesh as command_mesh
+from alphacut.commands import microstructure as command_microstructure
+from alphacut.commands import modulus as command_modulus
+from alphacut.commands import report as command_report
+from alphacut.commands import run as command_run
+from alphacut.commands.options import Parser, refuse_petsc, split_petsc
+from alphacut.fuzzy import CampaignError
+from alphacut.io.files import rank, ranks, say, standard_output
+from alphacut.io.output_paths import check_destinations
+from alphacut.io.problem import BadInput
+from alphacut.io.provenance import own_version
+from alphacut.rve.solver.options import OptionError
 
 COMMANDS: dict[str, ModuleType] = {
     "run": command_run,
@@ -37,8 +33,6 @@ COMMANDS: dict[str, ModuleType] = {
     "modulus": command_modulus,
     "envelope": command_envelope,
     "report": command_report,
-    "charts": command_charts,
-    "cite": command_cite,
 }
 STATUSES = """\
 exit status:
@@ -51,7 +45,9 @@ exit status:
 
 
 def parsers(program: str, commands: Mapping[str, ModuleType]) -> tuple[Parser, dict[str, Parser]]:
-    """The parser of a program with the given commands, and those of the commands, by their names there."""
+    """The parser of a program with the given commands, and those of the commands, by their names
+    there.
+    """
     top = Parser(
         prog=program,
         description="From an uncertain microstructure to the fuzzy vibration of a structure.",
@@ -60,34 +56,46 @@ def parsers(program: str, commands: Mapping[str, ModuleType]) -> tuple[Parser, d
         allow_abbrev=False,
     )
     top.add_argument("--version", action="version", version=f"alphacut {own_version()}")
-    inner = top.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
+    inner = top.add_subparsers(
+        dest="command", metavar="COMMAND", required=True, parser_class=Parser
+    )
     made: dict[str, Parser] = {}
     for name, module in commands.items():
         about = module.ABOUT
-        made[name] = inner.add_parser(name, help=about, description=f"{about[:1].upper()}{about[1:]}.", allow_abbrev=False)
+        made[name] = inner.add_parser(
+            name, help=about, description=f"{about[:1].upper()}{about[1:]}.", allow_abbrev=False
+        )
         module.arguments(made[name])
     return top, made
 
 
-def main(arguments: Sequence[str] | None = None, *, program: str = "alphacut", names: Mapping[str, str] | None = None) -> int:
+def main(
+    arguments: Sequence[str] | None = None,
+    *,
+    program: str = "alphacut",
+    names: Mapping[str, str] | None = None,
+) -> int:
     """Run one command.
 
     Args:
         arguments: The command line after the program's name; the process's own if left out.
         program: The program's name, for messages.
-        names: Names of the commands here to their names in `COMMANDS`; all of them under their own names if left out.
+        names: Names of the commands here to their names in `COMMANDS`; all of them under their own
+            names if left out.
 
     Returns:
         Exit status, see `STATUSES`.
     """
-    commands = COMMANDS if names is None else {here: COMMANDS[there] for here, there in names.items()}
+    commands = (
+        COMMANDS if names is None else {here: COMMANDS[there] for here, there in names.items()}
+    )
     try:
         ours, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
         top, made = parsers(program, commands)
         options, left = top.parse_known_args(ours)
         if left:
             made[options.command].refuse([word for word in left if word.startswith("-")] or left)
-        refuse_petsc(commands[options.command].__name__.rpartition("command_")[2], petsc)
+        refuse_petsc(commands[options.command].__name__.rpartition(".")[2], petsc)
         check_destinations(made[options.command], options)
         with standard_output(getattr(options, "json", None) == "-") as out:
             return int(commands[options.command].run(options, petsc, out))
@@ -112,7 +120,9 @@ def main(arguments: Sequence[str] | None = None, *, program: str = "alphacut", n
 
 
 def failed(error: Exception) -> int:
-    """One line about a computation that failed; under mpirun the other ranks are told to stop as well."""
+    """One line about a computation that failed; under mpirun the other ranks are told to stop as
+    well.
+    """
     if os.environ.get("ALPHACUT_TRACEBACK"):
         raise error
     message = " ".join(str(error).split()) or type(error).__name__

@@ -13,7 +13,10 @@ myst_heading_anchors = 3
 source_suffix = {".md": "markdown"}
 exclude_patterns = ["README.md"]
 html_theme = "alabaster"
-html_theme_options = {"description": "From an uncertain microstructure to the fuzzy vibration of a structure", "fixed_sidebar": True}
+html_theme_options = {
+    "description": "From an uncertain microstructure to the fuzzy vibration of a structure",
+    "fixed_sidebar": True,
+}
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
 nitpicky = False

@@ -1,17 +1,24 @@
 """Vibration of structures with fuzzy parameters."""
 
-from frame.envelope import Envelope
-from frame.flow import LinearFlow
-from frame.graph_follower import GraphFollower
-from frame.integrators import INTEGRATORS, Exact, Gauss4, Midpoint, Newmark, RungeKutta4
-from frame.lagrangian import LagrangianSystem, pendulum
-from frame.linear import Accelerogram
-from frame.matrix_structure import MatrixStructure
-from frame.nonlinear_flow import LagrangianFlow
-from frame.propagation import METHODS, envelope
-from frame.record import FollowerRecord, record
-from frame.step_guard import StepGuard, guard
-from frame.storey import StoreyFrame
+from alphacut.frame.checks.step_resolution import StepGuard, guard
+from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.integrators import (
+    INTEGRATORS,
+    Exact,
+    Gauss4,
+    Midpoint,
+    Newmark,
+    RungeKutta4,
+)
+from alphacut.frame.dynamics.nonlinear import LagrangianFlow
+from alphacut.frame.envelope import Envelope
+from alphacut.frame.methods.follower_record import FollowerRecord, record
+from alphacut.frame.methods.graph_follower import GraphFollower
+from alphacut.frame.propagation import METHODS, envelope
+from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
+from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.matrix import MatrixStructure
+from alphacut.frame.structures.storey import StoreyFrame
 
 __all__ = [
     "INTEGRATORS",

@@ -1,4 +1,6 @@
-"""Envelopes: the α-cut bounds of the outputs over time, with the parameters that reach them and what they cost."""
+"""Envelopes: the α-cut bounds of the outputs over time, with the parameters that reach them and
+what they cost.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +10,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from frame.jet import Array
+from alphacut.frame.calculus.jet import Array
 
 if TYPE_CHECKING:
     import xarray
 
-    from frame.box import Boxes
+    from alphacut.frame.boxes import Boxes
 
 NATURES = ("inner", "estimated", "verified by sampling", "guaranteed")
 
@@ -43,33 +45,45 @@ class Envelope:
         time: Nodes, shape (T,), in s.
         outputs: Names of the observed quantities, m of them.
         parameters: Names of the uncertain parameters, d of them.
-        lower: Lower bounds of the nature stated below, shape (A, T, m), in SI units; of a certified envelope the proved ones.
+        lower: Lower bounds of the nature stated below, shape (A, T, m), in SI units; of a certified
+            envelope the proved ones.
         upper: Upper bounds, shape (A, T, m).
-        lower_at: Parameters that reach the lower bounds, of a certified envelope `inner_lower`, shape (A, T, m, d), in SI units.
+        lower_at: Parameters that reach the lower bounds, of a certified envelope `inner_lower`,
+            shape (A, T, m, d), in SI units.
         upper_at: Parameters that reach the upper bounds, shape (A, T, m, d).
         method: Name of the method.
-        nature: "inner": attained by the given parameters; "estimated": with `error`; "verified by sampling" or "guaranteed": certified.
+        nature: "inner": attained by the given parameters; "estimated": with `error`; "verified by
+            sampling" or "guaranteed": certified.
         trajectories: Number of trajectories (or eigen-analyses) computed.
         seconds: Wall time of computing.
-        error: Estimated envelope error, shape (A, T, m), in the units of the outputs; None where none was made.
-        inner_lower: Of a certified envelope what `lower_at` attains at most, less what the model of the motion may be wrong by, so that the
-            true lower bound lies between `lower` and this; shape (A, T, m). None without a certificate.
-        inner_upper: The same for the upper bound. Where it lies below `inner_lower`, no width is proved.
+        error: Estimated envelope error, shape (A, T, m), in the units of the outputs; None where
+            none was made.
+        inner_lower: Of a certified envelope what `lower_at` attains at most, less what the model of
+            the motion may be wrong by, so that the true lower bound lies between `lower` and this;
+            shape (A, T, m). None without a certificate.
+        inner_upper: The same for the upper bound. Where it lies below `inner_lower`, no width is
+            proved.
         facts: Further numbers and words by name, see below.
 
-    The facts that are there depend on the method. "The unit" is that of the first displacement among the outputs, else of the first output;
-    where the tolerance was relative, it is a share of each output's peak.
+    The facts that are there depend on the method. "The unit" is that of the first displacement
+    among the outputs, else of the first output; where the tolerance was relative, it is a share of
+    each output's peak.
 
-    - integrator: Name of the time stepping. step_error: What it is wrong by at most at the modal parameters and the widest box's corners,
-      in the unit of the first displacement; added to `error`, for each output in its own unit, where that was estimated.
+    - integrator: Name of the time stepping. step_error: What it is wrong by at most at the modal
+      parameters and the widest box's corners, in the unit of the first displacement; added to
+      `error`, for each output in its own unit, where that was estimated.
     - dominant_error: Said where time stepping adds more to an output than the search.
-    - tolerance: What the Graph Follower computed a graph for, in the unit. order: Degree of its Taylor models. recomputed: Derivatives
+    - tolerance: What the Graph Follower computed a graph for, in the unit. order: Degree of its
+      Taylor models. recomputed: Derivatives
       computed again. corners: Trajectories at corners, beside `trajectories`.
-    - degree: Of the polynomials of the modes. model_error: What trajectories of theirs are wrong by at most at held-out parameters, over
-      all outputs; of a certified envelope the bound that went into it, in the unit.
-    - estimated_error: Largest error, in the unit. missed_by_sample: By how much independent trajectories passed the bounds, in the unit.
-    - gap: Largest distance of attained and proved bounds, in the unit, which is that of gap_output. between_nodes: How far an output may
-      stray from a straight line between two nodes, in the unit. boxes: Parts of the parameters' box that the proof looked at, a count.
+    - degree: Of the polynomials of the modes. model_error: What trajectories of theirs are wrong by
+      at most at held-out parameters, over all outputs; of a certified envelope the bound that went
+      into it, in the unit.
+    - estimated_error: Largest error, in the unit. missed_by_sample: By how much independent
+      trajectories passed the bounds, in the unit.
+    - gap: Largest distance of attained and proved bounds, in the unit, which is that of gap_output.
+      between_nodes: How far an output may stray from a straight line between two nodes, in the
+      unit. boxes: Parts of the parameters' box that the proof looked at, a count.
       proof: What is proved and what sampled.
     - reason: Why the method was taken, or what it fell short of.
     """
@@ -92,18 +106,29 @@ class Envelope:
     facts: Mapping[str, float | str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        """What, over what, how far at the lowest level, by what method and how well, in a few lines."""
+        """What, over what, how far at the lowest level, by what method and how well, in a few
+        lines.
+        """
         span = f"{self.time[0]:g} … {self.time[-1]:g} s ({len(self.time)} nodes)"
         levels = ", ".join(f"{a:g}" for a in self.alpha)
-        lines = [f"Envelope of {', '.join(self.outputs)} over {span}, α = {levels}, uncertain {', '.join(self.parameters)}"]
+        lines = [
+            f"Envelope of {', '.join(self.outputs)} over {span}, α = {levels}, uncertain"
+            f" {', '.join(self.parameters)}"
+        ]
         for k, name in enumerate(self.outputs):
             unit = _unit(name)
-            error = "" if self.error is None else f", error up to {self.error[..., k].max():.2g}{unit}"
+            error = (
+                "" if self.error is None else f", error up to {self.error[..., k].max():.2g}{unit}"
+            )
             ends = np.array([self.minimum[0, k], self.maximum[0, k]])
             low, high = np.where(np.abs(ends) > 1e-9 * np.abs(ends).max(), ends, 0.0)
             lines.append(f"  {name}: {low:.6g} … {high:.6g}{unit} at α = {self.alpha[0]:g}{error}")
-        count = f"{self.trajectories} {'eigen-analyses' if self.method == 'modal' else 'trajectories'}"
-        return "\n".join([*lines, f"  {self.method}: {count}, {self.seconds:.2g} s, bounds {self.nature}"])
+        count = (
+            f"{self.trajectories} {'eigen-analyses' if self.method == 'modal' else 'trajectories'}"
+        )
+        return "\n".join(
+            [*lines, f"  {self.method}: {count}, {self.seconds:.2g} s, bounds {self.nature}"]
+        )
 
     @property
     def minimum(self) -> Array:
@@ -130,10 +155,21 @@ class Envelope:
         band, at = ("alpha", "time", "output"), ("alpha", "time", "output", "parameter")
         data: dict[str, Any] = {name: (band, getattr(self, name)) for name in ("lower", "upper")}
         data |= {name: (at, getattr(self, name)) for name in ("lower_at", "upper_at")}
-        data |= {name: (band, getattr(self, name)) for name in ("error", "inner_lower", "inner_upper") if getattr(self, name) is not None}
-        axes = {"alpha": self.alpha, "time": self.time, "output": list(self.outputs), "parameter": list(self.parameters)}
+        data |= {
+            name: (band, getattr(self, name))
+            for name in ("error", "inner_lower", "inner_upper")
+            if getattr(self, name) is not None
+        }
+        axes = {
+            "alpha": self.alpha,
+            "time": self.time,
+            "output": list(self.outputs),
+            "parameter": list(self.parameters),
+        }
         counts = {"trajectories": self.trajectories, "seconds": self.seconds}
-        dataset = xarray.Dataset(data, axes, {"method": self.method, "nature": self.nature, **counts, **self.facts})
+        dataset = xarray.Dataset(
+            data, axes, {"method": self.method, "nature": self.nature, **counts, **self.facts}
+        )
         dataset["time"].attrs["units"] = "s"
         units = sorted({output_unit(name) for name in self.outputs})
         for name in set(data) - {"lower_at", "upper_at"}:
@@ -144,11 +180,21 @@ class Envelope:
 
 
 def signed_envelope(flow: Trajectories, bounds: Array, at: Array, **rest: Any) -> Envelope:
-    """An envelope from upper bounds of (−output, output), shape (A, T, m, 2), and their unit coordinates (A, T, m, 2, d)."""
+    """An envelope from upper bounds of (−output, output), shape (A, T, m, 2), and their unit
+    coordinates (A, T, m, 2, d).
+    """
     cuts = flow.boxes
     where = cuts.to_physical(at)
     return Envelope(
-        cuts.alpha, flow.time, flow.outputs, cuts.names, -bounds[..., 0], bounds[..., 1], where[..., 0, :], where[..., 1, :], **rest
+        cuts.alpha,
+        flow.time,
+        flow.outputs,
+        cuts.names,
+        -bounds[..., 0],
+        bounds[..., 1],
+        where[..., 0, :],
+        where[..., 1, :],
+        **rest,
     )
 
 
@@ -161,4 +207,13 @@ def _unit(name: str) -> str:
 def output_unit(name: str) -> str:
     """SI unit of an output by its name."""
     kind = name.rstrip("0123456789")
-    return {"q": "m", "drift": "m", "v": "m/s", "shear": "N", "base_shear": "N", "roof": "m", "force": "N", "phi": "rad"}.get(kind, "SI")
+    return {
+        "q": "m",
+        "drift": "m",
+        "v": "m/s",
+        "shear": "N",
+        "base_shear": "N",
+        "roof": "m",
+        "force": "N",
+        "phi": "rad",
+    }.get(kind, "SI")

@@ -9,24 +9,24 @@ from typing import Any
 
 import numpy as np
 
-from frame.admissible import require_admissible
-from frame.auto import auto
-from frame.batch_follower import pursue
-from frame.box import ALPHA, UnitFlow, boxes
-from frame.default_method import default
-from frame.envelope import Envelope, signed_envelope
-from frame.flow import LinearFlow
-from frame.graph_follower import Followed, GraphFollower
-from frame.integrators import INTEGRATORS, Integrator
-from frame.lagrangian import LagrangianSystem
-from frame.linear import LinearSystem
-from frame.method_options import require_options
-from frame.modal_method import modal
-from frame.nonlinear_flow import LagrangianFlow
-from frame.sampling import monte_carlo, quasi_monte_carlo, vertex
-from frame.step_error import require_stable, step_error, with_step_error
-from frame.tolerance_guard import LIMIT
-from fuzzy import FuzzyNumber
+from alphacut.frame.boxes import ALPHA, UnitFlow, boxes
+from alphacut.frame.checks.admissible import require_admissible
+from alphacut.frame.checks.step_error import require_stable, step_error, with_step_error
+from alphacut.frame.checks.tolerance import LIMIT
+from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.integrators import INTEGRATORS, Integrator
+from alphacut.frame.dynamics.nonlinear import LagrangianFlow
+from alphacut.frame.envelope import Envelope, signed_envelope
+from alphacut.frame.methods.auto import auto
+from alphacut.frame.methods.batch_graph_follower import pursue
+from alphacut.frame.methods.default_method import default
+from alphacut.frame.methods.graph_follower import Followed, GraphFollower
+from alphacut.frame.methods.method_options import require_options
+from alphacut.frame.methods.modal import modal
+from alphacut.frame.methods.sampling import monte_carlo, quasi_monte_carlo, vertex
+from alphacut.frame.structures.lagrangian import LagrangianSystem
+from alphacut.frame.structures.linear import LinearSystem
+from alphacut.fuzzy import FuzzyNumber
 
 Progress = Callable[[float], None]
 
@@ -52,39 +52,52 @@ def envelope(
         duration: Length of the simulation, in s.
         step: Distance of the nodes and step of the integrator, in s.
         alpha: Levels, rising within [0, 1].
-        method: Name of a method, see `METHODS`; unless given, auto for linear structures with an error of 1e-4 m, or of a thousandth of
-            each peak where no output is a displacement, and improved-graph-follower for others.
-        integrator: Time stepping. Of linear structures an integrator or its name: exact (of auto and modal unless given), midpoint (of all
-            others), newmark, rk4, gauss4. Of general Lagrangian systems midpoint (unless given), composition4 or rk4.
-        relative: Whether the method's tolerance is a share of each output's peak at the modal parameters, instead of a length in SI units.
+        method: Name of a method, see `METHODS`; unless given, auto for linear structures with an
+            error of 1e-4 m, or of a thousandth of each peak where no output is a displacement, and
+            improved-graph-follower for others.
+        integrator: Time stepping. Of linear structures an integrator or its name: exact (of auto
+            and modal unless given), midpoint (of all others), newmark, rk4, gauss4. Of general
+            Lagrangian systems midpoint (unless given), composition4 or rk4.
+        relative: Whether the method's tolerance is a share of each output's peak at the modal
+            parameters, instead of a length in SI units.
         progress: Called with the fraction done.
         options: Options of the method, see below.
 
-    Options, in SI units; a tolerance is in m, or in the unit of the first output where none is a displacement, others in proportion:
+    Options, in SI units; a tolerance is in m, or in the unit of the first output where none is a
+    displacement, others in proportion:
 
-    - auto: `tolerance` (wanted error, 1e-4), `exclude` (of modal and improved-graph-follower), `budget` (most trajectories, 20000).
-    - modal: `tolerance` (of the polynomials of the modes, 1e-6), `budget` (most eigen-analyses, 280), `seed`; `certify` (wanted gap between
-      attained and proved bounds; none), then `boxes` (most boxes for each bound, 4000) and `workers` (processes, 1).
-    - improved-graph-follower: `tolerance` (promised gain worth a trajectory, 7e-5), `budget` (most trajectories, 5000), `spread` (first
-      points on each level, 64), `batch` (computed together, 32), `reach` (trust region, share of the box, 0.6), `order` (2), `contests`.
-    - graph-follower: `order` (of the Taylor models, 1 or 2), `tolerance` (1e-4), `sweeps` (1), `exact` (False), `models` (1), `corrected`
-      (False), `budget` (none), `record` (False); see `GraphFollower`.
+    - auto: `tolerance` (wanted error, 1e-4), `exclude` (of modal and improved-graph-follower),
+      `budget` (most trajectories, 20000).
+    - modal: `tolerance` (of the polynomials of the modes, 1e-6), `budget` (most eigen-analyses,
+      280), `seed`; `certify` (wanted gap between attained and proved bounds; none), then `boxes`
+      (most boxes for each bound, 4000) and `workers` (processes, 1).
+    - improved-graph-follower: `tolerance` (promised gain worth a trajectory, 7e-5), `budget` (most
+      trajectories, 5000), `spread` (first points on each level, 64), `batch` (computed together,
+      32), `reach` (trust region, share of the box, 0.6), `order` (2), `contests`.
+    - graph-follower: `order` (of the Taylor models, 1 or 2), `tolerance` (1e-4), `sweeps` (1),
+      `exact` (False), `models` (1), `corrected` (False), `budget` (none), `record` (False); see
+      `GraphFollower`.
     - vertex: none. monte-carlo, quasi-monte-carlo: `samples` on each level (1000, 1024), `seed`.
-    - Where no method is named: those of auto; `certify`, `seed`, `boxes` or `workers` ask for modal.
+    - Where no method is named: those of auto; `certify`, `seed`, `boxes` or `workers` ask for
+      modal.
 
     Raises:
-        ValueError: An unknown name or option, a value outside its range, a support that reaches values without a meaning, an unstable
-            step, or a motion that does not exist.
+        ValueError: An unknown name or option, a value outside its range, a support that reaches
+            values without a meaning, an unstable step, or a motion that does not exist.
         StepError: A step did not converge, or leaves the motion.
         ToleranceError: No method reaches the wanted error.
-        ModalError: The method is modal, and the structure has no smooth oscillating modes over the box.
+        ModalError: The method is modal, and the structure has no smooth oscillating modes over the
+            box.
 
     Warns:
-        UserWarning: The error of time stepping passes a hundredth of a peak; or the method is modal, and its error passes that and the
-            tolerance.
+        UserWarning: The error of time stepping passes a hundredth of a peak; or the method is
+            modal, and its error passes that and the tolerance.
     """
     if not isinstance(model, LagrangianSystem) and not hasattr(model, "matrices"):
-        raise ValueError(f"model: {model!r} is no structure; take a StoreyFrame, a MatrixStructure or a LagrangianSystem")
+        raise ValueError(
+            f"model: {model!r} is no structure; take a StoreyFrame, a MatrixStructure or a"
+            " LagrangianSystem"
+        )
     if method is None and isinstance(model, LagrangianSystem):
         method = "improved-graph-follower"
     propagate = default if method is None else _method(method)
@@ -114,12 +127,17 @@ def _integrator(given: str | Integrator | None, method: str | None) -> Integrato
     if isinstance(given, str) and given not in INTEGRATORS:
         raise ValueError(f"integrator: '{given}' is unknown; allowed are {', '.join(INTEGRATORS)}")
     if not isinstance(given, str) and not hasattr(given, "step_map"):
-        raise ValueError(f"integrator: {given!r} is none; take an integrator such as Exact(), or a name: {', '.join(INTEGRATORS)}")
+        raise ValueError(
+            f"integrator: {given!r} is none; take an integrator such as Exact(), or a name:"
+            f" {', '.join(INTEGRATORS)}"
+        )
     return INTEGRATORS[given] if isinstance(given, str) else given
 
 
 def warn_of_roughness(found: Envelope) -> None:
-    """Warns of an estimated envelope whose error passes what was asked for and a hundredth of the output's largest bound."""
+    """Warns of an estimated envelope whose error passes what was asked for and a hundredth of the
+    output's largest bound.
+    """
     if "reason" not in found.facts or found.error is None:
         return
     peak = np.maximum(np.abs(found.lower), np.abs(found.upper)).max((0, 1))
@@ -141,9 +159,15 @@ def follow(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> 
     return followed_envelope(flow, follower, followed, time.perf_counter() - begun)
 
 
-def followed_envelope(flow: UnitFlow, follower: GraphFollower, followed: Followed, seconds: float) -> Envelope:
+def followed_envelope(
+    flow: UnitFlow, follower: GraphFollower, followed: Followed, seconds: float
+) -> Envelope:
     """The envelope of a finished Graph Follower."""
-    facts: dict[str, float | str] = {"order": follower.order, "tolerance": follower.tolerance, "recomputed": followed.storage.recomputed}
+    facts: dict[str, float | str] = {
+        "order": follower.order,
+        "tolerance": follower.tolerance,
+        "recomputed": followed.storage.recomputed,
+    }
     if followed.exhausted:
         facts["reason"] = f"stopped at the budget of {follower.budget} trajectories"
     return signed_envelope(

@@ -1,30 +1,42 @@
 """Fuzzy inputs through any model: α-cuts, plans of samples, fuzzy results."""
 
-from fuzzy.arithmetic import DependencyError, apply
-from fuzzy.branch_and_bound import BranchAndBound
-from fuzzy.campaign import CampaignError
-from fuzzy.chebyshev import Chebyshev
-from fuzzy.domain import Domain, levels
-from fuzzy.enclosure import gradient_range
-from fuzzy.explain import Explanation, explain
-from fuzzy.interaction import Ellipsoidal, Linear
-from fuzzy.interval_sampling import IntervalQuasiMonteCarlo, IntervalResponse, RandomInput
-from fuzzy.known import Known
-from fuzzy.metamodel import Metamodel, TrainedBounds
-from fuzzy.monotone import Verification
-from fuzzy.numbers import Crisp, Cut, FuzzyNumber, Interval, PiecewiseLinear, Trapezoidal, Triangular
-from fuzzy.optimisation import Optimisation
-from fuzzy.plan import Plan
-from fuzzy.polymorphic import RandomResponse
-from fuzzy.propagation import propagate
-from fuzzy.response_surface import ResponseSurface
-from fuzzy.result import FuzzyResult, Nature
-from fuzzy.sampling import MonteCarlo, QuasiMonteCarlo
-from fuzzy.sets import FuzzySet, from_data
-from fuzzy.shares import Shares, width_shares
-from fuzzy.signed import Signed
-from fuzzy.store import Store, StoreError
-from fuzzy.transformation import Extended, General, Reduced, Vertex
+from alphacut.fuzzy.campaign.campaign import CampaignError
+from alphacut.fuzzy.campaign.store import Store, StoreError
+from alphacut.fuzzy.dry_run import Explanation, explain
+from alphacut.fuzzy.knowledge.interval_arithmetic import gradient_range
+from alphacut.fuzzy.knowledge.known import Known
+from alphacut.fuzzy.plans.alpha_cut_optimisation import Optimisation
+from alphacut.fuzzy.plans.branch_and_bound import BranchAndBound
+from alphacut.fuzzy.plans.interval_quasi_monte_carlo import (
+    IntervalQuasiMonteCarlo,
+    IntervalResponse,
+    RandomInput,
+)
+from alphacut.fuzzy.plans.metamodel import Metamodel, TrainedBounds
+from alphacut.fuzzy.plans.monotonicity import Verification
+from alphacut.fuzzy.plans.monte_carlo import MonteCarlo, QuasiMonteCarlo
+from alphacut.fuzzy.plans.plan import Plan
+from alphacut.fuzzy.plans.signed import Signed
+from alphacut.fuzzy.plans.sparse_chebyshev import Chebyshev
+from alphacut.fuzzy.plans.transformation import Extended, General, Reduced, Vertex
+from alphacut.fuzzy.propagation import propagate
+from alphacut.fuzzy.random_response import RandomResponse
+from alphacut.fuzzy.samples.result import FuzzyResult, Nature
+from alphacut.fuzzy.sets.arithmetic import DependencyError, apply
+from alphacut.fuzzy.sets.boxes import Domain, levels
+from alphacut.fuzzy.sets.interaction import Ellipsoidal, Linear
+from alphacut.fuzzy.sets.membership import FuzzySet, from_data
+from alphacut.fuzzy.sets.numbers import (
+    Crisp,
+    Cut,
+    FuzzyNumber,
+    Interval,
+    PiecewiseLinear,
+    Trapezoidal,
+    Triangular,
+)
+from alphacut.fuzzy.surrogates.response_surface import ResponseSurface
+from alphacut.fuzzy.width_contributions import Shares, width_shares
 
 __all__ = [
     "BranchAndBound",

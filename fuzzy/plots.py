@@ -7,18 +7,27 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fuzzy.domain import levels
-from fuzzy.numbers import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
-from fuzzy.sets import FuzzySet
+from alphacut.fuzzy.sets.boxes import levels
+from alphacut.fuzzy.sets.membership import FuzzySet
+from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")  # Okabe and Ito: told apart by everyone
+_COLOURS = (
+    "#0072B2",
+    "#D55E00",
+    "#009E73",
+    "#CC79A7",
+    "#E69F00",
+    "#56B4E9",
+)  # Okabe and Ito: told apart by everyone
 
 
-def plot_membership(axes: Axes, sets: Mapping[str, FuzzyNumber | FuzzySet], *, quantity: str = "p") -> None:
+def plot_membership(
+    axes: Axes, sets: Mapping[str, FuzzyNumber | FuzzySet], *, quantity: str = "p"
+) -> None:
     """Draw membership functions, each under its name.
 
     Args:
@@ -31,10 +40,14 @@ def plot_membership(axes: Axes, sets: Mapping[str, FuzzyNumber | FuzzySet], *, q
         axes.plot(x, grade, color=colour, label=name, linewidth=1.8)
         axes.fill_between(x, grade, color=colour, alpha=0.12, linewidth=0)
     axes.set(xlabel=quantity, ylabel="membership μ", ylim=(0, 1.08))
-    axes.legend(fontsize="small", frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=3)
+    axes.legend(
+        fontsize="small", frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=3
+    )
 
 
-def plot_cuts(axes: Axes, number: FuzzyNumber, alpha: Sequence[float], *, quantity: str = "p") -> None:
+def plot_cuts(
+    axes: Axes, number: FuzzyNumber, alpha: Sequence[float], *, quantity: str = "p"
+) -> None:
     """Draw a fuzzy number decomposed into α-cuts.
 
     Args:
@@ -48,7 +61,13 @@ def plot_cuts(axes: Axes, number: FuzzyNumber, alpha: Sequence[float], *, quanti
     for level in alpha:
         cut = number.cut(level)
         axes.plot(cut, (level, level), color=_COLOURS[1], marker="|", markersize=9, linewidth=1.4)
-        axes.annotate(f"α = {level:.3g}", (cut.upper, level), xytext=(5, 2), textcoords="offset points", fontsize="small")
+        axes.annotate(
+            f"α = {level:.3g}",
+            (cut.upper, level),
+            xytext=(5, 2),
+            textcoords="offset points",
+            fontsize="small",
+        )
     axes.margins(x=0.15)  # room for the labels
     axes.set(xlabel=quantity, ylabel="membership μ, α", ylim=(-0.03, 1.12))
 
@@ -62,7 +81,9 @@ def _outline(fuzzy: FuzzyNumber | FuzzySet) -> tuple[list[float], list[float]]:
 
 
 def figure_36() -> Figure:
-    """The paper's Fig. 36: crisp number, crisp interval, triangular number, fuzzy interval, and a non-convex subnormal set."""
+    """The paper's Fig. 36: crisp number, crisp interval, triangular number, fuzzy interval, and a
+    non-convex subnormal set.
+    """
     from matplotlib.figure import Figure
 
     x = np.linspace(9, 11, 81)

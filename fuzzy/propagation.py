@@ -9,19 +9,26 @@ from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
-from fuzzy.call import Call, Function
-from fuzzy.campaign import Campaign, Progress
-from fuzzy.domain import Domain, levels
-from fuzzy.interaction import Interaction
-from fuzzy.known import Known
-from fuzzy.numbers import FuzzyNumber
-from fuzzy.plan import Plan
-from fuzzy.result import FuzzyResult
-from fuzzy.shelf import shelf
-from fuzzy.store import Identity, Store
-from fuzzy.transformation import General
-from fuzzy.vetting import fuzzy_inputs, interaction_list, known_facts, require_callable, require_plan, shared_numbers
-from fuzzy.workers import pool, require_workers
+from alphacut.fuzzy.arguments import (
+    fuzzy_inputs,
+    interaction_list,
+    known_facts,
+    require_callable,
+    require_plan,
+    shared_numbers,
+)
+from alphacut.fuzzy.campaign.call import Call, Function
+from alphacut.fuzzy.campaign.campaign import Campaign, Progress
+from alphacut.fuzzy.campaign.sample_store import shelf
+from alphacut.fuzzy.campaign.store import Identity, Store
+from alphacut.fuzzy.campaign.workers import pool, require_workers
+from alphacut.fuzzy.knowledge.known import Known
+from alphacut.fuzzy.plans.plan import Plan
+from alphacut.fuzzy.plans.transformation import General
+from alphacut.fuzzy.samples.result import FuzzyResult
+from alphacut.fuzzy.sets.boxes import Domain, levels
+from alphacut.fuzzy.sets.interaction import Interaction
+from alphacut.fuzzy.sets.numbers import FuzzyNumber
 
 
 def propagate(
@@ -44,23 +51,31 @@ def propagate(
     """Fuzzy outputs of a function of fuzzy inputs.
 
     Args:
-        function: Gets the inputs by name and returns a number, an array, or a mapping of names to either. With `shared` it gets a list
-            of points (mappings of names to numbers) that agree in those inputs and returns a list of outputs; with `vectorised` it gets
-            arrays, shape (n,), and returns arrays whose first axis is n.
-        inputs: Fuzzy number of each input; a plain number is crisp. Inputs are independent, also where one number object stands for two.
-        plan: How the boxes of the inputs are searched; the general transformation method if not given.
+        function: Gets the inputs by name and returns a number, an array, or a mapping of names to
+            either. With `shared` it gets a list of points (mappings of names to numbers) that agree
+            in those inputs and returns a list of outputs; with `vectorised` it gets arrays, shape
+            (n,), and returns arrays whose first axis is n.
+        inputs: Fuzzy number of each input; a plain number is crisp. Inputs are independent, also
+            where one number object stands for two.
+        plan: How the boxes of the inputs are searched; the general transformation method if not
+            given.
         alpha: Rising levels; 0, ¼, ½, ¾, 1 if not given.
         interactions: Constraints between the inputs; plans that cannot respect them refuse.
         shared: Inputs whose equality lets samples share one call.
         vectorised: Whether the function takes arrays.
-        workers: Processes of this machine; the result is the same for any number. They import the main script, so its calls must stand
-            under `if __name__ == "__main__":` and the function in a file.
+        workers: Processes of this machine; the result is the same for any number. They import the
+            main script, so its calls must stand under `if __name__ == "__main__":` and the function
+            in a file.
         executor: Any `concurrent.futures` executor, instead of `workers`.
-        known: Facts about the function, such as the signs of its effects, on which guaranteed bounds rest.
-        store: Where samples are kept (or its path): a campaign that was stopped, however, resumes from it.
-        identity: What a sample depends on besides its inputs (case, options, versions), as JSON can say it; a store needs it. The store
+        known: Facts about the function, such as the signs of its effects, on which guaranteed
+            bounds rest.
+        store: Where samples are kept (or its path): a campaign that was stopped, however, resumes
+            from it.
+        identity: What a sample depends on besides its inputs (case, options, versions), as JSON can
+            say it; a store needs it. The store
             cannot see that the function changed: say so here, by a version or a hash of its text.
-        spot_check: Whether the first sample found in the store is run again, and the store refused if it gives something else.
+        spot_check: Whether the first sample found in the store is run again, and the store refused
+            if it gives something else.
         progress: Called with the share done, 0 … 1.
 
     Raises:
@@ -69,7 +84,9 @@ def propagate(
         StoreError: The store cannot be written.
         RuntimeError: The workers cannot start.
     """
-    domain = Domain(fuzzy_inputs(inputs), levels(4) if alpha is None else alpha, interaction_list(interactions))
+    domain = Domain(
+        fuzzy_inputs(inputs), levels(4) if alpha is None else alpha, interaction_list(interactions)
+    )
     known = known_facts(known, domain.names)
     plan = plan or General()
     require_plan(plan)
@@ -77,10 +94,17 @@ def propagate(
     require_callable(function, domain.names, by_name=not shared, sent=workers > 1)
     call = Call(function, domain.names, tuple(shared), vectorised)
     start = perf_counter()
-    with nullcontext(executor) if executor else pool(workers) as running, shelf(store, identity, domain.names) as samples:
-        campaign = Campaign(call, running, progress, known, samples, stepwise=plan.stepwise, spot_check=spot_check)
+    with (
+        nullcontext(executor) if executor else pool(workers) as running,
+        shelf(store, identity, domain.names) as samples,
+    ):
+        campaign = Campaign(
+            call, running, progress, known, samples, stepwise=plan.stepwise, spot_check=spot_check
+        )
         result = plan.run(campaign, domain)
         result = result.confronted(known.stated(domain.names, result.outputs))
         campaign.report(1.0)
     result = replace(result, notes=(*result.notes, *shared_numbers(domain)))
-    return result.charged(calls=campaign.calls, reused=campaign.reused, seconds=perf_counter() - start)
+    return result.charged(
+        calls=campaign.calls, reused=campaign.reused, seconds=perf_counter() - start
+    )

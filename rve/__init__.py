@@ -1,8 +1,8 @@
 """The periodic cell: four models of its homogenised stiffness behind one result type."""
 
-from rve.cell import LOADS, STRAIN, Cell, Phase
-from rve.model import Model, cross_check, named
-from rve.result import Homogenised, StressCurve, effective_modulus
+from alphacut.rve.cell import LOADS, STRAIN, Cell, Phase
+from alphacut.rve.model import Model, cross_check, named
+from alphacut.rve.result import Homogenised, StressCurve, effective_modulus
 
 __all__ = [
     "LOADS",

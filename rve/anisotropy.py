@@ -1,7 +1,7 @@
 """What the modulus of eq. 16 hides: the stiffness of the cell in every direction of its plane.
 
-A square array has three moduli, not two. Eq. 16 takes the hydrostatic one and the shear along the axes; the shear along the
-diagonals, (C11 − C12)/2, does not enter.
+A square array has three moduli, not two. Eq. 16 takes the hydrostatic one and the shear along the
+axes; the shear along the diagonals, (C11 − C12)/2, does not enter.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stochastic.truncated_normal import Array
+from alphacut.stochastic.theta.truncated_normal import Array
 
 ISOTROPIC_ENOUGH = 0.1  # difference of the shear ratio from 1 that is not worth a warning
 CONSTANTS = ("E1", "E2", "E3", "nu12", "nu13", "nu23", "G12", "G13", "G23")
@@ -26,51 +26,78 @@ def rotated(stiffness: Array, angle: ArrayLike) -> Array:
         Shape (…, 3, 3), in Pa.
     """
     c, s = np.cos(angle), np.sin(angle)
-    strains = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])
-    turn = np.moveaxis(strains, (0, 1), (-2, -1))  # strain in the turned axes from strain in the old ones
+    strains = np.array(
+        [[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]]
+    )
+    turn = np.moveaxis(
+        strains, (0, 1), (-2, -1)
+    )  # strain in the turned axes from strain in the old ones
     back = np.linalg.inv(turn)
     return np.asarray(np.swapaxes(back, -1, -2) @ stiffness @ back)
 
 
 def directional_young(stiffness: Array, angle: ArrayLike) -> Array:
-    """Plane-strain Young's modulus along `angle` (radians): stress over strain in a bar cut along it, free at its sides, in Pa."""
+    """Plane-strain Young's modulus along `angle` (radians): stress over strain in a bar cut along
+    it, free at its sides, in Pa.
+    """
     return np.asarray(1 / np.linalg.inv(rotated(stiffness, angle))[..., 0, 0])
 
 
 def directional_shear(stiffness: Array, angle: ArrayLike) -> Array:
-    """Shear modulus in axes along `angle` (radians), in Pa: σ12 over 2 ε12, the normal stresses being zero."""
+    """Shear modulus in axes along `angle` (radians), in Pa: σ12 over 2 ε12, the normal stresses
+    being zero.
+    """
     return np.asarray(1 / np.linalg.inv(rotated(stiffness, angle))[..., 2, 2])
 
 
 def shear_ratio(stiffness: Array) -> float:
-    """Shear modulus along the diagonals over that along the axes, (C11 − C12)/(2 C33): 1 for an isotropic plane."""
+    """Shear modulus along the diagonals over that along the axes, (C11 − C12)/(2 C33): 1 for an
+    isotropic plane.
+    """
     return float((stiffness[0, 0] - stiffness[0, 1]) / (2 * stiffness[2, 2]))
 
 
 def shear_ratio_in_words(ratio: float) -> str:
     """One line on what the shear ratio means for E of eq. 16."""
-    told = f"shear modulus along the diagonals over that along the axes: {ratio:.3f} (1 in an isotropic plane)"
+    told = (
+        f"shear modulus along the diagonals over that along the axes: {ratio:.3f} (1 in an"
+        " isotropic plane)"
+    )
     if abs(ratio - 1) <= ISOTROPIC_ENOUGH:
         return told
     side = "below" if ratio > 1 else "above"
-    return f"{told}; E of eq. 16 takes that along the axes and can lie {side} that of any isotropic composite of these phases"
+    return (
+        f"{told}; E of eq. 16 takes that along the axes and can lie {side} that of any isotropic"
+        " composite of these phases"
+    )
 
 
 def plane_constants(stiffness: Array, poisson: float) -> dict[str, float]:
-    """Orthotropic constants, axes along the array, that give `stiffness` in plane strain; names as in `CONSTANTS`, moduli in Pa.
+    """Orthotropic constants, axes along the array, that give `stiffness` in plane strain; names as
+    in `CONSTANTS`, moduli in Pa.
 
-    What does not act in plane strain is isotropic: stiffnesses 13, 23 and 33, and the shears 13 and 23, are those of the in-plane bulk
-    modulus and of Poisson's ratio by eq. 16. So does σ33 follow, which the cell does not compute.
+    What does not act in plane strain is isotropic: stiffnesses 13, 23 and 33, and the shears 13 and
+    23, are those of the in-plane bulk modulus and of Poisson's ratio by eq. 16. So does σ33 follow,
+    which the cell does not compute.
 
     Args:
-        stiffness: Mean plane-strain stiffness of the square array, Voigt order, shape (3, 3), in Pa.
+        stiffness: Mean plane-strain stiffness of the square array, Voigt order, shape (3, 3), in
+            Pa.
         poisson: Poisson's ratio of eq. 16.
     """
     bulk = (stiffness[0, 0] + stiffness[0, 1]) / 2
     lateral, shear = 2 * poisson * bulk, (1 - 2 * poisson) * bulk
-    normal = np.array([[stiffness[0, 0], stiffness[0, 1], lateral], [stiffness[1, 0], stiffness[1, 1], lateral], [lateral, lateral, 0]])
+    normal = np.array(
+        [
+            [stiffness[0, 0], stiffness[0, 1], lateral],
+            [stiffness[1, 0], stiffness[1, 1], lateral],
+            [lateral, lateral, 0],
+        ]
+    )
     normal[2, 2] = lateral + 2 * shear
     give = np.linalg.inv(normal)
     moduli = 1 / np.diag(give)
     ratios = [-give[0, 1] * moduli[0], -give[0, 2] * moduli[0], -give[1, 2] * moduli[1]]
-    return dict(zip(CONSTANTS, map(float, [*moduli, *ratios, stiffness[2, 2], shear, shear]), strict=True))
+    return dict(
+        zip(CONSTANTS, map(float, [*moduli, *ratios, stiffness[2, 2], shear, shear]), strict=True)
+    )

@@ -1,19 +1,22 @@
-"""What no effective stiffness can leave: Reuss and Voigt as matrices, Hashin–Shtrikman for the in-plane bulk modulus.
+"""What no effective stiffness can leave: Reuss and Voigt as matrices, Hashin–Shtrikman for the
+in-plane bulk modulus.
 
-The in-plane bulk modulus of a square array is isotropic enough for Hashin–Shtrikman; its shear modulus G12 is not and lies below the
-isotropic lower bound, so it is not tested against that.
+The in-plane bulk modulus of a square array is isotropic enough for Hashin–Shtrikman; its shear
+modulus G12 is not and lies below the isotropic lower bound, so it is not tested against that.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from rve.cell import Phase
-from stochastic.truncated_normal import Array
+from alphacut.rve.cell import Phase
+from alphacut.stochastic.theta.truncated_normal import Array
 
 
 def voigt(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
-    """Stiffness at uniform strain, shape (…, 3, 3) for area fractions of the inclusion of shape (…), in Pa."""
+    """Stiffness at uniform strain, shape (…, 3, 3) for area fractions of the inclusion of shape
+    (…), in Pa.
+    """
     share = np.asarray(fraction)[..., None, None]
     return np.asarray((1 - share) * matrix.stiffness + share * inclusion.stiffness)
 
@@ -21,7 +24,12 @@ def voigt(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
 def reuss(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
     """Stiffness at uniform in-plane stress, shape (…, 3, 3), in Pa."""
     share = np.asarray(fraction)[..., None, None]
-    return np.asarray(np.linalg.inv((1 - share) * np.linalg.inv(matrix.stiffness) + share * np.linalg.inv(inclusion.stiffness)))
+    return np.asarray(
+        np.linalg.inv(
+            (1 - share) * np.linalg.inv(matrix.stiffness)
+            + share * np.linalg.inv(inclusion.stiffness)
+        )
+    )
 
 
 def bulk_modulus(stiffness: Array) -> Array:

@@ -6,12 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stochastic import RadiusMap
-from stochastic.truncated_normal import Array
+from alphacut.stochastic import RadiusMap
+from alphacut.stochastic.theta.truncated_normal import Array
 
 STRAIN = 0.01  # eq. 15
-LOADS = np.array([[STRAIN, STRAIN, 0.0], [0.0, 0.0, 2 * STRAIN]])  # eq. 15 as (ε11, ε22, 2 ε12); ε12 is the tensor component
-THREE_LOADS = np.vstack([LOADS, [[STRAIN, -STRAIN, 0.0]]])  # with the third, the whole planar stiffness follows
+LOADS = np.array(
+    [[STRAIN, STRAIN, 0.0], [0.0, 0.0, 2 * STRAIN]]
+)  # eq. 15 as (ε11, ε22, 2 ε12); ε12 is the tensor component
+THREE_LOADS = np.vstack(
+    [LOADS, [[STRAIN, -STRAIN, 0.0]]]
+)  # with the third, the whole planar stiffness follows
 
 
 @dataclass(frozen=True)
@@ -31,13 +35,17 @@ class Phase:
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.modulus) and self.modulus > 0):
-            raise ValueError(f"Young's modulus is {self.modulus:g} Pa; it must be positive and finite")
+            raise ValueError(
+                f"Young's modulus is {self.modulus:g} Pa; it must be positive and finite"
+            )
         if not -1 < self.poisson < 0.5:
             raise ValueError(f"Poisson's ratio is {self.poisson:g}; it must lie inside (-1, 0.5)")
 
     @property
     def stiffness(self) -> Array:
-        """Plane-strain stiffness in Voigt order (11, 22, 12 with 2 ε12), shape (3, 3), in Pa (eq. 6)."""
+        """Plane-strain stiffness in Voigt order (11, 22, 12 with 2 ε12), shape (3, 3), in Pa (eq.
+        6).
+        """
         e, nu = self.modulus, self.poisson
         unit = np.array([[1 - nu, nu, 0], [nu, 1 - nu, 0], [0, 0, (1 - 2 * nu) / 2]])
         return e / ((1 + nu) * (1 - 2 * nu)) * unit

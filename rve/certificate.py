@@ -1,4 +1,6 @@
-"""The certificate of a result: properties every right one has, measured, kept with it, and an error where one is violated."""
+"""The certificate of a result: properties every right one has, measured, kept with it, and an error
+where one is violated.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rve.bounds import bulk_modulus, hashin_shtrikman_bulk, reuss, voigt
-from rve.cell import Phase
-from stochastic.truncated_normal import Array
+from alphacut.rve.bounds import bulk_modulus, hashin_shtrikman_bulk, reuss, voigt
+from alphacut.rve.cell import Phase
+from alphacut.stochastic.theta.truncated_normal import Array
 
 ROUND_OFF = 1e-9
 
@@ -23,7 +25,8 @@ class Limits:
     """How much violation of each kind is round-off or declared error, relative.
 
     Args:
-        algebraic: For what holds exactly in exact arithmetic: residual, Hill–Mandel, symmetry, periodicity.
+        algebraic: For what holds exactly in exact arithmetic: residual, Hill–Mandel, symmetry,
+            periodicity.
         discretisation: Declared error of the stiffness, for the bounds.
     """
 
@@ -52,11 +55,16 @@ def require(checks: Mapping[str, float], limits: Limits) -> dict[str, float]:
     for name, value in checks.items():
         limit = limits.discretisation if name in BOUNDS else limits.algebraic
         if not value <= limit:
-            raise CertificateError(f"{WHAT[name]}: relative violation {value:.2e}, {limit:.2e} is allowed; do not use this result")
+            raise CertificateError(
+                f"{WHAT[name]}: relative violation {value:.2e}, {limit:.2e} is allowed; do not use"
+                " this result"
+            )
     return dict(checks)
 
 
-def stiffness_checks(stiffness: Array, fraction: Array, weights: Array, phases: tuple[Phase, Phase]) -> dict[str, float]:
+def stiffness_checks(
+    stiffness: Array, fraction: Array, weights: Array, phases: tuple[Phase, Phase]
+) -> dict[str, float]:
     """Symmetry and bounds of the mean stiffness.
 
     Args:
@@ -66,7 +74,9 @@ def stiffness_checks(stiffness: Array, fraction: Array, weights: Array, phases: 
         phases: Matrix and inclusion.
     """
     mean = np.tensordot(weights, stiffness, axes=1)
-    low, high = (np.tensordot(weights, bound(fraction, *phases), axes=1) for bound in (reuss, voigt))
+    low, high = (
+        np.tensordot(weights, bound(fraction, *phases), axes=1) for bound in (reuss, voigt)
+    )
     least, greatest = (weights @ bound for bound in hashin_shtrikman_bulk(fraction, *phases))
     bulk = float(bulk_modulus(mean))
     return {
@@ -77,18 +87,24 @@ def stiffness_checks(stiffness: Array, fraction: Array, weights: Array, phases: 
     }
 
 
-def load_checks(stress: Array, loads: Array, fraction: Array, weights: Array, phases: tuple[Phase, Phase]) -> dict[str, float]:
+def load_checks(
+    stress: Array, loads: Array, fraction: Array, weights: Array, phases: tuple[Phase, Phase]
+) -> dict[str, float]:
     """The same from fewer than three loads: symmetry and bounds of the energies that they see.
 
     Args:
-        stress: Homogenised (σ11, σ22, σ12) at the nodes of θ for each load, shape (n, 3, loads), in Pa.
+        stress: Homogenised (σ11, σ22, σ12) at the nodes of θ for each load, shape (n, 3, loads), in
+            Pa.
         loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3).
         fraction: Area fraction of the particle at the nodes, shape (n,).
         weights: Weights of the nodes, shape (n,).
         phases: Matrix and inclusion.
     """
     energy = loads @ np.tensordot(weights, stress, axes=1)
-    low, high = (loads @ np.tensordot(weights, bound(fraction, *phases), axes=1) @ loads.T for bound in (reuss, voigt))
+    low, high = (
+        loads @ np.tensordot(weights, bound(fraction, *phases), axes=1) @ loads.T
+        for bound in (reuss, voigt)
+    )
     return {
         "symmetry": float(abs(energy - energy.T).max() / abs(energy).max()),
         "reuss": _below(energy - low, energy),
@@ -98,4 +114,6 @@ def load_checks(stress: Array, loads: Array, fraction: Array, weights: Array, ph
 
 def _below(difference: Array, scale: Array) -> float:
     """How far the least eigenvalue is below zero, relative to the size of `scale`."""
-    return max(0.0, -float(np.linalg.eigvalsh((difference + difference.T) / 2)[0])) / float(abs(scale).max())
+    return max(0.0, -float(np.linalg.eigvalsh((difference + difference.T) / 2)[0])) / float(
+        abs(scale).max()
+    )

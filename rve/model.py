@@ -1,4 +1,6 @@
-"""The interface that every model of the cell answers to, the table of their names, and two models checked against one another."""
+"""The interface that every model of the cell answers to, the table of their names, and two models
+checked against one another.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +8,16 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import Any, Protocol
 
-from rve.cell import Phase
-from rve.result import Homogenised
-from stochastic import RadiusMap
+from alphacut.rve.cell import Phase
+from alphacut.rve.result import Homogenised
+from alphacut.stochastic import RadiusMap
 
 MODELS = {  # name → module and class; imported when asked for, so that none is paid for in vain
-    "prism": ("rve.prism", "PrismModel"),
-    "slices": ("rve.slices", "SlicesModel"),
-    "table": ("rve.table", "TableModel"),
-    "series": ("rve.series", "SeriesModel"),
-    "auto": ("rve.choice", "AutoModel"),
+    "prism": ("alphacut.rve.prism.model", "PrismModel"),
+    "slices": ("alphacut.rve.slices.model", "SlicesModel"),
+    "table": ("alphacut.rve.table.model", "TableModel"),
+    "series": ("alphacut.rve.series.model", "SeriesModel"),
+    "auto": ("alphacut.rve.auto.model", "AutoModel"),
 }
 
 
@@ -26,11 +28,14 @@ class Model(Protocol):
     def name(self) -> str:
         """Name in `MODELS`."""
 
-    def solve(self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]) -> list[Homogenised]:
+    def solve(
+        self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
+    ) -> list[Homogenised]:
         """One result for each of `inclusions`, in their order; what they share is done once.
 
         Raises:
-            RuntimeError: The model does not reach what it declares; the message says why and what would help.
+            RuntimeError: The model does not reach what it declares; the message says why and what
+                would help.
         """
 
 
@@ -47,7 +52,9 @@ def named(name: str, **options: Any) -> Model:
     unknown = sorted(set(options) - set(maker.__dataclass_fields__))
     if unknown:
         allowed = ", ".join(maker.__dataclass_fields__)
-        raise ValueError(f"the model {name} has no option {unknown[0]!r}; its options are {allowed}")
+        raise ValueError(
+            f"the model {name} has no option {unknown[0]!r}; its options are {allowed}"
+        )
     model: Model = maker(**options)
     return model
 
@@ -56,7 +63,9 @@ class CrossCheckError(RuntimeError):
     """Two models of the same cell disagree."""
 
 
-def cross_check(first: Sequence[Homogenised], second: Sequence[Homogenised], *, tolerance: float) -> float:
+def cross_check(
+    first: Sequence[Homogenised], second: Sequence[Homogenised], *, tolerance: float
+) -> float:
     """The largest relative difference in E between two models' results of the same cells.
 
     Raises:
@@ -67,7 +76,8 @@ def cross_check(first: Sequence[Homogenised], second: Sequence[Homogenised], *, 
     if not gaps[worst] <= tolerance:
         a, b = first[worst], second[worst]
         raise CrossCheckError(
-            f"{a.method} gives E = {a.modulus:.10g} Pa and {b.method} {b.modulus:.10g} Pa: {gaps[worst]:.2e} apart, {tolerance:.2e} is "
-            f"allowed; refine the coarser of the two or allow more"
+            f"{a.method} gives E = {a.modulus:.10g} Pa and {b.method} {b.modulus:.10g} Pa:"
+            f" {gaps[worst]:.2e} apart, {tolerance:.2e} is allowed; refine the coarser of the two"
+            " or allow more"
         )
     return gaps[worst]

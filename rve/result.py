@@ -7,14 +7,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rve.cell import STRAIN
-from stochastic.truncated_normal import Array
+from alphacut.rve.cell import STRAIN
+from alphacut.stochastic.theta.truncated_normal import Array
 
 
 def effective_modulus(s11: float, s12: float) -> tuple[float, float]:
     """Young's modulus (Pa) and Poisson's ratio by the paper's convention, eq. 16.
 
-    A square array is not isotropic: this E is the paper's convention, not a property in every direction.
+    A square array is not isotropic: this E is the paper's convention, not a property in every
+        direction.
 
     Args:
         s11: Mean homogenised σ11 under ε11 = ε22 = 0.01, in Pa.
@@ -34,7 +35,8 @@ class StressCurve:
         weights: Quadrature weights with f_Θ inside, shape (n,), sum 1.
         s11: σ11 under load 1 at the nodes, shape (n,), in Pa.
         s12: σ12 under load 2 at the nodes, shape (n,), in Pa.
-        stiffness: The whole planar stiffness at the nodes, Voigt order (11, 22, 12 with 2 ε12), shape (n, 3, 3), in Pa, if known.
+        stiffness: The whole planar stiffness at the nodes, Voigt order (11, 22, 12 with 2 ε12),
+            shape (n, 3, 3), in Pa, if known.
     """
 
     theta: Array
@@ -60,7 +62,8 @@ class Homogenised:
         unknowns: Unknowns of one linear system after elimination of constraints.
         iterations: Iterations of the linear solver, one number per load.
         seconds: Wall time by stage: mesh, assemble, setup, solve, total, jit.
-        error: Estimated relative error of E by source: space, theta, table; empty where none was made.
+        error: Estimated relative error of E by source: space, theta, table; empty where none was
+            made.
         reason: Why this model and resolution were taken.
         checks: Certificate: name of each property to its measured violation, within its bound.
     """
@@ -87,9 +90,15 @@ class Homogenised:
 
     @property
     def stiffness(self) -> Array | None:
-        """Mean planar stiffness under f_Θ, Voigt order, shape (3, 3), in Pa; None if the model did not make it."""
+        """Mean planar stiffness under f_Θ, Voigt order, shape (3, 3), in Pa; None if the model did
+        not make it.
+        """
         curve = self.curve
-        return None if curve.stiffness is None else np.tensordot(curve.weights, curve.stiffness, axes=1)
+        return (
+            None
+            if curve.stiffness is None
+            else np.tensordot(curve.weights, curve.stiffness, axes=1)
+        )
 
     @property
     def estimated_error(self) -> float:

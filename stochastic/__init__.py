@@ -1,7 +1,7 @@
 """From particles to the random radius of the cell: law of θ, radius map, quadrature in θ."""
 
-from stochastic.quadrature import ThetaRule, gauss_rule, layered_rule
-from stochastic.radius_map import HermiteMap, RadiusMap
-from stochastic.truncated_normal import TruncatedNormal
+from alphacut.stochastic.radius_map import HermiteMap, RadiusMap
+from alphacut.stochastic.theta.quadrature import ThetaRule, gauss_rule, layered_rule
+from alphacut.stochastic.theta.truncated_normal import TruncatedNormal
 
 __all__ = ["HermiteMap", "RadiusMap", "ThetaRule", "TruncatedNormal", "gauss_rule", "layered_rule"]

@@ -1,4 +1,6 @@
-"""``python -m stochastic microstructure CASE``: from particles to the radius map; the same as ``alphacut microstructure``."""
+"""``python -m stochastic microstructure CASE``: from particles to the radius map; the same as
+``alphacut microstructure``.
+"""
 
 import sys
 

@@ -1,9 +1,11 @@
-"""From particles to the fuzzy radius map: sections 4.1 and 4.2 of the paper, on simulated or measured discs.
+"""From particles to the fuzzy radius map: sections 4.1 and 4.2 of the paper, on simulated or
+measured discs.
 
-This differs from the paper in: 1. The supports of a2 and a4 are derived: they span the p-box of least area that contains the
-sample's distribution save for its own bootstrap band. 2. The bound of r_n for non-overlapping discs is √(4/π) for any cell and 1
-for the square one, not √(π/4). 3. a1 and a3 are the limits themselves, not the middles of the outer two of 100 bins between them
-(0.13 + 0.0037 and 0.87 − 0.0037 in the paper).
+This differs from the paper in: 1. The supports of a2 and a4 are derived: they span the p-box of
+least area that contains the sample's distribution save for its own bootstrap band. 2. The bound of
+r_n for non-overlapping discs is √(4/π) for any cell and 1 for the square one, not √(π/4). 3. a1 and
+a3 are the limits themselves, not the middles of the outer two of 100 bins between them (0.13 +
+0.0037 and 0.87 − 0.0037 in the paper).
 """
 
 from __future__ import annotations
@@ -17,14 +19,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stochastic.area_weighted import AreaWeighted
-from stochastic.hermite_fit import HermiteFit
-from stochastic.neighbours import Neighbours, cell_correlation, neighbours
-from stochastic.pbox import PBox, least_pbox
-from stochastic.refused import RefusedError
-from stochastic.sections import Measured, Section, Simulated, reduced_radii
-from stochastic.slope_band import SlopeBand, slope_band
-from stochastic.truncated_normal import TruncatedNormal
+from alphacut.stochastic.errors import RefusedError
+from alphacut.stochastic.fit.area_weighted import AreaWeighted
+from alphacut.stochastic.fit.bootstrap import SlopeBand, slope_band
+from alphacut.stochastic.fit.hermite_fit import HermiteFit
+from alphacut.stochastic.fit.pbox import PBox, least_pbox
+from alphacut.stochastic.sections import Measured, Section, Simulated, reduced_radii
+from alphacut.stochastic.tessellation.delaunay import Neighbours, cell_correlation, neighbours
+from alphacut.stochastic.theta.truncated_normal import TruncatedNormal
 
 if TYPE_CHECKING:
     import xarray
@@ -41,8 +43,10 @@ class Study:
         seed: Seed of everything that is left to chance.
         confidence: Level of the simultaneous bootstrap band, in (0, 1).
         bootstrap: Number of resamples, at least 100.
-        band: Half width, in probability, by which the distribution may leave the p-box; None for that bootstrap band.
-        sampling: Whether the supports of a2 and a4 shall also hold the slopes' own bootstrap band, so that fewer data make a fuzzier map.
+        band: Half width, in probability, by which the distribution may leave the p-box; None for
+            that bootstrap band.
+        sampling: Whether the supports of a2 and a4 shall also hold the slopes' own bootstrap band,
+            so that fewer data make a fuzzier map.
         distribution: Law of θ.
 
     Raises:
@@ -61,13 +65,18 @@ class Study:
 
     def __post_init__(self) -> None:
         if self.limits is not None and not 0 < self.limits[0] < self.limits[1] < 1:
-            raise ValueError(f"the limits of r_n are {self.limits[0]:g} and {self.limits[1]:g}; they need 0 < lower < upper < 1")
+            raise ValueError(
+                f"the limits of r_n are {self.limits[0]:g} and {self.limits[1]:g}; they need 0 <"
+                " lower < upper < 1"
+            )
         if not 0 < self.share < 1:
             raise ValueError(f"the share of area to keep is {self.share:g}; it must lie in (0, 1)")
         if not 0 < self.confidence < 1:
             raise ValueError(f"the confidence is {self.confidence:g}; it must lie in (0, 1)")
         if self.bootstrap < 100:
-            raise ValueError(f"{self.bootstrap} resamples were asked for; the band needs 100 or more")
+            raise ValueError(
+                f"{self.bootstrap} resamples were asked for; the band needs 100 or more"
+            )
         if self.band is not None and not 0 <= self.band < 1:
             raise ValueError(f"the band is {self.band:g}; it must lie in [0, 1)")
         if self.seed < 0:
@@ -85,8 +94,10 @@ class Microstructure:
         kept: The part of it within the limits.
         pbox: Fuzzy radius map.
         slopes: Bootstrap band of the fitted slopes.
-        band: Half width of the simultaneous bootstrap band of the distribution function, in probability.
-        allowed: Half width by which the distribution may leave the p-box: that band, or the one asked for.
+        band: Half width of the simultaneous bootstrap band of the distribution function, in
+            probability.
+        allowed: Half width by which the distribution may leave the p-box: that band, or the one
+            asked for.
         direct: Delaunay neighbours of each section.
         seconds: Wall time by stage: pack, fit, neighbours, total.
     """
@@ -114,30 +125,35 @@ class Microstructure:
 
     def summary(self) -> dict[str, Any]:
         """Every number found, lengths in m, ready for JSON."""
-        from stochastic.microstructure_summary import summary
+        from alphacut.stochastic.microstructure_summary import summary
 
         return summary(self)
 
     def fragment(self) -> str:
         """The section [radius] of a case file."""
-        from stochastic.microstructure_summary import fragment
+        from alphacut.stochastic.microstructure_summary import fragment
 
         return fragment(self)
 
     def to_dataset(self) -> xarray.Dataset:
         """Distribution, band and p-box of r_n over a grid, with the map as attributes."""
-        from stochastic.microstructure_summary import to_dataset
+        from alphacut.stochastic.microstructure_summary import to_dataset
 
         return to_dataset(self)
 
     def draw(self, folder: Path) -> dict[str, list[Path]]:
         """Draw every figure into `folder` as SVG and PNG; name of each figure to its files."""
-        from stochastic.figures import draw
+        from alphacut.stochastic.figures.all import draw
 
         return draw(self, folder)
 
 
-def study(case: Study, *, executor: Executor | None = None, progress: Callable[[float], None] | None = None) -> Microstructure:
+def study(
+    case: Study,
+    *,
+    executor: Executor | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Microstructure:
     """Do all of it: discs, cells, distribution, limits, fit, p-box, neighbours.
 
     Args:
@@ -152,27 +168,52 @@ def study(case: Study, *, executor: Executor | None = None, progress: Callable[[
     begin = perf_counter()
     tell = progress or (lambda share: None)
     streams = np.random.SeedSequence(case.seed, spawn_key=(1,)).spawn(2)
-    sections = case.source.sections(case.seed, executor=executor, progress=lambda share: tell(0.7 * share))
+    sections = case.source.sections(
+        case.seed, executor=executor, progress=lambda share: tell(0.7 * share)
+    )
     packed = perf_counter()
     sample = reduced_radii(sections)
     lower, upper = case.limits or sample.limits(case.share)
     if not upper < 1:
-        raise RefusedError(f"a share of {case.share:g} of the area reaches up to r_n = {upper:.4g}; the square cell takes less than 1")
+        raise RefusedError(
+            f"a share of {case.share:g} of the area reaches up to r_n = {upper:.4g}; the square"
+            " cell takes less than 1"
+        )
     kept, fit = sample.truncated(lower, upper), HermiteFit(lower, upper, case.distribution)
     band = kept.band(case.confidence, case.bootstrap, np.random.default_rng(streams[0]))
     tell(0.8)
     allowed = band if case.band is None else case.band
-    slopes = slope_band(fit, kept, level=case.confidence, resamples=case.bootstrap, generator=np.random.default_rng(streams[1]))
+    slopes = slope_band(
+        fit,
+        kept,
+        level=case.confidence,
+        resamples=case.bootstrap,
+        generator=np.random.default_rng(streams[1]),
+    )
     pbox = least_pbox(fit, kept, allowed, hold=slopes if case.sampling else None)
     tell(0.9)
     fitted = perf_counter()
     direct = [neighbours(section.discs) for section in sections]
     tell(1.0)
     end = perf_counter()
-    seconds = {"pack": packed - begin, "fit": fitted - packed, "neighbours": end - fitted, "total": end - begin}
-    return Microstructure(case, sections, sample, kept, pbox, slopes, band, allowed, direct, seconds)
+    seconds = {
+        "pack": packed - begin,
+        "fit": fitted - packed,
+        "neighbours": end - fitted,
+        "total": end - begin,
+    }
+    return Microstructure(
+        case, sections, sample, kept, pbox, slopes, band, allowed, direct, seconds
+    )
 
 
 def mean_correlation(sections: list[Section]) -> float:
     """Mean correlation of r_n between cells that share a wall."""
-    return float(np.mean([cell_correlation(section.diagram, section.diagram.reduced_radii) for section in sections]))
+    return float(
+        np.mean(
+            [
+                cell_correlation(section.diagram, section.diagram.reduced_radii)
+                for section in sections
+            ]
+        )
+    )

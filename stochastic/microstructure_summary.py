@@ -6,13 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stochastic.microstructure import Microstructure, mean_correlation
+from alphacut.stochastic.microstructure import Microstructure, mean_correlation
 
 if TYPE_CHECKING:
     import xarray
 
 
-EDGE = "only cells that no disc beyond the window's edge can change; each stands for 1/p, p the share of places where its like is whole"
+EDGE = (
+    "only cells that no disc beyond the window's edge can change; each stands for 1/p, p the share"
+    " of places where its like is whole"
+)
 
 
 def summary(found: Microstructure) -> dict[str, Any]:
@@ -25,12 +28,18 @@ def summary(found: Microstructure) -> dict[str, Any]:
         "cells": len(sample.values),
         "edge": "none: the boxes are periodic" if all(one.periodic for one in discs) else EDGE,
         "hidden": int(sum(section.diagram.hidden.sum() for section in found.sections)),
-        "rejected": {str(row): reason for section in found.sections for row, reason in section.rejected.items()},
+        "rejected": {
+            str(row): reason
+            for section in found.sections
+            for row, reason in section.rejected.items()
+        },
         "area_fraction": float(np.mean([one.area_fraction for one in discs])),
         "area_fraction_of_cells": sample.area_fraction,
         "smallest_radius": float(radii.min()),
         "largest_radius": float(radii.max()),
-        "cell_areas_sum_error": max(abs(section.diagram.areas.sum() / section.discs.area - 1) for section in found.sections),
+        "cell_areas_sum_error": max(
+            abs(section.diagram.areas.sum() / section.discs.area - 1) for section in found.sections
+        ),
         "mean_r_n": sample.mean,
         "largest_r_n": float(sample.values[-1]),
         "limits": list(found.limits),
@@ -61,7 +70,9 @@ def summary(found: Microstructure) -> dict[str, Any]:
 def _neighbours(found: Microstructure) -> dict[str, Any]:
     number = np.concatenate([one.number for one in found.direct])
     distance = np.concatenate([one.distances for one in found.direct])
-    diameter = 2 * float(np.mean(np.concatenate([section.discs.radii for section in found.sections])))
+    diameter = 2 * float(
+        np.mean(np.concatenate([section.discs.radii for section in found.sections]))
+    )
     if not len(number):
         return {"counted": 0}
     return {
@@ -78,11 +89,13 @@ def _neighbours(found: Microstructure) -> dict[str, Any]:
 
 def _mean_area_fraction(found: Microstructure) -> float:
     """Mean of π/4 r² under the law of θ, for the modal map."""
-    from stochastic.quadrature import gauss_rule
+    from alphacut.stochastic.theta.quadrature import gauss_rule
 
     fit = found.pbox.fit
     rule = gauss_rule(fit.distribution, points=8)
-    return float(rule.mean(np.pi / 4 * fit.map((found.pbox.a2[1], found.pbox.a4[1]))(rule.nodes) ** 2))
+    return float(
+        rule.mean(np.pi / 4 * fit.map((found.pbox.a2[1], found.pbox.a4[1]))(rule.nodes) ** 2)
+    )
 
 
 def fragment(found: Microstructure) -> str:
@@ -94,19 +107,19 @@ def fragment(found: Microstructure) -> str:
 
     discs = float(np.mean([section.discs.area_fraction for section in found.sections]))
     return (
-        f"[radius]  # from {len(found.sample.values)} cells; the limits keep {found.share_kept:.4%} of their area\n"
-        f"# area fraction of the discs {discs:.4f}, of the cells {found.sample.area_fraction:.4f}, "
-        f"of this map at its modal values, which the modulus uses, {_mean_area_fraction(found):.4f}\n"
-        f"theta = [{law.lower:g}, {law.upper:g}]\n"
-        f"a1 = {box.fit.a1:.10g}\n"
-        f"a2 = {triangle(box.a2)}\n"
-        f"a3 = {box.fit.a3:.10g}\n"
-        f"a4 = {triangle(box.a4)}\n"
+        f"[radius]  # from {len(found.sample.values)} cells; the limits keep {found.share_kept:.4%}"
+        f" of their area\n# area fraction of the discs {discs:.4f}, of the cells"
+        f" {found.sample.area_fraction:.4f}, of this map at its modal values, which the modulus"
+        f" uses, {_mean_area_fraction(found):.4f}\ntheta = [{law.lower:g}, {law.upper:g}]\na1 ="
+        f" {box.fit.a1:.10g}\na2 = {triangle(box.a2)}\na3 = {box.fit.a3:.10g}\na4 ="
+        f" {triangle(box.a4)}\n"
     )
 
 
 def to_dataset(found: Microstructure) -> xarray.Dataset:
-    """Distribution function of r_n between the limits with its band, and both bounds of the p-box, over a grid of radii."""
+    """Distribution function of r_n between the limits with its band, and both bounds of the p-box,
+    over a grid of radii.
+    """
     import xarray
 
     fit = found.pbox.fit
@@ -122,6 +135,13 @@ def to_dataset(found: Microstructure) -> xarray.Dataset:
     }
     said = {"a1": fit.a1, "a2": list(found.pbox.a2), "a3": fit.a3, "a4": list(found.pbox.a4)}
     said |= {"band": found.band, "band_allowed": found.allowed, "seed": found.study.seed}
-    dataset = xarray.Dataset({name: ("r_n", values, {"units": "1"}) for name, values in columns.items()}, {"r_n": radius}, said)
-    dataset["r_n"].attrs = {"units": "1", "long_name": "reduced radius r/a, a half the side of a square of the cell's area"}
+    dataset = xarray.Dataset(
+        {name: ("r_n", values, {"units": "1"}) for name, values in columns.items()},
+        {"r_n": radius},
+        said,
+    )
+    dataset["r_n"].attrs = {
+        "units": "1",
+        "long_name": "reduced radius r/a, a half the side of a square of the cell's area",
+    }
     return dataset

@@ -1,7 +1,8 @@
 """The map θ ↦ r(θ) of a truncated normal to the reduced particle radius (paper, eq. 12).
 
-This differs from the paper in: 1. The Hermite functions take ξ = (θ − lower)/(upper − lower) ∈ [0, 1] and not θ itself; the
-slopes a2, a4 are not rescaled. 2. The radius is bounded by the square cell, r < 1, and not by √(π/4).
+This differs from the paper in: 1. The Hermite functions take ξ = (θ − lower)/(upper − lower) ∈ [0,
+1] and not θ itself; the slopes a2, a4 are not rescaled. 2. The radius is bounded by the square
+cell, r < 1, and not by √(π/4).
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stochastic.truncated_normal import Array, TruncatedNormal
+from alphacut.stochastic.theta.truncated_normal import Array, TruncatedNormal
 
 
 class RadiusMap(Protocol):
@@ -52,8 +53,9 @@ class HermiteMap:
         low, high = self.extremes() if finite else (np.nan, np.nan)
         if not (low > 0 and high < 1):  # also catches nan
             raise ValueError(
-                f"the radius map a1 = {self.a1:g}, a2 = {self.a2:g}, a3 = {self.a3:g}, a4 = {self.a4:g} gives radii from {low:.4g} to "
-                f"{high:.4g}; they must stay inside (0, 1), in halves of the cell's side: lower a1 or a3, or the slopes a2, a4"
+                f"the radius map a1 = {self.a1:g}, a2 = {self.a2:g}, a3 = {self.a3:g}, a4 ="
+                f" {self.a4:g} gives radii from {low:.4g} to {high:.4g}; they must stay inside (0,"
+                " 1), in halves of the cell's side: lower a1 or a3, or the slopes a2, a4"
             )
 
     @property
@@ -73,13 +75,17 @@ class HermiteMap:
 
     def slope(self, theta: ArrayLike) -> Array:
         """dr/dξ at `theta`, any shape."""
-        return np.polynomial.polynomial.polyval(self.xi(theta), np.polynomial.polynomial.polyder(self.monomials))
+        return np.polynomial.polynomial.polyval(
+            self.xi(theta), np.polynomial.polynomial.polyder(self.monomials)
+        )
 
     def extremes(self) -> tuple[float, float]:
         """Least and greatest radius on the support."""
         turning = np.roots(np.polynomial.polynomial.polyder(self.monomials)[::-1])
         inner = turning.real[(abs(turning.imag) < 1e-12) & (turning.real > 0) & (turning.real < 1)]
-        radii = np.polynomial.polynomial.polyval(np.concatenate([[0.0, 1.0], inner]), self.monomials)
+        radii = np.polynomial.polynomial.polyval(
+            np.concatenate([[0.0, 1.0], inner]), self.monomials
+        )
         return float(radii.min()), float(radii.max())
 
     @property
@@ -87,5 +93,7 @@ class HermiteMap:
         """Whether r never falls as θ rises."""
         _, b, c, d = self.monomials
         turning = [-c / (3 * d)] if d else []
-        lowest = [b + 2 * c * x + 3 * d * x * x for x in (0.0, 1.0, *(x for x in turning if 0 < x < 1))]
+        lowest = [
+            b + 2 * c * x + 3 * d * x * x for x in (0.0, 1.0, *(x for x in turning if 0 < x < 1))
+        ]
         return bool(min(lowest) >= 0)

@@ -9,14 +9,14 @@ from typing import Protocol
 
 import numpy as np
 
-from stochastic.apollonius import Apollonius, apollonius
-from stochastic.area_weighted import AreaWeighted
-from stochastic.circle_file import CircleFile
-from stochastic.discs import Discs
-from stochastic.open_window import WholeCells, whole_cells
-from stochastic.packing import Packing, packing_seeds
-from stochastic.refused import RefusedError
-from stochastic.section_image import SectionImage
+from alphacut.stochastic.errors import RefusedError
+from alphacut.stochastic.fit.area_weighted import AreaWeighted
+from alphacut.stochastic.particles.circles_csv import CircleFile
+from alphacut.stochastic.particles.discs import Discs
+from alphacut.stochastic.particles.image import SectionImage
+from alphacut.stochastic.particles.packing import Packing, packing_seeds
+from alphacut.stochastic.tessellation.apollonius import Apollonius, apollonius
+from alphacut.stochastic.tessellation.edge_correction import WholeCells, whole_cells
 
 Progress = Callable[[float], None]
 PATCHES = 5  # a single section is cut into 5 × 5 patches, drawn as wholes in the bootstrap
@@ -45,7 +45,9 @@ class Section:
 class Source(Protocol):
     """A supply of sections."""
 
-    def sections(self, seed: int, *, executor: Executor | None = None, progress: Progress | None = None) -> list[Section]:
+    def sections(
+        self, seed: int, *, executor: Executor | None = None, progress: Progress | None = None
+    ) -> list[Section]:
         """All sections, the same for one seed whatever the workers."""
 
 
@@ -66,13 +68,20 @@ class Simulated:
 
     def __post_init__(self) -> None:
         if self.packings < 5:
-            raise ValueError(f"{self.packings} packings were asked for; the bootstrap draws whole packings and needs 5 or more")
+            raise ValueError(
+                f"{self.packings} packings were asked for; the bootstrap draws whole packings and"
+                " needs 5 or more"
+            )
 
-    def sections(self, seed: int, *, executor: Executor | None = None, progress: Progress | None = None) -> list[Section]:
+    def sections(
+        self, seed: int, *, executor: Executor | None = None, progress: Progress | None = None
+    ) -> list[Section]:
         """Every packing with its cells."""
         made: list[Section] = []
         seeds = packing_seeds(seed, self.packings)
-        for section in (executor.map if executor else map)(_packed, [self.packing] * self.packings, seeds):
+        for section in (executor.map if executor else map)(
+            _packed, [self.packing] * self.packings, seeds
+        ):
             made.append(section)
             if progress:
                 progress(len(made) / self.packings)
@@ -89,7 +98,9 @@ class Measured:
 
     file: CircleFile | SectionImage
 
-    def sections(self, seed: int, *, executor: Executor | None = None, progress: Progress | None = None) -> list[Section]:
+    def sections(
+        self, seed: int, *, executor: Executor | None = None, progress: Progress | None = None
+    ) -> list[Section]:
         """The section with its cells; `seed` and `executor` do nothing here."""
         circles = self.file.read()
         section = _section(circles.discs, circles.rejected)
@@ -99,7 +110,8 @@ class Measured:
 
 
 def reduced_radii(sections: list[Section]) -> AreaWeighted:
-    """Area-weighted r_n of all whole cells; groups are the sections, or the patches of a single one.
+    """Area-weighted r_n of all whole cells; groups are the sections, or the patches of a single
+    one.
 
     Raises:
         RefusedError: A cell is smaller than its disc, so that discs overlap.
@@ -109,11 +121,18 @@ def reduced_radii(sections: list[Section]) -> AreaWeighted:
         disc, discs = section.whole.disc, section.discs
         values.append(section.diagram.reduced_radii[disc])
         weights.append(section.diagram.areas[disc] * section.whole.weight)
-        patch = np.minimum((PATCHES * discs.centres[disc] / discs.size).astype(int), PATCHES - 1) @ (PATCHES, 1)
+        patch = np.minimum(
+            (PATCHES * discs.centres[disc] / discs.size).astype(int), PATCHES - 1
+        ) @ (PATCHES, 1)
         groups.append(np.full(len(disc), number) if len(sections) > 1 else patch)
-    sample = AreaWeighted.of(np.concatenate(values), np.concatenate(weights), np.concatenate(groups))
+    sample = AreaWeighted.of(
+        np.concatenate(values), np.concatenate(weights), np.concatenate(groups)
+    )
     if sample.values[-1] > np.sqrt(4 / np.pi):
-        raise RefusedError(f"a cell has r_n = {sample.values[-1]:.4g}, more area of disc than of cell: discs overlap; mend the data")
+        raise RefusedError(
+            f"a cell has r_n = {sample.values[-1]:.4g}, more area of disc than of cell: discs"
+            " overlap; mend the data"
+        )
     return sample
 
 

@@ -1,0 +1,114 @@
+"""What the particles and the radius map of a case must fulfil as a whole."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+from alphacut.case.case import Case
+from alphacut.io.problem import Problem
+from alphacut.stochastic import HermiteMap, TruncatedNormal
+
+SLOPES = ("a1", "a2", "a3", "a4")
+
+
+def particles(case: Case) -> Iterator[Problem]:
+    """Exactly one source of particles, and numbers in it that fit together."""
+    sources = [
+        name
+        for name in ("packing", "circles", "image")
+        if any(key.startswith(f"microstructure.{name}.") for key in case.values)
+    ]
+    if len(sources) != 1:
+        allowed = (
+            "one of [microstructure.packing], [microstructure.circles], [microstructure.image]"
+        )
+        yield Problem(
+            "microstructure",
+            f"got {len(sources)} sources of particles",
+            ", ".join(sources),
+            allowed,
+        )
+    if case.has("microstructure.limits"):
+        limits = case.numbers("microstructure.limits")
+        if len(limits) != 2 or not limits[0] < limits[1]:
+            yield Problem(
+                "microstructure.limits",
+                "the limits need two values in rising order",
+                str(list(limits)),
+                "for example [0.13, 0.87]",
+            )
+    yield from sizes(case)
+    for name in ("size", "origin"):
+        key = f"microstructure.circles.{name}"
+        if case.has(key) and len(case.numbers(key)) != 2:
+            yield Problem(key, f"got {len(case.numbers(key))} values", allowed="two: across and up")
+
+
+def sizes(case: Case) -> Iterator[Problem]:
+    """The radii of packed discs: a file of them, or both ends of their law in order."""
+    key = "microstructure.packing"
+    low, high = (f"{key}.{end}_radius" for end in ("smallest", "largest"))
+    ends = [name for name in (low, high) if name in case.written]
+    if not case.has(f"{key}.discs"):
+        return
+    if case.has(f"{key}.file") and ends:
+        yield Problem(
+            ends[0],
+            "the radii come from a file besides",
+            str(case.written[ends[0]]),
+            f"one of {key}.file and the two ends",
+        )
+    elif not case.has(f"{key}.file"):
+        for name in (low, high):
+            if name not in ends:
+                yield Problem(
+                    name,
+                    "missing: the law of the radii needs it",
+                    allowed=f'a length such as "1.6 mm", or {key}.file',
+                )
+    if len(ends) == 2 and case.number(low) > case.number(high):
+        yield Problem(
+            low, "the smallest radius is greater than the largest", str(case.written[low])
+        )
+
+
+def radius(case: Case, alpha: float) -> Iterator[Problem]:
+    """r(θ) must stay inside (0, 1) in every corner of the α-cuts; r is linear in a1 … a4, so
+    corners suffice.
+    """
+    theta = case.numbers("radius.theta")
+    if len(theta) != 2 or not theta[0] < theta[1]:
+        yield Problem(
+            "radius.theta",
+            "the support of θ needs two ends in rising order",
+            str(list(theta)),
+            "for example [-3, 3]",
+        )
+        return
+    law = TruncatedNormal(*theta)
+    for corner in itertools.product(
+        *(sorted(set(case.fuzzy(f"radius.{name}").cut(alpha))) for name in SLOPES)
+    ):
+        a1, a2, a3, a4 = corner
+        try:
+            HermiteMap(a1, a2, a3, a4, law)
+        except ValueError as error:
+            key = guilty(corner)
+            yield Problem(f"radius.{key}", str(error), str(case.written.get(f"radius.{key}", "")))
+            return
+
+
+def guilty(corner: tuple[float, ...]) -> str:
+    """The slope to name when r(θ) leaves (0, 1): the one whose taming alone cures it, else the
+    steeper.
+    """
+    a1, a2, a3, a4 = corner
+    tame = a3 - a1
+    for name, slope2, slope4 in (("a2", tame, a4), ("a4", a2, tame)):
+        try:
+            HermiteMap(a1, slope2, a3, slope4)
+        except ValueError:
+            continue
+        return name
+    return "a2" if abs(a2 - tame) > abs(a4 - tame) else "a4"

@@ -1,0 +1,87 @@
+"""What a structure cannot do without although no single key of it is required: damping, and
+something that moves it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from alphacut.case.case import Case
+from alphacut.io.problem import Problem
+
+RAYLEIGH = ("rayleigh_mass", "rayleigh_stiffness")
+DAMPING = 'damping_ratio = "5 %", rayleigh_mass and rayleigh_stiffness'
+
+
+def incomplete(case: Case) -> Iterator[Problem]:
+    """Every key that a frame or tower lacks."""
+    if case.has("frame.masses"):
+        yield from frame_damping(case)
+        yield from frame_motion(case)
+    if case.has("tower.storeys"):
+        yield from tower_damping(case)
+
+
+def given(case: Case, section: str, *names: str) -> bool:
+    """Whether the file holds any of the keys."""
+    return any(f"{section}.{name}" in case.written for name in names)
+
+
+def frame_damping(case: Case) -> Iterator[Problem]:
+    """Dampers go with their placement; where there are none, the damping is given otherwise."""
+    if given(case, "frame", "dampers") and not given(case, "frame", "damper_placement"):
+        yield Problem(
+            "frame.damper_placement",
+            "missing: where the dampers stand",
+            allowed='"ground" or "storey"',
+        )
+    if not given(case, "frame", "dampers") and given(case, "frame", "damper_placement"):
+        yield Problem(
+            "frame.dampers",
+            "missing: damper_placement says where dampers stand",
+            allowed='for example "50 N s/m", for all floors',
+        )
+    elif not given(case, "frame", "dampers", "damping_ratio", *RAYLEIGH):
+        yield Problem(
+            "frame.dampers",
+            "missing: the frame has no damping",
+            allowed=f'dampers, {DAMPING}; "0 %" for none',
+        )
+
+
+def tower_damping(case: Case) -> Iterator[Problem]:
+    """Both of Rayleigh's factors, or a ratio."""
+    if not given(case, "tower", "damping_ratio"):
+        for name in RAYLEIGH:
+            if not given(case, "tower", name):
+                yield Problem(
+                    f"tower.{name}",
+                    "missing: the tower needs damping",
+                    allowed=f'{DAMPING}; "0 %" for none',
+                )
+
+
+def frame_motion(case: Case) -> Iterator[Problem]:
+    """A start is given, unless the ground moves; and something moves at all."""
+    if case.has("frame.accelerogram"):
+        return
+    missing = [name for name in ("displacements", "velocities") if not given(case, "frame", name)]
+    for name in missing:
+        yield Problem(
+            f"frame.{name}",
+            "missing: without an accelerogram the start moves the frame",
+            allowed="one for each floor, or for all",
+        )
+    starts = [
+        number
+        for name in ("displacements", "velocities")
+        for number in case.fuzzies(f"frame.{name}")
+    ]
+    if not missing and not any(number.support.lower or number.support.upper for number in starts):
+        what = (
+            "nothing moves the frame: displacements and velocities are zero, and there is no"
+            " accelerogram"
+        )
+        yield Problem(
+            "frame.displacements", what, allowed="a start that is not zero, or an accelerogram"
+        )

@@ -1,0 +1,154 @@
+"""The names of a structure's inputs and outputs: as many values as floors, and no name that it does
+not have.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from alphacut.case.case import Case
+from alphacut.case.checks_structure import RAYLEIGH
+from alphacut.case.values import nearest
+from alphacut.io.problem import Problem
+
+GROUPS = ("E", "I", "m", "l", "d", "q0", "v0", "zeta", *RAYLEIGH)
+OTHERS = {  # structures beside the storey frame, and their inputs
+    "pendulum": ("m", "l", "d", "g", "phi_0", "omega_0"),
+    "tower": ("E_columns", "E_columns_top", "E_beams", "mass", "zeta", *RAYLEIGH),
+}
+OUTPUTS = {
+    "pendulum": ("force",),
+    "tower": ("roof", "drift"),
+}  # of structures beside the storey frame
+
+
+def floors(case: Case) -> Iterator[Problem]:
+    """Every array of the frame has one entry for each floor; one entry alone holds for all of them."""
+    count = len(case.fuzzies("frame.masses"))
+    for name in ("lengths", "dampers", "displacements", "velocities", "second_moment", "columns"):
+        found = len(
+            case.numbers("frame.columns") if name == "columns" else case.fuzzies(f"frame.{name}")
+        )
+        if found not in (1, count):
+            few = f"{count} value{'s' if count > 1 else ''}"
+            words = (
+                f"{few}, or one for all floors; the number of floors is that of frame.masses, which"
+                f" has {count}"
+            )
+            yield Problem(
+                f"frame.{name}",
+                f"got {found} values for {count} floor{'s' if count > 1 else ''}",
+                allowed=words,
+            )
+    if case.has("frame.damping_ratio") and len(case.fuzzies("frame.damping_ratio")) not in (
+        1,
+        count,
+    ):
+        what = f"got {len(case.fuzzies('frame.damping_ratio'))} values for {count} modes"
+        yield Problem(
+            "frame.damping_ratio",
+            what,
+            allowed=f"one for all modes, or {count}: one for each, by rising frequency",
+        )
+    moments = case.fuzzies("frame.second_moment")
+    if len(moments) > 1 and any(moment.support.width > 0 for moment in moments):
+        allowed = (
+            "one fuzzy value for all storeys, or crisp ones; what makes a storey uncertain by"
+            " itself may be its length"
+        )
+        yield Problem(
+            "frame.second_moment",
+            "one of several values is fuzzy",
+            str(case.written["frame.second_moment"]),
+            allowed,
+        )
+    yield from known_output(case, count)
+    for key in fuzzy_keys(case):
+        for name in case.names(key):
+            yield from known_input(key, name, count)
+
+
+def named_inputs(case: Case, section: str, known: tuple[str, ...]) -> Iterator[Problem]:
+    """Fuzzy inputs of a structure that has no groups of them."""
+    for key in fuzzy_keys(case):
+        for name in case.names(key):
+            if name == "zeta" and section == "tower" and not case.has("tower.damping_ratio"):
+                yield Problem(
+                    key,
+                    "the tower has no damping ratio",
+                    name,
+                    "zeta where tower.damping_ratio is given",
+                )
+            elif name not in known:
+                yield Problem(
+                    key,
+                    f"the {section} has no input {name}",
+                    name,
+                    ", ".join(known),
+                    nearest(name, known),
+                )
+
+
+def fuzzy_keys(case: Case) -> list[str]:
+    """Keys that name fuzzy inputs of the structure."""
+    keys = [
+        "envelope.fuzzy",
+        "exceedance.random",
+        *(f"study[{i}].fuzzy" for i in range(study_count(case))),
+    ]
+    return [key for key in keys if case.has(key)]
+
+
+def study_count(case: Case) -> int:
+    """Number of [[study]] tables."""
+    return int(str(case.values.get("study", 0)))
+
+
+def known_output(case: Case, floors: int) -> Iterator[Problem]:
+    """The observed quantities, and the one that a study draws."""
+    kinds = ("q", "v", "drift", "shear")
+    possible = [f"{kind}{floor + 1}" for kind in kinds for floor in range(floors)] + ["base_shear"]
+    for name in case.names("frame.outputs"):
+        if name not in possible:
+            yield Problem(
+                "frame.outputs",
+                f"there is no output {name}",
+                name,
+                f"q, v, drift or shear with a floor, base_shear: {', '.join(possible[:floors])} …",
+                nearest(name, possible),
+            )
+    outputs = case.names("frame.outputs") or tuple(possible[:floors])
+    for index in range(study_count(case)):
+        drawn = str(case.values.get(f"study[{index}].output", ""))
+        if drawn and drawn not in outputs:
+            yield Problem(
+                f"study[{index}].output", f"there is no output {drawn}", drawn, ", ".join(outputs)
+            )
+    limited = case.text("exceedance.output") if case.has("exceedance.output") else possible[0]
+    if limited not in possible:
+        allowed = f"q, v, drift or shear with a floor, base_shear: {', '.join(possible[:floors])} …"
+        yield Problem(
+            "exceedance.output",
+            f"there is no output {limited}",
+            limited,
+            allowed,
+            nearest(limited, possible),
+        )
+
+
+def known_input(key: str, name: str, count: int) -> Iterator[Problem]:
+    """A fuzzy input of the frame: a group or one floor's member of it."""
+    members = [f"{group}{floor + 1}" for group in ("m", "l", "d") for floor in range(count)]
+    members += [f"{group}{floor + 1}_0" for group in ("q", "v") for floor in range(count)]
+    members += [f"zeta{mode + 1}" for mode in range(count)]
+    if name not in GROUPS and name not in members:
+        each = f"m1 to m{count}" if count > 1 else "m1"
+        allowed = f"{', '.join(GROUPS)}, or one floor: {each}, l1, d1, q1_0, v1_0 …"
+        yield Problem(
+            key,
+            f"the frame has no input {name}",
+            name,
+            allowed,
+            nearest(name, members) if re.match("[mldqvz]", name) else "",
+        )

@@ -1,0 +1,123 @@
+"""Changes of a case from the command line: one key and its new value each."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from typing import Any
+
+from alphacut.case.key import Key
+from alphacut.case.schema import SECTIONS, every_key
+from alphacut.case.values import nearest
+from alphacut.io.problem import BadInput, Problem
+from alphacut.io.quantity import NUMBER
+
+Raw = dict[str, Any]
+ARRAYS = ("fuzzy list", "numbers", "choices")  # kinds of keys that hold arrays
+
+
+def apply_change(raw: Raw, change: str) -> str:
+    """Put one ``KEY=VALUE`` into the tree; returns the key's full name."""
+    name, equals, value = change.partition("=")
+    name = name.strip().replace("-", "_")
+    known = every_key()
+    full = [name] if name in known else [key for key in known if key.rpartition(".")[2] == name]
+    if not equals:
+        raise BadInput(
+            Problem(
+                "--set",
+                "there is no = in it",
+                change,
+                "KEY=VALUE, for example cell.matrix_modulus='20 GPa'",
+            )
+        )
+    if re.match(r"study\b", name):
+        raise BadInput(
+            Problem(
+                "--set",
+                "a [[study]] is changed in the case file",
+                change,
+                "keys of the other sections",
+            )
+        )
+    if not full:
+        raise BadInput(no_key(name, change, raw))
+    present = (
+        [
+            key
+            for key in full
+            if key.rpartition(".")[2] in (table_of(raw, key.rpartition(".")[0]) or {})
+        ]
+        if len(full) > 1
+        else full
+    )
+    present = [key for key in present if not key.startswith("study.")]
+    if len(present) != 1:
+        raise BadInput(
+            Problem("--set", f"the key {name} is not clear", change, "one of " + ", ".join(full))
+        )
+    section, _, key = present[0].rpartition(".")
+    table = table_of(raw, section, make=True)
+    if table is not None:
+        table[key] = toml_or_text(value.strip(), known[present[0]])
+    return present[0]
+
+
+def no_key(name: str, change: str, raw: Raw) -> Problem:
+    """The problem of a change of what is no key: nothing at all, a section, a misspelling."""
+    if not name:
+        return Problem("--set", "there is no key before the =", change, "any key of the case")
+    if name in SECTIONS:
+        return Problem(
+            "--set",
+            f"{name} is a section",
+            change,
+            ", ".join(f"{name}.{key}" for key in SECTIONS[name].keys),
+        )
+    here = [
+        key for key in every_key() if table_of(raw, key.rpartition(".")[0]) is not None
+    ]  # keys of the case's own sections come first
+    return Problem(
+        "--set",
+        f"there is no key {name}",
+        change,
+        "any key of the case",
+        nearest(name, here) or nearest(name, every_key()),
+    )
+
+
+def table_of(raw: Raw, section: str, *, make: bool = False) -> Raw | None:
+    """The table of a section, ``microstructure.packing`` for one inside another; None where there
+    is none.
+    """
+    table: Any = raw
+    for name in section.split(".") if section else ():
+        if name not in table and make:
+            table[name] = {}
+        table = table.get(name)
+        if not isinstance(table, dict):
+            return None
+    return table  # type: ignore[no-any-return]
+
+
+def toml_or_text(value: str, key: Key) -> object:
+    """A value from a command line: TOML where it is TOML, else text; where an array is wanted,
+    ``E,m`` is one.
+    """
+    try:
+        found = tomllib.loads(f"x = {value}")["x"]
+    except tomllib.TOMLDecodeError:
+        found = (
+            float(value) if re.fullmatch(r"[+-]?(\d+\.|\.\d+)([eE][+-]?\d+)?", value) else value
+        )  # .3 and 3. are no TOML
+    if (
+        key.alone
+        and not isinstance(found, list)
+        and (not isinstance(found, str) or "," not in re.sub(r"\[.*?\]", "", found))
+    ):
+        return found  # one for all
+    if key.kind in ARRAYS and not isinstance(found, list):
+        items = [item.strip() for item in value.strip("[] ").split(",") if item.strip()]
+        plain = key.kind == "numbers" and not key.unit
+        return [float(item) if plain and re.fullmatch(NUMBER, item) else item for item in items]
+    return str(found) if key.kind == "text" else found

@@ -1,0 +1,75 @@
+"""``alphacut check``: everything that is wrong with a case, at once."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import TextIO
+
+from alphacut.case.load import load
+from alphacut.commands.options import add_common
+from alphacut.io.files import as_json, say, write_text
+from alphacut.io.problem import BadInput
+from alphacut.stages.readiness import ready
+
+ABOUT = (
+    "check a case without computing anything: one line for each problem, with line, key, value,"
+    " what is allowed, the nearest key"
+)
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    add_common(parser)
+
+
+def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
+    """Check and report; with ``--json`` the problems as data."""
+    try:
+        case = load(options.case, options.set)
+        found = ready(case)
+    except BadInput as error:
+        answer(
+            options,
+            {
+                "case": options.case,
+                "ok": False,
+                "problems": [asdict(problem) for problem in error.problems],
+            },
+            out,
+        )
+        raise
+    warnings = [f"warning: {remark}" for remark in (*found.warnings, *found.rough)]
+    answer(
+        options,
+        {
+            "case": options.case,
+            "ok": True,
+            "problems": [],
+            "warnings": warnings,
+            "stages": list(case.stages),
+            "period_s": found.period,
+        },
+        out,
+    )
+    for warning in warnings:
+        say(warning)
+    if options.json != "-" and not options.quiet:
+        about = "about " if "modulus" in case.stages else ""  # the modulus is yet to be computed
+        period = f"; first natural period {about}{found.period:.3g} s" if found.period else ""
+        passed = "modulus" in case.stages and "frame.modulus" in case.written
+        over = "; frame.modulus is passed over, stage modulus hands its own on" if passed else ""
+        out.write(
+            f"{options.case}: no problems; stages {', '.join(case.stages)};"
+            f" {case.text('title')}{period}{over}\n"
+        )
+    return 0
+
+
+def answer(options: argparse.Namespace, document: Mapping[str, object], out: TextIO) -> None:
+    """Write the JSON answer where it is wanted."""
+    if options.json == "-":
+        out.write(as_json(document))
+    elif options.json:
+        write_text(options.json, as_json(document, indent=2))

@@ -1,0 +1,305 @@
+"""``alphacut envelope``, also ``python -m frame envelope``: fuzzy forward dynamics of the
+structure.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, TextIO
+
+import numpy as np
+
+from alphacut.case.case import Case
+from alphacut.case.load import load
+from alphacut.case.schema import ENVELOPE_METHODS
+from alphacut.case.values import nearest
+from alphacut.commands.options import add_common, add_keys, add_workers, changes, check_workers
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.io import quantity
+from alphacut.io.files import as_json, write_text
+from alphacut.io.problem import BadInput, Problem
+from alphacut.io.progress import progress
+from alphacut.io.provenance import fingerprint
+from alphacut.io.units import engineering, largest_by_unit
+from alphacut.stages import envelope
+from alphacut.stages import exceedance as outcomes
+from alphacut.stages.modulus import read_number, stand_in
+from alphacut.stages.structure import structure
+from alphacut.stochastic.theta.truncated_normal import Array
+
+if TYPE_CHECKING:
+    from alphacut.frame import Envelope
+
+ABOUT = "lower and upper envelopes of the structure's vibration on every α-cut"
+KEYS = {
+    "--fuzzy": "envelope.fuzzy",
+    "--duration": "envelope.duration",
+    "--step": "envelope.step",
+    "--alpha": "envelope.alpha",
+    "--method": "envelope.method",
+    "--integrator": "envelope.integrator",
+    "--order": "envelope.order",
+    "--tolerance": "envelope.tolerance",
+    "--relative-tolerance": "envelope.relative_tolerance",
+    "--certify": "envelope.certify",
+}
+OF_AUTO = ("modal", "improved-graph-follower")
+BARE = {
+    "--duration": "s",
+    "--step": "s",
+    "--tolerance": "m",
+    "--certify": "m",
+}  # options that may leave the unit out
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    add_common(parser)
+    add_keys(parser, KEYS, BARE)
+    parser.add_argument(
+        "--modulus",
+        metavar="QUANTITY|FILE.nc",
+        help="Young's modulus: '[22, 24, 26] GPa' or the α-cuts of a file (default: the case's)",
+    )
+    parser.add_argument(
+        "--exclude",
+        metavar="NAMES",
+        default="",
+        help="methods that method auto must not take, separated by commas",
+    )
+    add_workers(parser, "the proof of a certificate")
+    parser.add_argument(
+        "--strict",
+        action="store_true",
+        help="refuse a time step or tolerance too coarse for the motion",
+    )
+    parser.add_argument(
+        "--out", metavar="FILE.nc", help="write envelopes and where they are reached as NetCDF"
+    )
+
+
+def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
+    """Compute and report."""
+    add_units(options)
+    check_workers(options.workers)
+    if options.certify is not None and options.method is None:
+        options.method = "modal"  # the one that can
+    case = load(options.case, changes(options, KEYS), without=replaced(options))
+    handed = given_modulus(options.modulus) or stand_in(case)
+    task = replace(envelope.task_of(case), exclude=excluded(options.exclude))
+    contradictions(options, case, task)
+    if case.has("exceedance.output"):
+        outcomes.require_random(case, structure(case, handed))  # before anything is computed
+    with progress("Envelopes", quiet=options.quiet) as tick:
+        found = envelope.compute(
+            case,
+            task,
+            modulus=handed,
+            strict=options.strict,
+            workers=options.workers,
+            progress=tick,
+        )
+    dataset = outcomes.with_peaks(found, structure(case, handed), task)
+    if options.out:
+        key = fingerprint(
+            {"case": case.values, "task": task, "modulus": handed}, ("fuzzy", "frame")
+        )
+        envelope.write(dataset, options.out, case_text=case.text_of_file, key=key)
+    limit = exceeded(options, case, handed)
+    document = as_json(
+        {
+            **envelope.document(found, dataset["peak_tried"].values),
+            **({"exceedance": limit} if limit else {}),
+        },
+        indent=None if options.json == "-" else 2,
+    )
+    if options.json == "-":
+        out.write(document)
+    elif options.json:
+        write_text(options.json, document)
+    if options.json != "-" and not options.quiet:
+        out.write(
+            summary(found, dataset["peak_tried"].values[0])
+            + (outcomes.sentence(limit) if limit else "")
+        )
+    return 0
+
+
+def exceeded(
+    options: argparse.Namespace, case: Case, handed: FuzzyNumber | None
+) -> dict[str, Any] | None:
+    """The fuzzy probability of exceeding the case's limit; None where it names none."""
+    if not case.has("exceedance.output"):
+        return None
+    with progress("Exceedance", quiet=options.quiet) as tick:
+        return outcomes.exceedance_document(outcomes.exceedance(case, handed, tick))
+
+
+def add_units(options: argparse.Namespace) -> None:
+    """``--duration 30`` means 30 s, ``--step 0.01`` 0.01 s, ``--tolerance 1e-4`` 1e-4 m."""
+    for option, unit in BARE.items():
+        name = option.removeprefix("--")
+        text = getattr(options, name)
+        if (
+            text is not None
+            and quantity.SINGLE.fullmatch(text.strip())
+            and not text.strip()[-1].isalpha()
+        ):
+            setattr(options, name, f"{text} {unit}")
+
+
+def replaced(options: argparse.Namespace) -> tuple[str, ...]:
+    """The case's tolerance, where an option gives the other kind."""
+    if options.tolerance is not None and options.relative_tolerance is None:
+        return ("envelope.relative_tolerance",)
+    return (
+        ("envelope.tolerance", "pendulum.tolerance")
+        if options.relative_tolerance is not None and options.tolerance is None
+        else ()
+    )
+
+
+def contradictions(options: argparse.Namespace, case: Case, task: envelope.EnvelopeTask) -> None:
+    """Refuse options that have no meaning together.
+
+    Raises:
+        BadInput: A modulus for a structure that takes none, or methods left out where none is
+            chosen.
+    """
+    if options.modulus is not None and not case.has("frame.masses"):
+        raise BadInput(
+            Problem(
+                "--modulus",
+                "this structure takes no modulus",
+                options.modulus,
+                "with a storey frame",
+            )
+        )
+    if task.exclude and task.method != "auto":
+        raise BadInput(
+            Problem(
+                "--exclude", f"the method is {task.method}", options.exclude, "with --method auto"
+            )
+        )
+
+
+def excluded(text: str) -> tuple[str, ...]:
+    """Names of methods, separated by commas."""
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    for name in names:
+        if name not in ENVELOPE_METHODS:
+            raise BadInput(
+                Problem(
+                    "--exclude",
+                    f"there is no method {name}",
+                    text,
+                    " or ".join(OF_AUTO),
+                    nearest(name, OF_AUTO),
+                )
+            )
+        if name not in OF_AUTO:
+            raise BadInput(
+                Problem(
+                    "--exclude",
+                    f"'{name}' is unknown to auto, which takes other methods",
+                    text,
+                    " or ".join(OF_AUTO),
+                )
+            )
+    if set(names) == set(OF_AUTO):
+        raise BadInput(
+            Problem("--exclude", "no method is left for auto to take", text, " or ".join(OF_AUTO))
+        )
+    return names
+
+
+def given_modulus(text: str | None) -> FuzzyNumber | None:
+    """The modulus of ``--modulus`` in Pa: a quantity, or the α-cuts of a file."""
+    if text is None:
+        return None
+    if text.endswith(".nc"):
+        return read_number(text)
+    try:
+        number = quantity.fuzzy(text, "Pa")
+    except ValueError as error:
+        raise BadInput(
+            Problem(
+                "--modulus",
+                str(error),
+                text,
+                "a stress such as '[22.8, 24.8, 25.8] GPa', or FILE.nc",
+            )
+        ) from None
+    if not number.support.lower > 0:
+        raise BadInput(Problem("--modulus", "out of range", text, "greater than 0"))
+    return number
+
+
+def summary(found: Envelope, tried: Array | None = None) -> str:
+    """Extremes and fuzzy peaks at the lowest level as a small table; the lower ends of the peaks
+    those tried, shape (m,), where known.
+    """
+    from alphacut.frame.envelope import output_unit
+    from alphacut.frame.exceedance import peaks
+
+    of = peaks(found)
+    units = [output_unit(name) for name in found.outputs]
+    least = of.lower[0] if tried is None else tried
+    columns = [
+        list(map(float, row))
+        for row in np.stack([found.minimum[0], found.maximum[0], least, of.upper[0]], axis=1)
+    ]
+    largest = largest_by_unit(
+        (value, unit) for unit, values in zip(units, columns, strict=True) for value in values
+    )
+    shown = [
+        [engineering(value, unit, beside=largest[unit]) for value in values]
+        for unit, values in zip(units, columns, strict=True)
+    ]
+    rows = [(name, *values) for name, values in zip(found.outputs, shown, strict=True)]
+    lines = [
+        f"{name:>14}  {low:>12}  {high:>12}   {least} … {most}\n"
+        for name, low, high, least, most in rows
+    ]
+    effort = "eigen-analyses" if found.method == "modal" else "trajectories"
+    cost = (
+        f"{found.method}: {found.trajectories} {effort}, {found.seconds:.1f} s, bounds"
+        f" {found.nature}{error_in_words(found)}"
+    )
+    head = (
+        "        output           min           max   peak: least tried … greatest   (α ="
+        f" {found.alpha[0]:g})\n"
+    )
+    return f"{head}{''.join(lines)}{cost}\n{proved(found)}"
+
+
+def error_in_words(found: Envelope) -> str:
+    """The largest estimated error of each output; empty where none was estimated."""
+    from alphacut.frame.envelope import output_unit
+
+    if found.error is None:
+        return ""
+    largest = zip(found.outputs, found.error.max((0, 1)), strict=True)
+    words = ", attained to within " if "gap" in found.facts else ", error up to "
+    return words + ", ".join(
+        f"{engineering(float(value), output_unit(name), digits=2)} of {name}"
+        for name, value in largest
+    )
+
+
+def proved(found: Envelope) -> str:
+    """What a certificate says, as a line; empty without one."""
+    from alphacut.frame.envelope import output_unit
+
+    if "gap" not in found.facts:
+        return ""
+    of = str(found.facts["gap_output"])
+    gap, between = (
+        engineering(float(found.facts[name]), output_unit(of)) for name in ("gap", "between_nodes")
+    )
+    return (
+        f"every node's bounds enclosed to within {gap} of {of}, up to {between} beyond them between"
+        f" nodes; {found.facts['proof']}\n"
+    )

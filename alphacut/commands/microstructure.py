@@ -1,0 +1,99 @@
+"""``alphacut microstructure``, also ``python -m stochastic microstructure``: from particles to the
+fuzzy radius map.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+from alphacut.case.load import load
+from alphacut.commands.options import add_common, add_workers, check_workers
+from alphacut.io.files import as_json, say, whole_file, write_text
+from alphacut.io.progress import progress
+from alphacut.io.provenance import attributes, door, fingerprint, versions
+from alphacut.stages import microstructure
+
+if TYPE_CHECKING:
+    from alphacut.stochastic.microstructure import Microstructure
+
+ABOUT = "from particles, packed or measured, to the random radius and its fuzzy map"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    add_common(parser)
+    add_workers(parser)
+    parser.add_argument(
+        "--out",
+        metavar="FOLDER",
+        help="write radius.toml (a case fragment), microstructure.nc and figures here",
+    )
+    parser.add_argument("--no-figures", action="store_true", help="numbers only")
+
+
+def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
+    """Compute, write, report."""
+    check_workers(options.workers)
+    case = load(options.case, options.set)
+    case.need("microstructure.seed")
+    with progress("Microstructure", quiet=options.quiet) as tick:
+        found = microstructure.compute(case, workers=options.workers, progress=tick, quiet=True)
+    written: list[str] = []
+    if options.out:
+        key = fingerprint(case.values, ("stochastic",))
+        written = write(
+            found,
+            Path(options.out),
+            attributes(case.text_of_file, key),
+            figures=not options.no_figures,
+        )
+    document = {
+        **found.summary(),
+        "fragment": found.fragment(),
+        "files": written,
+        "versions": versions(),
+    }
+    if options.json == "-":
+        out.write(as_json(document))
+    elif options.json:
+        write_text(options.json, as_json(document, indent=2))
+    for remark in microstructure.left_out(found):
+        say(remark)
+    if options.json != "-" and not options.quiet:
+        out.write(found.fragment())
+        advise(found.fragment(), options.out)
+    return 0
+
+
+def advise(fragment: str, folder: str | None) -> None:
+    """Say what the fragment is for, and warn of a slope that came out crisp."""
+    for remark in microstructure.crisp_slopes(fragment):
+        say(remark)
+    place = (
+        f"{folder}/radius.toml" if folder else "this section (--out FOLDER keeps it as radius.toml)"
+    )
+    say(
+        f"next: put {place} in place of [radius] of a case with [cell] and [mesh], then {door()}"
+        " modulus CASE"
+    )
+
+
+def write(
+    found: Microstructure, folder: Path, said: Mapping[str, str | int], *, figures: bool = True
+) -> list[str]:
+    """Write numbers, figures, the fragment and, last of all, the dataset; returns the paths from
+    `folder`.
+    """
+    write_text(folder / "microstructure.json", as_json(found.summary(), indent=2))
+    drawn = found.draw(folder / "figures") if figures else {}
+    write_text(folder / "radius.toml", found.fragment())
+    with whole_file(folder / "microstructure.nc") as partial:
+        found.to_dataset().assign_attrs(said).to_netcdf(partial)
+    numbers = [
+        folder / name for name in ("microstructure.json", "microstructure.nc", "radius.toml")
+    ]
+    files = [*numbers, *(path for paths in drawn.values() for path in paths)]
+    return [str(path.relative_to(folder)) for path in files]

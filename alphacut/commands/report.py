@@ -1,0 +1,45 @@
+"""``alphacut report``: the results of a run as one self-contained HTML page."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TextIO
+
+from alphacut.io.files import as_json, write_text
+from alphacut.report.page import report
+
+ABOUT = "one self-contained HTML page of a run's results, with interactive envelopes"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    parser.add_argument(
+        "folder", metavar="FOLDER", help="results of a run, for example results/paper"
+    )
+    parser.add_argument(
+        "--out", metavar="FILE.html", help="where the page goes (default: FOLDER/report.html)"
+    )
+    parser.add_argument(
+        "--json",
+        metavar="FILE",
+        help="write the page's path and size as JSON; - for standard output",
+    )
+    parser.add_argument("--quiet", action="store_true", help="print nothing")
+
+
+def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
+    """Write the page."""
+    folder = Path(options.folder)
+    path = Path(options.out) if options.out else folder / "report.html"
+    page = report(folder)
+    write_text(path, page)
+    document = as_json({"file": str(path), "bytes": len(page.encode())})
+    if options.json == "-":
+        out.write(document)
+    elif options.json:
+        write_text(options.json, document)
+    if options.json != "-" and not options.quiet:
+        out.write(f"{path}\n")
+    return 0

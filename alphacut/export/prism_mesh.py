@@ -1,0 +1,119 @@
+"""The prism mesh of a case as a meshio mesh, written for ParaView, Gmsh, Abaqus and CalculiX."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from alphacut.case.case import Case
+from alphacut.io.files import whole_file
+from alphacut.io.problem import BadInput, Problem
+from alphacut.stages.cell import modal_values, parts
+
+if TYPE_CHECKING:
+    import meshio
+
+# From Basix's order of a wedge's edges to meshio's, Abaqus's and Gmsh's reader's: lower triangle,
+# upper triangle, vertical edges.
+ORDER = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11]
+MIRRORED = [
+    0,
+    2,
+    1,
+    3,
+    5,
+    4,
+    8,
+    7,
+    6,
+    11,
+    10,
+    9,
+    12,
+    14,
+    13,
+]  # from there to VTK's: the lower triangle seen from outside
+PHASES = (
+    "MATRIX",
+    "PARTICLE",
+)  # names of the element sets, where a format has sets in place of data
+VTK_ORDER = {".vtu", ".vtk", ".xdmf"}
+FORMATS = {
+    ".vtu": "vtu",
+    ".vtk": "vtk",
+    ".xdmf": "xdmf",
+    ".msh": "gmsh",
+    ".inp": "abaqus",
+}  # read back, they give points, cells and phase
+FIELDLESS = {".inp"}
+
+
+def prism_mesh(case: Case) -> meshio.Mesh:
+    """Quadratic wedges of the physical-stochastic domain at the modal radius map, with the phase of
+    each (0 matrix, 1 particle).
+    """
+    import meshio
+    from meshio._mesh import topological_dimension
+
+    from alphacut.rve.mesh.prism_grid import PrismGrid
+    from alphacut.rve.mesh.triangulation import triangulate
+    from alphacut.rve.prism.model import reference_radius
+
+    radius, _, _ = parts(modal_values(case), case.numbers("radius.theta"))
+    plane = triangulate(size=case.number("mesh.size"), radius=reference_radius(radius))
+    grid = PrismGrid(
+        plane, case.integer("mesh.layers"), case.text("mesh.interface") == "conforming"
+    )
+    phase = np.tile(plane.inside.astype(np.int64), grid.layers)
+    topological_dimension.setdefault(
+        "wedge15", 3
+    )  # meshio 5.3 reads and writes this cell but has forgotten its dimension
+    return meshio.Mesh(
+        grid.positions(radius), [("wedge15", grid.cells[:, ORDER])], cell_data={"phase": [phase]}
+    )
+
+
+def check_ending(path: Path, *, fields: bool = False) -> None:
+    """Refuse an ending whose format cannot hold what is to be written, before anything is computed.
+
+    Raises:
+        BadInput: The ending names no format that keeps quadratic wedges and their phase, or one
+            without `fields` where they are wanted.
+    """
+    allowed = [ending for ending in FORMATS if not (fields and ending in FIELDLESS)]
+    if path.suffix in allowed:
+        return
+    lacks = (
+        "this format cannot hold fields"
+        if path.suffix in FORMATS
+        else "this ending names no format that holds quadratic wedges and phases"
+    )
+    raise BadInput(Problem("--out", lacks, str(path), ", ".join(allowed)))
+
+
+def write_mesh(mesh: meshio.Mesh, path: Path) -> None:
+    """Write a mesh in the format that the file's ending names, whole or not at all.
+
+    Where a format has no data on elements, the element sets MATRIX and PARTICLE tell the phases.
+
+    Raises:
+        BadInput: See `check_ending`.
+    """
+    import meshio
+
+    check_ending(path, fields=bool(mesh.point_data))
+    wedges, phase = mesh.cells[0].data, mesh.cell_data["phase"]
+    if path.suffix in VTK_ORDER:
+        mesh = meshio.Mesh(
+            mesh.points, [("wedge15", wedges[:, MIRRORED])], mesh.point_data, mesh.cell_data
+        )
+    if path.suffix in FIELDLESS:
+        sets = {name: [np.flatnonzero(phase[0] == number)] for number, name in enumerate(PHASES)}
+        mesh = meshio.Mesh(mesh.points, [("wedge15", wedges)], cell_sets=sets)
+    own = (
+        {"data_format": "XML"} if path.suffix == ".xdmf" else {}
+    )  # else its numbers are in a second file, by the partial one's name
+    with whole_file(path) as partial:
+        meshio.write(partial, mesh, file_format=FORMATS[path.suffix], **own)

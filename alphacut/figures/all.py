@@ -1,0 +1,121 @@
+"""Every figure of a run, by the name of its file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from alphacut.figures import envelope as figure_envelope
+from alphacut.figures import exceedance as figure_exceedance
+from alphacut.figures import follower as figure_follower
+from alphacut.figures import frame as figure_frame
+from alphacut.figures import fuzzy as figure_fuzzy
+from alphacut.figures import modulus as figure_modulus
+from alphacut.figures import radius as figure_radius
+from alphacut.figures import record as figure_record
+from alphacut.figures import response as figure_response
+from alphacut.figures import shares as figure_shares
+from alphacut.figures.style import save, style
+from alphacut.io.progress import progress
+from alphacut.stages.pipeline import Results
+from alphacut.stages.structure import structure
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
+
+Drawing = tuple[str, Callable[[], "Figure"]]
+
+
+def drawings(results: Results) -> Iterator[Drawing]:
+    """Name and function of each figure that the results allow."""
+    if results.case.has("radius.a1"):
+        if "microstructure" not in results.case.stages:  # that stage draws both from its particles
+            if results.case.quoted:
+                yield "fig11-radii", lambda: figure_radius.radii(results.case)
+            yield "fig13-p-box", lambda: figure_radius.p_box(results.case)
+        yield "fig14-cone", lambda: figure_radius.cone(results.case)
+    if (modulus := results.modulus) is not None:
+        yield "fig16-stress-curves", lambda: figure_modulus.stress_curves(modulus)
+        yield "fig17-mean-stress", lambda: figure_modulus.mean_stress(modulus)
+        yield "fig18-modulus", lambda: figure_modulus.fuzzy_modulus(modulus, results.case)
+        if results.case.quoted:
+            yield "fig19-membership", lambda: figure_fuzzy.membership(modulus)
+    if (stress := results.response) is not None:
+        yield "response", lambda: figure_response.response(stress)
+    if results.envelopes:
+        yield "fig20-mapping", lambda: figure_fuzzy.mapping(results)
+    if results.envelopes and results.case.has("frame.masses"):
+        yield "fig26-frame", lambda: figure_frame.frame(results.case)
+        yield "fig27-chain", lambda: figure_frame.chain(results.case)
+    if results.envelopes and results.case.has("tower.storeys"):
+        yield "tower", lambda: figure_frame.tower(results.case)
+    model = structure(results.case, results.handed).linear if results.envelopes else None
+    if model is not None and (shaken := model.ground) is not None:
+        yield "record", lambda: figure_record.record(shaken)
+    if (
+        results.case.has("envelope.method")
+        and results.case.text("envelope.method") == "graph-follower"
+        and results.envelopes
+    ):
+        richest = max(results.studies, key=lambda study: len(study.task.fuzzy))
+        yield "fig21-25-graph-follower", lambda: figure_follower.follower(results, richest)
+    if (limited := results.exceedance) is not None:
+        yield "exceedance", lambda: figure_exceedance.exceedance(limited)
+    for study in results.studies:
+        yield from figure_envelope.drawings(study, results.envelopes[study.name])
+
+
+def share_drawings(driving: xarray.Dataset) -> Iterator[Drawing]:
+    """Figures of what drives the widths."""
+    if "modulus_share" in driving:
+        yield "shares-modulus", lambda: figure_shares.of_modulus(driving)
+    if "share" in driving:
+        yield "shares-over-time", lambda: figure_shares.over_time(driving)
+
+
+def file_stem(name: str, results: Results) -> str:
+    """The figure's name; the paper's number leads it in the paper's case alone."""
+    return name if results.case.quoted else re.sub(r"^fig[\d-]+-", "", name)
+
+
+def draw(results: Results, driving: xarray.Dataset, *, quiet: bool = False) -> list[str]:
+    """Draw every figure as SVG and PNG into figures/; returns the names of the files."""
+    folder = results.folder / "figures"
+    names: list[str] = []
+    todo = [*drawings(results), *share_drawings(driving)]
+    with progress("Figures", quiet=quiet) as tick, style():
+        for done, (name, make) in enumerate(todo, start=1):
+            names += [
+                str(path.relative_to(results.folder))
+                for path in save(make(), folder / file_stem(name, results))
+            ]
+            if tick:
+                tick(done / len(todo))
+    return [*particle_pictures(folder, results), *names, *mesh_picture(results)]
+
+
+def particle_pictures(folder: Path, results: Results) -> list[str]:
+    """The figures that the microstructure stage has drawn: 03-04_two_point … 13_pbox, radius_map."""
+    if "microstructure" not in results.case.stages:
+        return []
+    found = [path for path in sorted(folder.iterdir()) if re.match(r"\d|radius_map", path.name)]
+    return [str(path.relative_to(results.folder)) for path in found]
+
+
+def mesh_picture(results: Results) -> list[str]:
+    """Fig. 15 and the stress on slices, where the modulus was computed on prisms."""
+    if results.modulus is None or results.case.text("modulus.method") != "prism":
+        return []
+    from alphacut.figures.mesh import draw_mesh
+
+    pictures = {f"figures/{file_stem('fig15-prism-mesh', results)}.png": "mesh"}
+    if results.case.text("mesh.interface") == "conforming":
+        pictures["figures/stress-on-slices.png"] = "stress"
+    return [
+        name
+        for name, kind in pictures.items()
+        if draw_mesh(results.case, results.folder / name, kind)
+    ]

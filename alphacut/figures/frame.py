@@ -1,0 +1,194 @@
+"""The structure drawn to scale (Fig. 26), a storey frame or a tower, and as a chain of masses,
+springs and dampers (Fig. 27).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from alphacut.case.case import Case
+from alphacut.figures.style import BLUE, GREY, INK, ORANGE, PURPLE, figure
+from alphacut.stages.structure import per_floor
+from alphacut.stages.structure_words import spread_damping
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+def frame(case: Case) -> Figure:
+    """Fig. 26: floors, columns with their lengths, displacements."""
+    lengths = [length.modal for length in per_floor(case, "frame.lengths")]
+    masses = [mass.modal for mass in per_floor(case, "frame.masses")]
+    height = sum(lengths)
+    span, level = 0.45 * max(height, 6.0) if len(lengths) < 5 else 0.3 * height, 0.0
+    high = min(9.0, 1.4 + 0.5 * height, 4.4 * 1.13 * height / (2.15 * span))
+    drawn, axes = figure(high * 2.15 * span / (1.13 * height), high)
+    ground(axes, 0.0, span)
+    for floor, (length, mass) in enumerate(zip(lengths, masses, strict=True), start=1):
+        for x in (0.0, span):
+            axes.plot([x, x], [level, level + length], color=INK, lw=1.4)
+        axes.annotate(
+            f"$l_{{{floor}}}$ = {length:.2f} m",
+            (-0.06 * span, level + length / 2),
+            ha="right",
+            va="center",
+            fontsize=8,
+        )
+        level += length
+        axes.plot(
+            [-0.03 * span, 1.03 * span], [level, level], color=INK, lw=6, solid_capstyle="butt"
+        )
+        label = f"$m_{{{floor}}}$ = {mass / 1000:g} t"
+        axes.annotate(
+            label,
+            (span / 2, level),
+            xytext=(0, 6),
+            textcoords="offset points",
+            ha="center",
+            va="bottom",
+            fontsize=8,
+        )
+        axes.annotate(
+            "",
+            (1.32 * span, level),
+            (1.08 * span, level),
+            arrowprops={"arrowstyle": "-|>", "color": ORANGE},
+        )
+        axes.annotate(f"$q_{{{floor}}}$", (1.35 * span, level), va="center", color=ORANGE)
+    axes.set_xlim(-0.6 * span, 1.55 * span)
+    axes.set_ylim(-0.05 * height, 1.08 * height)
+    axes.set_aspect("equal")
+    axes.axis("off")
+    return drawn
+
+
+def tower(case: Case) -> Figure:
+    """The beam frame to scale, its parts of one modulus in one colour."""
+    storeys, bays = case.integer("tower.storeys"), case.integer("tower.bays")
+    height, width = case.number("tower.height"), case.number("tower.width")
+    high = float(np.clip(storeys * height / (bays * width) * 2.6, 2.4, 6.5))
+    drawn, axes = figure(5.4, high)
+    levels, lines = height * np.arange(storeys + 1), width * np.arange(bays + 1)
+    half = storeys // 2
+    for label, ends, colour in (
+        ("columns, lower half", levels[[0, half]], BLUE),
+        ("columns, upper half", levels[[half, storeys]], PURPLE),
+    ):
+        if ends[1] > ends[0]:
+            axes.vlines(lines, *ends, color=colour, lw=1.2, label=label)
+    axes.hlines(levels[1:], lines[0], lines[-1], color=ORANGE, lw=0.7, label="beams")
+    ground(axes, 0.0, lines[-1])
+    axes.set_aspect("equal")
+    axes.set_xlabel(f"m; {bays} bays of {width:g} m")
+    axes.set_ylabel(f"m; {storeys} storeys of {height:g} m")
+    axes.grid(False)
+    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)
+    return drawn
+
+
+def ground(axes: Axes, left: float, right: float) -> None:
+    """Hatched ground line at height 0."""
+    axes.fill_between(
+        [left - 0.1 * right, 1.1 * right],
+        [0, 0],
+        [-0.03 * right] * 2,
+        hatch="////",
+        facecolor="white",
+        edgecolor=GREY,
+        lw=0,
+    )
+    axes.plot([left - 0.1 * right, 1.1 * right], [0, 0], color=INK, lw=1)
+
+
+def chain(case: Case) -> Figure:
+    """Fig. 27: the frame with rigid floors and bending columns as masses on springs, with its
+    dampers if it has any.
+    """
+    floors = len(case.fuzzies("frame.masses"))
+    damped = case.has("frame.damper_placement") and any(
+        d.support.upper > 0 for d in case.fuzzies("frame.dampers")
+    )
+    placement = case.text("frame.damper_placement") if damped else "none"
+    wide = min(10.0, 2.2 + 1.5 * floors)
+    drawn, axes = figure(wide, 2.15 * wide / (1.6 * floors + 0.5) + 0.1)
+    foot = -0.9 if placement == "ground" else -0.5
+    axes.plot([0, 0], [foot, 0.75], color=INK, lw=1)
+    axes.fill_betweenx(
+        [foot, 0.75], [-0.12] * 2, [0, 0], hatch="////", facecolor="white", edgecolor=GREY, lw=0
+    )
+    for floor in range(1, floors + 1):
+        left, right = 1.6 * floor - 1.0, 1.6 * floor
+        start = 0.0 if floor == 1 else left - 0.6
+        spring(axes, start, left, 0.2)
+        axes.annotate(f"$k_{{{floor}}}$", ((start + left) / 2, 0.36), ha="center", fontsize=9)
+        axes.fill_between(
+            [left, right], [-0.3] * 2, [0.6] * 2, facecolor="#dbe9f4", edgecolor=INK, lw=1
+        )
+        axes.annotate(f"$m_{{{floor}}}$", ((left + right) / 2, 0.15), ha="center", va="center")
+        axes.annotate(
+            "",
+            (right + 0.12, 0.85),
+            (left + 0.4, 0.85),
+            arrowprops={"arrowstyle": "-|>", "color": ORANGE},
+        )
+        axes.annotate(
+            f"$q_{{{floor}}}$", (left + 0.25, 0.85), ha="center", va="center", color=ORANGE
+        )
+        if placement == "ground":
+            damper(axes, ((left + right) / 2, -0.3), ((left + right) / 2, -0.9))
+            axes.annotate(
+                f"$d_{{{floor}}}$", ((left + right) / 2 + 0.16, -0.6), va="center", fontsize=9
+            )
+        elif placement == "storey":
+            damper(axes, (start, -0.1), (left, -0.1))
+            axes.annotate(
+                f"$d_{{{floor}}}$", ((start + left) / 2, -0.3), ha="center", va="top", fontsize=9
+            )
+    if placement == "ground":
+        axes.plot([-0.12, 1.6 * floors + 0.2], [-0.9, -0.9], color=INK, lw=1)
+        axes.fill_between(
+            [-0.12, 1.6 * floors + 0.2],
+            [-1.02] * 2,
+            [-0.9] * 2,
+            hatch="////",
+            facecolor="white",
+            edgecolor=GREY,
+            lw=0,
+        )
+    if words := "; ".join(spread_damping(case)):
+        axes.annotate(
+            f"damping besides: {words}" if damped else f"damping: {words}",
+            (0.1, foot),
+            va="top",
+            fontsize=9,
+        )
+    axes.set_xlim(-0.2, 1.6 * floors + 0.3)
+    axes.set_ylim(-1.1 if placement == "ground" else -0.7, 1.05)
+    axes.set_aspect("equal")
+    axes.axis("off")
+    return drawn
+
+
+def spring(axes: Axes, left: float, right: float, height: float) -> None:
+    """A zigzag between two points at one height."""
+    inner = np.linspace(left + 0.15 * (right - left), right - 0.15 * (right - left), 10)
+    zigzag = height + 0.1 * np.array([0, 1, -1, 1, -1, 1, -1, 1, -1, 0])
+    axes.plot([left, *inner, right], [height, *zigzag, height], color=BLUE, lw=1.2)
+
+
+def damper(axes: Axes, start: tuple[float, float], end: tuple[float, float]) -> None:
+    """A dashpot between two points, along the axes."""
+    a, b = np.array(start), np.array(end)
+    along, across = (b - a), 0.09 * np.array([a[1] - b[1], b[0] - a[0]]) / np.hypot(*(b - a))
+    cup, piston = a + 0.4 * along, a + 0.55 * along
+    rim = a + 0.68 * along
+    for points in (
+        [a, cup],
+        [rim + across, cup + across, cup - across, rim - across],
+        [piston + 0.8 * across, piston - 0.8 * across],
+        [piston, b],
+    ):
+        axes.plot(*np.array(points).T, color=INK, lw=1)

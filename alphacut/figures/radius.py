@@ -1,0 +1,124 @@
+"""The random radius: its law before tessellation (Fig. 11), the p-box of the map (Fig. 13), the
+cone over θ (Fig. 14).
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from alphacut.case.case import Case
+from alphacut.case.checks_material import SLOPES
+from alphacut.figures.style import BLUE, GREY, INK, PURPLE, figure
+from alphacut.stochastic import HermiteMap, TruncatedNormal
+from alphacut.stochastic.theta.truncated_normal import Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SIGMA = np.log(10) / 6  # eq. 11: the radius varies by a factor of ten over θ in [-3, 3]
+
+
+def law(case: Case) -> TruncatedNormal:
+    """Law of θ."""
+    lower, upper = case.numbers("radius.theta")
+    return TruncatedNormal(lower, upper)
+
+
+def maps(case: Case, alpha: float) -> list[HermiteMap]:
+    """The radius maps at the corners of an α-cut."""
+    corners = itertools.product(
+        *(sorted(set(case.fuzzy(f"radius.{name}").cut(alpha))) for name in SLOPES)
+    )
+    return [HermiteMap(a1, a2, a3, a4, law(case)) for a1, a2, a3, a4 in corners]
+
+
+def modal_map(case: Case) -> HermiteMap:
+    """The radius map at the modal values."""
+    a1, a2, a3, a4 = (case.fuzzy(f"radius.{name}").modal for name in SLOPES)
+    return HermiteMap(a1, a2, a3, a4, law(case))
+
+
+def radii(case: Case) -> Figure:
+    """Fig. 11: distribution of the paper's log-normal particle radii, σ_r = (ln 10)/6, median 1."""
+    drawn, axes = figure()
+    theta = np.linspace(law(case).lower, law(case).upper, 400)
+    axes.plot(np.exp(SIGMA * theta), law(case).cdf(theta), color=BLUE, lw=1.8)  # eq. 11
+    axes.set_xlabel("radius r over its median")
+    axes.set_ylabel("cumulative distribution")
+    axes.set_ylim(0, 1.02)
+    axes.set_title(
+        f"Log-normal particle radii, σ$_r$ = (ln 10)/6 = {SIGMA:.4f}, truncated",
+        loc="left",
+        fontsize=10,
+    )
+    return drawn
+
+
+def distribution(radius: HermiteMap, at: Array) -> Array:
+    """P(r ≤ at) under the law of θ, for maps that rise with θ."""
+    theta = np.linspace(radius.distribution.lower, radius.distribution.upper, 2001)
+    return radius.distribution.cdf(np.interp(at, np.maximum.accumulate(radius(theta)), theta))
+
+
+def p_box(case: Case) -> Figure:
+    """Fig. 13: lower and upper distribution of r_n over the supports of the fuzzy slopes, and the
+    modal one.
+    """
+    drawn, axes = figure()
+    corners = maps(case, 0.0)
+    low, high = (
+        min(radius.extremes()[0] for radius in corners),
+        max(radius.extremes()[1] for radius in corners),
+    )
+    at = np.linspace(low, high, 600)
+    family = np.array([distribution(radius, at) for radius in corners])
+    axes.fill_between(
+        at, family.min(0), family.max(0), color=PURPLE, alpha=0.15, lw=0, label="p-box, α = 0"
+    )
+    axes.plot(at, family.min(0), color=INK, lw=1)
+    axes.plot(at, family.max(0), color=INK, lw=1)
+    axes.plot(at, distribution(modal_map(case), at), color=PURPLE, lw=1.8, label="modal map")
+    axes.set_xlabel("reduced radius r$_n$ = r/a")
+    axes.set_ylabel("cumulative distribution")
+    axes.set_ylim(0, 1.02)
+    axes.legend(loc="lower right")
+    return drawn
+
+
+def cone(case: Case) -> Figure:
+    """Fig. 14: the particle in the physical-stochastic domain: every slice at one θ is a cell with
+    the radius r(θ).
+    """
+    import matplotlib.pyplot as plt
+
+    drawn = plt.figure(figsize=(5.0, 5.4))
+    axes: Any = drawn.add_subplot(projection="3d")
+    radius = modal_map(case)
+    theta, angle = np.linspace(law(case).lower, law(case).upper, 80), np.linspace(0, 2 * np.pi, 80)
+    r = radius(theta)[:, None]
+    axes.plot_surface(
+        r * np.cos(angle),
+        r * np.sin(angle),
+        np.broadcast_to(theta[:, None], (80, 80)),
+        color=PURPLE,
+        alpha=0.65,
+        lw=0,
+    )
+    for level in np.linspace(theta[0], theta[-1], 5):
+        axes.plot([-1, 1, 1, -1, -1], [-1, -1, 1, 1, -1], level, color=GREY, lw=0.8)
+        axes.plot(
+            radius(level) * np.cos(angle), radius(level) * np.sin(angle), level, color=INK, lw=0.8
+        )
+    for x, y in itertools.product((-1, 1), (-1, 1)):
+        axes.plot([x, x], [y, y], [theta[0], theta[-1]], color=GREY, lw=0.8)
+    axes.set_xlabel("x$_1$/a")
+    axes.set_ylabel("x$_2$/a")
+    axes.set_zlabel("θ")
+    axes.set_xticks([-1, 0, 1])
+    axes.set_yticks([-1, 0, 1])
+    axes.set_box_aspect((1, 1, 1.3), zoom=0.88)
+    axes.view_init(elev=18, azim=-55)
+    return drawn

@@ -1,0 +1,118 @@
+"""Share of each input in the width of the vibration over time: Figs. 34 and 35 as numbers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from alphacut.figures.captions import in_words
+from alphacut.figures.envelope import WORDS
+from alphacut.figures.style import BLUE, GREY, ORANGE, PURPLE, figure, prefix_axis
+from alphacut.stochastic.theta.truncated_normal import Array
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLOURS = (BLUE, ORANGE, PURPLE, GREY)
+STYLES = ("-", "--", ":", "-.")
+MOST = 4  # outputs in one figure
+WINDOW = 1 / 40  # of the duration: the means wander less than the vibration
+
+
+def over_time(found: xarray.Dataset) -> Figure:
+    """Width lost when an input is fixed, over the width, for each output; below it the width
+    itself, grey.
+    """
+    import matplotlib.pyplot as plt
+
+    outputs = [str(name) for name in found["output"].values][-MOST:]
+    drawn, grid = plt.subplots(
+        len(outputs),
+        1,
+        figsize=(7.2, 1.0 + 1.9 * len(outputs)),
+        sharex=True,
+        squeeze=False,
+        layout="constrained",
+    )
+    for axes, output in zip(grid[:, 0], outputs, strict=True):
+        panel(axes, found.sel(output=output), output)
+    span = float(found["time"].values[-1] - found["time"].values[0])
+    title = (
+        f"shares (lines) of the width (grey) at the lowest α; means over {WINDOW * span:.2g} s,"
+        " weighted with the width"
+    )
+    grid[0, 0].set_title(title, loc="left", fontsize=10)
+    grid[-1, 0].set_xlabel("time t, s")
+    names = grid[0, 0].get_legend_handles_labels()
+    drawn.legend(*names, fontsize=8, loc="outside lower center", ncols=min(4, len(names[0])))
+    return drawn
+
+
+def panel(axes: Axes, found: xarray.Dataset, output: str) -> None:
+    """The shares in one output's width."""
+    from alphacut.frame.envelope import output_unit
+
+    time, width = found["time"].values, found["width"].values
+    behind = axes.twinx()
+    behind.fill_between(time, 0, width, color="#d9d9d9", lw=0)
+    behind.set_ylim(bottom=0)
+    behind.grid(False)
+    prefix_axis(behind, f"width of {output}", output_unit(output))
+    axes.set_zorder(behind.get_zorder() + 1)
+    axes.patch.set_visible(False)
+    for index, name in enumerate(found["input"].values):
+        colour, dashes = (
+            COLOURS[index % len(COLOURS)],
+            STYLES[(index // len(COLOURS)) % len(STYLES)],
+        )
+        share = weighted(found["share"].sel(input=name).values, width)
+        axes.plot(
+            time,
+            share,
+            color=colour,
+            ls=dashes,
+            lw=1.3,
+            label=WORDS.get(str(name)) or in_words(str(name)),
+        )
+    axes.set_xlim(time[0], time[-1])
+    axes.set_ylim(0, 1)
+    axes.set_ylabel("share")
+
+
+def weighted(share: Array, width: Array) -> Array:
+    """Moving means of the share over a window around each time, weighted with the width; NaN where
+    there is no width at all.
+    """
+    half = max(1, round(WINDOW * len(width) / 2))
+    above, below = (
+        np.convolve(values, np.ones(2 * half + 1))[half:-half]
+        for values in (np.nan_to_num(share) * width, width)
+    )
+    means: Array = np.divide(above, below, out=np.full(len(width), np.nan), where=below > 0)
+    return means
+
+
+def of_modulus(found: xarray.Dataset) -> Figure:
+    """Width of E lost when an input of the cell is fixed, over the width, by level."""
+    drawn, axes = figure(6.4, 3.2)
+    names = [str(name) for name in found["cell_input"].values]
+    levels = [level for level in found["alpha"].values if level < 1]
+    thickness = 0.8 / len(names)
+    for index, name in enumerate(names):
+        share = [
+            float(found["modulus_share"].sel(cell_input=name, alpha=level)) for level in levels
+        ]
+        places = [
+            place + (index - (len(names) - 1) / 2) * thickness for place in range(len(levels))
+        ]
+        axes.bar(
+            places, share, thickness, color=COLOURS[index % len(COLOURS)], label=in_words(name)
+        )
+    axes.set_xticks(range(len(levels)), [f"α = {level:g}" for level in levels])
+    axes.set_ylabel("share of the width of E")
+    axes.set_ylim(0, 1)
+    axes.legend(fontsize=8)
+    return drawn

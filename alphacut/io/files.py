@@ -1,0 +1,108 @@
+"""What goes out: one JSON object on standard output and nothing else, files that are never half
+written, one rank that speaks.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, redirect_stdout
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+
+RANKS = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "MPI_LOCALRANKID")
+SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS")
+
+
+def rank() -> int:
+    """This process's MPI rank as mpirun tells it, without starting MPI; 0 where there is none."""
+    return next((int(os.environ[name]) for name in RANKS if name in os.environ), 0)
+
+
+def ranks() -> int:
+    """The number of MPI ranks as mpirun tells it; 1 where there is none."""
+    return next((int(os.environ[name]) for name in SIZES if name in os.environ), 1)
+
+
+@contextmanager
+def whole_file(path: Path | str) -> Iterator[Path]:
+    """A temporary name beside `path`, with the same ending, renamed to it once the block is
+    through.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
+    try:
+        yield partial
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def write_text(path: Path | str, text: str) -> None:
+    """Write a text file, whole or not at all."""
+    with whole_file(path) as partial:
+        partial.write_text(text, encoding="utf-8")
+
+
+def plain(value: Any) -> Any:
+    """A value that JSON can hold; what is not finite becomes null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(entry) for key, entry in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, list | tuple):
+        return [plain(entry) for entry in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if isinstance(value, str | int | bool | None) else str(value)
+
+
+def as_json(document: Mapping[str, Any], *, indent: int | None = None) -> str:
+    """One JSON object, ending in a line feed; arrays of plain numbers stay on one line when
+    indented.
+    """
+    return json.dumps(plain(document), indent=indent, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+@contextmanager
+def standard_output(json_to_stdout: bool) -> Iterator[TextIO]:
+    """The stream that answers go to.
+
+    With ``--json -`` everything that libraries print, C ones too, goes to standard error, so that
+    the one JSON object stands alone; on every MPI rank but the first, nothing is printed at all.
+    """
+    if rank() == 0 and not json_to_stdout:
+        yield sys.stdout
+        return
+    sys.stdout.flush()
+    kept = os.dup(1)
+    target = os.open(os.devnull, os.O_WRONLY) if rank() else 2
+    os.dup2(target, 1)
+    stream = os.fdopen(
+        kept if rank() == 0 else os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"
+    )
+    try:
+        with redirect_stdout(sys.stderr if rank() == 0 else stream):
+            yield stream
+    finally:
+        stream.flush()
+        sys.stdout.flush()
+        os.dup2(kept, 1)
+        if rank():
+            os.close(kept)
+            os.close(target)
+        stream.close()
+
+
+def say(message: str) -> None:
+    """One line to people, on standard error; the first rank alone speaks."""
+    if rank() == 0:
+        print(f"alphacut: {message}", file=sys.stderr, flush=True)

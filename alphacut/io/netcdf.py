@@ -1,0 +1,139 @@
+"""Reading stored results: every file tells the version of its format, and one that is too new is
+refused with what to do about it.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from alphacut.io.output_paths import hint
+from alphacut.io.problem import BadInput, Problem
+from alphacut.io.provenance import FORMAT, own_version
+
+NEEDED = ("case", "title", "case_text", "command", "versions", "seconds")  # of summary.json
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def require_known(version: object, path: Path, *, key: str, maker: str = "") -> None:
+    """Refuse a format that this program does not know; files of every older version are read, as
+    are those that tell none.
+
+    Args:
+        version: What the file says.
+        path: The file.
+        key: Key or option that names it, for the message.
+        maker: Program that wrote it.
+
+    Raises:
+        BadInput: The format is newer than this program, or no version at all.
+    """
+    if version is None:
+        return
+    whole = int(str(version)) if str(version).isdecimal() else 0
+    if whole < 1:
+        raise BadInput(
+            Problem(
+                key,
+                f"{path} tells no version of its format: {version}",
+                allowed="format_version 1 or more",
+            )
+        )
+    if whole > FORMAT:
+        made = f", written by {maker}" if maker else ""
+        cure = (
+            f"install that version, or make the file anew with this one, {own_version()}, by"
+            " alphacut run --fresh"
+        )
+        raise BadInput(
+            Problem(
+                key,
+                f"{path} has format {whole}{made}; this program reads formats up to {FORMAT}",
+                allowed=cure,
+            )
+        )
+
+
+def read_dataset(path: Path | str, *, key: str = "file") -> xarray.Dataset:
+    """A NetCDF file of this program, whole in memory.
+
+    Raises:
+        BadInput: There is no such file, it is no NetCDF file, or its format is newer.
+    """
+    import xarray
+
+    path = Path(path)
+    if not path.is_file():
+        raise BadInput(Problem(key, "there is no such file", str(path), hint(path)))
+    try:
+        found = xarray.load_dataset(path)
+    except (OSError, ValueError) as error:
+        what = "this is no NetCDF file, or a damaged one"
+        raise BadInput(
+            Problem(key, what, str(path), "a file of this program, such as modulus.nc of a run")
+        ) from error
+    version = found.attrs.get("format_version")
+    require_known(
+        None if version is None else str(version),
+        path,
+        key=key,
+        maker=str(found.attrs.get("created_by", "")),
+    )
+    return upgraded(found)
+
+
+def upgraded(found: xarray.Dataset) -> xarray.Dataset:
+    """A dataset of format 1 as one of format 2: there the proved bounds of a certified envelope
+    stood beside the attained ones.
+    """
+    if "outer_lower" not in found:
+        return found
+    turned = found.rename({"lower": "inner_lower", "upper": "inner_upper"})
+    return turned.rename({"outer_lower": "lower", "outer_upper": "upper"})
+
+
+def damaged(path: Path, why: str) -> BadInput:
+    """The error for a summary that cannot be used."""
+    return BadInput(
+        Problem(
+            str(path),
+            f"this file is damaged: {why}",
+            allowed="make it anew with alphacut run, which keeps what is computed",
+        )
+    )
+
+
+def read_summary(folder: Path) -> dict[str, Any]:
+    """summary.json of a folder that a run has written.
+
+    Raises:
+        BadInput: There is none, it is no JSON, or its format is newer.
+    """
+    path = folder / "summary.json"
+    allowed = "a folder that alphacut run has written"
+    if not path.is_file():
+        raise BadInput(
+            Problem(
+                str(folder), "there are no results here: summary.json is missing", allowed=allowed
+            )
+        )
+    try:
+        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise damaged(path, str(error)) from None
+    if not isinstance(found, dict):
+        raise damaged(path, "it holds no object")
+    told = found.get("versions")
+    version = told.get("alphacut") if isinstance(told, dict) else None
+    require_known(
+        found.get("format_version"),
+        path,
+        key=str(folder),
+        maker=f"alphacut {version}" if version else "",
+    )
+    if missing := [name for name in NEEDED if name not in found]:
+        raise damaged(path, f"it holds no {missing[0]}")
+    return found

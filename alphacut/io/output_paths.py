@@ -1,0 +1,101 @@
+"""Where results are to go, looked at before anything is computed: a place that can be written, with
+an ending that is known.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from alphacut.io.problem import BadInput, Problem
+
+INSIDE = (
+    "inside ./enter only the project, the current folder, home and the temporary folder are visible"
+)
+ENDINGS = {"FILE.nc": (".nc",), "FILE.html": (".html", ".htm")}
+OUTPUTS = ("out", "json", "export", "store")
+
+
+def check_destinations(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    """Refuse what a command could not write.
+
+    Raises:
+        BadInput: One problem for each option that names such a place.
+    """
+    problems: list[Problem] = []
+    for action in parser._actions:
+        given = getattr(options, action.dest, None)
+        if action.dest in OUTPUTS and given == "":
+            problems.append(
+                Problem(
+                    action.option_strings[-1],
+                    "the name is empty",
+                    allowed=f"a {str(action.metavar).lower()}",
+                )
+            )
+        elif action.dest in OUTPUTS and isinstance(given, str) and given != "-":
+            option, kind = action.option_strings[-1], str(action.metavar)
+            place = list(unwritable(option, Path(given), folder=kind == "FOLDER"))
+            problems += place or unknown_ending(option, kind, given)
+    if problems:
+        raise BadInput(problems)
+
+
+def unknown_ending(option: str, kind: str, given: str) -> Iterator[Problem]:
+    """The problem of a file name whose ending names no format that this option writes."""
+    ending = Path(given).suffix.lower()
+    if option == "--json" and ending not in ("", ".json"):
+        yield Problem(
+            option, "this ending is not that of JSON", given, ".json, or - for standard output"
+        )
+    elif option == "--out" and kind in ENDINGS and ending not in ENDINGS[kind]:
+        yield Problem(option, "this ending is not known", given, " or ".join(ENDINGS[kind]))
+
+
+def unwritable(option: str, path: Path, *, folder: bool) -> Iterator[Problem]:
+    """The problem of a place that cannot be written: the wrong kind, or a folder that is read-only
+    or cannot be made.
+    """
+    if path.is_dir() and not folder:
+        yield Problem(
+            option,
+            "this is a folder, and a file is wanted",
+            str(path),
+            "a file's name, for example " + str(path / "result"),
+        )
+        return
+    if folder and path.exists() and not path.is_dir():
+        yield Problem(
+            option, "this is a file, and a folder is wanted", str(path), "a new or existing folder"
+        )
+        return
+    there = path if folder else path.parent
+    while not there.exists() and there != there.parent:
+        there = there.parent
+    try:
+        if str(there) != "/dev":
+            tempfile.TemporaryFile(dir=there).close()
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        yield Problem(
+            option,
+            f"nothing can be written in {there}: {reason}",
+            str(path),
+            hint(path) or "a folder that you may write to",
+        )
+
+
+def hint(path: Path) -> str:
+    """What the environment shows, for a path outside of it; empty where that cannot be why."""
+    if not os.environ.get("ALPHACUT_INSIDE"):
+        return ""
+    shown = [
+        Path(__file__).resolve().parents[2],
+        Path.cwd(),
+        Path.home(),
+        Path(tempfile.gettempdir()),
+    ]
+    return "" if any(path.absolute().is_relative_to(folder) for folder in shown) else INSIDE

@@ -1,0 +1,127 @@
+"""Where a result comes from: versions, command, case; and the fingerprint by which it is known
+again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import shlex
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, is_dataclass
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+# 2: the bounds of a certified envelope are the proved ones; of the NetCDF files and of summary.json
+FORMAT = 2
+PACKAGES = {
+    "dolfinx": "fenics-dolfinx",
+    "basix": "fenics-basix",
+    "petsc4py": "petsc4py",
+    "mpi4py": "mpi4py",
+    "gmsh": "gmsh",
+    "numpy": "numpy",
+    "scipy": "scipy",
+    "xarray": "xarray",
+}
+
+NESTED = ("stochastic", "rve", "fuzzy", "frame")  # packages in folders of their own
+
+
+@cache
+def own_version() -> str:
+    """Version of alphacut: from its installation, else from pyproject.toml beside it."""
+    try:
+        return version("alphacut")
+    except PackageNotFoundError:
+        import tomllib
+
+        project = Path(__file__).resolve().parents[2] / "pyproject.toml"
+        return str(tomllib.loads(project.read_text(encoding="utf-8"))["project"]["version"])
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Versions of alphacut, Python and of the packages that are installed."""
+    found = {"alphacut": own_version(), "python": platform.python_version()}
+    for name, distribution in PACKAGES.items():
+        try:
+            found[name] = version(distribution)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def sources(package: str) -> list[tuple[str, Path]]:
+    """Python files of one of this project's packages with their names relative to it, sorted."""
+    root = Path(__file__).resolve().parents[1]
+    folder = root if package == "alphacut" else (root / package).resolve()
+    files = ((file.relative_to(folder).as_posix(), file) for file in folder.rglob("*.py"))
+    other = () if package != "alphacut" else NESTED
+    return sorted(pair for pair in files if pair[0].partition("/")[0] not in other)
+
+
+@cache
+def source_digest(packages: tuple[str, ...]) -> str:
+    """Digest of the source of some of this project's packages: a changed program does not trust
+    what an older one stored.
+    """
+    digest = hashlib.sha256()
+    for package in packages:
+        for name, file in sources(package):
+            digest.update(name.encode() + file.read_bytes())
+    return digest.hexdigest()
+
+
+def fingerprint(inputs: Mapping[str, Any], packages: Sequence[str]) -> str:
+    """Digest of everything that a result depends on: its inputs, the program's source, the versions
+    of the libraries.
+    """
+    content = {
+        "inputs": inputs,
+        "source": source_digest(tuple(packages)),
+        "versions": versions(),
+        "format": FORMAT,
+    }
+    return hashlib.sha256(
+        json.dumps(content, sort_keys=True, default=_canonical).encode()
+    ).hexdigest()
+
+
+def _canonical(value: object) -> object:
+    if is_dataclass(value) and not isinstance(value, type):
+        return [type(value).__name__, asdict(value)]
+    return str(value)
+
+
+def door() -> str:
+    """How this program is called here: ``./enter python -m alphacut`` inside the environment, else
+    ``alphacut``.
+    """
+    return "./enter python -m alphacut" if os.environ.get("ALPHACUT_INSIDE") else "alphacut"
+
+
+def command() -> str:
+    """The command line of this process as it would be typed: ``python -m alphacut run …``, without
+    the place of the program.
+    """
+    program = Path(sys.argv[0])
+    name = f"python -m {program.parent.name}" if program.name == "__main__.py" else program.name
+    return f"{name} {shlex.join(sys.argv[1:])}".strip()
+
+
+def attributes(case_text: str, key: str) -> dict[str, str | int]:
+    """Attributes that every NetCDF file carries."""
+    return {
+        "format_version": FORMAT,
+        "created_by": f"alphacut {own_version()}",
+        "command": command(),
+        "versions": json.dumps(versions()),
+        "case": case_text,
+        "fingerprint": key,
+    }

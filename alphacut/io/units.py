@@ -1,0 +1,154 @@
+"""Units at the border: what the user writes becomes SI, exactly, by way of decimals."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from decimal import Decimal
+from functools import cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pint
+
+QUANTITIES = {  # SI unit: (name of the quantity, a value as a user would write it)
+    "": ("number without a unit", "0.3"),
+    "Pa": ("stress or modulus", "80 GPa"),
+    "m": ("length", "2.5 m"),
+    "m^2": ("area", "0.01 m^2"),
+    "m^4": ("second moment of area", "1e-6 m^4"),
+    "kg": ("mass", "20 t"),
+    "kg/m": ("mass per length", "12 t/m"),
+    "kg/m^3": ("density", "2500 kg/m^3"),
+    "s": ("time", "30 s"),
+    "m/s": ("velocity", "-0.5 m/s"),
+    "m/s^2": ("acceleration", "9.81 m/s^2"),
+    "N*s/m": ("damping coefficient", "50 N s/m"),
+    "N*m*s": ("rotational damping coefficient", "0.1 N m s"),
+    "N/m": ("stiffness", "30 kN/m"),
+    "N": ("force", "0.02 N"),
+    "1/s": ("rate", "0.05 1/s"),
+    "rad": ("angle", "1.5 rad"),
+    "rad/s": ("angular velocity", "0.1 rad/s"),
+}
+
+ACCEPTED = {  # units that the page on the case format lists; any other of the same dimension that pint knows is taken too
+    "Pa": ("Pa", "kPa", "MPa", "GPa", "N/mm^2", "N/m^2", "kN/cm^2", "psi", "ksi"),
+    "m": ("m", "mm", "cm", "um", "km", "inch", "ft"),
+    "m^2": ("m^2", "cm^2", "mm^2"),
+    "m^4": ("m^4", "cm^4", "mm^4"),
+    "kg": ("kg", "t", "g"),
+    "kg/m": ("kg/m", "t/m"),
+    "kg/m^3": ("kg/m^3", "t/m^3", "g/cm^3"),
+    "s": ("s", "ms", "min"),
+    "m/s": ("m/s", "mm/s", "cm/s", "km/h"),
+    "m/s^2": ("m/s^2", "cm/s^2", "mm/s^2", "g_0"),
+    "N*s/m": ("N s/m", "kN s/m", "kg/s"),
+    "N*m*s": ("N m s", "kN m s"),
+    "N/m": ("N/m", "kN/m", "N/mm"),
+    "N": ("N", "kN", "MN"),
+    "1/s": ("1/s", "Hz"),
+    "rad": ("rad", "mrad", "deg"),
+    "rad/s": ("rad/s", "deg/s"),
+}
+
+
+MEANT = {
+    ("m/s^2", "g"): "g_0",
+    ("s", "m"): "min",
+    ("kg", "T"): "t",
+    ("Pa", "g"): "GPa",
+}  # units that are others than were meant
+
+
+@cache
+def registry() -> pint.UnitRegistry:
+    """The one unit registry; decimals, so that 250 cm and 2.5 m become the same float."""
+    import pint
+
+    return pint.UnitRegistry(non_int_type=Decimal)
+
+
+@cache
+def factor(unit: str, si: str) -> Decimal:
+    """How many `si` one `unit` is.
+
+    Raises:
+        ValueError: The unit is unknown, or measures something else.
+    """
+    import pint
+
+    if not si:
+        if unit in ("", "1"):
+            return Decimal(1)
+        if unit == "%":
+            return Decimal("0.01")
+        raise ValueError(f'the unit "{unit}" is wrong')
+    if not unit:
+        raise ValueError("the unit is missing")
+    if re.search(r"\btons?\b", unit):
+        raise ValueError(f'the unit "{unit}" means several things; write t for 1000 kg, or lb')
+    try:
+        one = registry().Quantity(
+            Decimal(1), registry().parse_units(re.sub(r"([A-Za-z])([234])(?!\w)", r"\1^\2", unit))
+        )
+        return Decimal(one.to(si).magnitude)
+    except (pint.UndefinedUnitError, pint.DimensionalityError):
+        close = next(
+            (name for name in ACCEPTED.get(si, ()) if name.lower() == unit.lower()),
+            MEANT.get((si, unit), ""),
+        )
+        raise ValueError(
+            f'the unit "{unit}" is wrong' + (f"; did you mean {close}?" if close else "")
+        ) from None
+    except (
+        Exception
+    ):  # pint's tokeniser raises whatever Python's does on text that is not a unit at all
+        raise ValueError(f'the unit "{unit}" cannot be read') from None
+
+
+PREFIXES = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
+MINUS = "\u2212"
+PREFIXED = ("m", "m/s", "m/s^2", "N", "Pa", "s", "rad", "W", "J")
+
+
+def engineering(value: float, si: str, *, digits: int = 4, beside: float = 0.0) -> str:
+    """A value in `si` for people: ``−3.590 MN``; with the prefix of `beside` where that is larger,
+    so that a column has one unit.
+
+    A unit that takes no prefix stands as it is.
+    """
+    if si not in PREFIXED or not math.isfinite(value) or not (value or beside):
+        return f"{value:.{digits}g} {si}".strip().replace("-", MINUS)
+    largest = float(f"{max(abs(value), abs(beside)):.{digits}g}")
+    exponent = min(9, max(-9, 3 * math.floor(math.log10(largest) / 3)))
+    scaled = float(f"{value:.{digits}g}") / 10.0**exponent
+    places = max(0, digits - 1 - math.floor(math.log10(abs(scaled)))) if scaled else 0
+    number = f"{scaled:.{places}f}" if places < digits + 3 else f"{scaled:.{digits}g}"
+    return f"{number} {PREFIXES[exponent]}{si}".replace("-", MINUS)
+
+
+def largest_by_unit(values: Iterable[tuple[float, str]]) -> dict[str, float]:
+    """The largest magnitude among values of the same unit: what `engineering` takes as `beside` to
+    show them alike.
+    """
+    found: dict[str, float] = {}
+    for value, si in values:
+        found[si] = max(found.get(si, 0.0), abs(value))
+    return found
+
+
+def axis_prefix(largest: float, si: str) -> tuple[float, str]:
+    """Factor and unit for an axis whose values reach `largest`: with a prefix where plain numbers
+    would be long.
+    """
+    if si not in PREFIXED or not math.isfinite(largest) or largest <= 0 or 0.1 <= largest < 1000:
+        return 1.0, si
+    exponent = min(9, max(-9, 3 * math.floor(math.log10(largest) / 3)))
+    return 10.0**-exponent, f"{PREFIXES[exponent]}{si}"
+
+
+def shown(value: float, unit: str, si: str) -> float:
+    """A value in `si`, in `unit`, for people."""
+    return float(Decimal(repr(float(value))) / factor(unit, si))

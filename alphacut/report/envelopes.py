@@ -1,0 +1,133 @@
+"""The report's section on envelopes: the interactive plot, extremes, peaks."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from alphacut.io.units import engineering, largest_by_unit
+from alphacut.report.tables import section, table
+from alphacut.stages import exceedance as outcomes
+
+
+def envelopes(summary: Mapping[str, Any], exceedance: str = "") -> str:
+    """The interactive plot and the extremes; the picture of the exceedance where there is one."""
+    controls = (
+        '<div class="controls"><label>study <select id="study"></select></label><label>output'
+        ' <select id="output"></select></label><label>α <input type="range" id="alpha" min="0"'
+        ' max="1" step="0.01" value="0.5"><output id="alpha-shown">0.50</output></label><button'
+        ' type="button" id="reset">whole range</button></div>'
+    )
+    hint = (
+        '<p class="hint">The shaded bands are the computed α-cuts, the darker the higher α; the'
+        " orange line is the cut at the slider's α, between computed levels by linear"
+        " interpolation. Drag or turn the wheel to zoom, double click to see everything.</p>"
+    )
+    rows = extremes(summary["envelopes"])
+    svg = (
+        '<svg id="plot" role="img" aria-label="Envelopes over time"></svg><div id="readout"></div>'
+    )
+    lowest = f"{min(study['alpha'][0] for study in summary['envelopes'].values()):g}"
+    head = ("study", "output", f"least at α = {lowest}", f"greatest at α = {lowest}", "error up to")
+    return section(
+        "Envelopes",
+        controls,
+        svg,
+        hint,
+        table(head[: len(rows[0])], rows, numbers=2),
+        peaks(summary),
+        exceedance,
+    )
+
+
+def extremes(studies: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    """Least and greatest value of each output, all of one unit with one prefix; the error where any
+    study estimated it.
+    """
+    from alphacut.frame.envelope import output_unit
+
+    each = [
+        (name, study, output, output_unit(output))
+        for name, study in studies.items()
+        for output in study["min"]
+    ]
+    largest = largest_by_unit(
+        (study[side][output], unit) for _, study, output, unit in each for side in ("min", "max")
+    )
+    rows: list[tuple[str, ...]] = []
+    for name, study, output, unit in each:
+        ends = (
+            engineering(study[side][output], unit, beside=largest[unit]) for side in ("min", "max")
+        )
+        error = study.get("error", {}).get(output)
+        included = " (within the bounds)" if "gap" in study else ""
+        rows.append(
+            (
+                name,
+                output,
+                *ends,
+                "not estimated" if error is None else engineering(error, unit, digits=2) + included,
+            )
+        )
+    return (
+        rows
+        if any(study.get("error") for study in studies.values())
+        else [row[:-1] for row in rows]
+    )
+
+
+def natural(summary: Mapping[str, Any]) -> str:
+    """The first natural periods, where the structure is linear."""
+    omega = summary.get("structure", {}).get("omega_rad_per_s")
+    if not omega:
+        return ""
+    periods = ", ".join(f"{2 * math.pi / w:.3g}" for w in omega[:4])
+    return f"<p>First natural periods at the modal values: {periods} s.</p>"
+
+
+def peaks(summary: Mapping[str, Any]) -> str:
+    """Fuzzy peaks of every study, and the fuzzy probability of exceeding the case's limit."""
+    from alphacut.frame.envelope import output_unit
+
+    each = [
+        (name, output, output_unit(output), of)
+        for name, study in summary["envelopes"].items()
+        for output, of in study.get("peak", {}).items()
+    ]
+    largest = largest_by_unit((of["upper"][0], unit) for _, _, unit, of in each)
+    rows = [(name, output, *peak_row(of, unit, largest[unit])) for name, output, unit, of in each]
+    words = (
+        "<p>Fuzzy peak of each output's magnitude at the nodes; what may lie between them is said"
+        " under methods where it is known. On the lowest level no trajectory peaks below the first"
+        " value or above the last; the second is the least peak among some tried, so the least of"
+        " all lies between the first two.</p>"
+    )
+    limit = (
+        f"<p>P{html.escape(outcomes.sentence(summary['exceedance'])[1:].rstrip())}.</p>"
+        if "exceedance" in summary
+        else ""
+    )
+    head = ("study", "output", "not below", "least tried", "greatest", "highest α")
+    return "<h3>Peaks</h3>" + words + table(head, rows, numbers=2) + limit if rows else limit
+
+
+def peak_row(of: Mapping[str, Any], unit: str, largest: float) -> Iterator[str]:
+    """One peak: its bounds and the least one tried on the lowest level, and its interval on the
+    highest.
+    """
+    yield engineering(of["lower"][0], unit, beside=largest)
+    yield engineering(of["tried"][0], unit, beside=largest) if "tried" in of else "not tried"
+    yield engineering(of["upper"][0], unit, beside=largest)
+    yield between(of["tried" if "tried" in of else "lower"][-1], of["upper"][-1], unit, largest)
+
+
+def between(lower: float, upper: float, unit: str, largest: float) -> str:
+    """An interval, or the one value where both ends are shown alike; with the prefix of the largest
+    in the table.
+    """
+    ends = dict.fromkeys(
+        (engineering(lower, unit, beside=largest), engineering(upper, unit, beside=largest))
+    )
+    return " … ".join(ends)

@@ -1,0 +1,82 @@
+"""Figures in the report: vector drawings inside the page, each once."""
+
+from __future__ import annotations
+
+import base64
+import html
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from alphacut.figures.captions import caption
+from alphacut.report.tables import section
+
+ELSEWHERE = (
+    "fig18-modulus",
+    "modulus",
+    "response",
+    "exceedance",
+)  # figures that stand in the section they belong to
+WIDE = re.compile(
+    r"envelope-|chain|record|shares-over-time|graph-follower"
+)  # figures that need the page's whole width
+SVG_LIMIT = 200_000  # bytes; a heavier figure goes into the page as PNG
+
+
+def listed(summary: Mapping[str, Any], folder: Path, name: str) -> str:
+    """A figure by its name without the paper's number, if this run has drawn it; an older one in
+    the folder is passed over.
+    """
+    for file in summary.get("figures", []):
+        if re.fullmatch(rf"(fig\d+-)?{name}", Path(file).stem) and file.endswith(".svg"):
+            return picture(
+                folder / file, caption(Path(file).stem, paper=bool(summary.get("paper")))
+            )
+    return ""
+
+
+def gallery(summary: Mapping[str, Any], folder: Path) -> str:
+    """Every figure of the run that no other section shows."""
+    names = [
+        name
+        for name in summary.get("figures", [])
+        if name.endswith(".png") and Path(name).stem not in ELSEWHERE
+    ]
+    paper = bool(summary.get("paper"))
+    figures = []
+    for name in names:
+        drawn = picture((folder / name).with_suffix(".svg"), caption(Path(name).stem, paper=paper))
+        figures.append(
+            drawn.replace("<figure>", '<figure class="wide">', 1) if WIDE.search(name) else drawn
+        )
+    return (
+        section("Figures", '<div class="gallery">' + "\n".join(figures) + "</div>")
+        if figures
+        else ""
+    )
+
+
+def picture(svg: Path, caption: str) -> str:
+    """A figure: as SVG where that is light, else as PNG; empty where there is none."""
+    png = svg.with_suffix(".png")
+    if svg.is_file() and svg.stat().st_size < SVG_LIMIT:
+        text = re.sub(r"^.*?(?=<svg)", "", svg.read_text(encoding="utf-8"), flags=re.DOTALL)
+        content = unique_ids(
+            re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL), svg.stem + "-"
+        )
+    elif png.is_file():
+        content = (
+            f'<img alt="{html.escape(caption)}"'
+            f' src="data:image/png;base64,{base64.b64encode(png.read_bytes()).decode()}">'
+        )
+    else:
+        return ""
+    return f"<figure>{content}<figcaption>{html.escape(caption)}</figcaption></figure>"
+
+
+def unique_ids(svg: str, prefix: str) -> str:
+    """An SVG whose ids do not clash with another's on the same page."""
+    svg = re.sub(r'\bid="([^"]+)"', rf'id="{prefix}\1"', svg)
+    svg = re.sub(r"url\(#([^)]+)\)", rf"url(#{prefix}\1)", svg)
+    return re.sub(r'href="#([^"]+)"', rf'href="#{prefix}\1"', svg)

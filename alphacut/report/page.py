@@ -1,0 +1,106 @@
+"""The report of a run as one HTML page that needs nothing else: no network, no other file."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from string import Template
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from alphacut.case.quick import banner
+from alphacut.io.netcdf import damaged, read_dataset, read_summary
+from alphacut.report.sections import sections
+
+if TYPE_CHECKING:
+    import xarray
+
+HERE = Path(__file__).parent
+
+
+def report(folder: Path) -> str:
+    """The page for the results in a folder.
+
+    Raises:
+        BadInput: The folder holds no results of a run, or those of a newer program.
+    """
+    summary = read_summary(folder)
+    try:
+        return page(summary, folder)
+    except (KeyError, TypeError, AttributeError, IndexError) as error:
+        raise damaged(folder / "summary.json", f"{type(error).__name__} at {error}") from error
+
+
+def page(summary: Mapping[str, Any], folder: Path) -> str:
+    """The page for a summary."""
+    text = {
+        name: (HERE / f"report.{name}").read_text(encoding="utf-8")
+        for name in ("html", "css", "js")
+    }
+    return Template(text["html"]).substitute(
+        title=html.escape(summary["title"]),
+        name=html.escape(summary["case"]),
+        about=re.sub(
+            r"`([^`]+)`",
+            r"<code>\1</code>",
+            html.escape(" ".join(summary.get("about", "").split())),
+        ),
+        banner=(
+            f'<p class="banner">{html.escape(banner(summary["quick"]))}.</p>'
+            if "quick" in summary
+            else ""
+        ),
+        css=text["css"],
+        js=text["js"],
+        sections="\n".join(sections(summary, folder)),
+        envelopes=embedded(plots(summary, folder)),
+    )
+
+
+def embedded(document: object) -> str:
+    """JSON that may stand inside a script element."""
+    return json.dumps(document, ensure_ascii=False).replace("<", "\\u003c")
+
+
+def plots(summary: Mapping[str, Any], folder: Path) -> list[dict[str, Any]]:
+    """The data of the interactive plot: every study's bounds as 32-bit floats."""
+    found = []
+    for name, study in summary.get("envelopes", {}).items():
+        found.append(
+            plot(name, study, read_dataset(folder / f"envelope_{name}.nc", key=str(folder)))
+        )
+    return found
+
+
+def plot(name: str, study: Mapping[str, Any], dataset: xarray.Dataset) -> dict[str, Any]:
+    """One study: lower and upper bounds by level and output, in base64."""
+    from alphacut.frame.envelope import output_unit
+
+    time = dataset["time"].values
+    bounds = {
+        side: dataset[side].transpose("alpha", "output", "time").values
+        for side in ("lower", "upper")
+    }
+    return {
+        "name": name,
+        "title": f"{name}: fuzzy {', '.join(study['fuzzy'])}",
+        "fuzzy": len(dataset["parameter"]),
+        "alpha": dataset["alpha"].values.tolist(),
+        "outputs": [str(output) for output in dataset["output"].values],
+        "units": [output_unit(str(output)) for output in dataset["output"].values],
+        "step": float(time[1] - time[0]),
+        **{
+            side: [[packed(row) for row in level] for level in values]
+            for side, values in bounds.items()
+        },
+    }
+
+
+def packed(row: np.ndarray[Any, Any]) -> str:
+    """Numbers as little-endian 32-bit floats in base64."""
+    return base64.b64encode(np.ascontiguousarray(row, "<f4").tobytes()).decode()

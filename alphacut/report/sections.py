@@ -1,0 +1,311 @@
+"""The sections of the report, each a piece of HTML."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from alphacut.figures.captions import core, in_words
+from alphacut.io.units import engineering
+from alphacut.report.citation import citation
+from alphacut.report.differences import differences
+from alphacut.report.envelopes import envelopes, natural
+from alphacut.report.figures import gallery, listed
+from alphacut.report.tables import section, table
+from alphacut.stages import response
+
+NATURES = {
+    "inner": (
+        "Inner bounds are attained by the parameters stored with them, up to the error of the"
+        " model; a search may have missed more."
+    ),
+    "estimated": (
+        "Estimated bounds come from a model of the motion whose error was estimated, not proved."
+    ),
+    "verified by sampling": (
+        "Verified by sampling: the search is proved to leave nothing out, the error of its model is"
+        " sampled."
+    ),
+    "guaranteed": "Guaranteed bounds are proved to hold the true range.",
+}
+
+
+def sections(summary: Mapping[str, Any], folder: Path) -> Iterator[str]:
+    """All sections that the results allow, in reading order."""
+    if "microstructure" in summary:
+        yield microstructure(summary["microstructure"])
+    if "modulus" in summary:
+        yield modulus(summary["modulus"], listed(summary, folder, "modulus"))
+    if "given_modulus" in summary:
+        yield given(summary["given_modulus"])
+    if "response" in summary:
+        yield stress(summary["response"], listed(summary, folder, "response"))
+    if words := summary.get("structure", {}).get("words"):
+        yield built(words, natural(summary))
+    if summary.get("envelopes"):
+        yield envelopes(summary, listed(summary, folder, "exceedance"))
+    if summary.get("shares"):
+        yield shares(summary["shares"])
+    if summary.get("paper"):
+        yield comparison(summary["paper"])
+    yield methods(summary)
+    yield gallery(summary, folder)
+    yield case_text(summary)
+    yield differing(summary)
+    yield versions(summary)
+
+
+def microstructure(found: Mapping[str, Any]) -> str:
+    """Particles, cells, and the fuzzy radius map."""
+    low, high = found["limits"]
+    words = (
+        f"<p>{found['discs']} discs in {found['packings']} sections, area fraction"
+        f" {found['area_fraction']:.4f}{of_map(found)}. The limits {low:.4g} and {high:.4g} of r/a"
+        f" keep {found['share_kept']:.3%} of the area.</p>"
+    )
+    rows = [("a1", f"{found['a1']:.5g}")]
+    rows += [
+        (name, "[" + ", ".join(f"{end:.5g}" for end in found[name]) + "]") for name in ("a2", "a4")
+    ]
+    rows.insert(2, ("a3", f"{found['a3']:.5g}"))
+    return section(
+        "Microstructure", words, table(("parameter of the radius map", "fuzzy value"), rows)
+    )
+
+
+def of_map(found: Mapping[str, Any]) -> str:
+    """The area fraction that the modulus gets, where it is known."""
+    name = "mean_area_fraction_of_map"
+    return (
+        f"; {found[name]:.4f} by the fitted map at its modal values, which is what the modulus uses"
+        if name in found
+        else ""
+    )
+
+
+def modulus(found: Mapping[str, Any], drawn: str) -> str:
+    """The fuzzy modulus with its α-cuts, error budget and certificate."""
+    cuts = zip(found["alpha"], found["E_GPa"]["lower"], found["E_GPa"]["upper"], strict=True)
+    rows = [(f"{alpha:g}", f"{low:.4f}", f"{high:.4f}") for alpha, low, high in cuts]
+    words = (
+        f"<p>{'Core' if '[' in core(found) else 'Modal value'} <strong>{core(found)}</strong>,"
+        f" support [{found['lower_GPa']:.4f}, {found['upper_GPa']:.4f}] GPa; Poisson's ratio"
+        f" {found['nu']:.4f}. E is the modulus of eq. 16, the paper's convention: a square array is"
+        f" not isotropic. {found['samples']} samples, {found['solves']} linear systems,"
+        f" {found['seconds']:.1f} s. {html.escape(sentence(found.get('reason', '')))}"
+        f" {html.escape(isotropy(found))}</p>"
+    )
+    budget = [(in_words(name), f"{value:.2g}") for name, value in found.get("error", {}).items()]
+    checks = [(in_words(name), f"{value:.2g}") for name, value in found.get("checks", {}).items()]
+    return section(
+        "Fuzzy modulus",
+        words,
+        drawn,
+        table(("α", "lower E, GPa", "upper E, GPa"), rows),
+        (
+            "<h3>Error budget</h3>" + table(("source", "estimated relative error of E"), budget)
+            if budget
+            else ""
+        ),
+        (
+            "<h3>Certificate</h3>"
+            + table(("property", "measured violation, largest of all samples"), checks)
+            if checks
+            else ""
+        ),
+    )
+
+
+def given(found: Mapping[str, Any]) -> str:
+    """The modulus that the case gives instead of having it computed."""
+    cuts = zip(found["alpha"], found["E_GPa"]["lower"], found["E_GPa"]["upper"], strict=True)
+    rows = [(f"{alpha:g}", f"{low:.4f}", f"{high:.4f}") for alpha, low, high in cuts]
+    words = f"<p>Given by the case: <code>{html.escape(found['of'])}</code>.</p>"
+    return section("Fuzzy modulus", words, table(("α", "lower E, GPa", "upper E, GPa"), rows))
+
+
+def isotropy(found: Mapping[str, Any]) -> str:
+    """How far the array is from isotropic, in a sentence; empty where it was not computed."""
+    from alphacut.rve.anisotropy import shear_ratio_in_words
+
+    return (
+        sentence(shear_ratio_in_words(float(found["shear_ratio"])))
+        if found.get("shear_ratio") is not None
+        else ""
+    )
+
+
+def stress(found: Mapping[str, Any], drawn: str) -> str:
+    """The random and fuzzy stress of the cell."""
+    words = (
+        f"<p>Homogenised stress {found['quantity']}, random with θ at every fuzzy sample: intervals"
+        " of its mean, its quantiles and of the probability of exceeding a limit. Bounds are"
+        f" {found['nature']}; {html.escape(found['note'])}.</p>"
+    )
+    head = ("quantity", f"cut at α = {found['alpha'][0]:g}", f"cut at α = {found['alpha'][-1]:g}")
+    return section("Random and fuzzy stress", words, drawn, table(head, response.table(found)))
+
+
+def built(words: Mapping[str, Any], periods: str) -> str:
+    """The structure: what it is, its floors or inputs, its first periods."""
+    sentences = "".join(f"<p>{html.escape(text)}</p>" for text in words["sentences"])
+    return section("Structure", sentences, table(words["head"], words["rows"]), periods)
+
+
+def shares(found: Mapping[str, Any]) -> str:
+    """What drives the width."""
+    from alphacut.figures.envelope import WORDS
+
+    words = (
+        "<p>Share of the width at α = 0 that is lost when an input is fixed at its modal value and"
+        " all others are kept.</p>"
+    )
+    kinds = dict.fromkeys(
+        tuple(entry) for entry in found.values()
+    )  # quantities that depend on the same inputs share a table
+    tables = []
+    for inputs in kinds:
+        of = [name for name, entry in found.items() if tuple(entry) == inputs]
+        rows = [
+            (
+                WORDS.get(name) or in_words(name),
+                *(f"{found[quantity][name]:.1%}" for quantity in of),
+            )
+            for name in inputs
+        ]
+        tables.append(table(("input", *of), rows))
+    return section("What drives the width", words, *tables)
+
+
+def comparison(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Paper, here, difference."""
+    from alphacut.stages.summary import cells
+
+    return section(
+        "Paper and here",
+        table(
+            ("quantity", "place", "paper", "here", "difference", ""),
+            [cells(dict(row)) for row in rows],
+            numbers=2,
+        ),
+    )
+
+
+def methods(summary: Mapping[str, Any]) -> str:
+    """Which method was used for each stage and what it cost."""
+    rows: list[tuple[object, ...]] = []
+    if cell := summary.get("modulus"):
+        rows.append(
+            (
+                "fuzzy modulus",
+                f"{cell['method']}, plan {cell['plan']}",
+                cell["nature"],
+                f"{cell['samples']} samples",
+                f"{cell['seconds']:.1f}",
+            )
+        )
+    for name, study in summary.get("envelopes", {}).items():
+        rows.append(
+            (
+                f"envelope {name}",
+                study["method"],
+                study["nature"],
+                effort(study),
+                f"{study['seconds']:.1f}",
+            )
+        )
+    words = "".join(f"<p>{html.escape(text)}</p>" for text in (*explained(rows), *proofs(summary)))
+    return section(
+        "Methods and cost",
+        table(("stage", "method", "nature of the bounds", "cost", "seconds"), rows, numbers=3),
+        words,
+    )
+
+
+def explained(rows: Sequence[tuple[object, ...]]) -> Iterator[str]:
+    """What each nature of bounds in the table means."""
+    yield from (
+        NATURES[nature]
+        for nature in dict.fromkeys(str(row[2]) for row in rows)
+        if nature in NATURES
+    )
+
+
+def proofs(summary: Mapping[str, Any]) -> Iterator[str]:
+    """How narrowly each certified envelope is enclosed, and what that rests on."""
+    from alphacut.frame.envelope import output_unit
+
+    for name, study in summary.get("envelopes", {}).items():
+        if "gap" in study:
+            of = str(study.get("gap_output", next(iter(study.get("min", {"q": 0})))))
+            gap, between = (
+                engineering(float(study.get(key, 0.0)), output_unit(of), digits=2)
+                for key in ("gap", "between_nodes")
+            )
+            yield (
+                f"The bounds of envelope {name} are proved at every node, and no wider than {gap}"
+                f" of {of} beyond what is attained; between nodes the motion leaves a straight line"
+                f" by {between} at most. {sentence(study['proof'])}"
+            )
+
+
+def effort(study: Mapping[str, Any]) -> str:
+    """What an envelope cost: trajectories, or eigen-analyses where the modes stand for them."""
+    return (
+        f"{study['trajectories']}"
+        f" {'eigen-analyses' if study['method'] == 'modal' else 'trajectories'}"
+    )
+
+
+def sentence(text: str) -> str:
+    """Text as a sentence: a capital at its head, a full stop at its end."""
+    return f"{text[0].upper()}{text[1:].rstrip('.')}." if text else ""
+
+
+def case_text(summary: Mapping[str, Any]) -> str:
+    """The case file as it was, and what the command line changed."""
+    changes = "".join(
+        f"<li><code>{html.escape(change)}</code></li>" for change in summary.get("changes", ())
+    )
+    return section(
+        "The case",
+        f"<p>Changed on the command line:</p><ul>{changes}</ul>" if changes else "",
+        f"<details><summary>{html.escape(summary['case'])}.toml</summary><pre>{html.escape(summary['case_text'])}</pre></details>",
+    )
+
+
+def differing(summary: Mapping[str, Any]) -> str:
+    """What the program does otherwise than the paper, from the heads of the modules that the run
+    used.
+    """
+    found = tuple(differences(summary))
+    rows = "".join(
+        f"<li><strong>{html.escape(subject)}</strong>: {html.escape(text)}</li>"
+        for subject, text in found
+    )
+    listed = f"<ul>{rows}</ul>"
+    if not summary.get(
+        "paper"
+    ):  # for a case of one's own they are no news, but they are what the numbers rest on
+        listed = (
+            f"<details><summary>{len(found)} places where the methods differ from the paper they"
+            f" follow</summary>{listed}</details>"
+        )
+    return section("Differences from the paper", listed) if found else ""
+
+
+def versions(summary: Mapping[str, Any]) -> str:
+    """Versions, command, and how to cite."""
+    found = ", ".join(f"{name} {version}" for name, version in summary["versions"].items())
+    command = (
+        f"<p>Made by <code>{html.escape(summary['command'])}</code> in {summary['seconds']:.0f}"
+        " s.</p>"
+    )
+    return section(
+        "Versions and citation",
+        command,
+        f"<p>{html.escape(found)}</p>",
+        f"<pre>{html.escape(citation())}</pre>",
+    )

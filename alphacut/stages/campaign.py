@@ -1,0 +1,241 @@
+"""The campaign of a case: the cell as a function that any process can call, its fuzzy inputs, the
+plan of samples.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from alphacut.case.case import Case
+from alphacut.fuzzy import Extended, FuzzyNumber, General, Known, Plan, Reduced, Signed
+from alphacut.io.provenance import source_digest, versions
+from alphacut.stages.cell import INPUTS, SHARED, CellChoice, cell_choice, key_of, parts
+from alphacut.stochastic.theta.interpolation import between_nodes
+from alphacut.stochastic.theta.truncated_normal import Array
+
+if TYPE_CHECKING:
+    from alphacut.rve.result import Homogenised
+
+SOURCES = ("space", "theta", "table")  # of error, see rve.result.Homogenised
+JUDGED = ("prism", "auto")
+TABULATED = ("table", "auto")  # methods whose samples may share a table over the particle's moduli
+OF_CURVES = (
+    1e-9  # relative tolerance on E with which the curve between the nodes is good to 1e-4 or so
+)
+SHOWN = 61  # points of a stored stress curve
+
+
+def theta_shown(theta: tuple[float, ...]) -> Array:
+    """The θ at which stress curves are stored, shape (SHOWN,)."""
+    return np.linspace(theta[0], theta[1], SHOWN)
+
+
+@dataclass(frozen=True)
+class CellTask:
+    """One task of the campaign: samples that share everything but the inclusion's modulus. Runs in
+    any process.
+
+    Args:
+        choice: Model of the cell.
+        crisp: Inputs that are not fuzzy, by name, in SI.
+        theta: Support of θ.
+    """
+
+    choice: CellChoice
+    crisp: Mapping[str, float]
+    theta: tuple[float, ...]
+
+    def __call__(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float | Array]]:
+        """Outputs of each point: E, nu, mean stresses, stress curves, linear systems solved, errors
+        by source, certificate.
+        """
+        values = [{**self.crisp, **point} for point in points]
+        radius, matrix, _ = parts(values[0], self.theta)
+        inclusions = [parts(value, self.theta)[2] for value in values]
+        results = self.choice.model().solve(radius, matrix, inclusions)
+        outputs: list[dict[str, float | Array]] = []
+        for result in results:
+            s11, s12 = result.curve.mean
+            means = {
+                "E": result.modulus,
+                "nu": result.poisson,
+                "s11": s11,
+                "s12": s12,
+                "systems": len(result.iterations),
+            }
+            curves = {
+                name: self.resampled(result.curve.theta, stress)
+                for name, stress in (("curve11", result.curve.s11), ("curve12", result.curve.s12))
+            }
+            errors = {f"error:{source}": result.error.get(source, 0.0) for source in SOURCES}
+            outputs.append(
+                {
+                    **means,
+                    **curves,
+                    **errors,
+                    **{f"check:{name}": value for name, value in result.checks.items()},
+                }
+            )
+        return outputs
+
+    def judged(self, point: Mapping[str, float]) -> Homogenised | None:
+        """A sample once more with what the campaign leaves out to be quick: the prism's estimated
+        error, or auto's reason.
+        """
+        if self.choice.method not in JUDGED:
+            return None
+        radius, matrix, inclusion = parts({**self.crisp, **point}, self.theta)
+        return replace(self.choice, estimate=True).model().solve(radius, matrix, [inclusion])[0]
+
+    def resampled(self, nodes: Array, stress: Array) -> Array:
+        """A stress curve at `SHOWN` points over θ, for pictures: models choose their own nodes, and
+        not the same for every sample.
+        """
+        return between_nodes(nodes, stress, theta_shown(self.theta))
+
+
+def plan_of(case: Case) -> Plan:
+    """The plan that a case asks for."""
+    plans: dict[str, Plan] = {
+        "general": General(),
+        "reduced": Reduced(),
+        "extended": Extended(outputs=("E",)),
+        "signed": Signed(outputs=("E",)),
+    }
+    return plans[case.text("modulus.plan")]
+
+
+def fuzzy_inputs(case: Case) -> dict[str, FuzzyNumber]:
+    """The inputs of the cell that are fuzzy, by name, in SI."""
+    numbers = {name: case.fuzzy(key_of(name)) for name in INPUTS}
+    found = {name: number for name, number in numbers.items() if number.support.width > 0}
+    return found or {"inclusion_modulus": numbers["inclusion_modulus"]}
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What is to be run: the cell's task, its fuzzy inputs, the plan.
+
+    Args:
+        task: The function, for any process.
+        inputs: Fuzzy inputs by name, in SI.
+        plan: How their boxes are searched.
+        alpha: Levels, rising.
+        shared: Inputs whose equality lets samples share a mesh and its assembly.
+        known: What mechanics proves of the cell's response.
+        store: File that keeps every sample; a campaign that was stopped goes on from there.
+    """
+
+    task: CellTask
+    inputs: Mapping[str, FuzzyNumber]
+    plan: Plan
+    alpha: tuple[float, ...]
+    shared: tuple[str, ...]
+    known: Known
+    store: Path | None = None
+
+    @property
+    def identity(self) -> dict[str, Any] | None:
+        """What a sample depends on besides its fuzzy inputs; None without a store."""
+        return identity(self.task.choice, self.task.crisp, self.task.theta) if self.store else None
+
+
+def campaign(
+    case: Case,
+    *,
+    petsc: Mapping[str, str] | None = None,
+    exclude: tuple[str, ...] = (),
+    store: Path | None = None,
+) -> Campaign:
+    """The campaign that a case asks for.
+
+    Args:
+        case: With the sections radius, cell, mesh and modulus.
+        petsc: PETSc options that override the solver's.
+        exclude: Models that method auto must not take.
+        store: File that keeps every sample.
+    """
+    inputs = fuzzy_inputs(case)
+    crisp = {name: case.fuzzy(key_of(name)).modal for name in INPUTS if name not in inputs}
+    support = case.fuzzy(key_of("inclusion_modulus")).cut(0.0)
+    choice = cell_choice(case, exclude=exclude, petsc=petsc)
+    if (
+        choice.method in TABULATED
+    ):  # no other method's samples depend on the range, and a wider one may take them as they are
+        choice = replace(choice, moduli=(support.lower, support.upper))
+    if case.has("response.quantity") and choice.method == "auto" and "series" not in choice.exclude:
+        choice = replace(
+            choice, tolerance=min(choice.tolerance, OF_CURVES)
+        )  # a curve needs more nodes than its mean, and they cost little
+    task = CellTask(choice, crisp, case.numbers("radius.theta"))
+    shared = tuple(name for name in inputs if name in SHARED) or ("inclusion_modulus",)
+    return Campaign(
+        task,
+        inputs,
+        plan_of(case),
+        case.numbers("modulus.alpha"),
+        shared,
+        known(case, inputs),
+        store,
+    )
+
+
+def known(case: Case, inputs: Mapping[str, FuzzyNumber]) -> Known:
+    """The signs of the inputs' effects on E, where mechanics proves them.
+
+    Where both phases have the same Poisson's ratio ν >= 0, more stiff material can only stiffen: A
+    and B of eq. 16 rise, and with them E = 3A/2 − A²/(2B). The radius rises with a1, a2, a3 and
+    falls with a4, since h1, h2, h3 >= 0 >= h4 (eq. 12). Nothing is stated for finite elements on
+    the product space, whose error depends on the mesh that moves with the radius.
+    """
+    matrix, inclusion = (
+        case.fuzzy("cell.matrix_modulus").support,
+        case.fuzzy("cell.inclusion_modulus").support,
+    )
+    poisson = {case.fuzzy(f"cell.{phase}_poisson").support for phase in ("matrix", "inclusion")}
+    stiffer, softer = inclusion.lower >= matrix.upper, inclusion.upper <= matrix.lower
+    one = next(iter(poisson))
+    if (
+        case.text("modulus.method") == "prism"
+        or len(poisson) > 1
+        or one.width
+        or one.lower < 0
+        or not (stiffer or softer)
+    ):
+        return Known()
+    way = 1 if stiffer else -1
+    signs = {
+        "a1": way,
+        "a2": way,
+        "a3": way,
+        "a4": -way,
+        "matrix_modulus": 1,
+        "inclusion_modulus": 1,
+    }
+    return Known(signs={name: {"E": sign} for name, sign in signs.items() if name in inputs})
+
+
+def identity(
+    choice: CellChoice, crisp: Mapping[str, float], theta: tuple[float, ...]
+) -> dict[str, Any]:
+    """What a sample depends on besides its fuzzy inputs: model, resolution, crisp inputs, the
+    program and its libraries.
+    """
+    source = source_digest(("stochastic", "rve"))
+    content = {
+        "choice": asdict(choice),
+        "crisp": dict(crisp),
+        "theta": theta,
+        "source": source,
+        "versions": versions(),
+    }
+    found: dict[str, Any] = json.loads(
+        json.dumps(content)
+    )  # tuples become lists, as they are when read again
+    return found

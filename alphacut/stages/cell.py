@@ -1,0 +1,203 @@
+"""The cell of a case: its parts at crisp values, its model, and its result as a document."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from alphacut.case.case import Case
+from alphacut.io.problem import BadInput, Problem
+from alphacut.io.provenance import versions
+from alphacut.rve.anisotropy import directional_shear, directional_young, shear_ratio
+from alphacut.rve.cell import Phase
+from alphacut.stochastic import HermiteMap, RadiusMap, TruncatedNormal
+
+if TYPE_CHECKING:
+    from alphacut.rve.result import Homogenised
+
+GPA = 1e9
+LEAST_TOLERANCE, MOST_TOLERANCE = 1e-10, 0.1  # of E, see rve.choice.AutoModel
+INPUTS = (
+    "a1",
+    "a2",
+    "a3",
+    "a4",
+    "matrix_modulus",
+    "matrix_poisson",
+    "inclusion_modulus",
+    "inclusion_poisson",
+)
+SHARED = tuple(
+    name for name in INPUTS if name != "inclusion_modulus"
+)  # what samples of one task have in common
+
+
+def key_of(name: str) -> str:
+    """Full case key of a cell input: ``radius.a2``, ``cell.matrix_modulus``."""
+    return f"radius.{name}" if name in ("a1", "a2", "a3", "a4") else f"cell.{name}"
+
+
+class CellModel(Protocol):
+    """What the front door needs of a model of the cell; `rve` has several."""
+
+    def solve(
+        self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
+    ) -> list[Homogenised]:
+        """One result for each inclusion material; mesh and assembly are shared."""
+
+
+@dataclass(frozen=True)
+class CellChoice:
+    """Which model of the cell, at which resolution; small enough to be sent to a worker process.
+
+    Args:
+        method: prism, slices, table, series or auto.
+        layers: Element layers in θ.
+        size: Element size over half the cell's side.
+        interface: conforming, or sign.
+        tolerance: Relative tolerance on E, for method auto.
+        exclude: Models that method auto must not take.
+        petsc: PETSc options that override the solver's, without their prefix.
+        parallel: Whether all MPI ranks work on one cell together.
+        moduli: Moduli of the particle that all samples together span, in Pa, for a table that they
+            share; None if not known.
+        estimate: Whether a model that can is to estimate its error at an extra cost.
+        stiffness: Whether a model that can leave it out is to make the whole planar stiffness.
+    """
+
+    method: str = "prism"
+    layers: int = 12
+    size: float = 0.15
+    interface: str = "conforming"
+    tolerance: float = 1e-4
+    exclude: tuple[str, ...] = ()
+    petsc: Mapping[str, str] = field(default_factory=dict)
+    parallel: bool = False
+    moduli: tuple[float, float] | None = None
+    estimate: bool = False
+    stiffness: bool = False
+
+    def model(self) -> CellModel:
+        """The model itself; this is where DOLFINx may be imported."""
+        from alphacut.stages.cell_models import cell_model
+
+        return cell_model(self)
+
+
+def cell_choice(
+    case: Case, *, exclude: tuple[str, ...] = (), petsc: Mapping[str, str] | None = None
+) -> CellChoice:
+    """The model that a case asks for.
+
+    Raises:
+        BadInput: The case names its model, so that none can be excluded; or auto is asked for what
+            no model reaches.
+    """
+    method, tolerance = case.text("modulus.method"), case.number("modulus.tolerance")
+    if exclude and method != "auto":
+        what = f"the method is {method}, and only method auto leaves a choice"
+        raise BadInput(Problem("--exclude", what, ", ".join(exclude), "beside --method auto"))
+    if method == "auto" and not LEAST_TOLERANCE <= tolerance <= MOST_TOLERANCE:
+        allowed = f"from {LEAST_TOLERANCE:g} to {MOST_TOLERANCE:g} with method auto"
+        raise BadInput(
+            Problem(
+                "modulus.tolerance", "out of range", f"{tolerance:g}", allowed, file=str(case.path)
+            )
+        )
+    return CellChoice(
+        method,
+        case.integer("mesh.layers"),
+        case.number("mesh.size"),
+        case.text("mesh.interface"),
+        tolerance,
+        exclude,
+        petsc or {},
+    )
+
+
+def parts(values: Mapping[str, float], theta: tuple[float, ...]) -> tuple[HermiteMap, Phase, Phase]:
+    """Radius map, matrix and inclusion from the values of `INPUTS`, in SI."""
+    law = TruncatedNormal(theta[0], theta[1])
+    radius = HermiteMap(values["a1"], values["a2"], values["a3"], values["a4"], law)
+    matrix = Phase(values["matrix_modulus"], values["matrix_poisson"])
+    return radius, matrix, Phase(values["inclusion_modulus"], values["inclusion_poisson"])
+
+
+def modal_values(case: Case) -> dict[str, float]:
+    """The modal value of every input of the cell."""
+    return {name: case.fuzzy(key_of(name)).modal for name in INPUTS}
+
+
+def solve(case: Case, model: CellModel) -> Homogenised:
+    """Homogenise the cell at the modal values of its inputs.
+
+    Raises:
+        BadInput: r(θ) leaves (0, 1).
+    """
+    try:
+        radius, matrix, inclusion = parts(modal_values(case), case.numbers("radius.theta"))
+    except ValueError as error:
+        raise BadInput(Problem("radius", str(error), file=str(case.path))) from None
+    return model.solve(radius, matrix, [inclusion])[0]
+
+
+def anisotropy(radius: HermiteMap, matrix: Phase, inclusion: Phase) -> float | None:
+    """Shear ratio of a cell (see `rve.anisotropy.shear_ratio`) by the series, whatever model gives
+    E; None where the series refuses.
+    """
+    from alphacut.rve.series.model import SeriesModel
+
+    try:
+        stiffness = SeriesModel(accuracy=1e-4).solve(radius, matrix, [inclusion])[0].stiffness
+    except (RuntimeError, ValueError):
+        return None
+    return None if stiffness is None else shear_ratio(stiffness)
+
+
+def directions(result: Homogenised) -> dict[str, Any] | None:
+    """What eq. 16 hides, over the direction, and the anisotropy of the shear modulus; None without
+    the stiffness.
+
+    "young_GPa" is stress over strain in plane strain with free sides, 1/S11 of the planar
+    compliance: E/(1 − ν²) in an isotropic material, so that E of eq. 16 lies below it.
+    """
+    if result.stiffness is None:
+        return None
+    degrees = np.arange(0, 91, 15)
+    angle = np.deg2rad(degrees)
+    return {
+        "angle_deg": degrees,
+        "young_GPa": directional_young(result.stiffness, angle) / GPA,
+        "shear_GPa": directional_shear(result.stiffness, angle) / GPA,
+        "shear_ratio": shear_ratio(result.stiffness),
+    }
+
+
+def document(result: Homogenised) -> dict[str, Any]:
+    """The result as it is printed with ``--json``; moduli and stresses in GPa."""
+    mean11, mean12 = result.curve.mean
+    return {
+        "E_GPa": result.modulus / GPA,
+        "nu": result.poisson,
+        "stress_GPa": {"s11": mean11 / GPA, "s12": mean12 / GPA},
+        "stiffness_GPa": None if result.stiffness is None else result.stiffness / GPA,
+        "directions": directions(result),
+        "curve": {
+            "theta": result.curve.theta,
+            "weights": result.curve.weights,
+            "s11": result.curve.s11 / GPA,
+            "s12": result.curve.s12 / GPA,
+        },
+        "unknowns": result.unknowns,
+        "iterations": list(result.iterations),
+        "seconds": dict(result.seconds),
+        "method": result.method,
+        "solver": result.solver,
+        "error": dict(result.error),
+        "reason": result.reason,
+        "checks": dict(result.checks),
+        "versions": versions(),
+    }

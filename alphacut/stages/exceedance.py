@@ -1,0 +1,286 @@
+"""What an engineer reads off the envelopes: fuzzy peaks, and the fuzzy probability that an output
+exceeds a limit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from alphacut.case.case import Case
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.io import quantity
+from alphacut.io.problem import BadInput, Problem
+from alphacut.io.progress import Tick
+from alphacut.io.units import engineering
+from alphacut.stages.structure import Structure, structure
+from alphacut.stochastic.theta.truncated_normal import Array
+
+if TYPE_CHECKING:
+    import xarray
+
+    from alphacut.frame import Envelope
+    from alphacut.stages.envelope import EnvelopeTask
+
+Sampler = Callable[[np.random.Generator, int], Array]
+FACTS = (
+    "output",
+    "limit",
+    "fuzzy",
+    "random",
+    "deviation",
+    "samples",
+    "step",
+    "trajectories",
+    "nature",
+)
+NATURE = "inner: attained at the fuzzy points tried, with the sampling deviation given"
+
+
+def with_peaks(found: Envelope, wanted: Structure, task: EnvelopeTask) -> xarray.Dataset:
+    """The envelope's dataset with the fuzzy peak of each output's magnitude.
+
+    ``peak`` (alpha, bound, output) holds bounds of it, ``peak_tried`` (alpha, output) the least
+    peak among some trajectories.
+    """
+    from alphacut.frame.boxes import boxes
+    from alphacut.frame.exceedance import peaks, tried_peaks
+
+    of, cuts = peaks(found), boxes(wanted.inputs(task.fuzzy), task.alpha)
+    tried = tried_peaks(
+        wanted.flow(
+            cuts.names, task.duration, task.step, task.scheme if wanted.linear else task.integrator
+        ),
+        cuts,
+    )
+    words = {
+        "units": "SI, by output",
+        "long_name": "largest magnitude over time; the lower end is a bound from below",
+    }
+    dataset = found.to_dataset().assign(
+        peak=(("alpha", "bound", "output"), np.stack([of.lower, of.upper], axis=1), words)
+    )
+    least = {
+        "units": "SI, by output",
+        "long_name": (
+            "least peak among trajectories tried; the true one lies between the bound and this"
+        ),
+    }
+    return dataset.assign(peak_tried=(("alpha", "output"), tried, least)).assign_coords(
+        bound=["lower", "upper"]
+    )
+
+
+def peak_document(dataset: xarray.Dataset) -> dict[str, dict[str, Array]]:
+    """The fuzzy peak of each output: lower and upper ends and the least one tried, by level, in SI."""
+    found = {}
+    for name in dataset["output"].values:
+        found[str(name)] = {
+            side: dataset["peak"].sel(bound=side, output=name).values for side in ("lower", "upper")
+        }
+        if "peak_tried" in dataset:
+            found[str(name)]["tried"] = dataset["peak_tried"].sel(output=name).values
+    return found
+
+
+def shaped_like(number: FuzzyNumber) -> Sampler:
+    """Random values whose density is proportional to the membership: a triangle's is triangular, an
+    interval's uniform.
+
+    One value from each of `count` equally likely pieces, in random order (a Latin hypercube where
+    several inputs are random): means over them scatter less than those of independent draws.
+    """
+    grid = np.unique(np.concatenate([np.linspace(*number.support, 4001), *number.cuts[1:]]))
+    density = number.membership(grid)
+    share = np.concatenate([[0.0], np.cumsum(np.diff(grid) * (density[1:] + density[:-1]) / 2)])
+
+    def draw(rng: np.random.Generator, count: int) -> Array:
+        pieces = (rng.permutation(count) + rng.random(count)) / count
+        values: Array = np.interp(pieces * share[-1], share, grid)
+        return values
+
+    return draw
+
+
+def limit_of(case: Case) -> float:
+    """The limit in the SI unit of its output; for the drift of a storey also as a share of that
+    storey's modal height.
+
+    Raises:
+        BadInput: It is no positive quantity of that unit.
+    """
+    from alphacut.frame.envelope import output_unit
+
+    name, text = case.text("exceedance.output"), case.text("exceedance.limit")
+    unit, height = output_unit(name), storey_height(case, name)
+    try:
+        share = height is not None and text.rstrip().endswith("%")
+        limit = (
+            height * quantity.number(text, "") if share and height else quantity.number(text, unit)
+        )
+    except ValueError as error:
+        kind = f"a quantity in {unit}, as the output is" + (
+            ", or a share of the storey's height such as 0.5 %" if height else ""
+        )
+        raise case.refuse("exceedance.limit", str(error), kind) from None
+    if not limit > 0:
+        raise case.refuse("exceedance.limit", "out of range", "greater than 0")
+    return limit
+
+
+def storey_height(case: Case, output: str) -> float | None:
+    """The height in m of the storey whose drift an output is; None for any other output."""
+    kind, floor = output.rstrip("0123456789"), output.lstrip("abcdefghijklmnopqrstuvwxyz_")
+    if kind != "drift":
+        return None
+    if case.has("tower.height"):
+        return case.number("tower.height")
+    lengths = case.fuzzies("frame.lengths") if case.has("frame.lengths") else ()
+    index = 0 if len(lengths) == 1 else int(floor or 1) - 1
+    return lengths[index].modal if 0 <= index < len(lengths) else None
+
+
+def require_random(case: Case, wanted: Structure) -> None:
+    """Whether the inputs named as random can be.
+
+    Raises:
+        BadInput: One is crisp, or unknown.
+    """
+    for name in case.names("exceedance.random"):
+        try:
+            wanted.members(name)
+        except BadInput as error:
+            (problem,) = error.problems
+            what = (
+                "the modulus that the frame gets is crisp"
+                if name == "E" and name in wanted.numbers
+                else problem.what
+            )
+            raise BadInput(
+                Problem("exceedance.random", what, name, problem.allowed, file=str(case.path))
+            ) from None
+
+
+def split_inputs(
+    case: Case, wanted: Structure
+) -> tuple[dict[str, FuzzyNumber], dict[str, Sampler]]:
+    """The inputs that stay fuzzy and those that are random; where none stays fuzzy, a crisp one
+    stands in for them.
+    """
+    random = wanted.inputs(case.names("exceedance.random"))
+    fuzzy = {
+        name: number
+        for name, number in wanted.inputs(case.names("envelope.fuzzy")).items()
+        if name not in random
+    }
+    crisp = {name: number for name, number in wanted.numbers.items() if number.support.width == 0}
+    return fuzzy or dict([next(iter(crisp.items()))]), {
+        name: shaped_like(number) for name, number in random.items()
+    }
+
+
+def exceedance(
+    case: Case, handed: FuzzyNumber | None, progress: Tick | None = None
+) -> xarray.Dataset:
+    """Fuzzy probability that an output's magnitude exceeds the case's limit within the duration of
+    [envelope].
+
+    Args:
+        case: With the sections exceedance, envelope and a structure.
+        handed: Modulus of the stage before, in Pa.
+        progress: Told the share done.
+
+    Raises:
+        BadInput: The structure has no such output.
+    """
+    import xarray
+
+    from alphacut.frame import exceedance as probabilities
+    from alphacut.frame.envelope import output_unit
+
+    wanted, output = structure(case, handed), case.text("exceedance.output")
+    model = wanted.model if wanted.frame is None else replace(wanted.frame, outputs=(output,))
+    if output not in model.outputs:
+        raise case.refuse(
+            "exceedance.output", "the structure has no such output", ", ".join(wanted.outputs)
+        )
+    fuzzy, random = split_inputs(case, wanted)
+    found = probabilities.exceedance(
+        model,
+        fuzzy,
+        random,
+        limit=limit_of(case),
+        duration=case.number("envelope.duration"),
+        step=case.number("envelope.step"),
+        output=model.outputs.index(output),
+        alpha=case.numbers("envelope.alpha"),
+        samples=case.integer("exceedance.samples"),
+        rng=np.random.default_rng(case.integer("exceedance.seed")),
+        progress=progress,
+    )
+    about = {"long_name": f"probability that |{output}| exceeds the limit", "units": "1"}
+    ends = (("alpha", "bound"), np.column_stack([found.lower, found.upper]), about)
+    drawn = {
+        "samples": case.integer("exceedance.samples"),
+        "step": case.number("envelope.step"),
+        "trajectories": found.trajectories,
+    }
+    facts = {
+        "output": output,
+        "limit": limit_of(case),
+        "deviation": found.deviation,
+        "nature": NATURE,
+        **drawn,
+    }
+    names = {"fuzzy": ", ".join(fuzzy), "random": ", ".join(random)}
+    curve = (
+        ("alpha", "bound", "limit"),
+        np.stack([found.curve_lower, found.curve_upper], axis=1),
+        about,
+    )
+    axes = {
+        "alpha": found.alpha,
+        "bound": ["lower", "upper"],
+        "limit": ("limit", found.limits, {"units": output_unit(output)}),
+    }
+    return xarray.Dataset({"exceedance": ends, "curve": curve}, axes, {**facts, **names})
+
+
+def exceedance_document(found: xarray.Dataset) -> dict[str, Any]:
+    """The probability as it is printed with ``--json``; the limit in SI."""
+    from alphacut.frame.envelope import output_unit
+
+    sides = {str(side): found["exceedance"].sel(bound=side).values for side in ("lower", "upper")}
+    return {
+        **{name: found.attrs[name] for name in FACTS},
+        "unit": output_unit(found.attrs["output"]),
+        "alpha": found["alpha"].values,
+        **sides,
+    }
+
+
+def sentence(found: Mapping[str, Any]) -> str:
+    """The probability in words, at the lowest and the highest level."""
+    levels = dict.fromkeys((0, len(found["alpha"]) - 1))
+    cuts = (
+        f"[{found['lower'][k]:.3g}, {found['upper'][k]:.3g}] at α = {found['alpha'][k]:g}"
+        for k in levels
+    )
+    random = f" with random {found['random']}" if found["random"] else ""
+    nodes = f", at nodes every {found['step']:g} s" if "step" in found else ""
+    drawn = (
+        f"{found['samples']} random draws at each fuzzy point tried"
+        if "samples" in found
+        else "random draws"
+    )
+    scatter = (
+        f": {drawn}; standard deviation up to {found['deviation']:.2g}" if found["random"] else ""
+    )
+    worth = f" (inner bounds{nodes}{scatter})"
+    return (
+        f"probability of |{found['output']}| >"
+        f" {engineering(found['limit'], found['unit'])}{random}: {', '.join(cuts)}{worth}\n"
+    )

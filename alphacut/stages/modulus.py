@@ -1,0 +1,306 @@
+"""The fuzzy modulus of a case: samples of the cell, rearranged into α-cuts; as a document, a
+dataset and a fuzzy number.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from alphacut.case.case import Case
+from alphacut.fuzzy import Crisp, Explanation, FuzzyNumber, FuzzyResult, PiecewiseLinear, propagate
+from alphacut.fuzzy import explain as fuzzy_explain
+from alphacut.io.files import whole_file
+from alphacut.io.netcdf import read_dataset
+from alphacut.io.problem import BadInput, Problem
+from alphacut.io.progress import Tick
+from alphacut.io.provenance import attributes, versions
+from alphacut.stages.campaign import Campaign, theta_shown
+from alphacut.stages.cell import GPA, CellChoice, anisotropy, parts
+from alphacut.stages.measured_modulus import measured_modulus
+
+if TYPE_CHECKING:
+    import xarray
+
+    from alphacut.rve.result import Homogenised
+
+QUANTITIES = {
+    "E": ("Pa", "effective Young's modulus, eq. 16"),
+    "nu": ("1", "effective Poisson's ratio, eq. 16"),
+}
+STRESSES = {
+    "s11": ("Pa", "mean homogenised stress 11 under ε11 = ε22 = 0.01"),
+    "s12": ("Pa", "mean homogenised stress 12 under ε12 = 0.01"),
+}
+BOUNDS = QUANTITIES | STRESSES
+MEANING = {
+    "inner": "attained by samples, between which E may go further",
+    "estimated": "those of samples and of a model between them",
+    "guaranteed": "no value within the supports goes further",
+}
+
+
+@dataclass(frozen=True)
+class FuzzyModulus:
+    """The campaign's result for one case.
+
+    Args:
+        result: Bounds of every output over the levels, with all samples.
+        choice: Model of the cell that was used.
+        theta: Support of θ.
+        judged: The modal sample once more, with its estimated error and auto's reason; None for
+            models that give both with every sample.
+        shear_ratio: Anisotropy of the modal cell, see `rve.anisotropy`; None where it could not be
+            had.
+    """
+
+    result: FuzzyResult
+    choice: CellChoice
+    theta: tuple[float, ...] = (-3.0, 3.0)
+    judged: Homogenised | None = None
+    shear_ratio: float | None = None
+
+    @property
+    def number(self) -> PiecewiseLinear:
+        """The fuzzy modulus in Pa, to be handed on."""
+        return self.result.number("E")
+
+    @property
+    def nature(self) -> str:
+        """What the bounds of E are worth: guaranteed if they are on every level, else what they are
+        at least.
+        """
+        natures = sorted({str(nature) for nature in self.result.nature_of("E")})
+        return natures[0] if len(natures) == 1 else str(self.result.nature)
+
+    @property
+    def reason(self) -> str:
+        """Which model method auto took at the modal point, and why; empty for any other method."""
+        return self.judged.reason if self.judged and self.choice.method == "auto" else ""
+
+    @property
+    def error(self) -> dict[str, float]:
+        """Estimated relative error of E by source: the largest of all samples, or that of the modal
+        one where each would cost too much.
+        """
+        return self.largest("error") or (dict(self.judged.error) if self.judged else {})
+
+    @property
+    def worth(self) -> str:
+        """One line: what the bounds of E are worth, and the error of the model, which they do not
+        count.
+        """
+        parts = ", ".join(f"{name} {value:.1e}" for name, value in self.error.items())
+        whose = (
+            "modal sample"
+            if self.judged and not self.largest("error")
+            else "largest of all samples"
+        )
+        error = (
+            f"estimated at {sum(self.error.values()):.1e} of E ({parts}; {whose})"
+            if parts
+            else "not estimated"
+        )
+        return (
+            f"bounds {self.nature}: {MEANING.get(self.nature, '')}; the error of the cell's model"
+            f" comes on top, {error}"
+        )
+
+    @property
+    def solves(self) -> int:
+        """Linear systems solved."""
+        return int(self.result.values.output("systems").sum())
+
+    def largest(self, kind: str) -> dict[str, float]:
+        """The largest of each error ("error") or each property of the certificate ("check") over
+        all samples.
+        """
+        values = self.result.values
+        found = {
+            name.partition(":")[2]: float(values.output(name).max())
+            for name, _ in values.layout
+            if name.startswith(f"{kind}:")
+        }
+        return {name: value for name, value in found.items() if value or kind == "check"}
+
+    def document(self) -> dict[str, Any]:
+        """The result as it is printed with ``--json``; moduli and stresses in GPa."""
+        found = {name: self.result.bounds(name) for name in BOUNDS}
+        scaled = {
+            ("nu" if name == "nu" else f"{name}_GPa"): (1.0 if name == "nu" else GPA, ends)
+            for name, ends in found.items()
+        }
+        return {
+            "alpha": self.result.alpha,
+            **{
+                name: {"lower": lower / unit, "upper": upper / unit}
+                for name, (unit, (lower, upper)) in scaled.items()
+            },
+            "samples": self.result.runs,
+            "solves": self.solves,
+            "verification_samples": self.result.verification_runs,
+            "calls": self.result.calls,
+            "reused": self.result.reused,
+            "seconds": self.result.seconds,
+            "nature": self.nature,
+            "notes": list(self.result.notes),
+            "plan": self.result.plan,
+            "method": self.choice.method,
+            "reason": self.reason,
+            "error": self.error,
+            "shear_ratio": self.shear_ratio,
+            "checks": self.largest("check"),
+            "versions": versions(),
+        }
+
+    def dataset(self) -> xarray.Dataset:
+        """α-cuts of every quantity (alpha, bound), where they are reached, and all samples with
+        their stress curves.
+        """
+        import xarray
+
+        result = self.result
+        variables: dict[str, Any] = {}
+        for name, (unit, about) in BOUNDS.items():
+            column = result.column(name)
+            ends = np.stack(result.bounds(name), axis=1)
+            places = np.stack([result.lower_at[:, column], result.upper_at[:, column]], axis=1)
+            variables[name] = (("alpha", "bound"), ends, {"units": unit, "long_name": about})
+            variables[f"{name}_at"] = (
+                ("alpha", "bound", "parameter"),
+                places,
+                {"long_name": f"inputs that reach the ends of {name}, in SI"},
+            )
+            variables[f"{name}_sample"] = (
+                ("sample",),
+                result.values.output(name),
+                {"units": unit, "long_name": about},
+            )
+        variables["point"] = (
+            ("sample", "parameter"),
+            result.points,
+            {"long_name": "inputs of each sample, in SI"},
+        )
+        for name, about in (
+            ("curve11", "stress 11 under ε11 = ε22 = 0.01"),
+            ("curve12", "stress 12 under ε12 = 0.01"),
+        ):
+            variables[name] = (
+                ("sample", "theta"),
+                result.values.output(name),
+                {"units": "Pa", "long_name": f"homogenised {about}"},
+            )
+        for kind in ("error", "check"):
+            largest = self.error if kind == "error" else self.largest(kind)
+            variables[kind] = (
+                (f"{kind}_name",),
+                list(largest.values()),
+                {"long_name": f"largest {kind} of all samples"},
+            )
+        names = {"error_name": list(self.error), "check_name": list(self.largest("check"))}
+        coordinates = names | {
+            "theta": theta_shown(self.theta),
+            "alpha": result.alpha,
+            "bound": ["lower", "upper"],
+            "parameter": list(result.inputs),
+        }
+        numbers = {
+            "samples": result.runs,
+            "solves": self.solves,
+            "seconds": result.seconds,
+            "nature": self.nature,
+        }
+        numbers |= {} if self.shear_ratio is None else {"shear_ratio": self.shear_ratio}
+        return xarray.Dataset(
+            variables,
+            coordinates,
+            {"method": self.choice.method, "reason": self.reason, "plan": result.plan, **numbers},
+        )
+
+
+def compute(wanted: Campaign, *, workers: int = 1, progress: Tick | None = None) -> FuzzyModulus:
+    """Run a campaign.
+
+    Args:
+        wanted: What is to be run.
+        workers: Processes; the result is the same for any number. Under ``mpirun … -m
+            mpi4py.futures`` all of those are used.
+        progress: Told the share done.
+    """
+    wanted.task.choice.model()  # a model that cannot be had is one problem, not one for each sample
+    result = propagate(
+        wanted.task,
+        wanted.inputs,
+        wanted.plan,
+        alpha=wanted.alpha,
+        shared=wanted.shared,
+        workers=workers,
+        progress=progress,
+        known=wanted.known,
+        store=wanted.store,
+        identity=wanted.identity,
+    )
+    modal = {name: number.modal for name, number in wanted.inputs.items()}
+    cell = parts({**wanted.task.crisp, **modal}, wanted.task.theta)
+    return FuzzyModulus(
+        result, wanted.task.choice, wanted.task.theta, wanted.task.judged(modal), anisotropy(*cell)
+    )
+
+
+def explain(wanted: Campaign) -> Explanation:
+    """What `compute` would run and why."""
+    return fuzzy_explain(
+        wanted.inputs,
+        wanted.plan,
+        alpha=wanted.alpha,
+        shared=wanted.shared,
+        known=wanted.known,
+        store=wanted.store,
+        identity=wanted.identity,
+    )
+
+
+def write(modulus: FuzzyModulus, path: Path | str, *, case_text: str, key: str) -> None:
+    """Write ``modulus.nc``, whole or not at all."""
+    dataset = modulus.dataset().assign_attrs(attributes(case_text, key))
+    with whole_file(path) as partial:
+        dataset.to_netcdf(partial)
+
+
+def read_number(path: Path | str, option: str = "--modulus") -> FuzzyNumber:
+    """The fuzzy modulus in Pa from a file that `write` made.
+
+    Raises:
+        BadInput: The file is missing, holds no modulus, or was written by a newer program.
+    """
+    dataset = read_dataset(Path(path), key=option)
+    try:
+        alpha, ends = dataset["alpha"].values, dataset["E"].transpose("alpha", "bound").values
+    except (ValueError, KeyError) as error:
+        raise BadInput(
+            Problem(
+                option,
+                f"the file holds no α-cuts of a modulus ({error})",
+                str(path),
+                "a modulus.nc of this program",
+            )
+        ) from None
+    if len(alpha) == 1:
+        return Crisp(float(ends.mean()))
+    return PiecewiseLinear(
+        tuple(map(float, alpha)), tuple(map(float, ends[:, 0])), tuple(map(float, ends[:, 1]))
+    )
+
+
+def stand_in(case: Case) -> FuzzyNumber | None:
+    """The modulus in Pa that the case gives instead of having it computed; None if it gives none."""
+    if case.has("modulus.value"):
+        return case.fuzzy("modulus.value")
+    if case.has("modulus.file"):
+        return read_number(case.path.parent / case.text("modulus.file"), "modulus.file")
+    if case.has("modulus.measured"):
+        return measured_modulus(case.path.parent / case.text("modulus.measured"))
+    return None

@@ -1,0 +1,301 @@
+"""The chain of a case: fuzzy modulus, then envelopes; each is taken from its file while nothing it
+depends on has changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from alphacut.case.case import Case
+from alphacut.case.checks import FILES
+from alphacut.case.names import OTHERS
+from alphacut.commands.microstructure import write as write_microstructure
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.io.files import say, whole_file
+from alphacut.io.netcdf import require_known
+from alphacut.io.progress import progress
+from alphacut.io.provenance import attributes, fingerprint
+from alphacut.stages import envelope, microstructure, modulus, response
+from alphacut.stages import exceedance as outcomes
+from alphacut.stages.campaign import campaign
+from alphacut.stages.structure import structure
+
+if TYPE_CHECKING:
+    import xarray
+
+    from alphacut.stages.envelope import EnvelopeTask
+
+MODULUS_SECTIONS = ("radius", "cell", "mesh", "modulus")
+
+
+@dataclass(frozen=True)
+class Study:
+    """One envelope of a run.
+
+    Args:
+        name: Its file is envelope_NAME.nc.
+        task: What is computed.
+        figures: Figure of the paper for each output drawn; empty for none.
+        output: The one output drawn; empty for all.
+    """
+
+    name: str
+    task: EnvelopeTask
+    figures: tuple[str, ...] = ()
+    output: str = ""
+
+
+@dataclass(frozen=True)
+class Chain:
+    """How a run is done.
+
+    Args:
+        case: The case.
+        folder: Where results go.
+        workers: Processes that share the samples.
+        fresh: Compute everything anew.
+        quiet: No progress.
+        petsc: PETSc options that override the solver's.
+        strict: Refuse a time step that cannot resolve the fastest mode.
+    """
+
+    case: Case
+    folder: Path
+    workers: int = 1
+    fresh: bool = False
+    quiet: bool = False
+    petsc: Mapping[str, str] = field(default_factory=dict)
+    strict: bool = False
+
+    def file(self, name: str) -> Path:
+        """A file among the results."""
+        return self.folder / name
+
+    def run(self) -> Results:
+        """Compute every stage of the case, or take it from its file."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        if "microstructure" in self.case.stages:
+            return replace(self, case=self.with_particles()).after_particles()
+        return self.after_particles()
+
+    def after_particles(self) -> Results:
+        """The stages from the radius map on."""
+        handed = modulus.stand_in(self.case)
+        cell = self.modulus() if "modulus" in self.case.stages and handed is None else None
+        handed = modulus.read_number(self.file("modulus.nc")) if cell is not None else handed
+        envelopes = {}
+        if "envelope" in self.case.stages:
+            envelopes = {study.name: self.envelope(study, handed) for study in studies(self.case)}
+        stress = (
+            self.response(cell) if cell is not None and self.case.has("response.quantity") else None
+        )
+        limit = (
+            self.exceedance(handed) if envelopes and self.case.has("exceedance.output") else None
+        )
+        return Results(self.case, self.folder, cell, envelopes, handed, stress, limit)
+
+    def with_particles(self) -> Case:
+        """The case with the radius map of its particles; microstructure.nc, radius.toml and the
+        stage's figures are stored.
+        """
+        inputs = {
+            key: value
+            for key, value in self.case.values.items()
+            if key.startswith("microstructure")
+        }
+        files = [
+            self.case.digest(key)
+            for key in FILES
+            if key.startswith("microstructure") and self.case.has(key)
+        ]
+        key = fingerprint({"case": inputs, "files": files}, ("stochastic",))
+
+        def compute(path: Path) -> None:
+            with progress("Microstructure", quiet=self.quiet) as tick:
+                found = microstructure.compute(self.case, workers=self.workers, progress=tick)
+            write_microstructure(found, path.parent, attributes(self.case.text_of_file, key))
+
+        self.stored("microstructure.nc", key, compute)
+        return microstructure.with_radius(
+            self.case, microstructure.read_fragment(self.file("radius.toml"))
+        )
+
+    def modulus(self) -> xarray.Dataset:
+        """The fuzzy modulus, in modulus.nc."""
+        inputs = {
+            key: value
+            for key, value in self.case.values.items()
+            if key.partition(".")[0] in MODULUS_SECTIONS
+        }
+        key = fingerprint(
+            {"case": inputs, "petsc": dict(self.petsc)}, ("stochastic", "rve", "fuzzy")
+        )
+
+        def compute(path: Path) -> None:
+            store = self.file("samples.db")
+            if self.fresh:
+                for old in self.folder.glob("samples.db*"):
+                    old.unlink()
+            with progress("Fuzzy modulus", quiet=self.quiet) as tick:
+                wanted = campaign(self.case, petsc=self.petsc, store=store)
+                found = modulus.compute(wanted, workers=self.workers, progress=tick)
+            modulus.write(found, path, case_text=self.case.text_of_file, key=key)
+
+        return self.stored("modulus.nc", key, compute)
+
+    def response(self, cell: xarray.Dataset) -> xarray.Dataset:
+        """The random and fuzzy stress of the cell, in response.nc."""
+        wanted = {
+            key: value for key, value in self.case.values.items() if key.startswith("response.")
+        }
+        key = fingerprint(
+            {"modulus": cell.attrs["fingerprint"], "wanted": wanted},
+            ("stochastic", "fuzzy", "alphacut"),
+        )
+
+        def compute(path: Path) -> None:
+            with whole_file(path) as partial:
+                response.dataset(self.case, cell).assign_attrs(
+                    attributes(self.case.text_of_file, key)
+                ).to_netcdf(partial)
+
+        return self.stored("response.nc", key, compute)
+
+    def envelope(self, study: Study, handed: FuzzyNumber | None) -> xarray.Dataset:
+        """One study's envelope, in envelope_NAME.nc."""
+        key = self.vibration({"task": study.task, "holds": ("bounds", "peaks", "tried")}, handed)
+
+        def compute(path: Path) -> None:
+            with progress(f"Envelope {study.name}", quiet=self.quiet) as tick:
+                found = envelope.compute(
+                    self.case,
+                    study.task,
+                    modulus=handed,
+                    strict=self.strict,
+                    workers=self.workers,
+                    progress=tick,
+                )
+            dataset = outcomes.with_peaks(found, structure(self.case, handed), study.task)
+            envelope.write(dataset, path, case_text=self.case.text_of_file, key=key)
+
+        return self.stored(f"envelope_{study.name}.nc", key, compute)
+
+    def exceedance(self, handed: FuzzyNumber | None) -> xarray.Dataset:
+        """The fuzzy probability of exceeding the case's limit, in exceedance.nc."""
+        wanted = {
+            key: value
+            for key, value in self.case.values.items()
+            if key.partition(".")[0] in ("exceedance", "envelope")
+        }
+        key = self.vibration({"wanted": wanted}, handed)
+
+        def compute(path: Path) -> None:
+            with progress("Exceedance", quiet=self.quiet) as tick:
+                found = outcomes.exceedance(self.case, handed, tick)
+            envelope.write(found, path, case_text=self.case.text_of_file, key=key)
+
+        return self.stored("exceedance.nc", key, compute)
+
+    def vibration(self, wanted: Mapping[str, Any], handed: FuzzyNumber | None) -> str:
+        """Fingerprint of something wanted of the structure: it depends on the structure, its record
+        and the modulus too.
+        """
+        inputs = {
+            key: value
+            for key, value in self.case.values.items()
+            if key.partition(".")[0] in ("frame", *OTHERS)
+        }
+        record = [
+            self.case.digest(key)
+            for key in FILES
+            if key.endswith("accelerogram") and self.case.has(key)
+        ]
+        return fingerprint(
+            {"case": inputs, "record": record, "modulus": handed, **wanted}, ("fuzzy", "frame")
+        )
+
+    def stored(self, name: str, key: str, compute: Callable[[Path], None]) -> xarray.Dataset:
+        """The dataset in a file: as it is if it has the fingerprint `key`, else computed first."""
+        import xarray
+
+        path = self.file(name)
+        if not self.fresh and path.is_file() and fingerprint_of(path) == key:
+            if not self.quiet:
+                say(f"{path} is up to date")
+        else:
+            compute(path)
+        return xarray.load_dataset(path)
+
+
+@dataclass(frozen=True)
+class Results:
+    """What a run has found.
+
+    Args:
+        case: The case.
+        folder: Where the files are.
+        modulus: Dataset of modulus.nc; None where the case computes none.
+        envelopes: Datasets of the studies by name.
+        handed: The modulus handed on to the structure, in Pa; None where the structure took its
+            own.
+        response: Dataset of response.nc; None where the case does not ask for it.
+        exceedance: Dataset of exceedance.nc; None where the case names no limit.
+    """
+
+    case: Case
+    folder: Path
+    modulus: xarray.Dataset | None
+    envelopes: Mapping[str, xarray.Dataset]
+    handed: FuzzyNumber | None
+    response: xarray.Dataset | None = None
+    exceedance: xarray.Dataset | None = None
+
+    @property
+    def studies(self) -> tuple[Study, ...]:
+        """The studies, in the case's order."""
+        return studies(self.case) if self.envelopes else ()
+
+
+def fingerprint_of(path: Path) -> str:
+    """The fingerprint in a NetCDF file; empty if it cannot be read.
+
+    Raises:
+        BadInput: A newer program wrote the file; its results are not overwritten unasked.
+    """
+    import xarray
+
+    try:
+        with xarray.open_dataset(path) as dataset:
+            told = dict(dataset.attrs)
+    except (OSError, ValueError):
+        return ""
+    if "format_version" in told:
+        require_known(
+            str(told["format_version"]), path, key="--out", maker=str(told.get("created_by", ""))
+        )
+    return str(told.get("fingerprint", ""))
+
+
+def studies(case: Case) -> tuple[Study, ...]:
+    """The studies of a case: its [[study]] tables, or one made of [envelope]."""
+    count: Any = case.values.get("study", 0)
+    if not count:
+        return (Study("all", envelope.task_of(case)),)
+    found = []
+    for index in range(count):
+        key = f"study[{index}]"
+        task = envelope.task_of(
+            case, fuzzy=case.names(f"{key}.fuzzy"), duration=case.number(f"{key}.duration")
+        )
+        found.append(
+            Study(
+                case.text(f"{key}.name"),
+                task,
+                case.names(f"{key}.figures"),
+                case.text(f"{key}.output"),
+            )
+        )
+    return tuple(found)

@@ -1,0 +1,175 @@
+"""What a run would stumble over later, found before anything is computed: it reads the files that a
+case names and builds its structure.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from alphacut.case.case import Case
+from alphacut.case.checks import beside, replaced, stand_ins
+from alphacut.case.names import fuzzy_keys
+from alphacut.fuzzy import FuzzyNumber, Triangular
+from alphacut.io.problem import BadInput, Problem
+from alphacut.stages import modulus
+from alphacut.stages.accelerogram import accelerogram
+from alphacut.stages.pipeline import studies
+from alphacut.stages.resolution_checks import rough
+from alphacut.stages.structure import Structure, structure
+
+PERIODS = (0.02, 30.0)  # s, from a stiff machine frame to the slenderest towers
+STRONGEST = 50.0  # m/s², more than any ground acceleration recorded
+RECORDS = ("frame.accelerogram", "tower.accelerogram")
+
+
+@dataclass(frozen=True)
+class Readiness:
+    """What is to be said of a case that can be run.
+
+    Args:
+        warnings: Remarks.
+        rough: A step or tolerance that is coarse beside the motion: refused where it is meant
+            strictly.
+        period: First natural period at the modal values, in s; None where no linear structure
+            vibrates.
+    """
+
+    warnings: tuple[str, ...] = ()
+    rough: tuple[Problem, ...] = ()
+    period: float | None = None
+
+
+def ready(case: Case) -> Readiness:
+    """Remarks about a case that can be run.
+
+    Raises:
+        BadInput: It cannot: a stage lacks what it needs, a file is broken, an input named as fuzzy
+            is crisp.
+    """
+    if "microstructure" in case.stages:
+        from alphacut.stages.microstructure import require_readable, study_of
+
+        study_of(case)
+        require_readable(case)
+    stand_in = modulus.stand_in(case) if "modulus" in case.stages or replaced(case) else None
+    if "envelope" not in case.stages:
+        if "modulus" in case.stages and replaced(case):
+            what = (
+                f"there is nothing to compute: {', '.join(stand_ins(case))} stands in for stage"
+                " modulus"
+            )
+            raise BadInput(
+                Problem(
+                    "stages",
+                    what,
+                    str(list(case.stages)),
+                    'stages = ["modulus", "envelope"], with a structure',
+                )
+            )
+        return Readiness()
+    if problems := list(lacking(case)):
+        raise BadInput(problems)
+    wanted = structure(case, stand_in or expected(case))
+    if problems := list(crisp_names(case, wanted)):
+        raise BadInput(problems)
+    found = dict.fromkeys(
+        problem for study in studies(case) for problem in rough(wanted, study.task)
+    )
+    period = first_period(wanted)
+    return Readiness(
+        (*outlasted(case), *unlikely(case, period), *unproved(case)), tuple(found), period
+    )
+
+
+def first_period(wanted: Structure) -> float | None:
+    """First natural period of a linear structure, in s: a wrong unit shows there at once."""
+    from alphacut.frame.structures.linear import frequencies
+
+    return None if wanted.linear is None else 2 * math.pi / float(frequencies(wanted.linear)[0])
+
+
+def unproved(case: Case) -> Iterator[str]:
+    """A remark where a certificate is wanted that cannot become a guarantee."""
+    ratio = any(case.has(f"{section}.damping_ratio") for section in ("frame", "tower"))
+    if case.has("envelope.certify") and ratio:
+        yield (
+            "envelope.certify: with a damping ratio the error of the modal model is verified by"
+            " sampling, not proved; dampers and Rayleigh's factors allow a guarantee"
+        )
+
+
+def unlikely(case: Case, period: float | None) -> Iterator[str]:
+    """Remarks on values of which one has most likely the wrong unit."""
+    if period is not None and not PERIODS[0] <= period <= PERIODS[1]:
+        yield (
+            f"a first natural period of {period:.3g} s is unusual for a structure; check the units"
+            " of masses, lengths and moduli"
+        )
+    for key in RECORDS:
+        if case.has(key):
+            peak = float(abs(accelerogram(beside(case, case.text(key)), key).acceleration).max())
+            if peak > STRONGEST:
+                yield (
+                    f"{key}: a peak of {peak:.3g} m/s² is above any earthquake recorded; check the"
+                    " unit in its header"
+                )
+
+
+def lacking(case: Case) -> Iterator[Problem]:
+    """A frame needs a modulus from somewhere."""
+    if (
+        case.has("frame.masses")
+        and not case.has("frame.modulus")
+        and "modulus" not in case.stages
+        and not replaced(case)
+    ):
+        what = (
+            "missing; stage envelope needs a modulus: give frame.modulus, modulus.value or"
+            ' modulus.measured, or compute one with stages = ["modulus", "envelope"]'
+        )
+        yield Problem("frame.modulus", what, file=str(case.path), line=case.lines.get("frame", 0))
+
+
+def expected(case: Case) -> FuzzyNumber | None:
+    """In place of a modulus that is yet to be computed: the matrix's, between both phases; None
+    where the structure has its own.
+    """
+    if "modulus" not in case.stages or case.has("frame.modulus") or not case.has("frame.masses"):
+        return None
+    matrix, inclusion = case.fuzzy("cell.matrix_modulus"), case.fuzzy("cell.inclusion_modulus")
+    ends = sorted([*matrix.support, *inclusion.support])
+    return Triangular(ends[0], matrix.modal, max(ends[-1], ends[0] * (1 + 1e-9)))
+
+
+def crisp_names(case: Case, wanted: Structure) -> Iterator[Problem]:
+    """Names of fuzzy inputs that are crisp in the case, by the key that names them."""
+    for key in fuzzy_keys(case):
+        for name in case.names(key):
+            try:
+                wanted.members(name)
+            except BadInput as error:
+                (problem,) = error.problems
+                yield Problem(
+                    key,
+                    problem.what,
+                    name,
+                    problem.allowed,
+                    file=str(case.path),
+                    line=case.lines.get(key, 0),
+                )
+
+
+def outlasted(case: Case) -> Iterator[str]:
+    """A remark on durations that are longer than the record."""
+    for key in RECORDS:
+        if case.has(key):
+            record = accelerogram(beside(case, case.text(key)), key)
+            end = (len(record.acceleration) - 1) * record.step
+            longest = max(study.task.duration for study in studies(case))
+            if longest > end + 0.5 * record.step:
+                yield (
+                    f"{key}: the record ends at {end:g} s and the simulation at {longest:g} s;"
+                    " afterwards the ground is at rest"
+                )

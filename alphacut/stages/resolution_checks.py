@@ -1,0 +1,112 @@
+"""Settings that run and give rough envelopes: a time step or a tolerance that is coarse beside the
+motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import acos, cos, pi
+from typing import TYPE_CHECKING
+
+from alphacut.io.files import say
+from alphacut.io.problem import BadInput, Problem
+from alphacut.stages.structure import Structure
+
+if TYPE_CHECKING:
+    from alphacut.stages.envelope import EnvelopeTask
+
+MISSED = 0.01  # of a peak, between two nodes
+WITH_TOLERANCE = ("auto", "modal", "graph-follower", "improved-graph-follower")
+
+
+def rough(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
+    """What is coarse about an envelope."""
+    yield from coarse_step(wanted, task)
+    yield from coarse_tolerance(wanted, task)
+    yield from coarse_nodes(wanted, task)
+
+
+def coarse_step(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
+    """A step that cannot resolve the fastest mode, with the phase error that means; the exact
+    propagator needs none.
+    """
+    from alphacut.frame import guard
+
+    if wanted.linear is None or task.scheme == "exact":
+        return
+    found = guard(wanted.linear, task.step, task.duration)
+    if not found.ok:
+        yield Problem("envelope.step", found.message.removeprefix("step: "))
+
+
+def coarse_tolerance(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
+    """A tolerance, or the gap of a certificate, that is more than a hundredth of the peak of an
+    output.
+    """
+    from alphacut.frame.boxes import UnitFlow, boxes
+    from alphacut.frame.checks.tolerance import tolerance_guard
+
+    if task.method not in WITH_TOLERANCE:
+        return
+    inputs = wanted.inputs(task.fuzzy)
+    flow = wanted.flow(
+        tuple(inputs),
+        task.duration,
+        task.step,
+        "exact" if wanted.linear is not None else task.integrator,
+    )
+    if task.certify is not None:
+        gap = tolerance_guard(UnitFlow(flow, boxes(inputs, (0.0,))), task.certify)
+        if not gap.ok:
+            what = (
+                f"{task.certify:.3g} m lets bounds of {gap.output} be wide by {100 * gap.share:.3g}"
+                " % of its peak, more than 1 %"
+            )
+            yield Problem(
+                "envelope.certify", f"{what}; take at most {0.01 * task.certify / gap.share:.2g} m"
+            )
+        return
+    found = tolerance_guard(UnitFlow(flow, boxes(inputs, (0.0,)), task.relative), task.tolerance)
+    if not found.ok:
+        key = (
+            "envelope.relative_tolerance"
+            if task.relative
+            else "envelope.tolerance"
+            if wanted.linear
+            else "pendulum.tolerance"
+        )
+        yield Problem(key, found.message.removeprefix("tolerance: "))
+
+
+def coarse_nodes(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
+    """Nodes so far apart that the peaks of the slowest mode may lie between them, by more than a
+    hundredth.
+    """
+    from alphacut.frame.structures.linear import frequencies
+
+    if wanted.linear is None:
+        return
+    slowest = float(frequencies(wanted.linear)[0])
+    missed = 1 - cos(
+        min(pi, slowest * task.step) / 2
+    )  # of a cosine whose peak lies in the middle between two nodes
+    if missed > MISSED:
+        what = (
+            f"{task.step:g} s between nodes and a first natural period of {2 * pi / slowest:.3g} s:"
+            f" up to {100 * missed:.0f} % of a peak may lie between two nodes; take at most"
+            f" {2 * acos(1 - MISSED) / slowest:.2g} s"
+        )
+        yield Problem("envelope.step", what)
+
+
+def guard_against(wanted: Structure, task: EnvelopeTask, *, strict: bool) -> None:
+    """Warn of what is coarse about an envelope.
+
+    Raises:
+        BadInput: `strict`, and something is.
+    """
+    found = list(rough(wanted, task))
+    if found and strict:
+        raise BadInput(found)
+    for problem in found:
+        say(f"warning: {problem}")

@@ -1,0 +1,184 @@
+"""The cell's stress as what it is, random and fuzzy at once: its p-box, fuzzy quantiles and a fuzzy
+probability of exceeding a limit.
+
+The mean stress of section 3.2 leaves out how the stress scatters with θ; every sample of the fuzzy
+modulus holds the whole curve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from alphacut.case.case import Case
+from alphacut.fuzzy import Domain, FuzzyResult, RandomResponse
+from alphacut.stages.campaign import fuzzy_inputs
+from alphacut.stages.cell import GPA
+from alphacut.stochastic import TruncatedNormal
+
+if TYPE_CHECKING:
+    import xarray
+
+CURVES = {
+    "s11": ("curve11", "stress 11 under ε11 = ε22 = 0.01"),
+    "s12": ("curve12", "stress 12 under ε12 = 0.01"),
+}
+GRID = 81  # stresses at which the p-box is stored
+
+
+def random_response(case: Case, modulus: xarray.Dataset) -> RandomResponse:
+    """The wanted stress at every sample of the fuzzy modulus.
+
+    Args:
+        case: With the section response.
+        modulus: Dataset of the fuzzy modulus, with the samples' stress curves over θ.
+    """
+    from alphacut.fuzzy.samples.design import Design
+    from alphacut.fuzzy.samples.model import Values
+
+    curves, theta = (
+        modulus[CURVES[case.text("response.quantity")][0]].values,
+        modulus["theta"].values,
+    )
+    inputs = fuzzy_inputs(case)
+    domain = Domain(
+        {str(name): inputs[str(name)] for name in modulus["parameter"].values},
+        tuple(map(float, modulus["alpha"].values)),
+    )
+    table = np.hstack([curves, np.tile(theta, (len(curves), 1))])
+    values = Values((("curve", theta.shape), ("theta", theta.shape)), table)
+    samples = Design.from_samples(domain, modulus["point"].values).bounds(
+        values, plan="stored samples"
+    )
+    law = TruncatedNormal(*case.numbers("radius.theta"))
+    return RandomResponse.from_curves(samples, "curve", theta="theta", quantile=law.quantile)
+
+
+def ends(result: FuzzyResult) -> np.ndarray[Any, Any]:
+    """Lower and upper ends, shape (levels, 2, entries)."""
+    return np.stack([result.lower, result.upper], axis=1)
+
+
+def dataset(case: Case, modulus: xarray.Dataset) -> xarray.Dataset:
+    """p-box, fuzzy mean and quantiles and, where the case names a limit, the fuzzy probability of
+    exceeding it, by level; in SI.
+    """
+    import xarray
+
+    response, about = random_response(case, modulus), CURVES[case.text("response.quantity")][1]
+    stress = np.linspace(response.ordered.min(), response.ordered.max(), GRID)
+    probabilities = case.numbers("response.quantiles")
+    quantiles, pascal = response.quantile(probabilities), {"units": "Pa"}
+    places = np.stack([quantiles.lower_at, quantiles.upper_at], axis=1)
+    cut = ("alpha", "bound")
+    found: dict[str, Any] = {
+        "mean": (cut, ends(response.mean())[..., 0], {**pascal, "long_name": f"mean of {about}"}),
+        "cdf": (
+            (*cut, "stress"),
+            ends(response.p_box(stress)),
+            {"units": "1", "long_name": f"distribution function of {about}"},
+        ),
+        "quantile": (
+            (*cut, "probability"),
+            ends(quantiles),
+            {**pascal, "long_name": f"quantile of {about}"},
+        ),
+        "quantile_at": (
+            (*cut, "probability", "parameter"),
+            places,
+            {"long_name": "inputs that reach it, in SI"},
+        ),
+    }
+    if case.has("response.limit"):
+        words = {
+            "units": "1",
+            "long_name": f"probability that {about} exceeds the limit",
+            "limit": case.number("response.limit"),
+        }
+        found["exceedance"] = (
+            cut,
+            ends(response.exceedance(case.number("response.limit")))[..., 0],
+            words,
+        )
+    axes = {
+        "alpha": quantiles.alpha,
+        "bound": ["lower", "upper"],
+        "stress": stress,
+        "probability": list(probabilities),
+    }
+    coordinates: dict[str, Any] = {**axes, "parameter": list(quantiles.inputs)}
+    facts = {
+        "quantity": case.text("response.quantity"),
+        "nature": str(quantiles.nature),
+        "note": quantiles.notes[0],
+    }
+    made = xarray.Dataset(
+        found, coordinates, {**facts, "mean_deviation": deviation(case, modulus, response)}
+    )
+    made["stress"].attrs["units"] = "Pa"
+    return made
+
+
+def deviation(case: Case, modulus: xarray.Dataset, response: RandomResponse) -> float:
+    """Largest relative difference between the mean over the stored curve and the model's own mean:
+    what storing curves costs.
+    """
+    own = modulus[f"{case.text('response.quantity')}_sample"].values
+    return float(np.abs(response.ordered.mean(axis=1) / own - 1).max())
+
+
+def document(found: xarray.Dataset) -> dict[str, Any]:
+    """The response as it is printed with ``--json``; stresses in GPa."""
+
+    def cuts(name: str, unit: float = GPA, **place: float) -> dict[str, Any]:
+        values = found[name].sel(place) if place else found[name]
+        return {str(side): values.sel(bound=side).values / unit for side in ("lower", "upper")}
+
+    numbers: dict[str, Any] = {
+        **{name: found.attrs[name] for name in ("quantity", "nature", "note", "mean_deviation")},
+        "alpha": found["alpha"].values,
+        "mean_GPa": cuts("mean"),
+        "quantiles": [
+            {"probability": p, "GPa": cuts("quantile", probability=p)}
+            for p in found["probability"].values
+        ],
+        "p_box": {"stress_GPa": found["stress"].values / GPA, **cuts("cdf", 1.0)},
+    }
+    if "exceedance" in found:
+        numbers["exceedance"] = {
+            "limit_GPa": found["exceedance"].attrs["limit"] / GPA,
+            **cuts("exceedance", 1.0),
+        }
+    return numbers
+
+
+def table(numbers: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    """Each fuzzy quantity with its lowest and highest cut, in words."""
+    rows = [("mean", numbers["mean_GPa"], " GPa")]
+    rows += [
+        (f"quantile {entry['probability']:g}", entry["GPa"], " GPa")
+        for entry in numbers["quantiles"]
+    ]
+    if limit := numbers.get("exceedance"):
+        rows.append((f"probability of more than {limit['limit_GPa']:g} GPa", limit, ""))
+    return [
+        (
+            name,
+            *(
+                f"[{ends['lower'][level]:.4f}, {ends['upper'][level]:.4f}]{unit}"
+                for level in (0, -1)
+            ),
+        )
+        for name, ends, unit in rows
+    ]
+
+
+def text(numbers: Mapping[str, Any]) -> str:
+    """The response as a small table."""
+    lines = [
+        (f"{numbers['quantity']}", f"α = {numbers['alpha'][0]:g}", f"α = {numbers['alpha'][-1]:g}"),
+        *table(numbers),
+    ]
+    return "".join(f"{name:<38}{low:<26}{high}\n" for name, low, high in lines)

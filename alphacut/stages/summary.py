@@ -1,0 +1,239 @@
+"""summary.json of a run, and the table paper / here / difference."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from alphacut.case.checks import stand_ins
+from alphacut.io.provenance import FORMAT, command, versions
+from alphacut.stages import exceedance as outcomes
+from alphacut.stages import response
+from alphacut.stages.cell import GPA, SHARED, key_of, parts
+from alphacut.stages.pipeline import Results
+from alphacut.stages.structure import structure
+from alphacut.stages.structure_words import structure_words
+
+if TYPE_CHECKING:
+    import xarray
+
+    from alphacut.frame.structures.linear import LinearSystem
+
+Row = dict[str, Any]
+
+
+def summary(results: Results) -> dict[str, Any]:
+    """Everything in numbers: inputs that follow, the fuzzy modulus, the extremes of each study, the
+    comparison.
+    """
+    case = results.case
+    words = {
+        "case": case.name,
+        "title": case.text("title"),
+        "about": case.text("about"),
+        "case_text": case.text_of_file,
+    }
+    found: dict[str, Any] = {
+        "format_version": FORMAT,
+        **words,
+        "command": command(),
+        "versions": versions(),
+    }
+    particles = results.folder / "microstructure.json"
+    if "microstructure" in case.stages and particles.is_file():
+        found["microstructure"] = json.loads(particles.read_text(encoding="utf-8"))
+    if case.has("radius.a1"):
+        found["area_fraction"] = area_fraction(results)
+    if results.modulus is not None:
+        found["modulus"] = modulus_numbers(results.modulus)
+    elif results.handed is not None:
+        found["given_modulus"] = given(results)
+    if results.response is not None:
+        found["response"] = response.document(results.response)
+    if results.envelopes:
+        found["structure"] = structure_numbers(results)
+        fuzzy = {study.name: study.task.fuzzy for study in results.studies}
+        found["envelopes"] = {
+            name: {"fuzzy": fuzzy[name], **envelope_numbers(dataset)}
+            for name, dataset in results.envelopes.items()
+        }
+    if results.exceedance is not None:
+        found["exceedance"] = outcomes.exceedance_document(results.exceedance)
+    found["paper"] = comparison(case.quoted, found) if case.quoted else []
+    return found
+
+
+def area_fraction(results: Results) -> float:
+    """Mean area fraction of the particle at the modal map: E[π r²/4], the cell having the area 4."""
+    from alphacut.stochastic import gauss_rule
+
+    case = results.case
+    modal = {name: case.fuzzy(key_of(name)).modal for name in (*SHARED, "inclusion_modulus")}
+    radius, _, _ = parts(modal, case.numbers("radius.theta"))
+    rule = gauss_rule(radius.distribution, points=20)
+    return float(rule.mean(np.pi / 4 * radius(rule.nodes) ** 2))
+
+
+def modulus_numbers(dataset: xarray.Dataset) -> dict[str, Any]:
+    """α-cuts in GPa, modal value, support, cost."""
+    ends = dataset["E"].transpose("alpha", "bound").values / GPA
+    cuts = {"alpha": dataset["alpha"].values, "E_GPa": {"lower": ends[:, 0], "upper": ends[:, 1]}}
+    support = {
+        "modal_GPa": ends[-1].mean(),
+        "lower_GPa": ends[0, 0],
+        "upper_GPa": ends[0, 1],
+        "nu": dataset["nu"].values[-1].mean(),
+    }
+    cost = {
+        name: dataset.attrs[name]
+        for name in ("samples", "solves", "seconds", "method", "plan", "nature")
+    }
+    cost["reason"] = dataset.attrs.get("reason", "")
+    cost |= {name: dataset.attrs[name] for name in ("shear_ratio",) if name in dataset.attrs}
+    budget = {"error": listed(dataset, "error"), "checks": listed(dataset, "check")}
+    return {**cuts, **support, **cost, **budget}
+
+
+def given(results: Results) -> Row:
+    """The modulus that stands in for a computed one: where it comes from, and its α-cuts."""
+    assert results.handed is not None
+    key = next(iter(stand_ins(results.case)), "frame.modulus")
+    alpha = results.case.numbers("envelope.alpha") if results.envelopes else (0.0, 1.0)
+    cuts = np.array([results.handed.cut(level) for level in alpha]) / GPA
+    return {
+        "of": f"{key} = {results.case.written.get(key, '')}",
+        "alpha": alpha,
+        "E_GPa": {"lower": cuts[:, 0], "upper": cuts[:, 1]},
+    }
+
+
+def listed(dataset: xarray.Dataset, kind: str) -> dict[str, float]:
+    """Named numbers of a dataset, such as errors by source."""
+    if kind not in dataset:
+        return {}
+    return {
+        str(name): float(value)
+        for name, value in zip(dataset[f"{kind}_name"].values, dataset[kind].values, strict=True)
+    }
+
+
+def structure_numbers(results: Results) -> dict[str, Any]:
+    """The structure in words, and natural frequencies at the modal values where it has any."""
+    from alphacut.frame.structures.linear import frequencies
+
+    wanted = structure(results.case, results.handed)
+    words = {"words": structure_words(results.case, wanted)}
+    if wanted.linear is None:
+        return words
+    omega = frequencies(wanted.linear)
+    period = 2 * np.pi / omega[0]
+    return {
+        "omega_rad_per_s": omega,
+        "period_s": period,
+        "two_periods_s": 2 * period,
+        "parameters": counted(wanted.linear),
+        **words,
+    }
+
+
+def counted(model: LinearSystem) -> int:
+    """Parameters of the structure, initial conditions included; the factors that the paper's frame
+    does not have are left out.
+    """
+    from alphacut.frame import StoreyFrame
+
+    left_out = (
+        {"I", "rayleigh_mass", "rayleigh_stiffness"} if isinstance(model, StoreyFrame) else set()
+    )
+    return len(set(model.parameters) - left_out)
+
+
+def envelope_numbers(dataset: xarray.Dataset) -> dict[str, Any]:
+    """Extremes over time at the lowest level, widths, estimated errors where there are any, cost."""
+    lowest = dataset.isel(alpha=0)
+    names = [str(name) for name in dataset["output"].values]
+    low, high = lowest["lower"].min("time").values, lowest["upper"].max("time").values
+    width = (lowest["upper"] - lowest["lower"]).mean("time").values
+    cost = {name: dataset.attrs[name] for name in ("trajectories", "seconds", "method", "nature")}
+    columns = {"min": low, "max": high, "mean_width": width}
+    numbers = {
+        key: dict(zip(names, map(float, column), strict=True)) for key, column in columns.items()
+    }
+    if "gap" in dataset.attrs:
+        cost |= {
+            name: dataset.attrs[name]
+            for name in ("gap", "gap_output", "between_nodes", "proof")
+            if name in dataset.attrs
+        }
+    if "error" in dataset:
+        numbers["error"] = dict(
+            zip(names, map(float, lowest["error"].max("time").values), strict=True)
+        )
+    return (
+        numbers | {"alpha": dataset["alpha"].values, "peak": outcomes.peak_document(dataset)} | cost
+    )
+
+
+def comparison(path: Path, found: Mapping[str, Any]) -> list[Row]:
+    """One row for each number that the paper quotes.
+
+    Args:
+        path: TOML file of the quoted numbers; `of` says where in the summary the same number of
+            this run stands.
+        found: The summary.
+    """
+    rows: list[Row] = []
+    for entry in tomllib.loads(path.read_text(encoding="utf-8"))["quoted"]:
+        paper, here = float(entry["value"]), reached(found, str(entry["of"]))
+        difference = None if here is None else here - paper
+        percent = None if difference is None or not paper else 100 * difference / abs(paper)
+        rows.append(
+            {**entry, "paper": paper, "here": here, "difference": difference, "percent": percent}
+        )
+    return rows
+
+
+def reached(found: Mapping[str, Any], path: str) -> float | None:
+    """A number in the summary by its path; None where the run has none; "a / b" is a quotient."""
+    if " / " in path:
+        above, below = (reached(found, part) for part in path.split(" / "))
+        return None if above is None or not below else above / below
+    here: Any = found
+    for name in path.split(":"):
+        if not isinstance(here, Mapping) or name not in here:
+            return None
+        here = here[name]
+    return float(here)
+
+
+def table(rows: list[Row]) -> str:
+    """The comparison as aligned text."""
+    head = ("quantity", "place", "paper", "here", "difference", "")
+    lines = [head] + [cells(row) for row in rows]
+    widths = [max(len(line[column]) for line in lines) for column in range(len(head))]
+    lines.insert(1, tuple("-" * width for width in widths))
+    return "".join("  ".join(aligned(line, widths)).rstrip() + "\n" for line in lines)
+
+
+def aligned(line: tuple[str, ...], widths: list[int]) -> list[str]:
+    """Words to the left, numbers to the right."""
+    return [
+        cell.ljust(width) if column < 2 else cell.rjust(width)
+        for column, (cell, width) in enumerate(zip(line, widths, strict=True))
+    ]
+
+
+def cells(row: Row) -> tuple[str, ...]:
+    """One row in words; digits as many as the paper prints, and two more for this run."""
+    digits = len(str(row["value"]).partition(".")[2])
+    unit = f" {row['unit']}" if row.get("unit") else ""
+    more = digits if row.get("counted", False) else digits + 1
+    here = "not computed" if row["here"] is None else f"{row['here']:.{more}f}{unit}"
+    difference = "" if row["difference"] is None else f"{row['difference']:+.{more}f}"
+    percent = "" if row["percent"] is None else f"{row['percent']:+.2f} %"
+    return str(row["what"]), str(row["place"]), f"{row['value']}{unit}", here, difference, percent

@@ -1,0 +1,152 @@
+"""What drives the width: the share of each input in the width of the modulus over α, and of the
+vibration over time.
+
+The share of an input is the width lost when it alone is fixed at its modal value. For these
+additional propagations the cheap exact models
+serve, whatever the case itself uses: the series for the cell, the modal method for the frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from alphacut.case.case import Case
+from alphacut.fuzzy import Crisp, FuzzyNumber, Reduced, propagate
+from alphacut.io.files import say
+from alphacut.stages.campaign import campaign
+from alphacut.stages.pipeline import Results, Study
+from alphacut.stages.structure import structure
+from alphacut.stochastic.theta.truncated_normal import Array
+
+if TYPE_CHECKING:
+    import xarray
+
+    from alphacut.fuzzy.width_contributions import Shares
+
+
+def modulus_shares(case: Case) -> Shares:
+    """Shares of the cell's fuzzy inputs in the width of E, shape (inputs, levels)."""
+    from alphacut.fuzzy.width_contributions import width_shares
+
+    wanted = campaign(case)
+    choice = replace(wanted.task.choice, method="series")
+
+    def bounds(inputs: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
+        fuzzy = {name: number for name, number in inputs.items() if not isinstance(number, Crisp)}
+        crisp = {
+            **wanted.task.crisp,
+            **{name: number.modal for name, number in inputs.items() if name not in fuzzy},
+        }
+        if not fuzzy:
+            return np.zeros(len(wanted.alpha)), np.zeros(len(wanted.alpha))
+        shared = tuple(name for name in fuzzy if name != "inclusion_modulus") or tuple(fuzzy)
+        task = replace(wanted.task, choice=choice, crisp=crisp)
+        return propagate(task, fuzzy, Reduced(), alpha=wanted.alpha, shared=shared).bounds("E")
+
+    return width_shares(bounds, wanted.inputs)
+
+
+def envelope_shares(results: Results, study: Study) -> tuple[Shares, Array]:
+    """Shares of a study's fuzzy inputs in the width of every output at the lowest level, (inputs,
+    times, outputs); the times.
+
+    Raises:
+        ModalError: The modal method cannot treat the structure.
+    """
+    from alphacut import frame
+    from alphacut.fuzzy.width_contributions import width_shares
+
+    wanted = structure(results.case, results.handed)
+    assert wanted.linear is not None
+    model, inputs = wanted.linear, wanted.inputs(study.task.fuzzy)
+    step = (
+        study.task.step if model.ground is None else thinned(study.task.duration, study.task.step)
+    )
+    options: dict[str, Any] = (
+        {} if model.ground is None else {"tolerance": 1e-2, "relative": True}
+    )  # a share needs two digits
+    groups = {name: wanted.members(name) for name in study.task.fuzzy}
+    times: list[Array] = []
+
+    def bounds(fuzzy: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
+        left = {name: number for name, number in fuzzy.items() if not isinstance(number, Crisp)}
+        level, task = (study.task.alpha[0],), study.task
+        found = frame.envelope(
+            model, left, alpha=level, duration=task.duration, step=step, method="modal", **options
+        )
+        times.append(found.time)
+        return found.lower[0], found.upper[0]
+
+    return width_shares(bounds, inputs, groups=groups), times[0]
+
+
+def dataset(results: Results) -> xarray.Dataset:
+    """Shares of every input, of the modulus by level and of the richest study by time and output,
+    where there are two inputs or more.
+    """
+    import xarray
+
+    from alphacut.frame.structures.modes import ModalError
+
+    variables: dict[str, Any] = {}
+    coordinates: dict[str, Any] = {}
+    if results.modulus is not None and len(results.modulus["parameter"]) > 1:
+        cell = modulus_shares(results.case)
+        variables["modulus_share"] = (("cell_input", "alpha"), cell.share, {"units": "1"})
+        coordinates |= {
+            "cell_input": list(cell.names),
+            "alpha": list(results.case.numbers("modulus.alpha")),
+        }
+    study = richest(results)
+    if study is not None and len(study.task.fuzzy) > 1 and not results.case.has("pendulum.mass"):
+        try:
+            structure, time = envelope_shares(results, study)
+        except ModalError as error:
+            say(f"no shares of the width over time: {error}")
+        else:
+            variables["share"] = (("input", "time", "output"), structure.share, {"units": "1"})
+            variables["width"] = (("time", "output"), structure.width)
+            names = [str(name) for name in results.envelopes[study.name]["output"].values]
+            coordinates |= {"input": list(structure.names), "time": time, "output": names}
+    return xarray.Dataset(variables, coordinates, {"study": study.name if study else ""})
+
+
+def thinned(duration: float, step: float) -> float:
+    """A multiple of the step that divides the duration into some hundreds of nodes: enough to see,
+    where the exact propagator steps.
+    """
+    steps = round(duration / step)
+    return step * max(k for k in range(1, max(2, steps // 300)) if steps % k == 0)
+
+
+def richest(results: Results) -> Study | None:
+    """The study with the most fuzzy inputs; None without studies."""
+    return (
+        max(results.studies, key=lambda study: (len(study.task.fuzzy), study.task.duration))
+        if results.studies
+        else None
+    )
+
+
+def mean_shares(found: xarray.Dataset) -> dict[str, dict[str, float]]:
+    """Shares for a table: of E at the lowest level, of each output as the mean over time weighted
+    with the width.
+    """
+    table: dict[str, dict[str, float]] = {}
+    if "modulus_share" in found:
+        lowest = found["modulus_share"].isel(alpha=0)
+        table["E"] = {
+            str(name): float(lowest.sel(cell_input=name)) for name in found["cell_input"].values
+        }
+    if "share" in found:
+        weighted = (found["share"] * found["width"]).sum("time") / found["width"].sum("time")
+        for output in found["output"].values:
+            table[str(output)] = {
+                str(name): float(weighted.sel(input=name, output=output))
+                for name in found["input"].values
+            }
+    return table

@@ -1,0 +1,158 @@
+"""The promise of `auto` on random frames: true error against the tolerance, with and without the
+modal method.
+
+Run `python -m benchmarks.frame.random_frames --help`.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from alphacut.frame import Envelope, Exact, LinearFlow, StoreyFrame, envelope
+from alphacut.frame.boxes import UnitFlow, boxes
+from alphacut.fuzzy import FuzzyNumber, Triangular
+from benchmarks.frame.reference import true_envelope
+from benchmarks.rows import write
+
+RESULTS = Path(__file__).parents[1] / "results"
+TIME: dict[str, Any] = {"duration": 12.0, "step": 0.05, "alpha": (0,)}
+ORDERS: list[tuple[tuple[str, ...], tuple[float, ...]]] = [
+    ((), (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)),
+    (("modal",), (1e-2, 1e-3, 1e-4)),
+]
+GAP = 1e-7
+"""Of the certified envelope, in m, a tenth of the sharpest tolerance."""
+
+
+def random_frame(seed: int) -> tuple[StoreyFrame, dict[str, FuzzyNumber]]:
+    """A frame of two to eight storeys with one to four fuzzy parameters, all from `seed`."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(2, 9))
+    frame = StoreyFrame(
+        rng.uniform(4e3, 3e4, n),
+        rng.uniform(2.3, 3.2, n),
+        rng.uniform(20e9, 30e9),
+        rng.uniform(0.5e-6, 3e-6),
+        rng.uniform(20, 500, n),
+        str(rng.choice(["ground", "storey"])),
+        rng.uniform(-0.1, 0.1, n),
+        rng.uniform(-0.5, 0.5, n),
+    )
+    floors = 1 + rng.permutation(n)
+    pool = [
+        "E",
+        f"m{floors[0]}",
+        f"m{floors[1]}",
+        f"l{floors[0]}",
+        f"d{floors[-1]}",
+        f"q{floors[0]}_0",
+        f"v{floors[1]}_0",
+    ]
+    chosen = rng.choice(pool, int(rng.integers(1, 5)), replace=False)
+    return frame, {str(name): _around(frame.parameters[name], rng) for name in chosen}
+
+
+def _around(middle: float, rng: np.random.Generator) -> FuzzyNumber:
+    """A fuzzy number of 2 to 10 % to either side."""
+    left, right = abs(middle) * rng.uniform(0.02, 0.1, 2)
+    return Triangular(middle - left, middle, middle + right)
+
+
+def certified(frame: StoreyFrame, inputs: Mapping[str, FuzzyNumber]) -> Envelope | None:
+    """The envelope with inner and outer bounds no further apart than `GAP`; None where the modes
+    are not smooth enough for it.
+    """
+    try:
+        return envelope(frame, inputs, method="modal", certify=GAP, **TIME)
+    except ValueError:
+        return None
+
+
+def true_errors(
+    frame: StoreyFrame, inputs: Mapping[str, FuzzyNumber], found: Sequence[Envelope]
+) -> list[float]:
+    """Largest error of each envelope, in m: beyond the certified bounds, or against a dense,
+    polished reference at every 20th node.
+    """
+    truth = certified(frame, inputs)
+    if truth is None:
+        cuts = boxes(inputs, (0,))
+        flow = UnitFlow(
+            LinearFlow(frame, cuts.names, TIME["duration"], 20 * TIME["step"], Exact()), cuts
+        )
+        polished = true_envelope(flow, samples=2**12, candidates=min(8, 2 ** len(inputs)))
+        return [float(polished.errors(envelope).max()) for envelope in found]
+    assert truth.inner_lower is not None
+    assert truth.inner_upper is not None
+    errors = []
+    for e in found:
+        beyond = (
+            truth.lower - e.lower,
+            e.lower - truth.inner_lower,
+            e.upper - truth.upper,
+            truth.inner_upper - e.upper,
+        )
+        errors.append(float(max(0.0, *(x.max() for x in beyond))))
+    return errors
+
+
+def measured(seeds: Sequence[int]) -> Iterator[dict[str, Any]]:
+    """One row per frame, exclusion and tolerance."""
+    for seed in seeds:
+        frame, inputs = random_frame(seed)
+        orders = [
+            (exclude, tolerance) for exclude, tolerances in ORDERS for tolerance in tolerances
+        ]
+        found = [
+            envelope(frame, inputs, method="auto", tolerance=tolerance, exclude=exclude, **TIME)
+            for exclude, tolerance in orders
+        ]
+        for (exclude, tolerance), made, error in zip(
+            orders, found, true_errors(frame, inputs, found), strict=True
+        ):
+            yield {
+                "seed": seed,
+                "storeys": frame.floors,
+                "fuzzy": " ".join(inputs),
+                "excluded": " ".join(exclude),
+                "tolerance_m": tolerance,
+                "error_m": error,
+                "estimate_m": float(made.facts["estimated_error"]),
+                "method": made.method,
+                "trajectories": made.trajectories,
+                "seconds": made.seconds,
+            }
+
+
+def main() -> None:
+    """Measures, prints, writes."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--first", type=int, default=0, help="first seed (0)")
+    parser.add_argument("--frames", type=int, default=20, help="number of frames (20)")
+    options = parser.parse_args()
+    RESULTS.mkdir(exist_ok=True)
+    rows = []
+    for row in measured(range(options.first, options.first + options.frames)):
+        rows.append(row)
+        verdict = "" if row["error_m"] <= row["tolerance_m"] else "  ABOVE THE TOLERANCE"
+        print(
+            f"{row['seed']:3d} {row['storeys']} storeys, {row['fuzzy']:18s}"
+            f" {row['tolerance_m']:.0e} m: error {row['error_m']:.1e} m, estimate"
+            f" {row['estimate_m']:.1e} m, {row['method']}, {row['trajectories']} runs,"
+            f" {row['seconds']:.1f} s{verdict}",
+            flush=True,
+        )
+    kept = [row for row in rows if row["error_m"] <= row["tolerance_m"]]
+    print(f"{len(kept)} of {len(rows)} within the tolerance")
+    write(rows, RESULTS / "frame_random.csv")
+
+
+if __name__ == "__main__":
+    main()

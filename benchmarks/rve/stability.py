@@ -1,0 +1,213 @@
+"""What the models of the cell do at their edges: `make stability`.
+
+Every row is one edge and one model: the error declared and the true one (against the series), or
+the sentence of refusal. A row is wrong, and the program exits with 1, where a result came without a
+word and its true error is above the declared one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from alphacut.rve.cell import Phase
+from alphacut.rve.result import Homogenised
+from alphacut.rve.series.model import SeriesModel
+from alphacut.stochastic import HermiteMap, RadiusMap, TruncatedNormal
+from alphacut.stochastic.theta.truncated_normal import Array
+
+MATRIX, PARTICLE = Phase(20e9), Phase(80e9)
+PAPER_MAP = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)  # modal values of the paper, section 4.1
+ROUND_OFF = 1e-11
+
+Solve = Callable[[RadiusMap, Phase, Phase], Homogenised]
+
+
+def crisp(radius: float) -> HermiteMap:
+    """The map of a certain radius."""
+    return HermiteMap(radius, 0.0, radius, 0.0)
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A radius of 0.4 below θ = 0.3 and 0.7 above."""
+
+    distribution: TruncatedNormal = field(default_factory=TruncatedNormal)
+
+    def __call__(self, theta: ArrayLike) -> Array:
+        """Radius at `theta`, any shape."""
+        return np.where(np.asarray(theta, float) < 0.3, 0.4, 0.7)
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A cell at the edge of what a model can do."""
+
+    name: str
+    radius_map: RadiusMap
+    matrix: Phase = MATRIX
+    particle: Phase = PARTICLE
+
+
+EDGES = (
+    Edge("r = 1e-6", crisp(1e-6)),
+    Edge("r = 0.001", crisp(1e-3)),
+    Edge("r = 0.98", crisp(0.98)),
+    Edge("r = 0.98, hole", crisp(0.98), particle=Phase(20e3)),
+    Edge("r = 0.98, rigid", crisp(0.98), particle=Phase(20e15)),
+    Edge("r = 0.99999, hole", crisp(0.99999), particle=Phase(20e3)),
+    Edge("contrast 1e-6", PAPER_MAP, particle=Phase(20e3)),
+    Edge("contrast 1e6", PAPER_MAP, particle=Phase(20e15)),
+    Edge("ν_i = 0.499999", PAPER_MAP, particle=Phase(80e9, 0.499999)),
+    Edge("ν_m = 0.499999", PAPER_MAP, Phase(20e9, 0.499999)),
+    Edge("ν_m = ν_i = 0.4999", PAPER_MAP, Phase(20e9, 0.4999), Phase(80e9, 0.4999)),
+    Edge("map not monotone", HermiteMap(0.6, -1.5, 0.7, 0.5)),
+    Edge("map that jumps", Jump()),
+    Edge("steep map (distorted layers)", HermiteMap(0.02, 0.0, 0.95, 2.5)),
+)
+
+
+def models(*, small: bool) -> dict[str, Solve]:
+    """Name → model at a resolution that suits a test (`small`) or the table."""
+
+    def series(radius_map: RadiusMap, matrix: Phase, particle: Phase) -> Homogenised:
+        return SeriesModel().solve(radius_map, matrix, [particle])[0]
+
+    def slices(order: int, size: float) -> Solve:
+        from alphacut.rve.slices.model import SlicesModel
+
+        model = SlicesModel(order=order, mesh_size=size, points=8)
+        return lambda radius_map, matrix, particle: model.solve(radius_map, matrix, [particle])[0]
+
+    def table(radius_map: RadiusMap, matrix: Phase, particle: Phase) -> Homogenised:
+        from alphacut.rve.table.model import TableModel
+
+        return TableModel(1e-3 if small else 1e-6).solve(radius_map, matrix, [particle])[0]
+
+    def prism(layers: int, size: float) -> Solve:
+        from alphacut.rve.prism.model import PrismModel
+
+        model = PrismModel(mesh_size=size, layers=layers, estimate=True)
+        return lambda radius_map, matrix, particle: model.solve(radius_map, matrix, [particle])[0]
+
+    size = 0.5 if small else 0.25
+    return {
+        "series": series,
+        "table": table,
+        "slices, order 2": slices(2, size),
+        "slices, order 4": slices(4, size),
+        "prism": prism(6 if small else 12, size),
+    }
+
+
+LAYERS = (2, 3, 6, 12, 25, 50, 100, 200)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One edge met by one model: errors relative in E; `declared` and `true` are nan where the
+    model refused.
+    """
+
+    edge: str
+    model: str
+    outcome: str
+    declared: float
+    true: float
+    seconds: float
+    sentence: str = ""
+
+
+def meet(edge: Edge, name: str, solve: Solve) -> Row:
+    """Try one model on one edge."""
+    started = perf_counter()
+    try:
+        found = solve(edge.radius_map, edge.matrix, edge.particle)
+    except (RuntimeError, ValueError) as refusal:
+        return Row(
+            edge.name,
+            name,
+            "refuses",
+            np.nan,
+            np.nan,
+            perf_counter() - started,
+            str(refusal).splitlines()[0],
+        )
+    seconds = perf_counter() - started
+    try:
+        exact = SeriesModel().solve(edge.radius_map, edge.matrix, [edge.particle])[0]
+    except RuntimeError as refusal:
+        return Row(
+            edge.name,
+            name,
+            "unjudged",
+            found.estimated_error,
+            np.nan,
+            seconds,
+            f"no truth: {refusal}",
+        )
+    true = abs(found.modulus / exact.modulus - 1)
+    works = true <= found.estimated_error + ROUND_OFF
+    return Row(edge.name, name, "works" if works else "WRONG", found.estimated_error, true, seconds)
+
+
+def table(*, small: bool) -> Iterator[Row]:
+    """All rows: every edge by every model, then the layers of the prism model."""
+    chosen = models(small=small)
+    for edge in EDGES:
+        for name, solve in chosen.items():
+            yield meet(edge, name, solve)
+    from alphacut.rve.prism.model import PrismModel
+
+    for layers in LAYERS[:4] if small else LAYERS:
+
+        def prism(
+            radius_map: RadiusMap, matrix: Phase, particle: Phase, layers: int = layers
+        ) -> Homogenised:
+            return PrismModel(mesh_size=0.25, layers=layers, estimate=True).solve(
+                radius_map, matrix, [particle]
+            )[0]
+
+        yield meet(Edge(f"{layers} layers", PAPER_MAP), "prism", prism)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the table and write the CSV file; exit 1 if a row is wrong."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--small", action="store_true", help="coarse meshes, in seconds")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path(__file__).parents[1] / "results" / "cell_stability.csv",
+        help="CSV file to write",
+    )
+    options = parser.parse_args(arguments)
+    rows = []
+    print(f"{'edge':30} {'model':16} {'outcome':10} {'declared':>9} {'true':>9} {'seconds':>8}")
+    for row in table(small=options.small):
+        rows.append(row)
+        print(
+            f"{row.edge:30} {row.model:16} {row.outcome:10} {row.declared:9.1e} {row.true:9.1e}"
+            f" {row.seconds:8.2f}  {row.sentence}",
+            flush=True,
+        )
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    with options.out.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(Row.__dataclass_fields__)
+        writer.writerows([*row.__dict__.values()] for row in rows)
+    return int(any(row.outcome == "WRONG" for row in rows))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

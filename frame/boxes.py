@@ -1,0 +1,172 @@
+"""The boxes P_α of the uncertain parameters, and trajectories over the unit box."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from alphacut.frame.calculus.jet import Array, Jet
+from alphacut.frame.checks.numbers import require_numbers
+from alphacut.frame.dynamics.flow import Flow
+from alphacut.frame.envelope import output_unit
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy.arguments import fuzzy_inputs
+
+ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Boxes:
+    """Nested boxes, one per level, in physical and in unit coordinates.
+
+    The unit coordinate of a parameter runs over [−1, 1] on its widest cut: p = centre + radius u.
+
+    Args:
+        names: Parameters, d of them.
+        alpha: Levels, rising, shape (A,).
+        lower: Lower ends, shape (A, d), in SI units.
+        upper: Upper ends, shape (A, d).
+        modal: Values of membership 1, shape (d,).
+
+    Raises:
+        ValueError: No parameter, or a level outside [0, 1], or levels not rising.
+    """
+
+    names: tuple[str, ...]
+    alpha: Array
+    lower: Array
+    upper: Array
+    modal: Array
+
+    def __post_init__(self) -> None:
+        if not self.names:
+            raise ValueError("no uncertain parameter: name at least one")
+        if (
+            not len(self.alpha)
+            or self.alpha.min() < 0
+            or self.alpha.max() > 1
+            or (np.diff(self.alpha) <= 0).any()
+        ):
+            raise ValueError(f"alpha: {[float(a) for a in self.alpha]} must rise within [0, 1]")
+
+    @property
+    def centre(self) -> Array:
+        """Middle of the widest box, shape (d,)."""
+        middle: Array = (self.lower[0] + self.upper[0]) / 2
+        return middle
+
+    @property
+    def radius(self) -> Array:
+        """Half widths of the widest box, shape (d,)."""
+        half: Array = (self.upper[0] - self.lower[0]) / 2
+        return half
+
+    def to_unit(self, points: Array) -> Array:
+        """Unit coordinates of physical points (…, d); a parameter without width is at 0."""
+        unit: Array = (points - self.centre) / np.where(self.radius > 0, self.radius, 1.0)
+        return unit
+
+    def to_physical(self, unit: Array) -> Array:
+        """Physical points of unit coordinates (…, d), never outside the widest box."""
+        points: Array = np.clip(self.centre + self.radius * unit, self.lower[0], self.upper[0])
+        return points
+
+    def in_unit(self, jet: Jet) -> Jet:
+        """Derivatives by the physical parameters, turned into derivatives by the unit coordinates."""
+        shape, r = (1,) * jet.value.ndim, self.radius
+        return Jet(
+            jet.value,
+            jet.first * r.reshape(-1, *shape),
+            jet.second * (r[:, None] * r).reshape(len(r), len(r), *shape),
+        )
+
+    def unit(self, level: int) -> tuple[Array, Array]:
+        """Lower and upper ends of a level in unit coordinates."""
+        return self.to_unit(self.lower[level]), self.to_unit(self.upper[level])
+
+
+def boxes(inputs: Mapping[str, FuzzyNumber | float], alpha: Sequence[float] = ALPHA) -> Boxes:
+    """The α-cuts of `inputs` as boxes.
+
+    Args:
+        inputs: Fuzzy numbers by name, in SI units; a plain number is a crisp one.
+        alpha: Levels, rising within [0, 1].
+
+    Raises:
+        ValueError: An input is no number, or as `Boxes`.
+    """
+    levels = _levels(alpha)
+    numbers = fuzzy_inputs(inputs)
+    cuts = np.array(
+        [[number.cut(a) for number in numbers.values()] for a in levels], float
+    ).reshape(len(levels), len(numbers), 2)
+    modal = np.array([number.modal for number in numbers.values()])
+    return Boxes(tuple(numbers), levels, cuts[..., 0], cuts[..., 1], modal)
+
+
+def _levels(alpha: Sequence[float]) -> Array:
+    require_numbers("alpha", alpha, "[0, 1]")
+    levels = np.asarray(alpha, float)
+    if not len(levels) or levels.min() < 0 or levels.max() > 1 or (np.diff(levels) <= 0).any():
+        raise ValueError(f"alpha: {levels.tolist()} must rise within [0, 1]")
+    return levels
+
+
+@dataclass(frozen=True, eq=False)
+class UnitFlow:
+    """A flow in unit coordinates.
+
+    Args:
+        flow: The flow in physical parameters.
+        boxes: The boxes; its names must be those of `flow`.
+        relative: Whether tolerances are shares of each output's modal peak instead of lengths.
+    """
+
+    flow: Flow
+    boxes: Boxes
+    relative: bool = False
+
+    @property
+    def time(self) -> Array:
+        """Nodes, shape (T,), in s."""
+        return self.flow.time
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the observed quantities."""
+        return self.flow.outputs
+
+    @property
+    def reference(self) -> int:
+        """Index of the output that a tolerance is meant for: the first displacement, whatever
+        stands before it; else the first.
+        """
+        return next(
+            (index for index, name in enumerate(self.outputs) if output_unit(name) == "m"), 0
+        )
+
+    @cached_property
+    def scale(self) -> Array:
+        """Factor on a tolerance for each output, shape (m,).
+
+        Relative: the modal peaks. Else 1 when all outputs share a unit, or their modal peaks by
+            that of `reference`.
+        """
+        if not self.relative and len({output_unit(name) for name in self.outputs}) == 1:
+            return np.ones(len(self.outputs))
+        peak = np.abs(self.flow.values(self.boxes.modal[None])[0]).max(0)
+        shares: Array = np.where(peak > 0, peak, peak.max() or 1.0) / (
+            1.0 if self.relative else peak[self.reference] or 1.0
+        )
+        return shares
+
+    def values(self, unit: Array) -> Array:
+        """Trajectories at unit coordinates (S, d), shape (S, T, outputs)."""
+        return self.flow.values(self.boxes.to_physical(unit))
+
+    def taylor(self, unit: Array) -> Jet:
+        """Trajectories with derivatives by the unit coordinates, V = (S, T, outputs)."""
+        return self.boxes.in_unit(self.flow.taylor(self.boxes.to_physical(unit)))

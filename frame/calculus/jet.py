@@ -1,0 +1,248 @@
+"""Truncated Taylor polynomials of degree 2 in the parameters: write a model once, get its first and
+second derivatives.
+
+A jet is a value with its first and second derivatives with respect to d parameters. With d = 0 it
+is a plain array that costs nothing more, so the same code computes values alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Jet:
+    """A value of shape V with derivatives along d parameters; arithmetic broadcasts over V as NumPy
+    does.
+
+    Args:
+        value: Shape V.
+        first: First derivatives, shape (d, *V).
+        second: Second derivatives, shape (d, d, *V), symmetric in the first two axes.
+    """
+
+    value: Array
+    first: Array
+    second: Array
+
+    __array_ufunc__ = None  # an array on the left leaves the operation to the jet
+
+    @classmethod
+    def constant(cls, value: ArrayLike, directions: int) -> Jet:
+        """A jet without dependence on any of `directions` parameters."""
+        array = np.asarray(value, float)
+        return cls(
+            array,
+            np.zeros((directions, *array.shape)),
+            np.zeros((directions, directions, *array.shape)),
+        )
+
+    @property
+    def directions(self) -> int:
+        """Number of parameters d."""
+        return self.first.shape[0]
+
+    def __getitem__(self, index: Any) -> Jet:
+        key = index if isinstance(index, tuple) else (index,)
+        return Jet(
+            self.value[key],
+            self.first[(slice(None), *key)],
+            self.second[(slice(None), slice(None), *key)],
+        )
+
+    def map(self, linear: Callable[[Array], Array]) -> Jet:
+        """A linear map that acts alike on value and derivatives, given as a function of arrays with
+        any leading axes.
+        """
+        return Jet(linear(self.value), linear(self.first), linear(self.second))
+
+    def __neg__(self) -> Jet:
+        return Jet(-self.value, -self.first, -self.second)
+
+    def __add__(self, other: Jet | ArrayLike) -> Jet:
+        b = self._lift(other)
+        return _paired(self, b, lambda x, y: x + y)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Jet | ArrayLike) -> Jet:
+        return self + (-self._lift(other))
+
+    def __rsub__(self, other: Jet | ArrayLike) -> Jet:
+        return self._lift(other) + (-self)
+
+    def __mul__(self, other: Jet | ArrayLike) -> Jet:
+        if not isinstance(other, Jet):
+            factor = np.asarray(other, float)
+            return _padded(self, factor.ndim).map(lambda x: x * factor)
+        return _product(*_matched(self, other), np.multiply)
+
+    __rmul__ = __mul__
+
+    def __matmul__(self, other: Jet | Array) -> Jet:
+        if not isinstance(other, Jet):
+            return self.map(lambda x: x @ other)
+        return _product(self, other, np.matmul)
+
+    def __rmatmul__(self, other: Array) -> Jet:
+        return self.map(lambda x: other @ x)
+
+    def __truediv__(self, other: Jet | ArrayLike) -> Jet:
+        return self * (other**-1 if isinstance(other, Jet) else 1 / np.asarray(other, float))
+
+    def __rtruediv__(self, other: ArrayLike) -> Jet:
+        return self**-1 * other
+
+    def __pow__(self, exponent: float) -> Jet:
+        x = self.value
+        if exponent == 2:
+            return self * self
+        return self.chain(
+            x**exponent,
+            exponent * x ** (exponent - 1),
+            exponent * (exponent - 1) * x ** (exponent - 2),
+        )
+
+    def chain(self, f: Array, df: Array, ddf: Array) -> Jet:
+        """The jet of f(self) from f, f' and f'' at the value, elementwise."""
+        outer = self.first[:, None] * self.first[None, :]
+        return Jet(f, df * self.first, df * self.second + ddf * outer)
+
+    def _lift(self, other: Jet | ArrayLike) -> Jet:
+        return other if isinstance(other, Jet) else Jet.constant(other, self.directions)
+
+
+def _padded(a: Jet, ndim: int) -> Jet:
+    """`a` with V extended on the left by axes of length 1 up to `ndim` axes, so that its
+    derivatives broadcast as its value does.
+    """
+    missing = ndim - a.value.ndim
+    if missing <= 0:
+        return a
+    ones, d = (1,) * missing, a.directions
+    shape = a.value.shape
+    return Jet(
+        a.value.reshape(ones + shape),
+        a.first.reshape((d, *ones, *shape)),
+        a.second.reshape((d, d, *ones, *shape)),
+    )
+
+
+def _matched(a: Jet, b: Jet) -> tuple[Jet, Jet]:
+    return _padded(a, b.value.ndim), _padded(b, a.value.ndim)
+
+
+def _paired(a: Jet, b: Jet, operation: Callable[[Array, Array], Array]) -> Jet:
+    a, b = _matched(a, b)
+    return Jet(
+        operation(a.value, b.value), operation(a.first, b.first), operation(a.second, b.second)
+    )
+
+
+def _product(a: Jet, b: Jet, bilinear: Callable[[Array, Array], Array]) -> Jet:
+    """Leibniz' rule for a product that is linear in both factors."""
+    cross = bilinear(a.first[:, None], b.first[None, :])
+    second = (
+        bilinear(a.second, b.value) + bilinear(a.value, b.second) + cross + cross.swapaxes(0, 1)
+    )
+    return Jet(
+        bilinear(a.value, b.value), bilinear(a.first, b.value) + bilinear(a.value, b.first), second
+    )
+
+
+def variables(points: Array, names: Sequence[str], selected: Sequence[str]) -> dict[str, Jet]:
+    """Independent variables of a Taylor expansion, one jet of shape (S,) per name.
+
+    Args:
+        points: Values, shape (S, len(names)).
+        names: Names of the columns.
+        selected: The names to differentiate by, in the order of the derivatives; empty for values
+            alone.
+    """
+    d = len(selected)
+    jets = {name: Jet.constant(points[:, i], d) for i, name in enumerate(names)}
+    for k, name in enumerate(selected):
+        jets[name].first[k] = 1.0
+    return jets
+
+
+def stack(rows: Sequence[Sequence[Jet | float]], like: Mapping[str, Jet]) -> Jet:
+    """A matrix of shape (S, n, m) from entries of shape (S,) or plain numbers; S and d are those of
+    `like`.
+    """
+    sample = next(iter(like.values()))
+    size, d = sample.value.size, sample.directions
+    shape = (len(rows), len(rows[0]))
+    out = Jet.constant(np.zeros((size, *shape)), d)
+    for i, row in enumerate(rows):
+        for j, entry in enumerate(row):
+            if isinstance(entry, Jet):
+                out.value[:, i, j], out.first[..., i, j], out.second[..., i, j] = (
+                    entry.value,
+                    entry.first,
+                    entry.second,
+                )
+            else:
+                out.value[:, i, j] = entry
+    return out
+
+
+def inverse(a: Jet) -> Jet:
+    """Inverse of square matrices, V = (..., n, n): one factorisation serves the value and all
+    derivatives.
+    """
+    x = np.linalg.inv(a.value)
+    first = -x @ a.first @ x
+    cross = -x @ a.first[:, None] @ first[None, :]
+    return Jet(x, first, -x @ a.second @ x + cross + cross.swapaxes(0, 1))
+
+
+def concatenate(parts: Sequence[Jet], axis: int) -> Jet:
+    """Joins jets along a negative `axis` of V."""
+    return Jet(
+        *(
+            np.concatenate([getattr(p, part) for p in parts], axis)
+            for part in ("value", "first", "second")
+        )
+    )
+
+
+def sin(x: Any) -> Any:
+    """Sine of a jet, an array or a symbol of SymPy."""
+    return (
+        x.chain(np.sin(x.value), np.cos(x.value), -np.sin(x.value))
+        if isinstance(x, Jet)
+        else _elementary("sin", x)
+    )
+
+
+def cos(x: Any) -> Any:
+    """Cosine of a jet, an array or a symbol of SymPy."""
+    return (
+        x.chain(np.cos(x.value), -np.sin(x.value), -np.cos(x.value))
+        if isinstance(x, Jet)
+        else _elementary("cos", x)
+    )
+
+
+def exp(x: Any) -> Any:
+    """Exponential of a jet, an array or a symbol of SymPy."""
+    if isinstance(x, Jet):
+        value = np.exp(x.value)
+        return x.chain(value, value, value)
+    return _elementary("exp", x)
+
+
+def _elementary(name: str, x: Any) -> Any:
+    if isinstance(x, float | int | np.ndarray):
+        return getattr(np, name)(x)
+    import sympy  # only for symbols
+
+    return getattr(sympy, name)(x)

@@ -1,0 +1,42 @@
+"""Low-discrepancy points of Chebyshev density, denser towards the faces of the box where envelopes
+are often attained.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from alphacut.frame.calculus.jet import Array
+
+
+def primes(count: int) -> list[int]:
+    """The first `count` primes."""
+    found: list[int] = []
+    candidate = 2
+    while len(found) < count:
+        if all(candidate % p for p in found):
+            found.append(candidate)
+        candidate += 1
+    return found
+
+
+def halton(dimension: int, count: int, *, skip: int = 1) -> Array:
+    """Halton points in (0, 1), shape (count, dimension), digits permuted by a fixed multiplier so
+    that high primes do not line up.
+    """
+    out = np.zeros((count, dimension))
+    for axis, base in enumerate(primes(dimension)):
+        multiplier = max(1, round(base * 0.618))
+        weight = 1.0 / base
+        rest: Array = np.arange(skip, skip + count)
+        while rest.any():
+            rest, digit = np.divmod(rest, base)
+            out[:, axis] += (digit * multiplier % base) * weight
+            weight /= base
+    return out
+
+
+def chebyshev_points(dimension: int, count: int, *, skip: int = 1) -> Array:
+    """Points of [−1, 1]^d of Chebyshev density, shape (count, dimension)."""
+    points: Array = -np.cos(np.pi * halton(dimension, count, skip=skip))
+    return points

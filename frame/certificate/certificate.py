@@ -1,0 +1,142 @@
+"""Certified envelopes: for every node, level and output an attained bound and a proved one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.polynomial import Polynomial
+from alphacut.frame.certificate.branch_and_bound import BranchAndBound
+from alphacut.frame.certificate.remainder import largest_growth, suprema
+from alphacut.frame.certificate.wave_bounds import parts
+from alphacut.frame.modal.model import ModalModel
+from alphacut.frame.modal.search import problems
+
+ROUNDING = 1e-11
+"""Margin for floating point, as a share of the largest output."""
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """Enclosure of an envelope.
+
+    Args:
+        bounds: Attained upper bounds of (−output, output), less the model error, shape (A, T, m,
+            2).
+        at: Their unit coordinates, shape (A, T, m, 2, d).
+        outer: Proved upper bounds, shape (A, T, m, 2).
+        between: Bound of what the outputs do between nodes beyond a straight line, in units of the
+            reference output.
+        boxes: Boxes of parameters looked at.
+        scale: Size of each output beside the first, shape (m,).
+    """
+
+    bounds: Array
+    at: Array
+    outer: Array
+    between: float
+    boxes: int
+    scale: Array
+
+    @property
+    def gap(self) -> float:
+        """Largest difference between proved and attained bound, in units of the reference output."""
+        return float(((self.outer - self.bounds) / self.scale[:, None]).max())
+
+
+def certify(
+    model: ModalModel,
+    bounds: Array,
+    at: Array,
+    *,
+    gap: float,
+    model_error: Array,
+    scale: Array | None = None,
+    workers: int = 1,
+    budget: float = 4000,
+    progress: Callable[[float], None] | None = None,
+) -> Certificate:
+    """Encloses all bounds found by a search.
+
+    Args:
+        model: The modal model.
+        bounds: Upper bounds of (−output, output), shape (A, T, m, 2).
+        at: Their unit coordinates, shape (A, T, m, 2, d).
+        gap: Wanted difference between proved and attained bound, in units of the reference output.
+        model_error: Bound of the difference between the modal model and the trajectories, shape (T,
+            m).
+        scale: Factor on the gap for each output, shape (m,); ones if not given.
+        workers: Processes.
+        budget: Most boxes per bound on average.
+        progress: Called with the fraction done.
+
+    Raises:
+        ValueError: The model error alone exceeds the gap.
+    """
+    scale = np.ones(len(model.outputs)) if scale is None else scale
+    model, unit = model.in_units(scale), scale[:, None]
+    bounds = bounds / unit
+    margin = model_error / scale + ROUNDING * np.abs(bounds).max()
+    slack = (1 - 1e-6) * gap - 2 * float(
+        margin.max()
+    )  # so that rounding does not lift the gap above what was asked for
+    if slack <= 0:
+        limit = 2 * float(margin.max())
+        raise ValueError(
+            f"certify: the gap {gap:g} is not above twice the model error, {limit:.2g}; ask for a"
+            " wider gap or a lower tolerance"
+        )
+    inner, points, outer, boxes = bounds.copy(), at.copy(), np.empty_like(bounds), 0
+    levels = len(bounds)
+    for done, level in enumerate(reversed(range(levels))):
+        lower, upper = model.boxes.unit(level)
+        optima = problems(np.arange(len(model.time)), len(model.outputs), len(lower))
+        optima.point[:], optima.value[:] = (
+            at[level].reshape(optima.point.shape),
+            bounds[level].ravel(),
+        )
+        share = None if progress is None else (lambda x, done=done: progress((done + x) / levels))
+        found = BranchAndBound(slack, budget).run(
+            model, lower, upper, optima, workers=workers, progress=share
+        )
+        inner[level], points[level] = (
+            found.value.reshape(inner[level].shape),
+            found.point.reshape(points[level].shape),
+        )
+        outer[level], boxes = found.proved.reshape(outer[level].shape), boxes + found.boxes
+    wide = margin[None, :, :, None]
+    outer = np.minimum.accumulate(
+        outer, axis=0
+    )  # what holds on a wider box holds on those inside it
+    return Certificate(
+        (inner - wide) * unit, points, (outer + wide) * unit, _between(model), boxes, scale
+    )
+
+
+def _between(model: ModalModel) -> float:
+    """h²/8 times a bound of the second time derivative: how far an output strays from a straight
+    line between nodes.
+    """
+    reach = np.ones(len(model.boxes.names))
+    rate, growth = suprema(model.eigenvalue, reach)[0], largest_growth(model.eigenvalue, reach)
+    curve = np.zeros(len(model.outputs))
+    ground = model.flow.system.ground
+    for part in parts(model, growth):
+        share = suprema(part.share, reach)[0].reshape(model.count, -1)
+        curve += 2 * (part.waves[0].max(0) * rate**2) @ share
+        if part.forced and ground is not None:  # R'' = λ² R + λ a + a', and a' acts on Σ C_k alone
+            jump = Polynomial(
+                part.share.index,
+                2 * part.share.coefficients.reshape(-1, model.count, len(curve)).sum(1).real,
+            )
+            slope = (
+                np.abs(np.diff(ground.acceleration, append=0.0, prepend=0.0)).max() / ground.step
+            )
+            curve += (
+                2 * np.abs(ground.acceleration).max() * rate @ share
+                + slope * suprema(jump, reach)[0]
+            )
+    return float(curve.max() * model.flow.step**2 / 8)

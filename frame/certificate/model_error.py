@@ -1,0 +1,191 @@
+"""A proved bound of what the polynomials of a modal model do wrong, over the whole box and not at
+samples.
+
+Polynomials z_k = [φ_k; w_k] for the states of the modes make q(t) = 2 Re Σ φ_k exp(λ_k t) a motion
+that nearly obeys the equations. What it misses, λ_k φ_k − w_k and λ_k M w_k + D w_k + K φ_k, is a
+polynomial in the parameters, bounded by its Chebyshev coefficients. Damping only takes energy, so
+the deviation from the true motion, in the norm √(qᵀ K q + vᵀ M v), grows no faster than this
+defect: no eigenvalue problem is solved anew, and nothing rests on a distance between eigenvalues.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from alphacut.frame.calculus.chebyshev_bounds import ChebyshevGrid
+from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.polynomial import Polynomial
+from alphacut.frame.certificate.remainder import largest_growth, suprema
+from alphacut.frame.certificate.wave_bounds import Part, parts
+from alphacut.frame.dynamics.integrators import Exact
+from alphacut.frame.modal.model import ModalModel, fit_states
+from alphacut.frame.structures.linear import evaluate
+from alphacut.frame.structures.polynomial_dependence import UnprovedError, degrees
+
+MOST_NUMBERS = 120_000_000
+"""Values of the defects on their grid, at most: 1 GB."""
+CHUNK = 10_000
+
+
+def proved_error(model: ModalModel) -> Array:
+    """Bound of |model − true motion| over the box, shape (T, m), in units of the outputs; up to the
+    rounding of this computation.
+
+    Raises:
+        UnprovedError: The structure is not known to be a polynomial that loses energy, the scheme
+            is not the exact propagator, or the box is so wide or has so many parameters that the
+            bound cannot be computed.
+    """
+    if not isinstance(model.flow.integrator, Exact):
+        raise UnprovedError(
+            f"the motion is that of the scheme '{model.flow.integrator.name}'; only the exact"
+            " propagator is covered"
+        )
+    reach, m = np.ones(len(model.boxes.names)), len(model.outputs)
+    grid = _grid(model)
+    structure = _expanded(grid, partial(_structure, model))
+    stiffness, mass = Comparison.of(structure["stiffness"]), Comparison.of(structure["mass"])
+    deviation, own = np.zeros(len(model.time)), np.zeros((len(model.time), m))
+    for part, states in zip(
+        parts(model, largest_growth(model.eigenvalue, reach)), fit_states(model), strict=False
+    ):
+        defect = _expanded(grid, partial(_defects, model, part, states))
+        deviation += part.push * np.hypot(
+            stiffness.sup(defect["start_q"]), mass.sup(defect["start_v"])
+        )
+        for k in range(model.count):
+            missed = np.hypot(
+                stiffness.sup(defect["kinematic"][:, k]), mass.sup_dual(defect["dynamic"][:, k])
+            )
+            deviation += 2 * missed * part.elapsed[:, k]
+        largest = suprema(part.share, reach)[0].reshape(model.count, m)
+        own += (
+            2
+            * part.waves[0]
+            @ (np.abs(defect["outputs"]).sum(0) + part.left_out[:, None] * largest)
+        )
+    size = len(stiffness.factor)
+    rows = np.moveaxis(structure["rows"], 1, 0)  # (m, J, 2N)
+    reading = np.array(
+        [np.hypot(stiffness.sup_dual(row[:, :size]), mass.sup_dual(row[:, size:])) for row in rows]
+    )
+    bound: Array = deviation[:, None] * reading + own
+    return bound
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A symmetric matrix A(p) against its mean A₀ = L Lᵀ: lowest A₀ ≤ A(p) ≤ highest A₀ over the
+    box.
+
+    Args:
+        factor: L, shape (N, N).
+        lowest: See above.
+        highest: See above.
+    """
+
+    factor: Array
+    lowest: float
+    highest: float
+
+    @classmethod
+    def of(cls, coefficients: Array) -> Comparison:
+        """From the Chebyshev coefficients of A, shape (J, N, N), the mean first.
+
+        Raises:
+            UnprovedError: A(p) is not shown to stay positive definite.
+        """
+        try:
+            factor = np.linalg.cholesky(coefficients[0])
+        except np.linalg.LinAlgError:
+            raise UnprovedError(
+                "the mean mass or stiffness matrix is not positive definite"
+            ) from None
+        inverse = np.linalg.inv(factor)
+        spread = float(np.linalg.norm(np.abs(inverse @ coefficients[1:] @ inverse.T).sum(0), 2))
+        if spread >= 1:
+            raise UnprovedError(
+                "the box is so wide that mass and stiffness are not shown to stay positive definite"
+            )
+        return cls(factor, 1 - spread, 1 + spread)
+
+    def sup(self, coefficients: Array) -> float:
+        """Bound of √(x* A x) over the box from the coefficients of x, shape (J, N)."""
+        return float(
+            np.sqrt(self.highest) * np.linalg.norm(coefficients @ self.factor, axis=-1).sum()
+        )
+
+    def sup_dual(self, coefficients: Array) -> float:
+        """Bound of √(x* A⁻¹ x) over the box from the coefficients of x, shape (J, N)."""
+        solved = np.linalg.solve(self.factor, coefficients.T)
+        return float(np.linalg.norm(solved, axis=0).sum() / np.sqrt(self.lowest))
+
+
+def _grid(model: ModalModel) -> ChebyshevGrid:
+    """The grid on which all defects are known by their values."""
+    box = dict(
+        zip(
+            model.boxes.names,
+            zip(model.boxes.lower[0].tolist(), model.boxes.upper[0].tolist(), strict=True),
+            strict=True,
+        )
+    )
+    exponents = degrees(model.flow.system, box)
+    return ChebyshevGrid(tuple(2 * model.degree + exponents[name] for name in model.boxes.names))
+
+
+def _expanded(grid: ChebyshevGrid, sample: Callable[[Array], dict[str, Array]]) -> dict[str, Array]:
+    """Chebyshev coefficients of what `sample` gives at unit coordinates (S, d), each of shape (J,
+    …).
+    """
+    width = sum(
+        part.size * (2 if np.iscomplexobj(part) else 1)
+        for part in sample(np.zeros((1, len(grid.degrees)))).values()
+    )
+    if len(grid) * width > MOST_NUMBERS:
+        raise UnprovedError(
+            f"the defects need {len(grid):.2g} points of a grid over {len(grid.degrees)}"
+            " parameters: too many"
+        )
+    pieces = [sample(chunk) for chunk in np.array_split(grid.points, -(-len(grid) // CHUNK))]
+    return {
+        name: grid.coefficients(np.concatenate([piece.pop(name) for piece in pieces]))
+        for name in list(pieces[0])
+    }
+
+
+def _structure(model: ModalModel, unit: Array) -> dict[str, Array]:
+    """The matrices that measure what the motion misses."""
+    matrices, rows = evaluate(
+        model.flow.system, model.flow.names, model.boxes.to_physical(unit), derivatives=False
+    )
+    return {"mass": matrices.mass.value, "stiffness": matrices.stiffness.value, "rows": rows.value}
+
+
+def _defects(model: ModalModel, part: Part, states: Polynomial, unit: Array) -> dict[str, Array]:
+    """What one part misses at unit coordinates (S, d): of what sets it off, and of the equations of
+    motion mode by mode.
+    """
+    matrices, rows = evaluate(
+        model.flow.system, model.flow.names, model.boxes.to_physical(unit), derivatives=False
+    )
+    M, D, K, C = matrices.mass.value, matrices.damping.value, matrices.stiffness.value, rows.value
+    q, v = (
+        (0.0, -matrices.rigid[:, 0])
+        if part.forced
+        else (matrices.q0.value[..., 0], matrices.v0.value[..., 0])
+    )
+    rate = model.eigenvalue(unit)[..., None]
+    z = states(unit).reshape(len(unit), model.count, -1)  # (S, n, 2N)
+    shape, speed = np.split(z, 2, axis=-1)
+    return {
+        "start_q": 2 * shape.real.sum(1) - q,
+        "start_v": 2 * speed.real.sum(1) - v,
+        "kinematic": rate * shape - speed,
+        "dynamic": rate * (speed @ M) + speed @ D.swapaxes(-1, -2) + shape @ K,
+        "outputs": part.share(unit).reshape(len(unit), model.count, -1) - z @ C.swapaxes(-1, -2),
+    }

@@ -1,0 +1,114 @@
+"""Bounds of what a mode's motion does over time, whatever the parameters: exp(λ t) in free
+vibration, R(t; λ) under the ground's motion.
+
+A part of a modal model is 2 Re Σ_k C_k(p) w(t; λ_k(p)) with w = exp(λ t) or w = R = ∫ exp(λ (t −
+s)) a(s) ds; its r-th derivative by λ is bounded by t^r exp(g t), or by ∫ τ^r exp(g τ) |a(t − τ)|
+dτ, with g a bound of Re λ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.polynomial import Polynomial
+from alphacut.frame.modal.model import ModalModel
+from alphacut.frame.structures.linear import Accelerogram
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """The free or the forced part of a modal model.
+
+    Args:
+        share: C_k, n m polynomials.
+        waves: Bounds of the derivatives of w by λ, orders 0 to 3, shape (4, T, n).
+        elapsed: Bounds of ∫ |w| from 0 to t, shape (T, n).
+        push: What the part has been set off with up to t: 1, or a bound of ∫ |a| in m/s, shape
+            (T,).
+        left_out: Share of waves[0] by which the model's w may be wrong, shape (n,).
+        forced: Whether it is the forced part.
+    """
+
+    share: Polynomial
+    waves: Array
+    elapsed: Array
+    push: Array
+    left_out: Array
+    forced: bool = False
+
+
+def parts(model: ModalModel, growth: Array) -> list[Part]:
+    """The free part of a model and, under a load, the forced one; `growth` bounds Re λ_k, shape
+    (n,).
+    """
+    time = model.time[:, None]
+    powers = time ** np.arange(4)[:, None, None]
+    elapsed = np.where(
+        growth == 0, time, np.expm1(growth * time) / np.where(growth == 0, 1.0, growth)
+    )
+    found = [
+        Part(
+            model.coefficient,
+            powers * np.exp(growth * time),
+            elapsed,
+            np.ones(len(time)),
+            np.zeros(model.count),
+        )
+    ]
+    ground = model.flow.system.ground
+    if model.load is None or ground is None:
+        return found
+    kernels = [
+        _largest(growth, model.flow.step, ground, len(model.time), power) for power in range(4)
+    ]
+    waves, elapsed, push = (
+        _convolved(kernel, ground, model.time)
+        for kernel in (
+            np.stack(kernels),
+            _swell(kernels[0], model.time),
+            np.ones((len(kernels[0]), 1)),
+        )
+    )
+    return [
+        *found,
+        Part(model.load.share, waves, elapsed, push[:, 0], model.load.truncation, forced=True),
+    ]
+
+
+def _swell(kernel: Array, time: Array) -> Array:
+    """∫ exp(g s) ds from 0 to the end of each interval, at most."""
+    grown: Array = np.cumsum(kernel, axis=0) * ((time[-1] - time[0]) / len(kernel))
+    return grown
+
+
+def _largest(growth: Array, step: float, ground: Accelerogram, nodes: int, power: int) -> Array:
+    """Largest τ^power exp(g τ) in each interval between whose ends the load is linear, shape (J,
+    n).
+    """
+    every = ground.intervals(step)
+    ends = (np.arange((nodes - 1) * every + 1) * (step / every))[:, None]
+    value = ends**power * np.exp(growth * ends)
+    peak = -power / np.where(growth < 0, growth, -1e-300)
+    inside = (peak > ends[:-1]) & (peak < ends[1:])
+    summit = np.where(inside, peak, 0.0) ** power * np.exp(-float(power))
+    larger: Array = np.maximum(np.maximum(value[:-1], value[1:]), np.where(inside, summit, 0.0))
+    return larger
+
+
+def _convolved(kernel: Array, ground: Accelerogram, time: Array) -> Array:
+    """Upper sums of ∫ kernel(τ) |a(t − τ)| dτ at all nodes from the kernel's maxima (…, J, n),
+    shape (…, T, n).
+    """
+    count = kernel.shape[-2]
+    h = (time[-1] - time[0]) / count
+    size = np.abs(ground.at(np.arange(count + 1) * h))
+    load = np.maximum(size[:-1], size[1:])
+    columns = np.moveaxis(kernel, -2, -1).reshape(-1, count)
+    sums = h * np.array([np.convolve(column, load)[:count] for column in columns])
+    out = np.moveaxis(sums.reshape(*kernel.shape[:-2], kernel.shape[-1], count), -1, -2)
+    start = np.zeros((*out.shape[:-2], 1, out.shape[-1]))
+    nodes: Array = np.concatenate([start, out], axis=-2)[..., :: count // (len(time) - 1), :]
+    return nodes

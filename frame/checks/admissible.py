@@ -1,0 +1,91 @@
+"""Which values fuzzy parameters may take: what is positive, or does not feed energy in, must be so
+over the whole support.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import singledispatch
+
+import numpy as np
+
+from alphacut.frame.boxes import Boxes
+from alphacut.frame.checks.step_error import probes
+from alphacut.frame.structures.lagrangian import LagrangianSystem
+from alphacut.frame.structures.linear import LinearSystem, evaluate
+from alphacut.frame.structures.matrix import MatrixStructure
+from alphacut.frame.structures.storey import StoreyFrame
+
+POSITIVE, NOT_NEGATIVE, RATIO = (
+    "positive",
+    "0 or greater",
+    "0 or greater and below 1, the critical damping",
+)
+OF_FRAME = {
+    r"E|I|[ml]\d+": POSITIVE,
+    r"d\d+|rayleigh_(mass|stiffness)": NOT_NEGATIVE,
+    r"zeta\d*": RATIO,
+}
+"""Names of a storey frame's parameters, and what they must be; the others may be any number."""
+
+
+@singledispatch
+def wanted(system: LinearSystem | LagrangianSystem, name: str) -> str | None:
+    """What a parameter of `system` must be; None where nothing is known of it."""
+    return None
+
+
+@wanted.register
+def _(system: StoreyFrame, name: str) -> str | None:
+    return next((rule for pattern, rule in OF_FRAME.items() if re.fullmatch(pattern, name)), None)
+
+
+@wanted.register
+def _(system: MatrixStructure, name: str) -> str | None:
+    return RATIO if name in [ratio for ratio in system.ratios if isinstance(ratio, str)] else None
+
+
+def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> None:
+    """Refuses supports that reach values without a meaning.
+
+    Args:
+        system: The structure.
+        cuts: Its uncertain parameters.
+
+    Raises:
+        ValueError: A support is not finite or reaches what its parameter must not be, or the mass
+            matrix of a linear structure is not positive definite at the modal parameters or a
+            corner.
+    """
+    for name, low, high in zip(cuts.names, cuts.lower.min(0), cuts.upper.max(0), strict=True):
+        rule = wanted(system, name)
+        bad = (
+            (rule == POSITIVE and not low > 0)
+            or (rule in (NOT_NEGATIVE, RATIO) and not low >= 0)
+            or (rule == RATIO and not high < 1)
+        )
+        if bad or not np.isfinite([low, high]).all():
+            raise ValueError(
+                f"uncertain parameter {name}: its support [{low:g}, {high:g}] must be"
+                f" {rule or 'finite'}; narrow it"
+            )
+    if not isinstance(system, LagrangianSystem):
+        _require_mass(system, cuts)
+
+
+def _require_mass(system: LinearSystem, cuts: Boxes) -> None:
+    """Where the mass matrix is no mass, the motion does not exist or runs away."""
+    for point in probes(cuts):
+        try:
+            mass = evaluate(system, cuts.names, point[None], derivatives=False)[0].mass.value
+            positive = bool(np.linalg.eigvalsh(mass).min() > 0)
+        except np.linalg.LinAlgError:  # from damping by ratios, which divides by the mass
+            positive = False
+        if not positive:
+            at = ", ".join(
+                f"{name} = {value:g}" for name, value in zip(cuts.names, point, strict=True)
+            )
+            raise ValueError(
+                f"mass: the matrix is not positive definite at {at}; narrow the supports to where"
+                " every unknown has a mass"
+            )

@@ -1,0 +1,40 @@
+"""Whether what is given as numbers is numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sized
+from typing import Any
+
+import numpy as np
+
+FINITE = "biuf"
+"""Kinds of NumPy's data types that hold real numbers."""
+
+
+def require_number(name: str, value: Any, unit: str) -> None:
+    """Refuses what is no real number.
+
+    Args:
+        name: What the value is called.
+        value: What was given.
+        unit: Unit that a number is meant in; empty for none.
+
+    Raises:
+        ValueError: It is a text, a list or nothing.
+    """
+    if np.ndim(value) or np.asarray(value).dtype.kind not in FINITE:
+        raise ValueError(
+            f"{name}: {value!r} is not allowed; it must be a number{f', in {unit}' if unit else ''}"
+        )
+
+
+def require_numbers(name: str, values: Any, unit: str) -> None:
+    """Refuses what is no sequence of real and finite numbers, as `require_number`."""
+    if isinstance(values, str) or not isinstance(values, Sized):
+        raise ValueError(
+            f"{name}: {values!r} is not allowed; it must be a list of numbers, in {unit}"
+        )
+    for value in np.ravel(values) if isinstance(values, np.ndarray) else values:
+        require_number(name, value, unit)
+        if not np.isfinite(value):
+            raise ValueError(f"{name}: {value:g} is not allowed; every value must be finite")

@@ -1,0 +1,169 @@
+"""What time stepping adds to the error of an envelope, and steps too long for the scheme."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from functools import singledispatch
+
+import numpy as np
+
+from alphacut.frame.boxes import Boxes, UnitFlow
+from alphacut.frame.calculus.jet import Array
+from alphacut.frame.checks.corners import signs
+from alphacut.frame.checks.tolerance import LIMIT
+from alphacut.frame.dynamics.flow import Flow, LinearFlow, StepError
+from alphacut.frame.dynamics.integrators import Exact, state_matrix
+from alphacut.frame.dynamics.nonlinear import SCHEMES, LagrangianFlow
+from alphacut.frame.envelope import Envelope, output_unit
+from alphacut.frame.structures.linear import evaluate
+
+CORNERS = 16
+"""Corners of the widest box that are looked at, at most."""
+GROWTH = 1e-6
+"""Growth of a motion within a step that counts as rounding."""
+DIVERGED = 10.0
+"""Error of a scheme, as a multiple of the motion's peak, from which on it has left the motion."""
+
+
+def probes(cuts: Boxes) -> Array:
+    """The modal parameters and corners of the widest box, shape (S, d), in SI units."""
+    points: Array = np.unique(
+        np.vstack([cuts.modal, cuts.to_physical(signs(len(cuts.names), CORNERS))]), axis=0
+    )
+    return points
+
+
+def step_error(flow: UnitFlow) -> Array:
+    """Largest error of time stepping so far at the modal parameters and corners of the widest box,
+    shape (T, m), in units of the outputs.
+
+    Of a linear structure the distance from the exact propagator; else the distance from half the
+    step, extrapolated by the scheme's order.
+
+    Raises:
+        StepError: A scheme has left the motion.
+    """
+    if isinstance(flow.flow, LinearFlow) and isinstance(flow.flow.integrator, Exact):
+        return np.zeros((len(flow.time), len(flow.outputs)))
+    values, error = deviations(flow.flow, probes(flow.boxes))
+    so_far: Array = np.maximum.accumulate(error.max(0), axis=0)
+    peak = np.abs(values).max((0, 1))
+    for name, reached, least in zip(flow.outputs, so_far[-1], peak, strict=True):
+        if reached > DIVERGED * least > 0:
+            raise StepError(
+                f"step: its error, {reached:.2g}, passes the peak of {name}, {least:.2g}, many"
+                " times; take a smaller step"
+            )
+    return so_far
+
+
+@singledispatch
+def deviations(flow: Flow, points: Array) -> tuple[Array, Array]:
+    """More accurate trajectories at `points` (S, d), and the errors of those of the flow; both of
+    shape (S, T, m).
+    """
+    values = flow.values(points)
+    return values, np.zeros_like(values)
+
+
+@deviations.register
+def _(flow: LinearFlow, points: Array) -> tuple[Array, Array]:
+    exact = replace(flow, integrator=Exact()).values(points)
+    return exact, np.abs(flow.values(points) - exact)
+
+
+@deviations.register
+def _(flow: LagrangianFlow, points: Array) -> tuple[Array, Array]:
+    fine, gain = flow.halved().values(points)[:, ::2], 2.0 ** SCHEMES[flow.scheme]
+    return fine, np.abs(flow.values(points) - fine) * gain / (gain - 1)
+
+
+def with_step_error(found: Envelope, flow: UnitFlow, scheme: str, steps: Array) -> Envelope:
+    """The envelope with the error of time stepping in its facts, and added to its estimated error;
+    a proof is left as it is.
+
+    Args:
+        found: The envelope of the scheme's trajectories.
+        flow: These trajectories.
+        scheme: Name of the scheme.
+        steps: From `step_error`, shape (T, m).
+    """
+    alike = [
+        output_unit(name) == output_unit(flow.outputs[flow.reference]) for name in flow.outputs
+    ]
+    facts: dict[str, float | str] = {
+        "integrator": scheme,
+        "step_error": float(steps[:, alike].max()),
+        **found.facts,
+    }
+    facts |= _dominance(found, flow, steps.max(0))
+    error = found.error
+    if error is not None and found.inner_lower is None and steps.any():
+        error = error + steps
+        if "estimated_error" in facts:
+            facts["estimated_error"] = float((error / flow.scale).max())
+    _warn(found, steps.max(0))
+    return replace(found, error=error, facts=facts)
+
+
+def _dominance(found: Envelope, flow: UnitFlow, steps: Array) -> dict[str, str]:
+    """A fact where time stepping adds more to some output than the search for the bounds."""
+    tolerance = float(found.facts.get("tolerance", 0.0))
+    own = tolerance * flow.scale if found.error is None else found.error.max((0, 1))
+    ratio = np.divide(steps, own, out=np.zeros_like(steps), where=own > 0)
+    worst = int(ratio.argmax())
+    if ratio[worst] <= 1:
+        return {}
+    name, unit = flow.outputs[worst], output_unit(flow.outputs[worst]).replace("SI", "")
+    cure = (
+        "integrator exact has none"
+        if isinstance(flow.flow, LinearFlow)
+        else "take a smaller step, or a scheme of order 4"
+    )
+    return {
+        "dominant_error": (
+            f"time stepping: {steps[worst]:.2g} {unit} of {name} against {own[worst]:.2g} {unit} of"
+            f" the envelope; {cure}"
+        )
+    }
+
+
+def _warn(found: Envelope, steps: Array) -> None:
+    """Warns where time stepping is wrong by more than a hundredth of a peak."""
+    peak = np.maximum(np.abs(found.lower), np.abs(found.upper)).max((0, 1))
+    share = np.divide(steps, peak, out=np.zeros_like(steps), where=peak > 0)
+    worst = int(share.argmax())
+    if share[worst] > LIMIT:
+        of = f"{steps[worst]:.2g}, {100 * share[worst]:.2g} % of the peak of {found.outputs[worst]}"
+        warnings.warn(
+            f"step: {found.time[1]:g} s leaves an error of time stepping of {of}; take a smaller"
+            " step",
+            stacklevel=4,
+        )
+
+
+def require_stable(flow: Flow, cuts: Boxes) -> None:
+    """Refuses a step at which the scheme feeds energy into a linear structure that gains none.
+
+    Raises:
+        ValueError: A motion grows at the modal parameters or a corner of the widest box.
+    """
+    if not isinstance(flow, LinearFlow) or not np.isfinite(flow.integrator.stability_limit):
+        return
+    points = probes(cuts)
+    matrices, _ = evaluate(flow.system, flow.names, points, derivatives=False)
+    growth = np.abs(
+        np.linalg.eigvals(flow.integrator.step_map(matrices, flow.step).transfer.value)
+    ).max(-1)
+    rate = np.linalg.eigvals(state_matrix(matrices).value)
+    calm = flow.step * rate.real.max(-1) <= GROWTH
+    worst = int(np.where(calm, growth, 0.0).argmax())
+    if calm[worst] and growth[worst] > 1 + GROWTH:
+        fastest = float(np.abs(rate[worst]).max())
+        raise ValueError(
+            f"step: {flow.step:g} s gives omega_max h = {fastest * flow.step:.3g}, where the scheme"
+            f" {flow.integrator.name} is unstable; take at most some"
+            f" {flow.integrator.stability_limit / fastest:.2g} s, or the integrator exact, midpoint"
+            " or gauss4"
+        )

@@ -1,0 +1,256 @@
+"""One-step methods for linear structures, as maps of the state [q; v], with the facts they claim
+about themselves.
+
+Every method is a frozen dataclass with two claims that tests measure: `order`, and
+`stability_limit`, the largest ω h without growth of an undamped oscillation. All derivatives of a
+step with respect to parameters share one factorisation (`jet.inverse`): it is the scheme that is
+differentiated, not the differential equation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, inf, log2
+from typing import ClassVar, Protocol
+
+import numpy as np
+
+from alphacut.frame.calculus.jet import Jet, concatenate, inverse
+from alphacut.frame.structures.linear import Matrices
+
+
+@dataclass(frozen=True, eq=False)
+class StepMap:
+    """x[k+1] = T x[k] + G [a(t_k), a(t_{k+1})] with x = [q; v] and the acceleration a of the
+    ground.
+
+    Args:
+        transfer: T, shape (S, 2n, 2n).
+        load: G, shape (S, 2n, 2).
+    """
+
+    transfer: Jet
+    load: Jet
+
+
+Rational = tuple[tuple[float, ...], tuple[float, ...]]
+
+
+class Integrator(Protocol):
+    """A one-step method for linear structures."""
+
+    @property
+    def name(self) -> str:
+        """Name on the command line and in results."""
+
+    @property
+    def order(self) -> float:
+        """Order of the error in the step; infinite when exact."""
+
+    @property
+    def stability_limit(self) -> float:
+        """Largest stable ω h of an undamped oscillation; infinite when unconditional."""
+
+    @property
+    def amplification(self) -> Rational | None:
+        """R(z) with R(hλ) the factor of a step on a mode exp(λt), as numerator and denominator by
+        rising powers; None: no such R.
+
+        Both empty mean R = exp.
+        """
+
+    def step_map(self, matrices: Matrices, step: float) -> StepMap:
+        """The map of one step of length `step` in s; the load is linear within the step."""
+
+
+@dataclass(frozen=True)
+class Midpoint:
+    """Variational integrator: midpoint discrete Lagrangian with midpoint Lagrange–d'Alembert
+    forcing.
+
+    Eliminating the velocity gives (M/h + D/2 + hK/4) q[k+1] = (2M/h − hK/2) q[k] − (M/h − D/2 +
+    hK/4) q[k−1]. On a linear structure this is Newmark(1/4, 1/2).
+    """
+
+    name: ClassVar[str] = "midpoint"
+    order: ClassVar[float] = 2
+    stability_limit: ClassVar[float] = inf
+    amplification: ClassVar[Rational | None] = ((1.0, 0.5), (1.0, -0.5))
+
+    def step_map(self, matrices: Matrices, step: float) -> StepMap:
+        """The map of one step; its velocity is M⁻¹ times the discrete momentum."""
+        m, h = matrices, step
+        left = inverse(m.mass * (1 / h) + m.damping * 0.5 + m.stiffness * (h / 4))
+        forward = left @ (m.mass * (1 / h) + m.damping * 0.5 - m.stiffness * (h / 4))
+        kick = left @ m.mass
+        push = kick @ (m.rigid * np.full(2, -h / 4))  # half a step of the mean ground acceleration
+        eye = np.eye(m.mass.value.shape[-1])
+        upper = concatenate([forward, kick], -1)
+        lower = concatenate([(forward - eye) * (2 / h), kick * (2 / h) - eye], -1)
+        return StepMap(concatenate([upper, lower], -2), concatenate([push, push * (2 / h)], -2))
+
+
+@dataclass(frozen=True)
+class Newmark:
+    """Newmark's method.
+
+    Args:
+        beta: Weight of the new acceleration in the displacement.
+        gamma: Weight of the new acceleration in the velocity, at least 1/2 (less would feed energy
+            in).
+
+    Raises:
+        ValueError: beta is negative or gamma below 1/2.
+    """
+
+    beta: float = 0.25
+    gamma: float = 0.5
+    name: ClassVar[str] = "newmark"
+
+    def __post_init__(self) -> None:
+        if self.beta < 0 or self.gamma < 0.5:
+            raise ValueError(
+                f"newmark: beta {self.beta:g}, gamma {self.gamma:g}; beta must not be negative and"
+                " gamma at least 0.5"
+            )
+
+    @property
+    def order(self) -> float:
+        """2 for gamma = 1/2, else 1."""
+        return 2 if self.gamma == 0.5 else 1
+
+    @property
+    def stability_limit(self) -> float:
+        """Infinite for 2 beta >= gamma."""
+        return inf if 2 * self.beta >= self.gamma else (self.gamma / 2 - self.beta) ** -0.5
+
+    @property
+    def amplification(self) -> Rational | None:
+        """That of the midpoint rule for beta = 1/4, gamma = 1/2; else damping couples the modes of
+        a step.
+        """
+        return Midpoint.amplification if (self.beta, self.gamma) == (0.25, 0.5) else None
+
+    def step_map(self, matrices: Matrices, step: float) -> StepMap:
+        """The map of one step, acceleration eliminated."""
+        n, h = matrices.mass.value.shape[-1], step
+        flow = state_matrix(matrices)
+        acceleration = flow[..., n:, :]  # q̈ as rows acting on [q; v]
+        eye, zero = np.eye(n), np.zeros((n, n))
+        new, old = (
+            np.vstack([self.beta * h**2 * eye, self.gamma * h * eye]),
+            np.vstack([(0.5 - self.beta) * h**2 * eye, (1 - self.gamma) * h * eye]),
+        )
+        drift = np.block([[eye, h * eye], [zero, eye]])
+        left = inverse(np.eye(2 * n) - new @ acceleration)
+        load = left @ np.hstack([old @ -matrices.rigid, new @ -matrices.rigid])
+        return StepMap(left @ (drift + old @ acceleration), load)
+
+
+@dataclass(frozen=True)
+class RungeKutta4:
+    """The classical explicit method of order 4."""
+
+    name: ClassVar[str] = "rk4"
+    order: ClassVar[float] = 4
+    stability_limit: ClassVar[float] = 2 * 2**0.5
+    amplification: ClassVar[Rational | None] = ((1.0, 1.0, 1 / 2, 1 / 6, 1 / 24), (1.0,))
+
+    def step_map(self, matrices: Matrices, step: float) -> StepMap:
+        """The map of one step: the exponential series up to h⁴."""
+        z = _loaded_flow(matrices, step) * step
+        z2 = z @ z
+        return _split(
+            np.eye(z.value.shape[-1]) + z + z2 * 0.5 + z2 @ z * (1 / 6) + z2 @ z2 * (1 / 24)
+        )
+
+
+@dataclass(frozen=True)
+class Gauss4:
+    """Variational integrator of order 4: quadratic trajectories, two Gauss points; on a linear
+    structure the (2, 2) Padé step.
+    """
+
+    name: ClassVar[str] = "gauss4"
+    order: ClassVar[float] = 4
+    stability_limit: ClassVar[float] = inf
+    amplification: ClassVar[Rational | None] = ((1.0, 1 / 2, 1 / 12), (1.0, -1 / 2, 1 / 12))
+
+    def step_map(self, matrices: Matrices, step: float) -> StepMap:
+        """The map of one step."""
+        z = _loaded_flow(matrices, step) * step
+        even = np.eye(z.value.shape[-1]) + z @ z * (1 / 12)
+        return _split(inverse(even - z * 0.5) @ (even + z * 0.5))
+
+
+@dataclass(frozen=True)
+class Exact:
+    """The exact propagator exp(A h), by its Taylor series with scaling and squaring; exact for a
+    load linear within each step.
+    """
+
+    name: ClassVar[str] = "exact"
+    order: ClassVar[float] = inf
+    stability_limit: ClassVar[float] = inf
+    amplification: ClassVar[Rational | None] = ((), ())
+
+    def step_map(self, matrices: Matrices, step: float) -> StepMap:
+        """The map of one step."""
+        return _split(exponential(_loaded_flow(matrices, step) * step))
+
+
+def exponential(z: Jet) -> Jet:
+    """Matrix exponential with derivatives, V = (..., N, N)."""
+    norm = float(np.abs(z.value).sum(-2).max(initial=0.0))
+    squarings = max(0, ceil(log2(norm / 0.25))) if norm > 0 else 0
+    z = z * 0.5**squarings
+    eye = np.eye(z.value.shape[-1])
+    degree = 12  # remainder 0.25^13/13! < 1e-17
+    series = z * (1 / degree) + eye
+    for k in range(degree - 1, 0, -1):
+        series = z @ series * (1 / k) + eye
+    for _ in range(squarings):
+        series = series @ series
+    return series
+
+
+def state_matrix(m: Matrices) -> Jet:
+    """A with [q; v]˙ = A [q; v], shape (S, 2n, 2n) (eq. 23)."""
+    light = inverse(m.mass)
+    lower = concatenate([-(light @ m.stiffness), -(light @ m.damping)], -1)
+    n = m.mass.value.shape[-1]
+    upper = Jet.constant(
+        np.broadcast_to(np.hstack([np.zeros((n, n)), np.eye(n)]), lower.value.shape),
+        lower.directions,
+    )
+    return concatenate([upper, lower], -2)
+
+
+def _loaded_flow(m: Matrices, step: float) -> Jet:
+    """The state matrix extended by the ground's acceleration a and its increment over a step, shape
+    (S, 2n + 2, 2n + 2).
+    """
+    flow = state_matrix(m)
+    n = m.mass.value.shape[-1]
+    size = 2 * n + 2
+    out = Jet.constant(np.zeros((len(flow.value), size, size)), flow.directions)
+    for whole, part in (
+        (out.value, flow.value),
+        (out.first, flow.first),
+        (out.second, flow.second),
+    ):
+        whole[..., : 2 * n, : 2 * n] = part
+    out.value[:, n : 2 * n, 2 * n] = -m.rigid[:, 0]
+    out.value[:, 2 * n, 2 * n + 1] = 1 / step
+    return out
+
+
+def _split(extended: Jet) -> StepMap:
+    """Separates state and load again; the load's columns become a(t_k) and a(t_{k+1})."""
+    old, rise = extended[..., :-2, -2:-1], extended[..., :-2, -1:]
+    return StepMap(extended[..., :-2, :-2], concatenate([old - rise, rise], -1))
+
+
+INTEGRATORS: dict[str, Integrator] = {
+    m.name: m for m in (Midpoint(), Newmark(), RungeKutta4(), Gauss4(), Exact())
+}

@@ -1,0 +1,173 @@
+"""The exact propagator by eigenvalues: every mode runs on its own, so that a trajectory of a
+hundred states costs little.
+
+Each mode's answer to the ground is R(t; λ) = ∫ exp(λ (t − s)) a(s) ds, marched from sample to
+sample of a record that is linear between them. Powers of the whole transfer matrix are never
+formed, and overdamped modes are as good as others: all 2n eigenvalues are kept.
+"""
+
+from __future__ import annotations
+
+from math import factorial
+
+import numpy as np
+
+from alphacut.frame.calculus.jet import Array, Jet, concatenate
+from alphacut.frame.dynamics.integrators import state_matrix
+from alphacut.frame.structures.classical import ClassicalModes, classical_modes
+from alphacut.frame.structures.linear import Matrices
+from alphacut.frame.structures.modes import eigenvectors
+
+LARGE = 40
+"""States from which on eigenvalues are cheaper than powers of the transfer matrix."""
+CONDITION = 1e9
+"""Condition of the eigenvectors above which the modes are too near to critical damping to stand for
+the structure.
+"""
+
+
+class NearlyCriticalError(RuntimeError):
+    """Two eigenvectors nearly coincide."""
+
+
+def spectral_trajectory(
+    matrices: Matrices, rows: Jet, *, load: Array | None, step: float, every: int, count: int
+) -> Jet:
+    """Outputs at `count` nodes, V = (S, count, m).
+
+    Args:
+        matrices: The structure.
+        rows: Observation rows, V = (S, m, 2n).
+        load: Ground acceleration at intervals `step`, shape ((count − 1) every + 1,), or None.
+        step: Interval of the load, in s.
+        every: Intervals from node to node.
+        count: Number of nodes.
+
+    Raises:
+        NearlyCriticalError: A pair of modes is so near to critical damping that its eigenvectors
+            coincide.
+    """
+    deep = matrices.mass.directions > 0
+    undamped = None if deep else classical_modes(matrices, rows)
+    if undamped is not None:
+        return _superposed(undamped, load=load, step=step, every=every, count=count)
+    rate, right, left = eigenvectors(state_matrix(matrices))
+    if (
+        float((np.abs(right.value).sum(-2).max(-1) * np.abs(left.value).sum(-2).max(-1)).max())
+        > CONDITION
+    ):
+        raise NearlyCriticalError("two modes nearly coincide at critical damping")
+    seen = (rows @ right).map(lambda x: x.swapaxes(-1, -2))  # V = (S, 2n, m)
+    start = concatenate([matrices.q0, matrices.v0], -2)
+    parts = []
+    if start.value.any() or start.first.any():
+        time = np.arange(count) * step * every
+        wave = np.exp(rate.value[:, None, :] * time[:, None])
+        waves = [wave, time[:, None] * wave, time[:, None] ** 2 * wave] if deep else [wave]
+        parts.append(_summed(rate, seen * (left @ start), waves))
+    if load is not None:
+        kick = np.concatenate([np.zeros_like(matrices.rigid), -matrices.rigid])
+        parts.append(
+            _summed(
+                rate,
+                seen * (left @ kick),
+                responses(rate.value, load, step, every=every, derivatives=deep),
+            )
+        )
+    if not parts:
+        return Jet.constant(
+            np.zeros((len(seen.value), count, seen.value.shape[-1])), rate.directions
+        )
+    return parts[0] if len(parts) == 1 else parts[0] + parts[1]
+
+
+def _superposed(
+    modes: ClassicalModes, *, load: Array | None, step: float, every: int, count: int
+) -> Jet:
+    """As `spectral_trajectory`, from modes that damping does not couple."""
+    out = np.zeros((len(modes.rate), count, modes.start.shape[-1]))
+    if modes.start.any():
+        out += (
+            np.exp(modes.rate[:, None, :] * (np.arange(count) * step * every)[:, None])
+            @ modes.start
+        ).real
+    if load is not None:
+        out += (responses(modes.rate, load, step, every=every)[0] @ modes.load).real
+    return Jet.constant(out, 0)
+
+
+def _summed(rate: Jet, share: Jet, waves: list[Array]) -> Jet:
+    """Re Σ_k C_k w(λ_k) from w, w' and w'', each (S, T, K); C has V = (S, K, m)."""
+    d, (samples, _, m) = rate.directions, share.value.shape
+    if not d:
+        return Jet.constant((waves[0] @ share.value).real, 0)
+    slope = rate.first[..., None]  # (d, S, K, 1)
+    pair = slope[:, None] * slope[None, :]
+    mixed = share.first[:, None] * slope[None, :]
+    nothing = np.zeros_like(share.value)
+    bent = share.value * rate.second[..., None] + mixed + mixed.swapaxes(0, 1)
+    columns = [  # what stands before w, w' and w'' in the value, the gradient and the Hessian
+        [share.value, *share.first, *share.second.reshape(d * d, *share.value.shape)],
+        [
+            nothing,
+            *(share.value * slope),
+            *bent.reshape(d * d, *nothing.shape),
+        ],
+        [nothing] * (1 + d) + [*(share.value * pair).reshape(d * d, *nothing.shape)],
+    ]
+    factors = np.concatenate([np.concatenate(row, -1) for row in columns], 1)
+    both = np.concatenate(waves, -1)
+    total = both.real @ factors.real - both.imag @ factors.imag
+    out = np.moveaxis(total.reshape(samples, -1, 1 + d + d * d, m), 2, 0)
+    return Jet(out[0], out[1 : d + 1], out[d + 1 :].reshape(d, d, *out.shape[1:]))
+
+
+def responses(
+    rate: Array, load: Array, step: float, *, every: int = 1, derivatives: bool = False
+) -> list[Array]:
+    """R and, if wanted, dR/dλ and d²R/dλ² at every `every`-th sample of the load, each shape (S, T,
+    K), for eigenvalues (S, K).
+    """
+    f = phi(rate * step, 4)
+    slopes = [[f[k], step * (f[k] - k * f[k + 1])] for k in (1, 2)]
+    for k, row in zip((1, 2), slopes, strict=True):
+        row.append(step**2 * (f[k] - 2 * k * f[k + 1] + k * (k + 1) * f[k + 2]))
+    orders = 3 if derivatives else 1
+    old = [step * (a - b) for a, b in zip(*slopes, strict=True)][:orders]
+    new = [step * b for b in slopes[1]][:orders]
+    E = f[0]
+    out: list[Array] = [
+        np.zeros((len(rate), (len(load) - 1) // every + 1, rate.shape[1]), complex)
+        for _ in range(orders)
+    ]
+    now = [np.zeros_like(E) for _ in range(orders)]
+    for j in range(1, len(load)):
+        moved = [E * now[0]]
+        if derivatives:
+            moved += [
+                E * (now[1] + step * now[0]),
+                E * (now[2] + 2 * step * now[1] + step**2 * now[0]),
+            ]
+        now = [x + load[j - 1] * a + load[j] * b for x, a, b in zip(moved, old, new, strict=True)]
+        if j % every == 0:
+            for whole, x in zip(out, now, strict=True):
+                whole[:, j // every] = x
+    return out
+
+
+def phi(z: Array, top: int) -> list[Array]:
+    """φ_0 … φ_top of exponential integrators, φ_k(z) = ∫ exp((1 − θ) z) θ^(k−1) / (k−1)! dθ over
+    [0, 1], to round-off.
+    """
+    z = np.asarray(z, complex)
+    small = np.abs(z) < 1
+    inner, outer = np.where(small, z, 0), np.where(small, 1, z)
+    series = np.zeros_like(z)
+    for j in range(20, -1, -1):  # Horner; 1/24! is below round-off
+        series = series * inner + 1 / factorial(j + top)
+    near, far = [series], [np.exp(outer)]
+    for k in range(top - 1, -1, -1):
+        near.insert(0, near[0] * inner + 1 / factorial(k))
+    for k in range(top):
+        far.append((far[-1] - 1 / factorial(k)) / outer)
+    return [np.where(small, a, b) for a, b in zip(near, far, strict=True)]

@@ -1,0 +1,212 @@
+"""What an engineer reads off an envelope: fuzzy peaks, and fuzzy probabilities of exceeding a
+limit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.frame.boxes import ALPHA, Boxes, boxes
+from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.low_discrepancy import chebyshev_points
+from alphacut.frame.dynamics.flow import Flow, LinearFlow
+from alphacut.frame.dynamics.integrators import Exact
+from alphacut.frame.dynamics.nonlinear import LagrangianFlow
+from alphacut.frame.envelope import Envelope
+from alphacut.frame.structures.lagrangian import LagrangianSystem
+from alphacut.frame.structures.linear import LinearSystem
+from alphacut.fuzzy import FuzzyNumber
+
+LIMITS = 201  # for which the probability is told besides
+
+
+@dataclass(frozen=True, eq=False)
+class FuzzyPeaks:
+    """Largest magnitude of each output over time, as intervals by level.
+
+    Args:
+        alpha: Levels, shape (A,).
+        lower: What the peak is at least, shape (A, m).
+        upper: What it is at most, shape (A, m).
+    """
+
+    alpha: Array
+    lower: Array
+    upper: Array
+
+
+def peaks(envelope: Envelope) -> FuzzyPeaks:
+    """Fuzzy peaks of |output| from the envelope: the upper ends are exact, the lower ends a bound
+    from below.
+
+    No trajectory peaks higher than the envelope; and each has, at every node, at least the
+    magnitude that its band is away from zero.
+    """
+    upper = np.maximum(envelope.upper, -envelope.lower).max(1)
+    lower = np.maximum(np.maximum(envelope.lower, -envelope.upper), 0.0).max(1)
+    return FuzzyPeaks(envelope.alpha, lower, upper)
+
+
+def tried_peaks(flow: Flow, cuts: Boxes, *, spread: int = 32) -> Array:
+    """The least peak of |output| over time among points tried on each level, shape (A, m): corners,
+    up to five parameters, and a spread.
+
+    The true lower end of the fuzzy peak lies between that of `peaks` and this.
+    """
+    least, found = np.full(len(flow.outputs), np.inf), []
+    for level in reversed(range(len(cuts.alpha))):
+        peak = np.abs(flow.values(_tried(cuts, level, spread, corner=5))).max(1)
+        least = np.minimum(least, peak.min(0))
+        found.append(least)
+    return np.array(found[::-1])
+
+
+@dataclass(frozen=True, eq=False)
+class FuzzyProbability:
+    """Probability that |output| exceeds a limit within the duration, as intervals by level.
+
+    Args:
+        alpha: Levels, shape (A,).
+        lower: Least probability over the fuzzy inputs, shape (A,).
+        upper: Greatest probability, shape (A,).
+        deviation: Largest standard deviation of the estimates; with few draws it stays large where
+            none or all of them exceed the limit.
+        trajectories: Trajectories computed.
+        limits: Other limits, from below the least peak to above the greatest, shape (L,), in the
+            output's unit.
+        curve_lower: Least probability of exceeding each of them, shape (A, L).
+        curve_upper: Greatest probability, shape (A, L).
+    """
+
+    alpha: Array
+    lower: Array
+    upper: Array
+    deviation: float
+    trajectories: int
+    limits: Array
+    curve_lower: Array
+    curve_upper: Array
+
+
+def exceedance(
+    system: LinearSystem | LagrangianSystem,
+    inputs: Mapping[str, FuzzyNumber],
+    random: Mapping[str, Callable[[np.random.Generator, int], Array]],
+    *,
+    limit: float,
+    duration: float,
+    step: float,
+    output: int = 0,
+    alpha: Sequence[float] = ALPHA,
+    samples: int = 200,
+    spread: int = 64,
+    rng: np.random.Generator | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> FuzzyProbability:
+    """Fuzzy probability of exceeding a limit when some inputs are random and others fuzzy.
+
+    The same random draws serve every fuzzy point (common random numbers), so differences between
+    points are not noise. The bounds
+    are attained at the points tried: corners and a spread of points of each box, from the narrowest
+        to the widest.
+
+    Args:
+        system: A linear structure, by the exact propagator, or a general system, by the midpoint
+            rule.
+        inputs: Fuzzy parameters.
+        random: Random parameters by name, each a sampler (generator, count) to values of shape
+            (count,).
+        limit: Magnitude of the output that must not be exceeded, in its unit.
+        duration: Length of the simulation, in s.
+        step: Distance of nodes, in s.
+        output: Index of the output.
+        alpha: Levels.
+        samples: Random draws.
+        spread: Points of the box besides its corners, per level.
+        rng: Source of the draws; seeded with 0 unless given.
+        progress: Called with the fraction done.
+
+    Raises:
+        ValueError: A parameter is both fuzzy and random, or the limit is not positive.
+    """
+    both = set(inputs) & set(random)
+    if both or not limit > 0:
+        raise ValueError(
+            f"exceedance: limit {limit:g} must be positive, and {sorted(both) or 'no input'} cannot"
+            " be both fuzzy and random"
+        )
+    rng = rng or np.random.default_rng(0)
+    cuts = boxes(inputs, alpha)
+    draws = (
+        np.column_stack([sampler(rng, samples) for sampler in random.values()])
+        if random
+        else np.zeros((1, 0))
+    )
+    flow = _flow(system, (*cuts.names, *random), duration, step)
+    tried = [_tried(cuts, level, spread) for level in range(len(cuts.alpha))]
+    total, found = sum(map(len, tried)), []
+    for point in np.concatenate(tried):
+        values = flow.values(np.hstack([np.tile(point, (len(draws), 1)), draws]))[:, :, output]
+        found.append(np.abs(values).max(1))
+        if progress:
+            progress(len(found) / total)
+    peak = np.sort(found, axis=1)
+    limits = np.linspace(0.95 * peak.min(), 1.05 * peak.max(), LIMITS)
+    of = np.repeat(np.arange(len(tried)), [len(points) for points in tried])
+    low, high = _bounds(peak, of, np.append(limits, limit))
+    deviation = (
+        max(_deviation(share, len(draws)) for share in (*low[:, -1], *high[:, -1]))
+        if random
+        else 0.0
+    )
+    return FuzzyProbability(
+        cuts.alpha,
+        low[:, -1],
+        high[:, -1],
+        deviation,
+        total * len(draws),
+        limits,
+        low[:, :-1],
+        high[:, :-1],
+    )
+
+
+def _deviation(share: float, draws: int) -> float:
+    """Standard deviation of a probability known by the share of some draws, before which any value
+    was as likely (Laplace's rule).
+    """
+    mean = (share * draws + 1) / (draws + 2)
+    return float(np.sqrt(mean * (1 - mean) / (draws + 3)))
+
+
+def _bounds(peak: Array, of: Array, limits: Array) -> tuple[Array, Array]:
+    """Least and greatest share of peaks above each limit, on each level, every level holding the
+    points of those above it.
+    """
+    share = np.array([1 - np.searchsorted(row, limits, side="right") / len(row) for row in peak])
+    levels = range(of.max() + 1)
+    return np.array([share[of >= k].min(0) for k in levels]), np.array(
+        [share[of >= k].max(0) for k in levels]
+    )
+
+
+def _flow(
+    system: LinearSystem | LagrangianSystem, names: tuple[str, ...], duration: float, step: float
+) -> Flow:
+    if isinstance(system, LagrangianSystem):
+        return LagrangianFlow(system, names, duration, step)
+    return LinearFlow(system, names, duration, step, Exact())
+
+
+def _tried(cuts: Boxes, level: int, spread: int, *, corner: int = 8) -> Array:
+    from alphacut.frame.methods.sampling import corners
+
+    lower, upper = cuts.unit(level)
+    if not (upper > lower).any():
+        return cuts.modal[None]
+    inner = (lower + upper) / 2 + (upper - lower) / 2 * chebyshev_points(len(lower), spread)
+    points = np.vstack([corners(lower, upper), inner]) if len(lower) <= corner else inner
+    return cuts.to_physical(points)

@@ -1,0 +1,183 @@
+"""The cheapest method that keeps a wanted error, with the estimate and the reason."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from alphacut.frame.boxes import UnitFlow
+from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.low_discrepancy import chebyshev_points
+from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.envelope import Envelope
+from alphacut.frame.methods.batch_graph_follower import pursue
+from alphacut.frame.methods.modal import modal
+from alphacut.frame.structures.modes import ModalError
+
+Progress = Callable[[float], None]
+CANDIDATES = ("modal", "improved-graph-follower")
+CHECKS = 512
+"""Trajectories of the independent second pass."""
+FLOOR = 0.5
+"""Least estimate of the modal method at a node, as a share of its largest: held-out samples are few
+and miss the worst at single nodes.
+"""
+
+
+class ToleranceError(RuntimeError):
+    """No method left reaches the wanted error."""
+
+
+def auto(
+    flow: UnitFlow,
+    progress: Progress | None = None,
+    *,
+    tolerance: float = 1e-4,
+    exclude: Sequence[str] = (),
+    budget: int = 20000,
+) -> Envelope:
+    """Envelope with an estimated error below `tolerance`.
+
+    Modal intervening variables come first, since tens of eigen-analyses cost less than any number
+    of trajectories; where their error estimate is too large, the Graph Follower in rounds, made
+    stricter until an independent sample finds nothing above the tolerance.
+
+    Args:
+        flow: The trajectories.
+        progress: Called with the fraction done.
+        tolerance: Wanted envelope error, in units of the (first) output.
+        exclude: Methods that must not be taken, out of `CANDIDATES`.
+        budget: Most trajectories of the Graph Follower.
+
+    Raises:
+        ValueError: An excluded name is unknown, or the tolerance is not positive.
+        ToleranceError: No method left reaches the tolerance.
+    """
+    return cheapest(
+        flow, progress, tolerance=tolerance, fitted=tolerance / 8, exclude=exclude, budget=budget
+    )
+
+
+def cheapest(
+    flow: UnitFlow,
+    progress: Progress | None,
+    *,
+    tolerance: float,
+    fitted: float,
+    exclude: Sequence[str] = (),
+    budget: int = 20000,
+) -> Envelope:
+    """As `auto`, with `fitted`, the error wanted of the modal model, apart from the tolerance that
+    it must keep.
+    """
+    for name in exclude:
+        if name not in CANDIDATES:
+            raise ValueError(f"exclude: '{name}' is unknown; allowed are {', '.join(CANDIDATES)}")
+    if not tolerance > 0:
+        raise ValueError(f"tolerance: {tolerance:g} is not allowed; it must be positive")
+    begun, refused = time.perf_counter(), [f"{name} excluded" for name in exclude]
+    if "modal" not in exclude and isinstance(flow.flow, LinearFlow):
+        try:
+            found = _levelled(modal(flow, progress, tolerance=fitted), flow)
+            if _estimate(found, flow) <= tolerance:
+                return _reported(
+                    found,
+                    flow,
+                    begun,
+                    "modal: polynomials of the modes reach the tolerance with the fewest"
+                    " eigen-analyses",
+                )
+            refused.append(f"modal estimates {_estimate(found, flow):.2g}")
+        except ModalError as error:
+            refused.append(str(error))
+    if "improved-graph-follower" not in exclude:
+        followed = _followed(flow, tolerance, budget, progress)
+        if followed is not None:
+            return _reported(
+                followed,
+                flow,
+                begun,
+                "improved-graph-follower, since"
+                f" {'; '.join(refused) or 'the system is not linear'}",
+            )
+        refused.append(f"improved-graph-follower needs more than {budget} trajectories")
+    raise ToleranceError(
+        f"auto: no method reaches {tolerance:g} ({'; '.join(refused)}); allow more methods, a"
+        " larger budget or tolerance"
+    )
+
+
+def _followed(
+    flow: UnitFlow, tolerance: float, budget: int, progress: Progress | None
+) -> Envelope | None:
+    """The Graph Follower, begun with more points until an independent sample agrees."""
+    spread, strict, used = 256, tolerance / 4, 0
+    for attempt in range(4):
+        found = pursue(flow, progress, tolerance=strict, budget=budget, spread=spread, contests=3)
+        used += found.trajectories
+        if "reason" in found.facts:
+            return None
+        missed = second_pass(found, flow, skip=100_003 * (attempt + 1))
+        used += CHECKS
+        if missed <= tolerance / 20:
+            error = np.full_like(found.lower, 1.0) * flow.scale * max(missed, strict)
+            return replace(
+                found,
+                trajectories=used,
+                error=error,
+                facts={**found.facts, "missed_by_sample": missed},
+            )
+        spread, strict = 4 * spread, strict / 2
+    return None
+
+
+def second_pass(found: Envelope, flow: UnitFlow, *, skip: int) -> float:
+    """By how much an independent sample of the widest box leaves the envelope, in units of the
+    tolerance.
+    """
+    lower, upper = flow.boxes.unit(0)
+    points = (lower + upper) / 2 + (upper - lower) / 2 * chebyshev_points(
+        len(lower), CHECKS, skip=skip
+    )
+    worst = 0.0
+    for chunk in np.array_split(points, 8):
+        values = flow.values(chunk)
+        beyond = np.maximum(values.max(0) - found.upper[0], found.lower[0] - values.min(0))
+        worst = max(worst, float((beyond / flow.scale).max()))
+    return worst
+
+
+def _levelled(found: Envelope, flow: UnitFlow) -> Envelope:
+    assert found.error is not None
+    return replace(
+        found, error=np.maximum(found.error, FLOOR * _estimate(found, flow) * flow.scale)
+    )
+
+
+def _estimate(found: Envelope, flow: UnitFlow) -> float:
+    assert found.error is not None
+    return float((found.error / flow.scale).max())
+
+
+def _reported(found: Envelope, flow: UnitFlow, begun: float, reason: str) -> Envelope:
+    facts = {**found.facts, "estimated_error": _estimate(found, flow), "reason": reason}
+    return replace(found, facts=facts, seconds=time.perf_counter() - begun)
+
+
+def width_shares(whole: Envelope, fixed: Sequence[Envelope]) -> Array:
+    """Share of width of each input over time: the width lost when it alone is fixed at its modal
+    value, shape (d, A, T, m).
+
+    Args:
+        whole: Envelope with all inputs fuzzy.
+        fixed: Envelopes with one input each at its modal value, in the order of the inputs.
+    """
+    width = whole.upper - whole.lower
+    lost = np.stack([width - (other.upper - other.lower) for other in fixed])
+    shares: Array = np.divide(
+        lost, width, out=np.zeros_like(lost), where=width > 1e-12 * np.abs(width).max()
+    )
+    return shares

@@ -1,0 +1,339 @@
+"""The Graph Follower in rounds: graphs are proposed by the Taylor models of all nodes together and
+computed in batches.
+
+The same idea as `frame.graph_follower` (storage, Taylor models, tolerance, post-processing), turned
+around: instead of one node after the other, every round asks the models of the best graphs at all
+nodes, takes the proposal that promises most in each window of time, and advances these graphs
+together as arrays. Nodes before and after a discovery profit alike, which is what backward sweeps
+are for; the points spread at the start look for basins independently of any model.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from alphacut.frame.boxes import UnitFlow
+from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_maximum
+from alphacut.frame.calculus.jet import Array, Jet
+from alphacut.frame.calculus.low_discrepancy import chebyshev_points
+from alphacut.frame.checks.corners import taken_in
+from alphacut.frame.envelope import Envelope, signed_envelope
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class BatchFollower:
+    """The method and its switches.
+
+    Args:
+        tolerance: Predicted gain above which a new graph is computed, in units of the outputs.
+        budget: Most graphs over all levels.
+        spread: Graphs on a spread of points per level that start the search.
+        batch: Graphs computed together.
+        reach: Trust region of a Taylor model, as a share of the half width of the box.
+        order: Degree κ of the Taylor models, which must be 2.
+        contests: How often, when no model promises more, those of neighbouring nodes are asked
+            where the optimum jumps in between.
+
+    Raises:
+        ValueError: A switch is out of its range.
+    """
+
+    tolerance: float = 7e-5
+    budget: int = 5000
+    spread: int = 64
+    batch: int = 32
+    reach: float = 0.6
+    order: int = 2
+    contests: int = 0
+
+    def __post_init__(self) -> None:
+        if not (self.tolerance > 0 and np.isfinite(self.tolerance)):
+            raise ValueError(f"tolerance: {self.tolerance:g} is not allowed; it must be positive")
+        if self.order != 2:
+            raise ValueError(
+                f"order: {self.order} is not allowed; the Graph Follower in rounds needs Taylor"
+                " models of degree 2"
+            )
+        if min(self.budget, self.spread, self.batch) < 1 or not 0 < self.reach <= 2:
+            raise ValueError(
+                f"budget {self.budget}, spread {self.spread}, batch {self.batch}, reach"
+                f" {self.reach:g}: out of range"
+            )
+
+    def run(self, flow: UnitFlow, *, progress: Progress | None = None) -> Pursuit:
+        """Pursues all levels of `flow.boxes`, from the narrowest box to the widest."""
+        levels = len(flow.boxes.alpha)
+        out = Pursuit.empty(flow)
+        for done, level in enumerate(reversed(range(levels))):
+            lower, upper = flow.boxes.unit(level)
+            out.enter(level, lower, upper, self)
+            limit = self.budget * (done + 1) // levels
+            points, contests = (
+                self._start(flow, lower, upper, out)[: max(1, limit - len(out.points))],
+                self.contests,
+            )
+            while len(points):
+                for chunk in np.array_split(points, -(-len(points) // self.batch)):
+                    out.take(chunk, self)
+                if progress:
+                    progress(min(1.0, len(out.points) / self.budget))
+                points = out.proposals(self, min(self.batch, limit - len(out.points)))
+                while not len(points) and contests and len(out.points) < limit:
+                    out.contest(self)
+                    contests -= 1
+                    points = out.proposals(self, min(self.batch, limit - len(out.points)))
+            out.leave(level)
+        return out
+
+    def _start(self, flow: UnitFlow, lower: Array, upper: Array, out: Pursuit) -> Array:
+        modal = flow.boxes.to_unit(flow.boxes.modal)[None]
+        if not (upper > lower).any():
+            return modal if not len(out.points) else np.zeros((0, len(lower)))
+        middle, half = (lower + upper) / 2, (upper - lower) / 2
+        return np.vstack(
+            [
+                modal,
+                middle + half * chebyshev_points(len(lower), self.spread, skip=1 + len(out.points)),
+            ]
+        )
+
+
+@dataclass(eq=False)
+class Pursuit:
+    """State of the search: best bounds, and what the models of stored graphs propose.
+
+    Arrays over problems have shape (T, m, 2); sides are (−output, output), both to be maximised.
+
+    Args:
+        flow: Computes graphs.
+        points: Unit coordinates of all graphs so far, shape (G, d).
+        value: Attained bounds of the present level.
+        at: Unit coordinates that attain them, shape (T, m, 2, d).
+        promise: Bound promised by the model of the best graph.
+        target: Unit coordinates it promises it at, shape (T, m, 2, d).
+        bounds: Attained bounds per finished level, shape (A, T, m, 2).
+        where: Their unit coordinates.
+        correction: What the final models still promise, at most the tolerance.
+        open_gain: What they promise above the tolerance when the budget ends the search.
+    """
+
+    flow: UnitFlow
+    points: Array
+    value: Array
+    at: Array
+    promise: Array
+    target: Array
+    bounds: Array
+    where: Array
+    correction: Array
+    open_gain: Array
+    lower: Array = field(default_factory=lambda: np.zeros(0))
+    upper: Array = field(default_factory=lambda: np.zeros(0))
+    tolerance: float = 0.0
+    reach: float = 0.6
+
+    @classmethod
+    def empty(cls, flow: UnitFlow) -> Pursuit:
+        """Nothing known yet."""
+        d, shape = len(flow.boxes.names), (len(flow.time), len(flow.outputs), 2)
+        levels = len(flow.boxes.alpha)
+        low, at = np.full(shape, -np.inf), np.zeros((*shape, d))
+        many, where = np.zeros((levels, *shape)), np.zeros((levels, *shape, d))
+        return cls(
+            flow,
+            np.zeros((0, d)),
+            low,
+            at,
+            low.copy(),
+            at.copy(),
+            many,
+            where,
+            many.copy(),
+            many.copy(),
+        )
+
+    def enter(self, level: int, lower: Array, upper: Array, method: BatchFollower) -> None:
+        """Starts a level; what narrower levels attained stays valid, models are asked anew in the
+        wider box.
+        """
+        del level
+        self.lower, self.upper, self.tolerance, self.reach = (
+            lower,
+            upper,
+            method.tolerance,
+            method.reach,
+        )
+        self.promise[:] = self.value
+        known = (
+            np.unique(self.at.reshape(-1, self.at.shape[-1]), axis=0)
+            if len(self.points)
+            else np.zeros((0, len(lower)))
+        )
+        if len(known) and (upper > lower).any():
+            keep = known[
+                np.linspace(0, len(known) - 1, min(len(known), 2 * method.spread)).astype(int)
+            ]
+            for chunk in np.array_split(keep, -(-len(keep) // method.batch)):
+                self._ask(chunk, self.flow.taylor(chunk), method)
+
+    def leave(self, level: int) -> None:
+        """Post-processing of a level."""
+        promised = np.maximum(self.promise - self.value, 0.0)
+        small = promised <= self.tolerance * self.flow.scale[:, None]
+        self.bounds[level], self.where[level] = self.value, self.at
+        self.correction[level] = np.where(small, promised, 0.0)
+        self.open_gain[level] = np.where(small, 0.0, promised)
+
+    def take(self, points: Array, method: BatchFollower) -> None:
+        """Computes graphs, updates the bounds at all nodes and asks their models."""
+        jet = self.flow.taylor(points)
+        self.points = np.vstack([self.points, points])
+        self._ask(points, jet, method)
+
+    def _ask(self, points: Array, jet: Jet, method: BatchFollower) -> None:
+        for s, point in enumerate(points):
+            signed = np.stack([-jet.value[s], jet.value[s]], -1)
+            better = signed > self.value
+            self.value[better], self.at[better] = signed[better], point
+            self._propose(point, jet, s, signed >= self.value)
+
+    def contest(self, method: BatchFollower) -> None:
+        """Asks the models of the graphs that hold a bound at one node about the next node, where
+        another basin holds it.
+        """
+        rivals: dict[bytes, list[tuple[int, int, int]]] = {}
+        for here, there in ((slice(1, None), slice(None, -1)), (slice(None, -1), slice(1, None))):
+            jumps = (
+                np.abs(self.at[here] - self.at[there]).max(-1)
+                > JUMP * (self.upper - self.lower).max()
+            )
+            for t, o, side in np.argwhere(jumps):
+                place = (int(t) + (here.start or 0), int(o), int(side))
+                rivals.setdefault(self.at[there][t, o, side].tobytes(), []).append(place)
+        points = np.array([np.frombuffer(key) for key in rivals]).reshape(-1, self.at.shape[-1])
+        for chunk, keys in zip(
+            _batches(points, method.batch),
+            _batches(np.array(list(rivals), object), method.batch),
+            strict=True,
+        ):
+            jet = self.flow.taylor(chunk)
+            self.points = np.vstack([self.points, chunk])
+            for s, key in enumerate(keys):
+                self._challenge(chunk[s], jet, s, np.array(rivals[key]))
+
+    def _challenge(self, point: Array, jet: Jet, s: int, places: Array) -> None:
+        """Lets the model of one graph promise at `places` (K, 3), where that is more than is
+        promised there.
+        """
+        t, o, side = places.T
+        promised, target = self._optima(point, jet, s, (t, o, side))
+        more = promised > self.promise[t, o, side]
+        self.promise[t[more], o[more], side[more]], self.target[t[more], o[more], side[more]] = (
+            promised[more],
+            target[more],
+        )
+
+    def _propose(self, point: Array, jet: Jet, s: int, close: Array) -> None:
+        """Optima of the model of one graph where it is best; they replace what the model of the
+        former best promised.
+        """
+        t, o, side = np.nonzero(close)
+        if not len(t) or not (self.upper > self.lower).any():
+            return
+        self.promise[t, o, side], self.target[t, o, side] = self._optima(
+            point, jet, s, (t, o, side)
+        )
+
+    def _optima(
+        self, point: Array, jet: Jet, s: int, places: tuple[Array, Array, Array]
+    ) -> tuple[Array, Array]:
+        """What the model of one graph promises at K places, shape (K,), and where, shape (K, d)."""
+        t, o, side = places
+        sign = 2.0 * side - 1
+        g = (jet.first[:, s, t, o] * sign).T
+        H = np.moveaxis(jet.second[:, :, s, t, o] * sign, -1, 0)
+        reach = self.reach * np.maximum((self.upper - self.lower) / 2, 1e-300)
+        low = np.maximum(self.lower - point, -reach)
+        high = np.minimum(self.upper - point, reach)
+        rows = (len(t), len(point))
+        maximise = global_maximum if len(point) <= 4 else local_maximum
+        x = maximise(g, H, np.broadcast_to(low, rows), np.broadcast_to(high, rows))
+        return jet.value[s, t, o] * sign + gain(g, H, x), point + x
+
+    def proposals(self, method: BatchFollower, count: int) -> Array:
+        """The most promising point of every window of time, apart from the others and from all
+        graphs computed, shape (≤ count, d).
+        """
+        chosen: list[Array] = []
+        for window in np.array_split(
+            np.arange(len(self.value)), max(1, min(count, len(self.value)))
+        ):
+            gains = (self.promise - self.value)[window] / self.flow.scale[:, None]
+            for k in np.argsort(-gains, axis=None)[:TRIES]:
+                t, o, side = np.unravel_index(k, gains.shape)
+                place = (window[t], o, side)
+                if gains[t, o, side] <= method.tolerance:
+                    break
+                point = np.clip(self.target[place], self.lower, self.upper)
+                if (np.abs(self.points - point).max(1) < 1e-7).any():
+                    self.promise[place] = self.value[
+                        place
+                    ]  # tried already: the model promised too much
+                elif all(np.abs(point - other).max() > SPACING for other in chosen):
+                    chosen.append(point)
+                    break
+        return np.array(chosen)[:count].reshape(-1, len(self.lower))
+
+
+def _batches(array: Array, size: int) -> list[Array]:
+    return [array[k : k + size] for k in range(0, len(array), size)]
+
+
+JUMP = 0.05
+"""Share of the box's width from which on optima of neighbouring nodes lie in different basins."""
+SAFETY = 2.0
+"""Factor on what the last models promise: the next ones promise again."""
+TRIES = 40
+"""Proposals looked at per window of time."""
+SPACING = 0.02
+"""Distance in unit coordinates between graphs of one batch."""
+
+
+def pursue(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> Envelope:
+    """Envelope by the Graph Follower in rounds, corrected by what the last models still promise;
+    options are the fields of `BatchFollower`.
+
+    The error is twice what these models promise, below the tolerance, or above it where the budget
+    ended the search, and by how much the corners of the boxes pass the bounds, which then take them
+    in. A basin that neither a model nor a corner shows is not in it. The fact "corners" counts
+    these, which need no derivatives.
+    """
+    method, begun = BatchFollower(**options), time.perf_counter()
+    found = method.run(flow, progress=progress)
+    bounds, where, missed, corners = taken_in(flow, found.bounds + found.correction, found.where)
+    error = (
+        SAFETY
+        * (
+            np.maximum(found.correction, found.open_gain).max(-1)
+            + method.tolerance / 2 * flow.scale
+        )
+        + missed[:, None]
+    )
+    facts: dict[str, float | str] = {"tolerance": method.tolerance, "order": 2, "corners": corners}
+    if found.open_gain.any():
+        facts["reason"] = (
+            f"stopped at the budget of {method.budget} trajectories; models promise"
+            f" {found.open_gain.max():.2g} more"
+        )
+    cost = {"trajectories": len(found.points), "seconds": time.perf_counter() - begun}
+    name = "improved-graph-follower"
+    return signed_envelope(
+        flow, bounds, where, method=name, nature="estimated", error=error, facts=facts, **cost
+    )

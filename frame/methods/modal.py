@@ -1,0 +1,232 @@
+"""Envelopes by modal intervening variables: what is tried first for linear structures."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from alphacut.frame.boxes import UnitFlow
+from alphacut.frame.calculus.jet import Array
+from alphacut.frame.certificate.certificate import certify
+from alphacut.frame.certificate.model_error import proved_error
+from alphacut.frame.certificate.remainder import require_certifiable
+from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.envelope import Envelope, signed_envelope
+from alphacut.frame.modal.model import ModalModel, fit_modes
+from alphacut.frame.modal.search import ModalSearch
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
+
+Progress = Callable[[float], None]
+SAFETY = 3.0
+"""Factor on the model error sampled at held-out points."""
+PORTION = 0.2
+"""Share of the gap that the error of the modal model may take on either side."""
+USUAL = 10.0
+"""Proved over sampled error, seldom less."""
+ATTEMPTS = 5
+"""Models of rising degree that are tried before the error is sampled instead of proved."""
+SEARCHED = 0.1
+"""Share of the time that the search takes before the proof begins, for the progress alone."""
+PROVED = (
+    "the error of its polynomials is bounded over the whole box by the energy of what they miss in"
+    " the equations of motion"
+)
+
+
+@dataclass(frozen=True)
+class Modal:
+    """The method and its options.
+
+    Args:
+        tolerance: Wanted error of the modal model, in units of the outputs.
+        budget: Most eigen-analyses.
+        seed: Of the samples that find the basins.
+        certify: Wanted gap between attained and proved bounds, in units of the outputs; None for no
+            certificate.
+        boxes: Most boxes of the branch and bound per bound, on average.
+        workers: Processes of the branch and bound.
+
+    Raises:
+        ValueError: A value is out of its range.
+    """
+
+    tolerance: float = 1e-6
+    budget: int = 280
+    seed: int = 0
+    certify: float | None = None
+    boxes: float = 4000
+    workers: int = 1
+
+    def __post_init__(self) -> None:
+        if not self.tolerance > 0 or self.budget < 1 or self.workers < 1 or self.boxes <= 0:
+            raise ValueError(
+                f"tolerance {self.tolerance:g}, budget {self.budget}, workers {self.workers}: each"
+                " must be positive"
+            )
+        if self.certify is not None and not self.certify > 0:
+            raise ValueError(f"certify: {self.certify:g} is not allowed; the gap must be positive")
+
+
+def modal(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> Envelope:
+    """Envelope of a linear structure from a polynomial modal model over the widest box.
+
+    Args:
+        flow: Trajectories of a `LinearFlow`.
+        progress: Called with the fraction done.
+        options: Fields of `Modal`.
+
+    Where the polynomials do not reach the tolerance, `error` says what they do, and the fact
+    "reason" that it is more.
+
+    Raises:
+        ModalError: The structure has no smooth oscillating modes over the box.
+        ValueError: The flow is not that of a linear structure.
+    """
+    if not isinstance(flow.flow, LinearFlow):
+        raise ValueError("method: 'modal' needs a linear structure; take graph-follower")
+    method, begun = Modal(**options), time.perf_counter()
+    if method.certify is not None:
+        return _certified(flow, method, method.certify, begun, progress)
+    model = fit_modes(
+        flow.flow, flow.boxes, tolerance=method.tolerance, budget=method.budget, scale=flow.scale
+    )
+    bounds, at = search_levels(model, ModalSearch.suited(model, method.seed), progress)
+    facts: dict[str, float | str] = {
+        "model_error": float(model.error.max()),
+        "degree": model.degree,
+    }
+    if (short := _short_of(model, method.tolerance, flow.scale)) is not None:
+        facts["reason"] = short
+    error = np.broadcast_to(2 * model.error, bounds.shape[:-1]).copy()
+    cost = {"trajectories": model.analyses, "seconds": time.perf_counter() - begun}
+    return signed_envelope(
+        flow, bounds, at, method="modal", nature="estimated", error=error, facts=facts, **cost
+    )
+
+
+def _short_of(model: ModalModel, tolerance: float, scale: Array) -> str | None:
+    """What to say of a model that misses the wanted error; None of one that keeps it."""
+    reached = float((model.error / scale).max())
+    if reached <= tolerance:
+        return None
+    cure = "take the method auto, narrower supports or a larger budget"
+    return (
+        f"modal: the polynomials reach {reached:.2g} and not the tolerance {tolerance:.2g}, see the"
+        f" error; {cure}"
+    )
+
+
+def _certified(
+    flow: UnitFlow, method: Modal, gap: float, begun: float, progress: Progress | None
+) -> Envelope:
+    assert isinstance(flow.flow, LinearFlow)
+    require_certifiable(len(flow.boxes.names))
+    model, error, unproved = _model_with_error(flow.flow, flow, method, gap)
+    searched = progress and (lambda share: progress(SEARCHED * share))
+    proved = progress and (lambda share: progress(SEARCHED + (1 - SEARCHED) * share))
+    bounds, at = search_levels(model, ModalSearch.suited(model, method.seed), searched)
+    proof = certify(
+        model,
+        bounds,
+        at,
+        gap=gap,
+        model_error=error,
+        scale=flow.scale,
+        workers=method.workers,
+        budget=method.boxes,
+        progress=proved,
+    )
+    facts: dict[str, float | str] = {
+        "model_error": float((error / flow.scale).max()),
+        "degree": model.degree,
+        "gap": proof.gap,
+    }
+    facts |= {
+        "gap_output": flow.outputs[flow.reference],
+        "between_nodes": proof.between,
+        "boxes": proof.boxes,
+        "proof": f"the branch and bound is rigorous for the modal model; {PROVED}",
+    }
+    if unproved:
+        sampled = (
+            "the error of its polynomials is verified by sampling, since it could not be proved"
+        )
+        facts["proof"] = (
+            f"the branch and bound is rigorous for the modal model; {sampled}: {unproved}"
+        )
+    envelope = signed_envelope(
+        flow,
+        proof.outer,
+        proof.at,
+        method="modal",
+        nature="verified by sampling" if unproved else "guaranteed",
+        error=(proof.outer - proof.bounds).max(-1),
+        trajectories=model.analyses,
+        seconds=time.perf_counter() - begun,
+        facts=facts,
+    )
+    return replace(envelope, inner_lower=-proof.bounds[..., 0], inner_upper=proof.bounds[..., 1])
+
+
+def _model_with_error(
+    linear: LinearFlow, flow: UnitFlow, method: Modal, gap: float
+) -> tuple[ModalModel, Array, str]:
+    """A modal model fit for a certificate, its error (T, m), and why that is only sampled; empty
+    where it is proved.
+
+    The proved bound exceeds the sampled error some thirty times, so the polynomials are refined
+    until it takes little of the gap.
+    """
+
+    def fitted(tolerance: float) -> ModalModel:
+        return fit_modes(
+            linear, flow.boxes, tolerance=tolerance, budget=method.budget, scale=flow.scale
+        )
+
+    model = first = fitted(min(method.tolerance, gap / 30))
+    reason = ""
+    for _ in range(ATTEMPTS):
+        sampled = float((model.error / flow.scale).max())
+        largest = USUAL * sampled  # a bound is seldom less, and takes time
+        if largest <= PORTION * gap:
+            try:
+                error = proved_error(model)
+            except UnprovedError as unknown:
+                reason = str(unknown)
+                break
+            largest = float((error / flow.scale).max())
+            if largest <= PORTION * gap:
+                return model, error, ""
+        reason = f"its bound, some {largest:.2g}, takes too much of the gap {gap:g}"
+        model, before = (
+            fitted(sampled * min(0.99, 4 * PORTION * gap / largest)),
+            model.degree,
+        )  # a degree more divides it by ten or so
+        if model.degree <= before:
+            break
+    return first, SAFETY * first.error, reason
+
+
+def search_levels(
+    model: ModalModel, search: ModalSearch, progress: Callable[[float], None] | None
+) -> tuple[Array, Array]:
+    """Bounds (A, T, m, 2) and unit coordinates (A, T, m, 2, d) on all levels, from the narrowest
+    box to the widest, nested.
+    """
+    cuts = model.boxes
+    shape = (len(cuts.alpha), len(model.time), len(model.outputs), 2)
+    bounds, at = np.empty(shape), np.empty((*shape, len(cuts.names)))
+    for done, level in enumerate(reversed(range(shape[0]))):
+        if progress:
+            progress(done / shape[0])
+        bounds[level], at[level] = search.run(
+            model, *cuts.unit(level), np.zeros((0, len(cuts.names)))
+        )
+        if done:
+            kept = bounds[level + 1] > bounds[level]
+            bounds[level][kept], at[level][kept] = bounds[level + 1][kept], at[level + 1][kept]
+    return bounds, at

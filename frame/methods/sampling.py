@@ -1,0 +1,84 @@
+"""Envelopes of given samples: the vertex method, Monte Carlo and quasi-Monte Carlo, for comparison."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from alphacut.frame.boxes import UnitFlow
+from alphacut.frame.calculus.jet import Array
+from alphacut.frame.envelope import Envelope, signed_envelope
+
+Progress = Callable[[float], None]
+
+
+def sample(flow: UnitFlow, points_of: Callable[[Array, Array], Array], method: str) -> Envelope:
+    """Envelope of the trajectories at given points of each box, wider boxes taking over the points
+    of the narrower ones.
+
+    Args:
+        flow: The trajectories.
+        points_of: From lower and upper ends (d,) to unit coordinates (S, d).
+        method: Name for the result.
+    """
+    begun = time.perf_counter()
+    shape = (len(flow.boxes.alpha), len(flow.time), len(flow.outputs), 2)
+    bounds, at, runs = np.full(shape, -np.inf), np.zeros((*shape, len(flow.boxes.names))), 0
+    for level in reversed(range(shape[0])):
+        if level + 1 < shape[0]:
+            bounds[level], at[level] = bounds[level + 1], at[level + 1]
+        points = points_of(*flow.boxes.unit(level))
+        runs += len(points)
+        for chunk in np.array_split(points, -(-len(points) // 256)):
+            values = flow.values(chunk)
+            signed = np.stack([-values, values], -1)
+            best = signed.argmax(0)
+            top = np.take_along_axis(signed, best[None], 0)[0]
+            better = top > bounds[level]
+            bounds[level], at[level][better] = np.maximum(top, bounds[level]), chunk[best][better]
+    return signed_envelope(
+        flow,
+        bounds,
+        at,
+        method=method,
+        nature="inner",
+        trajectories=runs,
+        seconds=time.perf_counter() - begun,
+    )
+
+
+def corners(lower: Array, upper: Array) -> Array:
+    """All corners of a box, shape (2^d, d); axes without width count once."""
+    axes = [(low,) if low == high else (low, high) for low, high in zip(lower, upper, strict=True)]
+    return np.array(np.meshgrid(*axes, indexing="ij")).reshape(len(axes), -1).T
+
+
+def vertex(flow: UnitFlow, progress: Progress | None = None) -> Envelope:
+    """Envelope of the corners of each box: the vertex method."""
+    return sample(flow, corners, "vertex")
+
+
+def monte_carlo(
+    flow: UnitFlow, progress: Progress | None = None, *, samples: int = 1000, seed: int = 0
+) -> Envelope:
+    """Envelope of `samples` uniform random trajectories per level."""
+    rng = np.random.default_rng(seed)
+    return sample(
+        flow, lambda lower, upper: rng.uniform(lower, upper, (samples, len(lower))), "monte-carlo"
+    )
+
+
+def quasi_monte_carlo(
+    flow: UnitFlow, progress: Progress | None = None, *, samples: int = 1024, seed: int = 0
+) -> Envelope:
+    """Envelope of a scrambled Sobol sequence of Chebyshev density per level."""
+    from scipy.stats import qmc
+
+    def points(lower: Array, upper: Array) -> Array:
+        unit = qmc.Sobol(len(lower), rng=np.random.default_rng(seed)).random(samples)
+        chebyshev: Array = (lower + upper) / 2 - (upper - lower) / 2 * np.cos(np.pi * unit)
+        return chebyshev
+
+    return sample(flow, points, "quasi-monte-carlo")

@@ -1,0 +1,277 @@
+"""Response of single modes to the motion of the ground, as Taylor series in the eigenvalue over
+windows of time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import ceil, exp, lgamma, log
+
+import numpy as np
+
+from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.polynomial import Polynomial
+from alphacut.frame.structures.linear import Accelerogram
+
+REACH = 6.0
+"""Largest change of phase (rad) over the box within a window."""
+FADED = 37.0
+"""Exponent at which what is left of a window has fallen below round-off."""
+Waves = tuple[Array, Array, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class LoadTable:
+    """R_k(t_j; λ) = ∫ exp(λ (t_j − s)) a(s) ds near the middle λ_k of the box.
+
+    Time is cut into windows so short that phases change little over the box within one. The part of
+    R that arises in the window of t_j is Σ_i moment[j, k, i] x^i with x = (λ − λ_k) / scale; what
+    earlier windows leave behind goes on as exp(λ (t_j − their end)).
+
+    Args:
+        middle: λ_k in the middle of the box, shape (n,).
+        scale: Length that makes the coefficients of order one, in 1/s.
+        moment: Coefficients, shape (T, n, order).
+        starts: First node of every window, rising from 0, shape (W,).
+        time: Nodes, shape (T,), in s.
+        share: What one unit of R_k puts into the outputs, n m polynomials.
+        truncation: Bound of what the series leave out of R, as a share of ∫ |a(s)| exp(Re λ (t −
+            s)) ds.
+    """
+
+    middle: Array
+    scale: float
+    moment: Array
+    starts: Array
+    time: Array
+    share: Polynomial
+    truncation: float
+
+    @classmethod
+    def build(
+        cls, ground: Accelerogram, time: Array, rate: Polynomial, share: Polynomial
+    ) -> LoadTable:
+        """The table for modes whose eigenvalues are `rate` over the unit box."""
+        middle = rate.coefficients[0]
+        spread = float(np.abs(rate.coefficients[1:]).sum(0).max())
+        length = min(len(time) - 1, max(1, int(REACH / max(spread, 1e-12) / (time[1] - time[0]))))
+        starts = np.arange(0, len(time) - 1, length)
+        window = length * (time[1] - time[0])
+        order = max(6, ceil(2.72 * spread * window + 18))
+        left = left_out(spread * window, order)
+        return cls(
+            middle,
+            1 / window,
+            _moments(ground, middle, time, starts, window, order),
+            starts,
+            time,
+            share,
+            left,
+        )
+
+    def values(self, unit: Array, rate: Array) -> Array:
+        """Response of the outputs at points (S, d) with eigenvalues (S, n), shape (S, T, m)."""
+        share = self.share(unit).reshape(*rate.shape, -1)
+        powers = self._powers(rate)
+        out = np.zeros((len(unit), len(self.time), share.shape[-1]))
+        left = np.zeros_like(rate)  # what is left of earlier windows at the start of this one
+        ends = np.append(self.starts[1:], len(self.time) - 1)
+        for start, end in zip(self.starts, ends, strict=True):
+            rows = slice(start + 1, end + 1)
+            own = np.einsum("jki,ski->sjk", self.moment[rows], powers, optimize=True)
+            wave = np.exp(rate[:, None, :] * (self.time[rows] - self.time[start])[None, :, None])
+            response = own + wave * left[:, None, :]
+            left = response[:, -1]
+            out[:, rows] = 2 * (response @ share).real
+        return out
+
+    def response(self, rate: Array, node: Array) -> Waves:
+        """R, dR/dλ and d²R/dλ² at one node per point, each shape (N, n), for eigenvalues (N, n)."""
+        powers = self._powers(rate).swapaxes(0, 1)  # (n, N, order)
+        total = np.einsum("kpi,pkix->pkx", powers, self._differentiated[node], optimize=True)
+        for end, later, tau in self._earlier(rate, node):
+            s0, s1, s2 = np.moveaxis(powers[:, later] @ self._differentiated[end], -1, 0).swapaxes(
+                1, 2
+            )
+            wave = np.exp(rate[later] * tau)
+            total[later] += np.stack(
+                [wave * s0, wave * (s1 + tau * s0), wave * (s2 + 2 * tau * s1 + tau * tau * s0)], -1
+            )
+        return total[..., 0], total[..., 1], total[..., 2]
+
+    def response_alone(self, rate: Array, node: Array) -> Array:
+        """R without its derivatives."""
+        powers = self._powers(rate).swapaxes(0, 1)
+        total: Array = np.einsum("kpi,pki->pk", powers, self.moment[node])
+        for end, later, tau in self._earlier(rate, node):
+            total[later] += np.exp(rate[later] * tau) * np.einsum(
+                "kpi,ki->pk", powers[:, later], self.moment[end], optimize=True
+            )
+        return total
+
+    def _earlier(self, rate: Array, node: Array) -> Iterator[tuple[int, Array, Array]]:
+        """Windows that end before some of the nodes: their last node, the points concerned, and the
+        time since, shape (N, 1).
+        """
+        fade = FADED / max(float(-rate.real.max()), 1e-300)
+        for end in self.starts[1:]:
+            since = self.time[node] - self.time[end]
+            later = np.flatnonzero((since > 0) & (since < fade))
+            if len(later):
+                yield end, later, since[later, None]
+
+    @cached_property
+    def _differentiated(self) -> Array:
+        """Coefficients of the moments' series and of their first and second derivatives by λ, shape
+        (T, n, order, 3).
+        """
+        out = [self.moment]
+        for _ in range(2):
+            following = np.zeros_like(self.moment)
+            following[..., :-1] = out[-1][..., 1:] * (
+                np.arange(1, self.moment.shape[-1]) / self.scale
+            )
+            out.append(following)
+        return np.stack(out, -1)
+
+    def _powers(self, rate: Array) -> Array:
+        """Powers of the scaled deviation, shape (S, n, order)."""
+        x = (rate - self.middle) / self.scale
+        plain = np.ones((*x.shape, self.moment.shape[-1]), complex)
+        for i in range(1, plain.shape[-1]):
+            plain[..., i] = plain[..., i - 1] * x
+        return plain
+
+
+@dataclass(frozen=True, eq=False)
+class LoadTables:
+    """Tables of modes grouped by how much their eigenvalues vary, so that slow modes need few
+    windows and fast ones soon forget.
+
+    Args:
+        share: What one unit of R_k puts into the outputs, n m polynomials.
+        tables: One table per group.
+        members: Indices of the modes of each group.
+    """
+
+    share: Polynomial
+    tables: tuple[LoadTable, ...]
+    members: tuple[Array, ...]
+
+    @classmethod
+    def build(
+        cls, ground: Accelerogram, time: Array, rate: Polynomial, share: Polynomial
+    ) -> LoadTables:
+        """The tables for modes whose eigenvalues are `rate` over the unit box."""
+        spread = np.abs(rate.coefficients[1:]).sum(0)
+        octave = np.floor(np.log2(np.maximum(spread, 1e-12) / max(spread.max(), 1e-12)))
+        members = tuple(np.flatnonzero(octave == o) for o in np.unique(octave))
+        columns = share.coefficients.reshape(len(share.index), rate.coefficients.shape[1], -1)
+        tables = tuple(
+            LoadTable.build(
+                ground,
+                time,
+                Polynomial(rate.index, rate.coefficients[:, own]),
+                Polynomial(share.index, columns[:, own].reshape(len(share.index), -1)),
+            )
+            for own in members
+        )
+        return cls(share, tables, members)
+
+    def in_units(self, scale: Array) -> LoadTables:
+        """The same for outputs divided by their scale (m,)."""
+        tables = tuple(replace(table, share=_divided(table.share, scale)) for table in self.tables)
+        return LoadTables(_divided(self.share, scale), tables, self.members)
+
+    @property
+    def truncation(self) -> Array:
+        """Bound of what the series leave out of R_k, as a share of ∫ |a(s)| exp(Re λ (t − s)) ds,
+        shape (n,).
+        """
+        out = np.empty(sum(map(len, self.members)))
+        for table, own in zip(self.tables, self.members, strict=True):
+            out[own] = table.truncation
+        return out
+
+    @property
+    def starts(self) -> Array:
+        """First node of every window of the group that needs most."""
+        return max((table.starts for table in self.tables), key=len)
+
+    def values(self, unit: Array, rate: Array) -> Array:
+        """As `LoadTable.values`."""
+        parts = [
+            table.values(unit, rate[:, own])
+            for table, own in zip(self.tables, self.members, strict=True)
+        ]
+        return sum(parts[1:], parts[0])
+
+    def response(self, rate: Array, node: Array) -> Waves:
+        """As `LoadTable.response`."""
+        R, dR, ddR = (np.empty_like(rate) for _ in range(3))
+        for table, own in zip(self.tables, self.members, strict=True):
+            R[:, own], dR[:, own], ddR[:, own] = table.response(rate[:, own], node)
+        return R, dR, ddR
+
+    def response_alone(self, rate: Array, node: Array) -> Array:
+        """As `LoadTable.response_alone`."""
+        R = np.empty_like(rate)
+        for table, own in zip(self.tables, self.members, strict=True):
+            R[:, own] = table.response_alone(rate[:, own], node)
+        return R
+
+
+def left_out(phase: float, order: int) -> float:
+    """Bound of |exp(x τ) − its series of `order` terms| for |x| τ up to `phase`, and of what grows
+    of it until the window's end.
+    """
+    return exp(order * log(max(phase, 1e-300)) - lgamma(order + 1) + 2 * phase)
+
+
+def _divided(share: Polynomial, scale: Array) -> Polynomial:
+    columns = share.coefficients.reshape(len(share.index), -1, len(scale)) / scale
+    return Polynomial(share.index, columns.reshape(share.coefficients.shape))
+
+
+def _moments(
+    ground: Accelerogram, middle: Array, time: Array, starts: Array, window: float, order: int
+) -> Array:
+    """Taylor coefficients of the window's own part of R_k at all nodes, shape (T, n, order), for a
+    load linear between its samples.
+
+    Per step: ∫ of exp((λ + x/window) τ) a over the step as a truncated series in x, by Gauss
+    quadrature to round-off; from node to node the series is multiplied by that of exp((λ +
+    x/window) h). A node that ends one window starts the next from nothing.
+    """
+    h = time[1] - time[0]
+    parts = ground.intervals(h)
+    points, weights = np.polynomial.legendre.leggauss(8 + ceil(abs(middle).max() * h / parts))
+    share = (points + 1) / 2
+    tau = h - (np.arange(parts)[:, None] + share).ravel() * (
+        h / parts
+    )  # from each point to the end of the step
+    fine = ground.at(
+        np.arange((len(time) - 1) * parts + 1) * (h / parts)
+    )  # as the exact propagator takes it
+    load = (fine[:-1, None] * (1 - share) + fine[1:, None] * share).reshape(len(time) - 1, -1)
+    factorial = np.cumprod(np.concatenate([[1.0], np.arange(1, order)]))
+    series = (tau[:, None] / window) ** np.arange(order) / factorial  # (Q, order)
+    kernel = np.exp(middle[:, None] * tau) * np.tile(weights, parts) * (h / parts / 2)  # (n, Q)
+    pushed = load @ (kernel.T[:, :, None] * series[:, None]).reshape(len(tau), -1)
+    pushed = pushed.reshape(len(time) - 1, len(middle), order)
+    advance = (
+        np.exp(middle * h)[:, None] * (h / window) ** np.arange(order) / factorial
+    )  # (n, order)
+    product = np.zeros(
+        (len(middle), order, order), complex
+    )  # truncated product with `advance` as a matrix
+    for i in range(order):
+        product[:, i, i:] = advance[:, : order - i]
+    out = np.zeros((len(time), len(middle), order), complex)
+    fresh = {int(start) for start in starts}
+    for j in range(1, len(time)):
+        carried = 0.0 if j - 1 in fresh else (out[j - 1][:, None] @ product)[:, 0]
+        out[j] = carried + pushed[j - 1]
+    return out

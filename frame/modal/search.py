@@ -1,0 +1,340 @@
+"""Global optimisation of the modal model over a box, for all nodes, outputs and sides together.
+
+Samples of the whole box start Newton's method on every stride-th node; what is found there is tried
+at the nodes around (the idea of
+the Graph Follower: envelopes consist of segments of graphs) until nothing improves, and carried to
+    the nodes between.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from alphacut.frame.calculus.box_quadratic import gain, local_maximum
+from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.low_discrepancy import chebyshev_points
+from alphacut.frame.modal.model import ModalModel
+
+RIVAL = 0.05
+"""Share of the largest bound by which a rival basin may lie behind and still be followed."""
+
+
+CALM = 20.0
+"""Change of phase (rad) over the box up to which the least effort finds the basins."""
+PIECE = 2000
+"""Problems treated together; more would leave the cache."""
+
+
+@dataclass(eq=False)
+class Optima:
+    """Best points so far of N problems.
+
+    Args:
+        node: Time node of each problem, shape (N,).
+        output: Its output, shape (N,).
+        side: +1 for an upper bound, −1 for a lower, shape (N,).
+        point: Unit coordinates, shape (N, d).
+        value: side × output there, shape (N,).
+    """
+
+    node: Array
+    output: Array
+    side: Array
+    point: Array
+    value: Array
+
+    def take(self, which: Array) -> Optima:
+        """A copy of the problems `which`."""
+        return Optima(
+            *(
+                getattr(self, name)[which].copy()
+                for name in ("node", "output", "side", "point", "value")
+            )
+        )
+
+    def offer(self, model: ModalModel, points: Array, which: Array) -> Array:
+        """Tries `points` (W, d) on problems `which` (W,), keeps what is better and returns those
+        problems.
+        """
+        if not len(which):
+            return which
+        value = self.side[which] * model.value_at(points, self.node[which], self.output[which])
+        better = value > self.value[which] + 1e-12
+        self.point[which[better]], self.value[which[better]] = points[better], value[better]
+        improved: Array = which[better]
+        return improved
+
+
+@dataclass(frozen=True)
+class ModalSearch:
+    """The search and its effort.
+
+    Args:
+        samples: Trajectories of the modal model that find the basins.
+        starts: Basins refined per problem.
+        iterations: Newton steps.
+        resolution: Phase of the fastest mode (rad) between nodes that are searched anew.
+        seed: Of the samples.
+    """
+
+    samples: int = 512
+    starts: int = 2
+    iterations: int = 10
+    resolution: float = 0.25
+    seed: int = 0
+
+    @classmethod
+    def suited(cls, model: ModalModel, seed: int = 0) -> ModalSearch:
+        """More samples and starts where phases vary much over the box: the more turns, the more
+        basins.
+        """
+        middle, rest = model.eigenvalue.coefficients[0], model.eigenvalue.coefficients[1:]
+        lasting = np.minimum(
+            model.time[-1], 5 / np.maximum(-middle.real, 1e-300)
+        )  # a mode that has died down has no basins
+        turned = float((np.abs(rest).sum(0) * lasting).max())  # rad
+        more = int(np.clip(np.log2(max(turned, 1.0) / CALM), 0, 2))
+        return cls(samples=512 * 2**more, starts=2 + more, seed=seed)
+
+    def run(
+        self, model: ModalModel, lower: Array, upper: Array, extra: Array
+    ) -> tuple[Array, Array]:
+        """Upper bounds of (−output, output) and their unit coordinates.
+
+        Args:
+            model: The modal model.
+            lower: Lower ends of the box, shape (d,).
+            upper: Upper ends.
+            extra: Further points to try everywhere, shape (E, d).
+
+        Returns:
+            Bounds, shape (T, m, 2), and points, shape (T, m, 2, d).
+        """
+        if not (upper > lower).any():
+            values = model.values(lower[None])[0]
+            return (
+                np.stack([-values, values], -1),
+                np.broadcast_to(lower, (*values.shape, 2, len(lower))).copy(),
+            )
+        fastest = float(np.abs(model.eigenvalue.coefficients[0]).max())
+        stride = max(1, int(self.resolution / (fastest * model.flow.step)))
+        pool = np.vstack([self._samples(lower, upper), extra])
+        values = np.concatenate(
+            [model.values(chunk) for chunk in np.array_split(pool, -(-len(pool) // 256))]
+        )
+        coarse, rivals = self._search(model, lower, upper, (pool, values), stride)
+        return self._spread(model, [coarse, *rivals], lower, upper, (pool, values))
+
+    def _search(
+        self, model: ModalModel, lower: Array, upper: Array, pool: tuple[Array, Array], stride: int
+    ) -> tuple[Optima, list[Optima]]:
+        """Optima on every stride-th node, and the local optima of other basins."""
+        nodes = np.unique(np.append(np.arange(0, len(model.time), stride), len(model.time) - 1))
+        best = _best_of_pool(*pool, nodes, self.starts)
+        for optima in best:
+            refine(model, optima, np.arange(len(optima.value)), lower, upper, self.iterations)
+        found = replace(best[0], point=best[0].point.copy(), value=best[0].value.copy())
+        for other in best[1:]:
+            better = other.value > found.value
+            found.point[better], found.value[better] = other.point[better], other.value[better]
+        self._follow(model, found, len(nodes), lower, upper)
+        return found, best
+
+    def _follow(
+        self, model: ModalModel, found: Optima, nodes: int, lower: Array, upper: Array
+    ) -> None:
+        """Tries at every node what its neighbours found, near and far, until nothing improves."""
+        grid = np.arange(len(found.value)).reshape(nodes, -1)
+        fresh = np.ones(len(found.value), bool)  # changed since it was last tried elsewhere
+        for _ in range(8):
+            changed = np.zeros(len(found.value), bool)
+            for shift in (1, 2, 4, 8, 16, 32):
+                for here, there in ((grid[shift:], grid[:-shift]), (grid[:-shift], grid[shift:])):
+                    new = (fresh | changed)[there.ravel()]
+                    changed[
+                        found.offer(model, found.point[there.ravel()[new]], here.ravel()[new])
+                    ] = True
+            again = np.flatnonzero(changed)
+            if not len(again):
+                return
+            refine(model, found, again, lower, upper, self.iterations)
+            fresh = changed
+
+    def _spread(
+        self,
+        model: ModalModel,
+        coarse: list[Optima],
+        lower: Array,
+        upper: Array,
+        pool: tuple[Array, Array],
+    ) -> tuple[Array, Array]:
+        """Carries optima to all nodes: the better of the two neighbours, then Newton; then rivals
+        from other basins likewise.
+        """
+        m, d, total = len(model.outputs), coarse[0].point.shape[1], len(model.time)
+        nodes = coarse[0].node.reshape(-1, 2 * m)[:, 0]
+        right = np.minimum(np.searchsorted(nodes, np.arange(total)), len(nodes) - 1)
+        neighbours = (right, np.maximum(right - 1, 0))
+        every = np.arange(2 * m * total)
+
+        def carried(optima: Optima) -> Optima:
+            out, points = (
+                problems(np.arange(total), m, d),
+                optima.point.reshape(len(nodes), 2 * m, d),
+            )
+            for near in neighbours:
+                out.offer(model, points[near].reshape(-1, d), every)
+            return out
+
+        found = carried(coarse[0])
+        refine(model, found, every, lower, upper, self.iterations)
+        margin = RIVAL * np.abs(found.value).max()
+        for rival in [
+            *(carried(other) for other in coarse[1:]),
+            _best_of_pool(*pool, np.arange(total), 1)[0],
+        ]:
+            apart = np.abs(rival.point - found.point).max(1) > 0.1 * (upper - lower).max()
+            which = np.flatnonzero(apart & (rival.value > found.value - margin))
+            refine(model, rival, which, lower, upper, self.iterations)
+            found.offer(model, rival.point[which], which)
+        self._contest(model, found, lower, upper)
+        return found.value.reshape(total, m, 2), found.point.reshape(total, m, 2, d)
+
+    def _contest(self, model: ModalModel, found: Optima, lower: Array, upper: Array) -> None:
+        """Where the optimum jumps between neighbouring nodes, refines either optimum at the other
+        node, until no jump moves.
+        """
+        grid = np.arange(len(found.value)).reshape(-1, 2 * len(model.outputs))
+        open_ = np.ones(len(found.value), bool)
+        for _ in range(20):
+            moved: list[Array] = []
+            for here, there in (
+                (grid[1:].ravel(), grid[:-1].ravel()),
+                (grid[:-1].ravel(), grid[1:].ravel()),
+            ):
+                jump = (
+                    np.abs(found.point[here] - found.point[there]).max(1)
+                    > 0.05 * (upper - lower).max()
+                )
+                jump &= open_[here] | open_[there]
+                rival = found.take(here[jump])
+                rival.point[:] = found.point[there[jump]]
+                rival.value[:] = (
+                    rival.side * model.value_at(rival.point, rival.node, rival.output)
+                    if jump.any()
+                    else 0.0
+                )
+                refine(model, rival, np.arange(len(rival.value)), lower, upper, self.iterations)
+                moved.append(found.offer(model, rival.point, here[jump]))
+            open_[:] = False
+            open_[np.concatenate(moved)] = True
+            if not open_.any():
+                return
+
+    def _samples(self, lower: Array, upper: Array) -> Array:
+        d = len(lower)
+        count = 2 ** round(
+            np.log2(max(64, self.samples * ((upper - lower) / 2).max()))
+        )  # narrow boxes hold fewer basins
+        unit = chebyshev_points(d, count, skip=1 + 7919 * self.seed)
+        points = np.vstack([unit, tensor_points(d, count)])
+        scaled: Array = (lower + upper) / 2 + (upper - lower) / 2 * points
+        return scaled
+
+
+def tensor_points(d: int, most: int) -> Array:
+    """The finest grid of extreme Chebyshev points with at most `most` points, shape (k^d, d); none
+    when the corners are too many.
+    """
+    k = int(most ** (1 / d) + 1e-9)
+    if k < 2:
+        return np.zeros((0, d))
+    axis = -np.cos(np.pi * np.arange(k) / (k - 1))
+    return np.array(np.meshgrid(*[axis] * d, indexing="ij")).reshape(d, -1).T
+
+
+def problems(nodes: Array, outputs: int, d: int) -> Optima:
+    """All outputs and sides at `nodes`, node by node; the sides of an output are (−1, +1)."""
+    count = 2 * outputs
+    node = np.repeat(nodes, count)
+    output, side = (
+        np.tile(np.repeat(np.arange(outputs), 2), len(nodes)),
+        np.tile([-1.0, 1.0], len(nodes) * outputs),
+    )
+    return Optima(node, output, side, np.zeros((len(node), d)), np.full(len(node), -np.inf))
+
+
+def _best_of_pool(pool: Array, values: Array, nodes: Array, starts: int) -> list[Optima]:
+    """The best points of the pool (P, d) for every problem, and the next best ones elsewhere in the
+    box; `values` is (P, T, m).
+    """
+    m = values.shape[-1]
+    chosen = (values if len(nodes) == values.shape[1] else values[:, nodes]).reshape(len(pool), -1)
+    reach = (
+        0.25 * np.ptp(pool, axis=0).max()
+    )  # points this near the best are taken out together with it
+    out = [problems(nodes, m, pool.shape[1]) for _ in range(starts)]
+    for column, sign in enumerate((-1.0, 1.0)):
+        left: Array = chosen
+        for optima in out:
+            best = left.argmin(0) if sign < 0 else left.argmax(0)
+            optima.point[column::2], optima.value[column::2] = (
+                pool[best],
+                sign * chosen[best, np.arange(len(best))],
+            )
+            if optima is not out[-1]:
+                unique, index = np.unique(best, return_inverse=True)
+                near = np.stack([np.abs(pool - pool[k]).max(1) < reach for k in unique], 1)
+                left = np.where(near[:, index], -sign * np.inf, left)
+    return out
+
+
+def refine(
+    model: ModalModel,
+    optima: Optima,
+    which: Array,
+    lower: Array,
+    upper: Array,
+    iterations: int = 10,
+) -> None:
+    """Newton's method with a trust region in the box on problems `which`, in pieces that stay in
+    the cache.
+    """
+    for piece in np.array_split(which, -(-len(which) // PIECE) or 1):
+        _newton(model, optima, piece, lower, upper, iterations)
+
+
+def _newton(
+    model: ModalModel, optima: Optima, which: Array, lower: Array, upper: Array, iterations: int
+) -> None:
+    """Stops a problem when its quadratic model promises under 1e-9."""
+    if not len(which):
+        return
+    radius: Array = np.full(len(which), 0.5)
+    node, output, side = optima.node[which], optima.output[which], optima.side[which]
+    f, g, H = model.at(optima.point[which], node, output)
+    g, H = side[:, None] * g, side[:, None, None] * H
+    for _ in range(iterations):
+        low = np.maximum(lower - optima.point[which], -radius[:, None])
+        high = np.minimum(upper - optima.point[which], radius[:, None])
+        step = local_maximum(g, H, low, high, rounds=2)
+        promised = gain(g, H, step)
+        open_ = promised > 1e-9
+        which, radius, step, promised, g, H, low = (
+            x[open_] for x in (which, radius, step, promised, g, H, low)
+        )
+        if not len(which):
+            return
+        trial = np.clip(optima.point[which] + step, lower, upper)
+        f, g2, H2 = model.at(trial, optima.node[which], optima.output[which])
+        side = optima.side[which]
+        got = side * f - optima.value[which]
+        better = got > 0
+        optima.point[which[better]], optima.value[which[better]] = trial[better], (side * f)[better]
+        g[better], H[better] = (side[:, None] * g2)[better], (side[:, None, None] * H2)[better]
+        ratio = got / promised
+        radius = np.where(
+            ratio > 0.75, 2 * radius, np.where(ratio < 0.25, 0.3 * np.abs(step).max(1), radius)
+        )

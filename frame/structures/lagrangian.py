@@ -1,0 +1,203 @@
+"""General mechanical systems by a Lagrangian L(q, v; p) and forces F(q, v; p), and general smooth
+ODEs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from alphacut.frame.calculus.jet import cos
+from alphacut.frame.structures.lagrangian_check import (
+    called,
+    expression,
+    listed,
+    require_dimensions,
+)
+
+Symbols = Sequence[Any]
+Named = Mapping[str, Any]
+Function = Callable[[Symbols, Symbols, Named], Any]
+
+
+@dataclass(frozen=True, eq=False)
+class LagrangianSystem:
+    """A system with n coordinates, given by plain Python functions of (q, v, p).
+
+    The functions must use arithmetic and `frame.jet.sin`, `cos`, `exp` only: they are called with
+    symbols. Whole and fractional powers are arithmetic; other functions of SymPy go where they are
+    smooth (`sympy.tan`, `sympy.log`); those of `math` and NumPy do not.
+
+    Args:
+        coordinates: Number of coordinates n.
+        parameters: All parameters with their modal values, in SI units.
+        lagrangian: L(q, v, p), with q and v sequences of n and p a mapping from names.
+        initial: The initial state (q0, v0) from p, n numbers each.
+        observed: Outputs by name, each a function of (q, v, p).
+        force: Generalised forces F(q, v, p), n of them; None for none.
+
+    Raises:
+        ValueError: L is not quadratic in v, so that momenta cannot be turned back into velocities,
+            some coordinate has no inertia, a function asks for what is not there or is not smooth,
+            or gives a list of another length.
+    """
+
+    coordinates: int
+    parameters: Mapping[str, float]
+    lagrangian: Function
+    initial: Callable[[Named], tuple[Symbols, Symbols]]
+    observed: Mapping[str, Function]
+    force: Function | None = None
+
+    def __post_init__(self) -> None:
+        require_dimensions(self)
+        for row in self.symbols.mass.tolist():
+            for entry in row:
+                if entry.free_symbols & set(self.symbols.v):
+                    raise ValueError(
+                        f"lagrangian: the mass matrix holds velocities ({entry}); L must be"
+                        " quadratic in v"
+                    )
+        eq = self.symbols
+        for name in self.observed:
+            self.output(name, eq.v)
+        start = dict(zip([*eq.q, *eq.v], [x for part in self.start() for x in part], strict=True))
+        modal = {eq.p[name]: value for name, value in self.parameters.items()}
+        if abs(eq.mass.subs(start).subs(modal).evalf().det()) < 1e-300:
+            raise ValueError(
+                "lagrangian: the mass matrix is singular at the start of the modal motion; give"
+                " every coordinate inertia"
+            )
+
+    def start(self) -> tuple[list[Any], list[Any]]:
+        """The initial state (q0, v0) in symbols.
+
+        Raises:
+            ValueError: It does not consist of one number for each coordinate.
+        """
+        given = called("initial", self.initial, self.symbols.p)
+        if not isinstance(given, Sequence) or len(given) != 2:
+            raise ValueError(
+                f"initial: {given} is not allowed; it must be two lists, the displacements and the"
+                " velocities"
+            )
+        q0, v0 = (
+            listed(f"initial: {part}", x, self.coordinates)
+            for part, x in zip(("q0", "v0"), given, strict=True)
+        )
+        return [expression("initial: q0", x) for x in q0], [
+            expression("initial: v0", x) for x in v0
+        ]
+
+    def output(self, name: str, velocity: Symbols) -> Any:
+        """An observed quantity in symbols, for velocities in any symbols."""
+        eq = self.symbols
+        return expression(
+            f"observed: {name}",
+            called(f"observed: {name}", self.observed[name], list(eq.q), list(velocity), eq.p),
+        )
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the observed quantities."""
+        return tuple(self.observed)
+
+    @cached_property
+    def symbols(self) -> Equations:
+        """The equations of motion in symbols."""
+        return Equations.derive(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """Symbols and expressions of a system.
+
+    Args:
+        q: Coordinates.
+        v: Velocities.
+        p: Parameters by name.
+        momentum: ∂L/∂v.
+        push: ∂L/∂q + F.
+        mass: ∂²L/∂v².
+    """
+
+    q: Any
+    v: Any
+    p: dict[str, Any]
+    momentum: Any
+    push: Any
+    mass: Any
+
+    @classmethod
+    def derive(cls, system: LagrangianSystem) -> Equations:
+        """Differentiates the Lagrangian."""
+        import sympy
+
+        n = system.coordinates
+        q, v = (sympy.Matrix(sympy.symbols(f"{x}:{n}", real=True)) for x in ("q", "v"))
+        p = {name: sympy.Symbol(f"p_{name}", real=True) for name in system.parameters}
+        L = expression("lagrangian", called("lagrangian", system.lagrangian, list(q), list(v), p))
+        momentum = sympy.Matrix([sympy.diff(L, x) for x in v])
+        push = sympy.Matrix([sympy.diff(L, x) for x in q])
+        if system.force is not None:
+            force = listed("force", called("force", system.force, list(q), list(v), p), n)
+            push += sympy.Matrix([expression("force", x) for x in force])
+        return cls(q, v, p, momentum, push, momentum.jacobian(v))
+
+    def velocity(self, momentum: Any) -> Any:
+        """Velocities from momenta."""
+        rest = self.momentum.subs({x: 0 for x in self.v})
+        return self.mass.LUsolve(momentum - rest)
+
+    def acceleration(self) -> Any:
+        """q̈ from the Euler–Lagrange equations."""
+        return self.mass.LUsolve(self.push - self.momentum.jacobian(self.q) * self.v)
+
+
+def pendulum(
+    *,
+    mass: float = 1.0,
+    length: float = 1.0,
+    damping: float = 0.1,
+    gravity: float = 9.81,
+    phi0: float = 1.5,
+    omega0: float = 0.0,
+) -> LagrangianSystem:
+    """The damped pendulum of the literature on the Graph Follower: L = m l² φ̇²/2 + m g l cos φ,
+    moment −d φ̇.
+
+    Parameters: "m", "l", "d", "g", "phi_0", "omega_0". Outputs: "force" in the bar, m l φ̇² + m g
+        cos φ, and the angle "phi".
+
+    Raises:
+        ValueError: Mass, length or gravity is not positive, or the damping is negative.
+    """
+    for name, value in {"mass": mass, "length": length, "gravity": gravity}.items():
+        if not value > 0:
+            raise ValueError(f"{name}: {value:g} is not allowed; it must be positive")
+    if damping < 0:
+        raise ValueError(f"damping: {damping:g} is not allowed; it must not be negative")
+
+    def lagrangian(q: Symbols, v: Symbols, p: Named) -> Any:
+        return p["m"] * p["l"] ** 2 * v[0] ** 2 / 2 + p["m"] * p["g"] * p["l"] * cos(q[0])
+
+    return LagrangianSystem(
+        coordinates=1,
+        parameters={
+            "m": mass,
+            "l": length,
+            "d": damping,
+            "g": gravity,
+            "phi_0": phi0,
+            "omega_0": omega0,
+        },
+        lagrangian=lagrangian,
+        initial=lambda p: ([p["phi_0"]], [p["omega_0"]]),
+        observed={
+            "force": lambda q, v, p: p["m"] * p["l"] * v[0] ** 2 + p["m"] * p["g"] * cos(q[0]),
+            "phi": lambda q, v, p: q[0],
+        },
+        force=lambda q, v, p: [-p["d"] * v[0]],
+    )

@@ -1,0 +1,113 @@
+"""What can be wrong with the functions of a Lagrangian system, found by calling them with symbols
+before anything is computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from alphacut.frame.checks.numbers import require_number
+
+if TYPE_CHECKING:
+    from alphacut.frame.structures.lagrangian import LagrangianSystem
+
+SMOOTH = "use arithmetic and frame.jet.sin, cos and exp, which are smooth and take symbols"
+ROUGH = (
+    "Abs",
+    "sign",
+    "Max",
+    "Min",
+    "Heaviside",
+    "DiracDelta",
+    "Piecewise",
+    "floor",
+    "ceiling",
+    "Mod",
+    "arg",
+    "re",
+    "im",
+)
+"""Functions of SymPy that have no second derivative everywhere."""
+
+
+def require_dimensions(system: LagrangianSystem) -> None:
+    """Refuses a system without coordinates, parameters or outputs, and parameters that are no
+    numbers.
+
+    Raises:
+        ValueError: It is one.
+    """
+    if not isinstance(system.coordinates, int) or system.coordinates < 1:
+        raise ValueError(
+            f"coordinates: {system.coordinates!r} is not allowed; it must be a whole number, 1 or"
+            " greater"
+        )
+    for name in ("parameters", "observed"):
+        if not isinstance(getattr(system, name), Mapping) or not getattr(system, name):
+            raise ValueError(
+                f"{name}: {getattr(system, name)!r} is not allowed; it must map names to values,"
+                " one at least"
+            )
+    for name, value in system.parameters.items():
+        require_number(f"parameter {name}", value, "SI units")
+
+
+def called(name: str, function: Callable[..., Any], *arguments: Any) -> Any:
+    """What a function gives for symbols.
+
+    Args:
+        name: What the function is called.
+        function: Of (q, v, p), or of p.
+        arguments: Symbols; p, the last, by name.
+
+    Raises:
+        ValueError: It asks for a parameter or coordinate that is not there, or cannot take symbols.
+    """
+    try:
+        return function(*arguments)
+    except KeyError as unknown:
+        raise ValueError(
+            f"{name}: there is no parameter {unknown}; known are {', '.join(arguments[-1])}"
+        ) from None
+    except IndexError:
+        raise ValueError(
+            f"{name}: asks for a coordinate beyond the {len(arguments[0])} that there are; raise"
+            " coordinates"
+        ) from None
+    except (TypeError, AttributeError) as failure:
+        raise ValueError(
+            f"{name}: cannot be called with symbols ({str(failure).rstrip('.')}); {SMOOTH}"
+        ) from None
+
+
+def listed(name: str, given: Any, count: int) -> list[Any]:
+    """The entries of a sequence, one for each coordinate.
+
+    Raises:
+        ValueError: It is no sequence, or of another length.
+    """
+    entries = list(given) if isinstance(given, Sequence) or hasattr(given, "tolist") else None
+    if entries is None or len(entries) != count:
+        raise ValueError(
+            f"{name}: {given} is not allowed; it must be a list of {count}, one for each coordinate"
+        )
+    return entries
+
+
+def expression(name: str, given: Any) -> Any:
+    """An expression of SymPy with two derivatives.
+
+    Raises:
+        ValueError: It is none, or holds a function without them.
+    """
+    import sympy
+
+    try:
+        found = sympy.sympify(given)
+    except sympy.SympifyError:
+        raise ValueError(f"{name}: {given!r} is no expression; {SMOOTH}") from None
+    rough = sorted({type(part).__name__ for part in sympy.preorder_traversal(found)} & set(ROUGH))
+    if rough or not isinstance(found, sympy.Expr):
+        raise ValueError(f"{name}: {rough[0] if rough else given} is not allowed; {SMOOTH}")
+    return found

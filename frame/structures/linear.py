@@ -1,0 +1,164 @@
+"""Linear structures M(p) q̈ + D(p) q̇ + K(p) q = −M(p) ι a(t) with parameters p (paper, eq. 23)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import ceil
+from typing import Protocol
+
+import numpy as np
+
+from alphacut.frame.calculus.jet import Array, Jet, variables
+
+
+@dataclass(frozen=True, eq=False)
+class Matrices:
+    """The structure at S parameter sets, each entry a jet.
+
+    Args:
+        mass: M, shape (S, n, n), in kg.
+        damping: D, shape (S, n, n), in N s/m.
+        stiffness: K, shape (S, n, n), in N/m.
+        q0: Initial displacement, shape (S, n, 1), in m.
+        v0: Initial velocity, shape (S, n, 1), in m/s.
+        pattern: ι, how the unknowns move rigidly with the ground, shape (n, 1); ones when None.
+    """
+
+    mass: Jet
+    damping: Jet
+    stiffness: Jet
+    q0: Jet
+    v0: Jet
+    pattern: Array | None = None
+
+    @property
+    def rigid(self) -> Array:
+        """ι, shape (n, 1)."""
+        return np.ones((self.mass.value.shape[-1], 1)) if self.pattern is None else self.pattern
+
+
+@dataclass(frozen=True, eq=False)
+class Accelerogram:
+    """Acceleration of the ground, linear between its samples and zero outside them.
+
+    Args:
+        step: Time between samples, in s.
+        acceleration: Samples from t = 0 on, shape (n,), in m/s².
+
+    Raises:
+        ValueError: The step is not positive or a sample is not finite.
+    """
+
+    step: float
+    acceleration: Array = field(repr=False)
+
+    def __post_init__(self) -> None:
+        if (
+            not self.step > 0
+            or not np.isfinite(self.acceleration).all()
+            or np.ndim(self.acceleration) != 1
+        ):
+            raise ValueError(
+                f"accelerogram: step {self.step:g} s must be positive and all"
+                f" {np.size(self.acceleration)} samples finite"
+            )
+
+    def at(self, time: Array) -> Array:
+        """Acceleration at `time`, any shape, in m/s²."""
+        samples = np.arange(len(self.acceleration)) * self.step
+        return np.interp(time, samples, self.acceleration, left=0.0, right=0.0)
+
+    def intervals(self, step: float) -> int:
+        """Into how many equal parts a step must be cut so that the record is linear, or nearly so,
+        within each.
+        """
+        least = ceil(step / self.step - 1e-9)
+        for parts in range(least, 8 * least):
+            share = self.step * parts / step
+            if abs(share - round(share)) < 1e-9:
+                return parts
+        return 8 * least
+
+    def band(self, share: float = 0.999) -> float:
+        """Angular frequency below which `share` of the record's power lies, in rad/s."""
+        power = np.cumsum(np.abs(np.fft.rfft(self.acceleration)) ** 2)
+        place = int(np.searchsorted(power, share * power[-1]))
+        return 2 * np.pi * place / (len(self.acceleration) * self.step)
+
+
+class LinearSystem(Protocol):
+    """A linear structure whose matrices are smooth functions of named parameters."""
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """All parameters with their modal values, in SI units."""
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the observed quantities."""
+
+    @property
+    def ground(self) -> Accelerogram | None:
+        """Base excitation, if any; the displacements are then relative to the ground."""
+
+    def matrices(self, p: Mapping[str, Jet]) -> Matrices:
+        """M, D, K and the initial state at S parameter sets."""
+
+    def observation(self, p: Mapping[str, Jet]) -> Jet:
+        """Rows C(p) with output = C(p) [q; v], shape (S, outputs, 2n)."""
+
+
+def evaluate(
+    system: LinearSystem, names: Sequence[str], points: Array, *, derivatives: bool
+) -> tuple[Matrices, Jet]:
+    """Matrices and observation rows at parameter sets; parameters not named keep their modal
+    values.
+
+    Args:
+        system: The structure.
+        names: Uncertain parameters.
+        points: Their values, shape (S, d).
+        derivatives: Whether to differentiate by `names`.
+    """
+    fixed = [name for name in system.parameters if name not in names]
+    values = np.hstack(
+        [points, np.tile([system.parameters[name] for name in fixed], (len(points), 1))]
+    )
+    p = variables(values, [*names, *fixed], names if derivatives else ())
+    return system.matrices(p), system.observation(p)
+
+
+def check_names(system: LinearSystem, names: Sequence[str]) -> None:
+    """Raises ValueError when a name is no parameter of `system`."""
+    for name in names:
+        if name not in system.parameters:
+            known = ", ".join(system.parameters)
+            raise ValueError(
+                f"uncertain parameter '{name}' is unknown; known are"
+                f" {known}{_members(system, name)}"
+            )
+
+
+def _members(system: LinearSystem, name: str) -> str:
+    """What to add where a name is short for several parameters, as of a storey frame."""
+    try:
+        group = getattr(system, "group", lambda _: ())(name)
+    except ValueError:
+        return ""
+    return (
+        f"; it is short for {', '.join(group)}: give each a number, as {{name: … for name in"
+        f" frame.group('{name}')}}"
+        if group
+        else ""
+    )
+
+
+def frequencies(system: LinearSystem) -> Array:
+    """Undamped angular frequencies at the modal parameters, rising, shape (n,), in rad/s."""
+    from scipy.linalg import eigh
+
+    matrices, _ = evaluate(system, (), np.zeros((1, 0)), derivatives=False)
+    squared = eigh(matrices.stiffness.value[0], matrices.mass.value[0], eigvals_only=True)
+    rising: Array = np.sqrt(np.maximum(squared, 0.0))
+    return rising

@@ -1,0 +1,183 @@
+"""A general linear structure from its matrices M, D, K, each a sum of given arrays times smooth
+factors of named parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from alphacut.frame.calculus.jet import Array, Jet
+from alphacut.frame.checks.numbers import require_number, require_numbers
+from alphacut.frame.structures.damping import modal_damping
+from alphacut.frame.structures.linear import Accelerogram, Matrices
+from alphacut.frame.structures.matrix_factors import require_factors
+
+Factor = Callable[[Mapping[str, Any]], Any]
+Terms = Sequence[tuple[Factor | str | float, Array]]
+
+
+@dataclass(frozen=True, eq=False)
+class MatrixStructure:
+    """M(p) q̈ + D(p) q̇ + K(p) q = −M(p) ι a(t) with M(p) = Σ_i f_i(p) M_i, likewise D and K.
+
+    A factor is a number, the name of a parameter, or a function of all parameters in plain
+    arithmetic, such as
+    `lambda p: p["E"] * p["l"] ** -3`.
+
+    Args:
+        parameters: All parameters with their modal values, in SI units.
+        mass: Pairs (factor, symmetric array (n, n)), in kg.
+        stiffness: Pairs, in N/m.
+        observed: Rows by output name, each (n,) acting on displacements or (2n,) acting on
+            displacements and velocities.
+        damping: Pairs, in N s/m.
+        q0: Initial displacements, shape (n,), in m; zero when None.
+        v0: Initial velocities, shape (n,), in m/s; zero when None.
+        ground: Base excitation, or None.
+        pattern: ι, how the unknowns move rigidly with the ground, shape (n,); ones when None.
+        ratios: Damping ratios ζ, numbers or names of parameters: one for all modes, or n by rising
+            frequency; added to `damping`, they follow the parameters through the modes
+            (`frame.damping`).
+
+    Raises:
+        ValueError: A shape does not fit, a number is not finite, a factor names no parameter, the
+            modal mass matrix is not symmetric and positive definite, or a modal ratio is outside
+            [0, 1).
+    """
+
+    parameters: Mapping[str, float]
+    mass: Terms
+    stiffness: Terms
+    observed: Mapping[str, Array]
+    damping: Terms = ()
+    q0: Array | None = None
+    v0: Array | None = None
+    ground: Accelerogram | None = None
+    pattern: Array | None = None
+    ratios: Sequence[str | float] = ()
+    size: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        if not self.mass or not self.stiffness or not self.observed:
+            raise ValueError("mass, stiffness and observed: each needs at least one entry")
+        for name, value in self.parameters.items():
+            require_number(f"parameter {name}", value, "SI units")
+        for kind in ("mass", "damping", "stiffness"):
+            require_factors(kind, getattr(self, kind), self.parameters)
+        n = len(self.mass[0][1])
+        object.__setattr__(self, "size", n)
+        for kind in ("mass", "damping", "stiffness"):
+            for _, array in getattr(self, kind):
+                if np.shape(array) != (n, n):
+                    raise ValueError(
+                        f"{kind}: an array has shape {np.shape(array)}; all must be ({n}, {n})"
+                    )
+                require_numbers(kind, np.asarray(array), "SI units")
+        self._check_vectors()
+        self._check_ratios()
+        self._check_mass()
+
+    def _check_vectors(self) -> None:
+        n = self.size
+        for name in ("q0", "v0", "pattern"):
+            if getattr(self, name) is not None and np.shape(getattr(self, name)) != (n,):
+                raise ValueError(
+                    f"{name}: shape {np.shape(getattr(self, name))} does not fit; it must be ({n},)"
+                )
+            require_numbers(
+                name, () if getattr(self, name) is None else getattr(self, name), "SI units"
+            )
+        for name, row in self.observed.items():
+            if np.shape(row) not in ((n,), (2 * n,)):
+                raise ValueError(
+                    f"observed: '{name}' has shape {np.shape(row)}; it must be ({n},) or ({2 * n},)"
+                )
+            require_numbers(f"observed: '{name}'", row, "SI units")
+
+    def _check_mass(self) -> None:
+        for _, array in self.mass:
+            uneven = np.abs(np.asarray(array, float) - np.transpose(array)).max()
+            if uneven > 1e-9 * np.abs(array).max():
+                raise ValueError(
+                    f"mass: an array is not symmetric, by {uneven:.2g}; a mass matrix is"
+                )
+        modal = sum(float(_value(f, self.parameters)) * np.asarray(A, float) for f, A in self.mass)
+        if not np.linalg.eigvalsh(modal).min() > 0:
+            raise ValueError(
+                "mass: the matrix at the modal parameters is not positive definite; every unknown"
+                " needs a mass"
+            )
+
+    def _check_ratios(self) -> None:
+        if isinstance(self.ratios, str) or not isinstance(self.ratios, Sequence):
+            raise ValueError(
+                f"ratios: {self.ratios!r} is not allowed; it must be a list, as [0.02]"
+            )
+        if len(self.ratios) not in (0, 1, self.size):
+            raise ValueError(
+                f"ratios: got {len(self.ratios)}; give one for all modes, or {self.size}, by rising"
+                " frequency"
+            )
+        for ratio in self.ratios:
+            if isinstance(ratio, str) and ratio not in self.parameters:
+                raise ValueError(
+                    f"ratios: '{ratio}' is no parameter; known are {', '.join(self.parameters)}"
+                )
+            value = float(_value(ratio, self.parameters))
+            if not 0 <= value < 1:
+                raise ValueError(
+                    f"ratios: {value:g} is not allowed; it must be 0 or greater and below 1, the"
+                    " critical damping"
+                )
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the observed quantities."""
+        return tuple(self.observed)
+
+    def matrices(self, p: Mapping[str, Jet]) -> Matrices:
+        """M, D, K and the initial state at S parameter sets."""
+        like = next(iter(p.values()))
+        n, samples, d = self.size, like.value.size, like.directions
+
+        def lifted(factor: Factor | str | float) -> Jet:
+            value = _value(factor, p)
+            return (
+                value if isinstance(value, Jet) else Jet.constant(np.full(samples, float(value)), d)
+            )
+
+        def total(terms: Terms) -> Jet:
+            out = Jet.constant(np.zeros((samples, n, n)), d)
+            for factor, array in terms:
+                out = out + lifted(factor)[:, None, None] * np.asarray(array, float)
+            return out
+
+        start = [np.zeros(n) if x is None else np.asarray(x, float) for x in (self.q0, self.v0)]
+        q0, v0 = (Jet.constant(np.tile(x[None, :, None], (samples, 1, 1)), d) for x in start)
+        pattern = None if self.pattern is None else np.asarray(self.pattern, float)[:, None]
+        mass, damping, stiffness = (
+            total(terms) for terms in (self.mass, self.damping, self.stiffness)
+        )
+        if self.ratios:
+            damping = damping + modal_damping(
+                mass, stiffness, [lifted(ratio) for ratio in self.ratios]
+            )
+        return Matrices(mass, damping, stiffness, q0, v0, pattern)
+
+    def observation(self, p: Mapping[str, Jet]) -> Jet:
+        """Rows C(p) with output = C(p) [q; v], shape (S, m, 2n)."""
+        like = next(iter(p.values()))
+        rows = np.zeros((len(self.observed), 2 * self.size))
+        for k, row in enumerate(self.observed.values()):
+            rows[k, : len(row)] = row
+        return Jet.constant(np.tile(rows, (like.value.size, 1, 1)), like.directions)
+
+
+def _value(factor: Factor | str | float, p: Mapping[str, Any]) -> Any:
+    if isinstance(factor, str):
+        return p[factor]
+    return factor(p) if callable(factor) else factor

@@ -1,0 +1,125 @@
+"""Complex modes of linear structures with analytic first and second derivatives: q(t; p) = 2 Re Σ
+C_k(p) exp(λ_k(p) t).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.frame.calculus.jet import Array, Jet, concatenate, inverse
+from alphacut.frame.dynamics.integrators import state_matrix
+from alphacut.frame.structures.linear import Matrices
+
+DOUBLE = 1e-6
+"""Distance of two eigenvalues, as a share of their size, below which they count as one."""
+
+
+class ModalError(RuntimeError):
+    """The structure has no smooth set of oscillating modes over the box."""
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Intervening variables of a structure (paper, section 7): smooth in the parameters, free of
+    oscillation.
+
+    Args:
+        eigenvalue: λ_k with Im λ_k > 0, by rising |λ_k|, complex jet, V = (S, n), in 1/s.
+        coefficient: C_k, what the initial state puts into the outputs, V = (S, n, m).
+        load: The same for a unit impulse of the ground's acceleration, V = (S, n, m).
+    """
+
+    eigenvalue: Jet
+    coefficient: Jet
+    load: Jet
+
+
+def modes(matrices: Matrices, rows: Jet, chosen: Array | None = None) -> Modes:
+    """Eigen-analyses at S parameter sets.
+
+    Args:
+        matrices: The structure.
+        rows: Observation rows, V = (S, m, 2n).
+        chosen: Indices of the modes wanted, among those that oscillate, by rising |λ|; all modes
+            when None.
+
+    Raises:
+        ModalError: A mode that is wanted does not oscillate (overdamped or free to drift).
+    """
+    values, X, Y = eigenvectors(state_matrix(matrices))
+    wanted = np.arange(values.value.shape[-1] // 2) if chosen is None else chosen
+    values = values[..., wanted]
+    if not oscillating(values.value).all():
+        raise ModalError(
+            "a mode does not oscillate: modal intervening variables need damping below critical in"
+            " every mode; use graph-follower"
+        )
+    start = concatenate([matrices.q0, matrices.v0], -2)
+    kick = np.concatenate([np.zeros_like(matrices.rigid), -matrices.rigid])
+    seen = rows @ X[..., wanted]  # V = (S, m, n)
+
+    def through(excitation: Jet | Array) -> Jet:
+        share = (Y @ excitation)[..., wanted, 0][..., None, :]
+        return (seen * share).map(lambda x: x.swapaxes(-1, -2))
+
+    return Modes(values, through(start), through(kick))
+
+
+def require_single(matrices: Matrices, chosen: Array) -> None:
+    """Refuses modes that share their frequency with another one at all S parameter sets: their
+    shapes are any mixture of both.
+
+    Args:
+        matrices: The structure.
+        chosen: Indices of the modes wanted, by rising |λ|.
+
+    Raises:
+        ModalError: There is such a pair.
+    """
+    rate = eigenvectors(state_matrix(matrices))[0].value
+    size = rate.shape[-1] // 2
+    apart = np.abs(rate[:, :size, None] - rate[:, None, :size]) / np.maximum(
+        np.abs(rate[:, :size, None]), 1e-300
+    )
+    for first, second in np.argwhere((apart < DOUBLE).all(0)):
+        if first < second and np.isin([first, second], chosen).any():
+            raise ModalError(
+                f"modal: modes {first + 1} and {second + 1} have the same frequency,"
+                f" {np.abs(rate[0, first]):.4g} rad/s, and so no smooth shapes; take the method"
+                " auto or improved-graph-follower"
+            )
+
+
+def oscillating(rate: Array) -> Array:
+    """Which eigenvalues belong to the upper of a conjugate pair."""
+    yes: Array = rate.imag > 1e-9 * np.abs(rate)
+    return yes
+
+
+def eigenvectors(A: Jet) -> tuple[Jet, Jet, Jet]:
+    """Eigenvalues (upper half plane, then real ones, then lower, each by rising |λ|), right and
+    left vectors of V = (S, 2n, 2n).
+
+    With X(p) = X(p0) Z(p), Z(p0) = I and diag Z = I, second-order perturbation in the eigenbasis
+    gives all derivatives.
+    """
+    values, X = np.linalg.eig(A.value)
+    group = np.where(oscillating(values), 0, np.where(oscillating(values.conj()), 2, 1))
+    order = np.lexsort((np.abs(values), group), axis=-1)
+    values, X = np.take_along_axis(values, order, -1), np.take_along_axis(X, order[:, None, :], -1)
+    Y = np.linalg.inv(X)
+    gap = values[:, None, :] - values[:, :, None]
+    size = values.shape[-1]
+    off = ~np.eye(size, dtype=bool)
+    weight = np.where(off, 1 / np.where(off & (gap != 0), gap, 1.0), 0.0)
+    G1, G2 = Y @ A.first @ X, Y @ A.second @ X
+    slope = np.einsum("...kk->...k", G1)
+    Z1 = G1 * weight
+    pair = G1[:, None] @ Z1[None, :] - Z1[:, None] * slope[None, :, :, None, :]
+    second = G2 + pair + pair.swapaxes(0, 1)
+    Z2 = second * weight
+    eye = np.broadcast_to(np.eye(size), Z1.shape[1:])
+    right = X @ Jet(eye, Z1, Z2)
+    return Jet(values, slope, np.einsum("...kk->...k", second)), right, inverse(right)

@@ -1,0 +1,117 @@
+"""Which structures are polynomials in their parameters and never gain energy: the facts that a
+proof about a modal model rests on.
+
+They follow from how a structure is written, not from samples of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import singledispatch
+from math import ceil, log, sqrt
+
+import numpy as np
+
+from alphacut.frame.structures.linear import LinearSystem
+from alphacut.frame.structures.matrix import MatrixStructure
+from alphacut.frame.structures.storey import StoreyFrame
+
+Box = Mapping[str, tuple[float, float]]
+ROUND_OFF = 1e-17
+"""Relative size from which on a Chebyshev coefficient counts as none: a hundredth of the precision
+that everything is computed in.
+"""
+
+
+class UnprovedError(RuntimeError):
+    """A property that a proof needs does not hold, or is not known to hold."""
+
+
+@singledispatch
+def degrees(system: LinearSystem, box: Box) -> dict[str, int]:
+    """Degree of M, D, K, the initial state and the observation rows in each parameter of a box, to
+    round-off.
+
+    Args:
+        system: The structure.
+        box: Lower and upper end of each uncertain parameter, in SI units.
+
+    Raises:
+        UnprovedError: They are no polynomials, or the damping may feed energy into the structure
+            somewhere in the box.
+    """
+    raise UnprovedError(
+        f"nothing is known about how a {type(system).__name__} depends on its parameters"
+    )
+
+
+@degrees.register
+def _(system: StoreyFrame, box: Box) -> dict[str, int]:
+    if system.damping_ratio:
+        raise UnprovedError("damping by modal ratios is no polynomial in the parameters")
+    for name, (lower, _) in box.items():
+        if (name[0] == "d" or name.startswith("rayleigh")) and lower < 0:
+            raise UnprovedError(
+                f"{name} reaches {lower:g}: a negative damper feeds energy into the structure"
+            )
+    return {name: inverse_cube_degree(*ends) if name[0] == "l" else 1 for name, ends in box.items()}
+
+
+@degrees.register
+def _(system: MatrixStructure, box: Box) -> dict[str, int]:
+    if system.ratios:
+        raise UnprovedError("damping by modal ratios is no polynomial in the parameters")
+    for kind in ("mass", "damping", "stiffness"):
+        for factor, array in getattr(system, kind):
+            if callable(factor):
+                raise UnprovedError(
+                    f"{kind} has a factor that is a function; only numbers and names of parameters"
+                    " are known polynomials"
+                )
+            if not np.array_equal(array, np.transpose(array)):
+                raise UnprovedError(f"{kind} has an array that is not symmetric")
+            if kind == "damping":
+                least = (
+                    box.get(factor, (system.parameters[factor],))[0]
+                    if isinstance(factor, str)
+                    else factor
+                )
+                _require_dissipation(least, np.asarray(array, float))
+    return dict.fromkeys(box, 1)
+
+
+def _require_dissipation(
+    factor: float, array: np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+) -> None:
+    eigenvalues = np.linalg.eigvalsh(array)
+    if factor < 0 or eigenvalues[0] < -1e-14 * np.abs(eigenvalues).max():
+        raise UnprovedError(
+            "a term of the damping has a negative factor or an indefinite array: it may feed energy"
+            " into the structure"
+        )
+
+
+def inverse_cube_degree(lower: float, upper: float) -> int:
+    """Degree at which the Chebyshev series of x⁻³ on an interval of positive numbers has fallen to
+    round-off.
+
+    Inside the Bernstein ellipse with semi-axes sum ρ > 1 the function stays below M, and what
+    follows after degree N is at most 2 M ρ^−N / (ρ − 1) (Trefethen, Approximation Theory and
+    Approximation Practice, theorem 8.2).
+    """
+    share = (upper - lower) / (upper + lower)
+    if not 0 <= share < 1:
+        raise UnprovedError(
+            f"a length between {lower:g} and {upper:g} m is not positive throughout"
+        )
+    if share == 0:
+        return 0
+
+    def needed(
+        reach: float,
+    ) -> int:  # the ellipse that crosses the axis where |x| has fallen to 1 − reach of the middle
+        axis = reach / share
+        rho = axis + sqrt(axis * axis - 1)
+        return ceil(log(2 / ((1 - reach) ** 3 * ROUND_OFF * (rho - 1))) / log(rho))
+
+    return max(1, min(needed(share + (1 - share) * k / 20) for k in range(1, 20)))

@@ -1,0 +1,251 @@
+"""Large linear structures by a small basis of displacement shapes that holds for the whole box of
+parameters.
+
+The full structure has thousands of unknowns and matrices that are sums of a few given matrices,
+each times a smooth factor of the
+parameters: K(p) = Σ_i f_i(p) K_i, likewise M and D. Projection on a common basis V makes it a small
+structure with n = V's columns, and everything in this package applies. The basis holds the energy
+of harmonic responses at a few parameter sets (`frame.response_basis`); the error is measured
+against trajectories of the full structure at other parameter sets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from alphacut.frame.calculus.jet import Array, Jet
+from alphacut.frame.calculus.low_discrepancy import chebyshev_points
+from alphacut.frame.dynamics.spectral import responses
+from alphacut.frame.structures.damping import modal_damping
+from alphacut.frame.structures.linear import Accelerogram, Matrices
+from alphacut.frame.structures.response_basis import energy_basis, response_shapes
+
+Factor = Callable[[Mapping[str, Any]], Any]
+
+
+@dataclass(frozen=True, eq=False)
+class AffineStructure:
+    """A large structure as sums of sparse matrices with factors.
+
+    Args:
+        parameters: All parameters with their modal values, in SI units.
+        mass: Pairs (factor of the parameters, sparse matrix (N, N)), in kg.
+        stiffness: Pairs, in N/m.
+        rayleigh: Names of the parameters that multiply M and K in the damping matrix.
+        excitation: How the ground moves the unknowns rigidly, shape (N,); dimensionless.
+        observed: Rows by output name, each (N,), acting on displacements.
+        ground: Base excitation, or None.
+        q0: Initial displacements, shape (N,).
+        v0: Initial velocities, shape (N,).
+        ratio: Name of the parameter that is the damping ratio of all modes, added to Rayleigh's;
+            None for none.
+    """
+
+    parameters: Mapping[str, float]
+    mass: Sequence[tuple[Factor, Any]]
+    stiffness: Sequence[tuple[Factor, Any]]
+    rayleigh: tuple[str, str]
+    excitation: Array
+    observed: Mapping[str, Array]
+    ground: Accelerogram | None = None
+    q0: Array | None = None
+    v0: Array | None = None
+    ratio: str | None = None
+
+    def assembled(self, p: Mapping[str, float]) -> tuple[Any, Any]:
+        """Sparse M and K at one parameter set."""
+        M = sum(float(f(p)) * A for f, A in self.mass)
+        K = sum(float(f(p)) * A for f, A in self.stiffness)
+        return M.tocsc(), K.tocsc()
+
+    def reduced(
+        self,
+        bounds: Mapping[str, tuple[float, float]],
+        *,
+        keep: float = 1e-11,
+        samples: int = 5,
+        frequencies: int = 24,
+    ) -> ReducedStructure:
+        """Projection on the shapes that carry the energy of the response to harmonic loads at
+        several points of a box.
+
+        Args:
+            bounds: Lower and upper ends of the uncertain parameters.
+            keep: Share of the strongest shape's strain energy below which a shape is left out.
+            samples: Points of the box.
+            frequencies: Frequencies of the load at each point.
+        """
+        band = self._band()
+        shapes = [
+            response_shapes(self, point, np.geomspace(*band, frequencies))
+            for point in _points(self.parameters, bounds, samples)
+        ]
+        M, K = self.assembled(self.parameters)
+        always = (
+            [self.excitation] if self.ground is not None else []
+        )  # so that the rigid motion is projected without error
+        basis = energy_basis(
+            np.hstack(shapes),
+            M,
+            K,
+            keep=keep,
+            always=always + [x for x in (self.q0, self.v0) if x is not None and x.any()],
+        )
+        small = [
+            [(f, basis.T @ (A @ basis)) for f, A in terms] for terms in (self.mass, self.stiffness)
+        ]
+        push = basis.T @ (
+            M @ self.excitation
+        )  # V is orthonormal in M: the coordinates of the rigid motion
+        state = [
+            np.zeros(basis.shape[1]) if x is None else basis.T @ (M @ x) for x in (self.q0, self.v0)
+        ]
+        rows = np.array([row @ basis for row in self.observed.values()])
+        return ReducedStructure(self, basis, small[0], small[1], push, rows, state[0], state[1])
+
+    def _band(self) -> tuple[float, float]:
+        """Angular frequencies from half the fundamental one to the end of the record's spectrum, at
+        least to twenty times the lower.
+        """
+        from scipy.sparse.linalg import splu
+
+        M, K = self.assembled(self.parameters)
+        x = splu(K).solve(M @ self.excitation)
+        fundamental = float(np.sqrt((x @ (K @ x)) / (x @ (M @ x))))
+        top = 0.0 if self.ground is None else self.ground.band()
+        return fundamental / 2, max(top, 20 * fundamental)
+
+    def trajectories(self, p: Mapping[str, float], time: Array) -> Array:
+        """Outputs of the full structure, exact for a record linear between its samples, by all its
+        modes; shape (T, m); for checking.
+
+        Rayleigh and modal damping keep the undamped modes, each of which answers with two
+        exponentials.
+        """
+        from scipy.linalg import eigh
+
+        M, K = self.assembled(p)
+        squared, shape = eigh(K.toarray(), M.toarray())
+        half = (float(p[self.rayleigh[0]]) + float(p[self.rayleigh[1]]) * squared) / 2
+        half += float(p[self.ratio]) * np.sqrt(squared) if self.ratio else 0.0
+        root = np.sqrt(half**2 - squared + 0j)
+        slow, fast = -half + root, -half - root
+        rows = np.array(list(self.observed.values())) @ shape
+        h, out = time[1] - time[0], np.zeros((len(time), len(rows)), complex)
+        if self.ground is not None:
+            every = self.ground.intervals(h)
+            load = self.ground.at(np.arange((len(time) - 1) * every + 1) * (h / every))
+            share = -(shape.T @ (M @ self.excitation)) / (slow - fast)
+            two = responses(np.stack([slow, fast]), load, h / every, every=every)[0]
+            out += ((two[0] - two[1]) * share) @ rows.T
+        for x, parts in ((self.q0, (-fast, slow)), (self.v0, (1.0, -1.0))):
+            if x is not None and x.any():
+                share = shape.T @ (M @ x) / (slow - fast)
+                out += (
+                    share
+                    * (
+                        parts[0] * np.exp(np.outer(time, slow))
+                        + parts[1] * np.exp(np.outer(time, fast))
+                    )
+                ) @ rows.T
+        found: Array = out.real
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedStructure:
+    """A small structure that stands for a large one; a `LinearSystem`.
+
+    Args:
+        full: The large structure.
+        basis: Shapes, orthonormal in M at the modal parameters, shape (N, n).
+        mass: Projected pairs (factor, matrix (n, n)).
+        stiffness: Projected pairs.
+        push: Coordinates of the rigid motion with the ground, shape (n,).
+        rows: Observation rows, shape (m, n).
+        q0: Initial coordinates, shape (n,).
+        v0: Initial velocities of the coordinates, shape (n,).
+    """
+
+    full: AffineStructure
+    basis: Array
+    mass: Sequence[tuple[Factor, Array]]
+    stiffness: Sequence[tuple[Factor, Array]]
+    push: Array
+    rows: Array
+    q0: Array
+    v0: Array
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """All parameters with their modal values, in SI units."""
+        return self.full.parameters
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the observed quantities."""
+        return tuple(self.full.observed)
+
+    @property
+    def ground(self) -> Accelerogram | None:
+        """Base excitation, if any."""
+        return self.full.ground
+
+    def matrices(self, p: Mapping[str, Jet]) -> Matrices:
+        """M, D, K and the initial state at S parameter sets."""
+        like = next(iter(p.values()))
+        size, d = like.value.size, like.directions
+
+        def total(terms: Sequence[tuple[Factor, Array]]) -> Jet:
+            parts = [_lifted(f(p), size, d)[:, None, None] * A for f, A in terms]
+            return parts[0] if len(parts) == 1 else sum(parts[1:], parts[0])
+
+        M, K = total(self.mass), total(self.stiffness)
+        a, b = (p[name][:, None, None] for name in self.full.rayleigh)
+        q0, v0 = (
+            Jet.constant(np.tile(x[None, :, None], (size, 1, 1)), d) for x in (self.q0, self.v0)
+        )
+        D = a * M + b * K
+        if self.full.ratio:
+            D = D + modal_damping(M, K, [p[self.full.ratio]])
+        return Matrices(M, D, K, q0, v0, self.push[:, None])
+
+    def observation(self, p: Mapping[str, Jet]) -> Jet:
+        """Rows C(p) with output = C(p) [q; v], shape (S, m, 2n)."""
+        like = next(iter(p.values()))
+        rows = np.hstack([self.rows, np.zeros_like(self.rows)])
+        return Jet.constant(np.tile(rows, (like.value.size, 1, 1)), like.directions)
+
+    def error(self, points: Sequence[Mapping[str, float]], time: Array, values: Array) -> float:
+        """Largest deviation of `values` (S, T, m) from trajectories of the full structure, relative
+        to the peak of each output.
+        """
+        worst = 0.0
+        for point, mine in zip(points, values, strict=True):
+            truth = self.full.trajectories({**self.parameters, **point}, time)
+            worst = max(worst, float((np.abs(mine - truth).max(0) / np.abs(truth).max(0)).max()))
+        return worst
+
+
+def _points(
+    modal: Mapping[str, float], bounds: Mapping[str, tuple[float, float]], samples: int
+) -> list[dict[str, float]]:
+    """The middle of the box and a spread of points."""
+    low, high = np.array(list(bounds.values())).T
+    unit = np.vstack([np.zeros((1, len(low))), chebyshev_points(len(low), samples - 1)])
+    return [
+        {**modal, **dict(zip(bounds, (low + high) / 2 + (high - low) / 2 * u, strict=True))}
+        for u in unit
+    ]
+
+
+def _lifted(factor: Any, size: int, directions: int) -> Jet:
+    return (
+        factor
+        if isinstance(factor, Jet)
+        else Jet.constant(np.full(size, float(factor)), directions)
+    )

@@ -1,0 +1,142 @@
+"""What can be said of a user's arguments before any sample is run."""
+
+from __future__ import annotations
+
+import inspect
+import pickle
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from numbers import Real
+from typing import Any
+
+from alphacut.fuzzy.knowledge.known import Known
+from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.fuzzy.sets.interaction import Interaction
+from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber
+
+
+def fuzzy_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNumber]:
+    """The inputs by name; a plain number is a crisp one.
+
+    Raises:
+        ValueError: The inputs are no mapping, or a value is neither a fuzzy number nor a number.
+    """
+    if not isinstance(inputs, Mapping):
+        raise ValueError(
+            f"the inputs are a {type(inputs).__name__}; they must map names to fuzzy numbers, as"
+            " {'E': Triangular(24, 25, 26)}"
+        )
+    return {name: _fuzzy(name, value) for name, value in inputs.items()}
+
+
+def _fuzzy(name: str, value: object) -> FuzzyNumber:
+    if isinstance(value, FuzzyNumber):
+        return value
+    if isinstance(value, Real):
+        return Crisp(float(value))
+    raise ValueError(
+        f"the input {name!r} is {value!r}; it must be a number or a fuzzy number such as"
+        " Triangular(24, 25, 26)"
+    )
+
+
+def shared_numbers(domain: Domain) -> tuple[str, ...]:
+    """A note for each fuzzy number that stands for several inputs: they are independent all the
+    same.
+    """
+    names: dict[int, list[str]] = {}
+    for name, number in domain.inputs.items():
+        if number.support.width > 0:
+            names.setdefault(id(number), []).append(name)
+    cure = "where they are one quantity, make it one input"
+    return tuple(
+        f"inputs {', '.join(same)} share one fuzzy number and vary independently; {cure}"
+        for same in names.values()
+        if len(same) > 1
+    )
+
+
+def known_facts(known: object, names: Sequence[str]) -> Known:
+    """What is known of the model; nothing if not given.
+
+    Raises:
+        ValueError: It is no `Known`, or names what is no input.
+    """
+    if not isinstance(known, Known | None):
+        raise ValueError(
+            f"known is {known!r}; it must be what is known of the function, as"
+            " fuzzy.Known(signs={'x': 1})"
+        )
+    facts = known or Known()
+    facts.check(names)
+    return facts
+
+
+def interaction_list(interactions: object) -> tuple[Interaction, ...]:
+    """The interactions between the inputs.
+
+    Raises:
+        ValueError: They are no list of interactions.
+    """
+    listed = (
+        interactions
+        if isinstance(interactions, Iterable) and not isinstance(interactions, str)
+        else (None,)
+    )
+    found = tuple(listed)
+    if not all(hasattr(one, "slack") for one in found):
+        raise ValueError(
+            f"the interactions are {interactions!r}; they must be a list such as"
+            " [fuzzy.Linear({'x': 1}, 2)]"
+        )
+    return found
+
+
+def require_plan(plan: object) -> None:
+    """A plan is an object that runs, not its name.
+
+    Raises:
+        ValueError: It is not.
+    """
+    if isinstance(plan, type) or not hasattr(plan, "run"):
+        raise ValueError(
+            f"the plan is {plan!r}; it must be a plan such as fuzzy.General(), fuzzy.Reduced() or"
+            " fuzzy.Signed()"
+        )
+
+
+def require_callable(function: Any, names: Sequence[str], *, by_name: bool, sent: bool) -> None:
+    """The function can be called with the inputs, and sent to worker processes where there are
+    some.
+
+    Raises:
+        ValueError: It cannot.
+    """
+    if not callable(function):
+        raise ValueError(f"the function is {function!r}, which cannot be called")
+    if by_name:
+        try:
+            inspect.signature(function).bind(**dict.fromkeys(names))
+        except TypeError as mismatch:
+            raise ValueError(
+                f"the function cannot be called with the inputs {', '.join(names)}: {mismatch}"
+            ) from None
+        except ValueError:
+            pass  # a function of C without a signature
+    if sent:
+        main = sys.modules["__main__"]
+        if getattr(function, "__module__", None) == "__main__" and not (
+            getattr(main, "__file__", None) or getattr(main, "__spec__", None)
+        ):
+            cure = "define it in a file that is imported, or take workers=1"
+            raise ValueError(
+                "the function cannot be sent to worker processes (it was typed in, not read from a"
+                f" file): {cure}"
+            )
+        try:
+            pickle.dumps(function)
+        except Exception as failure:
+            cure = "define it at the top level of a module, or take workers=1"
+            raise ValueError(
+                f"the function cannot be sent to worker processes ({failure}): {cure}"
+            ) from None

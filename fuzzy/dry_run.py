@@ -1,0 +1,295 @@
+"""What a campaign would run, and why: the plan is followed through the store up to the first sample
+that is not there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from alphacut.fuzzy.arguments import fuzzy_inputs, interaction_list, known_facts, require_plan
+from alphacut.fuzzy.campaign.call import BATCH, Call, Function, named_point
+from alphacut.fuzzy.campaign.memory_check import needed
+from alphacut.fuzzy.campaign.sample_store import Shelf, shelf
+from alphacut.fuzzy.campaign.store import Identity, Store, Stored
+from alphacut.fuzzy.knowledge.known import Known
+from alphacut.fuzzy.plans.plan import Plan
+from alphacut.fuzzy.plans.transformation import Extended, General, Reduced
+from alphacut.fuzzy.samples.model import Values
+from alphacut.fuzzy.sets.boxes import Domain, levels
+from alphacut.fuzzy.sets.interaction import Interaction
+from alphacut.fuzzy.sets.numbers import Array
+
+_SHOWN = 5
+_LISTED = 100_000  # samples that are listed at most where nothing is stored
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What a campaign would run.
+
+    Args:
+        samples: Samples that the plan asks for first; all of them unless it goes on from their
+            values.
+        stored: How many of them are stored.
+        missing: Inputs of those that would run, by name.
+        calls: Calls that they take.
+        seconds: Time that they would take one after the other, from the mean of those stored; None
+            where nothing tells.
+        memory: Bytes that the samples' numbers take.
+        reasons: Why they are not there, one sentence each.
+        open_end: What else the number of samples depends on; empty where it is known.
+    """
+
+    samples: int
+    stored: int
+    missing: tuple[dict[str, float], ...]
+    calls: int
+    seconds: float | None
+    memory: int
+    reasons: tuple[str, ...]
+    open_end: str = ""
+
+    def __str__(self) -> str:
+        missing = self.samples - self.stored
+        samples = f"the first {self.samples}" if self.open_end else f"{self.samples} samples"
+        head = (
+            f"{self.open_end}{samples}: {self.stored} stored, {missing} to run in {self.calls}"
+            " calls"
+        )
+        time = "" if self.seconds is None else f", about {self.seconds:.3g} s of work"
+        first = [
+            ", ".join(f"{name} = {value:.6g}" for name, value in point.items())
+            for point in self.missing[:_SHOWN]
+        ]
+        more = [f"… and {missing - _SHOWN} more"] if missing > _SHOWN else []
+        return "\n".join(
+            [
+                f"{head}{time}; {self.memory / 1e6:.3g} MB of memory",
+                *self.reasons,
+                *(f"  would run {row}" for row in first),
+                *more,
+            ]
+        )
+
+
+class _MissingError(Exception):
+    """The first samples that are not stored."""
+
+    def __init__(self, points: Array, missing: Array) -> None:
+        super().__init__()
+        self.points, self.missing = points, missing
+
+
+@dataclass
+class _Rehearsal:
+    """A model that only knows what is stored."""
+
+    samples: Shelf | None
+    known: Known
+    seen: int = 0
+    columns: int = 1
+    seconds: float = 0.0
+
+    def __call__(self, points: Array) -> Values:
+        keys = [self.samples.key(points[row]) for row in range(len(points))] if self.samples else []
+        stored = self.samples.stored(keys) if self.samples else {}
+        rows = [stored.get(key) for key in keys] or [None] * len(points)
+        found = [row for row in rows if row is not None]
+        self.seen += len(found)
+        self.seconds += sum(row.seconds for row in found)
+        self.columns = len(found[0].row) if found else self.columns
+        if len(found) < len(points):
+            raise _MissingError(points, points[[row is None for row in rows]])
+        return Values(found[0].layout, np.array([row.row for row in found]))
+
+    def report(self, share: float, *, last: bool = False) -> None:
+        """Nothing is done, so nothing is told."""
+
+
+def explain(
+    function: Function | Mapping[str, Any] | None = None,
+    inputs: Mapping[str, Any] | Plan | None = None,
+    plan: Plan | None = None,
+    *,
+    alpha: Sequence[float] | None = None,
+    interactions: Sequence[Interaction] = (),
+    shared: Sequence[str] = (),
+    vectorised: bool = False,
+    workers: int = 1,
+    executor: object = None,
+    known: Known | None = None,
+    store: Store | str | Path | None = None,
+    identity: Identity | None = None,
+    spot_check: bool = False,
+    progress: object = None,
+) -> Explanation:
+    """What `propagate` with the same arguments would run, and why. Nothing is run and no store is
+    made.
+
+    Args:
+        function: Not called; may be left out, so that the inputs come first.
+        inputs: Fuzzy number of each input; a plain number is crisp.
+        plan: How the boxes of the inputs are searched; the general transformation method if not
+            given.
+        alpha: Rising levels; 0, ¼, ½, ¾, 1 if not given.
+        interactions: Constraints between the inputs.
+        shared: Inputs whose equality lets samples share one call.
+        vectorised: Whether the function takes arrays.
+        workers: Changes nothing here.
+        executor: Changes nothing here.
+        known: Facts about the model.
+        store: Where samples are kept, if there.
+        identity: What a sample depends on besides its inputs.
+        spot_check: Changes nothing here.
+        progress: Changes nothing here.
+
+    Raises:
+        ValueError: An argument is wrong.
+    """
+    if isinstance(function, Mapping):
+        inputs, plan = function, cast("Plan | None", inputs) or plan
+    plan = plan or General()
+    require_plan(plan)
+    domain = Domain(
+        fuzzy_inputs(cast("Mapping[str, Any]", inputs)),
+        levels(4) if alpha is None else alpha,
+        interaction_list(interactions),
+    )
+    facts = known_facts(known, domain.names)
+    call = Call(_never, domain.names, tuple(shared), vectorised)
+    there = (
+        store if isinstance(store, Store) or (store is not None and Path(store).exists()) else None
+    )
+    if (
+        there is None
+        and isinstance(plan, Reduced | General | Extended)
+        and not plan.stepwise
+        and plan.size(domain) > _LISTED
+    ):
+        return _counted(plan.size(domain), domain, vectorised)
+    with shelf(there, identity, domain.names) as samples:
+        return _rehearsed(plan, domain, call, _Rehearsal(samples, facts), identity or {})
+
+
+def _rehearsed(
+    plan: Plan, domain: Domain, call: Call, rehearsal: _Rehearsal, identity: Identity
+) -> Explanation:
+    """The plan followed through the store."""
+    missing: Array
+    try:
+        points, missing = plan.run(rehearsal, domain).points, np.empty((0, len(domain.names)))
+    except _MissingError as stop:
+        points, missing = stop.points, stop.missing
+    reasons = (
+        _reasons(rehearsal.samples, identity, domain, missing)
+        if len(missing)
+        else ("everything is stored: nothing would run",)
+    )
+    return Explanation(
+        samples=len(points),
+        stored=len(points) - len(missing),
+        missing=tuple(named_point(domain.names, missing[row]) for row in range(len(missing))),
+        calls=len(list(call.tasks(missing))),
+        seconds=rehearsal.seconds / rehearsal.seen * len(missing) if rehearsal.seen else None,
+        memory=needed(len(points), len(domain.names) + rehearsal.columns),
+        reasons=reasons,
+        open_end=_open_end(plan) if plan.stepwise and len(missing) else "",
+    )
+
+
+def _counted(size: int, domain: Domain, vectorised: bool) -> Explanation:
+    """So many samples that they are counted, not listed: points that two levels share count twice."""
+    calls = -(-size // BATCH) if vectorised else size
+    few = "too many to list; take Signed, Optimisation or Chebyshev if these are too many to run"
+    return Explanation(
+        size,
+        0,
+        (),
+        calls,
+        None,
+        needed(size, len(domain.names) + 1),
+        ("there is no store yet: every sample is new", few),
+    )
+
+
+def _open_end(plan: Plan) -> str:
+    """What a plan says that goes on from the values of its samples."""
+    most = getattr(plan, "budget", None) or getattr(plan, "limit", None)
+    kind = "budget" if hasattr(plan, "budget") else "limit"
+    return (
+        f"how many samples {type(plan).__name__} takes depends on the"
+        f" model{f' ({kind} {most:,})' if most else ''}; "
+    )
+
+
+def _never(**_: float) -> float:
+    raise AssertionError("an explanation runs nothing")
+
+
+def _reasons(
+    samples: Shelf | None, identity: Identity, domain: Domain, missing: Array
+) -> tuple[str, ...]:
+    if samples is None:
+        return ("there is no store yet: every sample is new",)
+    keys = [samples.key(missing[row]) for row in range(len(missing))]
+    failed = samples.failed(keys)
+    reasons = (
+        [
+            f"{len(failed)} failed before and would be tried again, the first with:"
+            f" {next(iter(failed.values()))}"
+        ]
+        if failed
+        else []
+    )
+    own = [model for model in samples.models() if model.identity == dict(identity)]
+    if own and own[0].samples:
+        reasons += _new_values(samples, domain, missing)
+    else:
+        reasons += _nearest([model for model in samples.models() if model.samples], identity)
+    return tuple(reasons)
+
+
+def _new_values(samples: Shelf, domain: Domain, missing: Array) -> list[str]:
+    """Which inputs take values that no stored sample of this model has."""
+    stored = samples.points()
+    found = []
+    for column, name in enumerate(domain.names):
+        fresh = {float(value) for value in missing[:, column]} - {point[name] for point in stored}
+        if fresh:
+            found.append(
+                f"{name} takes {len(fresh)} values that no stored sample has, the first"
+                f" {min(fresh):.6g}"
+            )
+    return found or ["the inputs take stored values in new combinations"]
+
+
+def _nearest(models: list[Stored], identity: Identity) -> list[str]:
+    """How the model differs from the nearest one that has samples."""
+    if not models:
+        return ["the store is empty: every sample is new"]
+    differences = [_differences(model.identity, identity) for model in models]
+    nearest = min(range(len(models)), key=lambda i: len(differences[i]))
+    what = "; ".join(differences[nearest])
+    return [
+        f"no sample of this model is stored; the nearest model, with {models[nearest].samples}"
+        f" samples, differs: {what}"
+    ]
+
+
+def _differences(stored: Any, asked: Any, path: str = "") -> list[str]:
+    """Where two identities differ, each as `key: stored → asked`."""
+    if isinstance(stored, Mapping) and isinstance(asked, Mapping):
+        keys = sorted({*stored, *asked})
+        return [
+            line
+            for key in keys
+            for line in _differences(
+                stored.get(key), asked.get(key), f"{path}.{key}" if path else str(key)
+            )
+        ]
+    return [] if stored == asked else [f"{path}: {stored} → {asked}"]

@@ -1,0 +1,229 @@
+"""α-cut optimisation: every bound of every level searched by one of SciPy's optimisers (paper,
+appendix A and eq. 21).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from alphacut.fuzzy.plans.monotonicity import primary
+from alphacut.fuzzy.samples.design import Design
+from alphacut.fuzzy.samples.evaluation_cache import Memo
+from alphacut.fuzzy.samples.model import Model
+from alphacut.fuzzy.samples.result import FuzzyResult
+from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.fuzzy.sets.interaction import pulled
+from alphacut.fuzzy.sets.numbers import Array
+from alphacut.fuzzy.surrogates.chebyshev_polynomial import corners
+
+Method = Literal["multistart", "differential_evolution", "shgo", "direct", "dual_annealing"]
+_DIFFERENCE = 1e-6  # step of a derivative, as a share of the width of the cut
+# least distance of two starts, as a share of the width of the cut: they should lie in different
+# valleys
+_APART = 0.25
+_CORNERS = 6  # inputs up to which the first look includes all corners
+
+
+@dataclass(frozen=True)
+class Optimisation:
+    """Searches each bound, from the narrowest cut to the widest; every sample of every search
+    counts for all bounds.
+
+    Args:
+        method: "multistart" looks at corners and spread points first and descends from the best by
+            gradients; the others are SciPy's global optimisers of that name, which know nothing of
+            interactions.
+        starts: Descents per bound.
+        look: Spread points of the first look per level and input.
+        budget: Samples per bound that a global optimiser may take.
+        seed: Where random searches start from.
+        outputs: Outputs whose bounds matter; all if none is named.
+
+    Raises:
+        ValueError: There is no such method, or a number is not positive.
+    """
+
+    method: Method = "multistart"
+    starts: int = 3
+    look: int = 8
+    budget: int = 2000
+    seed: int = 0
+    outputs: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.method not in get_args(Method):
+            raise ValueError(
+                f"the optimiser is {self.method!r}; it must be one of {', '.join(get_args(Method))}"
+            )
+        if min(self.starts, self.look, self.budget) < 1:
+            raise ValueError(
+                f"starts, look and budget are {self.starts}, {self.look}, {self.budget}; each must"
+                " be 1 or more"
+            )
+
+    @property
+    def stepwise(self) -> bool:
+        """Samples depend on those before."""
+        return True
+
+    def run(self, model: Model, domain: Domain) -> FuzzyResult:
+        """Search all bounds."""
+        if self.method != "multistart":
+            domain.require_free(self.method)
+        memo = Memo(model)
+        modal = np.array([[number.modal for number in domain.inputs.values()]], float)
+        columns = memo(modal).columns
+        names = self.outputs or primary(columns, model.known)
+        for level in reversed(range(len(domain.alpha))):
+            cut = _Cut(memo, domain, level)
+            if not (cut.upper > cut.lower).any():
+                continue
+            if self.method == "multistart":
+                cut.look(self.look, self.seed)
+            for name in names:
+                for sign in (1.0, -1.0):
+                    self._search(cut, name, sign)
+            model.report(1 - level / len(domain.alpha))
+        return Design.from_samples(domain, memo.points).bounds(
+            memo.values, plan=f"optimisation by {self.method}"
+        )
+
+    def _search(self, cut: _Cut, output: str, sign: float) -> None:
+        if self.method == "multistart":
+            for start in cut.best(output, sign, self.starts):
+                cut.descend(start, output, sign)
+            return
+        import scipy.optimize
+
+        factor = sign / cut.scale(output)
+
+        def objective(unit: Array) -> Any:
+            if unit.ndim > 1:  # many points, one in each column
+                return factor * cut.values(unit.T, output)
+            return factor * float(cut.values(unit[None], output)[0])
+
+        bounds = [(0.0, 1.0)] * len(cut.moving)
+        if self.method == "differential_evolution":
+            rounds = max(1, self.budget // (15 * len(bounds)) - 1)
+            options = {
+                "maxiter": rounds,
+                "rng": self.seed,
+                "vectorized": True,
+                "updating": "deferred",
+                "polish": False,
+                "tol": 1e-8,
+            }
+            scipy.optimize.differential_evolution(objective, bounds, **options)
+        elif self.method == "direct":
+            scipy.optimize.direct(objective, bounds, maxfun=self.budget)
+        elif self.method == "shgo":
+            scipy.optimize.shgo(objective, bounds, options={"maxfev": self.budget})
+        else:
+            scipy.optimize.dual_annealing(objective, bounds, maxfun=self.budget, rng=self.seed)
+
+
+class _Cut:
+    """One level under search, in coordinates that run from 0 to 1 over those inputs that have a
+    width.
+    """
+
+    def __init__(self, memo: Memo, domain: Domain, level: int) -> None:
+        self.memo, self.domain, self.level = memo, domain, level
+        self.lower, self.upper = (ends[level] for ends in domain.boxes)
+        self.moving = np.flatnonzero(self.upper > self.lower)
+
+    def points(self, unit: Array) -> Array:
+        """Inputs of points (n, moving) of the unit cube, shape (n, inputs)."""
+        points = np.repeat(self.lower[None], len(unit), axis=0)
+        points[:, self.moving] = (
+            self.lower[self.moving] + unit * (self.upper - self.lower)[self.moving]
+        )
+        return np.clip(points, self.lower, self.upper)
+
+    def values(self, unit: Array, output: str) -> Array:
+        """One output at points of the unit cube, shape (n,)."""
+        return self.memo(self.points(unit)).select([output])[:, 0]
+
+    def scale(self, output: str) -> float:
+        """Range of an output over all samples so far, or its size: a unit in which optimisers'
+        absolute tolerances make sense.
+        """
+        seen = self.memo.values.select([output])
+        return float(np.ptp(seen)) or float(np.abs(seen).max()) or 1.0
+
+    def look(self, per_input: int, seed: int) -> None:
+        """Run the model at the corners and at spread points."""
+        from scipy.stats import qmc
+
+        inputs = len(self.moving)
+        spread: Array = qmc.Halton(inputs, rng=np.random.default_rng([seed, self.level])).random(
+            per_input * inputs
+        )
+        unit = np.concatenate([corners(inputs), spread]) if inputs <= _CORNERS else spread
+        points = self.points(unit)
+        allowed = self.domain.slack(points, self.domain.alpha[self.level]) >= 0
+        if allowed.any():
+            self.memo(points[allowed])
+        elif not self.domain.inside(self.memo.points)[self.level].any():
+            alpha = self.domain.alpha[self.level]
+            raise ValueError(
+                f"no point of the cut at α = {alpha:g} fulfils its interactions: they leave too"
+                " little room, or none"
+            )
+
+    def best(self, output: str, sign: float, count: int) -> Array:
+        """The best few of all samples in the cut that are not close to a better one, in unit
+        coordinates.
+        """
+        points = self.memo.points
+        points = points[self.domain.inside(points)[self.level]]
+        unit: Array = np.clip(
+            (points - self.lower)[:, self.moving] / (self.upper - self.lower)[self.moving], 0, 1
+        )
+        chosen: list[Array] = []
+        for row in np.argsort(sign * self.memo(points).select([output])[:, 0], kind="stable"):
+            if len(chosen) < count and all(
+                np.abs(unit[row] - other).max() > _APART for other in chosen
+            ):
+                chosen.append(unit[row])
+        return np.array(chosen)
+
+    def descend(self, start: Array, output: str, sign: float) -> None:
+        """A descent by gradients inside the cut; its samples stay in the memo."""
+        from scipy.optimize import minimize
+
+        scale = self.scale(output)
+
+        def objective(unit: Array) -> tuple[float, Array]:
+            steps = np.where(unit + _DIFFERENCE > 1, -_DIFFERENCE, _DIFFERENCE)
+            values = (
+                sign
+                / scale
+                * self.values(np.concatenate([unit[None], unit + np.diag(steps)]), output)
+            )
+            return float(values[0]), (values[1:] - values[0]) / steps
+
+        bounds = [(0.0, 1.0)] * len(start)
+        if self.domain.interactions:
+            alpha = self.domain.alpha[self.level]
+            room = {
+                "type": "ineq",
+                "fun": lambda unit: float(self.domain.slack(self.points(unit[None]), alpha)[0]),
+            }
+            found = minimize(
+                objective, start, jac=True, bounds=bounds, constraints=[room], method="SLSQP"
+            )
+            place, anchor = self.points(np.clip([found.x, start], 0, 1))
+            self.memo(pulled(place, anchor, lambda points: self.domain.slack(points, alpha))[None])
+        else:
+            minimize(
+                objective,
+                start,
+                jac=True,
+                bounds=bounds,
+                method="L-BFGS-B",
+                options={"maxiter": 50},
+            )

@@ -1,0 +1,256 @@
+"""Guaranteed bounds by branch and bound: boxes are split until their enclosures meet the values
+that the model attains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from alphacut.fuzzy.knowledge.interval_arithmetic import Pair, enclose
+from alphacut.fuzzy.samples.model import Model
+from alphacut.fuzzy.samples.result import FuzzyResult, Nature
+from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.fuzzy.sets.numbers import Array, Rows
+
+_ROUND_OFF = 1 + 1e-12  # more than the round-off of the mean-value form
+_AGREES = 1e-9  # of the values: by so much the model may differ from the function
+_TOGETHER = 256  # boxes that are split at once
+
+
+class _Boxes(NamedTuple):
+    """Boxes (n, inputs) with a proved lower bound of the searched output in each, (n,), and its
+    slopes, (n, inputs).
+    """
+
+    lower: Array
+    upper: Array
+    bound: Array
+    effect: Array
+
+
+@dataclass(frozen=True)
+class BranchAndBound:
+    """Proves bounds of a function that can be enclosed, from outside, to a stated gap.
+
+    Args:
+        function: The function itself, written in arithmetic and numpy's functions.
+        tolerance: Gap between proved and attained bound at which the search ends, as a share of the
+            range seen.
+        budget: Boxes per bound at which it ends at the latest; the bound is proved all the same,
+            but wider.
+
+    Raises:
+        ValueError: A number is not positive, or a sample of the model is not what the function
+            says.
+    """
+
+    function: Callable[..., Any]
+    tolerance: float = 1e-4
+    budget: int = 50_000
+
+    def __post_init__(self) -> None:
+        if not (self.tolerance > 0 and self.budget >= 1):
+            raise ValueError(
+                f"tolerance and budget are {self.tolerance:g} and {self.budget}; both must be"
+                " positive"
+            )
+
+    @property
+    def stepwise(self) -> bool:
+        """Samples depend on those before."""
+        return True
+
+    def run(self, model: Model, domain: Domain) -> FuzzyResult:
+        """Prove both bounds of every output on every level; the error is the gap to what the model
+        attains.
+        """
+        domain.require_free("BranchAndBound")
+        tried = _tried(domain)
+        first = model(tried)
+        columns = first.columns
+        found = enclose(self.function, domain.names, tried, tried)
+        for name in columns:
+            if name not in found:
+                raise ValueError(
+                    f"the function of BranchAndBound has no output {name}, as the model has: give"
+                    " it the model itself"
+                )
+            require_agreement(
+                found[name].value, first.select([name])[:, 0], name, domain.names, tried
+            )
+        shape = (len(domain.alpha), len(columns), 2)
+        proved, attained, places = (
+            np.empty(shape),
+            np.empty(shape),
+            np.empty((*shape, len(domain.names))),
+        )
+        runs = len(tried)
+        for level in reversed(range(len(domain.alpha))):
+            for column, name in enumerate(columns):
+                for side, sign in enumerate((1.0, -1.0)):
+                    search = _Search(self, model, domain, level=level, output=name, sign=sign)
+                    search.run()
+                    proved[level, column, side] = sign * search.proved
+                    attained[level, column, side] = sign * search.best
+                    places[level, column, side] = search.place
+                    runs += search.runs
+            model.report(1 - level / len(domain.alpha))
+        return FuzzyResult(
+            domain=domain,
+            outputs=columns,
+            lower=np.maximum.accumulate(
+                proved[..., 0]
+            ),  # what is proved of a cut holds in all cuts inside
+            upper=np.minimum.accumulate(proved[..., 1]),
+            lower_at=places[:, :, 0],
+            upper_at=places[:, :, 1],
+            base=Nature.GUARANTEED,
+            plan="branch and bound",
+            runs=runs,
+            error=np.abs(proved - attained).max(axis=2),
+            proved=np.ones(shape[:2], bool),
+            enforced=np.zeros(shape[:2], bool),
+        )
+
+
+def _tried(domain: Domain) -> Array:
+    """Samples at which the function is compared with the model first: modal values, corners and
+    middle of the support, (4, inputs).
+    """
+    lower, upper = (ends[0] for ends in domain.boxes)
+    modal = np.array([number.modal for number in domain.inputs.values()], float)
+    return np.stack([modal, lower, upper, (lower + upper) / 2])
+
+
+def require_agreement(
+    enclosed: Pair, values: Array, output: str, names: Sequence[str], points: Array
+) -> None:
+    """The model's values (n,) at points (n, inputs) lie in what the function says of them or of
+    boxes around them, (n,) each.
+
+    Raises:
+        ValueError: One does not: what is proved of the function says nothing of the model.
+    """
+    slack = _AGREES * np.maximum(np.abs(values), np.abs(values).max())
+    apart = np.flatnonzero((values < enclosed[0] - slack) | (values > enclosed[1] + slack))
+    if len(apart):
+        row = apart[0]
+        place = ", ".join(f"{name} = {x:.6g}" for name, x in zip(names, points[row], strict=True))
+        low, high = enclosed[0][row], enclosed[1][row]
+        said = f"{low:.6g}" if high - low <= 2 * slack[row] else f"{low:.6g} … {high:.6g}"
+        got = (
+            f"the function of BranchAndBound gives output {output} = {said} where the model gives"
+            f" {values[row]:.6g}, at {place}"
+        )
+        raise ValueError(f"{got}: it must be the model itself")
+
+
+class _Search:
+    """The least value of sign · output over one cut."""
+
+    def __init__(
+        self,
+        plan: BranchAndBound,
+        model: Model,
+        domain: Domain,
+        *,
+        level: int,
+        output: str,
+        sign: float,
+    ) -> None:
+        self.plan, self.model, self.names, self.output, self.sign = (
+            plan,
+            model,
+            domain.names,
+            output,
+            sign,
+        )
+        self.best, self.worst, self.runs = np.inf, -np.inf, 0
+        lower, upper = (ends[level : level + 1] for ends in domain.boxes)
+        self.place: Array = lower[0]
+        self.boxes = self._examined(lower, upper)
+
+    @property
+    def proved(self) -> float:
+        """A proved lower bound of the least value."""
+        return float(min(self.boxes.bound.min(initial=np.inf), self.best))
+
+    def run(self) -> None:
+        """Split the boxes of the lowest bounds until the gap is small enough."""
+        count = 1
+        while (
+            self.best - self.proved > self.plan.tolerance * self._scale()
+            and count < self.plan.budget
+        ):
+            order = np.argsort(self.boxes.bound)
+            chosen, rest = order[:_TOGETHER], order[_TOGETHER:]
+            children = self._examined(*self._halves(chosen))
+            kept = rest[self.boxes.bound[rest] <= self.best]
+            fresh = children.bound <= self.best
+            if not (self.boxes.upper[chosen] > self.boxes.lower[chosen]).any():
+                break
+            parts = [
+                np.concatenate([old[kept], new[fresh]])
+                for old, new in zip(self.boxes, children, strict=True)
+            ]
+            self.boxes = _Boxes(*parts)
+            count += len(children.bound)
+
+    def _scale(self) -> float:
+        """Range of the values seen; a share of the least one where there is none."""
+        return max(self.worst - self.best, abs(self.best) * 1e-9)
+
+    def _halves(self, chosen: Rows) -> tuple[Array, Array]:
+        """Chosen boxes cut in two across the input that matters most."""
+        lower, upper = self.boxes.lower[chosen], self.boxes.upper[chosen]
+        across = self.boxes.effect[chosen].argmax(axis=1)[:, None]
+        middle = np.take_along_axis((lower + upper) / 2, across, axis=1)
+        left, right = upper.copy(), lower.copy()
+        np.put_along_axis(left, across, middle, axis=1)
+        np.put_along_axis(right, across, middle, axis=1)
+        return np.concatenate([lower, right]), np.concatenate([left, upper])
+
+    def _examined(self, lower: Array, upper: Array) -> _Boxes:
+        """Boxes with their bounds: the enclosure, and the mean-value form about the middle; the
+        model is run at the middle and an end.
+        """
+        middle, half = (lower + upper) / 2, (upper - lower).T / 2
+        value, slope = self._enclosed(lower, upper)
+        about = self._enclosed(middle, middle)[0][0]
+        steep = np.maximum(np.abs(slope[0]), np.abs(slope[1]))
+        reach = (np.nan_to_num(steep * half, nan=np.inf) * _ROUND_OFF).sum(axis=0) * _ROUND_OFF
+        effect = np.where(half > 0, np.minimum(steep, 1e300) * half + half * 1e-300, -1.0)
+        low_end = np.where(
+            slope[0].T >= 0, lower, np.where(slope[1].T <= 0, upper, middle)
+        )  # monotone inputs go to their end
+        self._attain(low_end, value)
+        mean_value = np.nextafter(about - reach, -np.inf)
+        return _Boxes(
+            lower,
+            upper,
+            np.maximum(np.nan_to_num(value[0], nan=-np.inf, neginf=-np.inf), mean_value),
+            effect.T,
+        )
+
+    def _enclosed(self, lower: Array, upper: Array) -> tuple[Pair, Pair]:
+        """Values (n,) and slopes (inputs, n) of sign · output over boxes."""
+        found = enclose(self.plan.function, self.names, lower, upper)[self.output]
+        found = found if self.sign > 0 else -found
+        return found.value, found.slope
+
+    def _attain(self, points: Array, enclosed: Pair) -> None:
+        """Run the model, see that it is what the function encloses around each point, and remember
+        the least value.
+        """
+        values = self.sign * self.model(points).select([self.output])[:, 0]
+        seen = enclosed if self.sign > 0 else (-enclosed[1], -enclosed[0])
+        require_agreement(seen, self.sign * values, self.output, self.names, points)
+        self.runs += len(points)
+        least = int(values.argmin())
+        if values[least] < self.best:
+            self.best, self.place = float(values[least]), points[least]
+        self.worst = max(self.worst, float(values.max()))

@@ -1,0 +1,252 @@
+"""Interval quasi-Monte Carlo: random inputs whose distributions have fuzzy parameters (paper,
+section 7, [46]).
+
+Each quasi-random probability u becomes, per α, the interval of quantiles that the fuzzy parameters
+allow; the model is bounded over these intervals and the cuts of the other fuzzy inputs. Averages
+over u bound the mean, the distribution and every quantile of the response.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from alphacut.fuzzy.arguments import fuzzy_inputs, known_facts
+from alphacut.fuzzy.campaign.call import Call, Function
+from alphacut.fuzzy.campaign.campaign import Campaign, Progress
+from alphacut.fuzzy.knowledge.known import Known
+from alphacut.fuzzy.plans.plan import Plan
+from alphacut.fuzzy.plans.transformation import Reduced
+from alphacut.fuzzy.samples.result import FuzzyResult, Nature
+from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.fuzzy.sets.numbers import Array, FuzzyNumber, PiecewiseLinear
+
+_NOTES = 5  # of the plan at its many points that are kept
+_INNER = (
+    "the bounds are inner: too narrow where the model turns between the samples of a box; take"
+    " General or Optimisation as plan there"
+)
+
+
+@dataclass(frozen=True)
+class RandomInput:
+    """A random input with fuzzy parameters.
+
+    Args:
+        quantile: From a probability u (n,) and the parameters by name to quantiles (n,), monotone
+            in each parameter.
+        parameters: The fuzzy parameters by name.
+    """
+
+    quantile: Callable[..., Array]
+    parameters: Mapping[str, FuzzyNumber]
+
+    def interval(self, u: Array, alpha: float) -> tuple[Array, Array]:
+        """Least and greatest quantile at probabilities (n,) over the cut of the parameters, two
+        arrays (n,).
+        """
+        corners = product(*(number.cut(alpha) for number in self.parameters.values()))
+        values = np.array(
+            [
+                self.quantile(u, **dict(zip(self.parameters, corner, strict=True)))
+                for corner in corners
+            ]
+        )
+        return values.min(axis=0), values.max(axis=0)
+
+
+@dataclass(frozen=True)
+class IntervalResponse:
+    """A response with bounds at every quasi-random point.
+
+    Args:
+        alpha: Levels.
+        outputs: Names of the outputs.
+        lower: Lower ends, shape (points, levels, outputs).
+        upper: Upper ends, shape (points, levels, outputs).
+        runs: Samples of the model.
+        nature: What the bounds at the points are worth: inner where the plan has seen corners or
+            samples only, so that the bounds of a mean or a probability may be too narrow; the
+            averages over the points have the error of quasi-Monte Carlo besides.
+        notes: What the plan found on its way, one sentence each.
+    """
+
+    alpha: tuple[float, ...]
+    outputs: tuple[str, ...]
+    lower: Array
+    upper: Array
+    runs: int
+    nature: Nature = Nature.INNER
+    notes: tuple[str, ...] = ()
+
+    def mean(self, output: str = "y") -> tuple[Array, Array]:
+        """Bounds of the mean on every level, two arrays (levels,)."""
+        lower, upper = self._ends(output)
+        return lower.mean(axis=0), upper.mean(axis=0)
+
+    def p_box(self, at: ArrayLike, output: str = "y") -> tuple[Array, Array]:
+        """Bounds of the distribution function at responses `at` (m,), two arrays (levels, m)."""
+        lower, upper = self._ends(output)
+        wanted = np.atleast_1d(np.asarray(at, float))
+        return (upper[..., None] <= wanted).mean(axis=0), (lower[..., None] <= wanted).mean(axis=0)
+
+    def exceedance(self, limit: ArrayLike, output: str = "y") -> tuple[Array, Array]:
+        """Bounds of the probability to exceed each limit (m,), two arrays (levels, m)."""
+        lower, upper = self.p_box(limit, output)
+        return 1 - upper, 1 - lower
+
+    def quantile(self, probability: ArrayLike, output: str = "y") -> tuple[Array, Array]:
+        """Bounds of quantiles at probabilities (m,), two arrays (levels, m)."""
+        lower, upper = self._ends(output)
+        wanted = np.atleast_1d(np.asarray(probability, float))
+        return np.quantile(lower, wanted, axis=0).T, np.quantile(upper, wanted, axis=0).T
+
+    def _ends(self, output: str) -> tuple[Array, Array]:
+        if output not in self.outputs:
+            raise ValueError(f"there is no output {output!r}; there are {', '.join(self.outputs)}")
+        column = self.outputs.index(output)
+        return self.lower[..., column], self.upper[..., column]
+
+
+@dataclass(frozen=True)
+class IntervalQuasiMonteCarlo:
+    """How a model of random and fuzzy inputs is sampled.
+
+    Args:
+        points: Quasi-random points, best a power of 2.
+        seed: Where their scrambling starts from.
+        plan: How the model is bounded over the box of each point; corners, the default, are exact
+            where the model is monotone, and too narrow where it is not.
+
+    Raises:
+        ValueError: There is no point.
+    """
+
+    points: int = 256
+    seed: int = 0
+    plan: Plan = field(default_factory=Reduced)
+
+    def __post_init__(self) -> None:
+        if self.points < 1:
+            raise ValueError(
+                f"the number of quasi-random points is {self.points}; it must be 1 or more"
+            )
+
+    def run(
+        self,
+        function: Function,
+        random: Mapping[str, RandomInput],
+        inputs: Mapping[str, FuzzyNumber | float],
+        *,
+        alpha: Sequence[float],
+        vectorised: bool = False,
+        known: Known | None = None,
+        progress: Progress | None = None,
+    ) -> IntervalResponse:
+        """Bound the response at every point and level.
+
+        Args:
+            function: Gets random and fuzzy inputs by name.
+            random: The random inputs.
+            inputs: The fuzzy inputs, which may be none; a plain number is crisp.
+            alpha: Rising levels from 0 to 1.
+            vectorised: Whether the function takes arrays.
+            known: Facts about the function.
+            progress: Called with the share done, 0 … 1.
+
+        Raises:
+            ValueError: There is no random input, an input is named twice, or the levels do not rise
+                from 0 to 1.
+        """
+        from scipy.stats import qmc
+
+        fuzzy, random = fuzzy_inputs(inputs), _random_inputs(random)
+        twice = sorted(set(random) & set(inputs))
+        if twice:
+            raise ValueError(
+                f"{', '.join(twice)} is named among the random and the fuzzy inputs; each must be"
+                " one of the two"
+            )
+        facts = known_facts(known, (*random, *fuzzy))
+        u: Array = qmc.Sobol(len(random), rng=np.random.default_rng(self.seed)).random(self.points)
+        ends = {
+            name: [one.interval(u[:, i], level) for level in alpha]
+            for i, (name, one) in enumerate(random.items())
+        }
+        campaign = Campaign(
+            Call(function, (*random, *inputs), vectorised=vectorised), known=facts, stepwise=True
+        )
+        response = _Gathered()
+        for k in range(self.points):
+            drawn = {
+                name: _number(alpha, [cut[0][k] for cut in cuts], [cut[1][k] for cut in cuts])
+                for name, cuts in ends.items()
+            }
+            response.add(self.plan.run(campaign, Domain({**drawn, **fuzzy}, alpha)), facts)
+            if progress:
+                progress((k + 1) / self.points)
+        return response.response(tuple(alpha))
+
+
+@dataclass
+class _Gathered:
+    """What the plan found at the points so far."""
+
+    rows: list[tuple[Array, Array]] = field(default_factory=list)
+    outputs: tuple[str, ...] = ()
+    runs: int = 0
+    natures: set[Nature] = field(default_factory=set)
+    notes: dict[str, None] = field(default_factory=dict)  # each once, in their order
+
+    def add(self, result: FuzzyResult, known: Known) -> None:
+        """Take the bounds at one more point, confronted with what is stated."""
+        result = result.confronted(known.stated(result.inputs, result.outputs))
+        self.rows.append((result.lower, result.upper))
+        self.outputs, self.runs = result.outputs, self.runs + result.runs
+        self.natures.add(result.nature)
+        self.notes |= dict.fromkeys(result.notes)
+
+    def response(self, alpha: tuple[float, ...]) -> IntervalResponse:
+        """The response over all points, with the weakest of what their bounds are worth."""
+        weakest = next(
+            nature
+            for nature in (Nature.ESTIMATED, Nature.INNER, Nature.GUARANTEED)
+            if nature in self.natures
+        )
+        notes = (*tuple(self.notes)[:_NOTES], *((_INNER,) if weakest is Nature.INNER else ()))
+        table = np.array(self.rows)
+        return IntervalResponse(
+            alpha, self.outputs, table[:, 0], table[:, 1], self.runs, weakest, notes
+        )
+
+
+def _random_inputs(random: Mapping[str, RandomInput]) -> dict[str, RandomInput]:
+    """The random inputs, a plain number among their parameters made a crisp one."""
+    wrong = [name for name, one in random.items() if not isinstance(one, RandomInput)]
+    if wrong or not random:
+        got = (
+            f"the random input {wrong[0]} is {random[wrong[0]]!r}"
+            if wrong
+            else "there is no random input"
+        )
+        raise ValueError(
+            f"{got}; give RandomInput(quantile, parameters), or propagate the fuzzy inputs alone"
+        )
+    return {
+        name: RandomInput(one.quantile, fuzzy_inputs(one.parameters))
+        for name, one in random.items()
+    }
+
+
+def _number(
+    alpha: Sequence[float], lower: Sequence[float], upper: Sequence[float]
+) -> PiecewiseLinear:
+    """The quantiles that a point may have, as a fuzzy number; nested up to round-off, which is
+    taken away.
+    """
+    low, high = np.maximum.accumulate(lower), np.minimum.accumulate(upper)
+    return PiecewiseLinear(tuple(alpha), tuple(np.minimum(low, high)), tuple(high))

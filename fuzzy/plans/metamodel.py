@@ -1,0 +1,184 @@
+"""A metamodel of the bounds: trained to map boxes of the inputs straight to the bounds of the
+outputs (paper, section 7, [44]).
+
+Unlike a surface in the model's place it needs no search afterwards: once trained, any fuzzy inputs
+within the support that it was trained on get their bounds at once, without another run of the
+model. What it learns from is another plan's bounds on many boxes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from alphacut.fuzzy.plans.plan import Plan
+from alphacut.fuzzy.plans.transformation import Reduced
+from alphacut.fuzzy.samples.evaluation_cache import Memo
+from alphacut.fuzzy.samples.model import Model
+from alphacut.fuzzy.samples.result import FuzzyResult, Nature
+from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.fuzzy.sets.numbers import Array, Interval, Rows
+
+_SAFETY = 2  # the error elsewhere may be larger than on the boxes that were held out
+
+
+@dataclass(frozen=True)
+class Metamodel:
+    """Trains a metamodel of the bounds and asks it for the cuts.
+
+    Args:
+        boxes: Boxes to learn from.
+        held_out: Boxes more that it is tested on.
+        teacher: Plan whose bounds on each box are learnt; the corners are enough where the model is
+            monotone.
+        seed: Where the boxes are drawn from.
+
+    Raises:
+        ValueError: There are too few boxes.
+    """
+
+    boxes: int = 200
+    held_out: int = 50
+    teacher: Plan = field(default_factory=Reduced)
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.boxes < 2 or self.held_out < 1:
+            raise ValueError(
+                f"the metamodel has {self.boxes} boxes and {self.held_out} held out; it needs 2 and"
+                " 1 at least"
+            )
+
+    @property
+    def stepwise(self) -> bool:
+        """Samples depend on those before."""
+        return True
+
+    def run(self, model: Model, domain: Domain) -> FuzzyResult:
+        """Train on boxes within the support and predict the bounds of every cut."""
+        return self.train(model, domain).bounds(domain)
+
+    def train(self, model: Model, domain: Domain) -> TrainedBounds:
+        """Learn the bounds of every output from boxes within the support of the inputs.
+
+        Args:
+            model: The model.
+            domain: Its inputs; only their supports matter.
+
+        Raises:
+            ValueError: No input has a width.
+        """
+        from scipy.interpolate import RBFInterpolator
+
+        domain.require_free("Metamodel")
+        memo = Memo(model)
+        lower, upper = (ends[0] for ends in Domain(domain.inputs, (0.0,)).boxes)
+        moving = np.flatnonzero(upper > lower)
+        if not len(moving):
+            raise ValueError(
+                "no input has a width, so there is nothing to train a metamodel on; take Reduced,"
+                " which runs the model once"
+            )
+        unit = self._boxes(len(moving))
+        lessons = []
+        for row in range(len(unit)):
+            lessons.append(self._taught(memo, domain, _real(unit[row], lower, upper, moving)))
+            model.report(0.9 * (row + 1) / len(unit))
+        taught = np.array(lessons)
+        features, targets = unit.reshape(len(unit), -1), taught.reshape(len(unit), -1)
+        learn, test = slice(0, self.boxes + 2), slice(self.boxes + 2, None)
+        predict = RBFInterpolator(features[learn], targets[learn], kernel="cubic", degree=1)
+        missed = np.abs(predict(features[test]) - targets[test]).reshape(-1, 2, taught.shape[2])
+        return TrainedBounds(
+            memo.values.columns, (lower, upper), predict, missed.max(axis=(0, 1)), len(memo)
+        )
+
+    def _boxes(self, inputs: int) -> Array:
+        """Boxes of the unit cube, shape (n, 2, inputs): the whole cube, its middle, then evenly
+        spread pairs of corners.
+        """
+        from scipy.stats import qmc
+
+        pairs = qmc.Halton(2 * inputs, rng=np.random.default_rng(self.seed)).random(
+            self.boxes + self.held_out
+        )
+        ends = np.sort(pairs.reshape(-1, 2, inputs), axis=1)
+        first = np.array([[[0.0] * inputs, [1.0] * inputs], [[0.5] * inputs, [0.5] * inputs]])
+        return np.concatenate([first, ends])
+
+    def _taught(self, memo: Memo, domain: Domain, box: Array) -> Array:
+        """The teacher's bounds on a box, shape (2, outputs)."""
+        inputs = {name: Interval(*box[:, i]) for i, name in enumerate(domain.names)}
+        result = self.teacher.run(memo, Domain(inputs, (0.0,)))
+        return np.array([result.lower[0], result.upper[0]])
+
+
+def _real(box: Array, lower: Array, upper: Array, moving: Rows) -> Array:
+    """A box of the unit cube as a box of the inputs, shape (2, inputs)."""
+    ends = np.array([lower, lower])
+    ends[:, moving] += box * (upper - lower)[moving]
+    return np.clip(ends, lower, upper)
+
+
+@dataclass(frozen=True)
+class TrainedBounds:
+    """A trained metamodel of the bounds.
+
+    Args:
+        outputs: Names of the outputs.
+        support: Corners of the box that it was trained on, two arrays (inputs,).
+        predict: From boxes of the unit cube (n, 2 · moving inputs) to bounds (n, 2 · outputs).
+        missed: Largest error on the boxes that were held out, shape (outputs,).
+        runs: Samples of the model that the training took.
+    """
+
+    outputs: tuple[str, ...]
+    support: tuple[Array, Array]
+    predict: Callable[[Array], Array]
+    missed: Array
+    runs: int
+
+    def bounds(self, domain: Domain) -> FuzzyResult:
+        """Predicted bounds of every cut, no run of the model; nesting is enforced where predictions
+        break it.
+
+        Raises:
+            ValueError: An input leaves the support that the metamodel was trained on.
+        """
+        domain.require_free("Metamodel")
+        (low, high), (lower, upper) = self.support, domain.boxes
+        width = high - low
+        if (lower < low - 1e-12 * width).any() or (upper > high + 1e-12 * width).any():
+            known = f"{low.tolist()} to {high.tolist()}"
+            raise ValueError(
+                f"the inputs leave the support that the metamodel was trained on, {known}; train it"
+                " anew"
+            )
+        moving = width > 0
+        unit = np.stack(
+            [(lower - low)[:, moving] / width[moving], (upper - low)[:, moving] / width[moving]],
+            axis=1,
+        )
+        ends = self.predict(np.clip(unit, 0, 1).reshape(len(unit), -1)).reshape(len(unit), 2, -1)
+        least, most = ends.min(axis=1), ends.max(axis=1)
+        nested = np.minimum.accumulate(least[::-1])[::-1], np.maximum.accumulate(most[::-1])[::-1]
+        places = np.full(
+            (*least.shape, lower.shape[1]), np.nan
+        )  # a metamodel of bounds does not say where they are reached
+        return FuzzyResult(
+            domain=domain,
+            outputs=self.outputs,
+            lower=nested[0],
+            upper=nested[1],
+            lower_at=places,
+            upper_at=places,
+            base=Nature.ESTIMATED,
+            plan="metamodel",
+            runs=self.runs,
+            error=np.broadcast_to(_SAFETY * self.missed, least.shape).copy(),
+            proved=np.zeros(least.shape, bool),
+            enforced=(nested[0] < least) | (nested[1] > most),
+            notes=(f"the metamodel missed held-out boxes by up to {float(self.missed.max()):.3g}",),
+        )

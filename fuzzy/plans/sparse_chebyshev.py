@@ -1,0 +1,148 @@
+"""A Chebyshev surface in the model's place: interpolate over the support, then search the surface
+in every cut (paper, Fig. 2).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from alphacut.fuzzy.plans.monotonicity import primary
+from alphacut.fuzzy.samples.design import Design
+from alphacut.fuzzy.samples.evaluation_cache import Memo
+from alphacut.fuzzy.samples.model import Model
+from alphacut.fuzzy.samples.result import FuzzyResult, Nature
+from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.fuzzy.sets.numbers import Array, Rows
+from alphacut.fuzzy.surrogates.chebyshev_polynomial import Polynomial
+
+_SAFETY = 2  # the surface may miss other places by more than the samples that were held out
+
+
+class _Ends(NamedTuple):
+    """Extremes of the surface: places (levels, outputs, 2, inputs) and values (levels, outputs, 2)."""
+
+    places: Array
+    values: Array
+
+
+@dataclass(frozen=True)
+class Chebyshev:
+    """Interpolates the model until new samples agree with the surface, and searches the surface for
+    the extremes of every cut.
+
+    Args:
+        tolerance: Largest disagreement, as a share of the range of each output, at which refinement
+            ends.
+        budget: Samples at which it ends at the latest (the last step may pass it).
+        confirm: Run the model where the surface has its extremes. The bounds are then attained
+            (inner), their error the disagreement there and twice that at held-out samples;
+            otherwise they are the surface's (estimated), their error twice that at held-out
+            samples.
+        outputs: Outputs whose bounds matter; all if none is named.
+
+    Raises:
+        ValueError: A number is not positive.
+    """
+
+    tolerance: float = 1e-4
+    budget: int = 1000
+    confirm: bool = True
+    outputs: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not (self.tolerance > 0 and self.budget >= 1):
+            raise ValueError(
+                f"tolerance and budget are {self.tolerance:g} and {self.budget}; both must be"
+                " positive"
+            )
+
+    @property
+    def stepwise(self) -> bool:
+        """Samples depend on those before."""
+        return True
+
+    def run(self, model: Model, domain: Domain) -> FuzzyResult:
+        """Build the surface, search it, confirm what it says."""
+        from alphacut.fuzzy.plans.sparse_grid import SparseGrid
+
+        memo = Memo(model)
+        grid = SparseGrid(memo, *(ends[0] for ends in domain.boxes))
+        memo(np.array([[number.modal for number in domain.inputs.values()]], float))
+        missed, met = grid.refine(self.tolerance, self.budget)
+        missed = _SAFETY * missed
+        columns = memo.values.columns
+        chosen = np.array(
+            [memo.values.column(name) for name in self.outputs or primary(columns, model.known)]
+        )
+        ends = _extremes(grid.polynomial(), domain, chosen)
+        error = np.broadcast_to(missed[chosen], ends.values.shape[:2])
+        if self.confirm:
+            error = error + self._disagreement(memo, ends, chosen)
+        result = Design.from_samples(domain, memo.points).bounds(memo.values, plan="chebyshev")
+        table = np.broadcast_to(missed, result.lower.shape).copy()
+        table[:, chosen] = error
+        left = float(
+            (
+                missed
+                / _SAFETY
+                / np.maximum(np.ptp(memo.values.array, axis=0), np.finfo(float).tiny)
+            ).max()
+        )
+        notes = (
+            ()
+            if met
+            else (
+                (
+                    f"the surface ended at its budget of {self.budget} samples with {left:.1e} of"
+                    " the range missed"
+                ),
+            )
+        )
+        result = replace(result, error=table, notes=notes)
+        return result if self.confirm else _estimated(result, ends, chosen)
+
+    def _disagreement(self, memo: Memo, ends: _Ends, chosen: Rows) -> Array:
+        """How far the model is from the surface at the surface's extremes, shape (levels, outputs)."""
+        values = memo(ends.places.reshape(-1, ends.places.shape[-1])).array[:, chosen]
+        own = np.einsum("loso->los", values.reshape(*ends.values.shape, -1))
+        difference: Array = np.abs(own - ends.values).max(axis=2)
+        return difference
+
+
+def _extremes(surface: Polynomial, domain: Domain, chosen: Rows) -> _Ends:
+    lowers, uppers = domain.boxes
+    places = np.empty((len(lowers), len(chosen), 2, lowers.shape[1]))
+    values = np.empty(places.shape[:3])
+    for level, alpha in enumerate(domain.alpha):
+        slack = (
+            (lambda points, alpha=alpha: domain.slack(points, alpha))
+            if domain.interactions
+            else None
+        )
+        for row in range(len(chosen)):
+            for side, sign in enumerate((1.0, -1.0)):
+                found = surface.minimum(
+                    lowers[level], uppers[level], output=int(chosen[row]), sign=sign, slack=slack
+                )
+                places[level, row, side], values[level, row, side] = found
+    return _Ends(places, values)
+
+
+def _estimated(result: FuzzyResult, ends: _Ends, chosen: Rows) -> FuzzyResult:
+    """The surface's bounds in place of the samples'."""
+    lower, upper, lower_at, upper_at = (
+        table.copy() for table in (result.lower, result.upper, result.lower_at, result.upper_at)
+    )
+    lower[:, chosen], upper[:, chosen] = ends.values[..., 0], ends.values[..., 1]
+    lower_at[:, chosen], upper_at[:, chosen] = ends.places[:, :, 0], ends.places[:, :, 1]
+    return replace(
+        result,
+        lower=lower,
+        upper=upper,
+        lower_at=lower_at,
+        upper_at=upper_at,
+        base=Nature.ESTIMATED,
+    )

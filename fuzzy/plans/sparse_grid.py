@@ -1,0 +1,178 @@
+"""Adaptive sparse interpolation on nested Clenshaw–Curtis points.
+
+Refined input by input where the surface still misses new samples most: the dimension-adaptive
+method of Gerstner and Griebel (Computing 71, 2003), for interpolation instead of quadrature.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import product
+
+import numpy as np
+from numpy.polynomial.chebyshev import chebvander
+from scipy.stats import qmc
+
+from alphacut.fuzzy.samples.evaluation_cache import Memo
+from alphacut.fuzzy.sets.numbers import Array
+from alphacut.fuzzy.surrogates.chebyshev_polynomial import Polynomial
+
+Level = tuple[int, ...]
+_FIRST = 2  # level that every input reaches before the surface is trusted: 5 points
+_CHECKS = 4  # held-out samples per input, and 8 more
+
+
+@cache
+def nodes(level: int) -> Array:
+    """1 point (level 0) or 2**level + 1 points in [−1, 1]; those of a level hold those of the level
+    below, to the last bit.
+    """
+    if level == 0:
+        return np.zeros(1)
+    x: Array = np.cos(np.pi * np.arange(2**level + 1) / 2**level)
+    x[2 ** (level - 1)] = 0.0
+    return x
+
+
+@cache
+def _transform(level: int) -> Array:
+    """Matrix from values at the nodes to Chebyshev coefficients."""
+    inverse: Array = np.asarray(
+        np.linalg.inv(chebvander(nodes(level), len(nodes(level)) - 1)), float
+    )
+    return inverse
+
+
+class SparseGrid:
+    """A surface under construction.
+
+    Args:
+        memo: The model.
+        lower: Lower corner of its box, shape (inputs,).
+        upper: Upper corner, shape (inputs,).
+    """
+
+    def __init__(self, memo: Memo, lower: Array, upper: Array) -> None:
+        self.memo, self.lower, self.upper = memo, lower, upper
+        self._moving = np.flatnonzero(upper > lower)
+        self._accepted: set[Level] = set()
+        self._active: dict[Level, Array] = {}  # with its disagreement, shape (outputs,)
+        self._terms: dict[Level, Array] = {}
+        inputs = len(lower)
+        spread: Array = qmc.Halton(inputs, scramble=False).random(_CHECKS * inputs + 9)[1:]
+        self._checks = lower + spread * (upper - lower)
+        self._add((0,) * inputs)
+
+    def refine(self, tolerance: float, budget: int) -> tuple[Array, bool]:
+        """Refine until new and held-out samples agree with the surface to a share `tolerance` of
+        the range of each output.
+
+        Returns:
+            The largest disagreement left, shape (outputs,), and whether it is within the tolerance.
+        """
+        while True:
+            left = self._left()
+            rough = [level for level in self._active if self._is_rough(level)]
+            if not rough and (left <= tolerance * self._scale()).all():
+                return left, True
+            if not self._active or len(self.memo) >= budget:
+                return left, False
+            self.memo.report(0.9 * len(self.memo) / budget)
+            self._accept(rough[0] if rough else self._worst(tolerance))
+
+    def polynomial(self) -> Polynomial:
+        """The surface through all samples of the index set."""
+        return Polynomial(
+            self.lower,
+            self.upper,
+            np.array(list(self._terms)),
+            np.array(list(self._terms.values())),
+        )
+
+    def points(self, level: Level) -> Array:
+        """Tensor grid of a level, shape (n, inputs)."""
+        unit = np.array(list(product(*(nodes(one) for one in level))))
+        return np.clip(
+            (self.lower + self.upper) / 2 + unit * (self.upper - self.lower) / 2,
+            self.lower,
+            self.upper,
+        )
+
+    def _is_rough(self, level: Level) -> bool:
+        """Whether a level is too coarse to tell anything: nearly all its samples could lie on zeros
+        by symmetry.
+        """
+        return max(level) < _FIRST and sum(level) == max(level)
+
+    def _worst(self, tolerance: float) -> Level:
+        """The level whose samples the surface missed most; if it missed none, symmetry may hide
+        what held-out samples see: the coarsest.
+        """
+        missed = {
+            level: float((disagreement / self._scale()).max())
+            for level, disagreement in self._active.items()
+        }
+        worst = max(missed, key=lambda level: missed[level])
+        return (
+            worst
+            if missed[worst] > tolerance
+            else min(missed, key=lambda level: (sum(level), level))
+        )
+
+    def _left(self) -> Array:
+        """Largest disagreement at the held-out samples and at the newest samples of each direction,
+        shape (outputs,).
+        """
+        held_out = np.abs(self.polynomial()(self._checks) - self.memo(self._checks).array).max(
+            axis=0
+        )
+        worst: Array = np.max([held_out, *self._active.values()], axis=0)
+        return worst
+
+    def _scale(self) -> Array:
+        """Range of each output over all samples, shape (outputs,); 1 where there is none."""
+        span = np.ptp(self.memo.values.array, axis=0)
+        return np.where(span > 0, span, 1.0)
+
+    def _accept(self, level: Level) -> None:
+        del self._active[level]
+        self._accepted.add(level)
+        for i in self._moving:
+            forward = tuple(one + (j == i) for j, one in enumerate(level))
+            backward = [
+                tuple(one - (j == k) for j, one in enumerate(forward))
+                for k in range(len(level))
+                if forward[k]
+            ]
+            if all(below in self._accepted for below in backward):
+                self._add(forward)
+
+    def _add(self, level: Level) -> None:
+        """Run the samples of a level, note how far the surface without it misses them, and take
+        them in.
+        """
+        points = self.points(level)
+        values = self.memo(points).array
+        missed = (
+            np.abs(self.polynomial()(points) - values).max(axis=0)
+            if self._terms
+            else np.full(values.shape[1], np.inf)
+        )
+        self._active[level] = missed
+        for step in product(
+            *((0, 1) if one else (0,) for one in level)
+        ):  # the tensor product of differences of interpolants
+            self._add_tensor(
+                tuple(one - down for one, down in zip(level, step, strict=True)), (-1) ** sum(step)
+            )
+
+    def _add_tensor(self, level: Level, weight: int) -> None:
+        """Add the coefficients of one tensor interpolant to the surface's."""
+        sizes = [len(nodes(one)) for one in level]
+        table = self.memo(self.points(level)).array.reshape(*sizes, -1)
+        for axis, one in enumerate(level):
+            table = np.moveaxis(
+                np.asarray(np.tensordot(_transform(one), table, axes=(1, axis)), float), 0, axis
+            )
+        for degrees in np.ndindex(*sizes):
+            self._terms[degrees] = self._terms.get(degrees, 0.0) + weight * table[degrees]

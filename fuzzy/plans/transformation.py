@@ -1,0 +1,202 @@
+"""Hanss' transformation method: reduced, general and extended (M. Hanss, Applied Fuzzy Arithmetic,
+Springer 2005).
+
+Level j of m counts m + 1 − j points per input: the ends of its cut, and between them the midpoints
+of neighbouring points of the next level up. The general method runs the model on the grid of these
+points, the reduced method on the corners of each cut only, the extended method takes the ends only
+of those inputs in which the model is monotone.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise, product
+from math import prod
+
+import numpy as np
+
+from alphacut.fuzzy.campaign.memory_check import require
+from alphacut.fuzzy.knowledge.known import Known
+from alphacut.fuzzy.plans.monotonicity import Verification, require_few, verified, verify
+from alphacut.fuzzy.samples.design import Design
+from alphacut.fuzzy.samples.evaluation_cache import Memo
+from alphacut.fuzzy.samples.model import Model
+from alphacut.fuzzy.samples.result import FuzzyResult
+from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.fuzzy.sets.numbers import FuzzyNumber, Mask
+
+# of the support: points of different levels closer than this differ by round-off only, and are one
+# point
+_SAME = 1e-13
+
+
+def hanss_points(number: FuzzyNumber, alpha: Sequence[float]) -> list[list[float]]:
+    """Points of every level by Hanss' recursion.
+
+    Args:
+        number: A fuzzy number or interval.
+        alpha: Rising levels.
+
+    Returns:
+        For each level, from the lowest, its points in rising order: n at the top (one where the cut
+        is a single value, otherwise its two ends), n + 1 at the next level down, and so on.
+    """
+    known: list[float] = []  # in rising order
+    rows: list[list[float]] = []
+    for level in reversed(alpha):
+        lower, upper = number.cut(level)
+        between = [(left + right) / 2 for left, right in pairwise(rows[-1])] if rows else []
+        rows.append(
+            [
+                _settled(x, known, number.support.width)
+                for x in ([lower, *between, upper] if lower < upper else [lower])
+            ]
+        )
+    return rows[::-1]
+
+
+def _settled(x: float, known: list[float], width: float) -> float:
+    """The point already known that differs from x by round-off only, otherwise x, which is known
+    from now on.
+    """
+    place = bisect_left(known, x - _SAME * width)
+    if place < len(known) and known[place] - x <= _SAME * width:
+        return known[place]
+    known.insert(place, x)
+    return x
+
+
+@dataclass(frozen=True)
+class _Transformation:
+    """What the methods share: a grid per level, and the retransformation."""
+
+    @property
+    def stepwise(self) -> bool:
+        """All samples are known beforehand."""
+        return False
+
+    def _refined(self, names: Sequence[str]) -> set[str]:
+        """Inputs that get the recursion's inner points."""
+        raise NotImplementedError
+
+    def grids(self, domain: Domain) -> list[list[list[float]]]:
+        """For each level and input, the points in rising order."""
+        refined = self._refined(domain.names)
+        columns = []
+        for name, number in domain.inputs.items():
+            rows = hanss_points(number, domain.alpha)
+            columns.append(rows if name in refined else [sorted({row[0], row[-1]}) for row in rows])
+        return [list(level) for level in zip(*columns, strict=True)]
+
+    def size(self, domain: Domain) -> int:
+        """Samples over all levels, counted without listing them; points that two levels share count
+        twice.
+        """
+        return sum(prod(len(points) for points in grid) for grid in self.grids(domain))
+
+    def points(self, domain: Domain) -> Design:
+        """The samples of every level, each distinct one listed once."""
+        require(self.size(domain), len(domain.names))
+        return Design.from_levels(
+            domain, [np.array(list(product(*grid))) for grid in self.grids(domain)]
+        )
+
+    def run(self, model: Model, domain: Domain) -> FuzzyResult:
+        """Evaluate the samples and rearrange them into α-cuts."""
+        domain.require_free(type(self).__name__)
+        design = self.points(domain)
+        result = design.bounds(model(design.points), plan=type(self).__name__.lower())
+        return result.proving(lambda bounds: corners_suffice(bounds, model.known))
+
+
+def corners_suffice(result: FuzzyResult, known: Known) -> Mask:
+    """Where bounds that hold all corners of each cut are proved: the output is stated to be
+    monotone in every input.
+    """
+    lower, upper = result.domain.boxes
+    monotone = known.monotone_in(result.inputs, result.outputs)
+    proved: Mask = (monotone[None] | (lower == upper)[:, None, :]).all(axis=2)
+    return proved
+
+
+@dataclass(frozen=True)
+class General(_Transformation):
+    """The general transformation method: all combinations of the recursion's points. For any model;
+    225 samples in the paper's case.
+    """
+
+    def _refined(self, names: Sequence[str]) -> set[str]:
+        return set(names)
+
+
+@dataclass(frozen=True)
+class Reduced(_Transformation):
+    """The reduced transformation method: corners of each cut. Exact where the model is monotone in
+    every input.
+    """
+
+    def _refined(self, names: Sequence[str]) -> set[str]:
+        return set()
+
+
+@dataclass(frozen=True)
+class Vertex(Reduced):
+    """The vertex method (Dong and Shah, Fuzzy Sets and Systems 24, 1987): the same samples and
+    bounds as the reduced method.
+    """
+
+
+@dataclass(frozen=True)
+class Extended(_Transformation):
+    """The extended transformation method: ends only of the monotone inputs, all points of the
+    others.
+
+    Args:
+        monotone: Inputs in which the model rises or falls throughout. If not given, what the caller
+            knows of the model, and for the other inputs a verification at probes.
+        verification: How monotonicity is looked for.
+        outputs: Outputs whose bounds matter; all if none is named.
+        limit: Samples that the plan may take where monotonicity is not found in enough inputs.
+    """
+
+    monotone: tuple[str, ...] | None = None
+    verification: Verification = field(default_factory=Verification)
+    outputs: tuple[str, ...] = ()
+    limit: int = 10_000
+
+    @property
+    def stepwise(self) -> bool:
+        """Whether monotonicity is looked for first."""
+        return self.monotone is None
+
+    def _refined(self, names: Sequence[str]) -> set[str]:
+        unknown = set(self.monotone or ()) - set(names)
+        if unknown:
+            raise ValueError(
+                f"the monotone inputs name {sorted(unknown)}, which is no fuzzy input; there are"
+                f" {list(names)}"
+            )
+        return set(names) - set(self.monotone or ())
+
+    def run(self, model: Model, domain: Domain) -> FuzzyResult:
+        """Find the monotone inputs if they are not given, evaluate the samples and rearrange them
+        into α-cuts.
+        """
+        if self.monotone is not None:
+            known = replace(model.known, monotone=(*model.known.monotone, *self.monotone))
+            return super().run(model, domain).proving(lambda bounds: corners_suffice(bounds, known))
+        memo = Memo(model)
+        effects = verify(memo, domain, self.verification, outputs=self.outputs)
+        widest = effects.signs[0] != 0
+        classes = (widest | model.known.monotone_in(domain.names, effects.outputs)).all(axis=0)
+        chosen = replace(
+            self,
+            monotone=tuple(
+                name for name, holds in zip(domain.names, classes, strict=True) if holds
+            ),
+        )
+        model.report(0.5, last=True)
+        require_few(chosen.size(domain), self.limit, effects.notes(domain))
+        return verified(super(Extended, chosen).run(memo, domain), memo, effects)

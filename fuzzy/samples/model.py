@@ -1,0 +1,127 @@
+"""What a plan sees of a model: an evaluation of many points at once, with named outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import prod
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from alphacut.fuzzy.knowledge.known import Known
+from alphacut.fuzzy.sets.numbers import Array
+
+Output = float | Sequence[float] | Mapping[str, ArrayLike] | ArrayLike
+Layout = tuple[tuple[str, tuple[int, ...]], ...]
+
+
+@dataclass(frozen=True)
+class Values:
+    """Outputs at many points.
+
+    Args:
+        layout: Name and shape of each output, in column order; a number has the shape ().
+        array: One row per point, one column per entry of every output, shape (n, columns).
+    """
+
+    layout: Layout
+    array: Array
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Name of each column: `E`, or `s11[0]`, `s11[1]`, … for an output that is an array."""
+        names: list[str] = []
+        for name, shape in self.layout:
+            names += [name + "".join(f"[{i}]" for i in index) for index in np.ndindex(shape)]
+        return tuple(names)
+
+    def output(self, name: str) -> Array:
+        """One output at all points, shape (n, …).
+
+        Raises:
+            ValueError: There is no such output.
+        """
+        start = 0
+        for other, shape in self.layout:
+            size = prod(shape)
+            if other == name:
+                return self.array[:, start : start + size].reshape(-1, *shape)
+            start += size
+        raise ValueError(
+            f"there is no output {name!r}; there are {', '.join(other for other, _ in self.layout)}"
+        )
+
+    def select(self, columns: Sequence[str]) -> Array:
+        """The named columns, shape (n, len(columns)).
+
+        Raises:
+            ValueError: There is no such column.
+        """
+        return self.array[:, [self.column(name) for name in columns]]
+
+    def column(self, name: str) -> int:
+        """Index of a column.
+
+        Raises:
+            ValueError: There is no such column.
+        """
+        if name not in self.columns:
+            raise ValueError(f"there is no output {name}; there are {', '.join(self.columns)}")
+        return self.columns.index(name)
+
+
+class Model(Protocol):
+    """A model as plans call it."""
+
+    @property
+    def known(self) -> Known:
+        """What the caller knows about the model."""
+
+    def __call__(self, points: Array) -> Values:
+        """Outputs at the points, shape (n, inputs)."""
+
+    def report(self, share: float, *, last: bool = False) -> None:
+        """Tell the share done, 0 … 1; with `last`, one batch of points is still to come and fills
+        the rest.
+        """
+
+
+def flatten(output: Output) -> tuple[Layout, Array]:
+    """One sample's outputs as a layout and a row of numbers.
+
+    Args:
+        output: A number (named `y`), an array (`y[0]`, …) or a mapping of names to numbers or
+            arrays.
+
+    Raises:
+        ValueError: There is no number, one that is not finite, or two of the same name.
+    """
+    named = output if isinstance(output, Mapping) else {"y": output}
+    arrays = {str(name): np.asarray(value, float) for name, value in named.items()}
+    if not sum(array.size for array in arrays.values()):
+        raise ValueError("the function returned no number; it must return one at least")
+    for name, array in arrays.items():
+        if not np.isfinite(array).all():
+            raise ValueError(
+                f"output {name!r} is {array.ravel()[~np.isfinite(array.ravel())][0]}; every output"
+                " must be a finite number"
+            )
+    layout = tuple((name, array.shape) for name, array in arrays.items())
+    if any("[" in name for name in arrays) or len(arrays) < len(named):
+        _require_distinct(layout, named)
+    return layout, np.concatenate([array.ravel() for array in arrays.values()])
+
+
+def _require_distinct(layout: Layout, given: Mapping[str, ArrayLike]) -> None:
+    """Refuse outputs that two names of a mapping, such as `a[0]` and the first entry of `a`, would
+    share.
+    """
+    columns = Values(layout, np.zeros((0, 0))).columns
+    spelt = [str(name) for name in given]
+    twice = [
+        name for name in (*columns, *spelt) if columns.count(name) > 1 or spelt.count(name) > 1
+    ]
+    if twice:
+        raise ValueError(f"two outputs are named {twice[0]!r}; each needs a name of its own")

@@ -1,0 +1,259 @@
+"""What every plan returns: bounds on each α-level, the inputs that reach them, and what they are
+worth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from alphacut.fuzzy.knowledge.contradiction import contradictions
+from alphacut.fuzzy.knowledge.known import Signs
+from alphacut.fuzzy.samples.model import Values
+from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.fuzzy.sets.numbers import Array, Mask, PiecewiseLinear
+from alphacut.fuzzy.surrogates.response_surface import ResponseSurface
+
+if TYPE_CHECKING:
+    import xarray
+
+
+_PRINTED = 50  # outputs that are printed
+
+
+class Nature(StrEnum):
+    """What a bound is worth."""
+
+    GUARANTEED = "guaranteed"  # proved: the true range lies inside
+    INNER = "inner"  # attained by the model: the true range reaches at least so far
+    ESTIMATED = "estimated"  # from a surrogate, with an estimate of its error
+
+
+def _shown(value: float) -> str:
+    """A bound with six digits; 0 where it is less than a normal number."""
+    return f"{0.0 if abs(value) < np.finfo(float).tiny else value:.6g}"
+
+
+@dataclass(frozen=True)
+class FuzzyResult:
+    """Fuzzy outputs by their α-cuts.
+
+    Args:
+        domain: Inputs and levels.
+        outputs: Name of each output column.
+        lower: Lower ends, shape (levels, outputs).
+        upper: Upper ends, shape (levels, outputs).
+        lower_at: Inputs that reach the lower ends, shape (levels, outputs, inputs).
+        upper_at: Inputs that reach the upper ends, shape (levels, outputs, inputs).
+        base: What the bounds are worth where they are not proved.
+        plan: Name of the plan.
+        runs: Samples of the model that the bounds took.
+        verification_runs: Samples spent on verifying the plan's assumption, counted apart.
+        error: Estimated error of the bounds, shape (levels, outputs); zero where attained.
+        proved: Where the true range is proved to lie inside the bounds, shape (levels, outputs).
+        enforced: Where nesting had to be enforced, shape (levels, outputs).
+        notes: What the plan found on its way, one sentence each.
+        points: Samples of the model, shape (n, inputs).
+        values: Outputs at `points`.
+        calls: Calls of the model, each for the samples that share a set-up.
+        reused: Samples taken from a store instead of being run.
+        seconds: Wall time of the whole propagation.
+    """
+
+    domain: Domain
+    outputs: tuple[str, ...]
+    lower: Array
+    upper: Array
+    lower_at: Array
+    upper_at: Array
+    base: Nature
+    plan: str
+    runs: int
+    verification_runs: int = 0
+    error: Array = field(default_factory=lambda: np.zeros(0))
+    proved: Mask = field(default_factory=lambda: np.zeros(0, bool))
+    enforced: Mask = field(default_factory=lambda: np.zeros(0, bool))
+    notes: tuple[str, ...] = ()
+    points: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    values: Values = field(default_factory=lambda: Values((), np.zeros((0, 0))))
+    calls: int = 0
+    reused: int = 0
+    seconds: float = 0.0
+
+    @classmethod
+    def attained(
+        cls,
+        domain: Domain,
+        points: Array,
+        values: Values,
+        *,
+        lowest: NDArray[np.intp],
+        highest: NDArray[np.intp],
+        enforced: Mask,
+        plan: str,
+    ) -> FuzzyResult:
+        """Inner bounds taken from samples.
+
+        Args:
+            domain: Inputs and levels.
+            points: Samples, shape (n, inputs).
+            values: Outputs at the samples.
+            lowest: Row of the sample that reaches each lower end, shape (levels, outputs).
+            highest: Row of the sample that reaches each upper end, shape (levels, outputs).
+            enforced: Where nesting had to be enforced, shape (levels, outputs).
+            plan: Name of the plan.
+        """
+        columns = np.arange(values.array.shape[1])
+        return cls(
+            domain=domain,
+            outputs=values.columns,
+            lower=values.array[lowest, columns],
+            upper=values.array[highest, columns],
+            lower_at=points[lowest],
+            upper_at=points[highest],
+            base=Nature.INNER,
+            plan=plan,
+            runs=len(points),
+            error=np.zeros(lowest.shape),
+            proved=np.zeros(lowest.shape, bool),
+            enforced=enforced,
+            points=points,
+            values=values,
+        )
+
+    def proving(self, holds: Callable[[FuzzyResult], Mask]) -> FuzzyResult:
+        """The same bounds, proved where `holds` says so (shape (levels, outputs)) unless the
+        samples themselves contradict it.
+        """
+        proved = holds(self)
+        refuted = [
+            self.outputs[column] for column in np.flatnonzero((proved & self.enforced).any(axis=0))
+        ]
+        notes = tuple(
+            f"the samples contradict what is stated of output {name}: its bounds are inner only"
+            for name in refuted
+        )
+        return replace(
+            self,
+            proved=self.proved | (proved & ~self.enforced.any(axis=0)),
+            notes=(*self.notes, *notes),
+        )
+
+    def confronted(self, signs: Signs) -> FuzzyResult:
+        """The same bounds, proved only where the samples do not contradict stated signs, shape
+        (outputs, inputs), 0 where none is.
+        """
+        relevant = np.where(self.proved.any(axis=0).reshape(-1, 1), signs, 0)
+        found = contradictions(self.points, self.values.array, relevant)
+        notes = tuple(
+            f"{against.told(self.outputs[i], self.inputs)}; its bounds are inner only"
+            for i, against in found.items()
+        )
+        kept = self.proved & ~np.isin(np.arange(len(self.outputs)), list(found))
+        return replace(self, proved=kept, notes=(*self.notes, *notes)) if found else self
+
+    def __str__(self) -> str:
+        """The bounds of every output (of the first 50), a line for each level, with what they are
+        worth and what they cost.
+        """
+        lines = [f"{self.nature} bounds by the plan {self.plan}, {self.runs} runs"]
+        for column, name in enumerate(self.outputs[:_PRINTED]):
+            cuts = zip(self.domain.alpha, self.lower[:, column], self.upper[:, column], strict=True)
+            lines += [
+                f"{name}, α = {alpha:g}: {_shown(low)} … {_shown(high)}"
+                for alpha, low, high in cuts
+            ]
+        hidden = len(self.outputs) - _PRINTED
+        more = [f"… and {hidden:,} outputs more: bounds(NAME) has them"] if hidden > 0 else []
+        return "\n".join([*lines, *more, *self.notes])
+
+    @property
+    def nature(self) -> Nature:
+        """What the bounds are worth: the weakest over all levels and outputs."""
+        return Nature.GUARANTEED if self.proved.size and self.proved.all() else self.base
+
+    def nature_of(self, output: str = "y") -> tuple[Nature, ...]:
+        """What the bounds of one output are worth on each level."""
+        return tuple(
+            Nature.GUARANTEED if proved else self.base
+            for proved in self.proved[:, self.column(output)]
+        )
+
+    @property
+    def alpha(self) -> Array:
+        """Levels, rising."""
+        return np.array(self.domain.alpha)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs, in the order of the last axis of `lower_at` and `upper_at`."""
+        return self.domain.names
+
+    def column(self, output: str) -> int:
+        """Index of an output.
+
+        Raises:
+            ValueError: There is no such output.
+        """
+        if output not in self.outputs:
+            raise ValueError(f"there is no output {output!r}; there are {', '.join(self.outputs)}")
+        return self.outputs.index(output)
+
+    def bounds(self, output: str = "y") -> tuple[Array, Array]:
+        """Lower and upper ends of one output over the levels, two arrays of shape (levels,)."""
+        column = self.column(output)
+        return self.lower[:, column], self.upper[:, column]
+
+    def number(self, output: str = "y") -> PiecewiseLinear:
+        """One output as a fuzzy number, linear between its α-cuts.
+
+        Raises:
+            ValueError: The levels do not reach from 0 to 1.
+        """
+        lower, upper = self.bounds(output)
+        if self.alpha[0] != 0 or self.alpha[-1] != 1:
+            shown = ", ".join(f"{level:g}" for level in self.alpha)
+            raise ValueError(
+                f"the α-levels of the result are {shown}; a fuzzy number needs some from 0 to 1:"
+                " take alpha=levels(4)"
+            )
+        return PiecewiseLinear(tuple(self.alpha), tuple(lower), tuple(upper))
+
+    def surface(self, output: str = "y") -> ResponseSurface:
+        """Response surface of one output through the samples of the model."""
+        return ResponseSurface.fit(self.points, self.values.array[:, [self.column(output)]])
+
+    def charged(self, *, calls: int, reused: int, seconds: float) -> FuzzyResult:
+        """The same result with what it cost."""
+        return replace(self, calls=calls, reused=reused, seconds=seconds)
+
+    def to_dataset(self) -> xarray.Dataset:
+        """Bounds over (alpha, output), where they are reached over (alpha, output, parameter)."""
+        import xarray
+
+        bounds, places = ("alpha", "output"), ("alpha", "output", "parameter")
+        return xarray.Dataset(
+            {
+                "lower": (bounds, self.lower),
+                "upper": (bounds, self.upper),
+                "error": (bounds, self.error),
+                "lower_at": (places, self.lower_at),
+                "upper_at": (places, self.upper_at),
+            },
+            coords={
+                "alpha": self.alpha,
+                "output": list(self.outputs),
+                "parameter": list(self.inputs),
+            },
+            attrs={
+                "plan": self.plan,
+                "nature": str(self.nature),
+                "runs": self.runs,
+                "verification_runs": self.verification_runs,
+            },
+        )

@@ -1,0 +1,113 @@
+"""The fuzzy inputs cut at every level: the nested boxes over which a model is searched."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.fuzzy.sets.interaction import Interaction
+from alphacut.fuzzy.sets.numbers import Array, FuzzyNumber, Mask
+
+_ROUND_OFF = 1e-12  # of the support: points this close to a cut lie in it
+
+
+def levels(steps: int) -> tuple[float, ...]:
+    """The α-levels 0, 1/steps, …, 1: `steps` = 4 gives the paper's five.
+
+    Raises:
+        ValueError: `steps` is below 1.
+    """
+    if steps < 1:
+        raise ValueError(f"the number of steps between α-levels is {steps}; it must be 1 or more")
+    return tuple(step / steps for step in range(steps + 1))
+
+
+def _levels(alpha: Sequence[float]) -> tuple[float, ...]:
+    try:
+        return tuple(float(level) for level in alpha)
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"the α-levels are {alpha!r}; they must be a sequence of numbers that rise within"
+            " [0, 1]"
+        ) from None
+
+
+@dataclass(frozen=True)
+class Domain:
+    """Nested boxes of the inputs, one per α-level.
+
+    Args:
+        inputs: Name of each input and its fuzzy number, in the order of the columns of every array
+            of points.
+        alpha: Levels, rising within [0, 1].
+        interactions: Constraints between the inputs.
+
+    Raises:
+        ValueError: There is no input, the levels are none, do not rise, or leave [0, 1], or an
+            interaction names no input.
+    """
+
+    inputs: Mapping[str, FuzzyNumber]
+    alpha: Sequence[float]
+    interactions: Sequence[Interaction] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "inputs", dict(self.inputs))
+        object.__setattr__(self, "alpha", _levels(self.alpha))
+        if not self.inputs:
+            raise ValueError("there is no fuzzy input; name one at least")
+        rising = all(np.diff(self.alpha) > 0) and len(self.alpha) > 0
+        if not (rising and self.alpha[0] >= 0 and self.alpha[-1] <= 1):
+            raise ValueError(f"the α-levels are {list(self.alpha)}; they must rise within [0, 1]")
+        object.__setattr__(self, "interactions", tuple(self.interactions))
+        for interaction in self.interactions:
+            interaction.check(self.names)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the inputs in column order."""
+        return tuple(self.inputs)
+
+    @property
+    def boxes(self) -> tuple[Array, Array]:
+        """Lower and upper corners of the boxes, two arrays of shape (levels, inputs)."""
+        cuts = np.array(
+            [[number.cut(level) for number in self.inputs.values()] for level in self.alpha]
+        )
+        return cuts[..., 0], cuts[..., 1]
+
+    def inside(self, points: Array) -> Mask:
+        """Which points, shape (n, inputs), lie in the cut of each level, shape (levels, n)."""
+        lower, upper = self.boxes
+        slack = _ROUND_OFF * (upper[0] - lower[0])
+        boxes = ((points >= (lower - slack)[:, None]) & (points <= (upper + slack)[:, None])).all(
+            axis=2
+        )
+        allowed: Mask = boxes & np.array(
+            [self.slack(points, level) >= -_ROUND_OFF for level in self.alpha]
+        )
+        return allowed
+
+    def slack(self, points: Array, alpha: float) -> Array:
+        """Least room that the interactions leave at points (n, inputs) on a level, shape (n,);
+        infinite without interactions.
+        """
+        rooms = [interaction.slack(points, self.inputs, alpha) for interaction in self.interactions]
+        least: Array = np.min([np.full(len(points), np.inf), *rooms], axis=0)
+        return least
+
+    def require_free(self, plan: str) -> None:
+        """Refuse interactions, which the named plan cannot respect.
+
+        Raises:
+            ValueError: There are interactions.
+        """
+        if self.interactions:
+            kinds = ", ".join(type(interaction).__name__ for interaction in self.interactions)
+            cure = "take MonteCarlo, QuasiMonteCarlo, Optimisation or Chebyshev"
+            raise ValueError(
+                f"the {plan} plan cannot respect interactions between inputs (here: {kinds});"
+                f" {cure}"
+            )

@@ -1,0 +1,159 @@
+"""General fuzzy sets by their membership polyline: those that are no numbers can be shown and cut,
+but not computed with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from numbers import Integral
+from typing import NoReturn
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from alphacut.fuzzy.sets.numbers import Array, Cut, PiecewiseLinear
+
+
+@dataclass(frozen=True)
+class FuzzySet:
+    """A fuzzy set over the reals, membership linear between given points and 0 outside (paper,
+    appendix A, Fig. 36).
+
+    Args:
+        x: Points, not falling; two equal ones make a jump.
+        grade: Membership there, in [0, 1].
+
+    Raises:
+        ValueError: Lengths differ, points fall, or a grade leaves [0, 1].
+    """
+
+    x: tuple[float, ...]
+    grade: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        for name in ("x", "grade"):
+            object.__setattr__(self, name, tuple(float(value) for value in getattr(self, name)))
+        if len(self.x) != len(self.grade) or len(self.x) < 2:
+            raise ValueError(
+                f"the fuzzy set has {len(self.x)} points and {len(self.grade)} grades; it needs as"
+                " many of both, two or more"
+            )
+        if not np.isfinite(self.x).all() or any(b < a for a, b in pairwise(self.x)):
+            raise ValueError(
+                f"the points of the fuzzy set are {list(self.x)}; they must be finite and not fall"
+            )
+        if not all(0 <= grade <= 1 for grade in self.grade):
+            raise ValueError(
+                f"the grades of the fuzzy set are {list(self.grade)}; they must lie in [0, 1]"
+            )
+
+    @property
+    def height(self) -> float:
+        """Highest grade: 1 for a normal set, less for a subnormal one."""
+        return max(self.grade)
+
+    @property
+    def convex(self) -> bool:
+        """Whether every cut is one interval: grades rise to the top and fall from it."""
+        top = int(np.argmax(self.grade))
+        rising, falling = self.grade[: top + 1], self.grade[top:]
+        return all(a <= b for a, b in pairwise(rising)) and all(
+            a >= b for a, b in pairwise(falling)
+        )
+
+    def membership(self, x: ArrayLike) -> Array:
+        """Grade of membership at `x`, any shape; the higher one at a jump."""
+        x = np.asarray(x, float)
+        knots, grades = np.array(self.x), np.array(self.grade)
+        inside: Array = np.interp(x, knots, grades, left=0.0, right=0.0)
+        for knot in set(self.x):
+            inside = np.where(x == knot, grades[knots == knot].max(), inside)
+        return inside
+
+    def cut(self, alpha: float) -> tuple[Cut, ...]:
+        """The α-cut as intervals from left to right: several where the set is not convex, none
+        above its height.
+
+        Raises:
+            ValueError: `alpha` lies outside (0, 1].
+        """
+        if not 0 < alpha <= 1:
+            raise ValueError(f"the α of a cut is {alpha:g}; it must lie in (0, 1]")
+        pieces: list[Cut] = []
+        for (a, p), (b, q) in pairwise(zip(self.x, self.grade, strict=True)):
+            if max(p, q) < alpha:
+                continue
+            at = a if p == q else a + (b - a) * (alpha - p) / (q - p)
+            piece = Cut(a if p >= alpha else at, b if q >= alpha else at)
+            if pieces and piece.lower <= pieces[-1].upper:
+                pieces[-1] = Cut(pieces[-1].lower, piece.upper)
+            else:
+                pieces.append(piece)
+        return tuple(pieces)
+
+    def to_number(self) -> PiecewiseLinear:
+        """The same as a fuzzy number, to compute with.
+
+        Raises:
+            ValueError: The set is subnormal or not convex, so that it is no fuzzy number.
+        """
+        if self.height < 1:
+            reason = f"its highest grade is {self.height:g}, so its cut at α = 1 is empty"
+            raise ValueError(
+                f"the fuzzy set is subnormal and cannot be computed with: {reason}; scale its"
+                " grades to reach 1"
+            )
+        if not self.convex:
+            reason = "its grades fall and rise again, so its cuts are not intervals"
+            raise ValueError(
+                f"the fuzzy set is not convex and cannot be computed with: {reason}; take its"
+                " convex hull or its parts"
+            )
+        levels = sorted({0.0, 1.0, *self.grade})
+        cuts = [self.cut(level) if level else (Cut(self.x[0], self.x[-1]),) for level in levels]
+        return PiecewiseLinear(
+            tuple(levels), tuple(cut[0].lower for cut in cuts), tuple(cut[-1].upper for cut in cuts)
+        )
+
+    def _refuse(self, other: object) -> NoReturn:
+        self.to_number()
+        raise ValueError("a fuzzy set is shown, not computed with; take its to_number()")
+
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = (
+        _refuse
+    )
+
+
+def from_data(values: Sequence[float] | Array, *, levels: int = 10) -> PiecewiseLinear:
+    """Fuzzy number from measured values: its cut at α holds the middle share 1 − α of them, its
+    modal value is their median.
+
+    This is the transformation of a probability into the possibility whose cuts are confidence
+    intervals (Dubois, Foulloy, Mauris and Prade, Reliable Computing 10, 2004), with equal tails.
+
+    Args:
+        values: Measured values, one at least.
+        levels: Steps between the α-levels.
+
+    Raises:
+        ValueError: There is no value, one is not finite, or there is no step.
+    """
+    if not isinstance(levels, Integral) or levels < 1:
+        raise ValueError(
+            f"the number of steps between α-levels is {levels!r}; it must be a whole number, 1 or"
+            " more"
+        )
+    data = np.asarray(values, float).ravel()
+    if not len(data) or not np.isfinite(data).all():
+        finite = int(np.isfinite(data).sum())
+        raise ValueError(
+            f"the data hold {len(data)} values, {finite} of them finite; one or more, all finite,"
+            " are needed"
+        )
+    alpha = np.linspace(0, 1, levels + 1)
+    lower, upper = np.quantile(data, alpha / 2), np.quantile(data, 1 - alpha / 2)
+    return PiecewiseLinear(
+        tuple(alpha), tuple(np.minimum(lower, upper)), tuple(np.maximum(lower, upper))
+    )

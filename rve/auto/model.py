@@ -1,0 +1,135 @@
+"""The model `auto`: the cheapest model and resolution that reach a relative tolerance on E, with
+the error left and the reason.
+
+Models are tried from the cheapest on: series, table, slices, prism. One that cannot reach the
+tolerance says so itself, and the next is tried; every refusal is told in the result's reason.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from alphacut.rve.cell import Phase
+from alphacut.rve.result import Homogenised
+from alphacut.stochastic import RadiusMap
+
+ORDER = ("series", "table", "slices", "prism")  # cheapest first
+_MARGIN = 0.4  # of the tolerance, for the series at each θ and again for its rule in θ
+_WHY = {
+    "series": "exact for circles, a few small systems for each θ",
+    "table": "planar cells over r and E_i once, every further map and modulus an evaluation",
+    "slices": "planar cells at the nodes in θ",
+    "prism": "the product-space problem itself, refined until E settles",
+}
+
+
+class ChoiceError(RuntimeError):
+    """No model that is left reaches the tolerance."""
+
+
+@dataclass(frozen=True)
+class AutoModel:
+    """The cheapest model that reaches `tolerance`.
+
+    Args:
+        tolerance: Relative error of E allowed, in [1e-10, 0.1].
+        exclude: Names of models not to take, of series, table, slices, prism.
+        cache: Folder where tables are kept; None keeps them in the process.
+        moduli: Moduli of the particle that a table is to cover, in Pa, where further ones will be
+            asked for; None: those of each call.
+        progress: Called with the fraction done by models that take long.
+
+    Raises:
+        ValueError: A value lies outside its range, or nothing is left to choose from.
+    """
+
+    tolerance: float = 1e-4
+    exclude: tuple[str, ...] = ()
+    cache: Path | None = None
+    moduli: tuple[float, float] | None = None
+    progress: Callable[[float], None] | None = None
+    name = "auto"
+
+    def __post_init__(self) -> None:
+        if not 1e-10 <= self.tolerance <= 0.1:
+            raise ValueError(
+                f"the tolerance on E is {self.tolerance:g}; it must lie in [1e-10, 0.1]"
+            )
+        unknown = [name for name in self.exclude if name not in ORDER]
+        if unknown:
+            raise ValueError(
+                f"auto is told to exclude {unknown[0]!r}; known models are {', '.join(ORDER)}"
+            )
+        if not set(ORDER) - set(self.exclude):
+            raise ValueError(
+                "auto is told to exclude every model; leave one of series, table, slices, prism"
+            )
+
+    def solve(
+        self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
+    ) -> list[Homogenised]:
+        """One result for each of `inclusions`, in their order, all within the tolerance by their
+        own estimate.
+
+        Raises:
+            ChoiceError: No model left reaches the tolerance.
+        """
+        if not inclusions:
+            return []
+        refusals: list[str] = []
+        for name in ORDER:
+            if name in self.exclude:
+                refusals.append(f"{name} excluded")
+                continue
+            try:
+                results = self._take(name, radius_map, matrix, inclusions)
+            except RuntimeError as refusal:
+                refusals.append(f"{name} refused: {refusal}")
+                continue
+            return [replace(r, reason=self._reason(r, refusals)) for r in results]
+        raise ChoiceError(
+            f"no model reaches a relative error of {self.tolerance:g} in E: {'; '.join(refusals)}"
+        )
+
+    def _take(
+        self, name: str, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
+    ) -> list[Homogenised]:
+        """Results of one model at the resolution that the tolerance asks for; RuntimeError when it
+        has none.
+        """
+        if name == "series":
+            from alphacut.rve.series.model import SeriesModel
+
+            results = SeriesModel(accuracy=max(_MARGIN * self.tolerance, 1e-12)).solve(
+                radius_map, matrix, inclusions
+            )
+        elif name == "table":
+            from alphacut.rve.table.model import TableModel
+
+            model = TableModel(
+                self.tolerance, self.cache, moduli=self.moduli, progress=self.progress
+            )
+            results = model.solve(radius_map, matrix, inclusions)
+        elif name == "slices":
+            from alphacut.rve.auto.refine_slices import refined_slices
+
+            results = refined_slices(
+                radius_map, matrix, inclusions, tolerance=self.tolerance, progress=self.progress
+            )
+        else:
+            from alphacut.rve.auto.refine_prism import refined_prism
+
+            results = refined_prism(radius_map, matrix, inclusions, tolerance=self.tolerance)
+        worst = max(r.estimated_error for r in results)
+        if not worst <= self.tolerance:
+            raise ChoiceError(f"its estimated error is {worst:.1e}")
+        return results
+
+    def _reason(self, result: Homogenised, refusals: list[str]) -> str:
+        before = f" ({'; '.join(refusals)})" if refusals else ""
+        return (
+            f"{result.method} reaches a relative error of {self.tolerance:g} in E{before}:"
+            f" {_WHY[result.method]}; {result.reason}"
+        )

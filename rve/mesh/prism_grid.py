@@ -1,0 +1,105 @@
+"""The prism mesh of the product space: the planar mesh extruded over θ, its nodes moved so that the
+interface is the cone.
+
+Nodes are numbered level by level: on each of the layers + 1 levels of θ all planar nodes, then,
+half-way between levels, the planar vertices (a serendipity wedge has no midpoints there).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from alphacut.rve.mesh.mesh_motion import moved
+from alphacut.rve.mesh.triangulation import Integers, Triangulation
+from alphacut.stochastic import RadiusMap
+from alphacut.stochastic.theta.truncated_normal import Array, TruncatedNormal
+
+
+@dataclass(frozen=True)
+class PrismGrid:
+    """Wedges over a planar mesh; topology only, positions follow from a radius map.
+
+    Args:
+        plane: The planar mesh.
+        layers: Number of equal layers in θ, at least 1.
+        conforming: Whether the nodes follow the cone; if not they stay where the planar mesh has
+            them.
+    """
+
+    plane: Triangulation
+    layers: int
+    conforming: bool = True
+
+    def __post_init__(self) -> None:
+        if self.layers < 1:
+            raise ValueError(f"the number of layers is {self.layers}; at least 1 is needed")
+
+    @property
+    def nodes(self) -> int:
+        """Number of nodes in all."""
+        return (self.layers + 1) * len(self.plane.points) + self.layers * self.plane.vertices
+
+    @cached_property
+    def cells(self) -> Integers:
+        """Nodes of each wedge in Basix's order of vertices and edges, shape (layers · triangles,
+        15), layer by layer.
+        """
+        planar = len(self.plane.points)
+        t = self.plane.triangles
+        v0, v1, v2, e01, e02, e12 = t.T
+        layer = np.arange(self.layers)[:, None]
+        below, above = planar * layer, planar * (layer + 1)
+        middle = planar * (self.layers + 1) + self.plane.vertices * layer
+        columns = [v0 + below, v1 + below, v2 + below, v0 + above, v1 + above, v2 + above]
+        columns += [
+            e01 + below,
+            e02 + below,
+            v0 + middle,
+            e12 + below,
+            v1 + middle,
+            v2 + middle,
+            e01 + above,
+            e02 + above,
+            e12 + above,
+        ]
+        return np.stack(columns, axis=-1).reshape(-1, 15)
+
+    def levels(self, law: TruncatedNormal) -> Array:
+        """θ of the levels, shape (layers + 1,)."""
+        return np.linspace(law.lower, law.upper, self.layers + 1)
+
+    def planes(self, radius: RadiusMap) -> tuple[Array, Array]:
+        """Planar positions on the levels, shape (layers + 1, n, 2), and half-way between them,
+        shape (layers, n, 2).
+
+        Half-way the wedges have nodes on vertices only; the midpoints are where their shape
+        functions carry them.
+        """
+        levels, v, (a, b) = self.levels(radius.distribution), self.plane.vertices, self.plane.ends.T
+        full, half = (
+            self._at(radius, levels),
+            self._at(radius, (levels[1:] + levels[:-1]) / 2).copy(),
+        )
+        mean = (full[1:] + full[:-1]) / 2
+        half[:, v:] = mean[:, v:] + (half[:, a] + half[:, b] - mean[:, a] - mean[:, b]) / 2
+        return full, half
+
+    def _at(self, radius: RadiusMap, theta: Array) -> Array:
+        if not self.conforming:
+            return np.broadcast_to(self.plane.points, (len(theta), *self.plane.points.shape))
+        return np.array([moved(self.plane, float(r)) for r in radius(theta)])
+
+    def positions(self, radius: RadiusMap) -> Array:
+        """(x1, x2, θ) of all nodes, shape (nodes, 3)."""
+        full, half = self.planes(radius)
+        theta = self.levels(radius.distribution)
+        middle = (theta[1:] + theta[:-1]) / 2
+        half = half[:, : self.plane.vertices]
+        stacked = [
+            np.dstack([xy, np.broadcast_to(t[:, None, None], (*xy.shape[:2], 1))])
+            for xy, t in ((full, theta), (half, middle))
+        ]
+        return np.concatenate([s.reshape(-1, 3) for s in stacked])

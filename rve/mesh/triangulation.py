@@ -1,0 +1,148 @@
+"""The planar mesh under the prisms: Gmsh triangles of the periodic cell with the particle at a
+reference radius.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import gmsh
+import numpy as np
+from numpy.typing import NDArray
+
+from alphacut.stochastic.theta.truncated_normal import Array
+
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Triangulation:
+    """Six-node triangles of the cell [−1, 1]², vertices numbered before edge midpoints.
+
+    Args:
+        points: Positions of all nodes, shape (n, 2), edge midpoints at the middle of their straight
+            edge.
+        vertices: Number of vertices; node k is a vertex when k < vertices.
+        ends: The two vertices of each midpoint's edge, shape (n − vertices, 2).
+        triangles: Nodes of each triangle: three vertices, then the midpoints of edges (0, 1), (0,
+            2), (1, 2); shape (m, 6).
+        inside: Whether a triangle belongs to the particle, shape (m,).
+        arc: Whether a node lies on the interface, shape (n,).
+        radius: Radius of the particle in this mesh, 0 if the mesh has none.
+    """
+
+    points: Array
+    vertices: int
+    ends: Integers
+    triangles: Integers
+    inside: NDArray[np.bool_]
+    arc: NDArray[np.bool_]
+    radius: float
+
+
+def triangulate(*, size: float, radius: float) -> Triangulation:
+    """Mesh the cell with triangles of about `size`, opposite sides matching, the particle's edge at
+    `radius`.
+
+    Args:
+        size: Wanted edge length, in halves of the cell's side, in (0, 1].
+        radius: Radius of the particle in the mesh, in (0, 1), or 0 for a mesh that knows nothing of
+            it.
+
+    Raises:
+        ValueError: `size` or `radius` out of range.
+    """
+    if not 0 < size <= 1:
+        raise ValueError(
+            f"the mesh size is {size:g}; it must lie in (0, 1], in halves of the cell's side"
+        )
+    if not 0 <= radius < 1:
+        raise ValueError(f"the reference radius is {radius:g}; it must lie in [0, 1)")
+    points, triangles, inside = _gmsh_triangles(size, radius)
+    return _add_midpoints(points, triangles, inside, radius)
+
+
+def _gmsh_triangles(size: float, radius: float) -> tuple[Array, Integers, NDArray[np.bool_]]:
+    """Vertices (n, 2), triangles (m, 3) and the particle's triangles (m,), by the built-in kernel
+    of Gmsh.
+    """
+    gmsh.initialize(["", "-v", "1"], readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.NumThreads", 1)
+        surfaces = _square_with_disc(size, radius) if radius else _square(size)
+        gmsh.model.mesh.generate(2)
+        tags, xyz, _ = gmsh.model.mesh.getNodes()
+        number = np.zeros(int(tags.max()) + 1, np.int64)
+        number[tags] = np.arange(len(tags))
+        blocks = [
+            number[gmsh.model.mesh.getElementsByType(2, s)[1].astype(np.int64)].reshape(-1, 3)
+            for s in surfaces
+        ]
+    finally:
+        gmsh.finalize()
+    inside = np.concatenate([np.full(len(b), radius > 0 and k == 0) for k, b in enumerate(blocks)])
+    triangles = np.concatenate(blocks)
+    used, packed = np.unique(
+        triangles, return_inverse=True
+    )  # the centres of the arcs are points without triangles
+    return xyz.reshape(-1, 3)[used, :2], packed.reshape(-1, 3), inside
+
+
+def _outline(size: float) -> int:
+    """Curve loop of the square with opposite sides periodic."""
+    geo = gmsh.model.geo
+    corners = [geo.addPoint(x, y, 0, size) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    sides = [geo.addLine(corners[k], corners[(k + 1) % 4]) for k in range(4)]
+    geo.synchronize()
+    for first, second, shift in ((sides[3], sides[1], (2, 0)), (sides[0], sides[2], (0, 2))):
+        affine = np.eye(4)
+        affine[:2, 3] = shift
+        gmsh.model.mesh.setPeriodic(1, [second], [first], affine.ravel().tolist())
+    return int(geo.addCurveLoop(sides))
+
+
+def _square(size: float) -> tuple[int]:
+    """The cell without a particle: its surface."""
+    surface = gmsh.model.geo.addPlaneSurface([_outline(size)])
+    gmsh.model.geo.synchronize()
+    return (surface,)
+
+
+def _square_with_disc(size: float, radius: float) -> tuple[int, int]:
+    """The cell with its particle bounded by four arcs: surfaces of the particle and of the matrix."""
+    geo = gmsh.model.geo
+    centre = geo.addPoint(0, 0, 0, size)
+    poles = [
+        geo.addPoint(radius * x, radius * y, 0, size) for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1))
+    ]
+    arcs = [geo.addCircleArc(poles[k], centre, poles[(k + 1) % 4]) for k in range(4)]
+    disc = geo.addCurveLoop(arcs)
+    particle, matrix = geo.addPlaneSurface([disc]), geo.addPlaneSurface([_outline(size), disc])
+    geo.synchronize()
+    gmsh.model.mesh.embed(0, [centre], 2, particle)
+    return particle, matrix
+
+
+def _add_midpoints(
+    points: Array, triangles: Integers, inside: NDArray[np.bool_], radius: float
+) -> Triangulation:
+    """Number the edges and put a node on each; find the nodes of the interface."""
+    corners = triangles[:, [[0, 1], [0, 2], [1, 2]]]
+    ends, edge = np.unique(np.sort(corners.reshape(-1, 2), axis=1), axis=0, return_inverse=True)
+    edge = edge.reshape(-1, 3)
+    sides = np.stack(
+        [np.bincount(edge[inside == flag].ravel(), minlength=len(ends)) for flag in (False, True)]
+    )
+    arc_edge = (sides > 0).all(axis=0)  # an edge between a particle triangle and a matrix triangle
+    arc = np.zeros(len(points) + len(ends), bool)
+    arc[: len(points)][ends[arc_edge].ravel()] = True
+    arc[len(points) :] = arc_edge
+    return Triangulation(
+        np.concatenate([points, points[ends].mean(axis=1)]),
+        len(points),
+        ends,
+        np.hstack([triangles, len(points) + edge]),
+        inside,
+        arc,
+        radius,
+    )

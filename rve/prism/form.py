@@ -1,0 +1,189 @@
+"""DOLFINx behind the product-space cell: the mesh of wedges, and the θ-weighted stiffness of each
+phase (eq. 7).
+
+The form has no derivative along θ: div and D act on x alone, while the mesh is three-dimensional.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import basix.ufl
+import dolfinx
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx.fem import petsc
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from alphacut.rve.cell import Phase
+from alphacut.rve.mesh.prism_grid import PrismGrid
+from alphacut.rve.mesh.triangulation import Integers
+from alphacut.rve.mesh.wedge import slab_rule, tabulate, vector_wedge
+from alphacut.stochastic import RadiusMap
+from alphacut.stochastic.theta.truncated_normal import Array
+
+JIT = {
+    "cffi_extra_compile_args": ["-O3", "-ffast-math"]
+}  # twice as fast as the default -O2, equal to round-off
+
+
+@dataclass
+class PrismForm:
+    """Wedge mesh and stiffness forms of one grid; positions and phases are set anew for every map.
+
+    Args:
+        grid: Topology.
+        comm: Communicator; layers are dealt out to its ranks.
+    """
+
+    grid: PrismGrid
+    comm: MPI.Comm
+
+    def __post_init__(self) -> None:
+        if self.comm.size > self.grid.layers:
+            raise ValueError(
+                f"{self.comm.size} MPI ranks for {self.grid.layers} layers; every rank needs a"
+                " layer: use fewer ranks or more layers"
+            )
+        self.mesh = self._mesh()
+        self.points, self.weights = slab_rule()
+        self.shapes = tabulate(self.points)
+        started = perf_counter()
+        self.space = fem.functionspace(self.mesh, vector_wedge(2))
+        self._compile()
+        self.jit_seconds = perf_counter() - started
+
+    def _mesh(self) -> dolfinx.mesh.Mesh:
+        grid, rank, size = self.grid, self.comm.rank, self.comm.size
+        layer = np.repeat(np.arange(grid.layers), len(grid.plane.triangles))
+        owner = (layer * size // grid.layers).astype(np.int32)
+
+        def by_layer(_comm: MPI.Comm, _parts: int, _types: Any, _cells: Any) -> Any:
+            destinations = owner if rank == 0 else owner[:0]
+            ranks = dolfinx.graph.adjacencylist(
+                destinations, np.arange(len(destinations) + 1, dtype=np.int32)
+            )
+            return getattr(ranks, "_cpp_object", ranks)  # newer releases wrap the list
+
+        rough = np.zeros((grid.nodes, 3)) if rank == 0 else np.zeros((0, 3))
+        cells = grid.cells if rank == 0 else grid.cells[:0]
+        return dolfinx.mesh.create_mesh(
+            self.comm,
+            cells=cells,
+            x=rough,
+            e=vector_wedge(3),
+            partitioner=by_layer if size > 1 else None,
+        )
+
+    def _compile(self) -> None:
+        u, v = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
+        self._law = fem.Constant(self.mesh, 1.0)
+        self._load = fem.Constant(self.mesh, np.zeros(3))
+        self._stiffness = [fem.Constant(self.mesh, np.zeros(3)) for _ in range(2)]
+        self._share = self._point_function()
+        weight = (
+            ufl.exp(-(ufl.SpatialCoordinate(self.mesh)[2] ** 2) / 2) * self._law
+        )  # f_Θ of eq. 1
+        shares = (1.0, 1.0) if self.grid.conforming else (1 - self._share, self._share)
+        measure = self._measure()
+        phases = zip(self._stiffness, shares, strict=True)
+        parts = [(c, weight * part, measure(k)) for k, (c, part) in enumerate(phases)]
+        self._forms = [
+            self._jit(w * ufl.inner(_stress(c, _strain(u)), _strain(v)) * dx) for c, w, dx in parts
+        ]  # eq. 7
+        self._loads = [
+            self._jit(-w * ufl.inner(_stress(c, self._load), _strain(v)) * dx) for c, w, dx in parts
+        ]
+
+    @staticmethod
+    def _jit(form: ufl.Form) -> fem.Form:
+        with (
+            warnings.catch_warnings()
+        ):  # UFL signs a form by the printed quadrature points; they print in full
+            warnings.filterwarnings("ignore", message="Applying str")
+            return fem.form(form, jit_options=JIT)
+
+    def _point_function(self) -> fem.Function:
+        """A function with one value at every quadrature point: 1 in the particle, 0 in the matrix."""
+        element = basix.ufl.quadrature_element("prism", points=self.points, weights=self.weights)
+        return fem.Function(fem.functionspace(self.mesh, element))
+
+    def _measure(self) -> Any:
+        """Volume measure with the project's rule; part 0 the matrix and part 1 the particle where
+        the mesh conforms, else all twice.
+        """
+        rule = {
+            "quadrature_rule": "custom",
+            "quadrature_points": self.points,
+            "quadrature_weights": self.weights,
+        }
+        inside = np.tile(self.grid.plane.inside, self.grid.layers)[
+            self.mesh.topology.original_cell_index
+        ]
+        everywhere = np.ones_like(inside)
+        parts = (~inside, inside) if self.grid.conforming else (everywhere, everywhere)
+        data = [(k, np.flatnonzero(part).astype(np.int32)) for k, part in enumerate(parts)]
+        return ufl.Measure("dx", domain=self.mesh, metadata=rule, subdomain_data=data)
+
+    def place(self, radius: RadiusMap) -> Array:
+        """Move the nodes to the cone of `radius`; returns their positions in the grid's numbering,
+        shape (nodes, 3).
+        """
+        positions = self.grid.positions(radius)
+        self.mesh.geometry.x[:] = positions[self.mesh.geometry.input_global_indices]
+        self._law.value = 1 / (np.sqrt(2 * np.pi) * radius.distribution.mass)
+        return positions
+
+    def mark(self, share: Array) -> None:
+        """Set the share of the particle at the quadrature points, shape (cells, points), cells in
+        the grid's numbering.
+        """
+        self._share.x.array[:] = share[self.mesh.topology.original_cell_index].ravel()
+
+    def node_of_dof(self) -> Integers:
+        """Grid node of every local (owned and ghost) node of the function space."""
+        nodes = np.empty(
+            self.space.dofmap.index_map.size_local + self.space.dofmap.index_map.num_ghosts,
+            np.int64,
+        )
+        nodes[self.space.dofmap.list] = self.mesh.geometry.input_global_indices[
+            self.mesh.geometry.dofmap
+        ]
+        return nodes
+
+    def set_poisson(self, phases: tuple[Phase, Phase]) -> None:
+        """Take the phases' Poisson's ratios; Young's moduli stay 1."""
+        for phase, constants in zip(phases, self._stiffness, strict=True):
+            unit = Phase(1.0, phase.poisson).stiffness
+            constants.value[:] = unit[0, 0], unit[0, 1], unit[2, 2]
+
+    def add_stiffness(self, phase: int, matrix: PETSc.Mat) -> None:
+        """Add K_m (phase 0) or K_i (phase 1) of eq. 7 for a unit modulus."""
+        petsc.assemble_matrix(matrix, self._forms[phase])
+
+    def load(self, phase: int, strain: Array) -> Array:
+        """Nodal forces −⟨Bᵀ E ε̄⟩ of one phase for a unit modulus, shape (local nodes · 2,), ghosts
+        included.
+
+        Args:
+            phase: 0 the matrix, 1 the particle.
+            strain: Macroscopic strain (ε11, ε22, 2 ε12).
+        """
+        self._load.value[:] = strain
+        return np.array(fem.assemble_vector(self._loads[phase]).array)
+
+
+def _strain(w: Any) -> Any:
+    """In-plane strain (ε11, ε22, 2 ε12) of a field on the product space: θ is not differentiated."""
+    gradient = ufl.grad(w)
+    return ufl.as_vector([gradient[0, 0], gradient[1, 1], gradient[0, 1] + gradient[1, 0]])
+
+
+def _stress(c: Any, e: Any) -> Any:
+    """In-plane stress of the strain `e` from the three constants C11, C12, C33."""
+    return ufl.as_vector([c[0] * e[0] + c[1] * e[1], c[1] * e[0] + c[0] * e[1], c[2] * e[2]])

@@ -1,0 +1,137 @@
+"""Stress in the slices of the product space: a slice at fixed θ is a planar cell, cut out of the
+wedges at their Gauss points.
+
+θ depends on the wedge's third coordinate alone, so derivatives at fixed θ need the planar part of
+the Jacobian only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.rve.mesh.prism_grid import PrismGrid
+from alphacut.rve.mesh.triangulation import Integers
+from alphacut.rve.mesh.wedge import NODES, tabulate
+from alphacut.stochastic.theta.truncated_normal import Array
+
+CELL_AREA = 4.0
+
+
+@dataclass(frozen=True)
+class LayerStress:
+    """Stresses at the quadrature points of one layer.
+
+    Args:
+        stress: (σ11, σ22, σ12) for each load, shape (triangles, slices, points, 3, loads), in Pa.
+        strain: (ε11, ε22, 2 ε12), same shape.
+        area: Planar quadrature weights, shape (triangles, slices, points); they sum to 4 in each
+            slice.
+    """
+
+    stress: Array
+    strain: Array
+    area: Array
+
+    @property
+    def mean(self) -> Array:
+        """Homogenised stress of each slice, shape (slices, 3, loads)."""
+        return np.asarray((self.area[..., None, None] * self.stress).sum(axis=(0, 2)) / CELL_AREA)
+
+    @property
+    def energy(self) -> Array:
+        """Mean of σ_a : ε_b over each slice, shape (slices, loads, loads)."""
+        slices, loads = self.area.shape[1], self.stress.shape[-1]
+        weighted = self.area[..., None, None] * self.stress
+        left, right = (
+            field.swapaxes(0, 1).reshape(slices, -1, loads) for field in (weighted, self.strain)
+        )
+        return np.asarray(left.swapaxes(1, 2) @ right / CELL_AREA)
+
+
+@dataclass(frozen=True)
+class SliceStress:
+    """Evaluates stresses from displacements on one grid with given positions.
+
+    Args:
+        grid: Topology.
+        positions: (x1, x2, θ) of the nodes, shape (nodes, 3).
+        points: Quadrature points of the reference prism, ordered by ζ first, shape (q, 3).
+        weights: Their weights, shape (q,).
+        slices: Number of distinct ζ among the points.
+    """
+
+    grid: PrismGrid
+    positions: Array
+    points: Array
+    weights: Array
+    slices: int = 3
+
+    def layers(self, displacement: Array, stiffness: Array) -> Iterator[LayerStress]:
+        """Layer by layer.
+
+        Args:
+            displacement: Total displacement of the nodes for each load, shape (nodes, 2, loads).
+            stiffness: Voigt stiffness at the quadrature points, shape (cells, q or 1, 3, 3).
+        """
+        triangles = len(self.grid.plane.triangles)
+        for first in range(0, len(self.grid.cells), triangles):
+            part = slice(first, first + triangles)
+            yield self._layer(self.grid.cells[part], displacement, stiffness[part])
+
+    def _layer(self, cells: Integers, displacement: Array, stiffness: Array) -> LayerStress:
+        strain, determinant = self.strain(cells, displacement, self.points)
+        in_slices = (len(cells), self.slices, len(self.points) // self.slices)
+        weight = self.weights.reshape(self.slices, -1)
+        area = determinant * (weight / weight.sum(axis=1, keepdims=True) / 2).ravel()
+        return LayerStress(
+            (stiffness @ strain).reshape(*in_slices, 3, -1),
+            strain.reshape(*in_slices, 3, -1),
+            area.reshape(in_slices),
+        )
+
+    def strain(self, cells: Integers, displacement: Array, points: Array) -> tuple[Array, Array]:
+        """In-plane strain at fixed θ and the planar Jacobian's determinant.
+
+        Args:
+            cells: Nodes of the wedges to look at, shape (m, 15).
+            displacement: Of all nodes for each load, shape (nodes, 2, loads).
+            points: On the reference prism, shape (q, 3).
+
+        Returns:
+            (ε11, ε22, 2 ε12) for each load, shape (m, q, 3, loads), and determinants, shape (m, q).
+        """
+        table = _planar_derivatives(points)
+        a, b, c, d = self._jacobian(cells, table)
+        determinant = a * d - b * c
+        inverse = (
+            np.stack([d, -b, -c, a], axis=-1).reshape(*a.shape, 2, 2) / determinant[..., None, None]
+        )
+        values = displacement[cells].reshape(len(cells), 1, NODES, -1)
+        gradient = (inverse @ table @ values).reshape(
+            *a.shape, 2, 2, -1
+        )  # (m, q, ∂, component, load)
+        shear = gradient[..., 0, 1, :] + gradient[..., 1, 0, :]
+        return (
+            np.stack([gradient[..., 0, 0, :], gradient[..., 1, 1, :], shear], axis=-2),
+            determinant,
+        )
+
+    def determinants(self) -> Array:
+        """Planar Jacobian's determinant at all quadrature points, shape (cells, q); negative where
+        the mesh folds over.
+        """
+        a, b, c, d = self._jacobian(self.grid.cells, _planar_derivatives(self.points))
+        return np.asarray(a * d - b * c)
+
+    def _jacobian(self, cells: Integers, table: Array) -> tuple[Array, Array, Array, Array]:
+        """∂x1/∂ξ, ∂x2/∂ξ, ∂x1/∂η and ∂x2/∂η, each of shape (m, q)."""
+        jacobian = table @ self.positions[cells, :2].reshape(len(cells), 1, NODES, 2)
+        return jacobian[..., 0, 0], jacobian[..., 0, 1], jacobian[..., 1, 0], jacobian[..., 1, 1]
+
+
+def _planar_derivatives(points: Array) -> Array:
+    """Derivatives of the shape functions in the plane at points (q, 3), shape (q, 2, 15)."""
+    return np.asarray(tabulate(points, derivatives=True)[:2].transpose(1, 0, 2))

@@ -1,0 +1,161 @@
+"""One product-space system: its mesh, its constraints, and what follows from displacements on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from alphacut.rve.cell import Phase
+from alphacut.rve.mesh.periodicity import identify
+from alphacut.rve.mesh.prism_grid import PrismGrid
+from alphacut.rve.prism.form import PrismForm
+from alphacut.rve.prism.slice_stress import CELL_AREA, SliceStress
+from alphacut.rve.solver.constraints import LevelNumbering
+from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
+from alphacut.stochastic import RadiusMap, ThetaRule, layered_rule
+from alphacut.stochastic.theta.truncated_normal import Array
+
+
+class FoldedMeshError(RuntimeError):
+    """The mesh folds over where it follows a map."""
+
+
+@dataclass(frozen=True)
+class SliceMeans:
+    """Means over the slices at the Gauss points of the layers.
+
+    Args:
+        rule: θ of the slices and their weights, sum 1, n of them.
+        stress: Homogenised (σ11, σ22, σ12) for each load, shape (n, 3, loads), in Pa.
+        fraction: Area fraction of the particle, shape (n,).
+        energy: Mean of σ_a : ε_b over cell and θ for loads a and b, shape (loads, loads), in Pa.
+    """
+
+    rule: ThetaRule
+    stress: Array
+    fraction: Array
+    energy: Array
+
+
+class PrismSystem:
+    """The product-space system of one grid; positions and materials are set anew for each map.
+
+    Args:
+        grid: Topology.
+        comm: Communicator.
+    """
+
+    def __init__(self, grid: PrismGrid, comm: MPI.Comm) -> None:
+        self.grid, self.comm = grid, comm
+        self.form = PrismForm(grid, comm)
+        self.numbering = LevelNumbering(grid, identify(grid.plane))
+        self.nodes = self.form.node_of_dof()
+        self.local_map = self.numbering.local_map(self.nodes, comm)
+        self.pattern = self.numbering.matrix(self.local_map, comm)
+        self._jit = self.form.jit_seconds
+
+    def take_jit_seconds(self) -> float:
+        """Seconds of just-in-time compilation, reported once."""
+        seconds, self._jit = self._jit, 0.0
+        return seconds
+
+    def move(self, radius_map: RadiusMap) -> None:
+        """Move the nodes to the cone of a map and mark the particle at the quadrature points.
+
+        Raises:
+            FoldedMeshError: An element is inverted.
+        """
+        self.map = radius_map
+        self.positions = self.form.place(radius_map)
+        self.share = self._share()
+        if not self.grid.conforming:
+            self.form.mark(self.share)
+        elif not (self.slice_stress.determinants() > 0).all():
+            raise FoldedMeshError(
+                f"the mesh folds over where it follows the radius through {self.grid.layers} layers"
+                " in θ: take more layers or a smaller mesh size"
+            )
+
+    def _share(self) -> Array:
+        """Share of the particle, shape (cells, 1) on a conforming mesh, else (cells, points) from
+        the sign of z (eq. 13).
+        """
+        if self.grid.conforming:
+            return np.tile(self.grid.plane.inside, self.grid.layers)[:, None].astype(float)
+        x = np.einsum("qn,cnd->cqd", self.form.shapes, self.positions[self.grid.cells])
+        return np.asarray(
+            np.hypot(x[..., 0], x[..., 1]) < self.map(x[..., 2]), float
+        )  # z < 0 in eq. 14
+
+    def stiffness(self, phase: int) -> PETSc.Mat:
+        """Reduced K_m (phase 0) or K_i (phase 1) for a unit modulus."""
+        matrix = self.pattern.duplicate(copy=False)
+        matrix.setLGMap(self.local_map, self.local_map)
+        self.form.add_stiffness(phase, matrix)
+        matrix.assemble()
+        return matrix
+
+    def load(self, phase: int, strain: Array) -> PETSc.Vec:
+        """Reduced load of one phase for a unit modulus under a macroscopic strain (ε11, ε22, 2
+        ε12).
+        """
+        return self.numbering.vector(self.local_map, self.form.load(phase, strain), self.comm)
+
+    @property
+    def slice_stress(self) -> SliceStress:
+        """Evaluates stresses at the present positions."""
+        return SliceStress(self.grid, self.positions, self.form.points, self.form.weights)
+
+    def stiffness_at_points(self, phases: tuple[Phase, Phase]) -> Array:
+        """Voigt stiffness, shape (cells, points or 1, 3, 3), in Pa."""
+        return _mixed(self.share, phases)
+
+    def means(self, displacement: Array, phases: tuple[Phase, Phase]) -> SliceMeans:
+        """Homogenised stress of the slices and the mean energy from total displacements, shape
+        (nodes, 2, loads).
+        """
+        slices, stiffness = self.slice_stress, self.stiffness_at_points(phases)
+        rule = layered_rule(self.map.distribution, layers=self.grid.layers, points=slices.slices)
+        weights = rule.weights / rule.weights.sum()
+        shares = np.broadcast_to(self.share, (len(self.share), len(self.form.points))).reshape(
+            self.grid.layers, -1, slices.slices, 6
+        )
+        stress, fraction = [], []
+        energy = np.zeros((displacement.shape[2],) * 2)
+        for k, layer in enumerate(slices.layers(displacement, stiffness)):
+            stress.append(layer.mean)
+            fraction.append(np.einsum("msp,msp->s", layer.area, shares[k]) / CELL_AREA)
+            energy += np.tensordot(
+                weights[k * slices.slices : (k + 1) * slices.slices], layer.energy, axes=1
+            )
+        return SliceMeans(
+            ThetaRule(rule.nodes, weights), np.concatenate(stress), np.concatenate(fraction), energy
+        )
+
+    def affine(self, loads: Array) -> Array:
+        """Displacements ε̄·x of the nodes, shape (nodes, 2, loads)."""
+        x = self.positions[:, :2]
+        tensors = np.array([[[e[0], e[2] / 2], [e[2] / 2, e[1]]] for e in loads])
+        return np.asarray(np.einsum("lij,nj->nil", tensors, x))
+
+    def preconditioner(self, phases: tuple[Phase, Phase]) -> ThetaPreconditioner:
+        """The θ-preconditioner for these phases; a triangle that the interface cuts has the mean
+        stiffness of its wedges.
+        """
+        between = self.share.reshape(self.grid.layers, len(self.grid.plane.triangles), -1).mean(
+            axis=2
+        )
+        on = (np.concatenate([between[:1], between]) + np.concatenate([between, between[-1:]])) / 2
+        stiffness = _mixed(on, phases), _mixed(between, phases)
+        return ThetaPreconditioner(
+            self.numbering, self.grid.planes(self.map), stiffness, self.map.distribution, self.comm
+        )
+
+
+def _mixed(share: Array, phases: tuple[Phase, Phase]) -> Array:
+    """Voigt stiffness, shape (…, 3, 3), in Pa, of matrix with a `share` (…) of particle."""
+    share = share[..., None, None]
+    return np.asarray((1 - share) * phases[0].stiffness + share * phases[1].stiffness)

@@ -1,0 +1,135 @@
+"""One task: a map with its moduli in a fixed order. Mesh, matrices and preconditioner are made once
+and serve all of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from petsc4py import PETSc
+
+from alphacut.rve.cell import Phase
+from alphacut.rve.prism.system import PrismSystem
+from alphacut.rve.solver.krylov import LinearSolver
+from alphacut.rve.solver.level_blocks import LevelBlocks
+from alphacut.rve.solver.options import SolverOptions
+from alphacut.rve.solver.stopwatch import Stopwatch
+from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
+from alphacut.stochastic.theta.truncated_normal import Array
+
+CONTRAST_GRID = 1.25
+NO_LOAD = 1e-12  # relative size of a load that is nothing but round-off
+
+
+@dataclass(frozen=True)
+class Displacements:
+    """Solution of the cell for all loads.
+
+    Args:
+        total: Displacements of the nodes, ε̄x and fluctuation, shape (nodes, 2, loads).
+        affine: ε̄x alone, same shape.
+        iterations: Of the linear solver, for each load.
+        residual: Largest relative residual.
+    """
+
+    total: Array
+    affine: Array
+    iterations: tuple[int, ...]
+    residual: float
+
+
+class PrismTask:
+    """Reduced matrices and loads of one map; K = E_m K_m + E_i K_i is assembled once for each pair
+    of Poisson's ratios.
+
+    Args:
+        system: Mesh and forms, already moved to the map.
+        options: Linear solver.
+        loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3).
+        watch: Takes the times.
+    """
+
+    def __init__(
+        self, system: PrismSystem, options: SolverOptions, loads: Array, watch: Stopwatch
+    ) -> None:
+        self.system, self.options, self.strains, self.watch = system, options, loads, watch
+        self.affine = system.affine(loads)
+        self.poissons: tuple[float, float] | None = None
+
+    def solve(self, phases: tuple[Phase, Phase]) -> Displacements:
+        """The solution for a matrix and an inclusion; what an earlier call made serves again where
+        it can.
+
+        Raises:
+            ConvergenceError: The linear solver stopped early.
+        """
+        with self.watch("assemble"):
+            self._assemble(phases)
+        with self.watch("setup"):
+            solver = self._solver(phases)
+        with self.watch("solve"):
+            return self._solve_loads(solver, phases)
+
+    def _assemble(self, phases: tuple[Phase, Phase]) -> None:
+        poissons = phases[0].poisson, phases[1].poisson
+        if poissons == self.poissons:
+            return
+        system, self.poissons = self.system, poissons
+        system.form.set_poisson(phases)
+        self.matrices = [system.stiffness(k) for k in range(2)]
+        self.loads = [[system.load(k, strain) for strain in self.strains] for k in range(2)]
+        self.theta: tuple[int, ThetaPreconditioner] | None = None
+
+    @staticmethod
+    def _combined(
+        soft: PETSc.Object, hard: PETSc.Object, phases: tuple[Phase, Phase]
+    ) -> PETSc.Object:
+        """`soft` turned into E_m soft + E_i hard; matrices of one pattern, or vectors."""
+        soft.scale(phases[0].modulus)
+        structure = (
+            (PETSc.Mat.Structure.SAME_NONZERO_PATTERN,) if isinstance(soft, PETSc.Mat) else ()
+        )
+        soft.axpy(phases[1].modulus, hard, *structure)
+        return soft
+
+    def _solver(self, phases: tuple[Phase, Phase]) -> LinearSolver:
+        operator = self._combined(self.matrices[0].copy(), self.matrices[1], phases)
+        if self.options.all["pc_type"] == "python" and self.options.solver == "theta":
+            return LinearSolver(
+                operator, self.options, self._theta(phases), together=len(self.strains)
+            )
+        operator = operator.convert("aij")  # PETSc's own preconditioners want it
+        operator.setOption(PETSc.Mat.Option.SPD, True)
+        blocks = self.options.solver == "blocks" and self.options.all["pc_type"] == "python"
+        return LinearSolver(
+            operator, self.options, LevelBlocks(self.system.numbering, operator) if blocks else None
+        )
+
+    def _solve_loads(self, solver: LinearSolver, phases: tuple[Phase, Phase]) -> Displacements:
+        size = max(phases[k].modulus * load.norm() for k in range(2) for load in self.loads[k])
+        loads = [
+            self._combined(soft.copy(), hard, phases)
+            for soft, hard in zip(*self.loads, strict=True)
+        ]
+        if all(
+            load.norm() <= NO_LOAD * size for load in loads
+        ):  # equal phases: the affine field is the solution
+            return Displacements(self.affine, self.affine, (0,) * len(loads), 0.0)
+        solutions = solver.solve(loads)
+        fluctuation = np.stack(
+            [self.system.numbering.to_nodes(column) for column in solutions.values.T], axis=-1
+        )
+        return Displacements(
+            self.affine + fluctuation, self.affine, solutions.iterations, solutions.residual
+        )
+
+    def _theta(self, phases: tuple[Phase, Phase]) -> ThetaPreconditioner:
+        """Made for a contrast on a grid, so that near contrasts share one and no result depends on
+        who else is in the task.
+        """
+        step = round(np.log(phases[1].modulus / phases[0].modulus) / np.log(CONTRAST_GRID))
+        if self.theta is None or self.theta[0] != step:
+            near = replace(phases[1], modulus=phases[0].modulus * CONTRAST_GRID**step)
+            self.theta = step, self.system.preconditioner((phases[0], near))
+        return self.theta[1]

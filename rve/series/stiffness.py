@@ -1,0 +1,164 @@
+"""Stiffness of the cell with one circular particle by multipole series, any radius and phases, to a
+wanted truncation error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.rve.cell import Phase
+from alphacut.rve.series.multipoles import LOADS, MOST_HARMONICS, Contrast, modulus, multipoles
+from alphacut.stochastic.theta.truncated_normal import Array
+
+_BATCH = 2_000_000  # entries of one batch of matrices
+_ROUND_OFF = 2e-14
+_SLOWEST = 0.97  # decay from one harmonic to the next that is believed
+
+
+@dataclass(frozen=True)
+class SquareStiffness:
+    """Plane stiffness of a square-symmetric cell by its three independent moduli, in Pa; any common
+    shape.
+
+    Args:
+        bulk: C11 + C12, from ε11 = ε22.
+        deviator: C11 − C12, from ε11 = −ε22.
+        shear: C33, σ12 over 2 ε12.
+        error: Estimated relative truncation error, the largest of the three.
+        harmonics: Harmonics per potential that reached it.
+    """
+
+    bulk: Array
+    deviator: Array
+    shear: Array
+    error: Array
+    harmonics: Array
+
+    @property
+    def matrix(self) -> Array:
+        """Voigt matrices (11, 22, 12 with 2 ε12), shape (…, 3, 3)."""
+        return square_voigt(self.bulk, self.deviator, self.shear)
+
+
+def square_voigt(bulk: Array, deviator: Array, shear: Array) -> Array:
+    """Voigt matrices (…, 3, 3) of square symmetry from C11 + C12, C11 − C12 and C33 of one shape."""
+    voigt = np.zeros((*bulk.shape, 3, 3))
+    voigt[..., 0, 0] = voigt[..., 1, 1] = (bulk + deviator) / 2
+    voigt[..., 0, 1] = voigt[..., 1, 0] = (bulk - deviator) / 2
+    voigt[..., 2, 2] = shear
+    return voigt
+
+
+def square_stiffness(
+    radius: Array,
+    matrix: Phase,
+    inclusions: Sequence[Phase],
+    *,
+    tolerance: float = 1e-12,
+    loads: Sequence[str] = LOADS,
+) -> SquareStiffness:
+    """Stiffness of n cells times m inclusions.
+
+    Args:
+        radius: Radii over half the cell's side, shape (n,), each in [0, 1).
+        matrix: Material outside the particle.
+        inclusions: Materials of the particle, m of them.
+        tolerance: Relative truncation error allowed, at least 1e-13.
+        loads: Which moduli are wanted, of `LOADS`; the others are returned as nan.
+
+    Returns:
+        Moduli of shape (n, m).
+
+    Raises:
+        ValueError: A radius lies outside [0, 1).
+        SeriesError: The series does not reach `tolerance` (particles nearly in touch).
+    """
+    radius = np.atleast_1d(np.asarray(radius, float))
+    if not (np.all(radius >= 0) and np.all(radius < 1)):
+        worst = radius[np.argmax(np.abs(radius - 0.5))]
+        raise ValueError(f"a radius is {worst:g} halves of the cell's side; it must lie in [0, 1)")
+    contrast = Contrast.of(matrix, inclusions)
+    shape = (radius.size, len(inclusions))
+    found = {load: np.full(shape, np.nan) for load in loads}
+    error, used = np.full(shape, np.inf), np.zeros(shape, int)
+    todo, harmonics = np.arange(radius.size), _first_guess(radius, tolerance)
+    while todo.size:
+        for count in np.unique(harmonics[todo]):
+            for rows in _batches(todo[harmonics[todo] == count], shape[1] * count**2):
+                open_ = error[rows] > max(
+                    tolerance, _ROUND_OFF
+                )  # what is settled stays, whatever its companions need
+                values, left = _solve_batch(radius[rows], contrast, int(count), loads)
+                for load in loads:
+                    found[load][rows] = np.where(open_, values[load], found[load][rows])
+                error[rows], used[rows] = (
+                    np.where(open_, left, error[rows]),
+                    np.where(open_, count, used[rows]),
+                )
+        todo = todo[error[todo].max(axis=1) > max(tolerance, _ROUND_OFF)]
+        _refuse_touching(radius[todo], harmonics[todo], error[todo], tolerance)
+        harmonics[todo] = np.minimum(harmonics[todo] * 4 // 3 + 2, MOST_HARMONICS)
+    bulk, deviator, shear = (found.get(load, np.full(shape, np.nan)) for load in LOADS)
+    return SquareStiffness(bulk, deviator, shear, error, used)
+
+
+def _first_guess(radius: Array, tolerance: float) -> Array:
+    """Harmonics for each radius, from the rate at which images of touching particles fade, in steps
+    that keep batches few.
+    """
+    rate = 8 * np.arccosh(1 / np.maximum(radius, 1e-3))
+    steps = np.array([3, 4, 5, 6, 8, 10, 12, 16, 24, 32, 48, 64, 96, 128, MOST_HARMONICS])
+    return np.asarray(
+        steps[np.minimum(np.searchsorted(steps, np.log(1 / tolerance) / rate), steps.size - 1)]
+    )
+
+
+def _batches(rows: Array, entries: int) -> list[Array]:
+    """`rows` cut so that one batch of matrices stays small."""
+    return np.array_split(rows, max(1, -(-rows.size * entries // _BATCH)))
+
+
+def _solve_batch(
+    radius: Array, contrast: Contrast, count: int, loads: Sequence[str]
+) -> tuple[dict[str, Array], Array]:
+    """Moduli by load and their largest estimated relative error, all of shape (rows, m).
+
+    A harmonic changes a modulus by all but the factor `fade` of the error that it leaves; fade is
+    what the last two changes show, and at least exp(−5 arccosh(1/r)), the slowest decay met at
+    moderate contrasts. Doubled for safety.
+    """
+    least = np.exp(-5 * np.arccosh(1 / np.maximum(radius, 1e-3)))[:, None]
+    values, error = {}, np.full((radius.size, contrast.kappa_i.size), _ROUND_OFF / 10)
+    for load in loads:
+        last, before, first = (
+            modulus(load, multipoles(load, radius, contrast, harmonics=count - n), radius, contrast)
+            for n in range(3)
+        )
+        change, earlier = np.abs(last / before - 1), np.abs(before / first - 1)
+        fade = np.clip(
+            change / np.maximum(earlier, _ROUND_OFF / 10), least, np.maximum(least, _SLOWEST)
+        )
+        values[load] = last
+        error = np.maximum(
+            error,
+            _ROUND_OFF / 10 + 2 * np.maximum(change, earlier * least**1.5) * fade / (1 - fade),
+        )
+    return values, error
+
+
+class SeriesError(RuntimeError):
+    """The multipole series does not reach the wanted tolerance."""
+
+
+def _refuse_touching(radius: Array, harmonics: Array, error: Array, tolerance: float) -> None:
+    """Raise where no more harmonics are to be had."""
+    stuck = harmonics >= MOST_HARMONICS
+    if stuck.any():
+        raise SeriesError(
+            f"the series at r = {radius[stuck].max():.6g} reaches a relative error of"
+            f" {error[stuck].max():.1e} with {MOST_HARMONICS} harmonics and {tolerance:.1e} is"
+            " wanted: particles nearly touch; lower the radius or raise the tolerance"
+        )

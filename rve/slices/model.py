@@ -1,0 +1,206 @@
+"""The slices model: planar cell problems at the nodes of a rule in θ.
+
+The product-space form has no θ-derivative, so its exact solution at each θ is the planar problem
+with radius r(θ).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from alphacut.rve.cell import Phase
+from alphacut.rve.result import Homogenised
+from alphacut.rve.slices.curve import certified, curve_of, modulus_error, stresses
+from alphacut.rve.slices.theta_rule import DIGITS, extreme_radii, theta_error, theta_rule
+from alphacut.stochastic import RadiusMap
+from alphacut.stochastic.theta.truncated_normal import Array
+
+_IRREGULAR_FADE = 0.15  # least share of a change that is taken to be left by orders below 4
+_ROUND_OFF = 1e-13
+
+
+@dataclass(frozen=True)
+class SlicesModel:
+    """Planar DOLFINx solves with curved elements at the nodes of a Gauss rule in θ.
+
+    Args:
+        order: Polynomial degree of the elements, 2 to 4.
+        mesh_size: Edge length far from the interface, in halves of the cell's side, in (0, 1].
+        points: Nodes in θ, of each smooth piece where the map jumps or bends; at least 2.
+        centre: Centre of the particle in the cell [−1, 1]²; the moduli do not depend on it.
+        progress: Called with the fraction done.
+
+    Raises:
+        ValueError: A value lies outside its range.
+    """
+
+    order: int = 4
+    mesh_size: float = 0.2
+    points: int = 10
+    centre: tuple[float, float] = (0.0, 0.0)
+    progress: Callable[[float], None] | None = None
+    name = "slices"
+
+    def __post_init__(self) -> None:
+        if self.order not in (2, 3, 4):
+            raise ValueError(
+                f"the order of the planar elements is {self.order}; it must be 2, 3 or 4"
+            )
+        if not 0 < self.mesh_size <= 1:
+            raise ValueError(
+                f"the mesh size is {self.mesh_size:g}; it must lie in (0, 1], in halves of the"
+                " cell's side"
+            )
+        if self.points < 2:
+            raise ValueError(f"the rule in θ has {self.points} points; it needs at least 2")
+
+    def solve(
+        self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
+    ) -> list[Homogenised]:
+        """One result for each of `inclusions`, in their order.
+
+        Raises:
+            PlanarError: A linear system was not solved.
+        """
+        start = perf_counter()
+        rule = theta_rule(radius_map, points=self.points)
+        at_nodes = np.round(radius_map(rule.nodes), DIGITS)
+        radii = np.unique(np.concatenate([at_nodes, np.round(extreme_radii(radius_map), DIGITS)]))
+        slices = []
+        for radius in radii:
+            slices.append(
+                solve_slice(
+                    radius,
+                    matrix,
+                    inclusions,
+                    orders=range(max(1, self.order - 2), self.order + 1),
+                    mesh_size=self.mesh_size,
+                    centre=self.centre,
+                )
+            )
+            if self.progress:
+                self.progress(len(slices) / radii.size)
+        seconds = {stage: sum(s.seconds[stage] for s in slices) for stage in slices[0].seconds}
+        seconds["total"] = perf_counter() - start - seconds["jit"]
+        nodes = np.searchsorted(radii, at_nodes)
+        results = []
+        for m in range(len(inclusions)):
+            stiffness, error_of_slice = (
+                np.array([s.stiffness[m] for s in slices]),
+                np.array([s.error[m] for s in slices]),
+            )
+            curve = curve_of(rule, stiffness[nodes])
+            error = {
+                "space": modulus_error(curve, error_of_slice[nodes]),
+                "theta": theta_error(
+                    radius_map, rule, radii=radii, stress=np.stack(stresses(stiffness), axis=1)
+                ),
+            }
+            reason = (
+                f"{rule.nodes.size} nodes in θ, elements of order {self.order}, mesh size"
+                f" {self.mesh_size:g}"
+            )
+            result = Homogenised(
+                curve,
+                self.name,
+                slices[0].solver,
+                max(s.unknowns for s in slices),
+                (),
+                seconds,
+                error,
+                reason,
+            )
+            results.append(certified(result, radius_map, matrix, inclusions[m]))
+        return results
+
+
+@dataclass(frozen=True)
+class Slice:
+    """A planar cell solved for m inclusions by elements of several orders on one mesh.
+
+    Args:
+        order: The highest order.
+        by_order: Stiffness by order, in Pa, shape (orders, m, 3, 3).
+        unknowns: Of the largest linear system.
+        solver: Its solver.
+        factorisations: How many were made.
+        seconds: Wall time: mesh, jit, assemble, solve.
+    """
+
+    order: int
+    by_order: Array
+    unknowns: int
+    solver: str
+    factorisations: int
+    seconds: dict[str, float]
+
+    @property
+    def stiffness(self) -> Array:
+        """By the highest order, shape (m, 3, 3), in Pa."""
+        return np.asarray(self.by_order[-1])
+
+    @property
+    def gaps(self) -> Array:
+        """Relative change of C11 + C12 and C33 by each rise of the order, shape (orders − 1, m, 2)."""
+        moduli = np.stack(
+            [self.by_order[..., 0, 0] + self.by_order[..., 0, 1], self.by_order[..., 2, 2]], axis=-1
+        )
+        return np.asarray(np.abs(moduli[:-1] / moduli[1:] - 1))
+
+    @property
+    def error(self) -> Array:
+        """Estimated relative error of C11 + C12 and C33, shape (m,): the geometric series of
+        further orders, trebled.
+
+        What one order more leaves of the last change is what the last rise left of the one before;
+        orders below 4 are not yet regular.
+        """
+        gaps = self.gaps.max(axis=2)
+        fade = (
+            np.clip(gaps[-1] / np.maximum(gaps[-2], 1e-300), 0.01, 0.5)
+            if len(gaps) > 1
+            else np.zeros(gaps.shape[1])
+        )
+        if self.order < 4:
+            fade = np.maximum(fade, _IRREGULAR_FADE)
+        return np.asarray(3 * gaps[-1] * fade / (1 - fade) + _ROUND_OFF)
+
+
+def solve_slice(
+    radius: float,
+    matrix: Phase,
+    inclusions: Sequence[Phase],
+    *,
+    orders: Sequence[int],
+    mesh_size: float,
+    centre: tuple[float, float] = (0.0, 0.0),
+    share: bool = False,
+) -> Slice:
+    """Solve one planar cell by each of `orders`, rising, on one mesh; `share` as of
+    `PlanarCell.stiffness`.
+    """
+    from alphacut.rve.mesh.planar import planar_mesh
+    from alphacut.rve.planar.problem import PlanarCell
+    from alphacut.rve.planar.system import SOLVER
+
+    started = perf_counter()
+    mesh = planar_mesh(radius, size=mesh_size, centre=centre)
+    seconds = {"mesh": perf_counter() - started}
+    cells = [PlanarCell(mesh, order) for order in orders]
+    started = perf_counter()
+    stiffness = np.array([cell.stiffness(matrix, inclusions, share=share) for cell in cells])
+    seconds["solve"] = perf_counter() - started - sum(cell.seconds["assemble"] for cell in cells)
+    for name in ("mesh", "jit", "assemble"):
+        seconds[name] = seconds.get(name, 0.0) + sum(cell.seconds[name] for cell in cells)
+    return Slice(
+        orders[-1],
+        stiffness,
+        cells[-1].unknowns,
+        SOLVER,
+        sum(cell.factorisations for cell in cells),
+        seconds,
+    )

@@ -1,0 +1,220 @@
+"""The rule in θ of the models that solve slice by slice, fit for maps that jump or bend."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+
+from alphacut.rve.result import StressCurve, effective_modulus
+from alphacut.rve.slices.curve import curve_of
+from alphacut.stochastic import HermiteMap, RadiusMap, ThetaRule, gauss_rule
+from alphacut.stochastic.theta.truncated_normal import Array, TruncatedNormal
+
+_SAMPLES = 2049
+_LEAST_JUMP, _LEAST_BEND = 1e-3, 1e-8  # in radii, over one or two steps of the sampling
+_FINE = 128
+_MOST_POINTS = 1200
+DIGITS = 12  # radii equal to so many decimals are one slice
+
+
+@lru_cache(maxsize=256)
+def _gauss_rule(law: TruncatedNormal, points: int) -> ThetaRule:
+    return gauss_rule(law, points=points)
+
+
+class RuleError(RuntimeError):
+    """No rule in θ reaches the wanted accuracy."""
+
+
+def breaks(radius_map: RadiusMap) -> Array:
+    """The θ at which the map jumps or its slope does, rising; found by sampling and bisection.
+
+    What is narrower than a two-thousandth of the support falls between the samples and is not seen.
+    """
+    law = radius_map.distribution
+    theta = np.linspace(law.lower, law.upper, _SAMPLES)
+    radius = radius_map(theta)
+    change = np.abs(np.diff(radius))
+    suspects = np.flatnonzero(change > np.maximum(_LEAST_JUMP, 4 * np.median(change)))
+    jumps = [
+        x for k in suspects if (x := _bisect_jump(radius_map, theta[k], theta[k + 1])) is not None
+    ]
+    bend = np.abs(np.diff(radius, 2))
+    bent = np.flatnonzero(bend > np.maximum(_LEAST_BEND, 20 * np.median(bend)))
+    bends = [_bisect_bend(radius_map, theta[k], theta[k + 2]) for k in bent]
+    step = theta[1] - theta[0]
+    kinks = [x for x in bends if all(abs(x - jump) > 3 * step for jump in jumps)]
+    found = np.sort(np.array(jumps + kinks))
+    return found[np.append(True, np.diff(found) > step)] if found.size else found
+
+
+@lru_cache(maxsize=64)
+def _kept_breaks(radius_map: HermiteMap) -> Array:
+    return breaks(radius_map)
+
+
+def _bisect_jump(radius_map: RadiusMap, low: float, high: float) -> float | None:
+    """The jump inside [low, high], or None if the map is continuous there: halving leaves the
+    change over a jump as it was.
+    """
+    before, after = radius_map([low, high])
+    size = abs(after - before)
+    for _ in range(48):
+        middle = (low + high) / 2
+        value = float(radius_map([middle])[0])
+        if abs(value - before) > abs(value - after):
+            high, after = middle, value
+        else:
+            low, before = middle, value
+    return high if abs(after - before) > size / 4 else None
+
+
+def _bisect_bend(radius_map: RadiusMap, low: float, high: float) -> float:
+    """Where the map bends most inside [low, high], to a billionth."""
+    while high - low > 1e-9:
+        theta = np.linspace(low, high, 9)
+        most = int(np.argmax(np.abs(np.convolve(radius_map(theta), [1, 0, -2, 0, 1], "valid"))))
+        low, high = theta[most], theta[most + 4]
+    return (low + high) / 2
+
+
+def theta_rule(radius_map: RadiusMap, *, points: int) -> ThetaRule:
+    """Gauss rule of f_Θ with `points` nodes; where the map has breaks, Gauss–Legendre with as many
+    in each smooth piece.
+    """
+    law = radius_map.distribution
+    cuts = _kept_breaks(radius_map) if isinstance(radius_map, HermiteMap) else breaks(radius_map)
+    if cuts.size == 0:
+        return _gauss_rule(law, points)
+    x, w = np.polynomial.legendre.leggauss(points)
+    edges = np.concatenate([[law.lower], cuts, [law.upper]])
+    half = np.diff(edges)[:, None] / 2
+    nodes = (edges[:-1, None] + half * (1 + x)).ravel()
+    weights = (half * w).ravel() * law.pdf(nodes)
+    return ThetaRule(nodes, weights / weights.sum())
+
+
+def settle_rule(
+    radius_map: RadiusMap,
+    stiffness_at: Callable[[Array], Array],
+    *,
+    points: int | None,
+    accuracy: float,
+) -> tuple[list[StressCurve], list[float]]:
+    """Curves by rules whose nodes are added until E of each inclusion settles within `accuracy`,
+    and the estimated error of each.
+
+    Two finer rules tell how large the error of a rule is: its distance from them, doubled.
+
+    Args:
+        radius_map: The map.
+        stiffness_at: Stiffness at n radii for m inclusions, shape (n, m, 3, 3); cheap.
+        points: Nodes, or None to have them found.
+        accuracy: Relative error of E that counts as settled.
+
+    Raises:
+        RuleError: No rule in reach settles.
+    """
+    count = points or max(6, int(np.ceil(1 - 0.75 * np.log10(accuracy))))
+    known: dict[int, list[StressCurve]] = {}
+    settled: dict[int, tuple[StressCurve, float]] = {}
+    while True:
+        counts = [count, _finer(count), _finer(_finer(count))]
+        _add_curves(known, [n for n in counts if n not in known], radius_map, stiffness_at)
+        gaps = [
+            _gap(*(effective_modulus(*curve.mean)[0] for curve in three))
+            for three in zip(*(known[n] for n in counts), strict=True)
+        ]
+        for k, (curve, gap) in enumerate(zip(known[count], gaps, strict=True)):
+            if k not in settled and (
+                points or gap <= accuracy
+            ):  # each inclusion by itself, whatever its companions need
+                settled[k] = curve, gap
+        if len(settled) == len(gaps):
+            return [settled[k][0] for k in range(len(gaps))], [
+                settled[k][1] for k in range(len(gaps))
+            ]
+        if counts[-1] >= _MOST_POINTS:
+            raise RuleError(
+                f"the rule of {count} nodes in θ leaves a relative error of {max(gaps):.1e} in E"
+                f" and {accuracy:.1e} is wanted: the radius map is not smooth; allow a larger"
+                " error, or give the number of nodes"
+            )
+        count = counts[1]
+
+
+def _add_curves(
+    known: dict[int, list[StressCurve]],
+    counts: list[int],
+    radius_map: RadiusMap,
+    stiffness_at: Callable[[Array], Array],
+) -> None:
+    """Curves by the rules of `counts` nodes, all their radii solved in one go."""
+    rules = [theta_rule(radius_map, points=n) for n in counts]
+    stiffness = stiffness_at(np.concatenate([radius_map(rule.nodes) for rule in rules]))
+    parts = np.split(stiffness, np.cumsum([rule.nodes.size for rule in rules])[:-1])
+    for count, rule, part in zip(counts, rules, parts, strict=True):
+        known[count] = [curve_of(rule, part[:, k]) for k in range(part.shape[1])]
+
+
+def _finer(count: int) -> int:
+    """Nodes of the next finer rule: a third more."""
+    return count + max(2, count // 3)
+
+
+def _gap(value: float, finer: float, finest: float) -> float:
+    """Estimated relative error of `value`; two finer ones, since one alone may meet it by chance."""
+    return 2 * max(abs(finer - value), abs(finest - value)) / abs(finest)
+
+
+def extreme_radii(radius_map: RadiusMap) -> Array:
+    """Bounds of the radius on the support, shape (2,): exact at the ends of θ, a thousandth wide of
+    an extremum between them.
+    """
+    law = radius_map.distribution
+    radii = radius_map(np.linspace(law.lower, law.upper, _SAMPLES))
+    ends = np.sort(radii[[0, -1]])
+    slack = 1e-3 * (radii.max() - radii.min())
+    low = ends[0] if radii.min() >= ends[0] else max(radii.min() - slack, 0.9 * radii.min())
+    high = ends[1] if radii.max() <= ends[1] else radii.max() + min(slack, 0.1 * (1 - radii.max()))
+    return np.array([low, high])
+
+
+def theta_error(radius_map: RadiusMap, rule: ThetaRule, *, radii: Array, stress: Array) -> float:
+    """Estimated relative error of E by `rule`, from slices already solved.
+
+    The logarithm of the stress is smoother in √(1 − r²) than in θ: polynomials through the slices
+    at the nodes and at the extreme radii are averaged by a rule so fine that it leaves nothing out,
+    and compared with the average over the nodes. The largest gap of several degrees, doubled.
+
+    Args:
+        radius_map: The map.
+        rule: Its n nodes.
+        radii: Radii solved, shape (m,): those of the nodes and the two extreme ones.
+        stress: σ11 of load 1 and σ12 of load 2 at `radii`, shape (m, 2).
+    """
+    places = np.searchsorted(radii, np.round(radius_map(rule.nodes), DIGITS))
+    weights = np.maximum(np.bincount(places, rule.weights, minlength=radii.size), 1e-6)
+    fine = theta_rule(radius_map, points=_FINE)
+    touch, target, logarithm = (
+        np.sqrt(1 - radii**2),
+        np.sqrt(1 - radius_map(fine.nodes) ** 2),
+        np.log(stress),
+    )
+    low, high, span = logarithm.min(axis=0), logarithm.max(axis=0), np.ptp(logarithm, axis=0)
+    own = effective_modulus(*(rule.weights @ stress[places]))[0]
+    gaps = []
+    for degree in range(min(max(0, radii.size - 4), 9), min(radii.size, 13)):
+        basis, carried = (_chebyshev(x, touch.min(), touch.max(), degree) for x in (touch, target))
+        root = np.sqrt(weights)[:, None]
+        coefficients = np.linalg.lstsq(basis * root, logarithm * root, rcond=1e-14)[0]
+        refined = np.exp(np.clip(carried @ coefficients, low - span, high + span))
+        gaps.append(effective_modulus(*(fine.weights @ refined))[0] / own - 1)
+    return float(2 * np.abs(gaps).max())
+
+
+def _chebyshev(x: Array, low: float, high: float, degree: int) -> Array:
+    """Chebyshev polynomials of [low, high] up to `degree` at `x`."""
+    return np.polynomial.chebyshev.chebvander((2 * x - low - high) / max(high - low, 1e-12), degree)

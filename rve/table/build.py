@@ -1,0 +1,206 @@
+"""Building a table: mesh size and degrees are raised until the errors that they leave, seen in the
+solutions themselves, are small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Protocol
+
+import numpy as np
+
+from alphacut.rve.cell import Phase
+from alphacut.rve.series.stiffness import square_stiffness
+from alphacut.rve.slices.model import solve_slice
+from alphacut.rve.table.interpolant import Table, TableRange, coefficients, tail
+from alphacut.stochastic.theta.truncated_normal import Array
+
+_ORDER = 4
+_ROUGH, _FINEST = 0.5, 0.04  # mesh sizes
+_RATE = 7.5  # of the moduli in the mesh size
+_LEAST, _MOST_NODES = 7, 65  # radii
+_SPACE_SHARE = 0.6  # of the accuracy; the rest is for interpolation
+
+
+class TableError(RuntimeError):
+    """A table does not reach its accuracy."""
+
+
+class Source(Protocol):
+    """Where a table's moduli come from."""
+
+    mesh_size: float
+    space: Array
+    unknowns: int
+    systems: int
+
+    def moduli(self, radius: float, modulus: Array) -> Array:
+        """C11 + C12, C11 − C12 and C33 in Pa, shape (m, 3)."""
+
+    def rough(self, radius: float, modulus: Array) -> Array:
+        """The same, a few digits being enough."""
+
+
+@dataclass
+class SeriesSource:
+    """Moduli by multipole series: for tests of the table itself."""
+
+    span: TableRange
+    accuracy: float
+    mesh_size: float = 0.0
+    space: Array = field(default_factory=lambda: np.array([[0.5], [1e-13]]))
+    unknowns: int = 0
+    systems: int = 0
+
+    def moduli(self, radius: float, modulus: Array) -> Array:
+        """To round-off."""
+        phases = [Phase(float(e), self.span.poisson) for e in modulus]
+        cell = square_stiffness(np.array([radius]), self.span.matrix, phases)
+        return np.stack([cell.bulk[0], cell.deviator[0], cell.shear[0]], axis=-1)
+
+    rough = moduli
+
+
+@dataclass
+class PlanarSource:
+    """Moduli by planar cells of order 4 on meshes as fine as `accuracy` needs."""
+
+    span: TableRange
+    accuracy: float
+    mesh_size: float = field(init=False)
+    space: Array = field(init=False)
+    unknowns: int = 0
+    systems: int = 0
+
+    def __post_init__(self) -> None:
+        radii = np.unique(np.clip([0.3, 0.6, 0.72, 0.85, *self.span.radii], *self.span.radii))
+        rough = np.array([self._error(radius, _ROUGH) for radius in radii])
+        worst = int(rough.argmax())
+        size, error = _ROUGH, rough[worst]
+        while error > self.accuracy:
+            if size <= _FINEST:
+                raise TableError(
+                    f"planar cells at r = {radii[worst]:.4g} leave a relative error of {error:.1e}"
+                    f" on the finest mesh ({_FINEST:g}) and {self.accuracy:.1e} is wanted: allow a"
+                    " larger error, or take the series"
+                )
+            size = max(_FINEST, size * min(0.9, (0.8 * self.accuracy / error) ** (1 / _RATE)))
+            error = self._error(radii[worst], size)
+        self.mesh_size, self.space = size, np.stack([radii, rough * error / rough[worst]])
+
+    def _error(self, radius: float, size: float) -> float:
+        """Estimated relative error of the moduli at one radius and the two extreme inclusions."""
+        phases = self._phases(np.unique(self.span.moduli))
+        solved = solve_slice(
+            radius,
+            self.span.matrix,
+            phases,
+            orders=(_ORDER - 2, _ORDER - 1, _ORDER),
+            mesh_size=size,
+        )
+        self.systems += 3 * solved.factorisations
+        return float(solved.error.max())
+
+    def _phases(self, modulus: Array) -> list[Phase]:
+        return [Phase(float(e), self.span.poisson) for e in modulus]
+
+    def moduli(self, radius: float, modulus: Array) -> Array:
+        """At the chosen mesh size."""
+        return self._solve(radius, modulus, _ORDER, self.mesh_size)
+
+    def rough(self, radius: float, modulus: Array) -> Array:
+        """At the first mesh size, one order less."""
+        return self._solve(radius, modulus, _ORDER - 1, _ROUGH)
+
+    def _solve(self, radius: float, modulus: Array, order: int, size: float) -> Array:
+        solved = solve_slice(
+            radius,
+            self.span.matrix,
+            self._phases(modulus),
+            orders=(order,),
+            mesh_size=size,
+            share=True,
+        )
+        self.systems += 3 * solved.factorisations
+        self.unknowns = max(self.unknowns, solved.unknowns)
+        c = solved.stiffness
+        return np.stack([c[:, 0, 0] + c[:, 0, 1], c[:, 0, 0] - c[:, 0, 1], c[:, 2, 2]], axis=-1)
+
+
+SOURCES: dict[str, Callable[[TableRange, float], Source]] = {
+    "planar": PlanarSource,
+    "series": SeriesSource,
+}
+
+
+def build_table(
+    span: TableRange,
+    *,
+    accuracy: float,
+    source: str = "planar",
+    progress: Callable[[float], None] | None = None,
+) -> Table:
+    """Table of relative error `accuracy` in every modulus, by its own estimate.
+
+    Args:
+        span: What to cover.
+        accuracy: Relative error allowed, mesh and interpolation together.
+        source: "planar" or "series".
+        progress: Called with the fraction done of the present degree.
+
+    Raises:
+        TableError: The accuracy is not reached.
+    """
+    started = perf_counter()
+    supply = SOURCES[source](span, accuracy * _SPACE_SHARE)
+    allowed = accuracy * (1 - _SPACE_SHARE)
+    counts = (
+        _LEAST if span.radii[1] > span.radii[0] * (1 + 1e-12) else 1,
+        _moduli_needed(span, supply, allowed / 2),
+    )
+    known: dict[float, Array] = {}
+    while True:
+        radii, moduli = span.nodes(counts)
+        for k, radius in enumerate(radii):
+            if radius not in known:
+                known[radius] = np.log(supply.moduli(float(radius), moduli))
+            if progress:
+                progress((k + 1) / radii.size)
+        found = coefficients(np.array([known[radius] for radius in radii]))
+        noise = float(supply.space[1].max())
+        tails = tail(found, 0, noise=noise), tail(found, 1, noise=noise)
+        if sum(tails) <= allowed:
+            return Table(
+                span,
+                found,
+                supply.space,
+                supply.mesh_size,
+                supply.unknowns,
+                supply.systems,
+                perf_counter() - started,
+            )
+        if max(counts) >= _MOST_NODES:
+            raise TableError(
+                f"the table's coefficients leave a relative error of {sum(tails):.1e} with"
+                f" {counts[0]} radii and {counts[1]} moduli and {allowed:.1e} is wanted: cover"
+                " less, or allow a larger error"
+            )
+        if tails[0] >= tails[1]:
+            counts = (counts[0] + 2, counts[1])
+        else:
+            counts, known = (counts[0], counts[1] + 2), {}
+
+
+def _moduli_needed(span: TableRange, supply: Source, allowed: float) -> int:
+    """Nodes in the modulus that the strongest interaction, at the greatest radius, asks for."""
+    if span.moduli[1] <= span.moduli[0] * (1 + 1e-12):
+        return 1
+    found: list[Array] = []
+    for count in range(2, _MOST_NODES):
+        _, moduli = span.nodes((1, count))
+        found.extend(np.log(supply.rough(span.radii[1], moduli[len(found) :])))
+        if tail(coefficients(np.array(found)[None]), 1) <= allowed:
+            return count
+    return _MOST_NODES

@@ -1,0 +1,216 @@
+"""Chebyshev interpolant of the cell's moduli over radius and modulus of the particle, with its
+error from its own coefficients.
+
+The variables are u = √(1 − r²), which takes the sting out of nearly touching particles (polynomials
+in r² need three times the degree), and t = ln(E_i / E_m), in which a stiffness is analytic in the
+strip |Im t| < π. What is interpolated is the logarithm of each modulus, so that absolute errors of
+the interpolant are relative errors of the modulus.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from alphacut.rve.cell import Phase
+from alphacut.rve.series.stiffness import square_voigt
+from alphacut.stochastic.theta.truncated_normal import Array
+
+_SLACK = 1e-9
+
+
+@dataclass(frozen=True)
+class TableRange:
+    """What a table covers.
+
+    Args:
+        matrix: Material outside the particle.
+        poisson: Poisson's ratio of the particle.
+        radii: Least and greatest radius, inside (0, 1).
+        moduli: Least and greatest Young's modulus of the particle, in Pa.
+
+    Raises:
+        ValueError: A range is out of order or out of bounds.
+    """
+
+    matrix: Phase
+    poisson: float
+    radii: tuple[float, float]
+    moduli: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        if not 0 < self.radii[0] <= self.radii[1] < 1:
+            raise ValueError(
+                f"the table's radii are {self.radii}; they need 0 < least <= greatest < 1, in"
+                " halves of the cell's side"
+            )
+        if not 0 < self.moduli[0] <= self.moduli[1] < np.inf:
+            raise ValueError(
+                f"the table's moduli are {self.moduli} Pa; they need 0 < least <= greatest, both"
+                " finite"
+            )
+        Phase(self.moduli[0], self.poisson)
+
+    def _ends(self) -> Array:
+        """The variables u and t at the two ends, shape (2, 2)."""
+        return np.stack([_touch(np.array(self.radii)), self._contrast(np.array(self.moduli))])
+
+    def _contrast(self, modulus: Array) -> Array:
+        return np.asarray(np.log(modulus / self.matrix.modulus))
+
+    def coordinates(self, radius: Array, modulus: Array) -> tuple[Array, Array]:
+        """Chebyshev coordinates in [−1, 1] of radii and moduli, same shapes.
+
+        Raises:
+            ValueError: A radius or modulus lies outside the table.
+        """
+        for what, values, (low, high), unit in (
+            ("radius", radius, self.radii, ""),
+            ("modulus", modulus, self.moduli, " Pa"),
+        ):
+            outside = values[(values < low * (1 - _SLACK)) | (values > high * (1 + _SLACK))]
+            if outside.size:
+                raise ValueError(
+                    f"the table is asked for a {what} of {outside[0]:g}{unit}; it covers {low:g} to"
+                    f" {high:g}{unit}: widen it"
+                )
+        ends = self._ends()
+        return _unit(_touch(radius), ends[0]), _unit(self._contrast(modulus), ends[1])
+
+    def nodes(self, counts: tuple[int, int]) -> tuple[Array, Array]:
+        """Radii and moduli at the first Leja points of either direction, one point being the middle
+        of the range.
+        """
+        (u0, u1), (t0, t1) = self._ends()
+        u, t = (
+            a + (b - a) * (1 + leja(n)) / 2
+            for (a, b), n in zip(((u0, u1), (t0, t1)), counts, strict=True)
+        )
+        radii = np.clip(np.sqrt((1 - u) * (1 + u)), *self.radii)
+        return radii, np.clip(self.matrix.modulus * np.exp(t), *self.moduli)
+
+
+def _touch(radius: Array) -> Array:
+    return np.asarray(np.sqrt((1 - radius) * (1 + radius)))
+
+
+def _unit(values: Array, ends: Array) -> Array:
+    width = ends[1] - ends[0]
+    return (
+        np.clip(2 * (values - ends[0]) / width - 1, -1, 1)
+        if abs(width) > 1e-13
+        else np.zeros_like(values)
+    )
+
+
+def leja(count: int) -> Array:
+    """The first `count` points of the R-Leja sequence: 0 alone, else 1, −1, 0 and on; nested, and
+    Lobatto's points at 2^k + 1.
+
+    Their Lebesgue constant grows no faster than their number (Calvi & Phung 2011), so degrees can
+    be raised one by one with every value kept.
+    """
+    if count == 1:
+        return np.zeros(1)
+    angles = [0.0, np.pi, np.pi / 2]
+    while len(angles) < count:
+        half = angles[(len(angles) + 1) // 2] / 2
+        angles += [half, half + np.pi]
+    return np.cos(angles[:count])
+
+
+def coefficients(values: Array) -> Array:
+    """Chebyshev coefficients of `values` (n_r, n_E, …) at the Leja points of both directions, same
+    shape.
+    """
+    for axis in (0, 1):
+        count = values.shape[axis]
+        basis = chebyshev.chebvander(leja(count), count - 1)
+        values = np.moveaxis(np.tensordot(np.linalg.inv(basis), values, axes=(1, axis)), 0, axis)
+    return values
+
+
+def tail(coefficients: Array, axis: int, *, noise: float = 0.0) -> float:
+    """Estimated interpolation error along `axis`: the geometric series that the last coefficients
+    begin, fourfold for the points.
+
+    Args:
+        coefficients: Shape (n_r, n_E, moduli).
+        axis: 0 or 1.
+        noise: Error of the values themselves: where the last coefficients are no larger, they tell
+            of nothing else, and count once.
+    """
+    size = (
+        np.abs(np.moveaxis(coefficients, axis, 0))
+        .reshape(coefficients.shape[axis], -1, coefficients.shape[-1])
+        .sum(axis=1)
+        .max(axis=1)
+    )
+    if size.size == 1:
+        return 0.0
+    if size.size == 2:  # the constant tells nothing of a decay
+        last, fade = size[-1], 0.7
+    elif size.size < 5:
+        last, fade = size[-1], size[-1] / size[-2]
+    else:
+        last = size[-2:].max()
+        fade = np.sqrt(last / size[-4:-2].max())
+    fade = np.clip(fade, 0.1, 0.7)
+    return float(last if last <= noise else 4 * last * fade / (1 - fade))
+
+
+@dataclass(frozen=True)
+class Table:
+    """The interpolant.
+
+    Args:
+        span: What it covers.
+        coefficients: Of ln(C11 + C12), ln(C11 − C12) and ln C33 (in Pa) over u and t, shape (n_r,
+            n_E, 3).
+        space: Estimated relative error of the moduli that it interpolates, at some radii: radius
+            and error, shape (2, k).
+        mesh_size: Of the planar cells behind it; 0 for the series.
+        unknowns: Of their linear systems.
+        systems: Number of linear systems solved to build it.
+        seconds: What building it took.
+    """
+
+    span: TableRange
+    coefficients: Array
+    space: Array
+    mesh_size: float
+    unknowns: int
+    systems: int
+    seconds: float
+
+    @property
+    def interpolation(self) -> float:
+        """Estimated relative error of interpolation."""
+        noise = float(self.space[1].max())
+        return tail(self.coefficients, 0, noise=noise) + tail(self.coefficients, 1, noise=noise)
+
+    def space_error(self, radius: Array) -> Array:
+        """Estimated relative error of the interpolated moduli at `radius`, any shape."""
+        return np.asarray(np.exp(np.interp(radius, self.space[0], np.log(self.space[1]))))
+
+    def moduli(self, radius: Array, modulus: Array) -> Array:
+        """C11 + C12, C11 − C12 and C33 in Pa at n radii times m moduli, shape (n, m, 3).
+
+        Raises:
+            ValueError: A radius or modulus lies outside the table.
+        """
+        at_r, at_e = self.span.coordinates(radius, modulus)
+        rows = chebyshev.chebvander(at_r, self.coefficients.shape[0] - 1)
+        columns = chebyshev.chebvander(at_e, self.coefficients.shape[1] - 1)
+        logarithms = [
+            rows @ np.tensordot(column, self.coefficients, axes=(0, 1)) for column in columns
+        ]  # one by one: same bits in any company
+        return np.asarray(np.exp(np.stack(logarithms, axis=1)))
+
+    def stiffness(self, radius: Array, modulus: Array) -> Array:
+        """Voigt matrices in Pa at n radii times m moduli, shape (n, m, 3, 3); errors as of
+        `moduli`.
+        """
+        return square_voigt(*np.moveaxis(self.moduli(radius, modulus), -1, 0))

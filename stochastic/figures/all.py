@@ -1,0 +1,69 @@
+"""All figures of a microstructure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from alphacut.stochastic.figures.cells import draw_cells, draw_neighbours, draw_two_point
+from alphacut.stochastic.figures.statistics import (
+    draw_areas,
+    draw_correlation,
+    draw_map,
+    draw_neighbour_statistics,
+    draw_pbox,
+    draw_radii,
+)
+from alphacut.stochastic.figures.style import save, style
+from alphacut.stochastic.particles.discs import Discs
+from alphacut.stochastic.particles.log_normal import LogNormalRadii
+from alphacut.stochastic.particles.packing import Packing
+from alphacut.stochastic.sections import Simulated
+from alphacut.stochastic.tessellation.apollonius import apollonius
+from alphacut.stochastic.tessellation.delaunay import neighbours
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from alphacut.stochastic.microstructure import Microstructure
+
+
+def draw(found: Microstructure, folder: Path) -> dict[str, list[Path]]:
+    """Draw every figure into `folder`; name of each figure to its files.
+
+    The figures on direct neighbours show discs of one size at the same area fraction, as in the
+    paper.
+    """
+    source = found.study.source
+    law = source.packing.radii if isinstance(source, Simulated) else None
+    equal, many = _equal_discs(found, 120), _equal_discs(found, 4000)
+    radii = np.concatenate([section.discs.radii for section in found.sections])
+    generator = np.random.default_rng(found.study.seed)
+    figures: dict[str, Callable[[], Figure]] = {
+        "03-04_two_point": lambda: draw_two_point(many, generator),
+        "05-08_neighbours": lambda: draw_neighbours(equal),
+        "06-07_neighbour_statistics": lambda: draw_neighbour_statistics(
+            [neighbours(many)], 2 * float(many.radii[0])
+        ),
+        "09_correlation": lambda: draw_correlation(found, apollonius(many)),
+        "10_cells": lambda: draw_cells(found.sections[0].diagram),
+        "11_radii": lambda: draw_radii(radii, law),
+        "12_areas": lambda: draw_areas(found),
+        "13_pbox": lambda: draw_pbox(found),
+        "radius_map": lambda: draw_map(found),
+    }
+    with style():
+        return {name: save(figure(), folder / name) for name, figure in figures.items()}
+
+
+def _equal_discs(found: Microstructure, number: int) -> Discs:
+    """A packing of equal discs with the area fraction and the mean disc area of the sections."""
+    discs = [section.discs for section in found.sections]
+    radius = float(np.sqrt(np.mean(np.concatenate([one.radii for one in discs]) ** 2)))
+    fraction = float(np.mean([one.area_fraction for one in discs]))
+    return Packing(number, fraction, LogNormalRadii(radius, radius)).make(
+        np.random.default_rng([found.study.seed, number])
+    )

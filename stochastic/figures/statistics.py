@@ -1,0 +1,177 @@
+"""Distributions: radii (Fig. 11), neighbours (Figs. 6, 7), r_n and its p-box (Figs. 12, 13), and
+the map itself.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE, PALE
+from alphacut.stochastic.tessellation.delaunay import neighbouring_values
+from alphacut.stochastic.theta.truncated_normal import Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from alphacut.stochastic.microstructure import Microstructure
+    from alphacut.stochastic.particles.radius_law import RadiusLaw
+    from alphacut.stochastic.tessellation.apollonius import Apollonius
+    from alphacut.stochastic.tessellation.delaunay import Neighbours
+
+
+def draw_radii(radii: Array, law: RadiusLaw | None) -> Figure:
+    """Distribution function of the radii, measured or packed, and their law if there is one (Fig.
+    11).
+    """
+    import matplotlib.pyplot as plt
+
+    drawn, axes = plt.subplots(figsize=(6.4, 3.8))
+    values = 1e3 * np.sort(radii)
+    axes.step(
+        values,
+        np.arange(1, len(values) + 1) / len(values),
+        color=BLUE,
+        where="post",
+        label=f"{len(values)} discs",
+    )
+    if law is not None and law.smallest < law.largest:
+        grid = np.linspace(law.smallest, law.largest, 400)
+        axes.plot(1e3 * grid, law.cdf(grid), color=ORANGE, ls="--", label=law.label)
+    axes.set(xlabel="radius [mm]", ylabel="share of discs", ylim=(0, 1.02))
+    axes.legend()
+    return drawn
+
+
+def draw_neighbour_statistics(direct: list[Neighbours], diameter: float) -> Figure:
+    """Distances between direct neighbours (Fig. 6) and their number (Fig. 7), for discs of one
+    diameter (m).
+    """
+    import matplotlib.pyplot as plt
+
+    drawn, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.0))
+    discs = sum(len(one.number) for one in direct)
+    drawn.suptitle(
+        f"{discs} equal discs of the same area fraction, not those of the section", fontsize=10
+    )
+    distance = np.concatenate([one.distances for one in direct]) / diameter
+    number = np.concatenate([one.number for one in direct])
+    left.hist(distance, bins=80, density=True, color=BLUE)
+    left.axvline(1, color=ORANGE, label="one diameter")
+    left.set(
+        xlabel="distance of direct neighbours / diameter",
+        ylabel="density",
+        xlim=(0.8, np.quantile(distance, 0.999)),
+    )
+    left.legend()
+    counts = np.bincount(number)
+    right.bar(np.arange(len(counts)), counts / counts.sum(), color=BLUE)
+    right.axvline(number.mean(), color=ORANGE, label=f"mean {number.mean():.4g}")
+    right.set(
+        xlabel="number of direct neighbours",
+        ylabel="share of discs",
+        xlim=(2.3, number.max() + 0.7),
+    )
+    right.legend()
+    return drawn
+
+
+def draw_correlation(found: Microstructure, equal: Apollonius) -> Figure:
+    """Values of r_n of cells that share a wall, for the sections and for equal discs of the same
+    area fraction (Fig. 9).
+    """
+    import matplotlib.pyplot as plt
+
+    drawn, both = plt.subplots(1, 2, figsize=(9.6, 4.4))
+    diagrams = [section.diagram for section in found.sections]
+    for axes, shown, title in zip(
+        both, (diagrams, [equal]), ("the sections", "equal discs"), strict=True
+    ):
+        pairs = np.concatenate(
+            [neighbouring_values(one, one.reduced_radii) for one in shown], axis=1
+        )
+        axes.hist2d(*pairs, bins=80, cmap="Blues", range=[np.quantile(pairs, (0.0005, 0.9995))] * 2)
+        axes.set(xlabel="r_n of a cell", ylabel="r_n of a neighbour", aspect="equal")
+        axes.set_title(f"{title}: correlation {np.corrcoef(pairs)[0, 1]:+.3f}")
+        axes.grid(visible=False)
+    return drawn
+
+
+def draw_areas(found: Microstructure) -> Figure:
+    """Area of the cells over r_n, with the limits and what no disc can reach (Fig. 12)."""
+    import matplotlib.pyplot as plt
+
+    drawn, axes = plt.subplots(figsize=(6.4, 3.8))
+    for section in found.sections:
+        disc = section.whole.disc
+        radius, area = section.diagram.reduced_radii[disc], 1e6 * section.diagram.areas[disc]
+        inside = (radius >= found.limits[0]) & (radius <= found.limits[1])
+        axes.plot(radius[inside], area[inside], ".", ms=1.5, color=GREY, rasterized=True)
+        axes.plot(radius[~inside], area[~inside], ".", ms=4, color=BLUE, rasterized=True)
+    for limit in found.limits:
+        axes.axvline(limit, color=BLUE, lw=1)
+    bound = float(np.sqrt(4 / np.pi))
+    axes.axvspan(bound, bound + 0.07, facecolor="none", edgecolor=GREY, hatch="///", lw=0)
+    axes.text(
+        bound, axes.get_ylim()[1], "disc larger\nthan its cell ", ha="right", va="top", color=GREY
+    )
+    axes.set(xlabel="r_n = r/a", ylabel="area of the cell [mm²]", xlim=(0, bound + 0.07))
+    axes.set_title(
+        f"limits {found.limits[0]:.4g} and {found.limits[1]:.4g} keep {found.share_kept:.2%} of the"
+        " area"
+    )
+    return drawn
+
+
+def draw_pbox(found: Microstructure) -> Figure:
+    """Distribution of r_n between the limits with its bootstrap band, and the p-box around it (Fig.
+    13).
+    """
+    import matplotlib.pyplot as plt
+
+    drawn, (axes, apart) = plt.subplots(
+        2, 1, figsize=(6.4, 5.6), height_ratios=(3, 1.4), sharex=True
+    )
+    table = found.to_dataset()
+    radius, share = table["r_n"].values, table["cdf"].values
+    for panel, base in ((axes, 0 * share), (apart, table["fitted"].values)):
+        scale = 1 if panel is axes else 100
+        low, high = np.maximum(share - found.allowed, 0), np.minimum(share + found.allowed, 1)
+        panel.fill_between(
+            radius,
+            scale * (low - base),
+            scale * (high - base),
+            color=PALE,
+            label=f"band of ± {found.allowed:.2g}",
+        )
+        panel.plot(
+            radius, scale * (share - base), color=BLUE, label=f"{len(found.kept.values)} cells"
+        )
+        panel.plot(radius, scale * (table["pbox_upper"] - base), color=INK, lw=1, label="p-box")
+        panel.plot(radius, scale * (table["pbox_lower"] - base), color=INK, lw=1)
+    axes.set(ylabel="area-weighted share", ylim=(0, 1.02))
+    apart.set(xlabel="r_n = r/a", ylabel="less the fit [%]")
+    axes.legend(loc="upper left")
+    return drawn
+
+
+def draw_map(found: Microstructure) -> Figure:
+    """The map θ ↦ r_n: the sample's own, the fitted cubic and its fuzzy bounds (eq. 12)."""
+    import matplotlib.pyplot as plt
+
+    drawn, axes = plt.subplots(figsize=(6.4, 3.8))
+    fit, box = found.pbox.fit, found.pbox
+    theta = np.linspace(fit.distribution.lower, fit.distribution.upper, 601)
+    axes.step(theta, found.kept.quantile(fit.distribution.cdf(theta)), color=BLUE, label="sample")
+    axes.plot(
+        theta,
+        fit.map((box.a2[1], box.a4[1]))(theta),
+        color=ORANGE,
+        ls="--",
+        label=f"a2 = {box.a2[1]:.4f}, a4 = {box.a4[1]:.4f}",
+    )
+    axes.fill_between(theta, *box.bounds(theta), color=GREY, alpha=0.4, lw=0, label="fuzzy a2, a4")
+    axes.set(xlabel="θ [1]", ylabel="r_n = r/a", ylim=(0, 1))
+    axes.legend()
+    return drawn

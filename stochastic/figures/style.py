@@ -1,0 +1,59 @@
+"""One look for the figures of the microstructure, and saving as SVG and PNG, whole or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+INK, BLUE, ORANGE, GREEN, GREY, PALE = (
+    "#1a1a1a",
+    "#0072b2",
+    "#d55e00",
+    "#009e73",
+    "#8c8c8c",
+    "#dce9f2",
+)  # Okabe & Ito
+SETTINGS: dict[str, Any] = {
+    "font.size": 10,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e6e6e6",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+    "figure.constrained_layout.use": True,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "alphacut",
+    "savefig.dpi": 150,
+}
+
+
+@contextmanager
+def style(more: Mapping[str, Any] = MappingProxyType({})) -> Iterator[None]:
+    """The look, for the figures drawn inside the block, with `more` of matplotlib's settings."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    with mpl.rc_context({**SETTINGS, **more}):
+        yield
+
+
+def save(drawn: Figure, stem: Path) -> list[Path]:
+    """Write STEM.svg and STEM.png and close the figure."""
+    import matplotlib.pyplot as plt
+
+    stem.parent.mkdir(parents=True, exist_ok=True)
+    files = []
+    for kind in ("svg", "png"):
+        partial, file = stem.with_suffix(f".partial.{kind}"), stem.with_suffix(f".{kind}")
+        drawn.savefig(partial, metadata={"Date": None} if kind == "svg" else None)
+        files.append(partial.replace(file))
+    plt.close(drawn)
+    return files

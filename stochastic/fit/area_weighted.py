@@ -1,0 +1,153 @@
+"""The area-weighted distribution of the reduced radius r_n, with bootstrap bands (paper, eq. 8–10,
+Figs. 12, 13).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from alphacut.stochastic.errors import RefusedError
+from alphacut.stochastic.theta.truncated_normal import Array
+
+
+@dataclass(frozen=True, eq=False)
+class AreaWeighted:
+    """Weighted sample of r_n: the weight of a value is the share of area of its cell (eq. 9).
+
+    Args:
+        values: r_n, shape (n,); sorted when built by `of`.
+        weights: shape (n,), sum 1.
+        groups: What is drawn anew in the bootstrap as a whole, shape (n,): number of the packing,
+            or of the patch of a section.
+    """
+
+    values: Array
+    weights: Array
+    groups: Array
+
+    @classmethod
+    def of(
+        cls, values: ArrayLike, weights: ArrayLike | None = None, groups: ArrayLike | None = None
+    ) -> AreaWeighted:
+        """Sort, scale the weights to the sum 1 (equal ones if none are given); each value is its
+        own group if none are given.
+
+        Raises:
+            ValueError: There are no values, one is not finite, or a weight is negative.
+        """
+        values = np.asarray(values, float).ravel()
+        weights = np.ones_like(values) if weights is None else np.asarray(weights, float).ravel()
+        labels = (
+            np.arange(len(values))
+            if groups is None
+            else np.unique(np.asarray(groups).ravel(), return_inverse=True)[1]
+        )
+        if not len(values) or not (
+            np.isfinite(values).all() and (weights >= 0).all() and weights.sum() > 0
+        ):
+            raise ValueError(
+                f"got {len(values)} reduced radii; they need to be finite, at least one, with"
+                " weights that are not negative"
+            )
+        order = np.argsort(values, kind="stable")
+        return cls(values[order], weights[order] / weights.sum(), labels[order])
+
+    @cached_property
+    def cumulated(self) -> Array:
+        """Σ of the weights up to each value, shape (n,)."""
+        return np.asarray(np.minimum(np.cumsum(self.weights), 1.0))
+
+    def cdf(self, radius: ArrayLike) -> Array:
+        """Share of area with r_n ≤ radius, any shape."""
+        return np.asarray(
+            np.concatenate([[0.0], self.cumulated])[
+                np.searchsorted(self.values, radius, side="right")
+            ]
+        )
+
+    def quantile(self, share: ArrayLike) -> Array:
+        """Least value with at least `share` of the area at or below it, any shape."""
+        return np.asarray(
+            self.values[
+                np.minimum(
+                    np.searchsorted(self.cumulated, np.asarray(share) - 1e-12), len(self.values) - 1
+                )
+            ]
+        )
+
+    @property
+    def mean(self) -> float:
+        """Mean of r_n."""
+        return float(self.weights @ self.values)
+
+    @property
+    def area_fraction(self) -> float:
+        """Σ w π/4 r_n² (eq. 10)."""
+        return float(np.pi / 4 * self.weights @ self.values**2)
+
+    def share_within(self, lower: float, upper: float) -> float:
+        """Share of area with lower ≤ r_n ≤ upper."""
+        return float(self.weights[(self.values >= lower) & (self.values <= upper)].sum())
+
+    def limits(self, share: float) -> tuple[float, float]:
+        """Limits that keep `share` in (0, 1) of the area, with equal shares cut off below and
+        above.
+        """
+        if not 0 < share < 1:
+            raise ValueError(f"the share of area to keep is {share:g}; it must lie in (0, 1)")
+        return float(self.quantile((1 - share) / 2)), float(self.quantile((1 + share) / 2))
+
+    def truncated(self, lower: float, upper: float) -> AreaWeighted:
+        """What lies within the limits, its weights scaled to the sum 1.
+
+        Raises:
+            ValueError: The limits are not in order within (0, 1).
+            RefusedError: Fewer than ten values lie within them.
+        """
+        if not 0 < lower < upper < 1:
+            raise ValueError(
+                f"the limits of r_n are {lower:g} and {upper:g}; they need 0 < lower < upper < 1"
+            )
+        inside = (self.values >= lower) & (self.values <= upper)
+        if inside.sum() < 10:
+            raise RefusedError(
+                f"only {int(inside.sum())} of {len(self.values)} reduced radii lie between"
+                f" {lower:g} and {upper:g}; 10 needed"
+            )
+        return AreaWeighted.of(self.values[inside], self.weights[inside], self.groups[inside])
+
+    def resampled(self, number: int, generator: np.random.Generator) -> Iterator[Array]:
+        """Weights of `number` bootstrap samples: whole groups drawn with replacement; each of shape
+        (n,), sum 1.
+        """
+        count = int(self.groups.max()) + 1
+        for _ in range(number):
+            drawn = np.bincount(generator.integers(count, size=count), minlength=count)
+            weights = self.weights * drawn[self.groups]
+            yield weights / weights.sum()
+
+    def band(self, level: float, number: int, generator: np.random.Generator) -> float:
+        """Half width c of the simultaneous bootstrap band: sup |F* − F| ≤ c in a share `level` of
+        the resamples.
+
+        Raises:
+            RefusedError: There are fewer than five groups to draw from.
+        """
+        groups = int(self.groups.max()) + 1
+        if groups < 5:
+            raise RefusedError(
+                "a bootstrap needs five packings, or cells in five patches of a section; these lie"
+                f" in {groups} of the 25 patches: is the size of the section that of its particles,"
+                " in their unit? If so, take more particles"
+            )
+        step = np.append(np.diff(self.values) > 0, True)
+        farthest = [
+            np.abs((np.cumsum(w) - self.cumulated)[step]).max()
+            for w in self.resampled(number, generator)
+        ]
+        return float(np.quantile(farthest, level))

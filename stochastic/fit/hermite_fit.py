@@ -1,0 +1,176 @@
+"""The radius map fitted to a sample: r_n(θ) by matching f_r dr = f_θ dθ, its slopes by least
+squares (paper, section 4.2).
+
+The map that carries the law of θ to the sample is r(θ) = Q(F_Θ(θ)), Q the sample's quantile
+function: a staircase. Its distance to the Hermite cubic, ∫ (r − H)² f_Θ dθ, is a quadratic in (a2,
+a4) whose integrals over the steps are known in closed form. Where the minimiser is not monotone,
+the nearest monotone one in the same norm is taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.polynomial import polynomial
+
+from alphacut.stochastic.fit.area_weighted import AreaWeighted
+from alphacut.stochastic.radius_map import HermiteMap
+from alphacut.stochastic.theta.quadrature import gauss_rule
+from alphacut.stochastic.theta.truncated_normal import Array, TruncatedNormal
+
+SHAPES = np.array(
+    [[1.0, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]]
+)  # h1 … h4 of eq. 12 in powers of ξ
+XI = np.linspace(0, 1, 401)
+# least slope asked for at the points XI, in units of a3 − a1: keeps it positive between them
+MARGIN = 2e-5
+SLOPES = np.array(
+    [polynomial.polyval(XI, polynomial.polyder(h)) for h in SHAPES]
+)  # their slopes, shape (4, 201)
+
+
+@dataclass(frozen=True)
+class HermiteFit:
+    """Least-squares fit of the slopes a2, a4 of a Hermite map with given ends.
+
+    Args:
+        a1: Lower limit of r_n.
+        a3: Upper limit of r_n.
+        distribution: Law of θ.
+    """
+
+    a1: float
+    a3: float
+    distribution: TruncatedNormal
+
+    def slopes(self, sample: AreaWeighted, weights: Array | None = None) -> tuple[float, float]:
+        """Slopes a2, a4 of the monotone cubic nearest to the sample between the limits.
+
+        Args:
+            sample: r_n within [a1, a3].
+            weights: Other weights of the same values, shape (n,), sum 1 (for the bootstrap).
+        """
+        cumulated = sample.cumulated if weights is None else np.minimum(np.cumsum(weights), 1.0)
+        share = np.concatenate([[0.0], cumulated])
+        share[-1] = 1.0
+        right = (
+            np.diff(self._integrals(share), axis=1) @ sample.values - self._ends
+        )  # ∫ h_i (Q − a1 h1 − a3 h3) f_Θ
+        best = np.linalg.solve(self._gram, right)
+        steep = SLOPES[[1, 3]]
+        floor = -self.rising  # monotone: steep.T @ (a2, a4) ≥ floor
+        a2, a4 = (
+            best
+            if (steep.T @ best >= floor - 1e-12).all()
+            else self._nearest_monotone(best, steep, floor)
+        )
+        return float(max(a2, 0)), float(max(a4, 0))
+
+    def map(self, slopes: tuple[float, float]) -> HermiteMap:
+        """The map with these slopes."""
+        return HermiteMap(self.a1, slopes[0], self.a3, slopes[1], self.distribution)
+
+    def misfit(self, sample: AreaWeighted, slopes: tuple[float, float]) -> float:
+        """Root mean square of r(θ) − H(θ) under f_Θ, in units of r_n, by a fine rule."""
+        share = (np.arange(20_000) + 0.5) / 20_000
+        return float(
+            np.sqrt(
+                np.mean(
+                    (sample.quantile(share) - self.map(slopes)(self.distribution.quantile(share)))
+                    ** 2
+                )
+            )
+        )
+
+    @cached_property
+    def _powers(self) -> Array:
+        """Functions h2 and h4 in powers of θ, shape (2, 4)."""
+        law = self.distribution
+        xi = np.array([-law.lower, 1.0]) / (law.upper - law.lower)
+        powers = [np.array([1.0])]
+        for _ in range(3):
+            powers.append(polynomial.polymul(powers[-1], xi))
+        return np.array(
+            [
+                sum(np.pad(c * p, (0, 4 - len(p))) for c, p in zip(SHAPES[k], powers, strict=True))
+                for k in (1, 3)
+            ]
+        )
+
+    def _integrals(self, share: Array) -> Array:
+        """∫ h_i f_Θ dθ from the lower end to the quantile of each share, for h2 and h4, shape (2,
+        n); by parts, exact.
+        """
+        law = self.distribution
+        theta = law.quantile(share)
+        density, first = law.pdf(theta), law.pdf(law.lower)
+        moments = [share, first - density]
+        for k in (2, 3):
+            moments.append(
+                (k - 1) * moments[k - 2] - theta ** (k - 1) * density + law.lower ** (k - 1) * first
+            )
+        return np.asarray(self._powers @ np.array(moments))
+
+    @cached_property
+    def _shapes_at_nodes(self) -> tuple[Array, Array]:
+        rule = gauss_rule(self.distribution, points=8)
+        xi = (rule.nodes - self.distribution.lower) / (
+            self.distribution.upper - self.distribution.lower
+        )
+        return rule.weights, np.array([polynomial.polyval(xi, h) for h in SHAPES])
+
+    @cached_property
+    def _gram(self) -> Array:
+        weights, shape = self._shapes_at_nodes
+        return np.asarray(shape[[1, 3]] * weights @ shape[[1, 3]].T)
+
+    @cached_property
+    def _ends(self) -> Array:
+        weights, shape = self._shapes_at_nodes
+        return np.asarray(shape[[1, 3]] * weights @ (self.a1 * shape[0] + self.a3 * shape[2]))
+
+    @property
+    def rising(self) -> Array:
+        """Slopes at the points XI while a2 = a4 = 0, less the margin for monotony, shape (401,)."""
+        return np.asarray(self.a1 * SLOPES[0] + self.a3 * SLOPES[2] - MARGIN * (self.a3 - self.a1))
+
+    @property
+    def mean_shapes(self) -> tuple[float, float]:
+        """Means ∫ h2 f_Θ dθ and ∫ |h4| f_Θ dθ."""
+        weights, shape = self._shapes_at_nodes
+        return float(weights @ shape[1]), float(-weights @ shape[3])
+
+    def _nearest_monotone(self, best: Array, steep: Array, floor: Array) -> Array:
+        """Minimiser of the quadratic form over the half planes steep.T @ a ≥ floor: on one of their
+        edges or corners.
+        """
+        inverse = np.linalg.inv(self._gram)
+        lift = (floor - steep.T @ best) / np.einsum("ik,ij,jk->k", steep, inverse, steep)
+        on_edges = (best[:, None] + inverse @ steep * lift)[:, lift > 0]
+        optimal = (steep.T @ on_edges >= floor[:, None] - 1e-9).all(
+            axis=0
+        )  # feasible with a positive multiplier
+        if optimal.any():
+            return np.asarray(on_edges[:, np.argmax(optimal)])
+        corners = _corners(steep, floor)
+        corners = corners[:, (steep.T @ corners >= floor[:, None] - 1e-9).all(axis=0)]
+        apart = corners - best[:, None]
+        return np.asarray(corners[:, np.argmin(np.einsum("ik,ij,jk->k", apart, self._gram, apart))])
+
+
+def _corners(steep: Array, floor: Array) -> Array:
+    """Points where two of the lines steep.T @ a = floor meet, shape (2, m)."""
+    i, j = np.triu_indices(steep.shape[1], 1)
+    determinant = steep[0, i] * steep[1, j] - steep[1, i] * steep[0, j]
+    i, j, determinant = (array[np.abs(determinant) > 1e-12] for array in (i, j, determinant))
+    return np.asarray(
+        np.array(
+            [
+                floor[i] * steep[1, j] - floor[j] * steep[1, i],
+                floor[j] * steep[0, i] - floor[i] * steep[0, j],
+            ]
+        )
+        / determinant
+    )

@@ -1,0 +1,219 @@
+"""Triangular fuzzy slopes whose p-box contains a sample, with the least area (paper, section 4.2,
+Fig. 13).
+
+Since h2 ≥ 0 ≥ h4, the maps with a2, a4 anywhere in their supports lie between two of them: the
+least radius at each θ belongs to (lower end of a2, upper end of a4), the greatest to (upper end of
+a2, lower end of a4). Containing the sample's distribution function save for a band of half width c,
+staying monotone, and the area between the two bounds are all linear in the four ends: a linear
+programme. Rows are added for the values that a solution leaves outside until none is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import polynomial
+
+from alphacut.stochastic.errors import RefusedError
+from alphacut.stochastic.fit.area_weighted import AreaWeighted
+from alphacut.stochastic.fit.bootstrap import SlopeBand
+from alphacut.stochastic.fit.hermite_fit import SHAPES, SLOPES, HermiteFit
+from alphacut.stochastic.theta.truncated_normal import Array
+
+
+@dataclass(frozen=True)
+class PBox:
+    """A Hermite map with triangular fuzzy slopes.
+
+    Args:
+        fit: Its ends and the law of θ.
+        a2: Lower end, modal value and upper end of a2.
+        a4: The same of a4.
+    """
+
+    fit: HermiteFit
+    a2: tuple[float, float, float]
+    a4: tuple[float, float, float]
+
+    def bounds(self, theta: Array) -> tuple[Array, Array]:
+        """Least and greatest radius at `theta`, any shape."""
+        return self.fit.map((self.a2[0], self.a4[2]))(theta), self.fit.map(
+            (self.a2[2], self.a4[0])
+        )(theta)
+
+    @property
+    def area(self) -> float:
+        """Area between the two distribution functions, in units of r_n."""
+        h2, h4 = self.fit.mean_shapes
+        return (self.a2[2] - self.a2[0]) * h2 + (self.a4[2] - self.a4[0]) * h4
+
+    def excess(self, sample: AreaWeighted) -> float:
+        """Half width that a band around the sample must have for it to lie within the p-box: the
+        greatest breach in probability.
+        """
+        step = np.append(np.diff(sample.values) > 0, True)
+        before = np.concatenate([[0.0], sample.cumulated[step][:-1]])
+        values, after = sample.values[step], sample.cumulated[step]
+        grid = np.linspace(self.fit.distribution.lower, self.fit.distribution.upper, 20_001)
+        low, high = self.bounds(grid)
+        share = self.fit.distribution.cdf(grid)
+        least, greatest = (
+            np.interp(values, high, share),
+            np.interp(values, low, share),
+        )  # bounds of the distribution function
+        return float(max((least - before).max(), (after - greatest).max(), 0.0))
+
+    def contains(self, sample: AreaWeighted, band: float) -> bool:
+        """Whether the sample's distribution function lies within the p-box but for a band of half
+        width `band`.
+        """
+        return self.excess(sample) <= band + 1e-6
+
+
+def least_pbox(
+    fit: HermiteFit, sample: AreaWeighted, band: float, *, hold: SlopeBand | None = None
+) -> PBox:
+    """The p-box of least area around the fitted map that contains `sample` but for a band of half
+    width `band`.
+
+    Misfit alone gives little fuzziness where data are few and the band is wide; `hold` adds what
+    the slopes may be by chance.
+
+    Args:
+        fit: Ends of the map and law of θ.
+        sample: r_n within the ends.
+        band: In probability, in [0, 1).
+        hold: Slopes that the supports must hold as well, such as their own bootstrap band.
+
+    Raises:
+        RefusedError: No p-box of monotone cubics with these ends contains the sample.
+    """
+    modal = fit.slopes(sample)
+    core = _core(modal, hold)
+    wish = _Containment(fit, sample, band)
+    chosen = np.unique(np.linspace(0, len(wish) - 1, min(len(wish), 400)).astype(int))
+    for _ in range(50):
+        ends = _solve(fit, core, wish, chosen)
+        worst = wish.breach(np.array(ends))
+        if worst.max(initial=0.0) <= 1e-9:
+            return PBox(fit, (ends[0], modal[0], ends[1]), (ends[2], modal[1], ends[3]))
+        chosen = np.unique(np.concatenate([chosen, np.argsort(worst)[-100:]]))
+    raise RefusedError("the p-box did not settle after 50 rounds of added values")
+
+
+def _core(modal: tuple[float, float], hold: SlopeBand | None) -> list[tuple[float, float | None]]:
+    """Ranges of the four ends (a2L, a2U, a4L, a4U) that leave the modal slopes, and the band to
+    hold, inside the supports.
+    """
+    low, high = list(modal), list(modal)
+    if hold is not None:
+        low = [
+            max(0.0, min(value, ends[0]))
+            for value, ends in zip(modal, (hold.a2, hold.a4), strict=True)
+        ]
+        high = [max(value, ends[2]) for value, ends in zip(modal, (hold.a2, hold.a4), strict=True)]
+    return [(0, low[0]), (high[0], None), (0, low[1]), (high[1], None)]
+
+
+class _Containment:
+    """Rows of: greatest radius ≥ x where the band ends below, least radius ≤ x where it ends above;
+    first the one, then the other.
+    """
+
+    def __init__(self, fit: HermiteFit, sample: AreaWeighted, band: float) -> None:
+        step = np.append(np.diff(sample.values) > 0, True)
+        values, after = sample.values[step], sample.cumulated[step]
+        before = np.concatenate([[0.0], after[:-1]])
+        up, down = before + band < 1, after - band > 0
+        self.share = np.concatenate([(before + band)[up], (after - band)[down]])
+        law = fit.distribution
+        xi = (law.quantile(self.share) - law.lower) / (law.upper - law.lower)
+        shape = np.array([polynomial.polyval(xi, h) for h in SHAPES])
+        self.excess = (
+            np.concatenate([values[up], values[down]]) - fit.a1 * shape[0] - fit.a3 * shape[2]
+        )
+        self.values, self.h2, self.h4 = (
+            np.concatenate([values[up], values[down]]),
+            shape[1],
+            -shape[3],
+        )
+        self.up = np.arange(len(self.share)) < up.sum()
+
+    def __len__(self) -> int:
+        return len(self.share)
+
+    def rows(self, chosen: Array) -> tuple[Array, Array]:
+        """Matrix and right-hand side of rows @ (a2L, a2U, a4L, a4U) ≤ right."""
+        up, h2, h4, excess = self.up[chosen], self.h2[chosen], self.h4[chosen], self.excess[chosen]
+        zero = np.zeros_like(h2)
+        greatest, least = (
+            np.stack([zero, -h2, h4, zero], axis=1),
+            np.stack([h2, zero, zero, -h4], axis=1),
+        )
+        return np.where(up[:, None], greatest, least), np.where(up, -excess, excess)
+
+    def breach(self, ends: Array) -> Array:
+        """By how much (in r_n) each row is broken."""
+        matrix, right = self.rows(np.arange(len(self)))
+        return np.asarray(matrix @ ends - right)
+
+
+def _solve(
+    fit: HermiteFit, core: list[tuple[float, float | None]], wish: _Containment, chosen: Array
+) -> list[float]:
+    """Ends (a2L, a2U, a4L, a4U) of least p-box area that obey the chosen rows and keep all four
+    corners monotone.
+    """
+    from scipy.optimize import linprog
+
+    matrix, right = wish.rows(chosen)
+    monotone = []
+    for i in (0, 1):
+        for j in (2, 3):
+            row = np.zeros((SLOPES.shape[1], 4))
+            row[:, i], row[:, j] = -SLOPES[1], -SLOPES[3]
+            monotone.append(row)
+    h2, h4 = fit.mean_shapes
+    result = linprog(
+        [-h2, h2, -h4, h4],
+        A_ub=np.concatenate([matrix, *monotone]),
+        b_ub=np.concatenate([right, np.tile(fit.rising + 1e-9, 4)]),
+        bounds=core,
+    )
+    if result.status == 0:
+        return [float(x) for x in result.x]
+    least = _least_breach(
+        matrix, right, np.concatenate(monotone), np.tile(fit.rising + 1e-9, 4), core
+    )
+    raise RefusedError(
+        f"no p-box of monotone cubics from {fit.a1:g} to {fit.a3:g} contains the distribution: the"
+        f" best leaves r_n = {wish.values[chosen[least[0]]]:.4g} outside by {least[1]:.2g}; widen"
+        " the limits, or the band (where none is given, by more confidence)"
+    )
+
+
+def _least_breach(
+    matrix: Array,
+    right: Array,
+    monotone: Array,
+    rising: Array,
+    core: list[tuple[float, float | None]],
+) -> tuple[int, float]:
+    """Where and by how much the least bad p-box breaks containment."""
+    from scipy.optimize import linprog
+
+    slack = np.concatenate([-np.ones((len(matrix), 1)), np.zeros((len(monotone), 1))])
+    result = linprog(
+        [0, 0, 0, 0, 1],
+        A_ub=np.hstack([np.concatenate([matrix, monotone]), slack]),
+        b_ub=np.concatenate([right, rising]),
+        bounds=[*core, (0, None)],
+    )
+    if result.status != 0:
+        cure = "use more particles, or leave that uncertainty out (sampling = false)"
+        raise RefusedError(
+            "the slopes' own bootstrap band, which the supports must hold, reaches maps that are"
+            f" not monotone: {cure}"
+        )
+    return int(np.argmax(matrix @ result.x[:4] - right)), float(result.x[4])

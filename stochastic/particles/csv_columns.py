@@ -1,0 +1,187 @@
+"""Columns of lengths from a CSV file, their units in its header: ``x [mm], y [mm], d [mm]``."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from alphacut.stochastic.theta.truncated_normal import Array
+
+
+@dataclass(frozen=True, eq=False)
+class LengthColumns:
+    """Columns of lengths and the unit that they are written in.
+
+    Args:
+        rows: Row numbers as an editor shows them, shape (n,).
+        values: The columns in m, shape (n, columns); NaN where there is no number.
+        unit: Unit of the first column in the file, for messages.
+        metres: Metres in one such unit.
+    """
+
+    rows: Array
+    values: Array
+    unit: str
+    metres: float
+
+    def told(self, length: float, digits: int = 6) -> str:
+        """A length in m, in words of the file: ``6.59 mm``."""
+        return f"{length / self.metres:.{digits}g} {self.unit}"
+
+
+def length_columns(path: Path, columns: Sequence[str], unit: str = "") -> LengthColumns:
+    """The columns of a file that are wanted.
+
+    Args:
+        path: The file; separated by commas, semicolons or tabs; empty lines and those behind # are
+            passed over.
+        columns: Names of the columns; a column "d" (diameter) may stand in for "r".
+        unit: Unit of columns whose header names none; empty if each does.
+
+    Raises:
+        ValueError: The file cannot be read, a column or its unit is missing, two give the same, a
+            row has more fields than the header, or a number is written with a decimal comma.
+    """
+    header, rows = _fields(path, columns)
+    places = _places(header, columns, unit, path)
+    wanted = max(place for place, cell in enumerate(header, 1) if cell.strip())
+    table = []
+    for number, fields in rows:
+        _refuse_surplus(path, number, fields, wanted)
+        table.append(
+            [
+                factor * _number(fields[k] if k < len(fields) else "", path, number)
+                for k, factor, _ in places
+            ]
+        )
+    first = places[0][2]
+    values = np.array(table, float).reshape(-1, len(columns))
+    return LengthColumns(
+        np.array([number for number, _ in rows], int),
+        values,
+        first,
+        _metres(first, columns[0], path),
+    )
+
+
+def _fields(path: Path, columns: Sequence[str]) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """Fields of the header, and of the rows with their numbers."""
+    lines = _lines(path, columns)
+    separator = ";" if ";" in lines[0][1] else "\t" if "\t" in lines[0][1] else ","
+    try:
+        split = [(number, next(csv.reader([line], delimiter=separator))) for number, line in lines]
+    except csv.Error as error:
+        raise ValueError(f"{path} cannot be read as rows of numbers: {error}") from error
+    return split[0][1], split[1:]
+
+
+def _lines(path: Path, columns: Sequence[str]) -> list[tuple[int, str]]:
+    """Numbered lines that are neither empty nor comments, the header first."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path} cannot be read as text: {error}") from error
+    lines = [
+        (number, line)
+        for number, line in enumerate(text.splitlines(), 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not lines:
+        raise ValueError(
+            f"{path} is empty; it needs a header {', '.join(columns)} and a row for each particle"
+        )
+    return lines
+
+
+def _refuse_surplus(path: Path, number: int, fields: list[str], wanted: int) -> None:
+    """A row with more fields than the header: nearly always numbers with a decimal comma, cut in
+    two.
+    """
+    if any(field.strip() for field in fields[wanted:]):
+        told = ",".join(fields)
+        cure = "write decimals with a point (1.25, not 1,25), or name every column"
+        raise ValueError(
+            f"{path}: row {number} holds {told!r}, {len(fields)} fields where the header has"
+            f" {wanted}: a decimal comma? {cure}"
+        )
+
+
+def _places(
+    header: list[str], columns: Sequence[str], unit: str, path: Path
+) -> list[tuple[int, float, str]]:
+    """Place of each column in a row, the factor that makes metres of it, and its unit."""
+    if unit:
+        _metres(unit, "unit for all columns", path)
+    named: dict[str, tuple[int, float, str]] = {}
+    for place, cell in enumerate(header):
+        match = re.fullmatch(r"\s*(\w+)\s*(?:[\[(]\s*([^\])]+?)\s*[\])])?\s*", cell)
+        name = match[1].lower() if match else ""
+        radius = "r" if name == "d" else name
+        if match and radius in columns:
+            if radius in named:
+                first = header[named[radius][0]].strip()
+                raise ValueError(
+                    f"{path}: columns {first!r} and {cell.strip()!r} both give {radius}; it takes"
+                    " one of them: rename the other"
+                )
+            own = match[2] or unit
+            named[radius] = (
+                place,
+                _metres(own, cell.strip(), path) * (0.5 if name == "d" else 1.0),
+                own,
+            )
+    missing = [name for name in columns if name not in named]
+    if missing:
+        told = (
+            f"the header {', '.join(map(str.strip, header))!r} has no column {', '.join(missing)}"
+        )
+        wanted = ", ".join(f"{name} [mm]" for name in columns)
+        raise ValueError(
+            f"{path}: {told}; it needs '{wanted}', units in the header; d for diameters may stand"
+            " in for r"
+        )
+    return [named[name] for name in columns]
+
+
+def _metres(unit: str, column: str, path: Path) -> float:
+    """Metres in one `unit` of length."""
+    if not unit:
+        raise ValueError(
+            f"{path}: column {column!r} has no unit; write it in the header, such as 'r [mm]'"
+        )
+    try:
+        return float(_units()(f"1 {unit}").to("m").magnitude)  # type: ignore[attr-defined]
+    except Exception as error:  # the reader raises what it likes
+        raise ValueError(
+            f"{path}: column {column!r} has the unit {unit!r}, which is not a length; take mm, cm,"
+            " m, …"
+        ) from error
+
+
+@cache
+def _units() -> Callable[[str], object]:
+    """Pint's reader of quantities, which takes long to make."""
+    from pint import UnitRegistry
+
+    registry: Callable[[str], object] = UnitRegistry().Quantity
+    return registry
+
+
+def _number(text: str, path: Path, row: int) -> float:
+    """The number in a field; NaN where there is none."""
+    if re.fullmatch(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*", text):
+        point = text.strip().replace(",", ".")
+        raise ValueError(
+            f"{path}: row {row} holds {text.strip()!r}, a decimal comma; write decimals with a"
+            f" point: {point}"
+        )
+    try:
+        return float(text)
+    except ValueError:
+        return float("nan")

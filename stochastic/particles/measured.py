@@ -1,0 +1,99 @@
+"""The law of the particle radius where radii or diameters have been measured, but not their places."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from alphacut.stochastic.particles.csv_columns import length_columns
+from alphacut.stochastic.theta.truncated_normal import Array
+
+
+@dataclass(frozen=True)
+class MeasuredRadii:
+    """Radii of a list: their distribution function is linear between neighbouring values of the
+    list, the k-th of n at (k − 1)/(n − 1).
+
+    Args:
+        values: The list, in m, at least one, positive.
+        source: What to call it.
+
+    Raises:
+        ValueError: The list is empty, or a value is not positive and finite.
+    """
+
+    values: tuple[float, ...]
+    source: str = "a list"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", tuple(sorted(float(value) for value in self.values)))
+        if not self.values:
+            raise ValueError("the list of radii is empty; it needs at least one")
+        if not all(0 < value < np.inf for value in self.values):
+            raise ValueError(
+                f"the radii go from {self.values[0]:g} to {self.values[-1]:g} m; they must be"
+                " positive and finite"
+            )
+
+    @classmethod
+    def read(cls, path: Path, unit: str = "") -> MeasuredRadii:
+        """The radii of a CSV file with a column r, or d for diameters, and its unit in the header:
+        ``d [mm]``.
+
+        Raises:
+            ValueError: The file cannot be read, or a row holds no positive number (row and reason).
+        """
+        found = length_columns(path, ("r",), unit)
+        rows = zip(found.rows, found.values[:, 0], strict=True)
+        wrong = [
+            f"row {row} holds no positive number" for row, radius in rows if not 0 < radius < np.inf
+        ]
+        if wrong or not len(found.rows):
+            told = "; ".join(wrong[:10]) or "it holds no row"
+            raise ValueError(f"{path}: {told}; it needs a radius or diameter in each row")
+        return cls(tuple(map(float, found.values[:, 0])), path.name)
+
+    @property
+    def smallest(self) -> float:
+        """Least radius, in m."""
+        return self.values[0]
+
+    @property
+    def largest(self) -> float:
+        """Greatest radius, in m."""
+        return self.values[-1]
+
+    @property
+    def label(self) -> str:
+        """The law in words."""
+        return f"{len(self.values)} values of {self.source}"
+
+    @cached_property
+    def _grade(self) -> tuple[Array, Array, Array]:
+        """The values without repetitions, and the distribution function just below and at each of
+        them.
+        """
+        values, first, count = np.unique(self.values, return_index=True, return_counts=True)
+        steps = max(1, len(self.values) - 1)
+        return values, first / steps, (first + count - 1) / steps
+
+    def cdf(self, radius: ArrayLike) -> Array:
+        """P(r ≤ radius), any shape, `radius` in m."""
+        values, below, at = self._grade
+        radius = np.asarray(radius, float)
+        place = np.clip(np.searchsorted(values, radius, side="right"), 1, len(values)) - 1
+        after = np.minimum(place + 1, len(values) - 1)
+        gap = np.where(after > place, values[after] - values[place], 1.0)
+        share = at[place] + (radius - values[place]) / gap * (below[after] - at[place]) * (
+            after > place
+        )
+        return np.where(radius < values[0], 0.0, np.where(radius >= values[-1], 1.0, share))
+
+    def sample(self, number: int, generator: np.random.Generator) -> Array:
+        """`number` independent radii, shape (number,), in m."""
+        grade = np.linspace(0, 1, len(self.values)) if len(self.values) > 1 else np.zeros(1)
+        return np.interp(generator.random(number), grade, self.values)

@@ -1,0 +1,228 @@
+"""The Apollonius diagram (additively weighted Voronoi diagram) of discs, with exact cell areas
+(paper, section 4.1, Fig. 10).
+
+The cell of disc i holds the points x with |x − c_i| − r_i ≤ |x − c_j| − r_j for all j. It is
+star-shaped around c_i, and bounded by 1/ρ(φ) = max_j (a_j cos φ + b_j sin φ + c_j): one hyperbola
+per neighbour (see `hyperbola`), joined by an upper envelope (see `envelope`). A disc inside another
+one has no cell. In an open window the cells are cut at the window's edges, each of which acts as
+the wall towards the disc's own mirror image.
+
+This differs from the paper in: 1. No triangulation of the discs is made; every cell stands on its
+own, so that touching, overlapping, hidden and cocircular discs need no special case.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.stochastic.particles.discs import Discs
+from alphacut.stochastic.particles.neighbour_search import (
+    Pairs,
+    Surroundings,
+    hidden_discs,
+    nearest_in_each_class,
+    size_classes,
+)
+from alphacut.stochastic.tessellation.circle_envelope import Arcs, upper_envelopes
+from alphacut.stochastic.tessellation.hyperbola import anomaly, sector_area
+from alphacut.stochastic.theta.truncated_normal import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Apollonius:
+    """Cells of discs and the arcs that bound them.
+
+    Args:
+        discs: The discs.
+        areas: Area of each cell, shape (n,), in m²; 0 where a disc is hidden.
+        hidden: Whether the disc lies inside another one and has no cell, shape (n,).
+        cell: Disc whose cell each arc bounds, shape (m,), rising; arcs of a cell in the order of
+            their angle.
+        neighbour: Disc on the other side, shape (m,); the disc itself for its own image; −1 at the
+            edge of a window.
+        apart: Vector from the centre to that image of the neighbour, shape (m, 2), in m.
+        start: Angle at the centre where the arc begins, shape (m,).
+        end: Angle where it ends, shape (m,), `start` ≤ `end` ≤ `start` + 2π.
+    """
+
+    discs: Discs
+    areas: Array
+    hidden: Array
+    cell: Array
+    neighbour: Array
+    apart: Array
+    start: Array
+    end: Array
+
+    @property
+    def reduced_radii(self) -> Array:
+        """r_n = r/a with a = √A/2 (section 4.1), shape (n,); nan for hidden discs."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(self.hidden, np.nan, 2 * self.discs.radii / np.sqrt(self.areas))
+
+    @property
+    def cut(self) -> Array:
+        """Whether the cell touches the edge of the window, shape (n,)."""
+        touched = np.zeros(len(self.discs), bool)
+        touched[self.cell[self.neighbour < 0]] = True
+        return touched
+
+    def wall(self) -> tuple[Array, Array]:
+        """Sums d + Δ and differences d − Δ of every arc (see `hyperbola`), each of shape (m,), in
+        m.
+        """
+        return _near_far(self.discs.radii, self.cell, self.neighbour, self.apart)
+
+    def radius_at(self, arc: Array, angle: Array) -> Array:
+        """Distance from the centre to the wall of `arc` at `angle` (broadcast), in m."""
+        near, far = (side[arc] for side in self.wall())
+        psi = angle - np.arctan2(self.apart[arc, 1], self.apart[arc, 0])
+        return np.asarray(near * far / ((far - near) + (far + near) * np.cos(psi)))
+
+
+def apollonius(discs: Discs) -> Apollonius:
+    """Apollonius diagram of `discs`, overlapping and hidden ones among them.
+
+    The neighbours are certain, not guessed: cells from the nearest few discs of each size bound the
+    true ones, and a disc j can only cut the cell of i if |c_j − c_i| < 2 ρ_max,i − r_i + r_j; all
+    such discs are then taken into account.
+
+    Args:
+        discs: Periodic box or open window.
+    """
+    hidden = hidden_discs(discs, 16 * np.finfo(float).eps * discs.size.max())
+    reach = 2 * _first_bound(discs, hidden) - discs.radii
+    surroundings = Surroundings(discs, reach)
+    areas, parts = np.zeros(len(discs)), []
+    for of in surroundings.portions():
+        walls = _Walls.towards(discs, surroundings.pairs(of, reach), of=of, hidden=hidden)
+        areas += walls.areas()
+        arcs, pairs = walls.arcs, walls.pairs
+        parts.append(
+            (
+                arcs.owner,
+                pairs.second[arcs.function],
+                pairs.apart[arcs.function],
+                arcs.start,
+                arcs.end,
+            )
+        )
+    return Apollonius(
+        discs, areas, hidden, *(np.concatenate(column) for column in zip(*parts, strict=True))
+    )
+
+
+def _first_bound(discs: Discs, hidden: Array) -> Array:
+    """Upper bound of each cell's largest radius, shape (n,), from few neighbours, and from more
+    where few leave it wide.
+    """
+    largest: Array = np.zeros(len(discs))
+    of: Array = np.flatnonzero(~hidden)
+    number = math.ceil(24 / sum(1 for _ in size_classes(discs.radii)))
+    for _ in range(3):
+        few = _Walls.towards(discs, nearest_in_each_class(discs, number, of), of=of, hidden=hidden)
+        largest[of] = few.largest_radius()[of]
+        of = np.flatnonzero(largest - discs.radii > 3 * np.sqrt(discs.area / len(discs)))
+        number *= 4
+        if not len(of) or number > 4 * len(discs):
+            break
+    return largest
+
+
+def _near_far(radii: Array, first: Array, second: Array, apart: Array) -> tuple[Array, Array]:
+    """Sum d + Δ and difference d − Δ of pairs; an edge of the window (second < 0) is the wall
+    towards an equal disc.
+    """
+    distance = np.hypot(apart[:, 0], apart[:, 1])
+    difference = np.where(second < 0, 0.0, radii[first] - radii[second])
+    return distance + difference, distance - difference
+
+
+@dataclass(frozen=True, eq=False)
+class _Walls:
+    """Walls of every disc towards the others, and the envelopes that they form."""
+
+    discs: Discs
+    pairs: Pairs
+    arcs: Arcs
+
+    @classmethod
+    def towards(cls, discs: Discs, others: Pairs, *, of: Array, hidden: Array) -> _Walls:
+        """Cells of the discs `of` if only the `others` (and their own images, or the edges of the
+        window) were their neighbours.
+
+        Hidden discs, whose cell would be a line at most, are nobody's neighbours.
+        """
+        near, far = _near_far(discs.radii, others.first, others.second, others.apart)
+        seen = (near > 0) & (far > 0) & ~hidden[others.first] & ~hidden[others.second]
+        pairs = Pairs.join([others.where(seen), _bounds(discs, of[~hidden[of]])])
+        near, far = _near_far(discs.radii, pairs.first, pairs.second, pairs.apart)
+        direction = pairs.apart / np.hypot(pairs.apart[:, 0], pairs.apart[:, 1])[:, None]
+        amplitude = 1 / near + 1 / far
+        arcs = upper_envelopes(
+            amplitude * direction[:, 0],
+            amplitude * direction[:, 1],
+            1 / near - 1 / far,
+            np.bincount(pairs.first, minlength=len(discs)),
+        )
+        return cls(discs, pairs, arcs)
+
+    def _anomalies(self) -> tuple[Array, Array, Array, Array]:
+        """Anomalies at both ends of every arc, and d + Δ, d − Δ of its wall."""
+        of = self.arcs.function
+        apart = self.pairs.apart[of]
+        near, far = _near_far(self.discs.radii, self.pairs.first[of], self.pairs.second[of], apart)
+        towards = np.arctan2(apart[:, 1], apart[:, 0])
+        return (
+            anomaly(self.arcs.start - towards, near, far),
+            anomaly(self.arcs.end - towards, near, far),
+            near,
+            far,
+        )
+
+    def areas(self) -> Array:
+        """Cell areas, shape (n,)."""
+        return np.bincount(
+            self.arcs.owner, sector_area(*self._anomalies()), minlength=len(self.discs)
+        )
+
+    def largest_radius(self) -> Array:
+        """Upper bound of the distance from the centre to the cell's boundary, shape (n,); the
+        greatest is at an end of an arc.
+
+        Each corner is taken from that of its two walls which it lies less far out on; a per mille
+        is added for round-off.
+        """
+        start, end, near, far = self._anomalies()
+        owner = self.arcs.owner
+        following = np.append(np.arange(1, len(owner)), 0)
+        last = np.flatnonzero(np.append(owner[1:] != owner[:-1], True))
+        following[last] = np.concatenate([[0], last[:-1] + 1])[: len(last)]
+        ahead = np.abs(start[following]) < np.abs(end)
+        on, out = (
+            np.where(ahead, following, np.arange(len(owner))),
+            np.where(ahead, start[following], end),
+        )
+        radius = (near[on] + far[on]) / 4 * np.cosh(out) + (near[on] - far[on]) / 4
+        largest = np.zeros(len(self.discs))
+        np.maximum.at(largest, owner, 1.001 * radius)
+        return largest
+
+
+def _bounds(discs: Discs, of: Array) -> Pairs:
+    """What bounds every cell: the disc's own images in a periodic box, the edges in a window (as
+    its mirror images).
+    """
+    if discs.periodic:
+        shifts = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]) * discs.size
+        return Pairs(np.repeat(of, 8), np.repeat(of, 8), np.tile(shifts, (len(of), 1)))
+    centres = np.clip(
+        discs.centres[of], 1e-15 * discs.size, (1 - 1e-15) * discs.size
+    )  # off the edge, so that there is a mirror image
+    apart = np.zeros((len(of), 4, 2))
+    apart[:, 0, 0], apart[:, 1, 0] = -2 * centres[:, 0], 2 * (discs.size[0] - centres[:, 0])
+    apart[:, 2, 1], apart[:, 3, 1] = -2 * centres[:, 1], 2 * (discs.size[1] - centres[:, 1])
+    return Pairs(np.repeat(of, 4), np.full(4 * len(of), -1), apart.reshape(-1, 2))

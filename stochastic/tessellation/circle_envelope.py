@@ -1,0 +1,156 @@
+"""Upper envelopes of functions a cos φ + b sin φ + c over the circle, many at once.
+
+Two such functions meet at most twice, so the envelope of k of them has at most 2k − 2 arcs. The
+sweep walks around the circle: it takes the uppermost function, finds the first angle at which
+another one rises above it, and looks again just beyond. With t = tan(δ/2) the difference ahead of
+the current angle is a quadratic in t, so that no step needs an angle but the winner's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.stochastic.theta.truncated_normal import Array
+
+# the sweep goes this far past a crossing before it looks which function is uppermost: shorter arcs
+# are left out
+STRIDE = 1e-13
+
+
+@dataclass(frozen=True)
+class Arcs:
+    """Arcs of envelopes.
+
+    Args:
+        owner: Envelope that each arc belongs to, shape (m,), rising; the arcs of one envelope in
+            the order of φ.
+        function: Index of the function that is uppermost on the arc, shape (m,), counted through
+            all envelopes.
+        start: φ at which the arc begins, shape (m,).
+        end: φ at which it ends, `start` ≤ `end`, shape (m,).
+    """
+
+    owner: Array
+    function: Array
+    start: Array
+    end: Array
+
+
+def upper_envelopes(a: Array, b: Array, c: Array, counts: Array) -> Arcs:
+    """Upper envelopes of consecutive groups of functions.
+
+    Args:
+        a: Coefficients of cos φ, shape (k,), the groups one after the other.
+        b: Coefficients of sin φ, shape (k,).
+        c: Constants, shape (k,).
+        counts: Functions in each group, shape (n,), sum k; a group of none has no arcs.
+
+    Raises:
+        RuntimeError: A sweep does not close; this would be an error of the program.
+    """
+    first = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(int)
+    order = np.argsort(counts, kind="stable")
+    order = order[counts[order] > 0]
+    nothing = np.zeros(0, int)
+    parts: list[tuple[Array, Array, Array, Array]] = [(nothing, nothing, np.zeros(0), np.zeros(0))]
+    while len(order):
+        # groups of like size share one padded table, small enough for the cache; the padding
+        # repeats the last function
+        width = int(counts[order[: max(1, len(order) // 64)]][-1])
+        width = max(width, int(counts[order[0]]) + 2)
+        take = min(
+            int(np.searchsorted(counts[order], width, side="right")), max(1, 60_000 // width)
+        )
+        group, order = order[:take], order[take:]
+        table = first[group, None] + np.minimum(
+            np.arange(counts[group].max()), counts[group, None] - 1
+        )
+        parts.append(_sweep(a[table], b[table], c[table], table, group))
+    owner, function, start, end = (np.concatenate(column) for column in zip(*parts, strict=True))
+    rank = np.lexsort((start, owner))
+    return Arcs(owner[rank], function[rank], start[rank], end[rank])
+
+
+def _sweep(
+    a: Array, b: Array, c: Array, table: Array, group: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Walk once around the circle with all rows of `table` together; arcs as (owner, function,
+    start, end).
+    """
+    row = np.arange(len(a))
+    summit = np.argmax(np.hypot(a, b) + c, axis=1)  # the highest of all is on the envelope
+    phi = np.arctan2(b[row, summit], a[row, summit])
+    live, limit = row, phi + 2 * np.pi
+    took: list[tuple[Array, Array, Array]] = []  # row, function that takes over, angle
+    for step in range(4 * a.shape[1] + 16):
+        beyond = phi + STRIDE if step else phi
+        current, ahead = _next_crossing(a, b, c, beyond)
+        took.append((live, current, phi))
+        phi = beyond + ahead
+        on = phi < limit
+        if not on.all():
+            a, b, c, live, limit, phi = a[on], b[on], c[on], live[on], limit[on], phi[on]
+        if not len(live):
+            return _arcs(took, table, group)
+    raise RuntimeError(
+        "an envelope did not close after four times as many steps as it has functions"
+    )
+
+
+def _arcs(
+    took: list[tuple[Array, Array, Array]], table: Array, group: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Join the take-overs of each row into arcs, the last one with the first if they belong to one
+    function.
+    """
+    live, function, start = (np.concatenate(column) for column in zip(*took, strict=True))
+    order = np.argsort(live, kind="stable")
+    live, start = live[order], start[order]
+    function = table[live, function[order]]
+    last = np.flatnonzero(np.append(live[1:] != live[:-1], True))
+    first = np.concatenate([[0], last[:-1] + 1])
+    end = np.append(start[1:], 0.0)
+    end[last] = start[first] + 2 * np.pi
+    joined = (function[first] == function[last]) & (first != last)
+    start[first[joined]] = start[last[joined]] - 2 * np.pi
+    keep = np.ones(len(live), bool)
+    keep[last[joined]] = False
+    return group[live[keep]], function[keep], start[keep], end[keep]
+
+
+def _next_crossing(a: Array, b: Array, c: Array, phi: Array) -> tuple[Array, Array]:
+    """Uppermost function of each row at φ, and the angle from there until another one rises above
+    it.
+
+    With g ≤ 0 the difference of another function to the uppermost, h = −g(φ) and slope q = g'(φ),
+    the crossing solves (c − p) t² + 2 q t − h = 0 for the root at which g rises; its 1/t orders the
+    angles δ = 2 arccot(1/t) in (0, 2π) from the greatest to the least, and is computed without
+    cancellation.
+    """
+    row = np.arange(len(a))
+    cos, sin = np.cos(phi)[:, None], np.sin(phi)[:, None]
+    wave = a * cos + b * sin
+    slope = b * cos - a * sin
+    value, scale = wave + c, np.abs(a) + np.abs(b)
+    top = np.argmax(value, axis=1)
+    level = value >= value[row, top][:, None] - 2e-15 * (scale + scale[row, top][:, None])
+    current = np.argmax(
+        np.where(level, slope, -np.inf), axis=1
+    )  # of those that are uppermost but for round-off, the one that rises
+    wave -= wave[row, current][:, None]
+    slope -= slope[row, current][:, None]
+    constant = c - c[row, current][:, None]
+    below = np.abs(np.minimum(wave + constant, 0))
+    bend = constant - wave
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = np.sqrt(slope**2 + bend * below)  # nan: the two never meet
+        cotangent = np.where(slope >= 0, (slope + root) / below, bend / (root - slope))
+    tangent = (below == 0) & (slope == 0)
+    cotangent[tangent] = np.where(bend[tangent] > 0, np.inf, -np.inf)
+    same = (
+        np.abs(bend) + np.abs(slope) + below <= 1e-14 * scale
+    )  # one function twice, but for round-off
+    cotangent[np.isnan(cotangent) | same] = -np.inf
+    return current, 2 * np.arctan2(1.0, cotangent.max(axis=1))

@@ -1,0 +1,42 @@
+"""Curves over θ between the nodes that a model has chosen."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from alphacut.stochastic.theta.truncated_normal import Array
+
+FEWEST = 10  # nodes, from which on a polynomial through those of a Gauss rule beats pieces
+LARGEST = (
+    30.0  # Lebesgue constant up to which a polynomial is trusted: rules in layers have far more
+)
+
+
+def between_nodes(nodes: Array, values: Array, at: Array) -> Array:
+    """A curve at `at` (any shape) from its values at rising nodes, shape (n,).
+
+    The polynomial through all nodes where they are those of one Gauss rule, whose Lebesgue constant
+    is small: its error falls with the number of nodes as that of the rule itself does. Pieces that
+    keep the order of the values elsewhere.
+    """
+    from scipy.interpolate import BarycentricInterpolator, PchipInterpolator
+
+    if len(nodes) >= FEWEST and lebesgue(nodes, at) <= LARGEST:
+        return np.asarray(BarycentricInterpolator(nodes, values)(at))
+    return np.asarray(PchipInterpolator(nodes, values)(at))
+
+
+def lebesgue(nodes: Array, at: Array) -> float:
+    """By how much the polynomial through values at the nodes exceeds the largest of them at `at`,
+    at most; infinite for over 40 nodes.
+    """
+    if len(nodes) > 40:
+        return float("inf")
+    distance = nodes[:, None] - nodes
+    np.fill_diagonal(distance, 1.0)
+    gaps = np.asarray(at, float).ravel()[:, None] - nodes
+    found = np.zeros(len(gaps))
+    for own in range(len(nodes)):
+        others = np.arange(len(nodes)) != own
+        found += np.abs(np.prod(gaps[:, others] / distance[own, others], axis=1))
+    return float(found.max())

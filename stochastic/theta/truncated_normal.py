@@ -1,0 +1,85 @@
+"""The basic random variable θ: a standard normal cut to an interval and normalised on it (paper,
+section 3.1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtr, ndtri
+
+Array = NDArray[Any]  # of floats; shapes and units are said in words
+
+
+@dataclass(frozen=True)
+class TruncatedNormal:
+    """Standard normal law cut to [lower, upper], its density normalised there.
+
+    Args:
+        lower: Left end of the support, in standard deviations.
+        upper: Right end of the support, greater than `lower`.
+
+    Raises:
+        ValueError: The ends are not finite or not in order.
+    """
+
+    lower: float = -3.0
+    upper: float = 3.0
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.lower) and np.isfinite(self.upper) and self.lower < self.upper):
+            raise ValueError(
+                f"the support of θ is [{self.lower}, {self.upper}]; it needs two finite ends, lower"
+                " < upper"
+            )
+        if not self.mass > 0:
+            raise ValueError(
+                f"the standard normal gives the support [{self.lower}, {self.upper}] of θ no"
+                " probability; it needs one nearer to 0"
+            )
+
+    @cached_property
+    def mass(self) -> float:
+        """Probability that the uncut standard normal gives to the support."""
+        return float(self._below(self.upper))
+
+    def _below(self, theta: ArrayLike) -> Array:
+        """Uncut probability of [lower, theta]: a difference of tails on the side where they are
+        small, so that none cancels.
+        """
+        if self.lower > 0:
+            return np.asarray(ndtr(-self.lower) - ndtr(-np.asarray(theta, float)))
+        return np.asarray(ndtr(np.asarray(theta, float)) - ndtr(self.lower))
+
+    def pdf(self, theta: ArrayLike) -> Array:
+        """Density f_Θ at `theta` (any shape); zero outside the support."""
+        theta = np.asarray(theta, float)
+        inside = (theta >= self.lower) & (theta <= self.upper)
+        return np.where(inside, np.exp(-(theta**2) / 2) / (np.sqrt(2 * np.pi) * self.mass), 0.0)
+
+    def cdf(self, theta: ArrayLike) -> Array:
+        """P(Θ ≤ theta), any shape."""
+        return self._below(np.clip(np.asarray(theta, float), self.lower, self.upper)) / self.mass
+
+    def quantile(self, probability: ArrayLike) -> Array:
+        """The θ below which a share `probability` in [0, 1] lies, any shape."""
+        share = np.asarray(probability, float)
+        if not ((share >= 0) & (share <= 1)).all():
+            raise ValueError(
+                f"a probability is {share[~((share >= 0) & (share <= 1))].flat[0]:g}; each must lie"
+                " in [0, 1]"
+            )
+        theta = (
+            -ndtri(ndtr(-self.lower) - share * self.mass)
+            if self.lower > 0
+            else ndtri(ndtr(self.lower) + share * self.mass)
+        )
+        return np.asarray(np.clip(theta, self.lower, self.upper))
+
+    def sample(self, number: int, generator: np.random.Generator) -> Array:
+        """`number` independent values of θ, shape (number,)."""
+        return self.quantile(generator.random(number))

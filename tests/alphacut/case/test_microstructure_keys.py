@@ -1,0 +1,117 @@
+"""The keys of [microstructure] reach the study, and a value outside a half-open range is refused."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from alphacut.case.load import load
+from alphacut.entry import main
+from alphacut.io.problem import BadInput
+from alphacut.stages.microstructure import study_of
+from alphacut.stochastic.particles.log_normal import LogNormalRadii
+from alphacut.stochastic.particles.packing import Packing
+
+CONCRETE = Path(__file__).parents[3] / "cases" / "concrete.toml"
+
+
+def test_a_cell_without_a_radius_map_tells_where_it_comes_from(capfd):
+    assert main(["cell", str(CONCRETE), "--set", "modulus.method=series"]) == 2
+    assert (
+        "alphacut microstructure concrete.toml --out FOLDER makes it from the particles"
+        in capfd.readouterr().err
+    )
+
+
+def test_band_and_sampling_reach_the_study():
+    assert study_of(load(CONCRETE)).sampling is True
+    found = study_of(load(CONCRETE, ["microstructure.sampling=false", "microstructure.band=0.01"]))
+    assert (found.sampling, found.band) == (False, 0.01)
+    assert study_of(load(CONCRETE)).band is None
+    assert study_of(load(CONCRETE, ["microstructure.band=0"])).band == 0
+
+
+@pytest.mark.parametrize("value", ["1", "-0.1", "nan"])
+def test_a_band_outside_0_to_1_is_refused(value):
+    with pytest.raises(BadInput, match=r"microstructure\.band"):
+        load(CONCRETE, [f"microstructure.band={value}"])
+
+
+def test_a_flag_is_true_or_false():
+    with pytest.raises(BadInput, match="neither true nor false"):
+        load(CONCRETE, ["microstructure.sampling=1"])
+
+
+@pytest.fixture(scope="module")
+def section(tmp_path_factory):
+    """A case with 400 measured circles in a window, two of them nonsense that is dropped."""
+    folder = tmp_path_factory.mktemp("section")
+    packed = Packing(400, 0.25, LogNormalRadii(1e-3, 2e-3)).make(np.random.default_rng(1))
+    rows = np.column_stack([packed.centres, packed.radii]) * 1e3
+    lines = [
+        "x [mm],y [mm],r [mm]",
+        *(",".join(f"{value:.9f}" for value in row) for row in rows),
+        "1,1,x",
+        "2,2,y",
+    ]
+    (folder / "section.csv").write_text("\n".join(lines), encoding="utf-8")
+    text = CONCRETE.read_text(encoding="utf-8")
+    side = f'"{packed.size[0] * 1e3:.9f} mm"'
+    circles = (
+        f'[microstructure.circles]\nfile = "section.csv"\nsize = [{side}, {side}]\nperiodic ='
+        " true\ndrop = true\n"
+    )
+    text = re.sub(r"\[microstructure\.packing\].*?(?=\n\[cell\])", circles, text, flags=re.DOTALL)
+    text = re.sub(r"limits = .*", "", text).replace("sampling = true", "sampling = false")
+    (folder / "own.toml").write_text(text, encoding="utf-8")
+    return folder / "own.toml"
+
+
+def test_both_area_fractions_and_what_was_left_out_are_told(section, capfd):
+    assert main(["microstructure", str(section), "--set", "bootstrap=100"]) == 0
+    out, err = capfd.readouterr()
+    told = re.search(
+        r"area fraction of the discs 0\.2500, of the cells 0\.2\d+, of this map at its modal"
+        r" values.* (0\.2\d+)",
+        out,
+    )
+    assert told
+    assert "warning: 2 of 402 particles were left out: lacks a finite number (2)" in err
+
+
+def test_a_run_warns_of_what_was_left_out_as_well(section, tmp_path, capfd):
+    words = [
+        "--set",
+        'stages=["microstructure"]',
+        "--set",
+        "bootstrap=100",
+        "--set",
+        "microstructure.band=0.3",
+    ]
+    assert (
+        main(["run", str(section), *words, "--no-figures", "--quiet", "--out", str(tmp_path)]) == 0
+    )
+    err = capfd.readouterr().err
+    assert err.count("2 of 402 particles were left out") == 1
+    assert (
+        err.count("a2 came out crisp: the band around the particles' distribution is so wide") == 1
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        (
+            ["microstructure.band=0", "microstructure.limits=[0.05, 0.99]"],
+            r"widen the limits, or the band \(where none is given",
+        ),
+        (["microstructure.circles.unit=GPa"], "unit for all columns.*'GPa', which is not a length"),
+    ],
+)
+def test_a_refusal_names_a_cure_that_the_case_has(changes, told, section, capfd):
+    words = [
+        word for change in ["microstructure.bootstrap=100", *changes] for word in ("--set", change)
+    ]
+    assert main(["microstructure", str(section), *words]) in (1, 2)
+    assert re.search(told, capfd.readouterr().err)

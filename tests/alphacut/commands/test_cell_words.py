@@ -1,0 +1,121 @@
+"""What `cell` and `modulus` say of their numbers, and what they refuse instead of passing over."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from alphacut.entry import main
+
+PAPER = str(Path(__file__).parents[3] / "cases" / "paper.toml")
+STIFF = [
+    "--inclusion-modulus",
+    "70 GPa",
+    "--matrix-modulus",
+    "3 GPa",
+    "--a1",
+    "0.79",
+    "--a2",
+    "0.02",
+    "--a3",
+    "0.81",
+    "--a4",
+    "0.02",
+]
+
+
+def test_the_cell_names_its_strains_and_its_anisotropy(capfd):
+    assert main(["cell", PAPER, "--method", "series"]) == 0
+    out, err = capfd.readouterr()
+    assert "under ε11 = ε22 = 0.01" in out
+    assert "under ε12 = 0.01" in out
+    assert "shear_ratio = 1.0565" in out
+    assert not err
+
+
+@pytest.mark.parametrize(
+    "command", [["cell"], ["modulus", "--plan", "reduced", "--set", "modulus.alpha=[1]"]]
+)
+def test_a_modulus_that_no_isotropic_composite_has_comes_with_a_warning(command, capfd):
+    assert main([command[0], PAPER, *command[1:], "--method", "series", *STIFF]) == 0
+    out, err = capfd.readouterr()
+    assert "shear_ratio = 1.4986" in out
+    assert "warning: shear modulus" in err
+    assert "can lie below that of any isotropic composite" in err
+
+
+def test_the_modulus_says_what_its_bounds_are_worth_and_the_error_that_they_do_not_count(capfd):
+    pytest.importorskip("dolfinx")
+    coarse = [
+        "--mesh-size",
+        "0.5",
+        "--layers",
+        "3",
+        "--plan",
+        "reduced",
+        "--set",
+        "modulus.alpha=[0, 1]",
+    ]
+    assert main(["modulus", PAPER, "--method", "prism", *coarse, "--quiet", "--json", "-"]) == 0
+    error = json.loads(capfd.readouterr().out)["error"]
+    assert main(["modulus", PAPER, "--method", "prism", *coarse]) == 0
+    (line,) = [line for line in capfd.readouterr().out.splitlines() if line.startswith("bounds")]
+    assert line.startswith("bounds inner: attained by samples")
+    assert f"comes on top, estimated at {sum(error.values()):.1e} of E" in line
+    assert "modal sample" in line
+    assert main(["modulus", PAPER, "--method", "series", "--set", "modulus.alpha=[0, 1]"]) == 0
+    assert "bounds guaranteed: no value" in capfd.readouterr().out
+
+
+def test_a_cross_check_prints_the_difference_that_it_found(capfd):
+    pytest.importorskip("dolfinx")
+    assert main(["cell", PAPER, "--cross-check", "series,slices", "--tolerance", "1e-3"]) == 0
+    assert "series and slices differ by" in capfd.readouterr().out
+    assert (
+        main(
+            ["cell", PAPER, "--cross-check", "series,slices", "--tolerance", "1e-3", "--json", "-"]
+        )
+        == 0
+    )
+    assert 0 <= json.loads(capfd.readouterr().out)["difference"] < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (
+            ["cell", "--method", "series", "--cross-check", "series"],
+            "--cross-check = series: this takes two different models",
+        ),
+        (["cell", "--cross-check", "series,series"], "two different models"),
+        (
+            ["cell", "--method", "series", "--exclude", "series"],
+            "--exclude = series: the method is series",
+        ),
+        (
+            ["modulus", "--method", "prism", "--exclude", "series"],
+            "the method is prism, and only method auto leaves a choice",
+        ),
+        (
+            ["cell", "--method", "auto", "--tolerance", "1e-16"],
+            "1e-16 is out of range; allowed: a number without a unit from 1e-10 to 0.1",
+        ),
+        (
+            ["modulus", "--method", "auto", "--tolerance", "0.2"],
+            "modulus.tolerance = 0.2: 0.2 is out of range",
+        ),
+    ],
+)
+def test_what_would_be_passed_over_is_refused(words, told, capfd):
+    assert main([words[0], PAPER, *words[1:]]) == 2
+    err = capfd.readouterr().err
+    assert len(err.splitlines()) == 1
+    assert told in err
+
+
+def test_a_store_that_is_none_is_bad_input(tmp_path, capfd):
+    path = tmp_path / "diameters.csv"
+    path.write_text("d [mm]\n1.5\n", encoding="utf-8")
+    assert main(["modulus", PAPER, "--method", "series", "--store", str(path)]) == 2
+    assert "holds something else than samples" in capfd.readouterr().err
+    assert path.read_text(encoding="utf-8") == "d [mm]\n1.5\n"

@@ -1,0 +1,398 @@
+"""What the commands print and write: one JSON object with the promised names, whole files, the same
+whatever the workers.
+"""
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from alphacut.case.load import load
+from alphacut.case.schema import ENVELOPE_METHODS
+from alphacut.commands.options import split_petsc
+from alphacut.entry import COMMANDS, main, parsers
+from alphacut.io.files import as_json, rank, standard_output, whole_file
+from alphacut.stages.envelope import method_options, task_of
+
+CASES = Path(__file__).parents[3] / "cases"
+PAPER = str(CASES / "paper.toml")
+
+
+def answer(arguments, capfd):
+    """The one JSON object that a command prints; fails if there is anything else on standard
+    output.
+    """
+    assert main([*arguments, "--json", "-"]) == 0
+    out, _ = capfd.readouterr()
+    assert out.count("\n") == 1
+    return json.loads(out)
+
+
+def test_cell_prints_what_it_promises(capfd):
+    pytest.importorskip("dolfinx")
+    found = answer(
+        ["cell", PAPER, "--layers", "3", "--mesh-size", "0.5", "-rve_ksp_rtol", "1e-9"], capfd
+    )
+    assert {
+        "E_GPa",
+        "nu",
+        "stress_GPa",
+        "curve",
+        "unknowns",
+        "iterations",
+        "seconds",
+        "solver",
+        "versions",
+    } <= set(found)
+    assert set(found["stress_GPa"]) == {"s11", "s12"}
+    assert {"mesh", "assemble", "setup", "solve", "total", "jit"} <= set(found["seconds"])
+    assert len(found["iterations"]) == 2
+    assert "-rve_ksp_rtol 1e-9" in found["solver"]
+    weights, curve = np.array(found["curve"]["weights"]), np.array(found["curve"]["s11"])
+    assert weights @ curve == pytest.approx(found["stress_GPa"]["s11"], rel=1e-12)
+    assert found["E_GPa"] == pytest.approx(24.8, abs=0.4)
+
+
+def test_crisp_options_reach_the_cell(capfd):
+    crisp = ["--a1", "0.5", "--a3", "0.5", "--a2", "0", "--a4", "0", "--method", "series"]
+    found = answer(["cell", PAPER, *crisp, "--inclusion-modulus", "80000 MPa"], capfd)
+    assert found["stress_GPa"]["s11"] == pytest.approx(
+        0.467852842132, rel=1e-9
+    )  # series solution at r = 0.5
+    same = answer(["cell", PAPER, *crisp, "--inclusion-modulus", "20 GPa"], capfd)
+    assert same["E_GPa"] == pytest.approx(20, rel=1e-10)
+
+
+def test_modulus_prints_what_it_promises_whatever_the_workers(capfd, tmp_path):
+    base = ["modulus", PAPER, "--method", "series"]
+    one = answer([*base, "--workers", "1", "--out", str(tmp_path / "modulus.nc")], capfd)
+    two = answer([*base, "--workers", "2"], capfd)
+    assert one["samples"] == 225
+    assert one["alpha"] == [0, 0.25, 0.5, 0.75, 1]
+    for name in ("E_GPa", "nu", "s11_GPa", "s12_GPa"):
+        assert one[name] == two[name]
+        assert one[name]["lower"] == sorted(one[name]["lower"])
+        assert one[name]["upper"] == sorted(one[name]["upper"], reverse=True)
+    handed = answer(
+        [
+            "envelope",
+            PAPER,
+            "--fuzzy",
+            "E",
+            "--duration",
+            "0.5",
+            "--modulus",
+            str(tmp_path / "modulus.nc"),
+        ],
+        capfd,
+    )
+    typed = answer(["envelope", PAPER, "--fuzzy", "E", "--duration", "0.5"], capfd)
+    assert handed["min"][0][0] == pytest.approx(typed["min"][0][0], rel=1e-2)
+    assert handed["min"] != typed["min"]
+
+
+def test_envelope_prints_what_it_promises(capfd, tmp_path):
+    import xarray
+
+    path = tmp_path / "envelope.nc"
+    found = answer(
+        [
+            "envelope",
+            PAPER,
+            "--fuzzy",
+            "E,m",
+            "--duration",
+            "1",
+            "--step",
+            "0.01",
+            "--out",
+            str(path),
+        ],
+        capfd,
+    )
+    assert np.shape(found["min"]) == np.shape(found["max"]) == (5, 3)
+    assert found["trajectories"] > 0
+    with xarray.open_dataset(path) as dataset:
+        assert dataset["lower"].dims == ("alpha", "time", "output")
+        assert dataset["upper_at"].dims == ("alpha", "time", "output", "parameter")
+        assert dataset["lower"].attrs["units"] == "m"
+        assert list(dataset["parameter"].values) == ["E", "m1", "m2", "m3"]
+        assert {"format_version", "command", "versions", "case", "fingerprint"} <= set(
+            dataset.attrs
+        )
+    assert [file.name for file in tmp_path.iterdir()] == ["envelope.nc"]
+
+
+@pytest.mark.parametrize("method", ENVELOPE_METHODS)
+def test_every_offered_method_runs_and_gets_the_tolerance(method, capfd):
+    from alphacut import frame
+
+    assert method in frame.METHODS
+    found = answer(
+        [
+            "envelope",
+            PAPER,
+            "--method",
+            method,
+            "--fuzzy",
+            "E",
+            "--duration",
+            "0.5",
+            "--alpha",
+            "[0, 1]",
+        ],
+        capfd,
+    )
+    assert found["min"][0][0] <= found["min"][1][0] <= found["max"][1][0] <= found["max"][0][0]
+    task = task_of(load(PAPER, [f"envelope.method={method}", "envelope.tolerance=2 mm"]))
+    offered = method_options(task)
+    assert offered.get("tolerance", 2e-3) == 2e-3
+    assert "tolerance" in offered or method in ("vertex", "monte-carlo", "quasi-monte-carlo")
+
+
+def test_a_certificate_encloses_the_bounds(capfd):
+    found = answer(
+        [
+            "envelope",
+            PAPER,
+            "--method",
+            "modal",
+            "--fuzzy",
+            "E",
+            "--duration",
+            "0.5",
+            "--certify",
+            "1e-5",
+        ],
+        capfd,
+    )
+    assert found["nature"] in ("guaranteed", "verified by sampling")
+    assert (
+        main(
+            [
+                "envelope",
+                PAPER,
+                "--fuzzy",
+                "E",
+                "--duration",
+                "0.5",
+                "--certify",
+                "1e-5",
+                "--workers",
+                "2",
+                "--alpha",
+                "0",
+            ]
+        )
+        == 0
+    )
+    told = capfd.readouterr().out
+    assert "eigen-analyses" in told
+    assert "enclosed to within 10.00 µm of q1" in told
+    asked = [
+        "--set",
+        "envelope.certify=20 um",
+        "--set",
+        "envelope.method=auto",
+        "--duration",
+        "0.5",
+        "--fuzzy",
+        "m1",
+    ]
+    found = answer(["envelope", PAPER, *asked], capfd)
+    assert found["nature"] == "guaranteed"
+    assert found["facts"]["gap"] == pytest.approx(2e-5, rel=1e-3)
+    assert main(["envelope", "cases/pendulum.toml", "--set", "envelope.certify=1 um"]) == 2
+    assert "a pendulum cannot be certified" in capfd.readouterr().err
+    assert main(["envelope", PAPER, "--method", "vertex", "--certify", "1e-5"]) == 2
+    assert "cannot certify" in capfd.readouterr().err
+
+
+def test_what_c_code_prints_does_not_spoil_the_json(capfd):
+    with standard_output(True) as out:
+        os.write(1, b"noise from a library\n")
+        print("noise from Python", flush=True)
+        out.write("{}\n")
+    printed, err = capfd.readouterr()
+    assert printed == "{}\n"
+    assert "noise from a library" in err
+
+
+def test_only_the_first_rank_speaks(capfd, monkeypatch):
+    monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "1")
+    assert rank() == 1
+    assert main(["check", PAPER]) == 0
+    assert main(["check", "nowhere.toml"]) == 2
+    assert capfd.readouterr() == ("", "")
+
+
+def test_nothing_is_left_half_written(tmp_path):
+    (tmp_path / "kept.txt").write_text("old", encoding="utf-8")
+
+    def stopped():
+        with whole_file(tmp_path / "kept.txt") as partial:
+            partial.write_text("half", encoding="utf-8")
+            raise RuntimeError("stopped")
+
+    with pytest.raises(RuntimeError, match="stopped"):
+        stopped()
+    assert [(file.name, file.read_text()) for file in tmp_path.iterdir()] == [("kept.txt", "old")]
+
+
+def test_numbers_that_are_not_finite_become_null():
+    assert json.loads(as_json({"a": np.array([1.0, np.nan]), "b": {1: np.int64(2)}})) == {
+        "a": [1.0, None],
+        "b": {"1": 2},
+    }
+
+
+@pytest.mark.parametrize(
+    ("words", "ours", "petsc"),
+    [
+        (["cell", "c.toml", "-rve_ksp_rtol", "1e-10"], ["cell", "c.toml"], {"ksp_rtol": "1e-10"}),
+        (["-rve_ksp_monitor", "c.toml"], ["c.toml"], {"ksp_monitor": ""}),
+        (
+            ["-rve_ksp_view", "-rve_pc_type", "lu", "--json", "-"],
+            ["--json", "-"],
+            {"ksp_view": "", "pc_type": "lu"},
+        ),
+        (["-rve_shift", "-1.5", "c"], ["c"], {"shift": "-1.5"}),
+    ],
+)
+def test_petsc_options_are_taken_out_of_the_command_line(words, ours, petsc):
+    assert split_petsc(words) == (ours, petsc)
+
+
+def test_a_second_run_takes_what_is_up_to_date(tmp_path, monkeypatch, capfd):
+    from alphacut.stages import envelope, modulus
+
+    arguments = [
+        "run",
+        PAPER,
+        "--quick",
+        "--set",
+        "modulus.method=series",
+        "--out",
+        str(tmp_path),
+        "--no-figures",
+    ]
+    assert main(arguments) == 0
+    first = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    calls = []
+    for stage in (modulus, envelope):
+        monkeypatch.setattr(
+            stage,
+            "compute",
+            lambda *given, name=stage.__name__, **named: calls.append(name) or 1 / 0,
+        )
+    assert main(arguments) == 0
+    second = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert (second["modulus"], second["envelopes"]) == (first["modulus"], first["envelopes"])
+    assert calls == []
+    assert main([*arguments, "--set", "inclusion_modulus=[74, 80, 85] GPa"]) == 1
+    assert calls == ["alphacut.stages.modulus"]
+    assert main([*arguments, "--fresh"]) == 1
+    capfd.readouterr()
+
+
+def test_another_structure_or_record_is_computed_anew(tmp_path, capfd):
+    from alphacut.stages.pipeline import Chain, studies
+
+    record = tmp_path / "building.record.csv"
+    record.write_text((CASES / "building.record.csv").read_text(encoding="utf-8"), encoding="utf-8")
+    case = tmp_path / "tower.toml"
+    case.write_text((CASES / "tower.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    seen = set()
+
+    def key_of(changes):
+        chain = Chain(load(case, changes), tmp_path, quiet=True)
+        keys = []
+        object.__setattr__(chain, "stored", lambda name, key, compute: keys.append(key))
+        chain.envelope(studies(chain.case)[0], None)
+        return keys[0]
+
+    for changes in ([], ["tower.mass=12 t/m"], ["envelope.step=0.04 s"]):
+        seen.add(key_of(changes))
+    record.write_text(
+        record.read_text(encoding="utf-8").replace("0.01,-0.00001", "0.01,-0.00002", 1),
+        encoding="utf-8",
+    )
+    seen.add(key_of([]))
+    assert len(seen) == 4
+
+
+def test_a_failed_campaign_ends_with_status_3(tmp_path, monkeypatch, capfd):
+    from alphacut.rve.series.model import SeriesModel
+
+    def refuse(*_, **__):
+        raise RuntimeError("no convergence here")
+
+    monkeypatch.setattr(SeriesModel, "solve", refuse)
+    assert (
+        main(
+            [
+                "modulus",
+                PAPER,
+                "--method",
+                "series",
+                "--plan",
+                "reduced",
+                "--out",
+                str(tmp_path / "m.nc"),
+            ]
+        )
+        == 3
+    )
+    assert "samples failed" in capfd.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupt_says_how_to_go_on(monkeypatch, capfd):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(COMMANDS["check"], "load", interrupted)
+    assert main(["check", PAPER]) == 130
+    assert "the same command goes on from there" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_help_and_takes_quiet(name):
+    _, made = parsers("alphacut", COMMANDS)
+    text = made[name].format_help()
+    assert COMMANDS[name].ABOUT[:20].lower() in " ".join(text.split()).lower()
+    assert "--quiet" in text
+
+
+SHIPPED = [path for path in sorted(CASES.glob("*.toml")) if not path.stem.endswith(".quoted")]
+
+
+DRAWN_ELSEWHERE = ("concrete", "paper-literal")  # cases whose figures are those of the paper's case
+
+
+def quick_run(path, folder, capfd, *more):
+    """Summary of the quick form."""
+    assert main(["run", str(path), "--quick", "--out", str(folder), "--quiet", *more]) == 0, (
+        capfd.readouterr().err
+    )
+    return json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_every_shipped_case_runs_in_its_quick_form(path, tmp_path, capfd):
+    pytest.importorskip("dolfinx")
+    undrawn = path.stem in DRAWN_ELSEWHERE
+    summary = quick_run(path, tmp_path, capfd, *(["--no-figures"] if undrawn else []))
+    assert {"modulus", "envelopes"} & set(summary)
+    assert bool(summary["figures"]) != undrawn
+    assert all((tmp_path / name).stat().st_size > 1000 for name in summary["figures"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", DRAWN_ELSEWHERE)
+def test_the_other_cases_draw_their_figures_too(name, tmp_path, capfd):
+    summary = quick_run(CASES / f"{name}.toml", tmp_path, capfd)
+    assert summary["figures"]
+    assert all((tmp_path / figure).stat().st_size > 1000 for figure in summary["figures"])

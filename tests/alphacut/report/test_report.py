@@ -1,0 +1,159 @@
+"""The report is one file that asks for nothing else, and its α slider moves the drawn band."""
+
+import html
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from alphacut.entry import main
+
+PAPER = Path(__file__).parents[3] / "cases" / "paper.toml"
+CHROMIUM = (
+    shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+)
+PROBE = """
+<script>
+const seen = { errors: [], resources: 0, before: "", after: "", zoomed: "", tick: "" };
+window.addEventListener("error", (event) => seen.errors.push(String(event.message)));
+window.addEventListener("securitypolicyviolation", (event) => seen.errors.push(event.blockedURI));
+window.addEventListener("load", () => {
+  const band = () => document.getElementById("band").getAttribute("d");
+  const slider = document.getElementById("alpha");
+  slider.value = 0; slider.dispatchEvent(new Event("input")); seen.before = band();
+  slider.value = 0.5; slider.dispatchEvent(new Event("input")); seen.after = band();
+  const plot = document.getElementById("plot");
+  const box = plot.getBoundingClientRect();
+  plot.dispatchEvent(new WheelEvent("wheel", { deltaY: -1, clientX: box.left + box.width / 2, clientY: box.top + 50, cancelable: true }));
+  seen.zoomed = band();
+  seen.resources = performance.getEntriesByType("resource").length;
+  document.body.dataset.seen = JSON.stringify(seen);
+});
+</script>
+"""
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("results")
+    arguments = [
+        "run",
+        str(PAPER),
+        "--quick",
+        "--set",
+        "modulus.method=series",
+        "--out",
+        str(folder),
+        "--quiet",
+    ]
+    assert main(arguments) == 0
+    assert main(["report", str(folder), "--quiet"]) == 0
+    return folder
+
+
+def test_the_page_asks_for_nothing_outside(results):
+    page = (results / "report.html").read_text(encoding="utf-8")
+    links = re.findall(r'(?:src|href)="([^"]*)"', page)
+    assert all(link.startswith(("data:", "#")) for link in links), [link[:60] for link in links]
+    assert "default-src 'none'" in page
+
+
+def test_the_page_holds_what_a_colleague_asks_for(results):
+    page = (results / "report.html").read_text(encoding="utf-8")
+    for title in (
+        "Fuzzy modulus",
+        "Envelopes",
+        "Paper and here",
+        "Methods and cost",
+        "The case",
+        "Differences from the paper",
+        "Versions and citation",
+    ):
+        assert f"<h2>{title}</h2>" in page
+    summary = json.loads((results / "summary.json").read_text(encoding="utf-8"))
+    assert f"{summary['modulus']['modal_GPa']:.4f} GPa" in page
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
+def test_the_slider_moves_the_band_in_a_browser(results, tmp_path):
+    page = (results / "report.html").read_text(encoding="utf-8")
+    probed = tmp_path / "probed.html"
+    probed.write_text(page.replace("<style>", PROBE + "<style>", 1), encoding="utf-8")
+    flags = [
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-dev-shm-usage",
+        f"--user-data-dir={tmp_path / 'profile'}",
+    ]
+    command = [CHROMIUM, *flags, "--virtual-time-budget=5000", "--dump-dom", probed.as_uri()]
+    dom = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+    seen = json.loads(html.unescape(re.search(r'data-seen="([^"]*)"', dom)[1]))
+    assert seen["errors"] == []
+    assert seen["resources"] == 0
+    assert seen["before"].startswith("M")
+    assert len({seen["before"], seen["after"], seen["zoomed"]}) == 3
+
+
+def test_a_folder_without_results_is_named(tmp_path, capfd):
+    assert main(["report", str(tmp_path)]) == 2
+    assert "summary.json is missing" in capfd.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_certificate_is_told_with_its_gap_and_what_it_rests_on():
+    from alphacut.report.sections import methods
+
+    study = {
+        "method": "modal",
+        "nature": "guaranteed",
+        "trajectories": 52,
+        "seconds": 3.0,
+        "gap": 1e-6,
+        "proof": "bounded by <energy>",
+    }
+    study |= {"gap_output": "q2", "between_nodes": 3e-5}
+    page = methods({"envelopes": {"E": study}})
+    assert "envelope E are proved at every node, and no wider than 1.0 µm of q2" in page
+    assert "by 30 µm at most. Bounded by &lt;energy&gt;." in page
+    assert "Guaranteed bounds are proved" in page
+    assert "proved at" not in methods(
+        {"envelopes": {"E": {k: v for k, v in study.items() if k not in ("gap", "proof")}}}
+    )
+
+
+def test_only_what_the_run_drew_is_shown_and_what_the_command_line_changed_is_told(tmp_path, capfd):
+    case = str(Path(__file__).parents[3] / "cases" / "building.toml")
+    quick = ["run", case, "--quick", "--quiet", "--out", str(tmp_path)]
+    assert main(quick) == 0, capfd.readouterr().err
+    assert (tmp_path / "figures" / "record.svg").is_file()
+    assert main(["report", str(tmp_path), "--quiet"]) == 0
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert page.count("<figure") > 5
+    assert "Acceleration of the ground" in page
+    assert "Changed on the command line" not in page
+    assert main([*quick, "--no-figures", "--set", "exceedance.limit=1 %"]) == 0
+    assert main(["report", str(tmp_path), "--quiet"]) == 0
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<figure" not in page
+    assert "<code>exceedance.limit=1 %</code>" in page
+
+
+def test_the_array_s_shear_ratio_is_told_where_it_is_known():
+    from alphacut.report.sections import isotropy
+
+    assert "1.340 (1 in an isotropic plane); E of eq. 16" in isotropy({"shear_ratio": 1.34})
+    assert isotropy({"shear_ratio": None}) == isotropy({}) == ""
+
+
+def test_the_error_of_a_certified_envelope_is_said_to_be_within_its_bounds():
+    from alphacut.report.envelopes import extremes
+
+    study = {"min": {"q1": -0.2}, "max": {"q1": 0.3}, "error": {"q1": 1e-4}}
+    assert extremes({"E": study}) == [("E", "q1", "−200.0 mm", "300.0 mm", "100 µm")]
+    assert extremes({"E": {**study, "gap": 1e-4}}) == [
+        ("E", "q1", "−200.0 mm", "300.0 mm", "100 µm (within the bounds)")
+    ]

@@ -1,0 +1,210 @@
+"""Peaks and probabilities of exceedance agree with each other and with answers found another way,
+and stand in every result.
+"""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from alphacut.case.load import load
+from alphacut.entry import main
+from alphacut.fuzzy import Interval, Trapezoidal, Triangular
+from alphacut.io.problem import BadInput
+from alphacut.stages.exceedance import exceedance, limit_of, shaped_like
+from alphacut.stages.structure import structure
+
+CASES = Path(__file__).parents[3] / "cases"
+PAPER = CASES / "paper.toml"
+SHORT = ["envelope.duration=1 s", "envelope.alpha=[0, 1]", "exceedance.output=q3"]
+
+
+@pytest.mark.parametrize(
+    "number",
+    [Triangular(1, 2, 5), Interval(-1, 3), Trapezoidal(0, 1, 2, 4)],
+    ids=lambda number: type(number).__name__,
+)
+def test_random_values_have_the_shape_of_the_membership(number):
+    drawn = np.sort(shaped_like(number)(np.random.default_rng(5), 4000))
+    grid = np.linspace(*number.support, 20001)
+    area = np.cumsum(number.membership(grid))
+    share = np.interp(drawn, grid, area / area[-1])
+    assert len(drawn) == 4000
+    assert np.abs(share - (np.arange(4000) + 0.5) / 4000).max() < 1.95 / np.sqrt(
+        4000
+    )  # Kolmogorov–Smirnov, 0.1 %
+
+
+def test_without_random_inputs_the_probability_is_what_the_peaks_say(capfd):
+    arguments = [
+        "envelope",
+        str(PAPER),
+        "--fuzzy",
+        "E",
+        "--duration",
+        "1",
+        "--alpha",
+        "[0, 1]",
+        "--method",
+        "modal",
+        "--json",
+        "-",
+    ]
+    assert main(arguments) == 0
+    peak = json.loads(capfd.readouterr()[0])["peak"]
+    (_, _, least), (_, _, modal) = peak["lower"]
+    most = peak["upper"][0][2]
+    assert least <= modal < most
+    for limit, wanted in (
+        (0.9 * least, [1, 1]),
+        (1.001 * most, [0, 0]),
+        ((modal + most) / 2, [0, 1]),
+    ):
+        found = exceedance(
+            load(PAPER, [*SHORT, "envelope.fuzzy=E", f"exceedance.limit={limit} m"]), None
+        )
+        assert found["exceedance"].sel(alpha=0).values.tolist() == wanted
+
+
+def test_a_random_modulus_gives_the_share_found_by_quadrature():
+    changes = [*SHORT, "envelope.fuzzy=E", "exceedance.random=E", "exceedance.samples=1000"]
+    wanted = structure(load(PAPER), None)
+    grid = np.linspace(*wanted.numbers["E"].support, 401)
+    peak = np.abs(wanted.flow(("E",), 1.0, 0.01, "exact").values(grid[:, None])[:, :, 2]).max(1)
+    weight = wanted.numbers["E"].membership(grid)
+    limit = float(np.quantile(peak, 0.4))
+    share = float(weight @ (peak > limit) / weight.sum())
+    assert 0.1 < share < 0.9
+    found = exceedance(load(PAPER, [*changes, f"exceedance.limit={limit} m"]), None)
+    low, high = found["exceedance"].sel(alpha=0).values
+    assert low == high == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / 1000))
+
+
+def test_a_run_keeps_peaks_and_probability(tmp_path, capfd):
+    changes = [
+        'stages=["envelope"]',
+        "exceedance.output=q3",
+        "exceedance.limit=9 cm",
+        "exceedance.random=E",
+    ]
+    arguments = ["run", str(PAPER), "--quick", "--no-figures", "--quiet", "--out", str(tmp_path)]
+    assert main([*arguments, *(f"--set={change}" for change in changes)]) == 0, (
+        capfd.readouterr().err
+    )
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert summary["exceedance"]["limit"] == pytest.approx(0.09)
+    assert summary["exceedance"]["random"] == "E"
+    study = summary["envelopes"]["E-5s"]
+    assert study["peak"]["q1"]["upper"][0] == pytest.approx(
+        max(-study["min"]["q1"], study["max"]["q1"])
+    )
+    with xarray.open_dataset(tmp_path / "envelope_E-5s.nc") as stored:
+        assert stored["peak"].dims == ("alpha", "bound", "output")
+    assert main(["report", str(tmp_path), "--quiet"]) == 0
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<h3>Peaks</h3>" in page
+    assert "Probability of |q3| &gt; 90.00 mm" in page
+
+
+@pytest.mark.parametrize(
+    ("case", "changes", "pattern"),
+    [
+        ("paper", ["exceedance.output=q3", "exceedance.limit=20 N"], 'unit "N" is wrong'),
+        ("paper", ["exceedance.output=q3", "exceedance.limit=-20 mm"], "out of range"),
+        ("paper", ["exceedance.output=q4", "exceedance.limit=20 mm"], "no output q4"),
+        (
+            "paper",
+            ["exceedance.output=q3", "exceedance.limit=20 mm", "exceedance.random=m9"],
+            "no input m9",
+        ),
+        ("paper", ["exceedance.output=q3"], r"exceedance\.limit.*missing"),
+        (
+            "pendulum",
+            ["exceedance.output=forse", "exceedance.limit=20 N"],
+            "no output forse.*did you mean force",
+        ),
+        ("pendulum", ["exceedance.output=force", "exceedance.limit=20 m"], 'unit "m" is wrong'),
+        ("tower", ["exceedance.output=q3", "exceedance.limit=20 mm"], "no output q3.*roof, drift"),
+    ],
+)
+def test_a_limit_that_makes_no_sense_is_refused(case, changes, pattern):
+    with pytest.raises(BadInput, match=pattern):
+        load(CASES / f"{case}.toml", changes)
+
+
+def test_a_pendulum_may_exceed_a_force():
+    changes = [
+        "envelope.duration=1 s",
+        "envelope.fuzzy=m,d",
+        "envelope.alpha=[0, 1]",
+        "exceedance.output=force",
+    ]
+    random = ["exceedance.random=phi_0", "exceedance.samples=400"]
+    wanted = structure(load(CASES / "pendulum.toml"), None)
+    number, points = wanted.numbers["phi_0"], []
+    grid = np.linspace(*number.support, 301)
+    for m, d in ((0.95, 0.12), (1.05, 0.08)):  # the least and the greatest force
+        points.append(
+            np.abs(
+                wanted.flow(("phi_0", "m", "d"), 1.0, 0.01).values(
+                    np.c_[grid, np.full((301, 2), (m, d))]
+                )[:, :, 0]
+            ).max(1)
+        )
+    limit = float(np.quantile(points[0], 0.7))
+    weight = number.membership(grid)
+    least, most = (float(weight @ (peak > limit) / weight.sum()) for peak in points)
+    found = exceedance(
+        load(CASES / "pendulum.toml", [*changes, *random, f"exceedance.limit={limit} N"]), None
+    )
+    low, high = found["exceedance"].sel(alpha=0).values
+    assert (low, high) == pytest.approx((least, most), abs=0.1)
+    assert low < high
+    assert found.attrs["random"] == "phi_0"
+
+
+@pytest.mark.parametrize(("limit", "meters"), [("1 %", 0.04), ("0.5 %", 0.02), ("20 mm", 0.02)])
+def test_a_drift_may_be_limited_by_a_share_of_the_storey_height(limit, meters):
+    case = load(CASES / "building.toml", ["exceedance.output=drift1", f"exceedance.limit={limit}"])
+    assert limit_of(case) == pytest.approx(meters)
+    assert limit_of(
+        load(CASES / "building.toml", ["exceedance.output=drift2", "exceedance.limit=1 %"])
+    ) == pytest.approx(0.032)
+    assert limit_of(
+        load(CASES / "tower.toml", ["exceedance.output=drift", "exceedance.limit=1 %"])
+    ) == pytest.approx(0.03)
+
+
+@pytest.mark.parametrize("output", ["q8", "shear3", "drift9"])
+def test_a_share_limits_nothing_else_than_a_drift(output):
+    with pytest.raises(BadInput, match=r"exceedance\.(limit|output)"):
+        load(CASES / "building.toml", [f"exceedance.output={output}", "exceedance.limit=1 %"])
+
+
+def test_the_limited_output_need_not_be_observed_besides():
+    changes = [*SHORT[:2], "envelope.fuzzy=E", "exceedance.output=drift2", "exceedance.limit=1 %"]
+    bare, observed = (
+        exceedance(load(PAPER, [*changes, *more]), None)
+        for more in ((), ["frame.outputs=q1,q2,q3,drift2"])
+    )
+    assert bare["curve"].equals(observed["curve"])
+    assert 0 < float(bare["limit"][0]) < float(bare["limit"][-1])
+
+
+def test_the_probability_over_the_limit_falls_from_one_to_zero_and_meets_the_limit_s():
+    changes = [*SHORT, "envelope.fuzzy=E,m3", "exceedance.random=E"]
+    found = exceedance(load(PAPER, [*changes, "exceedance.limit=0.19 m"]), None)
+    curve = found["curve"].transpose("alpha", "bound", "limit").values
+    assert (curve[:, :, 0] == 1).all()
+    assert (curve[:, :, -1] == 0).all()
+    assert (np.diff(curve, axis=2) <= 0).all()
+    assert (curve[0, 0] <= curve[1, 0]).all()
+    assert (curve[0, 1] >= curve[1, 1]).all()
+    for index in (60, 100, 140):
+        limit = float(found["limit"][index]) + 1e-12
+        there = exceedance(load(PAPER, [*changes, f"exceedance.limit={limit!r} m"]), None)[
+            "exceedance"
+        ].transpose("alpha", "bound")
+        assert there.values == pytest.approx(curve[:, :, index])

@@ -1,0 +1,139 @@
+"""`check` finds what `run` would stumble over, and `run` says it before anything is computed."""
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from alphacut.entry import main
+
+CASES = Path(__file__).parents[3] / "cases"
+
+
+def own(folder, name, *changes):
+    """A copy of a shipped case and its record, with changes of its text."""
+    text = (CASES / f"{name}.toml").read_text(encoding="utf-8")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    shutil.copy(CASES / "building.record.csv", folder)
+    path = folder / "own.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+BROKEN = {
+    "no modulus": (
+        "building",
+        [('["modulus", "envelope"]', '["envelope"]')],
+        r"own.toml:\d+: frame.modulus: missing.*stages = ",
+    ),
+    "crisp input": (
+        "paper",
+        [('fuzzy = ["E"]', 'fuzzy = ["l"]')],
+        r"own.toml:\d+: study\[0\].fuzzy = l: this input is crisp",
+    ),
+    "crisp random": (
+        "building",
+        [('random = ["E"]', 'random = ["m1"]')],
+        r"own.toml:\d+: exceedance.random = m1: .*crisp",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+@pytest.mark.parametrize("command", ["check", "run"])
+def test_what_cannot_run_is_found_before(command, name, tmp_path, capfd):
+    case, changes, pattern = BROKEN[name]
+    path = own(tmp_path, case, *changes)
+    more = ["--out", str(tmp_path / "results")] if command == "run" else []
+    assert main([command, str(path), *more]) == 2
+    err = capfd.readouterr().err
+    assert re.search(pattern, err), err
+    assert len(err.splitlines()) == 1
+    assert not (tmp_path / "results").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "what"),
+    [
+        (
+            "0.02,-0.00000",
+            "0.02;-0.00000",
+            (
+                r"building.record.csv:5: frame.accelerogram = 0.02;-0.00000: .*pair of numbers;"
+                r" allowed: a time"
+            ),
+        ),
+        (
+            "0.02,-0.00000",
+            "0.025,-0.00000",
+            r"building.record.csv:5: .*this row is at 0.025 s; allowed: 0.02 s here",
+        ),
+        ("[m/s^2]", "[m/s]", r"building.record.csv:2: .*unit"),
+    ],
+)
+@pytest.mark.parametrize("command", ["check", "run"])
+def test_a_broken_record_is_read_by_check_and_its_line_is_that_of_the_file(
+    command, old, new, what, tmp_path, capfd
+):
+    path = own(tmp_path, "building")
+    record = tmp_path / "building.record.csv"
+    record.write_text(record.read_text(encoding="utf-8").replace(old, new, 1), encoding="utf-8")
+    more = ["--out", str(tmp_path / "results")] if command == "run" else []
+    assert main([command, str(path), *more]) == 2
+    assert re.search(what, capfd.readouterr().err)
+    assert not (tmp_path / "results").exists()
+
+
+def warnings(path, *more, capfd):
+    assert main(["check", str(path), "--json", "-", *more]) == 0
+    out, err = capfd.readouterr()
+    found = json.loads(out)["warnings"]
+    assert all(warning in err for warning in found)
+    return found
+
+
+def test_a_duration_beyond_the_record_is_remarked(tmp_path, capfd):
+    path = own(tmp_path, "building", ('duration = "20 s"', 'duration = "30 s"'))
+    (found,) = warnings(path, capfd=capfd)
+    assert "the record ends at 20 s and the simulation at 30 s" in found
+
+
+def test_a_coarse_step_is_warned_of(tmp_path, capfd):
+    path = own(tmp_path, "building", ('integrator = "exact"', 'integrator = "midpoint"'))
+    (found,) = warnings(path, capfd=capfd)
+    assert "omega_max h" in found
+    assert main(["run", str(path), "--strict", "--out", str(tmp_path / "results")]) == 2
+    assert not (tmp_path / "results").exists()
+
+
+@pytest.mark.parametrize(
+    "path",
+    [path for path in sorted(CASES.glob("*.toml")) if ".quoted" not in path.name],
+    ids=lambda path: path.stem,
+)
+def test_the_shipped_cases_are_ready(path, capfd):
+    told = warnings(path, capfd=capfd)
+    if path.stem == "paper-literal":  # the table read literally is no building
+        assert "first natural period of 0.00221 s is unusual" in told.pop()
+    assert told == []
+
+
+@pytest.mark.parametrize("command", ["check", "run"])
+def test_a_file_of_circles_is_read_before(command, tmp_path, capfd):
+    text = (CASES / "concrete.toml").read_text(encoding="utf-8")
+    start = text.index("[microstructure.packing]")
+    end = text.index("\n[", start)
+    circles = '[microstructure.circles]\nfile = "d.csv"\nsize = ["50 mm", "50 mm"]\n'
+    path = tmp_path / "own.toml"
+    path.write_text(text[:start] + circles + text[end:], encoding="utf-8")
+    (tmp_path / "d.csv").write_text("d [mm]\n3\n4\n", encoding="utf-8")
+    more = ["--out", str(tmp_path / "results")] if command == "run" else []
+    assert main([command, str(path), *more]) == 2
+    told = capfd.readouterr().err
+    assert "microstructure.circles.file" in told
+    assert "has no column x, y" in told
+    assert "'x [mm], y [mm], r [mm]'" in told

@@ -1,0 +1,78 @@
+"""What drives the width of a vibration: also under an earthquake; left out, with the reason, where
+there are no modes.
+"""
+
+import json
+from pathlib import Path
+
+import pytest
+import xarray
+
+from alphacut.entry import main
+from alphacut.stages.width_shares import thinned
+
+CASES = Path(__file__).parents[3] / "cases"
+SHORT = ['stages=["envelope"]', "envelope.fuzzy=E,m3"]
+
+
+def run(tmp_path, *changes, case="paper"):
+    text = (CASES / f"{case}.toml").read_text(encoding="utf-8").partition("[[study]]")
+    whole = text[0] + (
+        "[envelope]" + text[2].partition("[envelope]")[2] if text[1] else ""
+    )  # without its studies
+    (tmp_path / "case.toml").write_text(whole, encoding="utf-8")
+    (tmp_path / "record.csv").write_bytes((CASES / "building.record.csv").read_bytes())
+    words = [word for change in (*SHORT, *changes) for word in ("--set", change)]
+    return main(
+        [
+            "run",
+            str(tmp_path / "case.toml"),
+            "--quick",
+            "--no-figures",
+            "--quiet",
+            "--out",
+            str(tmp_path / "out"),
+            *words,
+        ]
+    )
+
+
+@pytest.mark.parametrize(
+    ("duration", "step", "factor"),
+    [(20.0, 0.01, 5), (1.0, 0.01, 1), (30.0, 0.01, 8), (0.07, 0.01, 1)],
+)
+def test_shares_take_some_hundreds_of_nodes(duration, step, factor):
+    assert thinned(duration, step) == pytest.approx(factor * step)
+    assert round(duration / thinned(duration, step), 9) == int(
+        round(duration / thinned(duration, step), 9)
+    )
+
+
+def test_a_frame_under_an_earthquake_has_shares_and_its_report_names_periods(tmp_path, capfd):
+    assert run(tmp_path, "frame.accelerogram=record.csv") == 0, capfd.readouterr().err
+    with xarray.open_dataset(tmp_path / "out" / "shares.nc") as found:
+        assert set(found["input"].values) == {"E", "m3"}
+        assert float(found["share"].isel(time=-1).sum("input").min()) > 0.3
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert set(summary["shares"]["q3"]) == {"E", "m3"}
+    assert main(["report", str(tmp_path / "out"), "--quiet"]) == 0
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "First natural periods at the modal values: 7, 3.12, 1.93 s" in page
+    assert "Inner bounds are attained" in page
+    assert "error up to" not in page  # the Graph Follower estimates none
+
+
+def test_a_modal_envelope_tells_its_error(tmp_path, capfd):
+    assert run(tmp_path, "envelope.method=modal") == 0, capfd.readouterr().err
+    assert main(["report", str(tmp_path / "out"), "--quiet"]) == 0
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "error up to" in page
+    assert "eigen-analyses" in page
+    assert "Estimated bounds come from a model" in page
+
+
+def test_without_oscillating_modes_a_run_goes_on_without_shares(tmp_path, capfd):
+    assert run(tmp_path, "frame.dampers=1 kN s/mm") == 0, capfd.readouterr().err
+    assert "no shares of the width over time: a mode does not oscillate" in capfd.readouterr().err
+    with xarray.open_dataset(tmp_path / "out" / "shares.nc") as found:
+        assert "share" not in found

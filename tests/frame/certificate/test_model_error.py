@@ -1,0 +1,354 @@
+"""The proved error of modal models: never below the true one, wherever that is sampled, and near
+enough to be of use.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import cumulative_trapezoid, solve_ivp
+
+from alphacut.frame import (
+    Accelerogram,
+    Exact,
+    LinearFlow,
+    MatrixStructure,
+    Midpoint,
+    StoreyFrame,
+    envelope,
+)
+from alphacut.frame.boxes import UnitFlow, boxes
+from alphacut.frame.calculus.chebyshev_bounds import ChebyshevGrid
+from alphacut.frame.calculus.polynomial import Polynomial
+from alphacut.frame.certificate import model_error
+from alphacut.frame.certificate.model_error import Comparison, proved_error
+from alphacut.frame.certificate.remainder import largest_growth
+from alphacut.frame.certificate.wave_bounds import parts
+from alphacut.frame.dynamics.spectral import responses
+from alphacut.frame.modal.ground_response import left_out
+from alphacut.frame.modal.model import ModalModel, fit_modes
+from alphacut.frame.structures.linear import evaluate
+from alphacut.frame.structures.polynomial_dependence import (
+    UnprovedError,
+    degrees,
+    inverse_cube_degree,
+)
+from alphacut.fuzzy import Interval, Triangular
+
+FRAME = StoreyFrame(
+    (20e3, 15e3, 10e3),
+    (4.0, 3.5, 3.0),
+    25e9,
+    1e-4,
+    (9e3, 5e3, 0.0),
+    q0=(0.1, 0.2, 0.25),
+    v0=(0.0, 0.5, 0.0),
+    outputs=("q3", "v1", "drift2"),
+)
+SHEAR = replace(
+    FRAME, outputs=("base_shear",), rayleigh=(0.02, 1e-4), dampers=(), damper_placement="storey"
+)
+SHAKEN = replace(
+    FRAME, ground=Accelerogram(0.05, 3 * np.random.default_rng(8).standard_normal(120))
+)
+CHAIN = MatrixStructure(
+    {"m": 2.0, "k": 80.0, "d": 0.3},
+    mass=[("m", np.eye(2))],
+    stiffness=[("k", np.array([[2.0, -1.0], [-1.0, 1.0]])), (3.0, np.eye(2))],
+    observed={"tip": np.array([0.0, 1.0])},
+    damping=[("d", np.diag([1.0, 0.0]))],
+    q0=np.array([0.0, 0.1]),
+)
+
+
+def model(system, inputs, tolerance=1e-4, **changes) -> ModalModel:
+    flow = LinearFlow(system, tuple(inputs), 10.0, 0.1, Exact())
+    return fit_modes(replace(flow, **changes), boxes(inputs, (0,)), tolerance=tolerance)
+
+
+@pytest.mark.parametrize(
+    ("system", "inputs"),
+    [
+        (
+            FRAME,
+            {
+                "E": Triangular(23e9, 25e9, 26e9),
+                "m1": Interval(19e3, 21e3),
+                "m3": Interval(9e3, 11e3),
+            },
+        ),
+        (FRAME, {"l1": Interval(3.9, 4.1), "d1": Interval(7e3, 11e3), "q3_0": Interval(0.2, 0.3)}),
+        (
+            SHEAR,
+            {
+                "E": Interval(24e9, 26e9),
+                "rayleigh_mass": Interval(0.01, 0.03),
+                "rayleigh_stiffness": Interval(0.0, 2e-4),
+            },
+        ),
+        (
+            SHAKEN,
+            {"E": Interval(24e9, 26e9), "m2": Interval(14e3, 16e3), "d1": Interval(7e3, 11e3)},
+        ),
+        (CHAIN, {"m": Interval(1.9, 2.1), "k": Interval(75, 85), "d": Interval(0.0, 0.6)}),
+    ],
+)
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-5])
+def test_no_sampled_trajectory_deviates_by_more_than_the_proved_error(
+    system, inputs, tolerance
+) -> None:
+    scale = 1e5 if system is SHEAR else 1.0  # N beside m
+    found = model(system, inputs, scale * tolerance)
+    unit = np.vstack(
+        [
+            np.random.default_rng(3).uniform(-1, 1, (300, 3)),
+            np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T,
+        ]
+    )
+    truth = UnitFlow(found.flow, found.boxes).values(unit)
+    deviation, proved = np.abs(found.values(unit) - truth).max(0), proved_error(found)
+    assert (deviation <= proved + 1e-12 * np.abs(truth).max()).all()
+    assert proved.max() < 1000 * deviation.max()
+
+
+def stretched(polynomial: Polynomial) -> Polynomial:
+    """The same with its constant and its first slope a thousandth too large."""
+    coefficients = polynomial.coefficients.copy()
+    coefficients[1] *= 1.001
+    coefficients[0] *= 1.001
+    return Polynomial(polynomial.index, coefficients)
+
+
+@pytest.mark.parametrize("wrong", ["eigenvalue", "coefficient", "load"])
+def test_a_model_that_is_wrong_is_proved_to_be_no_better(wrong) -> None:
+    system = SHAKEN if wrong == "load" else FRAME
+    good = model(system, {"E": Interval(24e9, 26e9), "m2": Interval(14e3, 16e3)}, 1e-7)
+    if wrong == "load":
+        assert good.load is not None
+        tables = tuple(replace(table, share=stretched(table.share)) for table in good.load.tables)
+        bad = replace(
+            good, load=replace(good.load, share=stretched(good.load.share), tables=tables)
+        )
+    else:
+        bad = replace(good, **{wrong: stretched(getattr(good, wrong))})
+    unit = np.array([[-1.0, 0.3], [1.0, -0.2], [0.9, 1.0]])
+    deviation = np.abs(bad.values(unit) - UnitFlow(bad.flow, bad.boxes).values(unit)).max(0)
+    assert deviation.max() > 1e-5 > proved_error(good).max()
+    assert (deviation <= proved_error(bad) + 1e-12).all()
+
+
+def test_what_is_not_known_is_not_proved() -> None:
+    inputs = {"E": Interval(24e9, 26e9), "m2": Interval(14e3, 16e3)}
+    with pytest.raises(UnprovedError, match="midpoint"):
+        proved_error(model(FRAME, inputs, integrator=Midpoint()))
+    with pytest.raises(UnprovedError, match="positive definite"):
+        proved_error(
+            model(
+                FRAME,
+                {"l1": Interval(3.0, 5.0), "l2": Interval(2.5, 4.5), "l3": Interval(2.0, 4.0)},
+                0.1,
+            )
+        )
+
+
+def test_structures_that_may_gain_energy_or_are_no_polynomials_are_refused() -> None:
+    box = {"m": (1.9, 2.1)}
+    with pytest.raises(UnprovedError, match="function"):
+        degrees(replace(CHAIN, mass=[(lambda p: p["m"] ** 2, np.eye(2))]), box)
+    with pytest.raises(UnprovedError, match="feed energy"):
+        degrees(replace(CHAIN, damping=[("d", np.array([[0.0, 1.0], [1.0, 0.0]]))]), box)
+    with pytest.raises(UnprovedError, match="feed energy"):
+        degrees(CHAIN, {"d": (-0.1, 0.1)})
+    with pytest.raises(UnprovedError, match="symmetric"):
+        degrees(replace(CHAIN, stiffness=[("k", np.array([[2.0, 1.0], [0.0, 1.0]]))]), box)
+    for damped in (replace(CHAIN, ratios=(0.05,)), replace(FRAME, damping_ratio=0.05)):
+        with pytest.raises(UnprovedError, match="modal ratios"):
+            degrees(damped, {})
+    with pytest.raises(UnprovedError, match="nothing is known"):
+        degrees(object(), box)  # type: ignore[arg-type]
+
+
+def test_certificate_says_why_it_is_only_sampled() -> None:
+    inputs = {"m": Interval(1.9, 2.1), "k": Interval(75, 85)}
+    stretched = replace(
+        CHAIN,
+        stiffness=[(lambda p: p["k"], np.array([[2.0, -1.0], [-1.0, 1.0]])), (3.0, np.eye(2))],
+    )
+    proved, sampled = (
+        envelope(s, inputs, duration=4, step=0.5, alpha=(0,), method="modal", certify=1e-4)
+        for s in (CHAIN, stretched)
+    )
+    assert proved.nature == "guaranteed"
+    assert "energy" in str(proved.facts["proof"])
+    assert sampled.nature == "verified by sampling"
+    assert "stiffness has a factor that is a function" in str(sampled.facts["proof"])
+    assert np.abs(proved.upper - sampled.upper).max() < 1e-4
+
+
+@pytest.mark.parametrize(("lower", "upper"), [(3.96, 4.04), (3.0, 5.0), (1.0, 4.0)])
+def test_degree_of_the_inverse_cube_reaches_round_off_and_not_far_beyond(lower, upper) -> None:
+    degree = inverse_cube_degree(lower, upper)
+    coefficients = np.polynomial.chebyshev.chebinterpolate(
+        lambda u: ((upper + lower) / 2 + (upper - lower) / 2 * u) ** -3.0, 2 * degree + 8
+    )
+    size = np.abs(coefficients) / np.abs(coefficients).max()
+    assert size[degree + 1 :].max() < 1e-13
+    assert size[: degree // 2 + 1].min() > 1e-14
+
+
+def test_chebyshev_coefficients_are_exact() -> None:
+    grid = ChebyshevGrid((3, 2))
+    x, y = grid.points.T
+    values = np.stack([1 + 2 * x - y, (4 * x**3 - 3 * x) * (2 * y**2 - 1) * 5], -1)
+    found = grid.coefficients(values.copy()).reshape(4, 3, 2)
+    expected = np.zeros((4, 3, 2))
+    expected[0, 0, 0], expected[1, 0, 0], expected[0, 1, 0], expected[3, 2, 1] = 1, 2, -1, 5
+    assert np.abs(found - expected).max() < 1e-14
+
+
+def test_comparison_holds_over_the_box() -> None:
+    rng = np.random.default_rng(5)
+    mean, part = np.diag([2.0, 3.0, 4.0]), rng.uniform(-0.3, 0.3, (2, 3, 3))
+    coefficients = np.stack([mean, *(part + part.swapaxes(-1, -2)) / 2])
+    found = Comparison.of(coefficients)
+    x = rng.standard_normal((5, 3))
+    for u, v in rng.uniform(-1, 1, (200, 2)):
+        A = coefficients[0] + u * coefficients[1] + v * coefficients[2]
+        assert (
+            np.linalg.eigvalsh(A - found.lowest * mean).min()
+            > 0
+            > np.linalg.eigvalsh(A - found.highest * mean).max()
+        )
+        assert all(
+            np.sqrt(y @ A @ y) <= found.sup(y[None])
+            and np.sqrt(y @ np.linalg.solve(A, y)) <= found.sup_dual(y[None])
+            for y in x
+        )
+
+
+def test_gap_is_shared_out_by_the_size_of_outputs_with_other_units() -> None:
+    inputs = {"E": Interval(24e9, 26e9), "m2": Interval(14e3, 16e3)}
+    both = replace(FRAME, outputs=("q3", "base_shear"))
+    found = envelope(both, inputs, duration=2, step=0.25, alpha=(0,), method="modal", certify=1e-5)
+    assert found.nature == "guaranteed"
+    assert found.inner_upper is not None
+    length, force = (found.upper - found.inner_upper)[0].max(0)
+    ratio = np.abs(found.upper[0, :, 1]).max() / np.abs(found.upper[0, :, 0]).max()
+    assert 1e-6 < length <= 1e-5
+    assert 1e-6 * ratio < force < 2e-5 * ratio
+
+
+def test_what_branch_and_bound_does_not_cover_is_refused_at_once() -> None:
+    seven = {name: Interval(0.99 * x, 1.01 * x) for name, x in list(FRAME.parameters.items())[:7]}
+    with pytest.raises(ValueError, match="7 uncertain parameters"):
+        envelope(FRAME, seven, duration=2, step=0.1, alpha=(0,), method="modal", certify=1e-5)
+
+
+def test_envelope_under_a_record_is_certified_and_contains_every_trajectory() -> None:
+    inputs = {"E": Interval(24e9, 26e9), "m2": Interval(14e3, 16e3)}
+    shaken = replace(SHAKEN, outputs=("q3", "base_shear"))
+    found = envelope(
+        shaken, inputs, duration=5, step=0.05, alpha=(0,), method="modal", certify=1e-5
+    )
+    assert found.nature == "guaranteed"
+    assert float(found.facts["gap"]) <= 1e-5
+    flow = LinearFlow(shaken, tuple(inputs), 5, 0.05, Exact())
+    low, high = np.array([number.cut(0) for number in inputs.values()]).T
+    share = np.vstack(
+        [np.random.default_rng(4).random((1500, 2)), [[0, 0], [0, 1], [1, 0], [1, 1]]]
+    )
+    values = flow.values(low + (high - low) * share)
+    assert (values <= found.upper[0]).all()
+    assert (values >= found.lower[0]).all()
+
+
+def test_waves_and_their_derivatives_stay_below_their_bounds() -> None:
+    found = model(SHAKEN, {"E": Interval(24e9, 26e9), "m2": Interval(14e3, 16e3)})
+    growth = largest_growth(found.eigenvalue, np.ones(2))
+    forced = parts(found, growth)[1]
+    unit = np.random.default_rng(6).uniform(-1, 1, (40, 2))
+    rate = found.eigenvalue(unit)
+    h = found.flow.step / SHAKEN.ground.intervals(found.flow.step)
+    every = SHAKEN.ground.intervals(found.flow.step)
+    load = SHAKEN.ground.at(np.arange((len(found.time) - 1) * every + 1) * h)
+    for order, wave in enumerate(responses(rate, load, h, every=every, derivatives=True)):
+        size = np.abs(wave).max(0)
+        assert (size <= forced.waves[order] * (1 + 1e-9) + 1e-15).all()
+        assert size.max() > 0.05 * forced.waves[order].max()  # and the bounds are not idle
+    walked = cumulative_trapezoid(
+        np.abs(responses(rate, load, h, every=every)[0]), dx=found.flow.step, axis=1, initial=0
+    )
+    assert (walked.max(0) <= 1.02 * forced.elapsed + 1e-12).all()
+
+
+@pytest.mark.parametrize(("phase", "order"), [(0.01, 4), (1.0, 8), (6.0, 20), (6.0, 35)])
+def test_remainder_of_the_exponential_series_is_bounded(phase, order) -> None:
+    x = phase * np.exp(1j * np.linspace(0, 2 * np.pi, 25))
+    terms = (
+        np.cumprod(
+            np.concatenate([np.ones((1, 25)), x / np.arange(order, order + 40)[:, None]]), axis=0
+        ).sum(0)
+        * x**order
+    )
+    remainder = np.abs(terms).max() / np.prod(np.arange(1.0, order + 1))
+    assert remainder <= left_out(phase, order) < 1e7 * remainder
+
+
+def test_series_leave_out_of_the_load_response_no_more_than_they_say() -> None:
+    found = model(SHAKEN, {"E": Interval(20e9, 30e9)})
+    assert found.load is not None
+    unit = np.linspace(-1, 1, 21)[:, None]
+    rate = found.eigenvalue(unit)
+    every = SHAKEN.ground.intervals(found.flow.step)
+    h = found.flow.step / every
+    truth = responses(
+        rate, SHAKEN.ground.at(np.arange((len(found.time) - 1) * every + 1) * h), h, every=every
+    )[0]
+    assert found.load.truncation.max() > 0
+    bound = (
+        found.load.truncation
+        * parts(found, largest_growth(found.eigenvalue, np.ones(1)))[1].waves[0]
+    )
+    for node in (20, 60, 100):
+        got = found.load.response(rate, np.full(len(unit), node))[0]
+        assert (np.abs(got - truth[:, node]) <= bound[node] + 1e-13).all()
+
+
+@pytest.mark.parametrize("kind", ["kinematic", "dynamic"])
+def test_each_of_the_two_defects_counts(kind, monkeypatch) -> None:
+    """A defect 2 Re d exp(λ t) in one of the two equations alone deviates as the integrated
+    equations say, and not beyond the bound.
+    """
+    found = model(FRAME, {"E": Interval(24.9e9, 25.1e9)}, 1e-7)
+    unit = np.zeros((1, 1))
+    matrices, rows = evaluate(
+        found.flow.system, found.flow.names, found.boxes.to_physical(unit), derivatives=False
+    )
+    M, D, K = (part.value[0] for part in (matrices.mass, matrices.damping, matrices.stiffness))
+    strange = np.array([1e-6, -2e-6, 1e-6]) * (1.0 if kind == "kinematic" else 1e3)
+    true = model_error._defects
+
+    def only(*args):
+        defects = {name: np.zeros_like(values) for name, values in true(*args).items()}
+        defects[kind][:, 1] = strange
+        return defects
+
+    monkeypatch.setattr(model_error, "_defects", only)
+    bound = proved_error(found)
+    rate = found.eigenvalue(unit)[0, 1]
+    inverse, zero = np.linalg.inv(M), np.zeros(3)
+    pushed = np.concatenate((strange, zero) if kind == "kinematic" else (zero, inverse @ strange))
+    matrix = np.block([[np.zeros((3, 3)), np.eye(3)], [-inverse @ K, -inverse @ D]])
+    moved = solve_ivp(
+        lambda t, x: matrix @ x + 2 * (pushed * np.exp(rate * t)).real,
+        (0, 10),
+        np.zeros(6),
+        t_eval=found.time,
+        rtol=1e-8,
+        atol=1e-14,
+    )
+    deviation = np.abs(moved.y.T @ rows.value[0].T)
+    assert (deviation <= bound + 1e-15).all()
+    assert deviation.max() > bound.max() / 50

@@ -1,0 +1,73 @@
+"""What is done where no method is named, and what is said of a modal model that misses its
+tolerance.
+"""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+from alphacut.frame import Exact, LinearFlow, MatrixStructure, StoreyFrame, envelope
+from alphacut.frame.structures.modes import ModalError
+from alphacut.fuzzy import Interval, Triangular
+
+FRAME = StoreyFrame((2e4, 1e4), (3.0, 3.0), 25e9, 1e-6, q0=(0.0, 0.01))
+LIGHT = {"m1": Interval(1e-3, 2e4)}
+EYE = np.eye(2)
+DOUBLE = MatrixStructure(
+    {"k": 10.0}, [(1.0, EYE)], [("k", EYE)], {"x": np.array([1.0, 0.0])}, q0=np.array([1.0, 2.0])
+)
+
+
+def test_a_double_mode_is_no_smooth_function_and_is_left_to_the_graph_follower() -> None:
+    found = envelope(DOUBLE, {"k": Triangular(9, 10, 12)}, duration=1.0, step=0.01)
+    assert found.method == "improved-graph-follower"
+    assert "modes 1 and 2 have the same frequency" in str(found.facts["reason"])
+    truth = np.cos(np.sqrt(np.linspace(9, 12, 400))[:, None] * found.time)
+    assert found.upper[-1, 50, 0] == pytest.approx(np.cos(np.sqrt(10) / 2), abs=1e-6)
+    assert found.error is not None
+    assert (truth.max(0) - found.upper[0, :, 0] <= found.error[0, :, 0]).all()
+    with pytest.raises(ModalError, match="take the method auto"):
+        envelope(DOUBLE, {"k": Triangular(9, 10, 12)}, duration=1.0, step=0.01, method="modal")
+
+
+def test_a_support_too_wide_for_polynomials_keeps_the_wanted_error() -> None:
+    found = envelope(FRAME, LIGHT, duration=1.0, step=0.02, alpha=(0,))
+    values = LinearFlow(FRAME, ("m1",), 1.0, 0.02, Exact()).values(
+        np.geomspace(1e-3, 2e4, 1500)[:, None]
+    )
+    assert (
+        max((values.max(0) - found.upper[0]).max(), (found.lower[0] - values.min(0)).max()) < 1e-4
+    )
+    assert "since modal estimates" in str(found.facts["reason"])
+
+
+def test_a_modal_model_that_misses_its_tolerance_says_so() -> None:
+    with pytest.warns(
+        UserWarning, match="reach .* and not the tolerance 1e-06.*take the method auto"
+    ):
+        found = envelope(FRAME, LIGHT, duration=1.0, step=0.02, alpha=(0,), method="modal")
+    assert "not the tolerance" in str(found.facts["reason"])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        envelope(FRAME, LIGHT, duration=1.0, step=0.02, alpha=(0,))
+
+
+def test_forces_alone_are_told_to_a_share_of_their_peaks() -> None:
+    shears = StoreyFrame(
+        (2e4, 1e4), (3.0, 3.0), 25e9, 1e-6, q0=(0.0, 0.01), outputs=("base_shear", "v2")
+    )
+    found = envelope(shears, {"E": Triangular(24e9, 25e9, 26e9)}, duration=1.0, step=0.02)
+    assert found.method == "modal"
+    assert found.error is not None
+    assert (found.error.max((0, 1)) < 1e-3 * np.abs(found.lower).max((0, 1))).all()
+
+
+def test_an_option_of_the_modal_method_asks_for_it() -> None:
+    inputs = {"E": Triangular(24e9, 25e9, 26e9)}
+    found = envelope(FRAME, inputs, duration=1.0, step=0.1, alpha=(0,), certify=1e-5)
+    assert found.nature == "guaranteed"
+    with pytest.raises(ModalError, match="same frequency"):
+        envelope(DOUBLE, {"k": Triangular(9, 10, 12)}, duration=1.0, step=0.01, seed=1)

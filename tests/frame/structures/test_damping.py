@@ -1,0 +1,211 @@
+"""Modal damping: every mode decays at its ratio, derivatives follow the modes, and Rayleigh damping
+is a case of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+from alphacut.frame import Accelerogram, Exact, LinearFlow, MatrixStructure, StoreyFrame, envelope
+from alphacut.frame.structures.linear import evaluate, frequencies
+from alphacut.fuzzy import Triangular
+
+FRAME = StoreyFrame(
+    (2e4, 1e4, 5e3), (2.5, 2.7, 2.7), 25e9, 1e-6, q0=(0.01, 0.03, 0.08), v0=(0, -0.5, -0.5)
+)
+RATIOS = (0.02, 0.05, 0.11)
+NAMES = ("E", "m2", "l1")
+
+
+def matrices(model, names=(), points=None):
+    return evaluate(
+        model, names, np.zeros((1, 0)) if points is None else points, derivatives=bool(names)
+    )[0]
+
+
+def decay(model):
+    """Damping ratios of the complex modes by rising frequency, found from the state matrix alone."""
+    found = matrices(model)
+    M, D, K = (x.value[0] for x in (found.mass, found.damping, found.stiffness))
+    n = len(M)
+    state = np.block(
+        [[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]]
+    )
+    values = sorted((x for x in np.linalg.eigvals(state) if x.imag > 0), key=abs)
+    return np.array([-x.real / abs(x) for x in values]), np.abs(values)
+
+
+@pytest.mark.parametrize("ratio", [0.05, RATIOS], ids=["one", "each"])
+def test_every_mode_decays_at_its_ratio_and_keeps_its_frequency(ratio):
+    ratios, omega = decay(replace(FRAME, damping_ratio=ratio))
+    assert np.abs(ratios - ratio).max() < 1e-12
+    assert np.abs(omega / frequencies(FRAME) - 1).max() < 1e-12
+
+
+def test_rayleigh_damping_is_the_modal_damping_of_its_ratios():
+    a, b = 0.08, 0.03
+    omega = frequencies(FRAME)
+    by_factors, by_ratios = (
+        replace(FRAME, rayleigh=(a, b)),
+        replace(FRAME, damping_ratio=tuple(a / (2 * omega) + b * omega / 2)),
+    )
+    D, E = (matrices(model).damping.value for model in (by_factors, by_ratios))
+    assert np.abs(D - E).max() < 1e-12 * np.abs(D).max()
+
+
+def test_damping_is_symmetric_and_added_to_the_dampers():
+    dampers = replace(FRAME, dampers=(30.0, 20.0, 10.0), damper_placement="storey")
+    both = matrices(replace(dampers, damping_ratio=RATIOS)).damping.value
+    alone = matrices(replace(FRAME, damping_ratio=RATIOS)).damping.value
+    assert np.abs(both - alone - matrices(dampers).damping.value).max() < 1e-12 * np.abs(both).max()
+    assert np.abs(alone - alone.swapaxes(1, 2)).max() < 1e-12 * np.abs(alone).max()
+
+
+@pytest.mark.parametrize("ratio", [0.05, RATIOS], ids=["one", "each"])
+def test_derivatives_are_those_of_the_modes_at_the_changed_parameters(ratio):
+    model = replace(FRAME, damping_ratio=ratio)
+    names = (*NAMES, *model.ratios)
+    modal = np.array([[model.parameters[name] for name in names]])
+    found = matrices(model, names, modal).damping
+    h = 1e-4 * modal[0]
+
+    def at(*moved):
+        point = modal + sum(
+            (sign * h[k] * np.eye(len(names))[k] for k, sign in moved), np.zeros_like(modal)
+        )
+        return evaluate(model, names, point, derivatives=False)[0].damping.value
+
+    for i in range(len(names)):
+        difference = (at((i, 1)) - at((i, -1))) / (2 * h[i])
+        assert np.abs(found.first[i] - difference).max() < 1e-6 * max(
+            np.abs(difference).max(), 1e-9
+        )
+        for j in range(len(names)):
+            four = [at((i, a), (j, b)) * a * b for a in (1, -1) for b in (1, -1)]
+            difference, scale = (
+                sum(four) / (4 * h[i] * h[j]),
+                np.abs(found.value).max() / (modal[0, i] * modal[0, j]),
+            )
+            assert np.abs(found.second[i, j] - difference).max() < 2e-5 * scale
+
+
+def test_equal_frequencies_with_one_ratio_are_no_obstacle_and_with_different_ones_are_refused():
+    eye, row = np.eye(2), {"q": np.array([1.0, 0.5])}
+    parts = ([("m", eye)], [("k", eye)], row)
+    same = MatrixStructure({"m": 2.0, "k": 8.0, "z": 0.1}, *parts, ratios=("z",), q0=np.ones(2))
+    found = matrices(same, ("k", "z"), np.array([[8.0, 0.1]])).damping
+    assert np.allclose(found.value[0], 2 * 0.1 * 4 * eye)  # 2 ζ √(k m)
+    assert np.allclose(found.first[:, 0], np.array([2 * 0.1 * 0.25, 8.0])[:, None, None] * eye)
+    assert np.allclose(found.second[0, 0, 0], -2 * 0.1 * 4 / (4 * 64) * eye)
+    different = MatrixStructure({"m": 2.0, "k": 8.0}, *parts, ratios=(0.1, 0.2), q0=np.ones(2))
+    with pytest.raises(
+        ValueError, match="modes 1 and 2 have the same frequency but different ratios"
+    ):
+        LinearFlow(different, ("k",), 1, 0.1).values(np.array([[8.0]]))
+
+
+def test_matrices_and_storeys_agree():
+    n = FRAME.floors
+    found = matrices(FRAME)
+    model = MatrixStructure(
+        {"E": FRAME.modulus, "zeta": 0.05},
+        [(1.0, found.mass.value[0])],
+        [(lambda p: p["E"] / FRAME.modulus, found.stiffness.value[0])],
+        {f"q{z + 1}": np.eye(n)[z] for z in range(n)},
+        q0=np.array(FRAME.q0),
+        v0=np.array(FRAME.v0),
+        ratios=("zeta",),
+    )
+    points = np.array([[24e9, 0.04], [26e9, 0.06]])
+    a, b = (
+        LinearFlow(x, ("E", "zeta"), 5, 0.05, Exact()).taylor(points)
+        for x in (model, replace(FRAME, damping_ratio=0.05))
+    )
+    for part in ("value", "first", "second"):
+        assert (
+            np.abs(getattr(a, part) - getattr(b, part)).max()
+            < 1e-9 * np.abs(getattr(b, part)).max()
+        )
+
+
+@pytest.mark.parametrize("record", [False, True])
+def test_modal_superposition_gives_the_same_motion(record):
+    """Uncoupled modes, each by the closed solution of a damped oscillator or by fine steps of its
+    own equation.
+    """
+    ground = Accelerogram(0.1, np.random.default_rng(2).standard_normal(51)) if record else None
+    model = replace(FRAME, damping_ratio=RATIOS, ground=ground)
+    found = matrices(FRAME)
+    M, K = found.mass.value[0], found.stiffness.value[0]
+    squared, shape = eigh(K, M)
+    omega, time = np.sqrt(squared), np.arange(101) * 0.05
+    q0, v0 = shape.T @ M @ FRAME.q0, shape.T @ M @ FRAME.v0
+    zeta = np.array(RATIOS)
+    damped = omega * np.sqrt(1 - zeta**2)
+    wave = np.exp(-zeta * omega * time[:, None])
+    modal = wave * (
+        q0 * np.cos(damped * time[:, None])
+        + (v0 + zeta * omega * q0) / damped * np.sin(damped * time[:, None])
+    )
+    if ground is not None:
+        fine = np.arange(100 * 100 + 1) * 5e-4
+        load = -(shape.T @ M @ np.ones(3))
+        kernel = np.exp(-zeta * omega * fine[:, None]) * np.sin(damped * fine[:, None]) / damped
+        acceleration = ground.at(fine)
+        for k in range(3):
+            modal[:, k] += (
+                load[k] * 5e-4 * np.convolve(kernel[:, k], acceleration)[: len(fine)][::100]
+            )
+    truth = modal @ shape.T
+    mine = LinearFlow(model, ("E",), 5, 0.05, Exact()).values(np.array([[FRAME.modulus]]))[0]
+    assert np.abs(mine - truth).max() < (1e-3 if record else 1e-10) * np.abs(truth).max()
+
+
+def test_envelopes_with_a_fuzzy_ratio_contain_its_trajectories():
+    model = replace(FRAME, damping_ratio=0.05)
+    inputs = {"E": Triangular(24e9, 25e9, 26e9), "zeta": Triangular(0.03, 0.05, 0.08)}
+    found = envelope(model, inputs, duration=8, step=0.05, alpha=(0, 1), tolerance=1e-6)
+    assert found.method == "modal"
+    points = np.random.default_rng(1).uniform([24e9, 0.03], [26e9, 0.08], (2000, 2))
+    values = LinearFlow(model, ("E", "zeta"), 8, 0.05, Exact()).values(points)
+    assert (values.max(0) - found.upper[0]).max() < 2e-6
+    assert (found.lower[0] - values.min(0)).max() < 2e-6
+    assert (found.upper[0] - values.max(0)).max() < 0.02  # and no wider than they are
+
+
+def test_group_and_messages():
+    each = replace(FRAME, damping_ratio=RATIOS)
+    assert each.group("zeta") == ("zeta1", "zeta2", "zeta3")
+    assert replace(FRAME, damping_ratio=0.05).group("zeta") == ("zeta",)
+    with pytest.raises(ValueError, match="uncertain parameter 'zeta' is unknown"):
+        FRAME.group("zeta")
+    for wrong, match in (
+        ((0.1, 0.2), "2 values for 3 modes"),
+        (1.0, "damping_ratio: 1 is not allowed"),
+        (-0.1, "below 1"),
+        (np.nan, "nan"),
+    ):
+        with pytest.raises(ValueError, match=match):
+            replace(FRAME, damping_ratio=wrong)
+    eye, row = np.eye(2), {"q": np.ones(2)}
+    for ratios, match in (
+        ((0.1,) * 3, "got 3; give one"),
+        (("z",), "'z' is no parameter"),
+        ((1.5,), "1.5 is not allowed"),
+    ):
+        with pytest.raises(ValueError, match=match):
+            MatrixStructure({}, [(1.0, eye)], [(1.0, eye)], row, ratios=ratios)
+    floating = MatrixStructure(
+        {"m": 1.0},
+        [("m", eye)],
+        [(1.0, np.array([[1.0, -1.0], [-1.0, 1.0]]))],
+        row,
+        ratios=(0.1,),
+        q0=np.ones(2),
+    )
+    with pytest.raises(ValueError, match="stiffness is not positive definite"):
+        LinearFlow(floating, ("m",), 1, 0.1).values(np.array([[1.0]]))

@@ -1,0 +1,107 @@
+"""General Lagrangian systems: order of the schemes, derivatives, energy, agreement with the linear
+path.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from alphacut.frame.dynamics.nonlinear import SCHEMES, LagrangianFlow, StepError
+from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
+
+SWING = pendulum(phi0=1.5, damping=0.1)
+POINT = np.array([[1.0, 1.0, 1.5]])
+NAMES = ("m", "l", "phi_0")
+
+
+def flow(
+    scheme: str, step: float, duration: float = 4.0, system: LagrangianSystem = SWING
+) -> LagrangianFlow:
+    return LagrangianFlow(system, NAMES, duration, step, scheme)
+
+
+@pytest.mark.parametrize(("scheme", "order"), SCHEMES.items())
+def test_error_falls_with_the_declared_order(scheme: str, order: int) -> None:
+    truth = flow("composition4", 0.005).values(POINT)[:, ::40]
+    errors = [
+        np.abs(flow(scheme, h).values(POINT)[:, :: round(0.2 / h)] - truth).max()
+        for h in (0.1, 0.05)
+    ]
+    assert abs(np.log2(errors[0] / errors[1]) - order) < 0.4
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_derivatives_are_those_of_the_scheme(scheme: str) -> None:
+    jet, f = flow(scheme, 0.05).taylor(POINT), flow(scheme, 0.05)
+    for i in range(3):
+        h = 2e-3 * np.eye(3)[i]
+        a, b, c, d = (f.taylor(POINT + k * h) for k in (-2, -1, 1, 2))
+        first = (a.value - 8 * b.value + 8 * c.value - d.value) / (12 * 2e-3)
+        second = (a.first - 8 * b.first + 8 * c.first - d.first) / (12 * 2e-3)
+        assert np.abs(jet.first[i] - first).max() < 1e-7 * np.abs(first).max()
+        assert np.abs(jet.second[i] - second).max() < 1e-6 * np.abs(second).max()
+    assert np.abs(f.values(POINT) - jet.value).max() < 1e-12
+
+
+def test_parameter_sets_advance_together() -> None:
+    points = POINT + 0.1 * np.random.default_rng(0).uniform(-1, 1, (5, 3))
+    together = flow("midpoint", 0.05).values(points)
+    alone = np.concatenate([flow("midpoint", 0.05).values(p[None]) for p in points])
+    assert np.abs(together - alone).max() < 1e-10
+
+
+def test_two_coupled_masses_agree_with_the_linear_integrator() -> None:
+    from alphacut.frame import LinearFlow, Midpoint, StoreyFrame
+
+    linear = StoreyFrame(
+        (2.0, 1.0), (1.0, 1.0), 1.0, 1.0, (0.3, 0.2), "ground", (0.1, 0.2), (0.0, -1.0)
+    )
+
+    def lagrangian(q: Any, v: Any, p: Any) -> Any:
+        return (p["m1"] * v[0] ** 2 + v[1] ** 2) / 2 - 24 * p["E"] * (
+            q[0] ** 2 + (q[1] - q[0]) ** 2
+        ) / 2
+
+    general = LagrangianSystem(
+        coordinates=2,
+        parameters={"E": 1.0, "m1": 2.0},
+        lagrangian=lagrangian,
+        initial=lambda p: ([0.1, 0.2], [0.0, -1.0]),
+        observed={"q1": lambda q, v, p: q[0], "q2": lambda q, v, p: q[1]},
+        force=lambda q, v, p: [-0.3 * v[0], -0.2 * v[1]],
+    )
+    point = np.array([[1.0, 2.0]])
+    a = LinearFlow(linear, ("E", "m1"), 5, 0.05, Midpoint()).taylor(point)
+    b = LagrangianFlow(general, ("E", "m1"), 5, 0.05).taylor(point)
+    assert np.abs(a.value - b.value).max() < 1e-10
+    assert np.abs(a.first - b.first).max() < 1e-9
+    assert np.abs(a.second - b.second).max() < 1e-7
+
+
+def test_energy_of_the_free_pendulum_stays_bounded() -> None:
+    free = LagrangianFlow(pendulum(damping=0.0), ("m",), 200, 0.05)
+    phi = free.values(np.ones((1, 1)))[0, :, 1]
+    late, early = np.abs(phi[-800:]).max(), np.abs(phi[:800]).max()
+    assert late == pytest.approx(early, abs=2e-3)
+
+
+def test_impossible_systems_are_refused() -> None:
+    with pytest.raises(ValueError, match="'tension' is unknown"):
+        LagrangianFlow(SWING, NAMES, 1, 0.1, observe=("tension",))
+    with pytest.raises(ValueError, match="'euler' is unknown"):
+        flow("euler", 0.1)
+    with pytest.raises(ValueError, match="mass: -1 is not allowed"):
+        pendulum(mass=-1)
+    with pytest.raises(ValueError, match="quadratic in v"):
+        LagrangianSystem(
+            1,
+            {"a": 1.0},
+            lambda q, v, p: v[0] ** 4,
+            lambda p: ([0], [0]),
+            {"q": lambda q, v, p: q[0]},
+        )
+    with pytest.raises(StepError, match="take a smaller step"):
+        flow("midpoint", 4.0, 400.0).values(POINT * [1, 1, 2])

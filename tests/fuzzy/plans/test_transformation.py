@@ -1,0 +1,157 @@
+"""The transformation method: its points against a closed form, its counts, its bounds."""
+
+from math import comb
+from time import perf_counter
+
+import numpy as np
+import pytest
+
+from alphacut.fuzzy import (
+    Crisp,
+    Domain,
+    Extended,
+    General,
+    Interval,
+    Nature,
+    Reduced,
+    Trapezoidal,
+    Triangular,
+    levels,
+    propagate,
+)
+from alphacut.fuzzy.plans.transformation import hanss_points
+
+PAPER = {
+    "a2": Triangular(0.001, 0.1, 0.3145),
+    "a4": Triangular(0.001, 0.1692, 0.9975),
+    "E": Triangular(75e9, 80e9, 85e9),
+}
+
+
+def monotone(a2, a4, E):
+    """Rises with a2 and E, falls with a4, curved: like the modulus of the cell."""
+    return {"E": np.sqrt(1 + a2) * (E / 1e9) ** 0.2 / (1 + a4), "nu": a2 - a4}
+
+
+def first_passage(number, level, index, alpha):
+    """Point `index` of `level` as a mean of cut ends: a walk up the levels, left or right with
+    probability ½, until it meets an end.
+
+    The walk from (level, index) has met neither end before it stops at level q with r steps to the
+    right; the ballot count of such walks is the number of lattice paths that leave the strip for
+    the first time, here by the reflection-free recurrence on free paths.
+    """
+    top = len(alpha) - 1
+    ends = [number.cut(a) for a in alpha]
+    if index in (0, top - level):
+        return ends[level].lower if index == 0 else ends[level].upper
+    total = 0.0
+    for q in range(
+        level + 1, top + 1
+    ):  # stops at level q at its left end (after `index` steps left) or at its right end
+        steps = q - level
+        to_left, to_right = index, top - level - index
+        if (
+            steps >= to_left
+            # the last step is a left one; before it, to_left − 1 left ones and too few right ones to
+            # have stopped
+        ):
+            right = steps - to_left
+            if right < to_right:
+                total += comb(steps - 1, to_left - 1) / 2**steps * ends[q].lower
+        if steps >= to_right:
+            left = steps - to_right
+            if left < to_left:
+                total += comb(steps - 1, to_right - 1) / 2**steps * ends[q].upper
+    return total
+
+
+@pytest.mark.parametrize("number", [*PAPER.values(), Triangular(-3.0, 1.0, 1.5)])
+@pytest.mark.parametrize("steps", [1, 4, 7])
+def test_points_are_first_passage_means_of_the_cut_ends(number, steps):
+    alpha = levels(steps)
+    for level, points in enumerate(hanss_points(number, alpha)):
+        assert len(points) == steps + 1 - level
+        expected = [first_passage(number, level, index, alpha) for index in range(len(points))]
+        np.testing.assert_allclose(points, expected, rtol=1e-13)
+
+
+def test_points_of_many_levels_take_no_time():
+    start = perf_counter()
+    points = hanss_points(Triangular(0.0, 0.3, 1.0), levels(300))
+    assert perf_counter() - start < 5  # 45,000 points; comparing each with all others takes minutes
+    assert [len(row) for row in points] == list(range(301, 0, -1))
+
+
+def test_fuzzy_intervals_start_from_two_points_and_crisp_inputs_from_one():
+    assert [len(points) for points in hanss_points(Trapezoidal(0, 1, 2, 4), levels(3))] == [
+        5,
+        4,
+        3,
+        2,
+    ]
+    assert [len(points) for points in hanss_points(Interval(0, 1), levels(3))] == [5, 4, 3, 2]
+    assert [len(points) for points in hanss_points(Crisp(1.0), levels(3))] == [1, 1, 1, 1]
+
+
+@pytest.mark.parametrize(
+    ("plan", "runs"),
+    [(General(), 225), (Reduced(), 33), (Extended(tuple(PAPER)), 33), (Extended(("E",)), 109)],
+)
+def test_counts_of_the_papers_case(plan, runs):
+    domain = Domain(PAPER, levels(4))
+    assert plan.size(domain) == runs
+    assert len(plan.points(domain).points) == runs
+
+
+def test_general_method_shares_maps_and_moduli():
+    points = General().points(Domain(PAPER, levels(4))).points
+    assert len(np.unique(points[:, :2], axis=0)) == 55
+    assert len(np.unique(points[:, 2])) == 9
+
+
+@pytest.mark.parametrize("plan", [General(), Reduced(), Extended(tuple(PAPER)), Extended(("a2",))])
+def test_every_method_is_exact_on_a_monotone_model(plan):
+    result = propagate(monotone, PAPER, plan)
+    lower, upper = result.bounds("E")
+    for level, low, high in zip(result.alpha, lower, upper, strict=True):
+        a2, a4, E = (number.cut(level) for number in PAPER.values())
+        assert low == monotone(a2.lower, a4.upper, E.lower)["E"]
+        assert high == monotone(a2.upper, a4.lower, E.upper)["E"]
+    assert result.nature is (
+        Nature.GUARANTEED if plan == Extended(tuple(PAPER)) else Nature.INNER
+    )  # there the caller states the property
+    assert not result.enforced.any()
+
+
+def test_bounds_are_reached_where_the_result_says():
+    result = propagate(monotone, PAPER)
+    for places, ends in ((result.lower_at, result.lower), (result.upper_at, result.upper)):
+        for level in range(5):
+            for column, output in enumerate(result.outputs):
+                point = dict(zip(result.inputs, places[level, column], strict=True))
+                assert monotone(**point)[output] == ends[level, column]
+
+
+def test_cuts_are_nested_and_enforcement_is_reported():
+    result = propagate(lambda x: np.cos(7 * x), {"x": Triangular(-1.0, 0.1, 1.0)}, Reduced())
+    lower, upper = result.bounds()
+    assert (np.diff(lower) >= 0).all()
+    assert (np.diff(upper) <= 0).all()
+    assert result.enforced[:, 0].tolist() == [True, True, True, True, False]
+
+
+def test_wrong_arguments_are_refused_by_name():
+    with pytest.raises(
+        ValueError,
+        match=(
+            r"monotone inputs name \['e'\], which is no fuzzy input; there are \['a2', 'a4', 'E'\]"
+        ),
+    ):
+        propagate(monotone, PAPER, Extended(("e",)))
+    with pytest.raises(ValueError, match="must rise within"):
+        propagate(monotone, PAPER, alpha=[0.5, 0.2])
+    with pytest.raises(ValueError, match="no fuzzy input"):
+        propagate(monotone, {})
+    with pytest.raises(ValueError, match="steps between α-levels is 0"):
+        levels(0)

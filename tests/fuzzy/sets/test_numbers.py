@@ -1,0 +1,90 @@
+"""Fuzzy numbers: cuts, membership, and what they refuse."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from alphacut.fuzzy import Crisp, Cut, Interval, PiecewiseLinear, Trapezoidal, Triangular
+
+finite = st.floats(-1e6, 1e6, allow_nan=False)
+NUMBERS = [
+    Crisp(1.0),
+    Interval(2.0, 3.0),
+    Triangular(4.0, 4.5, 5.5),
+    Trapezoidal(6.0, 6.5, 7.5, 8.0),
+    PiecewiseLinear((0.0, 0.3, 1.0), (1.0, 2.0, 2.0), (5.0, 4.0, 2.5)),
+]
+
+
+@pytest.mark.parametrize("number", NUMBERS, ids=lambda number: type(number).__name__)
+def test_cuts_are_nested_and_reach_from_support_to_modal_value(number):
+    cuts = [number.cut(level) for level in np.linspace(0, 1, 41)]
+    assert cuts[0] == number.support
+    assert all(a.lower <= b.lower <= b.upper <= a.upper for a, b in itertools.pairwise(cuts))
+    assert cuts[-1].lower <= number.modal <= cuts[-1].upper
+
+
+@pytest.mark.parametrize("number", NUMBERS, ids=lambda number: type(number).__name__)
+def test_membership_is_the_highest_level_whose_cut_holds_the_point(number):
+    levels = np.linspace(0, 1, 2001)
+    for x in np.linspace(number.support.lower - 1, number.support.upper + 1, 57):
+        holding = [
+            level for level in levels if number.cut(level).lower <= x <= number.cut(level).upper
+        ]
+        assert number.membership(x) == pytest.approx(max(holding, default=0.0), abs=6e-4)
+
+
+@settings(deadline=None)
+@given(st.lists(finite, min_size=3, max_size=3).map(sorted))
+def test_triangle_meets_its_three_values_exactly(values):
+    triangle = Triangular(*values)
+    assert triangle.cut(0) == (values[0], values[2])
+    assert triangle.cut(1) == (values[1], values[1])
+    assert triangle.modal == values[1]
+
+
+def test_membership_of_a_crisp_number_is_kronecker():
+    assert Crisp(1.0).membership([0.999, 1.0, 1.001]).tolist() == [0, 1, 0]
+
+
+def test_cut_width():
+    assert Cut(2.0, 3.5).width == 1.5
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Triangular(2, 1, 3), r"triangle is \[2, 1, 3\]; it needs lower <= modal <= upper"),
+        (lambda: Triangular(0, 1, np.inf), "all finite"),
+        (lambda: Interval(3, 2), r"interval is \[3, 2\]; it needs lower <= upper"),
+        (
+            lambda: Trapezoidal(0, 2, 1, 3),
+            r"trapezoid is \[0, 2, 1, 3\]; it needs lower <= left <= right <= upper",
+        ),
+        (lambda: Crisp(np.nan), "crisp number is"),
+        (lambda: PiecewiseLinear((0, 1), (0, 1), (1,)), "2 levels, 2 lower and 1 upper ends"),
+        (lambda: PiecewiseLinear((0, 0.5), (0, 1), (3, 2)), "must rise from 0 to 1"),
+        (lambda: PiecewiseLinear((0, 1), (0, 2), (3, 1)), "nested cuts"),
+        (lambda: Triangular(0, 1, 2).cut(1.5), r"α of a cut is 1.5; it must lie in \[0, 1\]"),
+    ],
+)
+def test_refusals_name_the_value_and_the_cure(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_what_is_no_number_has_no_grade():
+    assert np.isnan(Triangular(1, 2, 3).membership(np.nan))
+    np.testing.assert_array_equal(
+        Triangular(1, 2, 3).membership([0, 1.5, np.nan, np.inf]), [0, 0.5, np.nan, 0]
+    )
+
+
+def test_an_expression_is_printed_by_its_text():
+    assert "function" not in repr(Triangular(1, 2, 3) + Interval(0, 1))
+    assert "Triangular(lower=1, modal=2, upper=3) + Interval(lower=0, upper=1)" in str(
+        Triangular(1, 2, 3) + Interval(0, 1)
+    )

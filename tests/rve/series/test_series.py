@@ -1,0 +1,210 @@
+import numpy as np
+import pytest
+
+from alphacut.rve import Phase
+from alphacut.rve.series.model import SeriesModel
+from alphacut.rve.series.stiffness import SeriesError, square_stiffness
+from alphacut.rve.slices.theta_rule import breaks, theta_rule
+from alphacut.stochastic import HermiteMap, TruncatedNormal
+
+MATRIX = Phase(20e9)
+MODULI = ("bulk", "deviator", "shear")
+
+
+class Piecewise:
+    """r = 0.4 + 0.02 θ below θ = 0.3 and 0.7 + 0.02 θ from there on."""
+
+    distribution = TruncatedNormal()
+
+    def __call__(self, theta):
+        theta = np.asarray(theta, float)
+        return np.where(theta < 0.3, 0.4, 0.7) + 0.02 * theta
+
+
+def random_cells(count, seed, *, highest):
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        phases = [
+            Phase(20e9 * 10 ** rng.uniform(-3, 3) ** k, rng.uniform(-0.5, 0.49)) for k in (0, 1)
+        ]
+        yield rng.uniform(0.05, highest), *phases
+
+
+def largest_difference(a, b):
+    return max(np.max(np.abs(getattr(a, name) / getattr(b, name) - 1)) for name in MODULI)
+
+
+@pytest.mark.parametrize(
+    ("radius", "s11", "s12"),
+    [
+        (0.2, 0.396401666057, 0.158812312491),
+        (0.5, 0.467852842132, 0.186140947852),
+        (0.8, 0.667472541097, 0.255628130639),
+    ],
+)
+def test_twelve_digits_of_an_independent_solution(radius, s11, s12):
+    cell = square_stiffness(np.array([radius]), MATRIX, [Phase(80e9)])
+    assert 0.01 * cell.bulk[0, 0] / 1e9 == pytest.approx(s11, abs=6e-13)
+    assert 0.02 * cell.shear[0, 0] / 1e9 == pytest.approx(s12, abs=6e-13)
+
+
+def test_homogeneous_cell_is_the_matrix():
+    cells = square_stiffness(np.linspace(0, 0.99, 12), MATRIX, [MATRIX])
+    np.testing.assert_allclose(
+        cells.matrix[:, 0], np.broadcast_to(MATRIX.stiffness, (12, 3, 3)), rtol=1e-14, atol=1e-3
+    )
+
+
+def test_dilute_limit():
+    radius, inclusion = 2e-3, Phase(90e9, 0.1)
+    cell = square_stiffness(np.array([radius]), MATRIX, [inclusion])
+    km, ki = ((p.stiffness[0, 0] + p.stiffness[0, 1]) / 2 for p in (MATRIX, inclusion))
+    gm = MATRIX.stiffness[2, 2]
+    exact = (
+        np.pi * radius**2 / 4 * (ki - km) * (km + gm) / (ki + gm)
+    )  # area fraction times the single inclusion's effect
+    assert cell.bulk[0, 0] / 2 - km == pytest.approx(exact, rel=1e-5)
+
+
+def test_shift_of_compliances():
+    """Cherkaev, Lurie & Milton 1992: S + c·[[0,1,0],[1,0,0],[0,0,−2]] in both phases shifts the
+    effective S by just that.
+    """
+    rotation = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -2.0]])
+
+    def shifted(phase, c):
+        a, b, _ = np.linalg.inv(phase.stiffness)[0] + c * rotation[0]
+        nu = -b / a / (1 - b / a)  # plane strain: S12 / S11 = −ν / (1 − ν)
+        return Phase((1 - nu**2) / a, nu)
+
+    phases, c = (MATRIX, Phase(150e9, 0.1)), 4e-12
+    radius = np.array([0.3, 0.8, 0.95])
+    plain = square_stiffness(radius, phases[0], [phases[1]]).matrix[:, 0]
+    moved = square_stiffness(radius, shifted(phases[0], c), [shifted(phases[1], c)]).matrix[:, 0]
+    np.testing.assert_allclose(
+        np.linalg.inv(moved), np.linalg.inv(plain) + c * rotation, rtol=1e-12, atol=1e-25
+    )
+
+
+def test_voigt_and_reuss_enclose_the_stiffness():
+    for radius, matrix, inclusion in random_cells(40, 3, highest=0.99):
+        share = np.pi * radius**2 / 4
+        stiffness = square_stiffness(np.array([radius]), matrix, [inclusion]).matrix[0, 0]
+        voigt = (1 - share) * matrix.stiffness + share * inclusion.stiffness
+        reuss = np.linalg.inv(
+            (1 - share) * np.linalg.inv(matrix.stiffness)
+            + share * np.linalg.inv(inclusion.stiffness)
+        )
+        for gap in (voigt - stiffness, stiffness - reuss):
+            assert np.linalg.eigvalsh(gap).min() > -1e-12 * np.abs(voigt).max()
+
+
+def test_converged_to_1e_11_up_to_095():
+    for radius, matrix, inclusion in random_cells(30, 1, highest=0.95):
+        fine = square_stiffness(np.array([radius]), matrix, [inclusion], tolerance=1e-13)
+        cell = square_stiffness(np.array([radius]), matrix, [inclusion], tolerance=1e-11)
+        assert largest_difference(cell, fine) < 1e-11
+
+
+def test_declared_error_holds_and_is_no_fable():
+    ratios = []
+    for radius, matrix, inclusion in random_cells(150, 2, highest=0.998):
+        cell = square_stiffness(np.array([radius]), matrix, [inclusion], tolerance=1e-4)
+        true = largest_difference(cell, square_stiffness(np.array([radius]), matrix, [inclusion]))
+        if true > 1e-13:
+            ratios.append(cell.error[0, 0] / true)
+    assert len(ratios) > 30
+    assert min(ratios) > 1
+    assert np.median(ratios) < 30
+
+
+@pytest.mark.parametrize("contrast", [1e-6, 1e6])
+def test_extreme_contrast_is_the_limit_of_a_hole_or_a_rigid_disc(contrast):
+    radius = np.array([1e-6, 0.5, 0.98])
+    near, nearer = (
+        square_stiffness(radius, MATRIX, [Phase(20e9 * contrast ** (1 + k / 6))]) for k in (0, 1)
+    )
+    assert 1e-9 < largest_difference(near, nearer) < 1e-3
+
+
+@pytest.mark.parametrize("poissons", [(0.3, 0.4999999), (0.4999999, 0.3), (0.4999999, 0.4999999)])
+def test_no_locking_near_incompressibility(poissons):
+    matrix, inclusion = (Phase(e, nu) for e, nu in zip((20e9, 80e9), poissons, strict=True))
+    shear = square_stiffness(np.array([0.6]), matrix, [inclusion]).shear
+    softer = square_stiffness(
+        np.array([0.6]), Phase(20e9, poissons[0] - 1e-6), [Phase(80e9, poissons[1] - 1e-6)]
+    ).shear
+    assert abs(shear / softer - 1) < 1e-5
+
+
+def test_refuses_touching_particles_with_the_error():
+    with pytest.raises(
+        SeriesError, match=r"r = 0.99999 reaches a relative error of .* nearly touch"
+    ):
+        square_stiffness(np.array([0.5, 0.99999]), MATRIX, [Phase(20)])
+
+
+@pytest.mark.parametrize("radius", [-0.1, 1.0, np.nan])
+def test_refuses_a_radius_outside_the_cell(radius):
+    with pytest.raises(ValueError, match="must lie in"):
+        square_stiffness(np.array([0.5, radius]), MATRIX, [MATRIX])
+
+
+def test_model_on_the_paper_case():
+    low, modal = SeriesModel().solve(
+        HermiteMap(0.1337, 0.1, 0.8663, 0.1692), MATRIX, [Phase(75e9), Phase(80e9)]
+    )
+    assert modal.modulus / 1e9 == pytest.approx(24.771, abs=5e-4)
+    assert low.modulus < modal.modulus
+    assert modal.estimated_error < 1e-11
+    assert modal.stiffness[2, 2] * 0.02 == pytest.approx(modal.curve.mean[1], rel=1e-14)
+
+
+def test_rule_in_theta_declares_its_error():
+    radius_map = HermiteMap(0.1337, 0.3145, 0.8663, 0.001)
+    exact = SeriesModel().solve(radius_map, MATRIX, [Phase(80e9)])[0]
+    coarse = SeriesModel(points=6).solve(radius_map, MATRIX, [Phase(80e9)])[0]
+    true = abs(coarse.modulus / exact.modulus - 1)
+    assert 1e-8 < true < coarse.error["theta"] < 1e4 * true
+
+
+def test_a_map_that_jumps_is_cut_at_its_jump():
+    radius_map = Piecewise()
+    np.testing.assert_allclose(breaks(radius_map), [0.3], atol=1e-12)
+    assert breaks(HermiteMap(0.1337, 0.1, 0.8663, 0.1692)).size == 0
+    result = SeriesModel().solve(radius_map, MATRIX, [Phase(80e9)])[0]
+    assert result.error["theta"] < 1e-11
+    rule = theta_rule(radius_map, points=20)
+    assert rule.weights @ (rule.nodes < 0.3) == pytest.approx(
+        float(radius_map.distribution.cdf(0.3)), rel=1e-13
+    )
+
+
+class Bent:
+    """r = 0.4 + 0.12 |θ − 0.3|."""
+
+    distribution = TruncatedNormal()
+
+    def __call__(self, theta):
+        return 0.4 + 0.12 * np.abs(np.asarray(theta, float) - 0.3)
+
+
+def test_a_map_that_bends_is_cut_at_its_bend():
+    np.testing.assert_allclose(breaks(Bent()), [0.3], atol=1e-8)
+    exact = SeriesModel(points=40).solve(Bent(), MATRIX, [Phase(80e9)])[0]
+    assert SeriesModel().solve(Bent(), MATRIX, [Phase(80e9)])[0].modulus == pytest.approx(
+        exact.modulus, rel=1e-11
+    )
+
+
+@pytest.mark.parametrize("slopes", [(0.3145, 0.001), (0.001, 0.9975), (0.0, 0.0), (-0.2, -0.3)])
+def test_smooth_maps_are_not_cut(slopes):
+    assert breaks(HermiteMap(0.1337 + 0.1, slopes[0], 0.8663, slopes[1])).size == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "message"), [({"points": 1}, "at least 2"), ({"accuracy": 1e-15}, "must lie in")]
+)
+def test_options_out_of_range(options, message):
+    with pytest.raises(ValueError, match=message):
+        SeriesModel(**options)

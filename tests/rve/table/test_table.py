@@ -1,0 +1,174 @@
+import numpy as np
+import pytest
+
+from alphacut.rve import Phase
+from alphacut.rve.series.model import SeriesModel
+from alphacut.rve.series.stiffness import square_stiffness
+from alphacut.rve.table.build import TableError, build_table
+from alphacut.rve.table.cache import table_key
+from alphacut.rve.table.interpolant import TableRange, coefficients, leja, tail
+from alphacut.rve.table.model import TableModel
+from alphacut.stochastic import HermiteMap
+
+MATRIX = Phase(20e9)
+PAPER = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
+SPAN = TableRange(MATRIX, 0.3, (0.13, 0.87), (75e9, 85e9))
+
+
+def errors(table, radii, moduli):
+    cells = square_stiffness(
+        radii, table.span.matrix, [Phase(e, table.span.poisson) for e in moduli]
+    )
+    exact = np.stack([cells.bulk, cells.deviator, cells.shear], axis=-1)
+    return np.abs(table.moduli(radii, moduli) / exact - 1)
+
+
+def test_leja_points_are_nested_and_become_lobatto_points():
+    np.testing.assert_allclose(
+        np.sort(leja(17)), np.sort(np.cos(np.pi * np.arange(17) / 16)), atol=1e-15
+    )
+    np.testing.assert_array_equal(leja(9), leja(14)[:9])
+    assert len(np.unique(np.round(leja(40), 12))) == 40
+
+
+def test_coefficients_of_a_polynomial_are_exact():
+    x, y = leja(6), leja(3)
+    values = (
+        np.polynomial.chebyshev.chebval(x, [1, 0, 2, 0, 0, 0.5])[:, None]
+        * np.polynomial.chebyshev.chebval(y, [0, 1, 3])
+    )[..., None]
+    expected = np.outer([1, 0, 2, 0, 0, 0.5], [0, 1, 3])
+    np.testing.assert_allclose(coefficients(values)[..., 0], expected, atol=1e-13)
+
+
+def test_tail_of_a_geometric_series():
+    series = (0.2 ** np.arange(12.0))[:, None, None]
+    rest = 0.2**12 / 0.8
+    assert rest < tail(series, 0) < 100 * rest
+    assert tail(series, 1) == 0
+    assert tail(np.full((8, 1, 1), 1e-9), 0, noise=2e-9) == 1e-9
+
+
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-5, 1e-7, 1e-9])
+@pytest.mark.parametrize(
+    "span",
+    [
+        SPAN,
+        TableRange(Phase(20e9, 0.2), 0.4, (0.05, 0.97), (2e7, 2e9)),
+        TableRange(MATRIX, 0.0, (0.3, 0.9), (2e12, 2e14)),
+    ],
+)
+def test_declared_interpolation_error_holds(span, accuracy):
+    table = build_table(span, accuracy=accuracy, source="series")
+    true = errors(table, np.linspace(*span.radii, 41), np.geomspace(*span.moduli, 13)).max()
+    assert true < table.interpolation + 1e-12 <= accuracy + 1e-12
+
+
+def test_planar_table_reaches_its_accuracy():
+    table = build_table(SPAN, accuracy=1e-5)
+    true = errors(table, np.linspace(0.13, 0.87, 25), np.linspace(75e9, 85e9, 5)).max()
+    declared = table.interpolation + table.space[1].max()
+    assert true < declared < 1e-5
+    assert table.systems > 0
+    assert table.unknowns > 1000
+
+
+def test_degenerate_ranges_take_one_node():
+    table = build_table(
+        TableRange(MATRIX, 0.3, (0.5, 0.5), (80e9, 80e9)), accuracy=1e-9, source="series"
+    )
+    assert table.coefficients.shape == (1, 1, 3)
+    assert errors(table, np.array([0.5]), np.array([80e9])).max() < 1e-13
+
+
+def test_model_agrees_with_the_series_to_1e_7():
+    inclusions = [Phase(75e9), Phase(80e9, 0.2), Phase(85e9)]
+    model = TableModel(accuracy=1e-7, source="series")
+    for result, exact in zip(
+        model.solve(PAPER, MATRIX, inclusions),
+        SeriesModel().solve(PAPER, MATRIX, inclusions),
+        strict=True,
+    ):
+        assert abs(result.modulus / exact.modulus - 1) < 1e-7
+        assert abs(result.modulus / exact.modulus - 1) < result.estimated_error < 1e-7
+        np.testing.assert_allclose(result.stiffness, exact.stiffness, rtol=1e-7, atol=1)
+
+
+def test_kept_on_disk_by_all_that_it_depends_on(tmp_path, monkeypatch):
+    from alphacut.rve.table import cache as table_store
+
+    monkeypatch.setattr(table_store, "_in_process", {})
+    model = TableModel(accuracy=1e-4, source="series", cache=tmp_path)
+    first = model.solve(PAPER, MATRIX, [Phase(80e9)])[0]
+    assert "built in" in first.reason
+    (path,) = tmp_path.iterdir()
+    table_store._in_process.clear()
+    second = model.solve(PAPER, MATRIX, [Phase(80e9)])[0]
+    assert "kept" in second.reason
+    assert second.modulus == first.modulus
+    table_store._in_process.clear()
+    path.write_bytes(path.read_bytes()[:100])  # cut off: made anew, and whole again
+    assert "built in" in model.solve(PAPER, MATRIX, [Phase(80e9)])[0].reason
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+
+
+def test_key_changes_with_every_input():
+    keys = {
+        table_key(span, accuracy=accuracy, source=source)
+        for span in (
+            SPAN,
+            TableRange(MATRIX, 0.2, SPAN.radii, SPAN.moduli),
+            TableRange(Phase(21e9), 0.3, SPAN.radii, SPAN.moduli),
+        )
+        for accuracy in (1e-4, 1e-5)
+        for source in ("planar", "series")
+    }
+    assert len(keys) == 12
+
+
+def test_similar_maps_share_a_table():
+    model = TableModel(accuracy=1e-4, source="series")
+    other = HermiteMap(0.1337, 0.3145, 0.8663, 0.001)
+    model.solve(PAPER, MATRIX, [Phase(80e9)])
+    assert "kept" in model.solve(other, MATRIX, [Phase(80e9)])[0].reason
+
+
+def test_refuses_what_lies_outside():
+    with pytest.raises(
+        ValueError, match=r"asked for a radius of .* it covers 0.2 to 0.5: widen it"
+    ):
+        TableModel(radii=(0.2, 0.5), source="series").solve(PAPER, MATRIX, [Phase(80e9)])
+    with pytest.raises(ValueError, match=r"asked for a modulus of 8e\+10 Pa"):
+        TableModel(moduli=(1e9, 2e9), source="series").solve(PAPER, MATRIX, [Phase(80e9)])
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [({"accuracy": 1.0}, "must lie in"), ({"source": "prism"}, "must be planar or series")],
+)
+def test_options_out_of_range(options, message):
+    with pytest.raises(ValueError, match=message):
+        TableModel(**options)
+
+
+@pytest.mark.parametrize(
+    "changes", [{"radii": (0.5, 0.4)}, {"radii": (0.0, 0.4)}, {"moduli": (0.0, 1.0)}]
+)
+def test_ranges_out_of_order(changes):
+    with pytest.raises(ValueError, match="they need 0 < least <= greatest"):
+        TableRange(
+            **{
+                "matrix": MATRIX,
+                "poisson": 0.3,
+                "radii": (0.1, 0.5),
+                "moduli": (1e9, 2e9),
+                **changes,
+            }
+        )
+
+
+def test_refuses_when_interpolation_does_not_settle():
+    with pytest.raises(TableError, match="cover less, or allow a larger error"):
+        build_table(
+            TableRange(MATRIX, 0.3, (0.1, 0.9), (20.0, 20e18)), accuracy=1e-9, source="series"
+        )

@@ -1,0 +1,148 @@
+"""The certificate: green on right results, red on each way of being wrong."""
+
+import numpy as np
+import pytest
+
+from alphacut.rve.bounds import bulk_modulus, hashin_shtrikman_bulk, reuss, voigt
+from alphacut.rve.cell import LOADS, Phase
+from alphacut.rve.certificate import (
+    CertificateError,
+    Limits,
+    load_checks,
+    require,
+    stiffness_checks,
+)
+from alphacut.stochastic import HermiteMap
+
+SOFT, HARD = Phase(20e9), Phase(80e9, 0.2)
+PAPER = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
+
+
+def layered(fraction):
+    """Stiffness of a laminate in direction 1 by the exact mixture rules of its continuous fields."""
+    a, b = SOFT.stiffness, HARD.stiffness
+    share = np.array([1 - fraction, fraction])
+    c = np.stack([a, b])
+    c11 = 1 / (share / c[:, 0, 0]).sum()
+    ratio = share @ (c[:, 0, 1] / c[:, 0, 0])
+    c22 = share @ (c[:, 1, 1] - c[:, 0, 1] ** 2 / c[:, 0, 0]) + ratio**2 * c11
+    return np.array(
+        [[c11, ratio * c11, 0], [ratio * c11, c22, 0], [0, 0, 1 / (share / c[:, 2, 2]).sum()]]
+    )
+
+
+@pytest.mark.parametrize("fraction", [0.0, 0.2, 0.7, 1.0])
+def test_bounds_enclose_a_laminate_and_close_at_the_ends(fraction):
+    low, high, between = reuss(fraction, SOFT, HARD), voigt(fraction, SOFT, HARD), layered(fraction)
+    assert np.linalg.eigvalsh(between - low)[0] >= -1e-4 * SOFT.modulus * 1e-9
+    assert np.linalg.eigvalsh(high - between)[0] >= -1e-4 * SOFT.modulus * 1e-9
+    if fraction in (0.0, 1.0):
+        assert low == pytest.approx(high, rel=1e-12)
+
+
+def test_hashin_shtrikman_lies_inside_reuss_and_voigt_and_in_order():
+    fraction = np.linspace(0, 1, 11)
+    least, greatest = hashin_shtrikman_bulk(fraction, SOFT, HARD)
+    assert (least <= greatest * (1 + 1e-12)).all()
+    assert (bulk_modulus(voigt(fraction, SOFT, HARD)) >= greatest * (1 - 1e-12)).all()
+    assert (bulk_modulus(reuss(fraction, SOFT, HARD)) <= least * (1 + 1e-12)).all()
+
+
+def checks_of(stiffness):
+    return stiffness_checks(stiffness[None], np.array([0.4]), np.array([1.0]), (SOFT, HARD))
+
+
+def test_a_right_stiffness_passes():
+    lower, _ = hashin_shtrikman_bulk(0.4, SOFT, HARD)
+    right = reuss(0.4, SOFT, HARD) * float(lower / bulk_modulus(reuss(0.4, SOFT, HARD))) * 1.01
+    assert require(checks_of(right), Limits())["reuss"] == 0
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda c: c + np.triu(np.ones((3, 3)), 1) * 1e6, "not symmetric"),
+        (lambda c: reuss(0.4, SOFT, HARD) * 0.99, "below the Reuss bound"),
+        (lambda c: voigt(0.4, SOFT, HARD) * 1.01, "above the Voigt bound"),
+        (lambda c: voigt(0.4, SOFT, HARD) * 0.9999, "outside the Hashin–Shtrikman bounds"),
+        (lambda c: c * np.nan, "is allowed; do not use this result"),
+    ],
+)
+def test_a_wrong_stiffness_is_refused_by_name(wrong, message):
+    c = layered(0.4)
+    with pytest.raises(
+        (CertificateError, np.linalg.LinAlgError), match=f"{message}|did not converge"
+    ):
+        require(checks_of(wrong(c)), Limits())
+
+
+def test_a_flipped_shear_stress_is_below_the_reuss_bound():
+    stress = layered(0.4) @ LOADS.T
+    stress[2] *= -1
+    checks = load_checks(stress[None], LOADS, np.array([0.4]), np.array([1.0]), (SOFT, HARD))
+    with pytest.raises(CertificateError, match="Reuss"):
+        require(checks, Limits())
+
+
+class TestProductSpace:
+    """The same on the finite element model, broken on purpose."""
+
+    @pytest.fixture(autouse=True)
+    def model(self):
+        pytest.importorskip("dolfinx")
+        from alphacut.rve.prism import model as prism
+
+        prism._system.cache_clear()
+        yield
+        prism._system.cache_clear()
+
+    def solve(self, **options):
+        from alphacut.rve.prism.model import PrismModel
+
+        options = {"mesh_size": 0.4, "layers": 3, "stiffness": True, **options}
+        return PrismModel(**options).solve(PAPER, SOFT, [HARD])[0]
+
+    def test_green_with_every_property_measured(self):
+        checks = self.solve().checks
+        assert set(checks) == {
+            "residual",
+            "hill_mandel",
+            "periodicity",
+            "symmetry",
+            "reuss",
+            "voigt",
+            "hashin_shtrikman",
+        }
+        assert max(checks[k] for k in ("residual", "hill_mandel", "periodicity", "symmetry")) < 1e-8
+        assert max(checks[k] for k in ("reuss", "voigt")) == 0
+
+    def test_a_broken_periodic_pair_is_found(self, monkeypatch):
+        from alphacut.rve.mesh.periodicity import Periodicity, identify
+        from alphacut.rve.prism import system as prism_system
+
+        def broken(plane):
+            right = identify(plane)
+            unknown = right.unknown.copy()
+            lonely = np.flatnonzero(
+                (abs(plane.points[:, 0] - 1) < 1e-9) & (unknown >= right.vertices)
+            )[0]
+            unknown[lonely] = right.count
+            return Periodicity(unknown, right.vertices, right.count + 1)
+
+        monkeypatch.setattr(prism_system, "identify", broken)
+        with pytest.raises(CertificateError, match="differs on opposite sides"):
+            self.solve(solver="mumps")
+
+    def test_a_flipped_sign_of_the_load_is_found(self, monkeypatch):
+        from alphacut.rve.prism.form import PrismForm
+
+        right = PrismForm.load
+        monkeypatch.setattr(
+            PrismForm, "load", lambda self, phase, strain: -right(self, phase, strain)
+        )
+        with pytest.raises(CertificateError, match=r"Hill.Mandel"):
+            self.solve()
+
+    def test_a_solver_stopped_early_is_found_though_it_claims_success(self):
+        with pytest.raises(CertificateError, match="the linear system is not solved"):
+            self.solve(petsc={"ksp_rtol": "1e-2"})

@@ -1,0 +1,79 @@
+"""Pictures of particles show whole cells up to the edge and say what they show."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+from alphacut.stochastic.figures.cells import (
+    draw_cells,
+    draw_neighbours,
+    draw_two_point,
+    plot_cells,
+)
+from alphacut.stochastic.figures.statistics import draw_neighbour_statistics
+from alphacut.stochastic.particles.discs import Discs
+from alphacut.stochastic.particles.log_normal import LogNormalRadii
+from alphacut.stochastic.particles.packing import Packing
+from alphacut.stochastic.tessellation.apollonius import apollonius
+from alphacut.stochastic.tessellation.delaunay import neighbours
+
+EQUAL = Packing(120, 0.2, LogNormalRadii(1e-3, 1e-3)).make(np.random.default_rng(1))
+MANY = Packing(800, 0.2, LogNormalRadii(1e-3, 4e-3)).make(np.random.default_rng(2))
+
+
+@pytest.fixture(autouse=True)
+def closed():
+    """No figure stays open."""
+    yield
+    plt.close("all")
+
+
+def walls(discs: Discs) -> list[np.ndarray]:
+    """What is drawn of a section's cells, in mm."""
+    axes = plt.figure().add_subplot()
+    plot_cells(axes, apollonius(discs))
+    return [np.asarray(segment) for segment in axes.collections[0].get_segments()]
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_walls_that_leave_a_periodic_box_come_in_on_the_other_side(side):
+    drawn, size = walls(EQUAL), 1e3 * EQUAL.size
+    middles = np.array([wall[12] for wall in drawn])
+    leaving = [
+        wall
+        for wall in drawn
+        if wall[:, side].max() > size[side] > wall[:, side].min()
+        and 0 < wall[12, 1 - side] < size[1 - side]
+    ]
+    assert len(leaving) > 5
+    for wall in leaving:
+        there = wall[12] - np.eye(2)[side] * size[side]
+        assert np.hypot(*(middles - there).T).min() < 1e-6 * size[0]
+
+
+def test_a_corner_of_a_section_has_the_cells_of_the_whole_and_says_so():
+    whole = draw_cells(apollonius(EQUAL)).get_suptitle()
+    assert whole.startswith("one section of")
+    assert whole.endswith("with 120 discs")
+    diagram = apollonius(MANY)
+    drawn = draw_cells(diagram)
+    assert drawn.get_suptitle().startswith("a corner of one section")
+    axes = drawn.axes[1]
+    view = np.array([axes.get_xlim()[1], axes.get_ylim()[1]])
+    assert view == pytest.approx(1e3 * MANY.size * np.sqrt(120 / 800))
+    shown = np.concatenate(axes.collections[1].get_segments())
+    assert (shown.max(axis=0) > view).all()  # cells go on beyond the corner
+    assert (shown.max(axis=0) < 1.5 * view).all()  # and no more of them than needed
+
+
+def test_pictures_of_equal_discs_say_that_they_are_not_the_section():
+    pictures = [
+        draw_neighbours(EQUAL),
+        draw_neighbour_statistics([neighbours(EQUAL)], 2e-3),
+        draw_two_point(EQUAL, np.random.default_rng(1)),
+    ]
+    for drawn in pictures:
+        assert (
+            drawn.get_suptitle()
+            == "120 equal discs of the same area fraction, not those of the section"
+        )

@@ -1,0 +1,221 @@
+"""From a sample of r_n to the fuzzy radius map: exact fits, bootstrap bands, the p-box and its
+refusals.
+"""
+
+import numpy as np
+import pytest
+from scipy import integrate
+
+from alphacut.stochastic import HermiteMap, TruncatedNormal
+from alphacut.stochastic.errors import RefusedError
+from alphacut.stochastic.fit.area_weighted import AreaWeighted
+from alphacut.stochastic.fit.bootstrap import slope_band
+from alphacut.stochastic.fit.hermite_fit import HermiteFit
+from alphacut.stochastic.fit.pbox import PBox, least_pbox
+
+LAW = TruncatedNormal()
+TRUE = HermiteMap(0.13, 0.3, 0.87, 0.5)
+FIT = HermiteFit(0.13, 0.87, LAW)
+
+
+def drawn(radius: HermiteMap, number: int, seed: int) -> AreaWeighted:
+    return AreaWeighted.of(radius(LAW.sample(number, np.random.default_rng(seed))))
+
+
+def staircase_fit(sample: AreaWeighted) -> np.ndarray:
+    """Slopes by brute force: least squares over a fine grid of shares."""
+    share = (np.arange(400_000) + 0.5) / 400_000
+    xi = (LAW.quantile(share) + 3) / 6
+    h2, h4 = xi * (1 - xi) ** 2, xi**2 * (xi - 1)
+    rest = (
+        sample.quantile(share) - 0.13 * (1 + 2 * xi) * (1 - xi) ** 2 - 0.87 * xi**2 * (3 - 2 * xi)
+    )
+    return np.linalg.lstsq(np.stack([h2, h4], axis=1), rest, rcond=None)[0]
+
+
+def test_weighted_distribution_by_hand():
+    sample = AreaWeighted.of([0.5, 0.2, 0.8], [1, 2, 1])
+    assert sample.cdf([0.1, 0.2, 0.5, 0.79, 0.8]).tolist() == [0, 0.5, 0.75, 0.75, 1]
+    assert sample.quantile([0.1, 0.5, 0.6, 1]).tolist() == [0.2, 0.2, 0.5, 0.8]
+    assert sample.mean == pytest.approx(0.425)
+    assert sample.share_within(0.3, 0.9) == pytest.approx(0.5)
+    assert sample.area_fraction == pytest.approx(np.pi / 4 * (0.02 + 0.0625 + 0.16))
+
+
+def test_limits_keep_their_share():
+    sample = drawn(TRUE, 50_000, 1)
+    low, high = sample.limits(0.99)
+    assert sample.share_within(low, high) == pytest.approx(0.99, abs=1e-4)
+    assert sample.cdf(low) == pytest.approx(1 - sample.cdf(high), abs=1e-4)
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+def test_fit_equals_brute_force_least_squares(weighted):
+    rng = np.random.default_rng(2)
+    sample = AreaWeighted.of(TRUE(LAW.sample(50, rng)), rng.random(50) if weighted else None)
+    assert FIT.slopes(sample) == pytest.approx(staircase_fit(sample), abs=1e-4)
+
+
+def test_fit_returns_the_map_of_its_own_quantiles():
+    share = (np.arange(200_000) + 0.5) / 200_000
+    assert FIT.slopes(AreaWeighted.of(TRUE(LAW.quantile(share)))) == pytest.approx(
+        (0.3, 0.5), abs=2e-4
+    )
+
+
+def test_fit_stays_monotone_and_nearest():
+    rng = np.random.default_rng(3)
+    for values in (
+        rng.choice([0.14, 0.86], 400),
+        np.full(400, 0.5),
+        0.13 + 0.74 * rng.random(400) ** 6,
+    ):
+        sample = AreaWeighted.of(values)
+        slopes = FIT.slopes(sample)
+        fitted = FIT.map(slopes)
+        assert fitted.is_monotone
+        for nudge in ((0.05, 0), (-0.05, 0), (0, 0.05), (0, -0.05)):
+            other = np.array(slopes) + nudge
+            if (other >= 0).all() and HermiteMap(0.13, other[0], 0.87, other[1]).is_monotone:
+                assert FIT.misfit(sample, slopes) <= FIT.misfit(sample, (other[0], other[1])) + 1e-5
+
+
+def test_slopes_lie_in_their_band_for_twenty_seeds():
+    for seed in range(100, 120):
+        band = slope_band(
+            FIT,
+            drawn(TRUE, 2000, seed),
+            level=0.999,
+            resamples=200,
+            generator=np.random.default_rng(seed),
+        )
+        assert band.holds(0.3, 0.5), seed
+
+
+def test_band_misses_a_wrong_map():
+    band = slope_band(
+        FIT,
+        drawn(HermiteMap(0.13, 0.6, 0.87, 0.5), 2000, 0),
+        level=0.999,
+        resamples=200,
+        generator=np.random.default_rng(0),
+    )
+    assert not band.holds(0.3, 0.5)
+
+
+def test_band_narrows_with_the_root_of_the_sample():
+    widths = []
+    for number in (1000, 4000, 16000):
+        band = slope_band(
+            FIT,
+            drawn(TRUE, number, 9),
+            level=0.999,
+            resamples=300,
+            generator=np.random.default_rng(1),
+        )
+        widths.append([band.a2[2] - band.a2[0], band.a4[2] - band.a4[0]])
+    rate = np.log2(np.array(widths[:-1]) / widths[1:]) / 2
+    assert rate == pytest.approx(np.full((2, 2), 0.5), abs=0.12)
+
+
+def test_bootstrap_over_groups_feels_their_likeness():
+    values = np.repeat(TRUE(LAW.sample(40, np.random.default_rng(4))), 50)
+    alone, grouped = (
+        AreaWeighted.of(values),
+        AreaWeighted.of(values, groups=np.repeat(np.arange(40), 50)),
+    )
+    bands = [sample.band(0.95, 300, np.random.default_rng(0)) for sample in (alone, grouped)]
+    assert bands[1] > 4 * bands[0]
+
+
+def two_sorts(number: int, seed: int) -> AreaWeighted:
+    """A sample that no cubic fits: a mixture of two maps."""
+    rng = np.random.default_rng(seed)
+    theta = LAW.sample(number, rng)
+    return AreaWeighted.of(
+        np.where(rng.random(number) < 0.5, TRUE(theta), HermiteMap(0.13, 0.1, 0.87, 1.2)(theta))
+    )
+
+
+@pytest.mark.parametrize(
+    "sample", [two_sorts(3000, 1), drawn(TRUE, 3000, 2)], ids=["mixture", "cubic"]
+)
+@pytest.mark.parametrize("band", [0.0, 0.01, 0.05])
+def test_pbox_contains_the_sample_but_for_the_band(sample, band):
+    try:
+        box = least_pbox(FIT, sample, band)
+    except RefusedError:
+        assert band == 0.0  # the staircase itself may need steeper ends than a monotone cubic has
+        return
+    assert box.contains(sample, band)
+    theta = np.linspace(-3, 3, 301)
+    low, high = box.bounds(theta)
+    for a2 in box.a2:
+        for a4 in box.a4:
+            radius = FIT.map((a2, a4))
+            assert radius.is_monotone
+            assert (radius(theta) >= low - 1e-12).all()
+            assert (radius(theta) <= high + 1e-12).all()
+
+
+def test_shrunken_support_is_caught():
+    sample, band = two_sorts(5000, 3), 0.005
+    box = least_pbox(FIT, sample, band)
+    assert box.contains(sample, band)
+    for side, ends in (("a2", 0), ("a2", 2), ("a4", 0), ("a4", 2)):
+        slope = list(getattr(box, side))
+        if abs(slope[ends] - slope[1]) < 1e-3:
+            continue
+        slope[ends] = slope[1] + 0.8 * (slope[ends] - slope[1])
+        shrunken = (
+            PBox(FIT, tuple(slope), box.a4) if side == "a2" else PBox(FIT, box.a2, tuple(slope))
+        )
+        assert not shrunken.contains(sample, band), (side, ends)
+
+
+def test_no_smaller_pbox_does():
+    sample, band = two_sorts(5000, 3), 0.005
+    box = least_pbox(FIT, sample, band)
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        reach = rng.random(4) * 2
+        a2 = (
+            box.a2[1] + reach[0] * (box.a2[0] - box.a2[1]),
+            box.a2[1],
+            box.a2[1] + reach[1] * max(box.a2[2] - box.a2[1], 0.02),
+        )
+        a4 = (
+            box.a4[1] + reach[2] * (box.a4[0] - box.a4[1]),
+            box.a4[1],
+            box.a4[1] + reach[3] * max(box.a4[2] - box.a4[1], 0.02),
+        )
+        other = PBox(FIT, a2, a4)
+        if other.area < box.area * 0.999:
+            assert not other.contains(sample, band)
+
+
+def test_pbox_area_is_the_area_between_the_bounds():
+    box = PBox(FIT, (0.1, 0.3, 0.4), (0.2, 0.5, 0.9))
+    exact = integrate.quad(
+        lambda t: np.ptp(np.array(box.bounds(np.asarray(t)))) * LAW.pdf(t), -3, 3
+    )[0]
+    assert box.area == pytest.approx(exact, rel=1e-10)
+
+
+def test_hopeless_samples_are_refused_with_the_reason():
+    half = np.concatenate([np.full(500, 0.14), np.full(500, 0.86)])
+    with pytest.raises(
+        RefusedError,
+        match=r"no p-box of monotone cubics from 0\.13 to 0\.87 .* r_n = 0\.\d+ outside by",
+    ):
+        least_pbox(FIT, AreaWeighted.of(half), 0.01)
+    with pytest.raises(RefusedError, match="five packings"):
+        AreaWeighted.of([0.2, 0.3], groups=[0, 0]).band(0.9, 10, np.random.default_rng(0))
+    with pytest.raises(RefusedError, match="0 of 100 reduced radii lie"):
+        drawn(TRUE, 100, 0).truncated(0.5, 0.5001)
+    with pytest.raises(ValueError, match="0 < lower < upper < 1"):
+        drawn(TRUE, 100, 0).truncated(0.5, 1.2)
+    with pytest.raises(ValueError, match="finite"):
+        AreaWeighted.of([np.nan])
+    with pytest.raises(ValueError, match="share of area to keep"):
+        drawn(TRUE, 100, 0).limits(1.5)

@@ -1,0 +1,77 @@
+"""Curves between nodes: as good as their rule where that is a Gauss rule, without overshoot where
+it is not.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from alphacut.case.load import load
+from alphacut.rve import Phase
+from alphacut.stages.campaign import campaign
+from alphacut.stages.cell import CellChoice
+from alphacut.stochastic import HermiteMap, TruncatedNormal, gauss_rule, layered_rule
+from alphacut.stochastic.theta.interpolation import between_nodes, lebesgue
+
+CASES = Path(__file__).parents[2] / "cases"
+AT = np.linspace(-3, 3, 61)
+
+
+def wave(theta):
+    return 1 / (1 + np.exp(-theta))
+
+
+@pytest.mark.parametrize(("points", "error"), [(10, 3e-3), (14, 4e-4), (20, 3e-5)])
+def test_the_error_falls_with_the_nodes_of_a_gauss_rule(points, error):
+    nodes = gauss_rule(TruncatedNormal(), points=points).nodes
+    assert np.abs(between_nodes(nodes, wave(nodes), AT) - wave(AT)).max() < error
+
+
+@pytest.mark.parametrize(
+    "nodes",
+    [
+        layered_rule(TruncatedNormal(), layers=12, points=3).nodes,
+        np.linspace(-2.9, 2.9, 25),
+        AT[::10],
+    ],
+)
+def test_other_nodes_are_joined_without_overshoot(nodes):
+    found = between_nodes(nodes, np.sign(nodes), AT)
+    assert np.abs(found[(nodes[0] <= AT) & (nodes[-1] >= AT)]).max() <= 1 + 1e-12
+
+
+def test_the_lebesgue_constant_is_that_of_the_polynomials():
+    nodes = np.array([-1.0, 0.0, 1.0])
+    at = np.linspace(-1, 1, 2001)
+    basis = [np.polyval(np.polyfit(nodes, row, 2), at) for row in np.eye(3)]
+    assert lebesgue(nodes, at) == pytest.approx(np.abs(basis).sum(0).max())
+    assert lebesgue(np.arange(41.0), at) == np.inf
+
+
+def test_a_response_has_curves_good_to_four_digits_whatever_its_modulus_needs():
+    radius, matrix, particle = (
+        HermiteMap(0.1337, 0.1, 0.8663, 0.1692),
+        Phase(20e9, 0.3),
+        Phase(80e9, 0.3),
+    )
+    exact = CellChoice("series").model().solve(radius, matrix, [particle])[0].curve
+    truth = between_nodes(exact.theta, exact.s11, AT)
+    errors = []
+    for limited in (False, True):
+        changes = [
+            "modulus.method=auto",
+            "modulus.tolerance=1e-3",
+            *(["response.quantity=s11"] if limited else []),
+        ]
+        case = load(CASES / "porous.toml", changes)
+        assert case.has("response.quantity") == limited
+        choice = campaign(case).task.choice
+        own = (
+            CellChoice("auto", tolerance=choice.tolerance)
+            .model()
+            .solve(radius, matrix, [particle])[0]
+            .curve
+        )
+        errors.append(np.abs(between_nodes(own.theta, own.s11, AT) / truth - 1).max())
+    assert errors[1] < 1e-4 < 1e-2 < errors[0]

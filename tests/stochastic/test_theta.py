@@ -1,0 +1,152 @@
+"""The law of θ, the radius map and the θ-rules: against independent integrals, with measured
+degrees and orders.
+"""
+
+import numpy as np
+import pytest
+from scipy import integrate, stats
+
+from alphacut.stochastic import HermiteMap, TruncatedNormal, gauss_rule, layered_rule
+
+PAPER = dict(a1=0.1337, a2=0.1, a3=0.8663, a4=0.1692)
+SUPPORTS = [(-3.0, 3.0), (-1.0, 4.0), (5.0, 8.0), (-9.0, -6.5)]
+
+
+@pytest.mark.parametrize("support", SUPPORTS)
+def test_law_is_scipys_truncated_normal(support):
+    law, reference = TruncatedNormal(*support), stats.truncnorm(*support)
+    theta = np.linspace(*support, 31)
+    assert law.pdf(theta) == pytest.approx(reference.pdf(theta), rel=1e-10)
+    assert law.cdf(theta) == pytest.approx(reference.cdf(theta), rel=1e-10, abs=1e-15)
+    assert law.quantile(law.cdf(theta)) == pytest.approx(theta, abs=1e-8)
+    assert law.pdf([support[0] - 1e-9, support[1] + 1e-9]).tolist() == [0, 0]
+
+
+def test_density_is_normalised_on_its_support():
+    law = TruncatedNormal()
+    assert integrate.quad(law.pdf, -3, 3)[0] == pytest.approx(1, abs=1e-13)
+    assert law.mass == pytest.approx(0.9973002, abs=1e-7)
+
+
+def test_samples_follow_the_law():
+    law = TruncatedNormal(-1, 2)
+    assert stats.kstest(law.sample(20_000, np.random.default_rng(1)), law.cdf).pvalue > 1e-4
+    assert (
+        stats.kstest(
+            law.sample(20_000, np.random.default_rng(1)), TruncatedNormal(-1.1, 2).cdf
+        ).pvalue
+        < 1e-4
+    )
+
+
+@pytest.mark.parametrize("support", [(3, -3), (0, 0), (np.nan, 1), (0, np.inf)])
+def test_bad_support_is_refused(support):
+    with pytest.raises(ValueError, match="two finite ends"):
+        TruncatedNormal(*support)
+
+
+def test_support_without_probability_is_refused():
+    with pytest.raises(ValueError, match="no probability"):
+        TruncatedNormal(50, 51)
+
+
+def test_probability_outside_its_range_is_refused():
+    with pytest.raises(ValueError, match=r"1\.5; each must lie in"):
+        TruncatedNormal().quantile([0.5, 1.5])
+
+
+def test_map_takes_its_ends_and_slopes():
+    radius, step = HermiteMap(**PAPER), 1e-6
+    assert radius([-3, 3]).tolist() == [pytest.approx(0.1337), pytest.approx(0.8663)]
+    assert radius.slope([-3, 3]) == pytest.approx([0.1, 0.1692])
+    difference = (radius(1 + step) - radius(1 - step)) / (2 * step) * 6
+    assert radius.slope(1) == pytest.approx(difference, rel=1e-8)
+
+
+def test_map_equals_the_printed_hermite_functions():
+    xi = np.linspace(0, 1, 11)
+    printed = [
+        (1 + 2 * xi) * (1 - xi) ** 2,
+        xi * (1 - xi) ** 2,
+        xi**2 * (3 - 2 * xi),
+        xi**2 * (xi - 1),
+    ]
+    assert HermiteMap(**PAPER)(6 * xi - 3) == pytest.approx(
+        np.dot(list(PAPER.values()), printed), abs=1e-15
+    )
+
+
+@pytest.mark.parametrize(
+    "case", [PAPER, dict(a1=0.5, a2=1.2, a3=0.5, a4=1.2), dict(a1=0.3, a2=0.0, a3=0.4, a4=2.0)]
+)
+def test_extremes_and_monotony_against_dense_sampling(case):
+    radius = HermiteMap(**case)
+    dense = radius(np.linspace(-3, 3, 200_001))
+    assert radius.extremes() == pytest.approx((dense.min(), dense.max()), abs=1e-10)
+    assert radius.is_monotone == bool((np.diff(dense) > -1e-12).all())
+
+
+@pytest.mark.parametrize(
+    "change",
+    [dict(a1=0.0), dict(a3=1.0), dict(a2=9.0), dict(a4=9.0), dict(a2=np.nan), dict(a1=np.inf)],
+)
+def test_radius_outside_the_cell_is_refused(change):
+    with pytest.raises(ValueError, match=r"inside \(0, 1\)"):
+        HermiteMap(**(PAPER | change))
+
+
+def test_mean_area_fraction_of_the_paper():
+    radius, law = HermiteMap(**PAPER), TruncatedNormal()
+    exact = integrate.quad(lambda t: np.pi / 4 * radius(t) ** 2 * law.pdf(t), -3, 3, epsabs=1e-14)[
+        0
+    ]
+    rule = gauss_rule(law, points=4)  # r² f_Θ needs degree 6
+    assert rule.mean(np.pi / 4 * radius(rule.nodes) ** 2) == pytest.approx(exact, abs=1e-14)
+    assert exact == pytest.approx(0.2092, abs=5e-5)
+
+
+@pytest.mark.parametrize("support", SUPPORTS)
+@pytest.mark.parametrize("points", [1, 2, 5, 12])
+def test_gauss_rule_has_its_degree_and_no_more(support, points):
+    law = TruncatedNormal(*support)
+    rule, middle, half = (
+        gauss_rule(law, points=points),
+        sum(support) / 2,
+        (support[1] - support[0]) / 2,
+    )
+    fine = layered_rule(law, layers=40, points=20)
+
+    def error(degree: int) -> float:
+        return abs(
+            rule.mean(((rule.nodes - middle) / half) ** degree)
+            - fine.mean(((fine.nodes - middle) / half) ** degree)
+        )
+
+    assert max(error(k) for k in range(2 * points)) < 1e-13
+    assert error(2 * points) > 1e-10
+
+
+@pytest.mark.parametrize("points", [1, 2, 3])
+def test_layered_rule_has_order_twice_its_points(points):
+    law, exact = TruncatedNormal(), gauss_rule(TruncatedNormal(), points=30)
+    truth = exact.mean(np.exp(exact.nodes / 2))
+    errors = []
+    for layers in (24, 48):
+        rule = layered_rule(law, layers=layers, points=points)
+        errors.append(abs(rule.mean(np.exp(rule.nodes / 2)) - truth))
+    assert errors[1] > 1e-14
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2 * points, abs=0.15)
+
+
+def test_means_of_arrays_and_constants():
+    rule = layered_rule(TruncatedNormal(), layers=3, points=2)
+    assert rule.mean(np.full((6, 2), 7.0)) == pytest.approx([7, 7], rel=1e-15)
+    assert (rule.weights > 0).all()
+    assert (np.diff(rule.nodes) > 0).all()
+
+
+def test_rules_without_nodes_are_refused():
+    with pytest.raises(ValueError, match="at least one"):
+        layered_rule(TruncatedNormal(), layers=0, points=3)
+    with pytest.raises(ValueError, match="at least one"):
+        gauss_rule(TruncatedNormal(), points=0)
