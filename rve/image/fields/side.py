@@ -1,0 +1,145 @@
+"""One side of the bounds: fields of least energy in one of the two spaces, and their energies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
+from alphacut.rve.image.fields.division import divided, prolonged
+from alphacut.rve.image.fields.element import Element, airy_element, displacement_element
+from alphacut.rve.image.fields.energy import Energy, energy
+from alphacut.rve.image.fields.operator import Operator
+from alphacut.rve.image.fields.preconditioner import FourierPreconditioner
+from alphacut.stochastic.theta.truncated_normal import Array
+
+UNIT_LOADS = np.eye(3)
+SMALL = 1 << 17  # pixels up to which the loads are solved together
+COARSER = 10.0  # accuracy of a start on whole pixels over that asked for
+
+
+@dataclass(frozen=True)
+class Side:
+    """Space of trial fields with its coefficients.
+
+    Args:
+        name: "displacement" bounds the stiffness from above, "stress" the compliance.
+        element: Maker of the element for a pixel's aspect ratio.
+        stiff: Coefficients are K + G/3 and G; else 1/(4 (K + G/3)) and 1/(4 G).
+    """
+
+    name: str
+    element: Callable[[float], Element]
+    stiff: bool
+
+    def coefficients(self, bulk: Array, shear: Array) -> tuple[Array, Array]:
+        """Coefficients of trace and deviator from plane bulk and shear moduli."""
+        return (bulk, shear) if self.stiff else (0.25 / bulk, 0.25 / shear)
+
+
+DISPLACEMENT = Side("displacement", displacement_element, stiff=True)
+STRESS = Side("stress", airy_element, stiff=False)
+
+
+@dataclass(frozen=True)
+class SideSolution:
+    """Fields of one side.
+
+    Args:
+        side: The space.
+        aspect: Height of a pixel over its width.
+        fields: Fluctuations for the unit loads, shape (tiles, 3, types, rows, columns).
+        energy: Mean energies with their rounding.
+        iterations: Of the slowest load.
+        seconds: Wall time.
+    """
+
+    side: Side
+    aspect: float
+    fields: Array
+    energy: Energy
+    iterations: int
+    seconds: float
+
+
+def solve_side(
+    side: Side,
+    bulk: Array,
+    shear: Array,
+    *,
+    solver: ConjugateGradient,
+    aspect: float = 1.0,
+    division: int = 1,
+    start: Array | None = None,
+    pixels: bool = False,
+) -> SideSolution:
+    """Fields of least energy under the three unit loads of periodic tiles.
+
+    Args:
+        side: Space of the fields.
+        bulk: Plane-strain bulk modulus K + G/3 of each pixel, shape (tiles, rows, columns), any unit.
+        shear: Shear modulus, same shape and unit.
+        solver: Stopping rule.
+        aspect: Height of a pixel over its width.
+        division: Parts along each side into which every pixel is divided; the fields of whole pixels are the start.
+        start: Fields to start from, on the undivided pixels.
+        pixels: Keep the energy of each pixel.
+    """
+    began = perf_counter()
+    element = side.element(aspect)
+    modes = element.mean_modes(UNIT_LOADS)
+    trace, deviator = side.coefficients(bulk, shear)
+    coarse = (
+        replace(solver, accuracy=min(0.1, COARSER * solver.accuracy)) if division > 1 else solver
+    )
+    fields, iterations = _fields(element, trace, deviator, modes, coarse, start)
+    if division > 1:
+        trace, deviator = divided(trace, division), divided(deviator, division)
+        fields, iterations = _fields(
+            element, trace, deviator, modes, solver, prolonged(element, fields, division)
+        )
+    result = energy(element, trace, deviator, fields, modes, pixels=pixels)
+    return SideSolution(side, aspect, fields, result, iterations, perf_counter() - began)
+
+
+def _fields(
+    element: Element,
+    trace: Array,
+    deviator: Array,
+    modes: Array,
+    solver: ConjugateGradient,
+    start: Array | None,
+) -> tuple[Array, int]:
+    """Fields of the unit loads and the most iterations; on large images one load at a time, which keeps the work space small."""
+    operator = Operator(element, trace, deviator)
+    bulk, shear = (float(np.sqrt(c.min() * c.max())) for c in (trace, deviator))
+    preconditioner = FourierPreconditioner.of(
+        element, bulk, shear, (trace.shape[1], trace.shape[2])
+    )
+    scale = least_energy(element, trace, deviator, modes)
+    loads = modes.shape[1]
+    fields = np.empty((len(trace), loads, element.types, *trace.shape[1:]))
+    iterations = 0
+    together = loads if trace.size <= SMALL else 1
+    for first in range(0, loads, together):
+        part = slice(first, first + together)
+        guess = None if start is None else start[:, part]
+        solution = solver.solve(
+            operator, preconditioner, operator.load(modes[:, part]), scale[:, part], guess
+        )
+        fields[:, part] = solution.fields
+        iterations = max(iterations, solution.iterations)
+    return fields, iterations
+
+
+def least_energy(element: Element, trace: Array, deviator: Array, modes: Array) -> Array:
+    """Total energy that no field with the given means can be below, shape (tiles, loads): harmonic means of the coefficients."""
+    split = element.bulk_rows
+    parts = ((trace, modes[:split]), (deviator, modes[split:]))
+    pixels = trace.shape[1] * trace.shape[2]
+    return np.asarray(
+        sum(pixels / np.mean(1 / c, axis=(1, 2))[:, None] * np.sum(m**2, axis=0) for c, m in parts)
+    )

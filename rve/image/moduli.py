@@ -1,0 +1,87 @@
+"""Elastic moduli of the phases of an image, as values and as intervals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+SOFTEST = -0.25  # Poisson's ratio of the least plane-strain bulk modulus at a given E
+
+
+@dataclass(frozen=True)
+class PlaneModuli:
+    """Moduli of an isotropic material in plane strain.
+
+    Args:
+        bulk: Plane-strain bulk modulus K + G/3, in Pa, positive; K is that of three dimensions.
+        shear: Shear modulus G, in Pa, positive.
+
+    Raises:
+        ValueError: A modulus is not positive or not finite.
+    """
+
+    bulk: float
+    shear: float
+
+    def __post_init__(self) -> None:
+        for name, value in (("plane-strain bulk", self.bulk), ("shear", self.shear)):
+            if not 0 < value < np.inf:
+                raise ValueError(
+                    f"the {name} modulus of a phase is {value:g} Pa; it must be positive and finite"
+                )
+
+    @classmethod
+    def of_young(cls, modulus: float, poisson: float) -> PlaneModuli:
+        """From Young's modulus in Pa and Poisson's ratio, inside (−1, 0.5)."""
+        if not -1 < poisson < 0.5:
+            raise ValueError(
+                f"Poisson's ratio of a phase is {poisson:g}; it must lie inside (-1, 0.5)"
+            )
+        return cls.of_bulk(modulus / (3 * (1 - 2 * poisson)), modulus / (2 * (1 + poisson)))
+
+    @classmethod
+    def of_bulk(cls, bulk: float, shear: float) -> PlaneModuli:
+        """From the bulk modulus K of three dimensions and the shear modulus, in Pa."""
+        if not bulk > 0:
+            raise ValueError(f"the bulk modulus of a phase is {bulk:g} Pa; it must be positive")
+        return cls(bulk + shear / 3, shear)
+
+
+@dataclass(frozen=True)
+class ModuliInterval:
+    """All materials between two.
+
+    Args:
+        lower: Least moduli.
+        upper: Greatest moduli.
+        attained: Both ends are materials that can occur; else the interval only encloses them (a fuzzy Poisson's ratio).
+
+    Raises:
+        ValueError: The ends are the wrong way round.
+    """
+
+    lower: PlaneModuli
+    upper: PlaneModuli
+    attained: bool = True
+
+    def __post_init__(self) -> None:
+        if not (self.lower.bulk <= self.upper.bulk and self.lower.shear <= self.upper.shear):
+            raise ValueError("the interval of a phase's moduli runs backwards")
+
+    @classmethod
+    def crisp(cls, moduli: PlaneModuli) -> ModuliInterval:
+        """The interval of one material."""
+        return cls(moduli, moduli)
+
+    @classmethod
+    def of_young(cls, modulus: tuple[float, float], poisson: tuple[float, float]) -> ModuliInterval:
+        """Enclosure of all E and ν in intervals; with ν the shear modulus falls."""
+        (soft, stiff), (low, high) = modulus, poisson
+        least = min(max(low, SOFTEST), high)  # where E / (2 (1 + ν) (1 − 2 ν)) is least in ν
+        bulks = [PlaneModuli.of_young(stiff, nu).bulk for nu in poisson]
+        lower = PlaneModuli(
+            PlaneModuli.of_young(soft, least).bulk, PlaneModuli.of_young(soft, high).shear
+        )
+        upper = PlaneModuli(max(bulks), PlaneModuli.of_young(stiff, low).shear)
+        return cls(lower, upper, attained=low == high)

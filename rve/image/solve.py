@@ -1,0 +1,66 @@
+"""Both bounds of a crisp image."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+from alphacut.rve.image.bounds import StiffnessBounds, inverse_below
+from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
+from alphacut.rve.image.fields.side import DISPLACEMENT, STRESS, SideSolution, solve_side
+from alphacut.stochastic.theta.truncated_normal import Array
+
+
+@dataclass(frozen=True)
+class CrispBounds:
+    """Bounds of one image with the fields that prove them.
+
+    Args:
+        bounds: Of the stiffness.
+        upper: Displacement side.
+        lower: Stress side.
+    """
+
+    bounds: StiffnessBounds
+    upper: SideSolution
+    lower: SideSolution
+
+
+def solve_image(
+    bulk: Array,
+    shear: Array,
+    *,
+    aspect: float = 1.0,
+    solver: ConjugateGradient | None = None,
+    division: int = 1,
+    pixels: bool = False,
+) -> CrispBounds:
+    """Proved bounds of the effective stiffness of the periodic image.
+
+    Args:
+        bulk: Plane-strain bulk modulus K + G/3 of each pixel, shape (rows, columns), in Pa; row 0 is at the bottom, y rises with rows.
+        shear: Shear modulus of each pixel, same shape, in Pa.
+        aspect: Height of a pixel over its width.
+        solver: Stopping rule.
+        division: Parts along each side of a pixel.
+        pixels: Keep the energy of each pixel.
+    """
+    rule = solver or ConjugateGradient()
+    with ThreadPoolExecutor(2) as pool:
+        tasks = [
+            pool.submit(
+                solve_side,
+                side,
+                bulk[None],
+                shear[None],
+                solver=rule,
+                aspect=aspect,
+                division=division,
+                pixels=pixels,
+            )
+            for side in (DISPLACEMENT, STRESS)
+        ]
+        upper, lower = (task.result() for task in tasks)
+    return CrispBounds(
+        StiffnessBounds(inverse_below(lower.energy.upper[0]), upper.energy.upper[0]), upper, lower
+    )
