@@ -1,4 +1,4 @@
-"""What the modulus of eq. 16 hides: the stiffness of the cell in every direction of its plane.
+"""Stiffness of the cell in every direction of its plane, beside the modulus of eq. 16.
 
 A square array has three moduli, not two. Eq. 16 takes the hydrostatic one and the shear along the
 axes; the shear along the diagonals, (C11 − C12)/2, does not enter.
@@ -37,23 +37,17 @@ def rotated(stiffness: Array, angle: ArrayLike) -> Array:
 
 
 def directional_young(stiffness: Array, angle: ArrayLike) -> Array:
-    """Plane-strain Young's modulus along `angle` (radians): stress over strain in a bar cut along
-    it, free at its sides, in Pa.
-    """
+    """Plane-strain Young's modulus along `angle` (radians) of a bar with free sides, in Pa."""
     return np.asarray(1 / np.linalg.inv(rotated(stiffness, angle))[..., 0, 0])
 
 
 def directional_shear(stiffness: Array, angle: ArrayLike) -> Array:
-    """Shear modulus in axes along `angle` (radians), in Pa: σ12 over 2 ε12, the normal stresses
-    being zero.
-    """
+    """Shear modulus in axes along `angle` (radians), in Pa: σ12 over 2 ε12."""
     return np.asarray(1 / np.linalg.inv(rotated(stiffness, angle))[..., 2, 2])
 
 
 def shear_ratio(stiffness: Array) -> float:
-    """Shear modulus along the diagonals over that along the axes, (C11 − C12)/(2 C33): 1 for an
-    isotropic plane.
-    """
+    """Shear modulus along the diagonals over that along the axes, (C11 − C12)/(2 C33)."""
     return float((stiffness[0, 0] - stiffness[0, 1]) / (2 * stiffness[2, 2]))
 
 
@@ -73,8 +67,7 @@ def shear_ratio_in_words(ratio: float) -> str:
 
 
 def plane_constants(stiffness: Array, poisson: float) -> dict[str, float]:
-    """Orthotropic constants, axes along the array, that give `stiffness` in plane strain; names as
-    in `CONSTANTS`, moduli in Pa.
+    """Orthotropic constants of `stiffness` along the axes, named as in `CONSTANTS`, in Pa.
 
     What does not act in plane strain is isotropic: stiffnesses 13, 23 and 33, and the shears 13 and
     23, are those of the in-plane bulk modulus and of Poisson's ratio by eq. 16. So does σ33 follow,

@@ -1,5 +1,4 @@
-"""What no effective stiffness can leave: Reuss and Voigt as matrices, Hashin–Shtrikman for the
-in-plane bulk modulus.
+"""Bounds of effective stiffness: Reuss, Voigt, Hashin–Shtrikman for the in-plane bulk.
 
 The in-plane bulk modulus of a square array is isotropic enough for Hashin–Shtrikman; its shear
 modulus G12 is not and lies below the isotropic lower bound, so it is not tested against that.
@@ -14,9 +13,7 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 
 def voigt(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
-    """Stiffness at uniform strain, shape (…, 3, 3) for area fractions of the inclusion of shape
-    (…), in Pa.
-    """
+    """Stiffness at uniform strain, shape (…, 3, 3), in Pa, for area fractions of shape (…)."""
     share = np.asarray(fraction)[..., None, None]
     return np.asarray((1 - share) * matrix.stiffness + share * inclusion.stiffness)
 
@@ -38,7 +35,7 @@ def bulk_modulus(stiffness: Array) -> Array:
 
 
 def hashin_shtrikman_bulk(fraction: Array, matrix: Phase, inclusion: Phase) -> tuple[Array, Array]:
-    """Lower and upper bound of the in-plane bulk modulus, in Pa (Hashin & Rosen 1964; Hashin 1965)."""
+    """Bounds of the in-plane bulk modulus, in Pa (Hashin & Rosen 1964; Hashin 1965)."""
     bulk = [float(bulk_modulus(phase.stiffness)) for phase in (matrix, inclusion)]
     shear = [float(phase.stiffness[2, 2]) for phase in (matrix, inclusion)]
     share = np.asarray(fraction)

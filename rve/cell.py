@@ -43,9 +43,7 @@ class Phase:
 
     @property
     def stiffness(self) -> Array:
-        """Plane-strain stiffness in Voigt order (11, 22, 12 with 2 ε12), shape (3, 3), in Pa (eq.
-        6).
-        """
+        """Plane-strain stiffness in Voigt order (11, 22, 12 with 2 ε12), (3, 3), in Pa (eq. 6)."""
         e, nu = self.modulus, self.poisson
         unit = np.array([[1 - nu, nu, 0], [nu, 1 - nu, 0], [0, 0, (1 - 2 * nu) / 2]])
         return e / ((1 + nu) * (1 - 2 * nu)) * unit

@@ -1,6 +1,4 @@
-"""The certificate of a result: properties every right one has, measured, kept with it, and an error
-where one is violated.
-"""
+"""Certificate of a result: properties that every right one has, measured."""
 
 from __future__ import annotations
 
@@ -22,7 +20,7 @@ class CertificateError(RuntimeError):
 
 @dataclass(frozen=True)
 class Limits:
-    """How much violation of each kind is round-off or declared error, relative.
+    """Relative violation of each kind that is round-off or declared error.
 
     Args:
         algebraic: For what holds exactly in exact arithmetic: residual, Hill–Mandel, symmetry,
@@ -113,7 +111,7 @@ def load_checks(
 
 
 def _below(difference: Array, scale: Array) -> float:
-    """How far the least eigenvalue is below zero, relative to the size of `scale`."""
+    """Depth of the least eigenvalue below zero, relative to the size of `scale`."""
     return max(0.0, -float(np.linalg.eigvalsh((difference + difference.T) / 2)[0])) / float(
         abs(scale).max()
     )

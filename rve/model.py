@@ -1,6 +1,4 @@
-"""The interface that every model of the cell answers to, the table of their names, and two models
-checked against one another.
-"""
+"""Interface of the cell's models, the table of their names, and their cross-check."""
 
 from __future__ import annotations
 

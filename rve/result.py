@@ -1,4 +1,4 @@
-"""What every model of the cell returns: the homogenised stress over θ, and what follows from it."""
+"""Result of every model of the cell: the homogenised stress over θ."""
 
 from __future__ import annotations
 
@@ -90,9 +90,7 @@ class Homogenised:
 
     @property
     def stiffness(self) -> Array | None:
-        """Mean planar stiffness under f_Θ, Voigt order, shape (3, 3), in Pa; None if the model did
-        not make it.
-        """
+        """Mean planar stiffness under f_Θ, Voigt order, shape (3, 3), in Pa, or None."""
         curve = self.curve
         return (
             None

@@ -1,6 +1,4 @@
-"""``python -m stochastic microstructure CASE``: from particles to the radius map; the same as
-``alphacut microstructure``.
-"""
+"""Run ``python -m stochastic microstructure CASE``, the same as ``alphacut microstructure``."""
 
 import sys
 

@@ -1,5 +1,5 @@
-"""What is raised when a well-formed wish cannot be granted."""
+"""Errors of valid input that admits no solution."""
 
 
 class RefusedError(RuntimeError):
-    """A packing, a fit or a p-box that would not meet its own test; the message gives the numbers."""
+    """A packing, a fit or a p-box that fails its own test; the message gives the numbers."""

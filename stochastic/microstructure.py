@@ -1,5 +1,4 @@
-"""From particles to the fuzzy radius map: sections 4.1 and 4.2 of the paper, on simulated or
-measured discs.
+"""From particles to the fuzzy radius map (sections 4.1 and 4.2).
 
 This differs from the paper in: 1. The supports of a2 and a4 are derived: they span the p-box of
 least area that contains the sample's distribution save for its own bootstrap band. 2. The bound of
@@ -34,7 +33,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Study:
-    """How a microstructure is turned into a radius map.
+    """Settings of the way from a microstructure to a radius map.
 
     Args:
         source: Where the discs come from.
@@ -85,7 +84,7 @@ class Study:
 
 @dataclass(frozen=True, eq=False)
 class Microstructure:
-    """What the particles tell.
+    """Radius map of a microstructure, with the statistics that it rests on.
 
     Args:
         study: How it was found.

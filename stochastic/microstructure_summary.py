@@ -117,9 +117,7 @@ def fragment(found: Microstructure) -> str:
 
 
 def to_dataset(found: Microstructure) -> xarray.Dataset:
-    """Distribution function of r_n between the limits with its band, and both bounds of the p-box,
-    over a grid of radii.
-    """
+    """Distribution function of r_n with its band and p-box, over a grid of radii."""
     import xarray
 
     fit = found.pbox.fit

@@ -17,7 +17,7 @@ from alphacut.stochastic.theta.truncated_normal import Array, TruncatedNormal
 
 
 class RadiusMap(Protocol):
-    """What the cell problem needs to know of the random radius: its law and the map from θ."""
+    """Random radius of the cell problem: its law and the map from θ."""
 
     @property
     def distribution(self) -> TruncatedNormal:
@@ -90,7 +90,7 @@ class HermiteMap:
 
     @property
     def is_monotone(self) -> bool:
-        """Whether r never falls as θ rises."""
+        """True if r never falls as θ rises."""
         _, b, c, d = self.monomials
         turning = [-c / (3 * d)] if d else []
         lowest = [

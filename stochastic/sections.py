@@ -1,4 +1,4 @@
-"""Where discs come from: simulated packings, a list of circles, or an image."""
+"""Sources of discs: simulated packings, a list of circles, or an image."""
 
 from __future__ import annotations
 
@@ -110,8 +110,7 @@ class Measured:
 
 
 def reduced_radii(sections: list[Section]) -> AreaWeighted:
-    """Area-weighted r_n of all whole cells; groups are the sections, or the patches of a single
-    one.
+    """Area-weighted r_n of all whole cells, grouped by section or patch.
 
     Raises:
         RefusedError: A cell is smaller than its disc, so that discs overlap.

@@ -1,5 +1,4 @@
-"""The model `auto`: the cheapest model and resolution that reach a relative tolerance on E, with
-the error left and the reason.
+"""Model `auto`: the cheapest model that reaches a tolerance, with its error and the reason.
 
 Models are tried from the cheapest on: series, table, slices, prism. One that cannot reach the
 tolerance says so itself, and the next is tried; every refusal is told in the result's reason.
@@ -70,8 +69,7 @@ class AutoModel:
     def solve(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
     ) -> list[Homogenised]:
-        """One result for each of `inclusions`, in their order, all within the tolerance by their
-        own estimate.
+        """One result for each of `inclusions`, in their order, within the tolerance.
 
         Raises:
             ChoiceError: No model left reaches the tolerance.
@@ -96,9 +94,7 @@ class AutoModel:
     def _take(
         self, name: str, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
     ) -> list[Homogenised]:
-        """Results of one model at the resolution that the tolerance asks for; RuntimeError when it
-        has none.
-        """
+        """Results of one model at the resolution that the tolerance asks for."""
         if name == "series":
             from alphacut.rve.series.model import SeriesModel
 

@@ -1,6 +1,4 @@
-"""The product-space model with its error estimated from coarser meshes, and refined until that is
-small enough.
-"""
+"""Product-space model refined until its estimated error is small enough."""
 
 from __future__ import annotations
 

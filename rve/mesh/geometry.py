@@ -1,6 +1,4 @@
-"""Gmsh geometry of a periodic square with discs: the square cut by circles and their images,
-opposite sides bound to one another.
-"""
+"""Gmsh geometry of a periodic square cut by discs and their images."""
 
 from __future__ import annotations
 
@@ -28,9 +26,7 @@ class PeriodicSquare:
     high: float
 
     def cut(self, discs: Iterable[tuple[float, float, float]]) -> set[int]:
-        """Draw the square cut by discs (x, y, r) and their images; the tags of the surfaces inside
-        discs.
-        """
+        """Draw the square cut by discs (x, y, r) and images; tags of surfaces inside discs."""
         occ, period = gmsh.model.occ, self.high - self.low
         square = occ.addRectangle(self.low, self.low, 0, period, period)
         circles = []

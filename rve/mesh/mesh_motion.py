@@ -1,6 +1,4 @@
-"""Moving a planar mesh from its reference radius to any other: same topology, the interface on the
-circle of radius r.
-"""
+"""Motion of a planar mesh from its reference radius to any other."""
 
 from __future__ import annotations
 
@@ -12,8 +10,7 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 
 def moved(mesh: Triangulation, radius: float) -> Array:
-    """Positions of all nodes, shape (n, 2), with the interface at `radius`, curved edges on the
-    circle.
+    """Positions of all nodes, shape (n, 2), curved edges on the circle of `radius`.
 
     Nodes slide along rays from the centre: inside the particle in proportion, outside between the
     circle and the side of the square. Edge midpoints slide too, so that the layers between a large
@@ -30,18 +27,14 @@ def moved(mesh: Triangulation, radius: float) -> Array:
 
 
 def _across_diagonal(mesh: Triangulation) -> NDArray[np.bool_]:
-    """Whether the ends of an edge lie on different sides of a diagonal, outside the particle, shape
-    (edges,).
-    """
+    """Mask of edges outside the particle that cross a diagonal, shape (edges,)."""
     x, y = mesh.points[mesh.ends].transpose(2, 1, 0)
     crossed = ((x - y).prod(axis=0) < -1e-12) | ((x + y).prod(axis=0) < -1e-12)
     return np.asarray(crossed)
 
 
 def _slide(points: Array, old: float, new: float) -> Array:
-    """Move along rays, shape (n, 2): the circle of radius `old` goes to `new`, the sides of the
-    square stay.
-    """
+    """Move along rays, shape (n, 2), from the circle of radius `old` to `new`; sides stay."""
     reach = abs(points).max(axis=1)  # 1 on the square's sides
     distance = np.linalg.norm(points, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,5 +1,4 @@
-"""Periodicity by elimination: opposite nodes of the cell share one unknown, the corner has none
-(paper, section 4.2).
+"""Periodicity by elimination; the corner is fixed (section 4.2).
 
 The four corners are one periodic node; its fluctuation is fixed on the whole line over θ, because a
 translation u = c(θ) costs no energy at any θ.
@@ -31,9 +30,7 @@ class Periodicity:
     count: int
 
     def linear_injection(self, plane: Triangulation) -> sp.csr_matrix:
-        """Matrix that carries values on vertices to all nodes (a linear field is quadratic too),
-        shape (count, vertices).
-        """
+        """Matrix that carries values on vertices to all nodes, shape (count, vertices)."""
         rows, columns, values = (
             [np.arange(self.vertices)],
             [np.arange(self.vertices)],

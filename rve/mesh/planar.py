@@ -1,6 +1,4 @@
-"""The planar cell as Gmsh triangles of any order with a curved interface, the particle anywhere in
-the periodic cell.
-"""
+"""Planar cell as Gmsh triangles of any order with a curved interface."""
 
 from __future__ import annotations
 
@@ -107,8 +105,7 @@ def _refuse_touching_side(radius: float, centre: tuple[float, float]) -> None:
 
 
 def _grading(x: float, y: float, radius: float) -> float:
-    """Local edge length over the wanted one: less near the particle, and in the gap between a
-    particle and its images.
+    """Local edge length over the nominal one, less near the particle and in gaps.
 
     The factors spread the error evenly over radii from 0.1 to 0.98. Gmsh calls this for every
     point, hence no NumPy.
@@ -136,8 +133,7 @@ def _triangles(particle: set[int]) -> tuple[Array, Integers, NDArray[np.bool_]]:
 
 
 def curved_nodes(mesh: PlanarMesh, order: int) -> tuple[Array, Integers]:
-    """Nodes of Lagrange triangles of `order` in Basix' numbering, the edges on the interface bent
-    onto the circle.
+    """Nodes of Lagrange triangles of `order`, the interface's edges bent onto the circle.
 
     Inside a triangle the bend fades with the bubble of its edge, so the map stays smooth and the
     elements keep their order.
@@ -187,9 +183,7 @@ def _number_nodes(
 
 
 def _bend(mesh: PlanarMesh, ends: Integers, weights: Array) -> Array:
-    """Displacement of every node of the triangles whose edge `ends` (k, 2) lies on the circle;
-    `weights` (n, 2) are λ_a, λ_b.
-    """
+    """Displacement of all nodes of triangles with the edge `ends` (k, 2) on the circle."""
     a, b = mesh.points[ends[:, 0]], mesh.points[ends[:, 1]]
     centre = mesh.centre + 2 * np.round(((a + b) / 2 - mesh.centre) / 2)
     start, stop = (np.arctan2(p[:, 1] - centre[:, 1], p[:, 0] - centre[:, 0]) for p in (a, b))

@@ -1,5 +1,4 @@
-"""The prism mesh of the product space: the planar mesh extruded over θ, its nodes moved so that the
-interface is the cone.
+"""Prism mesh of the product space: the planar mesh extruded over θ around the cone.
 
 Nodes are numbered level by level: on each of the layers + 1 levels of θ all planar nodes, then,
 half-way between levels, the planar vertices (a serendipity wedge has no midpoints there).
@@ -44,9 +43,7 @@ class PrismGrid:
 
     @cached_property
     def cells(self) -> Integers:
-        """Nodes of each wedge in Basix's order of vertices and edges, shape (layers · triangles,
-        15), layer by layer.
-        """
+        """Nodes of each wedge in Basix's order, shape (layers · triangles, 15), layer by layer."""
         planar = len(self.plane.points)
         t = self.plane.triangles
         v0, v1, v2, e01, e02, e12 = t.T
@@ -72,8 +69,7 @@ class PrismGrid:
         return np.linspace(law.lower, law.upper, self.layers + 1)
 
     def planes(self, radius: RadiusMap) -> tuple[Array, Array]:
-        """Planar positions on the levels, shape (layers + 1, n, 2), and half-way between them,
-        shape (layers, n, 2).
+        """Positions on the levels, shape (layers + 1, n, 2), and half-way, shape (layers, n, 2).
 
         Half-way the wedges have nodes on vertices only; the midpoints are where their shape
         functions carry them.

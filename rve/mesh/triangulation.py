@@ -1,6 +1,4 @@
-"""The planar mesh under the prisms: Gmsh triangles of the periodic cell with the particle at a
-reference radius.
-"""
+"""Planar mesh under the prisms: Gmsh triangles at a reference radius."""
 
 from __future__ import annotations
 
@@ -41,8 +39,7 @@ class Triangulation:
 
 
 def triangulate(*, size: float, radius: float) -> Triangulation:
-    """Mesh the cell with triangles of about `size`, opposite sides matching, the particle's edge at
-    `radius`.
+    """Mesh the cell with triangles of about `size`, opposite sides matching.
 
     Args:
         size: Wanted edge length, in halves of the cell's side, in (0, 1].
@@ -63,9 +60,7 @@ def triangulate(*, size: float, radius: float) -> Triangulation:
 
 
 def _gmsh_triangles(size: float, radius: float) -> tuple[Array, Integers, NDArray[np.bool_]]:
-    """Vertices (n, 2), triangles (m, 3) and the particle's triangles (m,), by the built-in kernel
-    of Gmsh.
-    """
+    """Vertices (n, 2), triangles (m, 3) and the particle's triangles (m,), by Gmsh."""
     gmsh.initialize(["", "-v", "1"], readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.setNumber("General.NumThreads", 1)
@@ -109,7 +104,7 @@ def _square(size: float) -> tuple[int]:
 
 
 def _square_with_disc(size: float, radius: float) -> tuple[int, int]:
-    """The cell with its particle bounded by four arcs: surfaces of the particle and of the matrix."""
+    """Cell with its particle bounded by four arcs: surfaces of particle and matrix."""
     geo = gmsh.model.geo
     centre = geo.addPoint(0, 0, 0, size)
     poles = [

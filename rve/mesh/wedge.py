@@ -1,5 +1,4 @@
-"""The 15-node serendipity wedge, the paper's quadratic element of the product space (section 3.1),
-for field and geometry alike.
+"""Quadratic 15-node serendipity wedge of the product space (section 3.1).
 
 Span: P2(x1, x2) ⊗ {1, ζ} plus ζ² P1(x1, x2). One degree of freedom at every vertex and at every
 edge midpoint. Basix has no serendipity element on prisms, so the element is handed to it as a
@@ -85,9 +84,7 @@ def slab_rule(*, planar_degree: int = 4, layer_points: int = 3) -> tuple[Array, 
 
 
 def tabulate(points: Array, *, derivatives: bool = False) -> Array:
-    """Shape functions at `points`, shape (n, 15); with `derivatives` the three derivatives, shape
-    (3, n, 15).
-    """
+    """Shape functions at `points`, shape (n, 15), or their derivatives, shape (3, n, 15)."""
     table = wedge().tabulate(1 if derivatives else 0, points)
     return np.asarray(table[1:] if derivatives else table[0]).reshape(-1, len(points), NODES)[
         slice(None) if derivatives else 0

@@ -1,6 +1,4 @@
-"""The planar cell problem in DOLFINx: one radius, one mesh, any number of materials and the three
-loads at once.
-"""
+"""Planar cell problem in DOLFINx: one mesh, any materials, three loads at once."""
 
 from __future__ import annotations
 
@@ -95,9 +93,7 @@ class PlanarCell:
 
     @cached_property
     def periodic(self) -> sp.csr_matrix:
-        """P of K_per = Pᵀ K P: nodes on x = 1 and y = 1 follow those at −1, and the first node is
-        fixed.
-        """
+        """P of K_per = Pᵀ K P: nodes at 1 follow those at −1, the first node is fixed."""
         node = self.periodic_nodes
         target = (2 * node[:, None] + np.arange(2)).ravel() - 2
         free = np.flatnonzero(target >= 0)
@@ -107,9 +103,7 @@ class PlanarCell:
 
     @cached_property
     def periodic_nodes(self) -> Integers:
-        """Number of each node in the periodic cell, shape (n,); equal for partners on opposite
-        sides.
-        """
+        """Number of each node in the periodic cell, shape (n,)."""
         wrapped = np.where(self.coordinates > 1 - 1e-9, -1.0, self.coordinates)
         _, node = np.unique(np.round(wrapped * 1e8).astype(np.int64), axis=0, return_inverse=True)
         return node.ravel()
@@ -152,9 +146,7 @@ class PlanarCell:
         return found
 
     def displacement(self, matrix: Phase, inclusion: Phase) -> Array:
-        """Displacements under the three unit strains at the nodes, shape (2n, 3), one node fixed in
-        its fluctuation.
-        """
+        """Displacements under the three unit strains at the nodes, shape (2n, 3)."""
         pencil = self._pencil(matrix, inclusion.poisson)
         return np.asarray(self.affine - self.periodic @ pencil.solve(inclusion.modulus)[0])
 

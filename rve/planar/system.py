@@ -1,6 +1,4 @@
-"""The linear system of a planar cell: periodicity by elimination on a pattern kept for all
-materials, and its Cholesky factor.
-"""
+"""Linear system of a planar cell: periodic elimination and Cholesky factor."""
 
 from __future__ import annotations
 
@@ -23,8 +21,7 @@ class PlanarError(RuntimeError):
 
 
 class PeriodicPattern:
-    """K ↦ the entries of Pᵀ K P, for several K of 2 × 2 blocks that then share one sparsity
-    pattern.
+    """K ↦ the entries of Pᵀ K P, for several K of 2 × 2 blocks and one sparsity pattern.
 
     Args:
         nodes: Periodic number of each node, two degrees of freedom on each; those of node 0 are
@@ -116,8 +113,7 @@ class Cholesky:
 
 
 class Pencil:
-    """One cell's system for any modulus E of the particle: (fixed + E · unit), periodic, under the
-    three unit strains.
+    """One cell's system (fixed + E · unit) for any modulus E of the particle.
 
     Args:
         fixed: Unreduced stiffness of the matrix.
@@ -146,9 +142,7 @@ class Pencil:
         )  # 3 × 3: energy without fluctuation
 
     def solve(self, modulus: float) -> tuple[Array, Array]:
-        """Fluctuations less their sign, shape (unknowns, 3), and the stiffness in Pa, shape (3, 3),
-        for the particle's modulus in Pa.
-        """
+        """Negative fluctuations, shape (unknowns, 3), and stiffness in Pa, shape (3, 3)."""
         load = self.loads[0] + modulus * self.loads[1]
         correction = self._factor.solve(self._values[0] + modulus * self._values[1], load)
         uniform = self.uniform[0] + modulus * self.uniform[1]

@@ -1,6 +1,4 @@
-"""Error of a product-space result, estimated from companions: one of another mesh size, one of half
-the layers.
-"""
+"""Error of a product-space result, estimated from companions on other meshes."""
 
 from __future__ import annotations
 
@@ -21,9 +19,7 @@ _ROUGH = 0.25  # mesh size above which a coarser mesh would tell nothing
 
 
 def companion_size(mesh_size: float) -> float:
-    """Mesh size of the companion: twice as coarse, or twice as fine where that would be no mesh to
-    speak of.
-    """
+    """Mesh size of the companion: twice as coarse, or twice as fine where that is no mesh."""
     return 2 * mesh_size if mesh_size <= _ROUGH else mesh_size / 2
 
 
@@ -36,9 +32,7 @@ def space_error(results: Sequence[Homogenised], companions: Sequence[Homogenised
 
 
 def theta_error(results: Sequence[Homogenised], thick: Sequence[Homogenised]) -> list[float]:
-    """Relative error of E from the layers, for each result, from companions with half of them on
-    the same mesh.
-    """
+    """Relative error of E from the layers, from companions with half of them."""
     return [
         _gap(own, other, (own.unknowns / other.unknowns) ** ORDER)
         for own, other in zip(results, thick, strict=True)
@@ -53,9 +47,7 @@ def _gap(own: Homogenised, other: Homogenised, gain: float) -> float:
 def unresolved(
     radius_map: RadiusMap, curve: StressCurve, phases: tuple[Phase, Phase], *, mesh_size: float
 ) -> float:
-    """Relative change of E, tenfold, by particles so small beside the mesh that no refinement of it
-    tells their error.
-    """
+    """Relative change of E, tenfold, by particles too small for the mesh."""
     radius = radius_map(curve.theta)
     small = radius < mesh_size / 4
     if not small.any():

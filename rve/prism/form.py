@@ -1,5 +1,4 @@
-"""DOLFINx behind the product-space cell: the mesh of wedges, and the θ-weighted stiffness of each
-phase (eq. 7).
+"""DOLFINx behind the product-space cell: mesh of wedges, stiffness of each phase (eq. 7).
 
 The form has no derivative along θ: div and D act on x alone, while the mesh is three-dimensional.
 """
@@ -109,14 +108,12 @@ class PrismForm:
             return fem.form(form, jit_options=JIT)
 
     def _point_function(self) -> fem.Function:
-        """A function with one value at every quadrature point: 1 in the particle, 0 in the matrix."""
+        """Function of one value at every quadrature point: 1 in the particle, else 0."""
         element = basix.ufl.quadrature_element("prism", points=self.points, weights=self.weights)
         return fem.Function(fem.functionspace(self.mesh, element))
 
     def _measure(self) -> Any:
-        """Volume measure with the project's rule; part 0 the matrix and part 1 the particle where
-        the mesh conforms, else all twice.
-        """
+        """Volume measure; part 0 the matrix and part 1 the particle on a conforming mesh."""
         rule = {
             "quadrature_rule": "custom",
             "quadrature_points": self.points,
@@ -131,18 +128,14 @@ class PrismForm:
         return ufl.Measure("dx", domain=self.mesh, metadata=rule, subdomain_data=data)
 
     def place(self, radius: RadiusMap) -> Array:
-        """Move the nodes to the cone of `radius`; returns their positions in the grid's numbering,
-        shape (nodes, 3).
-        """
+        """Move the nodes to the cone of `radius`; returns their positions, shape (nodes, 3)."""
         positions = self.grid.positions(radius)
         self.mesh.geometry.x[:] = positions[self.mesh.geometry.input_global_indices]
         self._law.value = 1 / (np.sqrt(2 * np.pi) * radius.distribution.mass)
         return positions
 
     def mark(self, share: Array) -> None:
-        """Set the share of the particle at the quadrature points, shape (cells, points), cells in
-        the grid's numbering.
-        """
+        """Set the particle's share at the quadrature points, shape (cells, points)."""
         self._share.x.array[:] = share[self.mesh.topology.original_cell_index].ravel()
 
     def node_of_dof(self) -> Integers:
@@ -167,8 +160,7 @@ class PrismForm:
         petsc.assemble_matrix(matrix, self._forms[phase])
 
     def load(self, phase: int, strain: Array) -> Array:
-        """Nodal forces −⟨Bᵀ E ε̄⟩ of one phase for a unit modulus, shape (local nodes · 2,), ghosts
-        included.
+        """Nodal forces −⟨Bᵀ E ε̄⟩ of one phase for a unit modulus, shape (local nodes · 2,).
 
         Args:
             phase: 0 the matrix, 1 the particle.
@@ -179,7 +171,7 @@ class PrismForm:
 
 
 def _strain(w: Any) -> Any:
-    """In-plane strain (ε11, ε22, 2 ε12) of a field on the product space: θ is not differentiated."""
+    """In-plane strain (ε11, ε22, 2 ε12) on the product space; θ is not differentiated."""
     gradient = ufl.grad(w)
     return ufl.as_vector([gradient[0, 0], gradient[1, 1], gradient[0, 1] + gradient[1, 0]])
 

@@ -20,8 +20,7 @@ COMPONENTS = ("s11", "s22", "s12")
 
 @dataclass(frozen=True)
 class Spread:
-    """A stress component over cell and θ, sampled at the quadrature points, in Pa; every array has
-    shape (3 components, loads).
+    """Stress component over cell and θ at the quadrature points, in Pa, shape (3, loads).
 
     Args:
         mean: Mean under f_Θ.
@@ -162,7 +161,7 @@ def _edge_points(system: PrismSystem, start: int, end: int) -> Array:
 def _tractions(
     system: PrismSystem, displacement: Array, stiffness: Array, triangles: Array, points: Array
 ) -> tuple[Array, Array, Array]:
-    """For chosen triangles of every layer: angle (n, m), normal traction and shear (n, m, loads)."""
+    """Angle (n, m), normal traction and shear (n, m, loads) on chosen triangles."""
     grid, slices = system.grid, system.slice_stress
     cells = grid.cells.reshape(grid.layers, -1, grid.cells.shape[1])[:, triangles].reshape(
         -1, grid.cells.shape[1]

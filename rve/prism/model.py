@@ -1,5 +1,4 @@
-"""The paper's model of the cell: finite elements on the product of the cell and the random variable
-(sections 3.1, 4.2, 4.3).
+"""Product-space model: finite elements on cell × θ (sections 3.1, 4.2, 4.3).
 
 This differs from the paper in: 1. The interface is a set of curved element faces, not the sign of z
 at quadrature points (`interface="sign"` is the paper's eq. 13). 2. The fluctuation is fixed on the
@@ -43,8 +42,7 @@ INTERFACES = ("conforming", "sign")
 
 @dataclass(frozen=True)
 class PrismModel:
-    """Product-space finite elements: quadratic serendipity wedges around the cone of the random
-    radius.
+    """Product-space finite elements: quadratic serendipity wedges around the cone.
 
     Args:
         mesh_size: Edge length of the triangles, in halves of the cell's side, in (0, 1].
@@ -90,8 +88,7 @@ class PrismModel:
     def solve(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
     ) -> list[Homogenised]:
-        """One result for each of `inclusions`, in their order: mesh and assembly once, one solve
-        for each load.
+        """One result for each of `inclusions`, in their order; one mesh and assembly.
 
         Raises:
             ConvergenceError: The linear solver that was asked for stopped early; the default gives
@@ -115,9 +112,7 @@ class PrismModel:
         inclusions: Sequence[Phase],
         results: list[Homogenised],
     ) -> list[Homogenised]:
-        """The results with the estimated error of E; its own cost is booked as the stage
-        `estimate`.
-        """
+        """The results with the estimated error of E; its cost is booked as `estimate`."""
         watch = Stopwatch()
         with watch("estimate"):
             own = replace(self, estimate=False, stiffness=False, parallel=False)
@@ -155,9 +150,7 @@ class PrismModel:
         ]
 
     def local_stress(self, radius_map: RadiusMap, matrix: Phase, inclusion: Phase) -> LocalStress:
-        """Spread of the stresses over cell and θ, and the tractions on the interface, for the loads
-        of eq. 15.
-        """
+        """Spread of the stresses over cell and θ, and the interface tractions (loads of eq. 15)."""
         watch = Stopwatch()
         system = self._moved(radius_map, watch)
         _, displacements = self._solved(
@@ -185,9 +178,7 @@ class PrismModel:
     def _solved(
         self, task: PrismTask, phases: tuple[Phase, Phase]
     ) -> tuple[Homogenised, Displacements]:
-        """A result with its certificate; where the default solver fails, by a direct one, and the
-        result says so.
-        """
+        """A result with its certificate; by a direct solver where the default one fails."""
         try:
             return self._certified(task, phases)
         except (ConvergenceError, CertificateError) as failure:
@@ -230,9 +221,7 @@ class PrismModel:
 
     @property
     def limits(self) -> Limits:
-        """What the certificate allows: round-off, and for the bounds the stiffness that the mesh
-        adds, of third order in h.
-        """
+        """Violations that the certificate allows: round-off, and third order in h for bounds."""
         order = 3 if self.interface == "conforming" else 1
         return Limits(
             algebraic=self.options.residual_limit,
@@ -241,7 +230,7 @@ class PrismModel:
 
 
 def _what(failure: Exception) -> str:
-    """What happened, without its cure."""
+    """The failure, without its cure."""
     return str(failure).partition(":")[0]
 
 
@@ -268,9 +257,7 @@ def certify(
 
 
 def reference_radius(radius_map: RadiusMap) -> float:
-    """Radius at which the planar mesh is made: the middle of the map's range, to the nearest
-    twentieth, in [0.1, 0.9].
-    """
+    """Radius of the planar mesh: the middle of the map's range, rounded, in [0.1, 0.9]."""
     law = radius_map.distribution
     radii = radius_map(np.linspace(law.lower, law.upper, 65))
     return float(np.clip(np.round((radii.min() + radii.max()) * 10) / 20, 0.1, 0.9))

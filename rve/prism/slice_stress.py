@@ -1,5 +1,4 @@
-"""Stress in the slices of the product space: a slice at fixed θ is a planar cell, cut out of the
-wedges at their Gauss points.
+"""Stress in planar slices of the product space at the wedges' Gauss points.
 
 θ depends on the wedge's third coordinate alone, so derivatives at fixed θ need the planar part of
 the Jacobian only.
@@ -120,9 +119,7 @@ class SliceStress:
         )
 
     def determinants(self) -> Array:
-        """Planar Jacobian's determinant at all quadrature points, shape (cells, q); negative where
-        the mesh folds over.
-        """
+        """Planar Jacobian's determinant at all quadrature points, shape (cells, q)."""
         a, b, c, d = self._jacobian(self.grid.cells, _planar_derivatives(self.points))
         return np.asarray(a * d - b * c)
 

@@ -1,4 +1,4 @@
-"""One product-space system: its mesh, its constraints, and what follows from displacements on it."""
+"""One product-space system: its mesh, its constraints, and its results."""
 
 from __future__ import annotations
 
@@ -80,9 +80,7 @@ class PrismSystem:
             )
 
     def _share(self) -> Array:
-        """Share of the particle, shape (cells, 1) on a conforming mesh, else (cells, points) from
-        the sign of z (eq. 13).
-        """
+        """Particle's share, shape (cells, 1), or (cells, points) from the sign of z (eq. 13)."""
         if self.grid.conforming:
             return np.tile(self.grid.plane.inside, self.grid.layers)[:, None].astype(float)
         x = np.einsum("qn,cnd->cqd", self.form.shapes, self.positions[self.grid.cells])
@@ -99,9 +97,7 @@ class PrismSystem:
         return matrix
 
     def load(self, phase: int, strain: Array) -> PETSc.Vec:
-        """Reduced load of one phase for a unit modulus under a macroscopic strain (ε11, ε22, 2
-        ε12).
-        """
+        """Reduced load of one phase for a unit modulus under a strain (ε11, ε22, 2 ε12)."""
         return self.numbering.vector(self.local_map, self.form.load(phase, strain), self.comm)
 
     @property
@@ -114,9 +110,7 @@ class PrismSystem:
         return _mixed(self.share, phases)
 
     def means(self, displacement: Array, phases: tuple[Phase, Phase]) -> SliceMeans:
-        """Homogenised stress of the slices and the mean energy from total displacements, shape
-        (nodes, 2, loads).
-        """
+        """Stress of the slices and mean energy from displacements, shape (nodes, 2, loads)."""
         slices, stiffness = self.slice_stress, self.stiffness_at_points(phases)
         rule = layered_rule(self.map.distribution, layers=self.grid.layers, points=slices.slices)
         weights = rule.weights / rule.weights.sum()
@@ -142,9 +136,7 @@ class PrismSystem:
         return np.asarray(np.einsum("lij,nj->nil", tensors, x))
 
     def preconditioner(self, phases: tuple[Phase, Phase]) -> ThetaPreconditioner:
-        """The θ-preconditioner for these phases; a triangle that the interface cuts has the mean
-        stiffness of its wedges.
-        """
+        """θ-preconditioner for these phases; cut triangles take their wedges' mean stiffness."""
         between = self.share.reshape(self.grid.layers, len(self.grid.plane.triangles), -1).mean(
             axis=2
         )

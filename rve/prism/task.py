@@ -1,6 +1,4 @@
-"""One task: a map with its moduli in a fixed order. Mesh, matrices and preconditioner are made once
-and serve all of them.
-"""
+"""Task of one map with several moduli; mesh, matrices, preconditioner are shared."""
 
 from __future__ import annotations
 
@@ -40,8 +38,7 @@ class Displacements:
 
 
 class PrismTask:
-    """Reduced matrices and loads of one map; K = E_m K_m + E_i K_i is assembled once for each pair
-    of Poisson's ratios.
+    """Reduced matrices and loads of one map, K = E_m K_m + E_i K_i.
 
     Args:
         system: Mesh and forms, already moved to the map.
@@ -58,8 +55,7 @@ class PrismTask:
         self.poissons: tuple[float, float] | None = None
 
     def solve(self, phases: tuple[Phase, Phase]) -> Displacements:
-        """The solution for a matrix and an inclusion; what an earlier call made serves again where
-        it can.
+        """Solution for a matrix and an inclusion; earlier work serves again where it can.
 
         Raises:
             ConvergenceError: The linear solver stopped early.
@@ -125,9 +121,7 @@ class PrismTask:
         )
 
     def _theta(self, phases: tuple[Phase, Phase]) -> ThetaPreconditioner:
-        """Made for a contrast on a grid, so that near contrasts share one and no result depends on
-        who else is in the task.
-        """
+        """Preconditioner of a contrast on a grid, independent of the other samples."""
         step = round(np.log(phases[1].modulus / phases[0].modulus) / np.log(CONTRAST_GRID))
         if self.theta is None or self.theta[0] != step:
             near = replace(phases[1], modulus=phases[0].modulus * CONTRAST_GRID**step)

@@ -1,5 +1,4 @@
-"""Does the one-particle stochastic cell stand for the random material? Its averages beside direct
-homogenisation and bounds.
+"""Averages of the one-particle cell beside direct homogenisation and bounds.
 
 The paper averages the stress over θ at equal strain: over the cells of the material this is a Voigt
 average of their stiffness. The same cells averaged at equal stress give a Reuss average; the truth
@@ -41,17 +40,13 @@ class Isotropic:
 
     @property
     def modulus(self) -> float:
-        """Young's modulus of the plane-strain material, as eq. 16 takes it from A = 2 G and B = 2
-        K, in Pa.
-        """
+        """Young's modulus of eq. 16 from A = 2 G and B = 2 K, in Pa."""
         poisson = (1 - self.shear / self.bulk) / 2
         return 2 * self.shear * (1 + poisson)
 
 
 def mori_tanaka(fraction: float, matrix: Phase, inclusion: Phase) -> Isotropic:
-    """Round aligned fibres in plane strain, by Mori and Tanaka (1973): for stiff particles also the
-    lower bound of Hashin (1965).
-    """
+    """Round aligned fibres in plane strain (Mori & Tanaka 1973)."""
     outer, inner = Isotropic.of(matrix.stiffness), Isotropic.of(inclusion.stiffness)
     bulk = outer.bulk + fraction * _over(
         inner.bulk - outer.bulk, (1 - fraction) / (outer.bulk + outer.shear)

@@ -1,6 +1,4 @@
-"""Periodic cells with many discs, homogenised directly: what the one-particle stochastic cell is to
-stand for (paper, section 4.2).
-"""
+"""Periodic cells with many discs, homogenised directly (section 4.2)."""
 
 from __future__ import annotations
 
@@ -19,8 +17,7 @@ if TYPE_CHECKING:
 def many_particles(
     discs: Discs, matrix: Phase, inclusion: Phase, *, size: float = 0.35, around: int = 12
 ) -> Array:
-    """Effective plane-strain stiffness (11, 22, 12 with 2 ε12) of a periodic cell of discs, shape
-    (3, 3), in Pa.
+    """Plane-strain stiffness (11, 22, 12 with 2 ε12) of a cell of discs, shape (3, 3), in Pa.
 
     Quadratic triangles with curved edges that conform to the circles; periodicity by elimination;
     three loads.
@@ -84,9 +81,7 @@ def _affine(nodes: Array) -> Array:
 
 
 def _injection(nodes: Array) -> sp.csr_matrix:
-    """Matrix that gives opposite nodes of the unit square one unknown and the corner none, shape (2
-    n, unknowns).
-    """
+    """Periodic injection with the corner fixed, shape (2 n, unknowns)."""
     keys = np.round(nodes * 1e7).astype(np.int64)
     on_side = (keys == 0) | (keys == 10**7)
     _, first, label = np.unique(

@@ -1,6 +1,4 @@
-"""Conforming periodic meshes of cells with many discs, by Gmsh: quadratic triangles, their edges
-bent onto the circles.
-"""
+"""Conforming periodic meshes of many discs by Gmsh: curved quadratic triangles."""
 
 from __future__ import annotations
 
@@ -69,7 +67,7 @@ def many_mesh(discs: Discs, *, size: float, around: int = 12) -> tuple[Any, Arra
 
 
 def _off_the_sides(discs: Discs) -> Array:
-    """Centres in a box that begins where circles keep farthest from grazing its sides or corners."""
+    """Centres in a box that starts where circles least graze its sides or corners."""
     best, centres = -1.0, discs.centres
     for shift in np.random.default_rng(0).random((400, 2)):
         moved = np.mod(discs.centres + shift * discs.size, discs.size)

@@ -37,9 +37,7 @@ class LatticeSums:
 
     @cached_property
     def natanzon_period(self) -> float:
-        """The constant g of Q(z + P) − Q(z) = conj(P) ℘(z) + g P, from z = −1, P = 2, where Q and ℘
-        are 1 and −1 apart by oddness.
-        """
+        """Constant g of Q(z + P) − Q(z) = conj(P) ℘(z) + g P, from z = −1, P = 2."""
         n = np.arange(2, len(self.plain))
         half = 0.5**n
         natanzon = np.sum((n - 1) * 2 * half * self.conjugate[2:])  # Q(1)
@@ -59,18 +57,14 @@ def lattice_sums(highest: int) -> LatticeSums:
 
 
 def _lipschitz(n: int, power: int) -> float:
-    """Σ_q (2π)^n q^(n−1) / (n−1)! · e^(−2πq) / (1 − e^(−2πq))^power: rows of the lattice by
-    Lipschitz' formula.
-    """
+    """Σ_q (2π)^n q^(n−1) / (n−1)! · e^(−2πq) / (1 − e^(−2πq))^power, by Lipschitz' formula."""
     q = np.arange(1.0, 40.0)
     logarithm = n * np.log(2 * np.pi) - gammaln(n) + (n - 1) * np.log(q) - 2 * np.pi * q
     return float(np.sum(np.exp(logarithm) / (1 - np.exp(-2 * np.pi * q)) ** power))
 
 
 def _eisenstein(n: int) -> float:
-    """Σ p^-n over p = m + i j, n a multiple of 4: the row j = 0 by Riemann's ζ, the others by
-    Lipschitz.
-    """
+    """Σ p^-n over p = m + i j, n a multiple of 4, by Riemann's ζ and Lipschitz' formula."""
     return 2 * float(zeta(n)) + 2 * _lipschitz(n, 1)
 
 

@@ -1,5 +1,4 @@
-"""The series model of the cell: exact for circles, so the project's own truth, and for circles its
-fastest model.
+"""Series model of the cell: exact for circles, and their fastest model.
 
 It refuses, with the error it would have, where particles nearly touch (r > 0.9995 or so).
 """

@@ -1,5 +1,4 @@
-"""Doubly periodic Kolosov–Muskhelishvili potentials of the cell with one circular particle, plane
-strain.
+"""Doubly periodic Kolosov–Muskhelishvili potentials around a circle, plane strain.
 
 In the matrix 2μu = κφ − z conj(φ') − conj(ψ), with every particle P of the square lattice carrying
 the same multipoles (Weierstrass' and Natanzon's functions; Grigolyuk & Fil'shtinskii, Perforated
@@ -39,9 +38,7 @@ LOADS = ("hydrostatic", "deviator", "shear")
 
 @dataclass(frozen=True)
 class Contrast:
-    """The factors of the interface conditions for one matrix and m inclusions; every field of shape
-    (m,) or scalar.
-    """
+    """Factors of the interface conditions, one matrix and m inclusions, shape (m,)."""
 
     kappa: float
     mu: float
@@ -135,8 +132,7 @@ def family(harmonics: int, *, hydrostatic: bool) -> Family:
 
 
 def multipoles(load: str, radius: Array, contrast: Contrast, *, harmonics: int) -> Array:
-    """The a_n, scaled by r, under a unit far field: A = 1 ("hydrostatic"), B = 1 ("deviator") or B
-    = i ("shear").
+    """The a_n, scaled by r, under a unit far field: "hydrostatic", "deviator" or "shear".
 
     Args:
         load: One of `LOADS`.
@@ -183,8 +179,7 @@ def _system(
 
 
 def modulus(load: str, a: Array, radius: Array, contrast: Contrast) -> Array:
-    """C11 + C12, C11 − C12 or C33 in Pa, shape (n, m), from the multipoles `a` of `load`: mean
-    stress over mean strain.
+    """C11 + C12, C11 − C12 or C33 in Pa, shape (n, m), from the multipoles `a` of `load`.
 
     Both means follow from the jumps across the cell of 2μu and of the resultant φ + z conj(φ') +
     conj(ψ).

@@ -1,6 +1,4 @@
-"""Stiffness of the cell with one circular particle by multipole series, any radius and phases, to a
-wanted truncation error.
-"""
+"""Stiffness of the one-particle cell by multipole series, to a given error."""
 
 from __future__ import annotations
 
@@ -20,8 +18,7 @@ _SLOWEST = 0.97  # decay from one harmonic to the next that is believed
 
 @dataclass(frozen=True)
 class SquareStiffness:
-    """Plane stiffness of a square-symmetric cell by its three independent moduli, in Pa; any common
-    shape.
+    """Plane stiffness of a square-symmetric cell by its three moduli, in Pa.
 
     Args:
         bulk: C11 + C12, from ε11 = ε22.
@@ -44,7 +41,7 @@ class SquareStiffness:
 
 
 def square_voigt(bulk: Array, deviator: Array, shear: Array) -> Array:
-    """Voigt matrices (…, 3, 3) of square symmetry from C11 + C12, C11 − C12 and C33 of one shape."""
+    """Voigt matrices (…, 3, 3) of square symmetry from C11 + C12, C11 − C12 and C33."""
     voigt = np.zeros((*bulk.shape, 3, 3))
     voigt[..., 0, 0] = voigt[..., 1, 1] = (bulk + deviator) / 2
     voigt[..., 0, 1] = voigt[..., 1, 0] = (bulk - deviator) / 2
@@ -106,9 +103,7 @@ def square_stiffness(
 
 
 def _first_guess(radius: Array, tolerance: float) -> Array:
-    """Harmonics for each radius, from the rate at which images of touching particles fade, in steps
-    that keep batches few.
-    """
+    """Harmonics for each radius, from the decay of images, in few steps."""
     rate = 8 * np.arccosh(1 / np.maximum(radius, 1e-3))
     steps = np.array([3, 4, 5, 6, 8, 10, 12, 16, 24, 32, 48, 64, 96, 128, MOST_HARMONICS])
     return np.asarray(

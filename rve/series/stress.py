@@ -1,5 +1,4 @@
-"""Stresses anywhere in the cell by the multipole series, and their spread over the cell: the truth
-for local results.
+"""Stresses in the cell by the multipole series, and their spread.
 
 σ11 + σ22 = 4 Re φ' and σ22 − σ11 + 2i σ12 = 2 (conj(z) φ'' + ψ'). Of the images, the eight nearest
 are summed one by one, the others by their Taylor series around the cell's centre, which converges
@@ -94,9 +93,7 @@ class SeriesField:
         return found
 
     def interface(self, angle: Array, strain: Array, *, outside: bool = True) -> Array:
-        """Normal and shear traction on the interface in Pa, shape (n, 2), seen from the matrix or
-        from the particle.
-        """
+        """Normal and shear traction on the interface in Pa, shape (n, 2), from either side."""
         normal = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
         z = self.radius * (normal[:, 0] + 1j * normal[:, 1])
         s11, s22, s12 = (self._outside if outside else self._inside)(z, strain).T
@@ -110,9 +107,7 @@ class SeriesField:
         )
 
     def spread(self, strain: Array, *, points: int = 24) -> Spread:
-        """Mean, deviation and extremes of the stress over the cell and both sides of the interface,
-        under a mean strain (3,).
-        """
+        """Mean, deviation and extremes of the stress under a mean strain (3,)."""
         places, weights = _cell_rule(self.radius, points)
         angle = np.linspace(0, 2 * np.pi, 16 * points, endpoint=False)
         z = self.radius * np.exp(1j * angle)
@@ -130,7 +125,7 @@ class SeriesField:
         return [_unit_load(load, self.radius, self.matrix, self.inclusion) for load in LOADS]
 
     def _amounts(self, strain: Array) -> Array:
-        """How much of each unit load makes up the mean strain."""
+        """Amounts of the unit loads that make up the mean strain."""
         return np.array([strain[0] + strain[1], strain[0] - strain[1], strain[2] / 2])
 
     def _inside(self, z: Complex, strain: Array) -> Array:
@@ -240,7 +235,7 @@ def _images(
 
 @cache
 def _far_taylor(powers: tuple[int, ...], conjugate: bool) -> Array:
-    """Taylor coefficients of the images beyond the eight nearest, over P/2; shape (terms, powers)."""
+    """Taylor coefficients of the images beyond the eight nearest, shape (terms, powers)."""
     sums, half = lattice_sums(8 * MOST_HARMONICS + 8), _NEAR / 2
     m, k = np.array(powers)[None, :], np.arange(_TERMS)[:, None]
     total = (2 * sums.conjugate if conjugate else sums.plain)[m + k]
@@ -250,9 +245,7 @@ def _far_taylor(powers: tuple[int, ...], conjugate: bool) -> Array:
 
 
 def _cell_rule(radius: float, points: int) -> tuple[Array, Array]:
-    """Gauss points of the cell (n, 2) and weights of sum 1: rays in eight sectors, cut at the
-    interface.
-    """
+    """Gauss points of the cell (n, 2) and weights of sum 1 on rays cut at the interface."""
     x, w = np.polynomial.legendre.leggauss(points)
     angle = ((np.arange(8)[:, None] + (1 + x) / 2) * np.pi / 4).ravel()
     side = 1 / np.maximum(np.abs(np.cos(angle)), np.abs(np.sin(angle)))

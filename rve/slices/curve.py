@@ -1,6 +1,4 @@
-"""From stiffnesses at the nodes of θ to a stress curve, its error in E, and the certificate of a
-result.
-"""
+"""Stress curve, its error in E and its certificate, from stiffnesses at nodes of θ."""
 
 from __future__ import annotations
 
@@ -28,9 +26,7 @@ def curve_of(rule: ThetaRule, stiffness: Array) -> StressCurve:
 
 
 def modulus_error(curve: StressCurve, error: Array) -> float:
-    """Relative error of E of eq. 16 from that of C11 + C12 and C33 at the nodes, shape (n,),
-    whatever their signs.
-    """
+    """Relative error of E of eq. 16 from those of C11 + C12 and C33, shape (n,)."""
     s11, s12 = curve.mean
     bulk, shear = (
         float(curve.weights @ (s * error)) / mean
@@ -43,8 +39,7 @@ def modulus_error(curve: StressCurve, error: Array) -> float:
 def certified(
     result: Homogenised, radius_map: RadiusMap, matrix: Phase, inclusion: Phase
 ) -> Homogenised:
-    """The result with the certificate of its stiffness, whose bounds give way by the estimated
-    error alone.
+    """Result with the certificate of its stiffness, within the estimated error.
 
     Raises:
         CertificateError: Symmetry or a bound is violated.

@@ -145,7 +145,7 @@ class Slice:
 
     @property
     def gaps(self) -> Array:
-        """Relative change of C11 + C12 and C33 by each rise of the order, shape (orders − 1, m, 2)."""
+        """Relative change of C11 + C12 and C33 by each rise of order, (orders − 1, m, 2)."""
         moduli = np.stack(
             [self.by_order[..., 0, 0] + self.by_order[..., 0, 1], self.by_order[..., 2, 2]], axis=-1
         )
@@ -153,8 +153,7 @@ class Slice:
 
     @property
     def error(self) -> Array:
-        """Estimated relative error of C11 + C12 and C33, shape (m,): the geometric series of
-        further orders, trebled.
+        """Estimated relative error of C11 + C12 and C33, shape (m,): tail of the orders, trebled.
 
         What one order more leaves of the last change is what the last rise left of the one before;
         orders below 4 are not yet regular.
@@ -180,9 +179,7 @@ def solve_slice(
     centre: tuple[float, float] = (0.0, 0.0),
     share: bool = False,
 ) -> Slice:
-    """Solve one planar cell by each of `orders`, rising, on one mesh; `share` as of
-    `PlanarCell.stiffness`.
-    """
+    """Solve one planar cell by each of the rising `orders` on one mesh."""
     from alphacut.rve.mesh.planar import planar_mesh
     from alphacut.rve.planar.problem import PlanarCell
     from alphacut.rve.planar.system import SOLVER

@@ -56,9 +56,7 @@ def _kept_breaks(radius_map: HermiteMap) -> Array:
 
 
 def _bisect_jump(radius_map: RadiusMap, low: float, high: float) -> float | None:
-    """The jump inside [low, high], or None if the map is continuous there: halving leaves the
-    change over a jump as it was.
-    """
+    """Jump inside [low, high], or None where halving shows the map continuous."""
     before, after = radius_map([low, high])
     size = abs(after - before)
     for _ in range(48):
@@ -72,7 +70,7 @@ def _bisect_jump(radius_map: RadiusMap, low: float, high: float) -> float | None
 
 
 def _bisect_bend(radius_map: RadiusMap, low: float, high: float) -> float:
-    """Where the map bends most inside [low, high], to a billionth."""
+    """Sharpest bend of the map inside [low, high], to 1e-9."""
     while high - low > 1e-9:
         theta = np.linspace(low, high, 9)
         most = int(np.argmax(np.abs(np.convolve(radius_map(theta), [1, 0, -2, 0, 1], "valid"))))
@@ -81,9 +79,7 @@ def _bisect_bend(radius_map: RadiusMap, low: float, high: float) -> float:
 
 
 def theta_rule(radius_map: RadiusMap, *, points: int) -> ThetaRule:
-    """Gauss rule of f_Θ with `points` nodes; where the map has breaks, Gauss–Legendre with as many
-    in each smooth piece.
-    """
+    """Gauss rule of f_Θ with `points` nodes in each smooth piece of the map."""
     law = radius_map.distribution
     cuts = _kept_breaks(radius_map) if isinstance(radius_map, HermiteMap) else breaks(radius_map)
     if cuts.size == 0:
@@ -103,8 +99,7 @@ def settle_rule(
     points: int | None,
     accuracy: float,
 ) -> tuple[list[StressCurve], list[float]]:
-    """Curves by rules whose nodes are added until E of each inclusion settles within `accuracy`,
-    and the estimated error of each.
+    """Curves and their errors by rules refined until E settles within `accuracy`.
 
     Two finer rules tell how large the error of a rule is: its distance from them, doubled.
 
@@ -165,14 +160,12 @@ def _finer(count: int) -> int:
 
 
 def _gap(value: float, finer: float, finest: float) -> float:
-    """Estimated relative error of `value`; two finer ones, since one alone may meet it by chance."""
+    """Estimated relative error of `value`, from two finer ones."""
     return 2 * max(abs(finer - value), abs(finest - value)) / abs(finest)
 
 
 def extreme_radii(radius_map: RadiusMap) -> Array:
-    """Bounds of the radius on the support, shape (2,): exact at the ends of θ, a thousandth wide of
-    an extremum between them.
-    """
+    """Bounds of the radius on the support, shape (2,)."""
     law = radius_map.distribution
     radii = radius_map(np.linspace(law.lower, law.upper, _SAMPLES))
     ends = np.sort(radii[[0, -1]])

@@ -26,7 +26,7 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 @dataclass(frozen=True)
 class LevelNumbering:
-    """Where the unknowns of each level stand.
+    """Positions of the unknowns of each level.
 
     Args:
         grid: Topology.
@@ -48,7 +48,7 @@ class LevelNumbering:
 
     @cached_property
     def unknown_of_node(self) -> Integers:
-        """First of the two unknowns of each node of the grid, −1 on the fixed line, shape (nodes,)."""
+        """First of the two unknowns of each grid node, −1 on the fixed line, shape (nodes,)."""
         planar, vertices = (
             self.periodicity.unknown,
             self.periodicity.unknown[: self.grid.plane.vertices],
@@ -77,18 +77,14 @@ class LevelNumbering:
         )
 
     def local_map(self, nodes: Integers, comm: MPI.Comm) -> PETSc.LGMap:
-        """Where DOLFINx's local nodes, given by their grid nodes, go in the reduced system; what
-        goes nowhere is −1 and dropped.
-        """
+        """Reduced unknowns of DOLFINx's local nodes; −1 where dropped."""
         first = self.unknown_of_node[nodes]
         return PETSc.LGMap().create(
             np.where(first >= 0, first // 2, -1).astype(PETSc.IntType), bsize=2, comm=comm
         )
 
     def couplings(self) -> sp.csr_matrix:
-        """Which unknown pairs share a wedge: ones at all entries the reduced stiffness can have, by
-        blocks of 2.
-        """
+        """Pattern of unknown pairs that share a wedge, by blocks of 2."""
         pairs = self.unknown_of_node[self.grid.cells] // 2
         kept = pairs >= 0
         cell = np.broadcast_to(np.arange(len(pairs))[:, None], pairs.shape)
@@ -99,9 +95,7 @@ class LevelNumbering:
         return (incidence.T @ incidence).astype(bool).tocsr()
 
     def matrix(self, local_map: PETSc.LGMap, comm: MPI.Comm) -> PETSc.Mat:
-        """A matrix of zeros in 2 × 2 blocks that takes element matrices in DOLFINx's local
-        numbering and keeps Pᵀ K P.
-        """
+        """Zero matrix in 2 × 2 blocks that keeps Pᵀ K P of element matrices."""
         first = sum(comm.allgather(self.local_size(comm))[: comm.rank])
         rows = self.couplings()[first // 2 : (first + self.local_size(comm)) // 2]
         rows.sort_indices()
@@ -117,9 +111,7 @@ class LevelNumbering:
         return matrix
 
     def vector(self, local_map: PETSc.LGMap, values: Array, comm: MPI.Comm) -> PETSc.Vec:
-        """Pᵀ f from contributions in DOLFINx's local numbering, ghosts included, shape (local nodes
-        · 2,).
-        """
+        """Pᵀ f from contributions in DOLFINx's local numbering, shape (local nodes · 2,)."""
         vector = PETSc.Vec().createMPI((self.local_size(comm), self.size), bsize=2, comm=comm)
         vector.setLGMap(local_map)
         nodes = np.arange(len(values) // 2, dtype=PETSc.IntType)
@@ -128,9 +120,7 @@ class LevelNumbering:
         return vector
 
     def to_nodes(self, solution: Array) -> Array:
-        """Displacements of all nodes from the whole solution vector, shape (nodes, 2), zero on the
-        fixed line.
-        """
+        """Displacements of all nodes from the solution, shape (nodes, 2), zero on the line."""
         first = self.unknown_of_node
         values = solution[np.maximum(first, 0)[:, None] + np.arange(2)]
         return np.where(first[:, None] >= 0, values, 0.0)

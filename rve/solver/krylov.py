@@ -15,7 +15,7 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 
 class Preconditioner(Protocol):
-    """What PETSc calls for `pc_type python`."""
+    """Interface of PETSc's `pc_type python`."""
 
     def apply(self, _pc: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
         """Put the preconditioned residual into `result`."""
@@ -125,9 +125,7 @@ class LinearSolver:
         )
 
     def _solve(self, columns: Array) -> tuple[Array, int]:
-        """This rank's part of the solutions for unit loads, shape (local size, loads), and the
-        iterations.
-        """
+        """This rank's solutions for unit loads, shape (local size, loads), and iterations."""
         load = self.krylov.getOperators()[0].createVecLeft()
         load.array[:] = columns.ravel()
         x = load.duplicate()

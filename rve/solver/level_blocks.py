@@ -1,6 +1,4 @@
-"""The additive block preconditioner: one exact Cholesky factor for each level of θ and for what
-lies between, added up.
-"""
+"""Additive block preconditioner with one exact Cholesky factor for each θ-level."""
 
 from __future__ import annotations
 
@@ -11,8 +9,7 @@ from alphacut.rve.solver.constraints import LevelNumbering
 
 
 class LevelBlocks:
-    """Solves with the diagonal blocks of the reduced stiffness; for comparison with
-    `rve.theta_preconditioner`.
+    """Solves with the diagonal blocks of the reduced stiffness, for comparison.
 
     Args:
         numbering: Unknowns level by level.

@@ -1,5 +1,4 @@
-"""Cholesky factors of many matrices of one pattern, kept as triangles: L⁻¹ and L⁻ᵀ can be applied
-apart (CHOLMOD, supernodal).
+"""Cholesky factors of many matrices of one pattern, as triangles (CHOLMOD).
 
 One fill-reducing order serves all matrices, so that L is a smooth function of the entries:
 neighbouring levels have neighbouring L.

@@ -1,4 +1,4 @@
-"""Planar stiffness matrices of the cell on many levels of θ at once: same pattern, other positions."""
+"""Planar stiffness matrices of the cell on many θ-levels at once."""
 
 from __future__ import annotations
 
@@ -16,9 +16,7 @@ _CORNERS = np.array(
 
 
 def _gradients(nodes: int) -> Array:
-    """Derivatives of the triangle's shape functions at the rule's points, shape (3 points, 2,
-    nodes); nodes is 3 or 6.
-    """
+    """Derivatives of the shape functions at the rule's points, (3 points, 2, nodes)."""
     x, y = _CORNERS.T
     barycentric, slopes = (
         np.array([1 - x - y, x, y]),

@@ -62,9 +62,7 @@ class SolverOptions:
 
     @property
     def residual_limit(self) -> float:
-        """Relative residual above which a system counts as not solved: 1e-7, or more for a looser
-        tolerance, never above 1e-5.
-        """
+        """Relative residual above which a system counts as not solved, 1e-7 … 1e-5."""
         try:
             wanted = 100 * float(self.given.get("ksp_rtol", 0))
         except ValueError:

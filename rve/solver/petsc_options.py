@@ -1,6 +1,4 @@
-"""PETSc options put under the project's prefix for one solver, none lost: what PETSc has no use for
-is an error.
-"""
+"""PETSc options under the project's prefix; what PETSc does not use is an error."""
 
 from __future__ import annotations
 

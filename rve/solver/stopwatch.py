@@ -30,9 +30,7 @@ class Stopwatch:
         self.seconds[target] += seconds
 
     def report(self) -> dict[str, float]:
-        """Seconds by stage; the total leaves just-in-time compilation out. What is shared is booked
-        once, to the first to ask.
-        """
+        """Seconds by stage, just-in-time compilation left out."""
         self.seconds["total"] = sum(self.seconds[s] for s in ("mesh", "assemble", "setup", "solve"))
         report, self.seconds = self.seconds, dict.fromkeys(STAGES, 0.0)
         return report

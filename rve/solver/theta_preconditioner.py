@@ -40,9 +40,7 @@ _LINEAR = np.kron(
 
 
 def _with_components(unknown: Integers) -> Integers:
-    """Two degrees of freedom for each unknown of each triangle, −1 where it is fixed, shape (m,
-    2·nodes).
-    """
+    """Two degrees of freedom for each unknown of a triangle, −1 where fixed, (m, 2·nodes)."""
     pairs = np.where(unknown[:, :, None] >= 0, 2 * unknown[:, :, None] + np.arange(2), -1)
     return pairs.reshape(len(unknown), -1)
 
@@ -87,9 +85,7 @@ class ThetaPreconditioner:
         )
 
     def apply(self, _pc: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
-        """Result = P⁻¹ residual, called by PETSc; residuals of several loads side by side are
-        treated together.
-        """
+        """Result = P⁻¹ residual, called by PETSc; several loads side by side."""
         columns = residual.size // self.numbering.size
         level, middle = self._split(self._gather(residual.array_r.reshape(-1, columns)))
         vertices = middle.shape[1]
@@ -112,9 +108,7 @@ class ThetaPreconditioner:
         )
 
     def _excess(self, level: Array, middle: Array) -> tuple[Array, Array]:
-        """(M_quad⁻¹ − M_lin⁻¹) ⊗ K_1⁻¹ on vertices: this rank's rows of the two parts, on and
-        between levels.
-        """
+        """(M_quad⁻¹ − M_lin⁻¹) ⊗ K_1⁻¹ on this rank's vertices, on and between levels."""
         lifted = self.linear.forward(np.concatenate([level, middle]))
         every = np.concatenate(
             [self._gather(lifted[: len(level)]), self._gather(lifted[len(level) :])]
@@ -128,9 +122,7 @@ class ThetaPreconditioner:
         return np.concatenate(self.comm.allgather(local)) if self.comm.size > 1 else local
 
     def _split(self, vectors: Array) -> tuple[Array, Array]:
-        """Values on all levels and half-way between them, shapes (layers + 1, 2·count, columns) and
-        (layers, 2·vertices, columns).
-        """
+        """Values on the levels and half-way between them."""
         stride, planar, columns = (
             self.numbering.stride,
             2 * self.numbering.periodicity.count,

@@ -1,6 +1,4 @@
-"""Building a table: mesh size and degrees are raised until the errors that they leave, seen in the
-solutions themselves, are small.
-"""
+"""Build of a table: mesh size and degrees rise until their errors are small."""
 
 from __future__ import annotations
 
@@ -29,7 +27,7 @@ class TableError(RuntimeError):
 
 
 class Source(Protocol):
-    """Where a table's moduli come from."""
+    """Source of a table's moduli."""
 
     mesh_size: float
     space: Array

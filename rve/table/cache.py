@@ -1,6 +1,4 @@
-"""Tables on disk: one NumPy archive for each, named by the hash of all that it depends on, written
-whole or not at all.
-"""
+"""Tables on disk, one NumPy archive each, named by the hash of its origin."""
 
 from __future__ import annotations
 
@@ -56,8 +54,7 @@ def stored_table(
     source: str = "planar",
     progress: Callable[[float], None] | None = None,
 ) -> tuple[Table, bool]:
-    """The table from `folder`, or made and put there; and whether it was there. Without a folder it
-    is kept in this process alone.
+    """The table from `folder`, or made and put there; and the truth of "it was there".
 
     Raises:
         TableError: The accuracy is not reached.

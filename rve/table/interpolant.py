@@ -1,5 +1,4 @@
-"""Chebyshev interpolant of the cell's moduli over radius and modulus of the particle, with its
-error from its own coefficients.
+"""Chebyshev interpolant of the moduli over radius and modulus, with its error.
 
 The variables are u = √(1 − r²), which takes the sting out of nearly touching particles (polynomials
 in r² need three times the degree), and t = ln(E_i / E_m), in which a stiffness is analytic in the
@@ -23,7 +22,7 @@ _SLACK = 1e-9
 
 @dataclass(frozen=True)
 class TableRange:
-    """What a table covers.
+    """Range of a table.
 
     Args:
         matrix: Material outside the particle.
@@ -80,9 +79,7 @@ class TableRange:
         return _unit(_touch(radius), ends[0]), _unit(self._contrast(modulus), ends[1])
 
     def nodes(self, counts: tuple[int, int]) -> tuple[Array, Array]:
-        """Radii and moduli at the first Leja points of either direction, one point being the middle
-        of the range.
-        """
+        """Radii and moduli at the first Leja points of either direction."""
         (u0, u1), (t0, t1) = self._ends()
         u, t = (
             a + (b - a) * (1 + leja(n)) / 2
@@ -106,8 +103,7 @@ def _unit(values: Array, ends: Array) -> Array:
 
 
 def leja(count: int) -> Array:
-    """The first `count` points of the R-Leja sequence: 0 alone, else 1, −1, 0 and on; nested, and
-    Lobatto's points at 2^k + 1.
+    """The first `count` points of the R-Leja sequence; nested, Lobatto's at 2^k + 1.
 
     Their Lebesgue constant grows no faster than their number (Calvi & Phung 2011), so degrees can
     be raised one by one with every value kept.
@@ -122,9 +118,7 @@ def leja(count: int) -> Array:
 
 
 def coefficients(values: Array) -> Array:
-    """Chebyshev coefficients of `values` (n_r, n_E, …) at the Leja points of both directions, same
-    shape.
-    """
+    """Chebyshev coefficients of `values` (n_r, n_E, …) at the Leja points, same shape."""
     for axis in (0, 1):
         count = values.shape[axis]
         basis = chebyshev.chebvander(leja(count), count - 1)
@@ -133,8 +127,7 @@ def coefficients(values: Array) -> Array:
 
 
 def tail(coefficients: Array, axis: int, *, noise: float = 0.0) -> float:
-    """Estimated interpolation error along `axis`: the geometric series that the last coefficients
-    begin, fourfold for the points.
+    """Estimated interpolation error along `axis`: the tail of the coefficients, fourfold.
 
     Args:
         coefficients: Shape (n_r, n_E, moduli).
@@ -210,7 +203,5 @@ class Table:
         return np.asarray(np.exp(np.stack(logarithms, axis=1)))
 
     def stiffness(self, radius: Array, modulus: Array) -> Array:
-        """Voigt matrices in Pa at n radii times m moduli, shape (n, m, 3, 3); errors as of
-        `moduli`.
-        """
+        """Voigt matrices in Pa at n radii times m moduli, shape (n, m, 3, 3)."""
         return square_voigt(*np.moveaxis(self.moduli(radius, modulus), -1, 0))

@@ -1,6 +1,4 @@
-"""The table model: the cell's stiffness as an interpolant over radius and modulus of the particle;
-a sample is an evaluation.
-"""
+"""Table model: the cell's stiffness as an interpolant over radius and modulus."""
 
 from __future__ import annotations
 
@@ -25,8 +23,7 @@ _THETA_SHARE = 0.05  # of the accuracy; nodes in θ cost nothing here
 
 @dataclass(frozen=True)
 class TableModel:
-    """Chebyshev interpolant of planar solves over (r, E_i), averaged over θ by a rule as fine as it
-    needs.
+    """Chebyshev interpolant of planar solves over (r, E_i), averaged over θ.
 
     Args:
         accuracy: Relative error of E allowed, in [1e-9, 0.1].

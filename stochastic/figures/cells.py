@@ -1,6 +1,4 @@
-"""Pictures of discs and their cells: Figs. 5, 8, 9 and 10 of the paper, and why the two-point
-description fails (Figs. 3, 4).
-"""
+"""Pictures of discs and their cells (Figs. 3, 4, 5, 8, 9 and 10)."""
 
 from __future__ import annotations
 
@@ -20,9 +18,7 @@ if TYPE_CHECKING:
 
 
 def plot_discs(axes: Axes, discs: Discs, colour: str = BLUE, view: Array | None = None) -> None:
-    """Discs in their rectangle, or in its corner `view` (width, height, in m), with the images that
-    show in it, in mm.
-    """
+    """Discs in their rectangle, or in its corner `view` (m), with their images, in mm."""
     from matplotlib.collections import EllipseCollection
 
     view = discs.size if view is None else view
@@ -49,9 +45,7 @@ def plot_discs(axes: Axes, discs: Discs, colour: str = BLUE, view: Array | None 
 def plot_cells(
     axes: Axes, diagram: Apollonius, colour: str = INK, view: Array | None = None
 ) -> None:
-    """Walls of the cells, curved as they are, in mm, with the images that show in the rectangle or
-    its corner `view` (in m).
-    """
+    """Curved walls of the cells, with their images, in the rectangle or its corner `view` (m)."""
     from matplotlib.collections import LineCollection
 
     discs = diagram.discs
@@ -70,9 +64,7 @@ def plot_cells(
 
 
 def _shifts(discs: Discs) -> list[Array]:
-    """By what the images of a section lie apart from it, in m; the section itself alone where it
-    does not repeat.
-    """
+    """Shifts of the images of a section, in m; none but zero where it does not repeat."""
     return (
         [discs.size * (i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
         if discs.periodic
@@ -81,16 +73,12 @@ def _shifts(discs: Discs) -> list[Array]:
 
 
 def corner(discs: Discs, number: int = 120) -> Array:
-    """Width and height, in m, of a corner of the section that holds about `number` discs; all of it
-    if there are fewer.
-    """
+    """Width and height, in m, of a corner of the section that holds about `number` discs."""
     return np.asarray(discs.size * min(1.0, float(np.sqrt(number / len(discs)))))
 
 
 def draw_cells(diagram: Apollonius) -> Figure:
-    """Voronoi cells, whose walls cut discs, beside Apollonius cells, whose walls do not (Fig. 10);
-    a corner of a large section.
-    """
+    """Voronoi cells, whose walls cut discs, beside Apollonius cells (Fig. 10)."""
     import matplotlib.pyplot as plt
 
     discs = diagram.discs
@@ -174,9 +162,7 @@ def draw_two_point(discs: Discs, generator: np.random.Generator) -> Figure:
 def _from_pair_distances(
     discs: Discs, number: int, reach: float, generator: np.random.Generator
 ) -> Array:
-    """Places drawn one by one with the distances between all discs and any direction, shape
-    (number, 2), in m.
-    """
+    """Places drawn from the distances between all discs, shape (number, 2), in m."""
     from scipy.spatial import KDTree
 
     tree = KDTree(discs.centres, boxsize=discs.size)

@@ -1,6 +1,4 @@
-"""Distributions: radii (Fig. 11), neighbours (Figs. 6, 7), r_n and its p-box (Figs. 12, 13), and
-the map itself.
-"""
+"""Distributions of radii (Fig. 11), neighbours (Figs. 6, 7), and r_n (Figs. 12, 13)."""
 
 from __future__ import annotations
 
@@ -22,9 +20,7 @@ if TYPE_CHECKING:
 
 
 def draw_radii(radii: Array, law: RadiusLaw | None) -> Figure:
-    """Distribution function of the radii, measured or packed, and their law if there is one (Fig.
-    11).
-    """
+    """Distribution function of the radii, and their law if there is one (Fig. 11)."""
     import matplotlib.pyplot as plt
 
     drawn, axes = plt.subplots(figsize=(6.4, 3.8))
@@ -45,9 +41,7 @@ def draw_radii(radii: Array, law: RadiusLaw | None) -> Figure:
 
 
 def draw_neighbour_statistics(direct: list[Neighbours], diameter: float) -> Figure:
-    """Distances between direct neighbours (Fig. 6) and their number (Fig. 7), for discs of one
-    diameter (m).
-    """
+    """Distances (Fig. 6) and number (Fig. 7) of direct neighbours, discs of one diameter (m)."""
     import matplotlib.pyplot as plt
 
     drawn, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.0))
@@ -78,9 +72,7 @@ def draw_neighbour_statistics(direct: list[Neighbours], diameter: float) -> Figu
 
 
 def draw_correlation(found: Microstructure, equal: Apollonius) -> Figure:
-    """Values of r_n of cells that share a wall, for the sections and for equal discs of the same
-    area fraction (Fig. 9).
-    """
+    """Values of r_n of cells that share a wall, beside those of equal discs (Fig. 9)."""
     import matplotlib.pyplot as plt
 
     drawn, both = plt.subplots(1, 2, figsize=(9.6, 4.4))
@@ -125,9 +117,7 @@ def draw_areas(found: Microstructure) -> Figure:
 
 
 def draw_pbox(found: Microstructure) -> Figure:
-    """Distribution of r_n between the limits with its bootstrap band, and the p-box around it (Fig.
-    13).
-    """
+    """Distribution of r_n with its bootstrap band, and the p-box around it (Fig. 13)."""
     import matplotlib.pyplot as plt
 
     drawn, (axes, apart) = plt.subplots(

@@ -1,4 +1,4 @@
-"""One look for the figures of the microstructure, and saving as SVG and PNG, whole or not at all."""
+"""Style of the microstructure's figures, saved as SVG and PNG, whole or not at all."""
 
 from __future__ import annotations
 

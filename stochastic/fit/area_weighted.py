@@ -1,6 +1,4 @@
-"""The area-weighted distribution of the reduced radius r_n, with bootstrap bands (paper, eq. 8–10,
-Figs. 12, 13).
-"""
+"""Area-weighted distribution of r_n, with bootstrap bands (eq. 8–10, Figs. 12, 13)."""
 
 from __future__ import annotations
 
@@ -34,8 +32,7 @@ class AreaWeighted:
     def of(
         cls, values: ArrayLike, weights: ArrayLike | None = None, groups: ArrayLike | None = None
     ) -> AreaWeighted:
-        """Sort, scale the weights to the sum 1 (equal ones if none are given); each value is its
-        own group if none are given.
+        """Sort the values and scale the weights (equal by default) to the sum 1.
 
         Raises:
             ValueError: There are no values, one is not finite, or a weight is negative.
@@ -95,15 +92,13 @@ class AreaWeighted:
         return float(self.weights[(self.values >= lower) & (self.values <= upper)].sum())
 
     def limits(self, share: float) -> tuple[float, float]:
-        """Limits that keep `share` in (0, 1) of the area, with equal shares cut off below and
-        above.
-        """
+        """Limits that keep `share` in (0, 1) of the area, equal shares cut off at both ends."""
         if not 0 < share < 1:
             raise ValueError(f"the share of area to keep is {share:g}; it must lie in (0, 1)")
         return float(self.quantile((1 - share) / 2)), float(self.quantile((1 + share) / 2))
 
     def truncated(self, lower: float, upper: float) -> AreaWeighted:
-        """What lies within the limits, its weights scaled to the sum 1.
+        """Part of the sample within the limits, its weights scaled to the sum 1.
 
         Raises:
             ValueError: The limits are not in order within (0, 1).
@@ -122,9 +117,7 @@ class AreaWeighted:
         return AreaWeighted.of(self.values[inside], self.weights[inside], self.groups[inside])
 
     def resampled(self, number: int, generator: np.random.Generator) -> Iterator[Array]:
-        """Weights of `number` bootstrap samples: whole groups drawn with replacement; each of shape
-        (n,), sum 1.
-        """
+        """Weights of `number` bootstrap samples of whole groups, each of shape (n,), sum 1."""
         count = int(self.groups.max()) + 1
         for _ in range(number):
             drawn = np.bincount(generator.integers(count, size=count), minlength=count)
@@ -132,8 +125,7 @@ class AreaWeighted:
             yield weights / weights.sum()
 
     def band(self, level: float, number: int, generator: np.random.Generator) -> float:
-        """Half width c of the simultaneous bootstrap band: sup |F* − F| ≤ c in a share `level` of
-        the resamples.
+        """Half width c of the bootstrap band: sup |F* − F| ≤ c in a share `level` of the resamples.
 
         Raises:
             RefusedError: There are fewer than five groups to draw from.

@@ -25,7 +25,7 @@ class SlopeBand:
     level: float
 
     def holds(self, a2: float, a4: float) -> bool:
-        """Whether both slopes lie in the band."""
+        """True if both slopes lie in the band."""
         return self.a2[0] <= a2 <= self.a2[2] and self.a4[0] <= a4 <= self.a4[2]
 
 

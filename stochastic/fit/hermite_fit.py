@@ -1,5 +1,4 @@
-"""The radius map fitted to a sample: r_n(θ) by matching f_r dr = f_θ dθ, its slopes by least
-squares (paper, section 4.2).
+"""Fit of the radius map to a sample by f_r dr = f_θ dθ and least squares (section 4.2).
 
 The map that carries the law of θ to the sample is r(θ) = Q(F_Θ(θ)), Q the sample's quantile
 function: a staircase. Its distance to the Hermite cubic, ∫ (r − H)² f_Θ dθ, is a quadratic in (a2,
@@ -100,9 +99,7 @@ class HermiteFit:
         )
 
     def _integrals(self, share: Array) -> Array:
-        """∫ h_i f_Θ dθ from the lower end to the quantile of each share, for h2 and h4, shape (2,
-        n); by parts, exact.
-        """
+        """∫ h_i f_Θ dθ from the lower end to each quantile, for h2 and h4, shape (2, n); exact."""
         law = self.distribution
         theta = law.quantile(share)
         density, first = law.pdf(theta), law.pdf(law.lower)
@@ -143,9 +140,7 @@ class HermiteFit:
         return float(weights @ shape[1]), float(-weights @ shape[3])
 
     def _nearest_monotone(self, best: Array, steep: Array, floor: Array) -> Array:
-        """Minimiser of the quadratic form over the half planes steep.T @ a ≥ floor: on one of their
-        edges or corners.
-        """
+        """Minimiser of the quadratic form over the half planes steep.T @ a ≥ floor."""
         inverse = np.linalg.inv(self._gram)
         lift = (floor - steep.T @ best) / np.einsum("ik,ij,jk->k", steep, inverse, steep)
         on_edges = (best[:, None] + inverse @ steep * lift)[:, lift > 0]

@@ -1,5 +1,4 @@
-"""Triangular fuzzy slopes whose p-box contains a sample, with the least area (paper, section 4.2,
-Fig. 13).
+"""Triangular fuzzy slopes of the least p-box that contains a sample (section 4.2, Fig. 13).
 
 Since h2 ≥ 0 ≥ h4, the maps with a2, a4 anywhere in their supports lie between two of them: the
 least radius at each θ belongs to (lower end of a2, upper end of a4), the greatest to (upper end of
@@ -49,9 +48,7 @@ class PBox:
         return (self.a2[2] - self.a2[0]) * h2 + (self.a4[2] - self.a4[0]) * h4
 
     def excess(self, sample: AreaWeighted) -> float:
-        """Half width that a band around the sample must have for it to lie within the p-box: the
-        greatest breach in probability.
-        """
+        """Half width of the band with which the sample would lie within the p-box."""
         step = np.append(np.diff(sample.values) > 0, True)
         before = np.concatenate([[0.0], sample.cumulated[step][:-1]])
         values, after = sample.values[step], sample.cumulated[step]
@@ -65,17 +62,14 @@ class PBox:
         return float(max((least - before).max(), (after - greatest).max(), 0.0))
 
     def contains(self, sample: AreaWeighted, band: float) -> bool:
-        """Whether the sample's distribution function lies within the p-box but for a band of half
-        width `band`.
-        """
+        """True if the sample's distribution lies within the p-box, within a band of `band`."""
         return self.excess(sample) <= band + 1e-6
 
 
 def least_pbox(
     fit: HermiteFit, sample: AreaWeighted, band: float, *, hold: SlopeBand | None = None
 ) -> PBox:
-    """The p-box of least area around the fitted map that contains `sample` but for a band of half
-    width `band`.
+    """Least p-box around the fitted map that contains `sample`, within a band of `band`.
 
     Misfit alone gives little fuzziness where data are few and the band is wide; `hold` adds what
     the slopes may be by chance.
@@ -103,9 +97,7 @@ def least_pbox(
 
 
 def _core(modal: tuple[float, float], hold: SlopeBand | None) -> list[tuple[float, float | None]]:
-    """Ranges of the four ends (a2L, a2U, a4L, a4U) that leave the modal slopes, and the band to
-    hold, inside the supports.
-    """
+    """Ranges of the four ends (a2L, a2U, a4L, a4U) around the modal slopes, in the supports."""
     low, high = list(modal), list(modal)
     if hold is not None:
         low = [
@@ -117,9 +109,7 @@ def _core(modal: tuple[float, float], hold: SlopeBand | None) -> list[tuple[floa
 
 
 class _Containment:
-    """Rows of: greatest radius ≥ x where the band ends below, least radius ≤ x where it ends above;
-    first the one, then the other.
-    """
+    """Rows of greatest radius ≥ x where the band ends below, and least ≤ x where it ends above."""
 
     def __init__(self, fit: HermiteFit, sample: AreaWeighted, band: float) -> None:
         step = np.append(np.diff(sample.values) > 0, True)
@@ -162,9 +152,7 @@ class _Containment:
 def _solve(
     fit: HermiteFit, core: list[tuple[float, float | None]], wish: _Containment, chosen: Array
 ) -> list[float]:
-    """Ends (a2L, a2U, a4L, a4U) of least p-box area that obey the chosen rows and keep all four
-    corners monotone.
-    """
+    """Ends (a2L, a2U, a4L, a4U) of least p-box area under the chosen rows, corners monotone."""
     from scipy.optimize import linprog
 
     matrix, right = wish.rows(chosen)
@@ -200,7 +188,7 @@ def _least_breach(
     rising: Array,
     core: list[tuple[float, float | None]],
 ) -> tuple[int, float]:
-    """Where and by how much the least bad p-box breaks containment."""
+    """Place and size of the breach of the least bad p-box."""
     from scipy.optimize import linprog
 
     slack = np.concatenate([-np.ones((len(matrix), 1)), np.zeros((len(monotone), 1))])

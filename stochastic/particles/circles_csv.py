@@ -19,8 +19,7 @@ Told = Callable[..., str]  # a length in m, in words of the file
 
 @dataclass(frozen=True)
 class CircleFile:
-    """Circles listed in a CSV file with the columns x, y, r, their units in the header: ``x [mm], y
-    [mm], r [mm]``.
+    """Circles of a CSV file with the columns x, y, r and their units: ``x [mm], y [mm], r [mm]``.
 
     Args:
         path: The file. A column "d" (diameter) may stand in for r.

@@ -10,9 +10,7 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 
 def close_pairs(discs: Discs, gap: float) -> tuple[Array, Array]:
-    """Unordered pairs (first, second), each of shape (m,), whose surfaces are nearer than `gap` (m)
-    by the nearest image.
-    """
+    """Unordered pairs (first, second), each of shape (m,), whose surfaces are within `gap` (m)."""
     from scipy.spatial import cKDTree
 
     box = discs.size if discs.periodic else None
@@ -41,9 +39,7 @@ def surface_distance(discs: Discs, first: Array, second: Array) -> Array:
 
 
 def smallest_gap(discs: Discs) -> float:
-    """Least distance between two surfaces, a disc's own periodic images included, in m; infinite
-    for one disc in a window.
-    """
+    """Least distance between two surfaces, periodic images included, in m."""
     own = float(discs.size.min() - 2 * discs.radii.max()) if discs.periodic else np.inf
     probe = 0.1 * float(discs.radii.mean() + np.sqrt(discs.area / len(discs)))
     while True:

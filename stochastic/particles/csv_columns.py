@@ -100,9 +100,7 @@ def _lines(path: Path, columns: Sequence[str]) -> list[tuple[int, str]]:
 
 
 def _refuse_surplus(path: Path, number: int, fields: list[str], wanted: int) -> None:
-    """A row with more fields than the header: nearly always numbers with a decimal comma, cut in
-    two.
-    """
+    """Refuse a row with more fields than the header, as decimal commas make them."""
     if any(field.strip() for field in fields[wanted:]):
         told = ",".join(fields)
         cure = "write decimals with a point (1.25, not 1,25), or name every column"

@@ -68,15 +68,11 @@ class Discs:
 
     @property
     def area_fraction(self) -> float:
-        """Σ π r² over the area of the rectangle; for non-overlapping discs of a periodic box the
-        share that they cover.
-        """
+        """Σ π r² over the area of the rectangle."""
         return float(np.pi * (self.radii**2).sum() / self.area)
 
     def separation(self, first: Array, second: Array) -> Array:
-        """Vectors from the centres of `first` to those of `second` (indices of one shape), shape
-        (…, 2), nearest image, in m.
-        """
+        """Vectors from centres `first` to the nearest images of `second`, shape (…, 2), in m."""
         apart = self.centres[second] - self.centres[first]
         return apart - self.size * np.round(apart / self.size) if self.periodic else apart
 

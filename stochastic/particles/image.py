@@ -87,9 +87,7 @@ class SectionImage:
         return self.circles(picture.astype(float))
 
     def circles(self, picture: Array) -> MeasuredCircles:
-        """The circles of a grey image, shape (rows, columns); y points up from the lower edge, in
-        m.
-        """
+        """Circles of a grey image, shape (rows, columns); y points up from the lower edge, in m."""
         from skimage import measure
 
         share, labels = self._segmented(picture)
@@ -122,9 +120,7 @@ class SectionImage:
         )
 
     def _segmented(self, picture: Array) -> tuple[Array, Array]:
-        """Share of each pixel that is particle, in [0, 1], and labels of the particles, both of the
-        image's shape.
-        """
+        """Particle's share of each pixel, in [0, 1], and labels of the particles."""
         from scipy import ndimage
         from skimage import feature, filters, segmentation
 

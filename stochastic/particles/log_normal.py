@@ -13,8 +13,7 @@ from alphacut.stochastic.theta.truncated_normal import Array, TruncatedNormal
 
 @dataclass(frozen=True)
 class LogNormalRadii:
-    """r(θ) = exp(μ_r + σ_r θ), θ truncated normal, from the smallest to the largest radius (eq.
-    11).
+    """r(θ) = exp(μ_r + σ_r θ), θ truncated normal, between the limits (eq. 11).
 
     Args:
         smallest: Radius at the lower end of θ, in m, positive.

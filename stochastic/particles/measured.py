@@ -1,4 +1,4 @@
-"""The law of the particle radius where radii or diameters have been measured, but not their places."""
+"""Law of the particle radius from measured radii or diameters without places."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 @dataclass(frozen=True)
 class MeasuredRadii:
-    """Radii of a list: their distribution function is linear between neighbouring values of the
-    list, the k-th of n at (k − 1)/(n − 1).
+    """Radii of a list; the distribution function is linear between neighbouring values.
 
     Args:
         values: The list, in m, at least one, positive.
@@ -41,8 +40,7 @@ class MeasuredRadii:
 
     @classmethod
     def read(cls, path: Path, unit: str = "") -> MeasuredRadii:
-        """The radii of a CSV file with a column r, or d for diameters, and its unit in the header:
-        ``d [mm]``.
+        """Read a CSV file with a column r, or d for diameters, and its unit: ``d [mm]``.
 
         Raises:
             ValueError: The file cannot be read, or a row holds no positive number (row and reason).
@@ -74,9 +72,7 @@ class MeasuredRadii:
 
     @cached_property
     def _grade(self) -> tuple[Array, Array, Array]:
-        """The values without repetitions, and the distribution function just below and at each of
-        them.
-        """
+        """Distinct values, and the distribution function just below and at each of them."""
         values, first, count = np.unique(self.values, return_index=True, return_counts=True)
         steps = max(1, len(self.values) - 1)
         return values, first / steps, (first + count - 1) / steps

@@ -1,6 +1,4 @@
-"""Which discs come near which: searches over discs of very different radii, by classes of size, in
-periodic and open rectangles.
-"""
+"""Neighbour searches over discs of very different radii, in periodic and open rectangles."""
 
 from __future__ import annotations
 
@@ -44,7 +42,7 @@ class Pairs:
 
 
 def size_classes(radii: Array) -> Iterator[Array]:
-    """Indices of discs whose radii lie within a factor of two, class by class; together all discs."""
+    """Indices of discs whose radii lie within a factor of two, class by class."""
     top = radii.max()
     level = (
         np.floor(np.log2(np.maximum(radii, top * 2.0**-20) / top))
@@ -56,9 +54,7 @@ def size_classes(radii: Array) -> Iterator[Array]:
 
 
 def nearest_in_each_class(discs: Discs, number: int, of: Array) -> Pairs:
-    """For each of the discs `of` the `number` nearest centres of each size class (nearest images
-    only), itself left out.
-    """
+    """The `number` nearest other centres of each size class, for each of the discs `of`."""
     from scipy.spatial import KDTree
 
     parts = []
@@ -74,9 +70,7 @@ def nearest_in_each_class(discs: Discs, number: int, of: Array) -> Pairs:
 
 
 def hidden_discs(discs: Discs, round_off: float) -> Array:
-    """Whether each disc lies inside another one, but for `round_off` (m), shape (n,); of two in one
-    place the first does not.
-    """
+    """Mask of discs that lie inside another one, but for `round_off` (m), shape (n,)."""
     surroundings = Surroundings(discs, discs.radii.max() - discs.radii + round_off)
     hidden = np.zeros(len(discs), bool)
     for of in surroundings.portions():
@@ -119,9 +113,7 @@ class Surroundings:
             self.classes.append((KDTree(discs.centres[second] + shift), second, shift, largest))
 
     def portions(self, most: int = 3_000_000) -> Iterator[Array]:
-        """Indices of discs in portions whose pairs within reach fit into memory together (about
-        `most` of them).
-        """
+        """Indices of discs in portions of about `most` pairs within reach."""
         counts = np.zeros(len(self.discs))
         for tree, _, _, largest in self.classes:
             counts += tree.query_ball_point(
@@ -132,9 +124,7 @@ class Surroundings:
             yield np.flatnonzero(portion == value)
 
     def pairs(self, of: Array, reach: Array, *, closed: bool = False) -> Pairs:
-        """All pairs of discs i in `of` with every image of j (of i itself too) with |c_j − c_i| <
-        reach_i + r_j (≤ where `closed`).
-        """
+        """Pairs of discs i in `of` and images of j with |c_j − c_i| < reach_i + r_j (or ≤)."""
         discs, parts = self.discs, []
         for tree, second, shift, largest in self.classes:
             found = tree.query_ball_point(
@@ -157,9 +147,7 @@ class Surroundings:
 
 
 def _images(discs: Discs, members: Array, margin: float) -> tuple[Array, Array]:
-    """Indices of `members`, and shifts that carry them to all images within `margin` of the
-    rectangle.
-    """
+    """Indices of `members`, and shifts to all their images within `margin` of the rectangle."""
     if not discs.periodic:
         return members, np.zeros((len(members), 2))
     indices, shifts = [], []

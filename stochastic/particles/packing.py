@@ -93,8 +93,7 @@ class Packing:
             return relaxed(radii, side, gap=self.gap, generator=generator)
 
     def check(self, packing: Discs) -> None:
-        """Compare number, area fraction, gaps and the law of the radii (Kolmogorov–Smirnov at
-        `LEVEL`) with the wish.
+        """Compare number, area fraction, gaps and law of the radii with the specification.
 
         Raises:
             RefusedError: One of them differs; the message gives both numbers.
@@ -125,14 +124,12 @@ class Packing:
 def packings(
     wish: Packing, number: int, *, seed: int, executor: Executor | None = None
 ) -> Iterator[Discs]:
-    """`number` independent packings; the k-th depends on `seed` and k only, not on order, number or
-    workers.
-    """
+    """`number` independent packings; the k-th depends on `seed` and k only."""
     return (executor.map if executor else map)(_one, [wish] * number, packing_seeds(seed, number))
 
 
 def packing_seeds(seed: int, number: int) -> list[np.random.SeedSequence]:
-    """Independent streams of chance for `number` packings; the k-th depends on `seed` and k only."""
+    """Independent random streams; the k-th depends on `seed` and k only."""
     return np.random.SeedSequence(seed).spawn(number)
 
 
@@ -141,8 +138,7 @@ def _one(wish: Packing, seed: np.random.SeedSequence) -> Discs:
 
 
 def _law_test(radii: Array, law: RadiusLaw) -> tuple[float, float]:
-    """Kolmogorov–Smirnov distance and the probability of a greater one, at most where the law has
-    atoms.
+    """Kolmogorov–Smirnov distance and the probability of a greater one.
 
     Between neighbouring radii the difference of the distribution functions is greatest at one end:
     both are compared at each radius and just below it, so that a radius of positive probability is

@@ -1,4 +1,4 @@
-"""What a packing needs to know of the law of its radii."""
+"""Law of the radii as a packing needs it."""
 
 from __future__ import annotations
 

@@ -86,7 +86,7 @@ class _Standing:
         ]
 
     def hit(self, proposal: Array, radii: Array) -> Array:
-        """Whether each proposed disc overlaps one in place, shape (n,)."""
+        """Mask of proposed discs that overlap one in place, shape (n,)."""
         hit = np.zeros(len(proposal), bool)
         for tree, centres, standing in self.parts:
             ask = np.flatnonzero(~hit)
@@ -104,9 +104,7 @@ class _Standing:
 
 
 def _first_come(proposal: Array, radii: Array, side: float) -> Array:
-    """Mask of proposals kept so that none overlaps another: each goes unless one before it that
-    stays is in the way.
-    """
+    """Mask of proposals that overlap no earlier proposal that stays."""
     from scipy.spatial import cKDTree
 
     state = np.zeros(len(proposal), int)  # 0 open, 1 stays, -1 goes

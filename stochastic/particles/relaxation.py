@@ -20,7 +20,7 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 @dataclass(frozen=True)
 class Relaxation:
-    """How discs are pushed apart and shaken.
+    """Settings of the pushing and shaking of discs.
 
     Args:
         headroom: Growth of the radii while they repel, as a share of what the area fraction leaves
@@ -122,9 +122,7 @@ def _repulsion(
 def _shake(
     centres: Array, own: Array, side: float, *, generator: np.random.Generator, sweeps: int
 ) -> Array:
-    """Random moves without overlap: a disc moves if it stays clear of its neighbours' old and new
-    places alike.
-    """
+    """Random moves that keep clear of the neighbours' old and new places."""
     reach = 0.25 * (np.sqrt(side**2 / len(own)) - np.sqrt(np.pi) * float(np.sqrt((own**2).mean())))
     each = 5
     for _ in range(0, sweeps, each):

@@ -1,5 +1,4 @@
-"""The Apollonius diagram (additively weighted Voronoi diagram) of discs, with exact cell areas
-(paper, section 4.1, Fig. 10).
+"""Apollonius diagram of discs with exact cell areas (section 4.1, Fig. 10).
 
 The cell of disc i holds the points x with |x − c_i| − r_i ≤ |x − c_j| − r_j for all j. It is
 star-shaped around c_i, and bounded by 1/ρ(φ) = max_j (a_j cos φ + b_j sin φ + c_j): one hyperbola
@@ -65,15 +64,13 @@ class Apollonius:
 
     @property
     def cut(self) -> Array:
-        """Whether the cell touches the edge of the window, shape (n,)."""
+        """True if the cell touches the edge of the window, shape (n,)."""
         touched = np.zeros(len(self.discs), bool)
         touched[self.cell[self.neighbour < 0]] = True
         return touched
 
     def wall(self) -> tuple[Array, Array]:
-        """Sums d + Δ and differences d − Δ of every arc (see `hyperbola`), each of shape (m,), in
-        m.
-        """
+        """Sums d + Δ and differences d − Δ of every arc (see `hyperbola`), shape (m,), in m."""
         return _near_far(self.discs.radii, self.cell, self.neighbour, self.apart)
 
     def radius_at(self, arc: Array, angle: Array) -> Array:
@@ -116,9 +113,7 @@ def apollonius(discs: Discs) -> Apollonius:
 
 
 def _first_bound(discs: Discs, hidden: Array) -> Array:
-    """Upper bound of each cell's largest radius, shape (n,), from few neighbours, and from more
-    where few leave it wide.
-    """
+    """Upper bound of each cell's largest radius from a few neighbours, shape (n,)."""
     largest: Array = np.zeros(len(discs))
     of: Array = np.flatnonzero(~hidden)
     number = math.ceil(24 / sum(1 for _ in size_classes(discs.radii)))
@@ -133,9 +128,7 @@ def _first_bound(discs: Discs, hidden: Array) -> Array:
 
 
 def _near_far(radii: Array, first: Array, second: Array, apart: Array) -> tuple[Array, Array]:
-    """Sum d + Δ and difference d − Δ of pairs; an edge of the window (second < 0) is the wall
-    towards an equal disc.
-    """
+    """Sums d + Δ and differences d − Δ of pairs; a window's edge is a wall to an equal disc."""
     distance = np.hypot(apart[:, 0], apart[:, 1])
     difference = np.where(second < 0, 0.0, radii[first] - radii[second])
     return distance + difference, distance - difference
@@ -151,8 +144,7 @@ class _Walls:
 
     @classmethod
     def towards(cls, discs: Discs, others: Pairs, *, of: Array, hidden: Array) -> _Walls:
-        """Cells of the discs `of` if only the `others` (and their own images, or the edges of the
-        window) were their neighbours.
+        """Cells of the discs `of` with the `others` and their own images as only neighbours.
 
         Hidden discs, whose cell would be a line at most, are nobody's neighbours.
         """
@@ -190,8 +182,7 @@ class _Walls:
         )
 
     def largest_radius(self) -> Array:
-        """Upper bound of the distance from the centre to the cell's boundary, shape (n,); the
-        greatest is at an end of an arc.
+        """Upper bound of the distance from the centre to the cell's boundary, shape (n,).
 
         Each corner is taken from that of its two walls which it lies less far out on; a per mille
         is added for round-off.
@@ -213,9 +204,7 @@ class _Walls:
 
 
 def _bounds(discs: Discs, of: Array) -> Pairs:
-    """What bounds every cell: the disc's own images in a periodic box, the edges in a window (as
-    its mirror images).
-    """
+    """Bounds of every cell: own images in a periodic box, mirror images in a window."""
     if discs.periodic:
         shifts = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]) * discs.size
         return Pairs(np.repeat(of, 8), np.repeat(of, 8), np.tile(shifts, (len(of), 1)))

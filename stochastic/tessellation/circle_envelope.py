@@ -76,9 +76,7 @@ def upper_envelopes(a: Array, b: Array, c: Array, counts: Array) -> Arcs:
 def _sweep(
     a: Array, b: Array, c: Array, table: Array, group: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """Walk once around the circle with all rows of `table` together; arcs as (owner, function,
-    start, end).
-    """
+    """Walk once around the circle with all rows; arcs as (owner, function, start, end)."""
     row = np.arange(len(a))
     summit = np.argmax(np.hypot(a, b) + c, axis=1)  # the highest of all is on the envelope
     phi = np.arctan2(b[row, summit], a[row, summit])
@@ -102,9 +100,7 @@ def _sweep(
 def _arcs(
     took: list[tuple[Array, Array, Array]], table: Array, group: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """Join the take-overs of each row into arcs, the last one with the first if they belong to one
-    function.
-    """
+    """Join the take-overs of each row into arcs, across the start of the circle too."""
     live, function, start = (np.concatenate(column) for column in zip(*took, strict=True))
     order = np.argsort(live, kind="stable")
     live, start = live[order], start[order]
@@ -121,8 +117,7 @@ def _arcs(
 
 
 def _next_crossing(a: Array, b: Array, c: Array, phi: Array) -> tuple[Array, Array]:
-    """Uppermost function of each row at φ, and the angle from there until another one rises above
-    it.
+    """Uppermost function of each row at φ, and the angle at which another rises above it.
 
     With g ≤ 0 the difference of another function to the uppermost, h = −g(φ) and slope q = g'(φ),
     the crossing solves (c − p) t² + 2 q t − h = 0 for the root at which g rises; its 1/t orders the

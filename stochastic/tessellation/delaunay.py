@@ -1,6 +1,4 @@
-"""Direct neighbours by the Delaunay triangulation: their number and distances (paper, section 4.1,
-Figs. 5–7).
-"""
+"""Direct neighbours by the Delaunay triangulation (section 4.1, Figs. 5–7)."""
 
 from __future__ import annotations
 
@@ -34,8 +32,7 @@ class Neighbours:
 
 
 def neighbours(discs: Discs) -> Neighbours:
-    """Delaunay neighbours; on the torus of a periodic box, or of the centres in a window whose
-    neighbours cannot lie outside it.
+    """Delaunay neighbours, on a torus or of centres in a window that are sure of theirs.
 
     A triangle is the torus's own if its circumcircle lies where images have been laid out; the
     layer of images grows until all are. In a window only those centres count whose triangles all
@@ -79,9 +76,7 @@ def neighbours(discs: Discs) -> Neighbours:
 
 
 def neighbouring_values(diagram: Apollonius, values: Array) -> Array:
-    """Pairs of `values` (one per disc, shape (n,)) of cells that share a wall, either way round,
-    shape (2, m).
-    """
+    """Pairs of `values` of cells that share a wall, either way round, shape (2, m)."""
     beyond = (
         (diagram.neighbour > diagram.cell)
         & np.isfinite(values[diagram.cell])
@@ -92,16 +87,12 @@ def neighbouring_values(diagram: Apollonius, values: Array) -> Array:
 
 
 def cell_correlation(diagram: Apollonius, values: Array) -> float:
-    """Correlation of `values` (one per disc, shape (n,)) between cells that share a wall, each pair
-    of cells counted once.
-    """
+    """Correlation of `values`, shape (n,), between cells that share a wall."""
     return float(np.corrcoef(neighbouring_values(diagram, values))[0, 1])
 
 
 def _with_images(discs: Discs, margin: float) -> Array:
-    """Centres, first of the discs themselves, then of their images within `margin` of the box,
-    shape (m, 2).
-    """
+    """Centres of the discs, then of their images within `margin` of the box, shape (m, 2)."""
     points = [discs.centres]
     tiles = np.ceil(margin / discs.size).astype(int)
     for i in range(-tiles[0], tiles[0] + 1):
@@ -113,9 +104,7 @@ def _with_images(discs: Discs, margin: float) -> Array:
 
 
 def _circumcircles(triangles: Array) -> tuple[Array, Array]:
-    """Centres, shape (m, 2), and radii, shape (m,), of the circles through three points each, shape
-    (m, 3, 2).
-    """
+    """Centres (m, 2) and radii (m,) of the circles through three points each (m, 3, 2)."""
     b, c = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     twice = 2 * (b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0])
     bb, cc = (b**2).sum(axis=1), (c**2).sum(axis=1)

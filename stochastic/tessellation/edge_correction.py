@@ -39,8 +39,7 @@ class WholeCells:
 
 
 def whole_cells(diagram: Apollonius) -> WholeCells:
-    """Cells that the edge of the window leaves untouched, with the weights that make up for those
-    it does not.
+    """Cells clear of the window's edge, with weights that make up for the others.
 
     Raises:
         RefusedError: No cell is whole.

@@ -1,5 +1,4 @@
-"""The wall between two discs: a hyperbola in polar form around one focus, with its exact sector
-area.
+"""Wall between two discs: a hyperbola in polar form, with its exact sector area.
 
 Points as far from disc i as from disc j lie on ρ(ψ) = 1/(C + M cos ψ), ψ the angle at the centre of
 i from the direction of j,
@@ -32,9 +31,7 @@ def anomaly(psi: Array, near: Array, far: Array) -> Array:
 
 
 def sector_area(start: Array, end: Array, near: Array, far: Array) -> Array:
-    """Area between the centre and the wall from anomaly `start` to `end`, shape (m,), in the square
-    of the unit of `near`.
-    """
+    """Area between the centre and the wall from anomaly `start` to `end`, shape (m,)."""
     middle, half = (start + end) / 2, (end - start) / 2
     sum_, difference = 2 / near, 2 / far  # M + C, M − C
     bulge = 2 * np.sinh(middle / 2) ** 2 * np.sinh(half) + _sinh_less_argument(half)

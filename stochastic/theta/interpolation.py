@@ -27,9 +27,7 @@ def between_nodes(nodes: Array, values: Array, at: Array) -> Array:
 
 
 def lebesgue(nodes: Array, at: Array) -> float:
-    """By how much the polynomial through values at the nodes exceeds the largest of them at `at`,
-    at most; infinite for over 40 nodes.
-    """
+    """Lebesgue constant of polynomial interpolation at `at`; infinite for over 40 nodes."""
     if len(nodes) > 40:
         return float("inf")
     distance = nodes[:, None] - nodes

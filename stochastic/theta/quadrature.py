@@ -28,8 +28,7 @@ class ThetaRule:
 
 
 def layered_rule(distribution: TruncatedNormal, *, layers: int, points: int) -> ThetaRule:
-    """Gauss–Legendre with `points` nodes in each of `layers` equal slabs of the support, weighted
-    by f_Θ.
+    """Gauss–Legendre with `points` nodes in each of `layers` equal slabs, weighted by f_Θ.
 
     The weights are scaled to the sum 1, so that a constant is its own mean whatever the number of
     layers; the error of the mean of a smooth function falls with the power 2·points of the layer

@@ -1,6 +1,4 @@
-"""The basic random variable θ: a standard normal cut to an interval and normalised on it (paper,
-section 3.1).
-"""
+"""Basic random variable θ: a normalised, truncated standard normal (section 3.1)."""
 
 from __future__ import annotations
 
@@ -48,9 +46,7 @@ class TruncatedNormal:
         return float(self._below(self.upper))
 
     def _below(self, theta: ArrayLike) -> Array:
-        """Uncut probability of [lower, theta]: a difference of tails on the side where they are
-        small, so that none cancels.
-        """
+        """Uncut probability of [lower, theta], a difference of the smaller tails."""
         if self.lower > 0:
             return np.asarray(ndtr(-self.lower) - ndtr(-np.asarray(theta, float)))
         return np.asarray(ndtr(np.asarray(theta, float)) - ndtr(self.lower))
