@@ -75,7 +75,7 @@ class Boxes:
         return points
 
     def in_unit(self, jet: Jet) -> Jet:
-        """Derivatives by the physical parameters, turned into derivatives by the unit coordinates."""
+        """Derivatives by the unit coordinates from those by the physical parameters."""
         shape, r = (1,) * jet.value.ndim, self.radius
         return Jet(
             jet.value,
@@ -141,9 +141,7 @@ class UnitFlow:
 
     @property
     def reference(self) -> int:
-        """Index of the output that a tolerance is meant for: the first displacement, whatever
-        stands before it; else the first.
-        """
+        """Index of the output that a tolerance is meant for: the first displacement, else 0."""
         return next(
             (index for index, name in enumerate(self.outputs) if output_unit(name) == "m"), 0
         )

@@ -1,6 +1,4 @@
-"""Envelopes: the α-cut bounds of the outputs over time, with the parameters that reach them and
-what they cost.
-"""
+"""Envelopes: α-cut bounds of the outputs over time, where attained, at what cost."""
 
 from __future__ import annotations
 
@@ -21,7 +19,7 @@ NATURES = ("inner", "estimated", "verified by sampling", "guaranteed")
 
 
 class Trajectories(Protocol):
-    """What an envelope needs to know of the trajectories behind it."""
+    """Trajectories as an envelope needs them."""
 
     @property
     def boxes(self) -> Boxes:
@@ -106,9 +104,7 @@ class Envelope:
     facts: Mapping[str, float | str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        """What, over what, how far at the lowest level, by what method and how well, in a few
-        lines.
-        """
+        """Summary in a few lines: outputs, time, lowest level, method, error."""
         span = f"{self.time[0]:g} … {self.time[-1]:g} s ({len(self.time)} nodes)"
         levels = ", ".join(f"{a:g}" for a in self.alpha)
         lines = [
@@ -180,9 +176,7 @@ class Envelope:
 
 
 def signed_envelope(flow: Trajectories, bounds: Array, at: Array, **rest: Any) -> Envelope:
-    """An envelope from upper bounds of (−output, output), shape (A, T, m, 2), and their unit
-    coordinates (A, T, m, 2, d).
-    """
+    """Envelope from upper bounds of (−output, output), (A, T, m, 2), and their coordinates."""
     cuts = flow.boxes
     where = cuts.to_physical(at)
     return Envelope(

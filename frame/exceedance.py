@@ -1,6 +1,4 @@
-"""What an engineer reads off an envelope: fuzzy peaks, and fuzzy probabilities of exceeding a
-limit.
-"""
+"""Fuzzy peaks and fuzzy probabilities of exceeding a limit."""
 
 from __future__ import annotations
 
@@ -39,8 +37,7 @@ class FuzzyPeaks:
 
 
 def peaks(envelope: Envelope) -> FuzzyPeaks:
-    """Fuzzy peaks of |output| from the envelope: the upper ends are exact, the lower ends a bound
-    from below.
+    """Fuzzy peaks of |output|: upper ends of the envelope, lower ends from below.
 
     No trajectory peaks higher than the envelope; and each has, at every node, at least the
     magnitude that its band is away from zero.
@@ -51,8 +48,7 @@ def peaks(envelope: Envelope) -> FuzzyPeaks:
 
 
 def tried_peaks(flow: Flow, cuts: Boxes, *, spread: int = 32) -> Array:
-    """The least peak of |output| over time among points tried on each level, shape (A, m): corners,
-    up to five parameters, and a spread.
+    """Least peak of |output| among points tried on each level, shape (A, m).
 
     The true lower end of the fuzzy peak lies between that of `peaks` and this.
     """
@@ -175,17 +171,13 @@ def exceedance(
 
 
 def _deviation(share: float, draws: int) -> float:
-    """Standard deviation of a probability known by the share of some draws, before which any value
-    was as likely (Laplace's rule).
-    """
+    """Standard deviation of a probability from a share of draws (Laplace's rule)."""
     mean = (share * draws + 1) / (draws + 2)
     return float(np.sqrt(mean * (1 - mean) / (draws + 3)))
 
 
 def _bounds(peak: Array, of: Array, limits: Array) -> tuple[Array, Array]:
-    """Least and greatest share of peaks above each limit, on each level, every level holding the
-    points of those above it.
-    """
+    """Least and greatest share of peaks above each limit, nested over levels."""
     share = np.array([1 - np.searchsorted(row, limits, side="right") / len(row) for row in peak])
     levels = range(of.max() + 1)
     return np.array([share[of >= k].min(0) for k in levels]), np.array(

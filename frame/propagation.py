@@ -135,9 +135,7 @@ def _integrator(given: str | Integrator | None, method: str | None) -> Integrato
 
 
 def warn_of_roughness(found: Envelope) -> None:
-    """Warns of an estimated envelope whose error passes what was asked for and a hundredth of the
-    output's largest bound.
-    """
+    """Warn of an estimated envelope whose error passes tolerance and 1 % of the bound."""
     if "reason" not in found.facts or found.error is None:
         return
     peak = np.maximum(np.abs(found.lower), np.abs(found.upper)).max((0, 1))

@@ -1,4 +1,4 @@
-"""``python -m fuzzy modulus CASE``: the fuzzy effective modulus; the same as ``alphacut modulus``."""
+"""Run ``python -m fuzzy modulus CASE``, the same as ``alphacut modulus``."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""What can be said of a user's arguments before any sample is run."""
+"""Checks of a user's arguments before any sample is run."""
 
 from __future__ import annotations
 
@@ -41,9 +41,7 @@ def _fuzzy(name: str, value: object) -> FuzzyNumber:
 
 
 def shared_numbers(domain: Domain) -> tuple[str, ...]:
-    """A note for each fuzzy number that stands for several inputs: they are independent all the
-    same.
-    """
+    """Note for each fuzzy number that stands for several independent inputs."""
     names: dict[int, list[str]] = {}
     for name, number in domain.inputs.items():
         if number.support.width > 0:
@@ -57,7 +55,7 @@ def shared_numbers(domain: Domain) -> tuple[str, ...]:
 
 
 def known_facts(known: object, names: Sequence[str]) -> Known:
-    """What is known of the model; nothing if not given.
+    """Facts known of the model; none if not given.
 
     Raises:
         ValueError: It is no `Known`, or names what is no input.
@@ -106,8 +104,7 @@ def require_plan(plan: object) -> None:
 
 
 def require_callable(function: Any, names: Sequence[str], *, by_name: bool, sent: bool) -> None:
-    """The function can be called with the inputs, and sent to worker processes where there are
-    some.
+    """Refuse a function that the inputs or the worker processes cannot call.
 
     Raises:
         ValueError: It cannot.

@@ -1,6 +1,4 @@
-"""What a campaign would run, and why: the plan is followed through the store up to the first sample
-that is not there.
-"""
+"""Dry run of a campaign: its plan up to the first sample that is not stored."""
 
 from __future__ import annotations
 
@@ -30,7 +28,7 @@ _LISTED = 100_000  # samples that are listed at most where nothing is stored
 
 @dataclass(frozen=True)
 class Explanation:
-    """What a campaign would run.
+    """Samples that a campaign would run, with the reasons.
 
     Args:
         samples: Samples that the plan asks for first; all of them unless it goes on from their
@@ -128,8 +126,7 @@ def explain(
     spot_check: bool = False,
     progress: object = None,
 ) -> Explanation:
-    """What `propagate` with the same arguments would run, and why. Nothing is run and no store is
-    made.
+    """Preview of `propagate` with the same arguments; nothing is run or written.
 
     Args:
         function: Not called; may be left out, so that the inputs come first.
@@ -203,7 +200,7 @@ def _rehearsed(
 
 
 def _counted(size: int, domain: Domain, vectorised: bool) -> Explanation:
-    """So many samples that they are counted, not listed: points that two levels share count twice."""
+    """Count of samples too many to list; points of two levels count twice."""
     calls = -(-size // BATCH) if vectorised else size
     few = "too many to list; take Signed, Optimisation or Chebyshev if these are too many to run"
     return Explanation(
@@ -218,7 +215,7 @@ def _counted(size: int, domain: Domain, vectorised: bool) -> Explanation:
 
 
 def _open_end(plan: Plan) -> str:
-    """What a plan says that goes on from the values of its samples."""
+    """Remark on a plan that goes on from the values of its samples."""
     most = getattr(plan, "budget", None) or getattr(plan, "limit", None)
     kind = "budget" if hasattr(plan, "budget") else "limit"
     return (
@@ -255,7 +252,7 @@ def _reasons(
 
 
 def _new_values(samples: Shelf, domain: Domain, missing: Array) -> list[str]:
-    """Which inputs take values that no stored sample of this model has."""
+    """Inputs with values that no stored sample of this model has."""
     stored = samples.points()
     found = []
     for column, name in enumerate(domain.names):
@@ -269,7 +266,7 @@ def _new_values(samples: Shelf, domain: Domain, missing: Array) -> list[str]:
 
 
 def _nearest(models: list[Stored], identity: Identity) -> list[str]:
-    """How the model differs from the nearest one that has samples."""
+    """Differences to the nearest model that has samples."""
     if not models:
         return ["the store is empty: every sample is new"]
     differences = [_differences(model.identity, identity) for model in models]
@@ -282,7 +279,7 @@ def _nearest(models: list[Stored], identity: Identity) -> list[str]:
 
 
 def _differences(stored: Any, asked: Any, path: str = "") -> list[str]:
-    """Where two identities differ, each as `key: stored → asked`."""
+    """Differences of two identities, each as `key: stored → asked`."""
     if isinstance(stored, Mapping) and isinstance(asked, Mapping):
         keys = sorted({*stored, *asked})
         return [

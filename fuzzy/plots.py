@@ -81,9 +81,7 @@ def _outline(fuzzy: FuzzyNumber | FuzzySet) -> tuple[list[float], list[float]]:
 
 
 def figure_36() -> Figure:
-    """The paper's Fig. 36: crisp number, crisp interval, triangular number, fuzzy interval, and a
-    non-convex subnormal set.
-    """
+    """Crisp, interval, triangular, trapezoidal and non-convex subnormal sets (Fig. 36)."""
     from matplotlib.figure import Figure
 
     x = np.linspace(9, 11, 81)

@@ -1,5 +1,4 @@
-"""Random and fuzzy at once: what a response that is random at every fuzzy sample gives per α beyond
-its mean (paper, section 3.2).
+"""Random response at every fuzzy sample: what it gives beyond its mean (section 3.2).
 
 At each sample of the fuzzy inputs the response is a curve over the basic random variable θ, hence
 has a distribution. Over a cut the distributions lie between two bounds, a p-box; a quantile and a
@@ -64,20 +63,15 @@ class RandomResponse:
         return self._bounds("mean", self.ordered.mean(axis=1, keepdims=True))
 
     def p_box(self, at: ArrayLike) -> FuzzyResult:
-        """Bounds of the distribution function at responses `at` (m,), outputs `cdf[0]` and on: the
-        p-box of each cut.
-        """
+        """Bounds of the distribution function at responses `at` (m,), on each cut."""
         return self._bounds("cdf", self._below(at))
 
     def exceedance(self, limit: ArrayLike) -> FuzzyResult:
-        """Fuzzy probability that the response exceeds each limit (m,), outputs `exceedance[0]` and
-        on.
-        """
+        """Fuzzy probability that the response exceeds each limit (m,)."""
         return self._bounds("exceedance", 1 - self._below(limit))
 
     def quantile(self, probability: ArrayLike) -> FuzzyResult:
-        """Fuzzy quantiles of the response at probabilities (m,) in (0, 1), outputs `quantile[0]`
-        and on.
+        """Fuzzy quantiles of the response at probabilities (m,) in (0, 1).
 
         Raises:
             ValueError: A probability lies outside (0, 1).
@@ -105,9 +99,7 @@ class RandomResponse:
 
 
 def _share_below(ordered: Array, at: Array) -> Array:
-    """Probability of a response up to `at`, linear between the strata; 0 and 1 beyond the least and
-    the greatest.
-    """
+    """Probability of a response up to `at`, linear between the strata."""
     strata = (np.arange(len(ordered)) + 0.5) / len(ordered)
     share: Array = np.interp(at, ordered, strata)
     return np.where(at < ordered[0], 0.0, np.where(at >= ordered[-1], 1.0, share))

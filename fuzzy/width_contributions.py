@@ -1,6 +1,4 @@
-"""What drives the width: the share that is lost when an input is fixed at its modal value, all
-others kept (paper, Figs. 34 and 35).
-"""
+"""Contributions to the width: the share lost when an input is fixed (Figs. 34, 35)."""
 
 from __future__ import annotations
 

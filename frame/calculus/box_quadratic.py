@@ -1,6 +1,4 @@
-"""Maximising quadratics g·x + x·H·x/2 over boxes, many at once (the approximate problems of eq.
-22).
-"""
+"""Maxima of quadratics g·x + x·H·x/2 over boxes, many at once (eq. 22)."""
 
 from __future__ import annotations
 
@@ -33,8 +31,7 @@ def linear_maximum(g: Array, lower: Array, upper: Array) -> Array:
 def local_maximum(
     g: Array, H: Array, lower: Array, upper: Array, start: Array | None = None, *, rounds: int = 6
 ) -> Array:
-    """A local maximum uphill from `start` (or 0), shape (N, d): exact steps along each axis, then
-    Newton on the free axes.
+    """Local maximum uphill from `start` (or 0), shape (N, d), by axis and Newton steps.
 
     Args:
         g: Gradients, shape (N, d).
@@ -72,7 +69,7 @@ def _axes_ascent(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> No
 
 
 def _newton(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> Array:
-    """A projected Newton step on the axes that may move, halved at most twice, kept where it gains."""
+    """Projected Newton step on the free axes, halved at most twice."""
     slope = g + np.einsum("nij,nj->ni", H, x)
     free = ~(((x <= lower) & (slope <= 0)) | ((x >= upper) & (slope >= 0)))
     eye = np.eye(g.shape[1])
@@ -90,8 +87,7 @@ def _newton(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> Array:
 
 
 def global_maximum(g: Array, H: Array, lower: Array, upper: Array) -> Array:
-    """The global maximum, shape (N, d), by the stationary points of all faces of the box; arguments
-    as `local_maximum`.
+    """Global maximum, shape (N, d), by the stationary points of all faces.
 
     With more than `FACES_UP_TO` parameters the number of faces forbids this; then the best local
     maximum from 0, from the corner that the gradient points to, and from the ends of the axis of
@@ -113,9 +109,7 @@ def global_maximum(g: Array, H: Array, lower: Array, upper: Array) -> Array:
 
 
 def _face_points(g: Array, H: Array, lower: Array, upper: Array, free: tuple[int, ...]) -> Array:
-    """Stationary points of all faces with the same free axes, cut at the box, shape (N, 2^(d −
-    free), d).
-    """
+    """Stationary points of faces with the same free axes, shape (N, 2^(d − free), d)."""
     d = g.shape[1]
     bound = [i for i in range(d) if i not in free]
     corners = np.array(list(product((0, 1), repeat=len(bound))), int).reshape(

@@ -36,8 +36,7 @@ class ChebyshevGrid:
         return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(axes))
 
     def coefficients(self, values: Array) -> Array:
-        """Coefficients of products of Chebyshev polynomials from values (S, …), same shape, the
-        constant first.
+        """Chebyshev coefficients of values (S, …), same shape, the constant first.
 
         Since no product exceeds 1 on the box, Σ ‖c_j‖ bounds ‖polynomial‖ there, for any norm.
         """

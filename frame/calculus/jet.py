@@ -1,5 +1,4 @@
-"""Truncated Taylor polynomials of degree 2 in the parameters: write a model once, get its first and
-second derivatives.
+"""Truncated Taylor polynomials of degree 2: first and second derivatives of a model.
 
 A jet is a value with its first and second derivatives with respect to d parameters. With d = 0 it
 is a plain array that costs nothing more, so the same code computes values alone.
@@ -19,8 +18,7 @@ Array = NDArray[Any]
 
 @dataclass(frozen=True, eq=False)
 class Jet:
-    """A value of shape V with derivatives along d parameters; arithmetic broadcasts over V as NumPy
-    does.
+    """Value of shape V with derivatives along d parameters; broadcasts over V.
 
     Args:
         value: Shape V.
@@ -58,9 +56,7 @@ class Jet:
         )
 
     def map(self, linear: Callable[[Array], Array]) -> Jet:
-        """A linear map that acts alike on value and derivatives, given as a function of arrays with
-        any leading axes.
-        """
+        """Linear map of value and derivatives, given as a function of arrays."""
         return Jet(linear(self.value), linear(self.first), linear(self.second))
 
     def __neg__(self) -> Jet:
@@ -120,9 +116,7 @@ class Jet:
 
 
 def _padded(a: Jet, ndim: int) -> Jet:
-    """`a` with V extended on the left by axes of length 1 up to `ndim` axes, so that its
-    derivatives broadcast as its value does.
-    """
+    """`a` with V extended on the left by axes of length 1 up to `ndim` axes."""
     missing = ndim - a.value.ndim
     if missing <= 0:
         return a
@@ -174,9 +168,7 @@ def variables(points: Array, names: Sequence[str], selected: Sequence[str]) -> d
 
 
 def stack(rows: Sequence[Sequence[Jet | float]], like: Mapping[str, Jet]) -> Jet:
-    """A matrix of shape (S, n, m) from entries of shape (S,) or plain numbers; S and d are those of
-    `like`.
-    """
+    """Matrix of shape (S, n, m) from entries of shape (S,) or plain numbers."""
     sample = next(iter(like.values()))
     size, d = sample.value.size, sample.directions
     shape = (len(rows), len(rows[0]))
@@ -195,9 +187,7 @@ def stack(rows: Sequence[Sequence[Jet | float]], like: Mapping[str, Jet]) -> Jet
 
 
 def inverse(a: Jet) -> Jet:
-    """Inverse of square matrices, V = (..., n, n): one factorisation serves the value and all
-    derivatives.
-    """
+    """Inverse of square matrices, V = (..., n, n), by one factorisation."""
     x = np.linalg.inv(a.value)
     first = -x @ a.first @ x
     cross = -x @ a.first[:, None] @ first[None, :]

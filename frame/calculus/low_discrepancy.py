@@ -1,6 +1,4 @@
-"""Low-discrepancy points of Chebyshev density, denser towards the faces of the box where envelopes
-are often attained.
-"""
+"""Low-discrepancy points of Chebyshev density, denser towards the faces of the box."""
 
 from __future__ import annotations
 
@@ -21,9 +19,7 @@ def primes(count: int) -> list[int]:
 
 
 def halton(dimension: int, count: int, *, skip: int = 1) -> Array:
-    """Halton points in (0, 1), shape (count, dimension), digits permuted by a fixed multiplier so
-    that high primes do not line up.
-    """
+    """Halton points in (0, 1), shape (count, dimension), digits scrambled."""
     out = np.zeros((count, dimension))
     for axis, base in enumerate(primes(dimension)):
         multiplier = max(1, round(base * 0.618))

@@ -60,9 +60,7 @@ def derivative(index: Index, axis: int, coefficients: Array) -> Array:
 
 @lru_cache(64)
 def lowered(index: bytes, shape: tuple[int, int], axis: int) -> Index:
-    """Positions of the monomials with the exponent of `axis` one less, shape (terms,); 0 where
-    there is none.
-    """
+    """Positions of the monomials with one power of `axis` less, (terms,); 0 for none."""
     rows = np.frombuffer(index, np.int64).reshape(shape)
     lookup = {tuple(row): k for k, row in enumerate(rows.tolist())}
     step = np.eye(shape[1], dtype=np.int64)[axis]
@@ -128,9 +126,7 @@ class Polynomial:
 
 
 def fit(u: Array, data: Jet, degree: int) -> Polynomial:
-    """Least-squares fit to values and first and second derivatives, V = (S, K), at points (S, d) of
-    the unit box.
-    """
+    """Least-squares fit to values and derivatives, V = (S, K), at unit points (S, d)."""
     index = exponents(u.shape[1], degree)
     d = u.shape[1]
     unit = Polynomial(index, np.eye(len(index)))

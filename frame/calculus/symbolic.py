@@ -1,6 +1,4 @@
-"""Compiled functions of several variables with their first and second derivatives, from expressions
-written once.
-"""
+"""Compiled functions with first and second derivatives, from expressions."""
 
 from __future__ import annotations
 

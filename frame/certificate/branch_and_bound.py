@@ -1,5 +1,4 @@
-"""Branch and bound for the modal model: every bound of the envelope enclosed between an attained
-value and a proved one.
+"""Branch and bound for the modal model: every bound between attained and proved.
 
 A box of parameters is closed by one of four tests, each on the quadratic Taylor model with the
 remainder of `frame.remainder`:
@@ -251,9 +250,7 @@ class BranchAndBound:
     def _not_closed_near_best(
         self, model: ModalModel, optima: Optima, cells: Cells, T: Array
     ) -> Array:
-        """Test 3: no point of the box lies higher than the best one by more than the gap, from the
-        Taylor model at the best point.
-        """
+        """Test 3: boxes in which the best point's Taylor model allows more than the gap."""
         j = cells.problem
         best = optima.point[j]
         low, high = cells.centre - cells.radius - best, cells.centre + cells.radius - best
@@ -297,9 +294,7 @@ def _improve(
 
 
 def _separable(g: Array, H: Array, r: Array) -> Array:
-    """An upper bound of max g·x + x·H·x/2 over |x| <= r: mixed terms moved to the diagonal, then
-    axis by axis.
-    """
+    """Upper bound of max g·x + x·H·x/2 over |x| <= r, mixed terms moved to the diagonal."""
     diagonal = np.einsum("nii->ni", H)
     mixed = np.abs(H) * r[:, None, :]
     spread = np.where(r > 0, (mixed.sum(-1) - np.abs(diagonal) * r) / np.where(r > 0, r, 1.0), 0.0)

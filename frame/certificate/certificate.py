@@ -43,7 +43,7 @@ class Certificate:
 
     @property
     def gap(self) -> float:
-        """Largest difference between proved and attained bound, in units of the reference output."""
+        """Largest difference of proved and attained bound, in units of the reference."""
         return float(((self.outer - self.bounds) / self.scale[:, None]).max())
 
 
@@ -117,9 +117,7 @@ def certify(
 
 
 def _between(model: ModalModel) -> float:
-    """h²/8 times a bound of the second time derivative: how far an output strays from a straight
-    line between nodes.
-    """
+    """h²/8 times a bound of the second time derivative: rise between nodes at most."""
     reach = np.ones(len(model.boxes.names))
     rate, growth = suprema(model.eigenvalue, reach)[0], largest_growth(model.eigenvalue, reach)
     curve = np.zeros(len(model.outputs))

@@ -1,5 +1,4 @@
-"""A proved bound of what the polynomials of a modal model do wrong, over the whole box and not at
-samples.
+"""Proved bound of the polynomials' error in a modal model, over the whole box.
 
 Polynomials z_k = [φ_k; w_k] for the states of the modes make q(t) = 2 Re Σ φ_k exp(λ_k t) a motion
 that nearly obeys the equations. What it misses, λ_k φ_k − w_k and λ_k M w_k + D w_k + K φ_k, is a
@@ -32,8 +31,7 @@ CHUNK = 10_000
 
 
 def proved_error(model: ModalModel) -> Array:
-    """Bound of |model − true motion| over the box, shape (T, m), in units of the outputs; up to the
-    rounding of this computation.
+    """Bound of |model − true motion| over the box, shape (T, m), in units of the outputs.
 
     Raises:
         UnprovedError: The structure is not known to be a polynomial that loses energy, the scheme
@@ -79,8 +77,7 @@ def proved_error(model: ModalModel) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A symmetric matrix A(p) against its mean A₀ = L Lᵀ: lowest A₀ ≤ A(p) ≤ highest A₀ over the
-    box.
+    """Symmetric matrix A(p) against its mean A₀ = L Lᵀ: lowest A₀ ≤ A(p) ≤ highest A₀.
 
     Args:
         factor: L, shape (N, N).
@@ -139,9 +136,7 @@ def _grid(model: ModalModel) -> ChebyshevGrid:
 
 
 def _expanded(grid: ChebyshevGrid, sample: Callable[[Array], dict[str, Array]]) -> dict[str, Array]:
-    """Chebyshev coefficients of what `sample` gives at unit coordinates (S, d), each of shape (J,
-    …).
-    """
+    """Chebyshev coefficients of `sample` at unit coordinates (S, d), each (J, …)."""
     width = sum(
         part.size * (2 if np.iscomplexobj(part) else 1)
         for part in sample(np.zeros((1, len(grid.degrees)))).values()
@@ -167,9 +162,7 @@ def _structure(model: ModalModel, unit: Array) -> dict[str, Array]:
 
 
 def _defects(model: ModalModel, part: Part, states: Polynomial, unit: Array) -> dict[str, Array]:
-    """What one part misses at unit coordinates (S, d): of what sets it off, and of the equations of
-    motion mode by mode.
-    """
+    """Defects at unit coordinates (S, d) of the start and of each mode's motion."""
     matrices, rows = evaluate(
         model.flow.system, model.flow.names, model.boxes.to_physical(unit), derivatives=False
     )

@@ -1,6 +1,4 @@
-"""Bounds of the third derivatives of a modal model over a box: what a quadratic Taylor model leaves
-out, at most.
-"""
+"""Bounds of a modal model's third derivatives: the remainder of quadratic Taylor models."""
 
 from __future__ import annotations
 
@@ -32,9 +30,7 @@ def require_certifiable(parameters: int) -> None:
 
 
 def suprema(polynomial: Polynomial, reach: Array) -> list[Array]:
-    """Bounds of |derivative| for |u_i| <= reach_i by sums of magnitudes, orders 0 to 3, shapes (d,)
-    * order + (K,).
-    """
+    """Bounds of |derivative| for |u_i| <= reach_i, orders 0 to 3, shapes (d,) * order + (K,)."""
     d = polynomial.index.shape[1]
     size = np.prod(reach**polynomial.index, axis=1)
 

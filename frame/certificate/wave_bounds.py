@@ -1,5 +1,4 @@
-"""Bounds of what a mode's motion does over time, whatever the parameters: exp(λ t) in free
-vibration, R(t; λ) under the ground's motion.
+"""Bounds of a mode's motion over time: exp(λ t), and R(t; λ) under the ground's motion.
 
 A part of a modal model is 2 Re Σ_k C_k(p) w(t; λ_k(p)) with w = exp(λ t) or w = R = ∫ exp(λ (t −
 s)) a(s) ds; its r-th derivative by λ is bounded by t^r exp(g t), or by ∫ τ^r exp(g τ) |a(t − τ)|
@@ -41,9 +40,7 @@ class Part:
 
 
 def parts(model: ModalModel, growth: Array) -> list[Part]:
-    """The free part of a model and, under a load, the forced one; `growth` bounds Re λ_k, shape
-    (n,).
-    """
+    """Free part of a model, and the forced one under a load; `growth` bounds Re λ_k, (n,)."""
     time = model.time[:, None]
     powers = time ** np.arange(4)[:, None, None]
     elapsed = np.where(
@@ -85,9 +82,7 @@ def _swell(kernel: Array, time: Array) -> Array:
 
 
 def _largest(growth: Array, step: float, ground: Accelerogram, nodes: int, power: int) -> Array:
-    """Largest τ^power exp(g τ) in each interval between whose ends the load is linear, shape (J,
-    n).
-    """
+    """Largest τ^power exp(g τ) in each interval of a linear load, shape (J, n)."""
     every = ground.intervals(step)
     ends = (np.arange((nodes - 1) * every + 1) * (step / every))[:, None]
     value = ends**power * np.exp(growth * ends)
@@ -99,9 +94,7 @@ def _largest(growth: Array, step: float, ground: Accelerogram, nodes: int, power
 
 
 def _convolved(kernel: Array, ground: Accelerogram, time: Array) -> Array:
-    """Upper sums of ∫ kernel(τ) |a(t − τ)| dτ at all nodes from the kernel's maxima (…, J, n),
-    shape (…, T, n).
-    """
+    """Upper sums of ∫ kernel(τ) |a(t − τ)| dτ at all nodes, shape (…, T, n)."""
     count = kernel.shape[-2]
     h = (time[-1] - time[0]) / count
     size = np.abs(ground.at(np.arange(count + 1) * h))

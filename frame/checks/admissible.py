@@ -1,6 +1,4 @@
-"""Which values fuzzy parameters may take: what is positive, or does not feed energy in, must be so
-over the whole support.
-"""
+"""Admissible values of fuzzy parameters, over their whole supports."""
 
 from __future__ import annotations
 
@@ -31,7 +29,7 @@ OF_FRAME = {
 
 @singledispatch
 def wanted(system: LinearSystem | LagrangianSystem, name: str) -> str | None:
-    """What a parameter of `system` must be; None where nothing is known of it."""
+    """Admissible range of a parameter of `system`; None where nothing is known."""
     return None
 
 
@@ -74,7 +72,7 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
 
 
 def _require_mass(system: LinearSystem, cuts: Boxes) -> None:
-    """Where the mass matrix is no mass, the motion does not exist or runs away."""
+    """Refuse a mass matrix that is not positive."""
     for point in probes(cuts):
         try:
             mass = evaluate(system, cuts.names, point[None], derivatives=False)[0].mass.value

@@ -1,6 +1,4 @@
-"""Corners of boxes: where a motion depends on its parameters one way, they hold the bounds, and no
-model is needed to look at them.
-"""
+"""Corners of boxes: bounds of motions that depend on parameters one way."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether what is given as numbers is numbers."""
+"""Checks that given values are numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What time stepping adds to the error of an envelope, and steps too long for the scheme."""
+"""Error of time stepping in an envelope, and steps too long for the scheme."""
 
 from __future__ import annotations
 
@@ -35,8 +35,7 @@ def probes(cuts: Boxes) -> Array:
 
 
 def step_error(flow: UnitFlow) -> Array:
-    """Largest error of time stepping so far at the modal parameters and corners of the widest box,
-    shape (T, m), in units of the outputs.
+    """Largest time-stepping error so far at modal values and corners, shape (T, m).
 
     Of a linear structure the distance from the exact propagator; else the distance from half the
     step, extrapolated by the scheme's order.
@@ -60,9 +59,7 @@ def step_error(flow: UnitFlow) -> Array:
 
 @singledispatch
 def deviations(flow: Flow, points: Array) -> tuple[Array, Array]:
-    """More accurate trajectories at `points` (S, d), and the errors of those of the flow; both of
-    shape (S, T, m).
-    """
+    """More accurate trajectories at `points` (S, d), and the flow's errors, (S, T, m)."""
     values = flow.values(points)
     return values, np.zeros_like(values)
 
@@ -80,8 +77,7 @@ def _(flow: LagrangianFlow, points: Array) -> tuple[Array, Array]:
 
 
 def with_step_error(found: Envelope, flow: UnitFlow, scheme: str, steps: Array) -> Envelope:
-    """The envelope with the error of time stepping in its facts, and added to its estimated error;
-    a proof is left as it is.
+    """The envelope with the time-stepping error in its facts and estimated error.
 
     Args:
         found: The envelope of the scheme's trajectories.

@@ -1,4 +1,4 @@
-"""Whether a step resolves the fastest oscillation, and what it costs when it does not."""
+"""Resolution of the fastest oscillation by a step."""
 
 from __future__ import annotations
 
@@ -33,14 +33,12 @@ class StepGuard:
 
     @property
     def ok(self) -> bool:
-        """Whether the step resolves the fastest mode."""
+        """True if the step resolves the fastest mode."""
         return self.resolution <= LIMIT
 
     @property
     def phase_error(self) -> float:
-        """Phase by which the fastest mode lags at the end, in rad: the midpoint rule turns by 2
-        atan(ωh/2) instead of ωh per step.
-        """
+        """Phase lag of the fastest mode at the end, in rad, by 2 atan(ωh/2) for ωh."""
         return (self.resolution - 2 * atan(self.resolution / 2)) * self.duration / self.step
 
     @property

@@ -1,4 +1,4 @@
-"""Whether a tolerance is small beside the motion that it is a tolerance of."""
+"""Size of a tolerance beside the motion."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class ToleranceGuard:
 
     @property
     def ok(self) -> bool:
-        """Whether the tolerance resolves the motion."""
+        """True if the tolerance resolves the motion."""
         return self.share <= LIMIT * (1 + 1e-9)
 
     @property
@@ -55,9 +55,7 @@ class ToleranceGuard:
 
 
 def tolerance_guard(flow: UnitFlow, tolerance: float) -> ToleranceGuard:
-    """The guard of the output for which the tolerance is the largest share of the peak at the modal
-    parameters.
-    """
+    """Guard of the output of which the tolerance is the largest share of the peak."""
     peak = np.abs(flow.flow.values(flow.boxes.modal[None])[0]).max(0)
     wanted = tolerance * flow.scale
     worst = int(np.argmax(np.divide(wanted, peak, out=np.zeros_like(peak), where=peak > 0)))

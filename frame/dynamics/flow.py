@@ -1,6 +1,4 @@
-"""The discrete deterministic mapping f_d(t_j; p) of eq. 19: whole trajectories for many parameter
-sets at once.
-"""
+"""Discrete deterministic mapping f_d(t_j; p) of eq. 19 for many parameter sets."""
 
 from __future__ import annotations
 
@@ -68,7 +66,7 @@ class StepError(RuntimeError):
 
 
 class March(ABC):
-    """What flows that march from node to node share."""
+    """Base of flows that march from node to node."""
 
     names: tuple[str, ...]
 
@@ -90,9 +88,7 @@ class March(ABC):
         return self._finite(points, derivatives=False).value
 
     def taylor(self, points: Array) -> Jet:
-        """Trajectories with first and second derivatives of the scheme, V = (S, T, outputs); raises
-        as `values`.
-        """
+        """Trajectories with derivatives of the scheme, V = (S, T, outputs); raises as `values`."""
         return self._finite(points, derivatives=True)
 
     def _finite(self, points: Array, *, derivatives: bool) -> Jet:
@@ -111,9 +107,7 @@ class March(ABC):
         return found
 
     def _locate(self, points: Array, failure: Exception) -> NoReturn:
-        """Raises what failed with the parameters at which it does, found by halving the set of
-        points.
-        """
+        """Raise a failure with its parameters, found by halving the set of points."""
         while len(points) > 1:
             half = points[: len(points) // 2]
             try:
@@ -184,9 +178,7 @@ class LinearFlow(March):
         return found if every == 1 else found[:, ::every]
 
     def _load(self) -> tuple[Array | None, int]:
-        """Ground acceleration at the nodes; the exact propagator also takes the samples of a finer
-        record between them.
-        """
+        """Ground acceleration at the nodes, and for the exact propagator between them."""
         ground = self.system.ground
         if ground is None:
             return None, 1
@@ -195,8 +187,7 @@ class LinearFlow(March):
 
 
 def trajectory(step_map: StepMap, start: Jet, rows: Jet, *, load: Array | None, count: int) -> Jet:
-    """Outputs at `count` nodes without a loop over steps: powers of the step map within blocks of
-    √count steps, then block to block.
+    """Outputs at `count` nodes, by powers of the step map in blocks of √count steps.
 
     Args:
         step_map: One step.
@@ -261,9 +252,7 @@ def _starts(jump: Jet, start: Jet, forced: Jet | None, blocks: int) -> Jet:
 
 
 def _convolution(impulse: Jet, size: int) -> Jet:
-    """Response within a block to the loads of its earlier steps, V = (S, size m, 2 size), from C
-    T^k G, V = (S, size, m, 2).
-    """
+    """Response in a block to loads of earlier steps, V = (S, size, m, 2)."""
     lag = np.arange(size)[:, None] - 1 - np.arange(size)[None, :]
 
     def spread(x: Array) -> Array:

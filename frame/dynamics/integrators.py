@@ -1,5 +1,4 @@
-"""One-step methods for linear structures, as maps of the state [q; v], with the facts they claim
-about themselves.
+"""One-step methods for linear structures, with the facts they claim.
 
 Every method is a frozen dataclass with two claims that tests measure: `order`, and
 `stability_limit`, the largest ω h without growth of an undamped oscillation. All derivatives of a
@@ -21,8 +20,7 @@ from alphacut.frame.structures.linear import Matrices
 
 @dataclass(frozen=True, eq=False)
 class StepMap:
-    """x[k+1] = T x[k] + G [a(t_k), a(t_{k+1})] with x = [q; v] and the acceleration a of the
-    ground.
+    """x[k+1] = T x[k] + G [a(t_k), a(t_{k+1})] with x = [q; v], a of the ground.
 
     Args:
         transfer: T, shape (S, 2n, 2n).
@@ -53,8 +51,7 @@ class Integrator(Protocol):
 
     @property
     def amplification(self) -> Rational | None:
-        """R(z) with R(hλ) the factor of a step on a mode exp(λt), as numerator and denominator by
-        rising powers; None: no such R.
+        """R(z), z = hλ, of a step on exp(λt): numerator and denominator, or None.
 
         Both empty mean R = exp.
         """
@@ -65,8 +62,7 @@ class Integrator(Protocol):
 
 @dataclass(frozen=True)
 class Midpoint:
-    """Variational integrator: midpoint discrete Lagrangian with midpoint Lagrange–d'Alembert
-    forcing.
+    """Midpoint discrete Lagrangian with midpoint Lagrange–d'Alembert forcing.
 
     Eliminating the velocity gives (M/h + D/2 + hK/4) q[k+1] = (2M/h − hK/2) q[k] − (M/h − D/2 +
     hK/4) q[k−1]. On a linear structure this is Newmark(1/4, 1/2).
@@ -126,9 +122,7 @@ class Newmark:
 
     @property
     def amplification(self) -> Rational | None:
-        """That of the midpoint rule for beta = 1/4, gamma = 1/2; else damping couples the modes of
-        a step.
-        """
+        """R(z) of the midpoint rule for beta = 1/4, gamma = 1/2, else None."""
         return Midpoint.amplification if (self.beta, self.gamma) == (0.25, 0.5) else None
 
     def step_map(self, matrices: Matrices, step: float) -> StepMap:
@@ -167,9 +161,7 @@ class RungeKutta4:
 
 @dataclass(frozen=True)
 class Gauss4:
-    """Variational integrator of order 4: quadratic trajectories, two Gauss points; on a linear
-    structure the (2, 2) Padé step.
-    """
+    """Variational integrator of order 4, two Gauss points; linear: the (2, 2) Padé step."""
 
     name: ClassVar[str] = "gauss4"
     order: ClassVar[float] = 4
@@ -185,9 +177,7 @@ class Gauss4:
 
 @dataclass(frozen=True)
 class Exact:
-    """The exact propagator exp(A h), by its Taylor series with scaling and squaring; exact for a
-    load linear within each step.
-    """
+    """Exact propagator exp(A h) by scaling and squaring, for a load linear in each step."""
 
     name: ClassVar[str] = "exact"
     order: ClassVar[float] = inf
@@ -227,9 +217,7 @@ def state_matrix(m: Matrices) -> Jet:
 
 
 def _loaded_flow(m: Matrices, step: float) -> Jet:
-    """The state matrix extended by the ground's acceleration a and its increment over a step, shape
-    (S, 2n + 2, 2n + 2).
-    """
+    """State matrix extended by the load and its increment, shape (S, 2n + 2, 2n + 2)."""
     flow = state_matrix(m)
     n = m.mass.value.shape[-1]
     size = 2 * n + 2

@@ -1,6 +1,4 @@
-"""Trajectories of general mechanical systems with internal first and second derivatives, many
-parameter sets at once.
-"""
+"""Trajectories of general systems with internal derivatives, many sets at once."""
 
 from __future__ import annotations
 
@@ -140,8 +138,7 @@ def _state_symbols(eq: Any, scheme: str) -> tuple[list[Any], Any]:
 
 
 class Variational:
-    """One step of the midpoint variational integrator for (q, momentum), by Newton's method on
-    q[k+1].
+    """Step of the midpoint variational integrator for (q, momentum), by Newton on q[k+1].
 
     With q̄ = (q[k] + q[k+1])/2 and v̄ = (q[k+1] − q[k])/h: π[k] = L_v − h/2 (L_q + F), π[k+1] = L_v
     + h/2 (L_q + F). The converged

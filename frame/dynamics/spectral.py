@@ -1,5 +1,4 @@
-"""The exact propagator by eigenvalues: every mode runs on its own, so that a trajectory of a
-hundred states costs little.
+"""Exact propagator by eigenvalues: every mode runs on its own.
 
 Each mode's answer to the ground is R(t; λ) = ∫ exp(λ (t − s)) a(s) ds, marched from sample to
 sample of a record that is linear between them. Powers of the whole transfer matrix are never
@@ -125,9 +124,7 @@ def _summed(rate: Jet, share: Jet, waves: list[Array]) -> Jet:
 def responses(
     rate: Array, load: Array, step: float, *, every: int = 1, derivatives: bool = False
 ) -> list[Array]:
-    """R and, if wanted, dR/dλ and d²R/dλ² at every `every`-th sample of the load, each shape (S, T,
-    K), for eigenvalues (S, K).
-    """
+    """R and its derivatives by λ at every `every`-th sample, (S, T, K), for λ (S, K)."""
     f = phi(rate * step, 4)
     slopes = [[f[k], step * (f[k] - k * f[k + 1])] for k in (1, 2)]
     for k, row in zip((1, 2), slopes, strict=True):
@@ -156,9 +153,7 @@ def responses(
 
 
 def phi(z: Array, top: int) -> list[Array]:
-    """φ_0 … φ_top of exponential integrators, φ_k(z) = ∫ exp((1 − θ) z) θ^(k−1) / (k−1)! dθ over
-    [0, 1], to round-off.
-    """
+    """φ_0 … φ_top of exponential integrators to round-off."""
     z = np.asarray(z, complex)
     small = np.abs(z) < 1
     inner, outer = np.where(small, z, 0), np.where(small, 1, z)

@@ -1,6 +1,4 @@
-"""Direct α-cut optimisation (eq. 21): a SciPy optimiser for every node, bound and output. The
-reference on few nodes.
-"""
+"""Direct α-cut optimisation by SciPy for every node, bound and output (eq. 21)."""
 
 from __future__ import annotations
 

@@ -70,9 +70,7 @@ def cheapest(
     exclude: Sequence[str] = (),
     budget: int = 20000,
 ) -> Envelope:
-    """As `auto`, with `fitted`, the error wanted of the modal model, apart from the tolerance that
-    it must keep.
-    """
+    """As `auto`, with the modal model's own error `fitted` apart from the tolerance."""
     for name in exclude:
         if name not in CANDIDATES:
             raise ValueError(f"exclude: '{name}' is unknown; allowed are {', '.join(CANDIDATES)}")
@@ -135,9 +133,7 @@ def _followed(
 
 
 def second_pass(found: Envelope, flow: UnitFlow, *, skip: int) -> float:
-    """By how much an independent sample of the widest box leaves the envelope, in units of the
-    tolerance.
-    """
+    """Gain of an independent sample of the widest box, in units of the tolerance."""
     lower, upper = flow.boxes.unit(0)
     points = (lower + upper) / 2 + (upper - lower) / 2 * chebyshev_points(
         len(lower), CHECKS, skip=skip
@@ -168,8 +164,7 @@ def _reported(found: Envelope, flow: UnitFlow, begun: float, reason: str) -> Env
 
 
 def width_shares(whole: Envelope, fixed: Sequence[Envelope]) -> Array:
-    """Share of width of each input over time: the width lost when it alone is fixed at its modal
-    value, shape (d, A, T, m).
+    """Share of each input in the width over time, shape (d, A, T, m).
 
     Args:
         whole: Envelope with all inputs fuzzy.

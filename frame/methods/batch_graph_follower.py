@@ -1,5 +1,4 @@
-"""The Graph Follower in rounds: graphs are proposed by the Taylor models of all nodes together and
-computed in batches.
+"""Graph Follower in rounds: Taylor models of all nodes propose graphs in batches.
 
 The same idea as `frame.graph_follower` (storage, Taylor models, tolerance, post-processing), turned
 around: instead of one node after the other, every round asks the models of the best graphs at all
@@ -160,9 +159,7 @@ class Pursuit:
         )
 
     def enter(self, level: int, lower: Array, upper: Array, method: BatchFollower) -> None:
-        """Starts a level; what narrower levels attained stays valid, models are asked anew in the
-        wider box.
-        """
+        """Start a level; attained values stay, models are asked anew in the wider box."""
         del level
         self.lower, self.upper, self.tolerance, self.reach = (
             lower,
@@ -205,9 +202,7 @@ class Pursuit:
             self._propose(point, jet, s, signed >= self.value)
 
     def contest(self, method: BatchFollower) -> None:
-        """Asks the models of the graphs that hold a bound at one node about the next node, where
-        another basin holds it.
-        """
+        """Ask the models that hold a bound at one node about the next node."""
         rivals: dict[bytes, list[tuple[int, int, int]]] = {}
         for here, there in ((slice(1, None), slice(None, -1)), (slice(None, -1), slice(1, None))):
             jumps = (
@@ -229,9 +224,7 @@ class Pursuit:
                 self._challenge(chunk[s], jet, s, np.array(rivals[key]))
 
     def _challenge(self, point: Array, jet: Jet, s: int, places: Array) -> None:
-        """Lets the model of one graph promise at `places` (K, 3), where that is more than is
-        promised there.
-        """
+        """Let the model of one graph promise at `places` (K, 3)."""
         t, o, side = places.T
         promised, target = self._optima(point, jet, s, (t, o, side))
         more = promised > self.promise[t, o, side]
@@ -241,9 +234,7 @@ class Pursuit:
         )
 
     def _propose(self, point: Array, jet: Jet, s: int, close: Array) -> None:
-        """Optima of the model of one graph where it is best; they replace what the model of the
-        former best promised.
-        """
+        """Optima of the model of one graph where it is best."""
         t, o, side = np.nonzero(close)
         if not len(t) or not (self.upper > self.lower).any():
             return
@@ -254,7 +245,7 @@ class Pursuit:
     def _optima(
         self, point: Array, jet: Jet, s: int, places: tuple[Array, Array, Array]
     ) -> tuple[Array, Array]:
-        """What the model of one graph promises at K places, shape (K,), and where, shape (K, d)."""
+        """Promises of the model of one graph at K places, shape (K,), and points (K, d)."""
         t, o, side = places
         sign = 2.0 * side - 1
         g = (jet.first[:, s, t, o] * sign).T
@@ -268,9 +259,7 @@ class Pursuit:
         return jet.value[s, t, o] * sign + gain(g, H, x), point + x
 
     def proposals(self, method: BatchFollower, count: int) -> Array:
-        """The most promising point of every window of time, apart from the others and from all
-        graphs computed, shape (≤ count, d).
-        """
+        """Most promising points of every window of time, apart from others, (≤ count, d)."""
         chosen: list[Array] = []
         for window in np.array_split(
             np.arange(len(self.value)), max(1, min(count, len(self.value)))
@@ -307,8 +296,7 @@ SPACING = 0.02
 
 
 def pursue(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> Envelope:
-    """Envelope by the Graph Follower in rounds, corrected by what the last models still promise;
-    options are the fields of `BatchFollower`.
+    """Envelope by the Graph Follower in rounds; options are fields of `BatchFollower`.
 
     The error is twice what these models promise, below the tolerance, or above it where the budget
     ended the search, and by how much the corners of the boxes pass the bounds, which then take them

@@ -1,6 +1,4 @@
-"""What is done where no method is named: the modal model where it keeps the wanted error, else the
-Graph Follower in rounds.
-"""
+"""Default method: the modal model where it keeps the error, else the Graph Follower."""
 
 from __future__ import annotations
 
@@ -28,8 +26,7 @@ OF_MODAL = frozenset({"certify", "seed", "boxes", "workers"})
 def default(
     flow: UnitFlow, progress: Callable[[float], None] | None = None, **options: Any
 ) -> Envelope:
-    """Envelope of a linear structure by `auto`, with a sharper modal model; by `modal` where one of
-    its own options is given.
+    """Envelope of a linear structure by `auto`, or by `modal` with its own options.
 
     Args:
         flow: Trajectories of a `LinearFlow`.

@@ -20,7 +20,7 @@ from alphacut.fuzzy import FuzzyNumber
 
 @dataclass(frozen=True, eq=False)
 class FollowerRecord:
-    """What the Graph Follower did on one level for one output.
+    """Record of the Graph Follower on one level for one output.
 
     Args:
         time: Nodes, shape (T,), in s.

@@ -1,5 +1,4 @@
-"""The Graph Follower (paper, section 5.3): envelopes from few graphs, each replaced by its Taylor
-model near its parameters.
+"""Graph Follower (section 5.3): envelopes from few graphs and their Taylor models.
 
 This differs from the paper in: 1. One storage serves all outputs, both sides and all levels: levels
 are treated from the narrowest box to the widest, so that every stored graph is admissible and
@@ -32,7 +31,7 @@ APART = 0.5
 
 
 class FollowerStep(NamedTuple):
-    """What happened at one node for one bound (Figs. 21 to 23).
+    """Record of one node for one bound (Figs. 21 to 23).
 
     Args:
         level: Index of the α-cut.
@@ -202,9 +201,7 @@ class GraphFollower:
             self._note(out, level, node, guesses[:, 0], tried)
 
     def _guesses(self, signed: Array, points: Array) -> Index:
-        """Indices of the best stored graphs per bound, best first and each apart from those before,
-        shape (2m, models).
-        """
+        """Indices of the best, distinct stored graphs per bound, shape (2m, models)."""
         left = signed
         out: list[Index] = []
         for _ in range(min(self.models, signed.shape[1])):
@@ -218,9 +215,7 @@ class GraphFollower:
     def _optima(
         self, storage: Storage, node: int, guess: Index, box: tuple[Array, Array]
     ) -> tuple[Array, Array, Array]:
-        """Values of the guesses, steps to the optima of their Taylor models over the box (eq. 22),
-        and the gains these promise.
-        """
+        """Values, steps to the optima of the Taylor models (eq. 22), and promised gains."""
         m = len(guess) // 2
         side = np.tile([-1.0, 1.0], m)
         g, H = (np.empty((2 * m, *shape)) for shape in ((len(box[0]),), (len(box[0]),) * 2))
@@ -240,9 +235,7 @@ class GraphFollower:
         )
 
     def _correct(self, out: Followed, level: int) -> None:
-        """The gain that the Taylor model of the best graph still promises; what is above the
-        tolerance was tried and is no model.
-        """
+        """Gain that the Taylor model of the best graph still promises."""
         box = out.storage.flow.boxes.unit(level)
         limit = self.tolerance * np.repeat(out.storage.flow.scale, 2)
         for node in range(out.bounds.shape[1]):
@@ -267,7 +260,5 @@ class GraphFollower:
 
 
 def _signed(values: Array) -> Array:
-    """(−values, values) on a new axis before the last: both bounds become maxima; (…, G) to (…, 2,
-    G).
-    """
+    """(−values, values) on a new axis before the last, (…, G) to (…, 2, G)."""
     return np.stack([-values, values], -2)

@@ -1,6 +1,4 @@
-"""Storage of computed graphs: trajectories with the parameters they belong to, and their
-derivatives while memory lasts.
-"""
+"""Storage of computed graphs with parameters and, while memory lasts, derivatives."""
 
 from __future__ import annotations
 
@@ -64,7 +62,7 @@ class Storage:
         return self._values[..., : self._count]
 
     def holds(self, point: Array) -> bool:
-        """Whether the graph of `point` is stored."""
+        """True if the graph of `point` is stored."""
         return bool((np.abs(self.points - point).max(1, initial=0.0) < 1e-9).any())
 
     def add(self, points: Array) -> None:

@@ -109,7 +109,7 @@ def modal(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> E
 
 
 def _short_of(model: ModalModel, tolerance: float, scale: Array) -> str | None:
-    """What to say of a model that misses the wanted error; None of one that keeps it."""
+    """Remark on a model that misses its error; None where it keeps it."""
     reached = float((model.error / scale).max())
     if reached <= tolerance:
         return None
@@ -175,8 +175,7 @@ def _certified(
 def _model_with_error(
     linear: LinearFlow, flow: UnitFlow, method: Modal, gap: float
 ) -> tuple[ModalModel, Array, str]:
-    """A modal model fit for a certificate, its error (T, m), and why that is only sampled; empty
-    where it is proved.
+    """Modal model for a certificate, its error (T, m), and why that is only sampled.
 
     The proved bound exceeds the sampled error some thirty times, so the polynomials are refined
     until it takes little of the gap.
@@ -214,9 +213,7 @@ def _model_with_error(
 def search_levels(
     model: ModalModel, search: ModalSearch, progress: Callable[[float], None] | None
 ) -> tuple[Array, Array]:
-    """Bounds (A, T, m, 2) and unit coordinates (A, T, m, 2, d) on all levels, from the narrowest
-    box to the widest, nested.
-    """
+    """Nested bounds (A, T, m, 2) and unit coordinates (A, T, m, 2, d) on all levels."""
     cuts = model.boxes
     shape = (len(cuts.alpha), len(model.time), len(model.outputs), 2)
     bounds, at = np.empty(shape), np.empty((*shape, len(cuts.names)))

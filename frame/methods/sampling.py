@@ -1,4 +1,4 @@
-"""Envelopes of given samples: the vertex method, Monte Carlo and quasi-Monte Carlo, for comparison."""
+"""Envelopes of samples: vertex method, Monte Carlo, quasi-Monte Carlo."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ Progress = Callable[[float], None]
 
 
 def sample(flow: UnitFlow, points_of: Callable[[Array, Array], Array], method: str) -> Envelope:
-    """Envelope of the trajectories at given points of each box, wider boxes taking over the points
-    of the narrower ones.
+    """Envelope of the trajectories at given points of each box, nested.
 
     Args:
         flow: The trajectories.

@@ -1,6 +1,4 @@
-"""Response of single modes to the motion of the ground, as Taylor series in the eigenvalue over
-windows of time.
-"""
+"""Response of modes to the ground, as Taylor series in λ over windows of time."""
 
 from __future__ import annotations
 
@@ -112,9 +110,7 @@ class LoadTable:
         return total
 
     def _earlier(self, rate: Array, node: Array) -> Iterator[tuple[int, Array, Array]]:
-        """Windows that end before some of the nodes: their last node, the points concerned, and the
-        time since, shape (N, 1).
-        """
+        """Earlier windows: their last node, the points concerned, the time since, (N, 1)."""
         fade = FADED / max(float(-rate.real.max()), 1e-300)
         for end in self.starts[1:]:
             since = self.time[node] - self.time[end]
@@ -124,9 +120,7 @@ class LoadTable:
 
     @cached_property
     def _differentiated(self) -> Array:
-        """Coefficients of the moments' series and of their first and second derivatives by λ, shape
-        (T, n, order, 3).
-        """
+        """Coefficients of the moments' series and derivatives by λ, (T, n, order, 3)."""
         out = [self.moment]
         for _ in range(2):
             following = np.zeros_like(self.moment)
@@ -147,8 +141,7 @@ class LoadTable:
 
 @dataclass(frozen=True, eq=False)
 class LoadTables:
-    """Tables of modes grouped by how much their eigenvalues vary, so that slow modes need few
-    windows and fast ones soon forget.
+    """Tables of modes grouped by the spread of their eigenvalues.
 
     Args:
         share: What one unit of R_k puts into the outputs, n m polynomials.
@@ -187,9 +180,7 @@ class LoadTables:
 
     @property
     def truncation(self) -> Array:
-        """Bound of what the series leave out of R_k, as a share of ∫ |a(s)| exp(Re λ (t − s)) ds,
-        shape (n,).
-        """
+        """Bound of the series' rest, as a share of ∫ |a(s)| exp(Re λ (t − s)) ds, (n,)."""
         out = np.empty(sum(map(len, self.members)))
         for table, own in zip(self.tables, self.members, strict=True):
             out[own] = table.truncation
@@ -224,9 +215,7 @@ class LoadTables:
 
 
 def left_out(phase: float, order: int) -> float:
-    """Bound of |exp(x τ) − its series of `order` terms| for |x| τ up to `phase`, and of what grows
-    of it until the window's end.
-    """
+    """Bound of |exp(x τ) − its series of `order` terms| for |x| τ up to `phase`."""
     return exp(order * log(max(phase, 1e-300)) - lgamma(order + 1) + 2 * phase)
 
 
@@ -238,8 +227,7 @@ def _divided(share: Polynomial, scale: Array) -> Polynomial:
 def _moments(
     ground: Accelerogram, middle: Array, time: Array, starts: Array, window: float, order: int
 ) -> Array:
-    """Taylor coefficients of the window's own part of R_k at all nodes, shape (T, n, order), for a
-    load linear between its samples.
+    """Taylor coefficients of the window's own part of R_k, shape (T, n, order).
 
     Per step: ∫ of exp((λ + x/window) τ) a over the step as a truncated series in x, by Gauss
     quadrature to round-off; from node to node the series is multiplied by that of exp((λ +

@@ -1,5 +1,4 @@
-"""Modal intervening variables (paper, section 7): λ_k(p) and C_k(p) as low-degree polynomials, from
-few eigen-analyses.
+"""Modal intervening variables λ_k(p), C_k(p) as polynomials (section 7).
 
 Displacements oscillate in the parameters, the more the later; λ_k and C_k do not. With them as
 polynomials every trajectory, derivative and envelope follows without solving the equations of
@@ -79,9 +78,7 @@ class ModalModel:
 
     @cached_property
     def of_output(self) -> list[Polynomial]:
-        """For each output, λ_k, then its C_k, then what one unit of its load response puts into it:
-        2 n or 3 n polynomials.
-        """
+        """For each output λ_k, C_k and its load response: 2 n or 3 n polynomials."""
         shares = [self.coefficient.coefficients] + (
             [] if self.load is None else [self.load.share.coefficients]
         )
@@ -114,9 +111,7 @@ class ModalModel:
         return values if self.load is None else values + self.load.values(unit, rate)
 
     def at(self, unit: Array, node: Array, output: Array) -> tuple[Array, Array, Array]:
-        """Values (N,), gradients (N, d) and Hessians (N, d, d) of one output at one node per point
-        (N, d).
-        """
+        """Values (N,), gradients (N, d), Hessians (N, d, d) of one output, node by point (N, d)."""
         d = unit.shape[1]
         f, g, H = np.empty(len(unit)), np.empty((len(unit), d)), np.empty((len(unit), d, d))
         for o in np.unique(output):
@@ -149,9 +144,7 @@ class ModalModel:
 
 
 def composed(rate: Jet, share: Jet, wave: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
-    """2 Re Σ_k C_k w(λ_k) with gradient and Hessian; `wave` holds w, w', w'' by λ, shape (N, n);
-    rate and share have V = (N, n).
-    """
+    """2 Re Σ_k C_k w(λ_k) with gradient and Hessian; `wave` holds w, w', w'', (N, n)."""
     w, dw, ddw = wave
     value = 2 * (share.value * w).real.sum(-1)
     inner = share.value * dw
@@ -172,8 +165,7 @@ def analyse(
     *,
     states: bool = False,
 ) -> Modes:
-    """Eigen-analyses at unit coordinates (S, d), with derivatives by these; eigenvalues are those
-    of the flow's integrator.
+    """Eigen-analyses with derivatives at unit coordinates (S, d), of the integrator.
 
     Args:
         flow: The trajectories.
@@ -224,8 +216,7 @@ def fit_modes(
     budget: int = 280,
     scale: Array | float = 1.0,
 ) -> ModalModel:
-    """Fits polynomials of rising degree until held-out trajectories deviate by less than
-    `tolerance`, or the budget is spent.
+    """Fit polynomials of rising degree until held-out trajectories meet `tolerance`.
 
     Args:
         flow: The trajectories to stand for.
@@ -270,8 +261,7 @@ def fit_modes(
 
 
 def _needed(flow: LinearFlow, boxes: Boxes, allowed: Array) -> Array:
-    """Indices of the modes whose share in some output matters, by a bound of it in the middle of
-    the box.
+    """Indices of the modes whose share in some output matters.
 
     Args:
         flow: The trajectories.
@@ -296,17 +286,14 @@ def _needed(flow: LinearFlow, boxes: Boxes, allowed: Array) -> Array:
 
 
 def fit_points(d: int, degree: int) -> Array:
-    """Where to analyse for polynomials of a total degree in d variables: enough for least squares
-    with derivatives, shape (S, d).
-    """
+    """Points of analysis for a total degree in d variables, shape (S, d)."""
     data = 1 + d + d * (d + 1) // 2
     count = ceil((2.5 if d <= 6 else 5) * terms(d, degree) / data)
     return np.vstack([np.zeros((1, d)), chebyshev_points(d, count)])
 
 
 def fit_states(model: ModalModel) -> tuple[Polynomial, Polynomial]:
-    """The states [φ_k; λ_k φ_k] of the model's modes, n · 2N polynomials of its degree, fitted
-    where it was.
+    """Polynomials of the states [φ_k; λ_k φ_k] of the model's modes.
 
     Returns:
         What the initial state puts into them, and what a unit impulse of the ground's acceleration

@@ -55,9 +55,7 @@ class Optima:
         )
 
     def offer(self, model: ModalModel, points: Array, which: Array) -> Array:
-        """Tries `points` (W, d) on problems `which` (W,), keeps what is better and returns those
-        problems.
-        """
+        """Try `points` (W, d) on problems `which` (W,), keep and return the better ones."""
         if not len(which):
             return which
         value = self.side[which] * model.value_at(points, self.node[which], self.output[which])
@@ -87,9 +85,7 @@ class ModalSearch:
 
     @classmethod
     def suited(cls, model: ModalModel, seed: int = 0) -> ModalSearch:
-        """More samples and starts where phases vary much over the box: the more turns, the more
-        basins.
-        """
+        """More samples and starts where phases vary much over the box."""
         middle, rest = model.eigenvalue.coefficients[0], model.eigenvalue.coefficients[1:]
         lasting = np.minimum(
             model.time[-1], 5 / np.maximum(-middle.real, 1e-300)
@@ -170,9 +166,7 @@ class ModalSearch:
         upper: Array,
         pool: tuple[Array, Array],
     ) -> tuple[Array, Array]:
-        """Carries optima to all nodes: the better of the two neighbours, then Newton; then rivals
-        from other basins likewise.
-        """
+        """Carry optima to all nodes, from either neighbour, then Newton; rivals likewise."""
         m, d, total = len(model.outputs), coarse[0].point.shape[1], len(model.time)
         nodes = coarse[0].node.reshape(-1, 2 * m)[:, 0]
         right = np.minimum(np.searchsorted(nodes, np.arange(total)), len(nodes) - 1)
@@ -203,9 +197,7 @@ class ModalSearch:
         return found.value.reshape(total, m, 2), found.point.reshape(total, m, 2, d)
 
     def _contest(self, model: ModalModel, found: Optima, lower: Array, upper: Array) -> None:
-        """Where the optimum jumps between neighbouring nodes, refines either optimum at the other
-        node, until no jump moves.
-        """
+        """Refine either optimum at both nodes of a jump, until no jump moves."""
         grid = np.arange(len(found.value)).reshape(-1, 2 * len(model.outputs))
         open_ = np.ones(len(found.value), bool)
         for _ in range(20):
@@ -245,9 +237,7 @@ class ModalSearch:
 
 
 def tensor_points(d: int, most: int) -> Array:
-    """The finest grid of extreme Chebyshev points with at most `most` points, shape (k^d, d); none
-    when the corners are too many.
-    """
+    """Finest grid of extreme Chebyshev points with at most `most`, shape (k^d, d)."""
     k = int(most ** (1 / d) + 1e-9)
     if k < 2:
         return np.zeros((0, d))
@@ -267,9 +257,7 @@ def problems(nodes: Array, outputs: int, d: int) -> Optima:
 
 
 def _best_of_pool(pool: Array, values: Array, nodes: Array, starts: int) -> list[Optima]:
-    """The best points of the pool (P, d) for every problem, and the next best ones elsewhere in the
-    box; `values` is (P, T, m).
-    """
+    """Best points of the pool (P, d) for every problem, and rivals elsewhere."""
     m = values.shape[-1]
     chosen = (values if len(nodes) == values.shape[1] else values[:, nodes]).reshape(len(pool), -1)
     reach = (
@@ -299,9 +287,7 @@ def refine(
     upper: Array,
     iterations: int = 10,
 ) -> None:
-    """Newton's method with a trust region in the box on problems `which`, in pieces that stay in
-    the cache.
-    """
+    """Newton's method with a trust region in the box on problems `which`."""
     for piece in np.array_split(which, -(-len(which) // PIECE) or 1):
         _newton(model, optima, piece, lower, upper, iterations)
 

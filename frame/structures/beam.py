@@ -1,6 +1,4 @@
-"""Plane beam frames of many storeys and bays: Euler–Bernoulli beams with axial stiffness, three
-unknowns per joint.
-"""
+"""Plane frames of Euler–Bernoulli beams, many storeys and bays."""
 
 from __future__ import annotations
 
@@ -18,8 +16,7 @@ from alphacut.frame.structures.reduction import AffineStructure
 
 @dataclass(frozen=True, eq=False)
 class BeamFrame:
-    """A regular frame clamped at its foot, uncertain in the moduli of columns and beams, the floor
-    mass and the damping.
+    """Regular frame clamped at its foot, with uncertain moduli, floor mass and damping.
 
     Parameters: "E_columns", "E_columns_top" (upper half), "E_beams", "mass" (of the floors, per
     length of beam), "rayleigh_mass", "rayleigh_stiffness", "zeta" where a damping ratio is given.

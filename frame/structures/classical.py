@@ -1,6 +1,4 @@
-"""Classical damping, which keeps the undamped modes: a real symmetric eigenproblem of half the size
-in place of the complex one.
-"""
+"""Classical damping: a real symmetric eigenproblem of half the size."""
 
 from __future__ import annotations
 
@@ -19,8 +17,7 @@ not, taken for round-off.
 
 @dataclass(frozen=True, eq=False)
 class ClassicalModes:
-    """Outputs Re Σ_k C_k w_k(t), where w_k is exp(λ_k t) for the initial state, and its convolution
-    with the ground's acceleration.
+    """Outputs Re Σ_k C_k w_k(t), w_k = exp(λ_k t) or its convolution with the load.
 
     Args:
         rate: λ_k with Im λ_k > 0, shape (S, n), in 1/s.
@@ -34,8 +31,7 @@ class ClassicalModes:
 
 
 def classical_modes(matrices: Matrices, rows: Jet) -> ClassicalModes | None:
-    """The modes at S parameter sets, values alone; None where damping couples the modes or one of
-    them does not oscillate.
+    """Modes at S parameter sets, values alone; None where damping couples them.
 
     Args:
         matrices: The structure.

@@ -46,8 +46,7 @@ def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
 
 
 def square_root(operator: Jet, mass: Array) -> Jet:
-    """R with R R = A for A = M⁻¹K, V = (S, n, n), by differentiating R R = A: R' solves R R' + R' R
-    = A', a division in A's eigenbasis.
+    """R with R R = A for A = M⁻¹K, V = (S, n, n), and its derivatives.
 
     Args:
         operator: A, self-adjoint and positive definite in the scalar product of M.

@@ -1,6 +1,4 @@
-"""General mechanical systems by a Lagrangian L(q, v; p) and forces F(q, v; p), and general smooth
-ODEs.
-"""
+"""Mechanical systems by a Lagrangian L(q, v; p) and forces F(q, v; p); smooth ODEs."""
 
 from __future__ import annotations
 
@@ -165,8 +163,7 @@ def pendulum(
     phi0: float = 1.5,
     omega0: float = 0.0,
 ) -> LagrangianSystem:
-    """The damped pendulum of the literature on the Graph Follower: L = m l² φ̇²/2 + m g l cos φ,
-    moment −d φ̇.
+    """Damped pendulum: L = m l² φ̇²/2 + m g l cos φ, moment −d φ̇.
 
     Parameters: "m", "l", "d", "g", "phi_0", "omega_0". Outputs: "force" in the bar, m l φ̇² + m g
         cos φ, and the angle "phi".

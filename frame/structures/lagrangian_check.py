@@ -1,6 +1,4 @@
-"""What can be wrong with the functions of a Lagrangian system, found by calling them with symbols
-before anything is computed.
-"""
+"""Checks of a Lagrangian system's functions, called with symbols."""
 
 from __future__ import annotations
 
@@ -32,8 +30,7 @@ ROUGH = (
 
 
 def require_dimensions(system: LagrangianSystem) -> None:
-    """Refuses a system without coordinates, parameters or outputs, and parameters that are no
-    numbers.
+    """Refuse systems without coordinates, parameters or outputs, and bad parameters.
 
     Raises:
         ValueError: It is one.
@@ -54,7 +51,7 @@ def require_dimensions(system: LagrangianSystem) -> None:
 
 
 def called(name: str, function: Callable[..., Any], *arguments: Any) -> Any:
-    """What a function gives for symbols.
+    """Value of a function for symbols.
 
     Args:
         name: What the function is called.

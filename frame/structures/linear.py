@@ -70,9 +70,7 @@ class Accelerogram:
         return np.interp(time, samples, self.acceleration, left=0.0, right=0.0)
 
     def intervals(self, step: float) -> int:
-        """Into how many equal parts a step must be cut so that the record is linear, or nearly so,
-        within each.
-        """
+        """Number of equal parts of a step in which the record is linear, or nearly so."""
         least = ceil(step / self.step - 1e-9)
         for parts in range(least, 8 * least):
             share = self.step * parts / step
@@ -112,8 +110,7 @@ class LinearSystem(Protocol):
 def evaluate(
     system: LinearSystem, names: Sequence[str], points: Array, *, derivatives: bool
 ) -> tuple[Matrices, Jet]:
-    """Matrices and observation rows at parameter sets; parameters not named keep their modal
-    values.
+    """Matrices and observation rows at parameter sets; others keep modal values.
 
     Args:
         system: The structure.
@@ -141,7 +138,7 @@ def check_names(system: LinearSystem, names: Sequence[str]) -> None:
 
 
 def _members(system: LinearSystem, name: str) -> str:
-    """What to add where a name is short for several parameters, as of a storey frame."""
+    """Hint where a name is short for several parameters."""
     try:
         group = getattr(system, "group", lambda _: ())(name)
     except ValueError:

@@ -1,6 +1,4 @@
-"""A general linear structure from its matrices M, D, K, each a sum of given arrays times smooth
-factors of named parameters.
-"""
+"""Linear structure from matrices M, D, K: sums of arrays times smooth factors."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""Factors of the arrays of a matrix structure: numbers, names of parameters, or smooth functions of
-all parameters.
-"""
+"""Factors of a structure's arrays: numbers, parameter names, smooth functions."""
 
 from __future__ import annotations
 
@@ -13,8 +11,7 @@ from alphacut.frame.calculus.jet import Jet, variables
 
 
 def require_factors(kind: str, terms: Any, parameters: Mapping[str, float]) -> None:
-    """Refuses terms that are no pairs, and factors that are no number, no parameter and no function
-    of the parameters with derivatives.
+    """Refuse terms that are no pairs, and factors without derivatives.
 
     Args:
         kind: What the terms make up: mass, damping or stiffness.

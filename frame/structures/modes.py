@@ -1,6 +1,4 @@
-"""Complex modes of linear structures with analytic first and second derivatives: q(t; p) = 2 Re Σ
-C_k(p) exp(λ_k(p) t).
-"""
+"""Complex modes with derivatives: q(t; p) = 2 Re Σ C_k(p) exp(λ_k(p) t)."""
 
 from __future__ import annotations
 
@@ -22,8 +20,7 @@ class ModalError(RuntimeError):
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """Intervening variables of a structure (paper, section 7): smooth in the parameters, free of
-    oscillation.
+    """Intervening variables of a structure (section 7), smooth in the parameters.
 
     Args:
         eigenvalue: λ_k with Im λ_k > 0, by rising |λ_k|, complex jet, V = (S, n), in 1/s.
@@ -68,8 +65,7 @@ def modes(matrices: Matrices, rows: Jet, chosen: Array | None = None) -> Modes:
 
 
 def require_single(matrices: Matrices, chosen: Array) -> None:
-    """Refuses modes that share their frequency with another one at all S parameter sets: their
-    shapes are any mixture of both.
+    """Refuse modes of equal frequency at all S parameter sets.
 
     Args:
         matrices: The structure.
@@ -93,14 +89,13 @@ def require_single(matrices: Matrices, chosen: Array) -> None:
 
 
 def oscillating(rate: Array) -> Array:
-    """Which eigenvalues belong to the upper of a conjugate pair."""
+    """Mask of eigenvalues in the upper of a conjugate pair."""
     yes: Array = rate.imag > 1e-9 * np.abs(rate)
     return yes
 
 
 def eigenvectors(A: Jet) -> tuple[Jet, Jet, Jet]:
-    """Eigenvalues (upper half plane, then real ones, then lower, each by rising |λ|), right and
-    left vectors of V = (S, 2n, 2n).
+    """Eigenvalues (upper, real, lower, by |λ|), right and left vectors, V = (S, 2n, 2n).
 
     With X(p) = X(p0) Z(p), Z(p0) = I and diag Z = I, second-order perturbation in the eigenbasis
     gives all derivatives.

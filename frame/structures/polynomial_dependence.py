@@ -1,5 +1,4 @@
-"""Which structures are polynomials in their parameters and never gain energy: the facts that a
-proof about a modal model rests on.
+"""Polynomial dependence on parameters, and energy that never grows.
 
 They follow from how a structure is written, not from samples of it.
 """
@@ -29,8 +28,7 @@ class UnprovedError(RuntimeError):
 
 @singledispatch
 def degrees(system: LinearSystem, box: Box) -> dict[str, int]:
-    """Degree of M, D, K, the initial state and the observation rows in each parameter of a box, to
-    round-off.
+    """Degree of M, D, K, start and observation rows in each parameter, to round-off.
 
     Args:
         system: The structure.
@@ -92,8 +90,7 @@ def _require_dissipation(
 
 
 def inverse_cube_degree(lower: float, upper: float) -> int:
-    """Degree at which the Chebyshev series of x⁻³ on an interval of positive numbers has fallen to
-    round-off.
+    """Degree at which the Chebyshev series of x⁻³ on an interval is round-off.
 
     Inside the Bernstein ellipse with semi-axes sum ρ > 1 the function stays below M, and what
     follows after degree N is at most 2 M ρ^−N / (ρ − 1) (Trefethen, Approximation Theory and

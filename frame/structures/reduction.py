@@ -1,5 +1,4 @@
-"""Large linear structures by a small basis of displacement shapes that holds for the whole box of
-parameters.
+"""Reduction of large linear structures to few shapes that hold for the whole box.
 
 The full structure has thousands of unknowns and matrices that are sums of a few given matrices,
 each times a smooth factor of the
@@ -70,8 +69,7 @@ class AffineStructure:
         samples: int = 5,
         frequencies: int = 24,
     ) -> ReducedStructure:
-        """Projection on the shapes that carry the energy of the response to harmonic loads at
-        several points of a box.
+        """Projection on the shapes that carry the energy of harmonic responses in a box.
 
         Args:
             bounds: Lower and upper ends of the uncertain parameters.
@@ -108,9 +106,7 @@ class AffineStructure:
         return ReducedStructure(self, basis, small[0], small[1], push, rows, state[0], state[1])
 
     def _band(self) -> tuple[float, float]:
-        """Angular frequencies from half the fundamental one to the end of the record's spectrum, at
-        least to twenty times the lower.
-        """
+        """Angular frequencies from half the fundamental one to the end of the spectrum."""
         from scipy.sparse.linalg import splu
 
         M, K = self.assembled(self.parameters)
@@ -120,8 +116,7 @@ class AffineStructure:
         return fundamental / 2, max(top, 20 * fundamental)
 
     def trajectories(self, p: Mapping[str, float], time: Array) -> Array:
-        """Outputs of the full structure, exact for a record linear between its samples, by all its
-        modes; shape (T, m); for checking.
+        """Outputs of the full structure by all its modes, shape (T, m), for checking.
 
         Rayleigh and modal damping keep the undamped modes, each of which answers with two
         exponentials.
@@ -221,9 +216,7 @@ class ReducedStructure:
         return Jet.constant(np.tile(rows, (like.value.size, 1, 1)), like.directions)
 
     def error(self, points: Sequence[Mapping[str, float]], time: Array, values: Array) -> float:
-        """Largest deviation of `values` (S, T, m) from trajectories of the full structure, relative
-        to the peak of each output.
-        """
+        """Largest deviation of `values` (S, T, m) from the full structure, relative to peaks."""
         worst = 0.0
         for point, mine in zip(points, values, strict=True):
             truth = self.full.trajectories({**self.parameters, **point}, time)

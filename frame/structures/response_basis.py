@@ -1,5 +1,4 @@
-"""A small basis from responses of a large structure to harmonic loads: proper orthogonal
-decomposition in strain energy.
+"""Basis from harmonic responses: proper orthogonal decomposition in strain energy.
 
 By Parseval's theorem, responses over frequency hold the same shapes as trajectories over time, at
 the price of one sparse factorisation each. Strain energy as the measure favours shapes that matter
@@ -22,8 +21,7 @@ if TYPE_CHECKING:
 def response_shapes(
     structure: AffineStructure, p: Mapping[str, float], frequencies: Array
 ) -> Array:
-    """Real and imaginary parts of the displacements under harmonic ground motion, and of the
-    transform of a free vibration, (N, k).
+    """Displacements under harmonic ground motion and of a free vibration, (N, k).
 
     Args:
         structure: The large structure.
@@ -59,8 +57,7 @@ def response_shapes(
 def energy_basis(
     shapes: Array, M: Any, K: Any, *, keep: float, always: Sequence[Array] = ()
 ) -> Array:
-    """M-orthonormal basis of the shapes whose strain energy exceeds a share `keep` of the
-    strongest, and of those `always` kept.
+    """M-orthonormal shapes of strain energy above `keep` of the largest, or `always` kept.
 
     Args:
         shapes: Displacements, shape (N, k).

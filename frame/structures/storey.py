@@ -1,6 +1,4 @@
-"""The plane storey frame: rigid floors on massless bending columns (paper, section 6, Figs. 26 and
-27).
-"""
+"""Plane storey frame: rigid floors on bending columns (section 6, Figs. 26, 27)."""
 
 from __future__ import annotations
 
@@ -35,8 +33,7 @@ UNITS |= {
 
 @dataclass(frozen=True)
 class StoreyFrame:
-    """A chain of n floors; storey z has the stiffness k_z = 12 c_z E I / l_z³ with c_z columns
-    clamped at both ends, two unless given.
+    """Chain of n floors with k_z = 12 c_z E I / l_z³ for c_z clamped columns (2 by default).
 
     Parameters that can be uncertain: "E", "I", "m1" … "mn", "l1" …, "d1" …, "q1_0" … (initial
     displacements), "v1_0" … (initial velocities), "rayleigh_mass", "rayleigh_stiffness", and
@@ -184,8 +181,7 @@ class StoreyFrame:
         return {"E": self.modulus, "I": self.second_moment, **named, **damping, **self.ratios}
 
     def group(self, name: str) -> tuple[str, ...]:
-        """The parameters meant by a short name: "m" is m1 … mn, likewise "l", "d", "q0", "v0",
-        "zeta"; any other name is itself.
+        """Parameters of a short name: "m" is m1 … mn; any other name is itself.
 
         Raises:
             ValueError: The name is neither a group nor a parameter.

@@ -1,6 +1,4 @@
-"""How a user's function is called: one point, points that share a set-up, or arrays. Runs in the
-workers.
-"""
+"""Calls of a user's function, in the workers: points, points that share a set-up, arrays."""
 
 from __future__ import annotations
 
@@ -37,9 +35,7 @@ Outcome = Sample | Failure
 
 
 class LengthError(ValueError):
-    """A vectorised function did not return one output for each point; single points could hide
-    that.
-    """
+    """A vectorised function did not return one output for each point."""
 
 
 @dataclass(frozen=True)
@@ -89,9 +85,7 @@ class Call:
             yield list(range(start, min(start + size, len(points))))
 
     def __call__(self, points: Array) -> list[Outcome]:
-        """Outputs of one task; if it fails as a whole, each point is tried alone, so one bad point
-        spoils no other.
-        """
+        """Outputs of one task; if it fails as a whole, each point is tried alone."""
         start = perf_counter()
         try:
             outcomes = self._outcomes(points)
@@ -123,15 +117,13 @@ class Call:
         return self.function(named) if self.shared else [self.function(**point) for point in named]
 
     def _arrays(self, points: Array) -> dict[str, Array]:
-        """What a vectorised function returns, by name."""
+        """Outputs of a vectorised function, by name."""
         outputs = self.function(**dict(zip(self.names, points.T, strict=True)))
         named = outputs if isinstance(outputs, Mapping) else {"": outputs}
         return {str(name): np.asarray(value, float) for name, value in named.items()}
 
     def _split(self, arrays: dict[str, Array], points: Array) -> Sequence[Any]:
-        """The outputs of a vectorised function, point by point; a number that is the same for
-        single points is a constant.
-        """
+        """Outputs of a vectorised function, point by point; lone numbers are constants."""
         n = len(points)
         if any(array.ndim == 0 for array in arrays.values()) and n > 1:
             single = [self._arrays(points[[row]]) for row in (0, -1)]

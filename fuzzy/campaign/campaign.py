@@ -1,6 +1,4 @@
-"""A campaign: the samples of a plan, grouped into calls, run by workers, kept in a store, gathered
-in the order of the points.
-"""
+"""Campaign: the samples of a plan, run by workers and kept in a store."""
 
 from __future__ import annotations
 
@@ -45,7 +43,7 @@ class CampaignError(RuntimeError):
 
 
 def _causes(failures: list[tuple[dict[str, float], str]]) -> list[str]:
-    """What failed where; a cause of more than two failures is told once."""
+    """Causes of failures with their points, each told once."""
     places: dict[str, list[str]] = {}
     for point, error in failures:
         places.setdefault(error, []).append(_point(point))
@@ -114,9 +112,7 @@ class Campaign:
         return Values(self.layout, batch.array)
 
     def report(self, share: float, *, last: bool = False) -> None:
-        """Tell the share done, which never falls; with `last`, one batch of points is still to come
-        and fills the rest.
-        """
+        """Report the completed fraction, which never falls; `last` fills the rest."""
         if last:
             self.stepwise, self._before = False, share
         if self.progress and share > self._told:
@@ -154,9 +150,7 @@ class _Batch:
                 sleep(_POLL)
 
     def _tasks(self) -> Iterator[Task]:
-        """Calls to be made: without samples that are stored or that another campaign is running,
-        looked up just before each call.
-        """
+        """Calls to be made, without samples that are stored or run elsewhere."""
         for group in self.campaign.call.tasks(self.points):
             if rows := self._mine([row for row in group if self._open[row]]):
                 yield rows, self.points[rows]
@@ -197,9 +191,7 @@ class _Batch:
         self._tell()
 
     def _aligned(self, outcome: Outcome) -> Outcome:
-        """The outcome with its outputs in the order of the first sample's; a failure where they are
-        others.
-        """
+        """The outcome with outputs in the first sample's order; a failure where they differ."""
         if isinstance(outcome, Sample):
             if not self.campaign.layout:
                 self.campaign.layout = outcome.layout

@@ -16,9 +16,7 @@ class TooLargeError(ValueError):
 
 
 def available() -> int:
-    """Bytes that this process may still take: what the system has free, or its group's limit if
-    that is less.
-    """
+    """Bytes that this process may still take."""
     free = [_meminfo()]
     try:
         limit = Path("/sys/fs/cgroup/memory.max").read_text().strip()

@@ -1,6 +1,4 @@
-"""The worker processes of a pool, and what they refuse to do while they start: to run the campaign
-of the script that started them.
-"""
+"""Worker processes of a pool, which refuse to run a campaign while they start."""
 
 from __future__ import annotations
 
@@ -24,8 +22,7 @@ class PoolContext(ForkServerContext):
 
 
 def refuse_in_import() -> None:
-    """End a process that begins a campaign while it imports the main script: it would start workers
-    that do the same, for ever.
+    """End a process that begins a campaign while it imports the main script.
 
     A worker ends in silence, since its parent tells the reason; another process tells it itself.
     """

@@ -25,9 +25,7 @@ except (
 
 @dataclass
 class _File:
-    """The open file of one store; one per process, since closing any handle of a file drops all its
-    locks.
-    """
+    """Open file of one store; one per process, since closing a handle drops all locks."""
 
     handle: int
     users: int = 0

@@ -113,9 +113,7 @@ class Shelf:
         self._urgent |= outcome.seconds > _PAUSE
 
     def write(self, *, now: bool = False) -> None:
-        """Write what is gathered: now, or when the last transaction is long enough ago not to slow
-        the campaign down.
-        """
+        """Write the gathered outcomes, unless the last transaction was a moment ago."""
         start = perf_counter()
         due = (
             now
@@ -131,9 +129,7 @@ class Shelf:
         self._cost = self._written - start
 
     def _commit(self, keys: list[str]) -> None:
-        """Write gathered outcomes in one transaction; where the disk is too full for all, as many
-        as fit.
-        """
+        """Write outcomes in one transaction; as many as fit where the disk is full."""
         try:
             with self._store.transaction() as database:
                 self._save(database, keys)
@@ -212,8 +208,7 @@ class Shelf:
 def shelf(
     store: Store | str | Path | None, identity: Identity | None, names: Sequence[str]
 ) -> Iterator[Shelf | None]:
-    """The samples of one model in a store or in the store at a path; None where no store is asked
-    for.
+    """Samples of one model in a store or at a path; None without a store.
 
     Raises:
         ValueError: A store comes without an identity.

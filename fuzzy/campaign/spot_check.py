@@ -1,6 +1,4 @@
-"""A spot check: one stored sample run again, to see that the function is still the one that the
-store knows.
-"""
+"""Spot check: stored samples run again, to see that the function is the same."""
 
 from __future__ import annotations
 

@@ -31,13 +31,11 @@ CREATE TABLE sample (
 
 
 class StoreError(RuntimeError):
-    """The store cannot be written: the disk is full or broken, or another campaign blocks it. What
-    is stored stays readable.
-    """
+    """The store cannot be written or read; what is stored stays."""
 
 
 class Stored(NamedTuple):
-    """What a store holds of one model."""
+    """Content of a store for one model."""
 
     identity: dict[str, Any]
     samples: int
@@ -141,7 +139,7 @@ class Store:
         self.close()
 
     def models(self) -> list[Stored]:
-        """What is in the store, model by model."""
+        """Content of the store, model by model."""
         query = """SELECT identity, COUNT(outputs), COUNT(error), COALESCE(AVG(seconds), 0)
             FROM model LEFT JOIN sample ON sample.model = model.id GROUP BY model.id"""
         return [
@@ -150,7 +148,7 @@ class Store:
 
 
 def _barred(error: Exception) -> bool:
-    """Whether the place of a store is the trouble, not its content or the space left."""
+    """True if the place of a store is the trouble, not its content or the space left."""
     if isinstance(error, OSError):
         return error.errno != ENOSPC
     return any(words in str(error) for words in ("unable to open", "readonly database"))

@@ -1,6 +1,4 @@
-"""Where samples run: in this process, in a pool of processes, or through any executor that the
-caller brings.
-"""
+"""Executors of samples: this process, a pool of processes, or the caller's own."""
 
 from __future__ import annotations
 
@@ -22,8 +20,7 @@ Done = tuple[list[int], list[Outcome]]
 
 
 class ProcessPool(Executor):
-    """Processes of this machine that start afresh, end with this process even when it is killed,
-    and are replaced when they die.
+    """Fresh processes of this machine that end with this one and are replaced when they die.
 
     Args:
         workers: How many.
@@ -195,9 +192,7 @@ def completed(call: Call, tasks: Iterable[Task], executor: Executor | None) -> I
 def _outcomes(
     future: Future[list[Outcome]], executor: Executor, call: Call, points: Array
 ) -> list[Outcome]:
-    """What a call returned; if its process died, or another's beside it, it is run again by itself
-    to see which.
-    """
+    """Outcomes of a call, run again by itself if its process died."""
     try:
         return future.result()
     except BrokenExecutor:
@@ -213,7 +208,7 @@ def _outcomes(
 
 
 def _width(executor: Executor) -> int:
-    """How many calls the executor runs at once, as far as it says."""
+    """Number of calls that the executor runs at once, as far as it says."""
     return int(
         getattr(executor, "_max_workers", 0)
         or getattr(executor, "num_workers", 0)

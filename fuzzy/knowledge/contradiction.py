@@ -1,6 +1,4 @@
-"""Contradiction: samples that go against what is stated of a model, which cannot prove a statement
-but can refute it.
-"""
+"""Contradiction: samples that refute a statement about a model."""
 
 from __future__ import annotations
 
@@ -18,14 +16,14 @@ _PAIRS = 2e7  # pairs that are compared over all outputs, about
 
 
 class Contradiction(NamedTuple):
-    """Two samples, (inputs,) each, of which the second should have the larger output and has not."""
+    """Two samples, (inputs,) each; the second should have the larger output and has not."""
 
     lesser: Array
     greater: Array
     values: tuple[float, float]
 
     def told(self, output: str, names: Sequence[str]) -> str:
-        """What the samples say, in one sentence."""
+        """The contradiction in one sentence."""
         places = [
             ", ".join(f"{name} = {x:.6g}" for name, x in zip(names, point, strict=True))
             for point in (self.lesser, self.greater)
@@ -38,16 +36,13 @@ class Contradiction(NamedTuple):
 
 
 def negligible(values: Array) -> Array:
-    """Differences of outputs, shape (outputs,), that round-off explains, from their values (n,
-    outputs).
-    """
+    """Differences of outputs, shape (outputs,), that round-off explains."""
     size: Array = ROUND_OFF * (np.ptp(values, axis=0) + np.abs(values).max(axis=0))
     return size
 
 
 def contradictions(points: Array, values: Array, signs: Signs) -> dict[int, Contradiction]:
-    """The two samples that contradict the signs of each output's effects the most, for the outputs
-    where some do.
+    """The two samples that contradict stated signs the most, for each output with some.
 
     Args:
         points: Samples, shape (n, inputs); of more than 400 some that are spread over the values

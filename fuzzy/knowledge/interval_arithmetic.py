@@ -1,5 +1,4 @@
-"""Enclosures: interval arithmetic with gradients, rounded outwards, through functions that are
-written in arithmetic and numpy.
+"""Enclosures: interval arithmetic with gradients, rounded outwards.
 
 The function is called as it stands, with enclosures instead of arrays; what comes back holds, for
 sure, every value and every slope that the function takes over a box. Each operation is widened by
@@ -176,9 +175,7 @@ def _rising(function: Callable[[Array], Array]) -> Callable[[Pair], Pair]:
 
 
 def _cosine(v: Pair) -> Pair:
-    """Range of the cosine: its ends, and ±1 where a multiple of π lies between (or so close that
-    round-off could tell).
-    """
+    """Range of the cosine, ±1 included where a multiple of π may lie between."""
     small = (np.abs(v[0]) < _LARGE) & (np.abs(v[1]) < _LARGE)
     v = (
         np.where(small, v[0], 0.0),
@@ -271,9 +268,7 @@ def _entries(name: str, value: Any) -> Iterator[tuple[str, Any]]:
 def gradient_range(
     function: Callable[..., Any], names: Sequence[str]
 ) -> Callable[[Array, Array], Mapping[str, Pair]]:
-    """What `Known.gradient_range` asks for, from the function itself: with it the signed plan
-    proves the signs that it uses.
-    """
+    """Gradient range for `Known.gradient_range`, proved from the function itself."""
 
     def ranges(lower: Array, upper: Array) -> Mapping[str, Pair]:
         found = enclose(function, names, lower[None], upper[None])

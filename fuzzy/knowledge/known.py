@@ -1,4 +1,4 @@
-"""What the caller knows about a model: facts on which guaranteed bounds rest."""
+"""Facts about a model that its caller states, on which guaranteed bounds rest."""
 
 from __future__ import annotations
 
@@ -16,8 +16,7 @@ GradientRange = Callable[[Array, Array], Mapping[str, tuple[Array, Array]]]
 
 @dataclass(frozen=True)
 class Known:
-    """Facts about a model over the supports of its inputs. They are taken as proved: state only
-    what is.
+    """Facts about a model over the supports of its inputs, taken as proved.
 
     Args:
         signs: +1 for an input with which every output rises, −1 where every output falls; or such a
@@ -106,7 +105,7 @@ class Known:
         return table
 
     def monotone_in(self, inputs: Sequence[str], outputs: Sequence[str]) -> Mask:
-        """Whether each output is stated to be monotone in each input, shape (outputs, inputs)."""
+        """Stated monotonicity of each output in each input, shape (outputs, inputs)."""
         named = np.array([name in self.monotone for name in inputs])
         monotone: Mask = (self.stated(inputs, outputs) != 0) | named
         return monotone

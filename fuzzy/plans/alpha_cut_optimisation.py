@@ -1,6 +1,4 @@
-"""α-cut optimisation: every bound of every level searched by one of SciPy's optimisers (paper,
-appendix A and eq. 21).
-"""
+"""α-cut optimisation: every bound searched by a SciPy optimiser (appendix A, eq. 21)."""
 
 from __future__ import annotations
 
@@ -29,8 +27,7 @@ _CORNERS = 6  # inputs up to which the first look includes all corners
 
 @dataclass(frozen=True)
 class Optimisation:
-    """Searches each bound, from the narrowest cut to the widest; every sample of every search
-    counts for all bounds.
+    """Search of each bound, from the narrowest cut up; every sample counts for all bounds.
 
     Args:
         method: "multistart" looks at corners and spread points first and descends from the best by
@@ -126,9 +123,7 @@ class Optimisation:
 
 
 class _Cut:
-    """One level under search, in coordinates that run from 0 to 1 over those inputs that have a
-    width.
-    """
+    """One level under search, in unit coordinates of the inputs that have a width."""
 
     def __init__(self, memo: Memo, domain: Domain, level: int) -> None:
         self.memo, self.domain, self.level = memo, domain, level
@@ -148,9 +143,7 @@ class _Cut:
         return self.memo(self.points(unit)).select([output])[:, 0]
 
     def scale(self, output: str) -> float:
-        """Range of an output over all samples so far, or its size: a unit in which optimisers'
-        absolute tolerances make sense.
-        """
+        """Unit of an output for optimisers: its range over all samples, or its size."""
         seen = self.memo.values.select([output])
         return float(np.ptp(seen)) or float(np.abs(seen).max()) or 1.0
 
@@ -175,9 +168,7 @@ class _Cut:
             )
 
     def best(self, output: str, sign: float, count: int) -> Array:
-        """The best few of all samples in the cut that are not close to a better one, in unit
-        coordinates.
-        """
+        """The best few samples in the cut that lie apart, in unit coordinates."""
         points = self.memo.points
         points = points[self.domain.inside(points)[self.level]]
         unit: Array = np.clip(

@@ -1,6 +1,4 @@
-"""Guaranteed bounds by branch and bound: boxes are split until their enclosures meet the values
-that the model attains.
-"""
+"""Guaranteed bounds by branch and bound on enclosures."""
 
 from __future__ import annotations
 
@@ -22,9 +20,7 @@ _TOGETHER = 256  # boxes that are split at once
 
 
 class _Boxes(NamedTuple):
-    """Boxes (n, inputs) with a proved lower bound of the searched output in each, (n,), and its
-    slopes, (n, inputs).
-    """
+    """Boxes (n, inputs) with the proved lower bound (n,) and its slopes (n, inputs)."""
 
     lower: Array
     upper: Array
@@ -65,9 +61,7 @@ class BranchAndBound:
         return True
 
     def run(self, model: Model, domain: Domain) -> FuzzyResult:
-        """Prove both bounds of every output on every level; the error is the gap to what the model
-        attains.
-        """
+        """Prove both bounds of every output and level; the error is the gap to samples."""
         domain.require_free("BranchAndBound")
         tried = _tried(domain)
         first = model(tried)
@@ -118,9 +112,7 @@ class BranchAndBound:
 
 
 def _tried(domain: Domain) -> Array:
-    """Samples at which the function is compared with the model first: modal values, corners and
-    middle of the support, (4, inputs).
-    """
+    """Samples that compare function and model first: modal, corners, middle, (4, inputs)."""
     lower, upper = (ends[0] for ends in domain.boxes)
     modal = np.array([number.modal for number in domain.inputs.values()], float)
     return np.stack([modal, lower, upper, (lower + upper) / 2])
@@ -129,8 +121,7 @@ def _tried(domain: Domain) -> Array:
 def require_agreement(
     enclosed: Pair, values: Array, output: str, names: Sequence[str], points: Array
 ) -> None:
-    """The model's values (n,) at points (n, inputs) lie in what the function says of them or of
-    boxes around them, (n,) each.
+    """Refuse model values (n,) outside the function's enclosures at points (n, inputs).
 
     Raises:
         ValueError: One does not: what is proved of the function says nothing of the model.
@@ -215,9 +206,7 @@ class _Search:
         return np.concatenate([lower, right]), np.concatenate([left, upper])
 
     def _examined(self, lower: Array, upper: Array) -> _Boxes:
-        """Boxes with their bounds: the enclosure, and the mean-value form about the middle; the
-        model is run at the middle and an end.
-        """
+        """Boxes with bounds from the enclosure and the mean-value form; the model is run there."""
         middle, half = (lower + upper) / 2, (upper - lower).T / 2
         value, slope = self._enclosed(lower, upper)
         about = self._enclosed(middle, middle)[0][0]
@@ -243,9 +232,7 @@ class _Search:
         return found.value, found.slope
 
     def _attain(self, points: Array, enclosed: Pair) -> None:
-        """Run the model, see that it is what the function encloses around each point, and remember
-        the least value.
-        """
+        """Run the model, compare it with the enclosure, and remember the least value."""
         values = self.sign * self.model(points).select([self.output])[:, 0]
         seen = enclosed if self.sign > 0 else (-enclosed[1], -enclosed[0])
         require_agreement(seen, self.sign * values, self.output, self.names, points)

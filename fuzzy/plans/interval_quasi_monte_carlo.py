@@ -1,5 +1,4 @@
-"""Interval quasi-Monte Carlo: random inputs whose distributions have fuzzy parameters (paper,
-section 7, [46]).
+"""Interval quasi-Monte Carlo: random inputs with fuzzy parameters (section 7, [46]).
 
 Each quasi-random probability u becomes, per α, the interval of quantiles that the fuzzy parameters
 allow; the model is bounded over these intervals and the cuts of the other fuzzy inputs. Averages
@@ -46,9 +45,7 @@ class RandomInput:
     parameters: Mapping[str, FuzzyNumber]
 
     def interval(self, u: Array, alpha: float) -> tuple[Array, Array]:
-        """Least and greatest quantile at probabilities (n,) over the cut of the parameters, two
-        arrays (n,).
-        """
+        """Least and greatest quantile at probabilities (n,) over the cut, two arrays (n,)."""
         corners = product(*(number.cut(alpha) for number in self.parameters.values()))
         values = np.array(
             [
@@ -114,7 +111,7 @@ class IntervalResponse:
 
 @dataclass(frozen=True)
 class IntervalQuasiMonteCarlo:
-    """How a model of random and fuzzy inputs is sampled.
+    """Sampling plan of a model with random and fuzzy inputs.
 
     Args:
         points: Quasi-random points, best a power of 2.
@@ -194,7 +191,7 @@ class IntervalQuasiMonteCarlo:
 
 @dataclass
 class _Gathered:
-    """What the plan found at the points so far."""
+    """Findings of the plan so far."""
 
     rows: list[tuple[Array, Array]] = field(default_factory=list)
     outputs: tuple[str, ...] = ()
@@ -245,8 +242,6 @@ def _random_inputs(random: Mapping[str, RandomInput]) -> dict[str, RandomInput]:
 def _number(
     alpha: Sequence[float], lower: Sequence[float], upper: Sequence[float]
 ) -> PiecewiseLinear:
-    """The quantiles that a point may have, as a fuzzy number; nested up to round-off, which is
-    taken away.
-    """
+    """Quantiles of a point as a fuzzy number, nested to round-off."""
     low, high = np.maximum.accumulate(lower), np.minimum.accumulate(upper)
     return PiecewiseLinear(tuple(alpha), tuple(np.minimum(low, high)), tuple(high))

@@ -1,5 +1,4 @@
-"""A metamodel of the bounds: trained to map boxes of the inputs straight to the bounds of the
-outputs (paper, section 7, [44]).
+"""Metamodel from boxes of the inputs to bounds of the outputs (section 7, [44]).
 
 Unlike a surface in the model's place it needs no search afterwards: once trained, any fuzzy inputs
 within the support that it was trained on get their bounds at once, without another run of the
@@ -96,9 +95,7 @@ class Metamodel:
         )
 
     def _boxes(self, inputs: int) -> Array:
-        """Boxes of the unit cube, shape (n, 2, inputs): the whole cube, its middle, then evenly
-        spread pairs of corners.
-        """
+        """Boxes of the unit cube, shape (n, 2, inputs): the cube, its middle, spread ones."""
         from scipy.stats import qmc
 
         pairs = qmc.Halton(2 * inputs, rng=np.random.default_rng(self.seed)).random(
@@ -141,8 +138,7 @@ class TrainedBounds:
     runs: int
 
     def bounds(self, domain: Domain) -> FuzzyResult:
-        """Predicted bounds of every cut, no run of the model; nesting is enforced where predictions
-        break it.
+        """Predicted bounds of every cut, nested, without a run of the model.
 
         Raises:
             ValueError: An input leaves the support that the metamodel was trained on.

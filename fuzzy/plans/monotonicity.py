@@ -25,7 +25,7 @@ from alphacut.fuzzy.sets.numbers import Array, Mask, Rows
 
 @dataclass(frozen=True)
 class Verification:
-    """How signs are looked for where they are neither stated nor proved.
+    """Settings of the search for signs that are neither stated nor proved.
 
     Args:
         probes: Points per box at which derivatives are taken, besides its two extreme corners and
@@ -66,16 +66,14 @@ class Effects:
     proved: Mask
 
     def table(self, result: FuzzyResult, holds: Mask) -> Mask:
-        """Where something holds of all effects, shape (levels, outputs, inputs), for each bound of
-        a result, shape (levels, columns).
-        """
+        """Bounds for which something holds of all effects, shape (levels, columns)."""
         table = np.zeros(result.lower.shape, bool)
         for row, name in enumerate(self.outputs):
             table[:, result.column(name)] = holds[:, row].all(axis=1)
         return table
 
     def notes(self, domain: Domain) -> tuple[str, ...]:
-        """Which effects have no sign, and up to which level."""
+        """Effects without a sign, and up to which level."""
         found = []
         for row, output in enumerate(self.outputs):
             for column, name in enumerate(domain.names):
@@ -91,8 +89,7 @@ class Effects:
 def verify(
     model: Memo, domain: Domain, rule: Verification, *, outputs: Sequence[str] = ()
 ) -> Effects:
-    """Find the sign of every effect on every level, from the widest box up: what holds there holds
-    in all boxes inside.
+    """Find the sign of every effect on every level, from the widest box up.
 
     Args:
         model: The model with what is known of it.
@@ -158,9 +155,7 @@ class _Box:
     rule: Verification
 
     def seen(self, modal: Array, stated: Signs) -> Signs:
-        """Signs that the slopes at all probes have, with the margin; 0 where they do not, shape
-        (outputs, inputs).
-        """
+        """Signs of the slopes at all probes, with the margin, shape (outputs, inputs), else 0."""
         open_inputs = np.flatnonzero((stated == 0).any(axis=0))
         first = np.sign(self._slopes(modal, open_inputs)[0]).astype(np.int8)
         corners = self._corners(np.where(stated != 0, stated, first))
@@ -213,8 +208,7 @@ class _Box:
 
 
 def verified(result: FuzzyResult, memo: Memo, effects: Effects) -> FuzzyResult:
-    """Bounds that rest on verified signs, confronted with every sample that the plan ran on its
-    way.
+    """Bounds that rest on verified signs, confronted with all samples of the plan.
 
     Args:
         result: Bounds from the corners that the signs name.
@@ -243,9 +237,7 @@ def verified(result: FuzzyResult, memo: Memo, effects: Effects) -> FuzzyResult:
 
 
 def _contradicted(result: FuzzyResult, memo: Memo, effects: Effects) -> Mask:
-    """Outputs (columns,) whose samples in some cut go against their signs, where these rest on a
-    gradient or a level missed an extreme.
-    """
+    """Outputs (columns,) whose samples contradict their verified signs."""
     columns = np.array([result.column(name) for name in effects.outputs])
     looked_at = result.enforced[:, columns].any(axis=0) | (memo.known.gradient_range is not None)
     refuted = np.zeros(len(result.outputs), bool)

@@ -1,6 +1,4 @@
-"""Sampling plans: random or evenly spread points in every cut. Inner bounds that rise towards the
-truth slowly, for any model at all.
-"""
+"""Sampling plans: random or evenly spread points in every cut, for inner bounds."""
 
 from __future__ import annotations
 
@@ -21,7 +19,7 @@ _TRIES = 200  # rounds of drawing points that fulfil the interactions
 
 @dataclass(frozen=True)
 class _Sampling:
-    """What both plans share: points of the unit cube carried into every cut.
+    """Points of the unit cube carried into every cut, shared by both plans.
 
     Args:
         samples: Points per level.
@@ -46,7 +44,7 @@ class _Sampling:
             )
 
     def unit(self, count: int, inputs: int, *, level: int, turn: int) -> Array:
-        """Points of the unit cube for a level, shape (count, inputs); `turn` counts repeated draws."""
+        """Points of the unit cube for a level, shape (count, inputs); `turn` counts repeats."""
         raise NotImplementedError
 
     def run(self, model: Model, domain: Domain) -> FuzzyResult:

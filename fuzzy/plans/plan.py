@@ -14,7 +14,7 @@ class Plan(Protocol):
 
     @property
     def stepwise(self) -> bool:
-        """Whether its samples depend on those before, so that it reports its progress itself."""
+        """True if samples depend on those before, so that the plan reports its progress."""
 
     def run(self, model: Model, domain: Domain) -> FuzzyResult:
         """Bounds of every output of the model on every level."""

@@ -1,6 +1,4 @@
-"""The signed plan: where the sign of an effect is known, one end of the cut gives the lower bound
-and the other the upper.
-"""
+"""Signed plan: known signs of effects name the corner of each bound."""
 
 from __future__ import annotations
 
@@ -22,8 +20,7 @@ from alphacut.fuzzy.sets.numbers import Array
 
 @dataclass(frozen=True)
 class Signed:
-    """Two corners per level where all effects have a sign; an input without one gets the points of
-    the general method instead.
+    """Two corners per level where all effects have a sign, else the general method's points.
 
     Signs are stated by the caller (`Known.signs`), proved from a range of the gradient, or seen at
     probes. The bounds are guaranteed where all signs are stated or proved, and inner otherwise.
@@ -56,9 +53,7 @@ class Signed:
         return verified(result, memo, effects)
 
     def _points(self, effects: Effects, domain: Domain) -> list[Array]:
-        """For each level, the corners that the signs name, times the general method's points of the
-        inputs without a sign.
-        """
+        """Corners that the signs name, times the general method's points of other inputs."""
         grids = General().grids(domain)
         return [
             _level_points(np.unique(signs, axis=0), grid)
@@ -67,9 +62,7 @@ class Signed:
 
 
 def _size(effects: Effects, domain: Domain) -> int:
-    """Samples of the plan, counted without listing them; points that two patterns of signs share
-    count twice.
-    """
+    """Samples of the plan, counted without listing them."""
     total = 0.0
     for signs, grid in zip(effects.signs, General().grids(domain), strict=True):
         counts = np.array([len(points) for points in grid])

@@ -1,6 +1,4 @@
-"""A Chebyshev surface in the model's place: interpolate over the support, then search the surface
-in every cut (paper, Fig. 2).
-"""
+"""Sparse Chebyshev surface in the model's place, searched in every cut (Fig. 2)."""
 
 from __future__ import annotations
 
@@ -22,7 +20,7 @@ _SAFETY = 2  # the surface may miss other places by more than the samples that w
 
 
 class _Ends(NamedTuple):
-    """Extremes of the surface: places (levels, outputs, 2, inputs) and values (levels, outputs, 2)."""
+    """Extremes of the surface: places (levels, outputs, 2, inputs), values (levels, outputs, 2)."""
 
     places: Array
     values: Array
@@ -30,8 +28,7 @@ class _Ends(NamedTuple):
 
 @dataclass(frozen=True)
 class Chebyshev:
-    """Interpolates the model until new samples agree with the surface, and searches the surface for
-    the extremes of every cut.
+    """Interpolation until new samples agree; the surface is searched in every cut.
 
     Args:
         tolerance: Largest disagreement, as a share of the range of each output, at which refinement
@@ -105,7 +102,7 @@ class Chebyshev:
         return result if self.confirm else _estimated(result, ends, chosen)
 
     def _disagreement(self, memo: Memo, ends: _Ends, chosen: Rows) -> Array:
-        """How far the model is from the surface at the surface's extremes, shape (levels, outputs)."""
+        """Distance of model and surface at the surface's extremes, (levels, outputs)."""
         values = memo(ends.places.reshape(-1, ends.places.shape[-1])).array[:, chosen]
         own = np.einsum("loso->los", values.reshape(*ends.values.shape, -1))
         difference: Array = np.abs(own - ends.values).max(axis=2)

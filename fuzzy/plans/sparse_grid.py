@@ -24,9 +24,7 @@ _CHECKS = 4  # held-out samples per input, and 8 more
 
 @cache
 def nodes(level: int) -> Array:
-    """1 point (level 0) or 2**level + 1 points in [−1, 1]; those of a level hold those of the level
-    below, to the last bit.
-    """
+    """1 point (level 0) or 2**level + 1 points in [−1, 1], nested to the last bit."""
     if level == 0:
         return np.zeros(1)
     x: Array = np.cos(np.pi * np.arange(2**level + 1) / 2**level)
@@ -64,8 +62,7 @@ class SparseGrid:
         self._add((0,) * inputs)
 
     def refine(self, tolerance: float, budget: int) -> tuple[Array, bool]:
-        """Refine until new and held-out samples agree with the surface to a share `tolerance` of
-        the range of each output.
+        """Refine until samples agree with the surface to a share `tolerance` of the range.
 
         Returns:
             The largest disagreement left, shape (outputs,), and whether it is within the tolerance.
@@ -99,15 +96,11 @@ class SparseGrid:
         )
 
     def _is_rough(self, level: Level) -> bool:
-        """Whether a level is too coarse to tell anything: nearly all its samples could lie on zeros
-        by symmetry.
-        """
+        """True if a level is too coarse: nearly all its samples could be zeros by symmetry."""
         return max(level) < _FIRST and sum(level) == max(level)
 
     def _worst(self, tolerance: float) -> Level:
-        """The level whose samples the surface missed most; if it missed none, symmetry may hide
-        what held-out samples see: the coarsest.
-        """
+        """Level whose samples the surface missed most; the coarsest if it missed none."""
         missed = {
             level: float((disagreement / self._scale()).max())
             for level, disagreement in self._active.items()
@@ -120,9 +113,7 @@ class SparseGrid:
         )
 
     def _left(self) -> Array:
-        """Largest disagreement at the held-out samples and at the newest samples of each direction,
-        shape (outputs,).
-        """
+        """Largest disagreement at held-out and newest samples, shape (outputs,)."""
         held_out = np.abs(self.polynomial()(self._checks) - self.memo(self._checks).array).max(
             axis=0
         )
@@ -148,9 +139,7 @@ class SparseGrid:
                 self._add(forward)
 
     def _add(self, level: Level) -> None:
-        """Run the samples of a level, note how far the surface without it misses them, and take
-        them in.
-        """
+        """Run the samples of a level, note the surface's misses, and take them in."""
         points = self.points(level)
         values = self.memo(points).array
         missed = (

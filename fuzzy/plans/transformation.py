@@ -1,5 +1,4 @@
-"""Hanss' transformation method: reduced, general and extended (M. Hanss, Applied Fuzzy Arithmetic,
-Springer 2005).
+"""Transformation method: reduced, general and extended (Hanss, 2005).
 
 Level j of m counts m + 1 − j points per input: the ends of its cut, and between them the midpoints
 of neighbouring points of the next level up. The general method runs the model on the grid of these
@@ -58,9 +57,7 @@ def hanss_points(number: FuzzyNumber, alpha: Sequence[float]) -> list[list[float
 
 
 def _settled(x: float, known: list[float], width: float) -> float:
-    """The point already known that differs from x by round-off only, otherwise x, which is known
-    from now on.
-    """
+    """The known point that differs from x by round-off only, otherwise x."""
     place = bisect_left(known, x - _SAME * width)
     if place < len(known) and known[place] - x <= _SAME * width:
         return known[place]
@@ -70,7 +67,7 @@ def _settled(x: float, known: list[float], width: float) -> float:
 
 @dataclass(frozen=True)
 class _Transformation:
-    """What the methods share: a grid per level, and the retransformation."""
+    """Base of the methods: a grid per level, and the retransformation."""
 
     @property
     def stepwise(self) -> bool:
@@ -91,9 +88,7 @@ class _Transformation:
         return [list(level) for level in zip(*columns, strict=True)]
 
     def size(self, domain: Domain) -> int:
-        """Samples over all levels, counted without listing them; points that two levels share count
-        twice.
-        """
+        """Samples over all levels, counted without listing them."""
         return sum(prod(len(points) for points in grid) for grid in self.grids(domain))
 
     def points(self, domain: Domain) -> Design:
@@ -112,9 +107,7 @@ class _Transformation:
 
 
 def corners_suffice(result: FuzzyResult, known: Known) -> Mask:
-    """Where bounds that hold all corners of each cut are proved: the output is stated to be
-    monotone in every input.
-    """
+    """Bounds that corners prove: the output is stated to be monotone in every input."""
     lower, upper = result.domain.boxes
     monotone = known.monotone_in(result.inputs, result.outputs)
     proved: Mask = (monotone[None] | (lower == upper)[:, None, :]).all(axis=2)
@@ -123,9 +116,7 @@ def corners_suffice(result: FuzzyResult, known: Known) -> Mask:
 
 @dataclass(frozen=True)
 class General(_Transformation):
-    """The general transformation method: all combinations of the recursion's points. For any model;
-    225 samples in the paper's case.
-    """
+    """General transformation method: all combinations of the recursion's points."""
 
     def _refined(self, names: Sequence[str]) -> set[str]:
         return set(names)
@@ -133,9 +124,7 @@ class General(_Transformation):
 
 @dataclass(frozen=True)
 class Reduced(_Transformation):
-    """The reduced transformation method: corners of each cut. Exact where the model is monotone in
-    every input.
-    """
+    """Reduced transformation method: corners of each cut; exact where monotone."""
 
     def _refined(self, names: Sequence[str]) -> set[str]:
         return set()
@@ -143,15 +132,12 @@ class Reduced(_Transformation):
 
 @dataclass(frozen=True)
 class Vertex(Reduced):
-    """The vertex method (Dong and Shah, Fuzzy Sets and Systems 24, 1987): the same samples and
-    bounds as the reduced method.
-    """
+    """Vertex method (Dong & Shah 1987): the corners of the reduced method."""
 
 
 @dataclass(frozen=True)
 class Extended(_Transformation):
-    """The extended transformation method: ends only of the monotone inputs, all points of the
-    others.
+    """Extended transformation method: ends of monotone inputs, all points of the others.
 
     Args:
         monotone: Inputs in which the model rises or falls throughout. If not given, what the caller
@@ -168,7 +154,7 @@ class Extended(_Transformation):
 
     @property
     def stepwise(self) -> bool:
-        """Whether monotonicity is looked for first."""
+        """True if monotonicity is looked for first."""
         return self.monotone is None
 
     def _refined(self, names: Sequence[str]) -> set[str]:
@@ -181,9 +167,7 @@ class Extended(_Transformation):
         return set(names) - set(self.monotone or ())
 
     def run(self, model: Model, domain: Domain) -> FuzzyResult:
-        """Find the monotone inputs if they are not given, evaluate the samples and rearrange them
-        into α-cuts.
-        """
+        """Find the monotone inputs, evaluate the samples, rearrange them into α-cuts."""
         if self.monotone is not None:
             known = replace(model.known, monotone=(*model.known.monotone, *self.monotone))
             return super().run(model, domain).proving(lambda bounds: corners_suffice(bounds, known))

@@ -29,9 +29,7 @@ class Design:
 
     @classmethod
     def from_levels(cls, domain: Domain, points: Sequence[Array]) -> Design:
-        """Gather the points of each level, shape (n_level, inputs), and list the distinct ones
-        once.
-        """
+        """Gather the points of each level, shape (n_level, inputs), listed once."""
         distinct, inverse = np.unique(np.concatenate(points), axis=0, return_inverse=True)
         ends = np.cumsum([len(rows) for rows in points])[:-1]
         return cls(domain, distinct, tuple(np.split(inverse.ravel(), ends)))
@@ -49,8 +47,7 @@ class Design:
         return cls(domain, points, rows)
 
     def bounds(self, values: Values, *, plan: str) -> FuzzyResult:
-        """Retransformation: the extremes of each level's samples and of every level above, so cuts
-        are nested by construction.
+        """Retransformation: extremes of each level's samples and of every level above.
 
         Args:
             values: Outputs at `points`.
@@ -69,9 +66,7 @@ class Design:
         )
 
     def _extremes(self, values: Array) -> tuple[Rows, Mask]:
-        """Rows of the least values (levels, outputs), and where a level's own samples would have
-        missed the level above.
-        """
+        """Rows of the least values (levels, outputs), and places that own samples miss."""
         columns = np.arange(values.shape[1])
         best: list[Rows] = []
         enforced: list[Mask] = []

@@ -25,7 +25,7 @@ class Memo:
 
     @property
     def known(self) -> Known:
-        """What the caller knows about the model."""
+        """Facts that the caller knows about the model."""
         return self._model.known
 
     def report(self, share: float, *, last: bool = False) -> None:

@@ -1,4 +1,4 @@
-"""What a plan sees of a model: an evaluation of many points at once, with named outputs."""
+"""Model as a plan sees it: an evaluation of many points with named outputs."""
 
 from __future__ import annotations
 
@@ -77,15 +77,13 @@ class Model(Protocol):
 
     @property
     def known(self) -> Known:
-        """What the caller knows about the model."""
+        """Facts that the caller knows about the model."""
 
     def __call__(self, points: Array) -> Values:
         """Outputs at the points, shape (n, inputs)."""
 
     def report(self, share: float, *, last: bool = False) -> None:
-        """Tell the share done, 0 … 1; with `last`, one batch of points is still to come and fills
-        the rest.
-        """
+        """Report the completed fraction, 0 … 1; `last` fills the rest."""
 
 
 def flatten(output: Output) -> tuple[Layout, Array]:
@@ -115,9 +113,7 @@ def flatten(output: Output) -> tuple[Layout, Array]:
 
 
 def _require_distinct(layout: Layout, given: Mapping[str, ArrayLike]) -> None:
-    """Refuse outputs that two names of a mapping, such as `a[0]` and the first entry of `a`, would
-    share.
-    """
+    """Refuse two names of a mapping that mean one output, such as `a[0]`."""
     columns = Values(layout, np.zeros((0, 0))).columns
     spelt = [str(name) for name in given]
     twice = [

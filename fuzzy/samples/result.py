@@ -1,6 +1,4 @@
-"""What every plan returns: bounds on each α-level, the inputs that reach them, and what they are
-worth.
-"""
+"""Result of every plan: bounds on each α-level, where they are reached, their nature."""
 
 from __future__ import annotations
 
@@ -27,7 +25,7 @@ _PRINTED = 50  # outputs that are printed
 
 
 class Nature(StrEnum):
-    """What a bound is worth."""
+    """Nature of a bound."""
 
     GUARANTEED = "guaranteed"  # proved: the true range lies inside
     INNER = "inner"  # attained by the model: the true range reaches at least so far
@@ -127,9 +125,7 @@ class FuzzyResult:
         )
 
     def proving(self, holds: Callable[[FuzzyResult], Mask]) -> FuzzyResult:
-        """The same bounds, proved where `holds` says so (shape (levels, outputs)) unless the
-        samples themselves contradict it.
-        """
+        """The same bounds, proved where `holds`, shape (levels, outputs), and samples agree."""
         proved = holds(self)
         refuted = [
             self.outputs[column] for column in np.flatnonzero((proved & self.enforced).any(axis=0))
@@ -145,9 +141,7 @@ class FuzzyResult:
         )
 
     def confronted(self, signs: Signs) -> FuzzyResult:
-        """The same bounds, proved only where the samples do not contradict stated signs, shape
-        (outputs, inputs), 0 where none is.
-        """
+        """The same bounds, proved where samples do not contradict signs (outputs, inputs)."""
         relevant = np.where(self.proved.any(axis=0).reshape(-1, 1), signs, 0)
         found = contradictions(self.points, self.values.array, relevant)
         notes = tuple(
@@ -158,9 +152,7 @@ class FuzzyResult:
         return replace(self, proved=kept, notes=(*self.notes, *notes)) if found else self
 
     def __str__(self) -> str:
-        """The bounds of every output (of the first 50), a line for each level, with what they are
-        worth and what they cost.
-        """
+        """Bounds of the first 50 outputs, a line for each level, with nature and cost."""
         lines = [f"{self.nature} bounds by the plan {self.plan}, {self.runs} runs"]
         for column, name in enumerate(self.outputs[:_PRINTED]):
             cuts = zip(self.domain.alpha, self.lower[:, column], self.upper[:, column], strict=True)
@@ -174,11 +166,11 @@ class FuzzyResult:
 
     @property
     def nature(self) -> Nature:
-        """What the bounds are worth: the weakest over all levels and outputs."""
+        """Weakest nature of the bounds over all levels and outputs."""
         return Nature.GUARANTEED if self.proved.size and self.proved.all() else self.base
 
     def nature_of(self, output: str = "y") -> tuple[Nature, ...]:
-        """What the bounds of one output are worth on each level."""
+        """Nature of one output's bounds on each level."""
         return tuple(
             Nature.GUARANTEED if proved else self.base
             for proved in self.proved[:, self.column(output)]

@@ -79,7 +79,7 @@ class Domain:
         return cuts[..., 0], cuts[..., 1]
 
     def inside(self, points: Array) -> Mask:
-        """Which points, shape (n, inputs), lie in the cut of each level, shape (levels, n)."""
+        """Mask of points, shape (n, inputs), in the cut of each level, shape (levels, n)."""
         lower, upper = self.boxes
         slack = _ROUND_OFF * (upper[0] - lower[0])
         boxes = ((points >= (lower - slack)[:, None]) & (points <= (upper + slack)[:, None])).all(
@@ -91,9 +91,7 @@ class Domain:
         return allowed
 
     def slack(self, points: Array, alpha: float) -> Array:
-        """Least room that the interactions leave at points (n, inputs) on a level, shape (n,);
-        infinite without interactions.
-        """
+        """Least room that the interactions leave at points (n, inputs), shape (n,)."""
         rooms = [interaction.slack(points, self.inputs, alpha) for interaction in self.interactions]
         least: Array = np.min([np.full(len(points), np.inf), *rooms], axis=0)
         return least

@@ -1,4 +1,4 @@
-"""Interaction between fuzzy inputs: constraints that cut their box down to what can occur together."""
+"""Interaction between fuzzy inputs: constraints on their box."""
 
 from __future__ import annotations
 
@@ -21,9 +21,7 @@ class Interaction(Protocol):
         """Refuse names that are no input."""
 
     def slack(self, points: Array, inputs: Mapping[str, FuzzyNumber], alpha: float) -> Array:
-        """Room left at points (n, inputs) on a level, shape (n,); it must not fall where α falls,
-        so that the cuts are nested.
-        """
+        """Room at points (n, inputs) on a level, shape (n,); never falls with α."""
 
 
 @dataclass(frozen=True)
@@ -58,9 +56,7 @@ class Linear:
         _require_inputs("linear", self.weights, inputs)
 
     def slack(self, points: Array, inputs: Mapping[str, FuzzyNumber], alpha: float) -> Array:
-        """Bound − Σ weights · inputs, shape (n,), as a share of the largest sum that its terms can
-        have, so that units do not matter.
-        """
+        """Bound − Σ weights · inputs, shape (n,), as a share of its largest possible sum."""
         weights = np.array([self.weights.get(name, 0.0) for name in inputs])
         largest = np.array([np.abs(number.support).max() for number in inputs.values()])
         slack: Array = (self.bound - points @ weights) / max(
@@ -71,8 +67,7 @@ class Linear:
 
 @dataclass(frozen=True)
 class Ellipsoidal:
-    """An ellipsoid inside each cut: tᵀ R⁻¹ t ≤ (1 − α)², where t_i = ±(1 − μ_i) is the signed
-    distance of input i from its modal value.
+    """Ellipsoid in each cut: tᵀ R⁻¹ t ≤ (1 − α)², with signed distances t_i = ±(1 − μ_i).
 
     With R = 1 the grades of membership add up like lengths instead of each counting alone; off its
     diagonal R says which inputs tend to be high or low together. The ellipsoid touches the faces of
@@ -140,8 +135,7 @@ class Ellipsoidal:
 
 
 def pulled(point: Array, anchor: Array, slack: Callable[[Array], Array]) -> Array:
-    """The point, moved towards an allowed anchor just so far that it is allowed itself; an
-    optimiser may leave it a little outside.
+    """The point, moved towards an allowed anchor until it is allowed.
 
     Args:
         point: Shape (inputs,).

@@ -1,6 +1,4 @@
-"""General fuzzy sets by their membership polyline: those that are no numbers can be shown and cut,
-but not computed with.
-"""
+"""General fuzzy sets by their membership polyline, to be shown and cut."""
 
 from __future__ import annotations
 
@@ -18,8 +16,7 @@ from alphacut.fuzzy.sets.numbers import Array, Cut, PiecewiseLinear
 
 @dataclass(frozen=True)
 class FuzzySet:
-    """A fuzzy set over the reals, membership linear between given points and 0 outside (paper,
-    appendix A, Fig. 36).
+    """Fuzzy set of the reals, piecewise linear, 0 outside (appendix A, Fig. 36).
 
     Args:
         x: Points, not falling; two equal ones make a jump.
@@ -56,7 +53,7 @@ class FuzzySet:
 
     @property
     def convex(self) -> bool:
-        """Whether every cut is one interval: grades rise to the top and fall from it."""
+        """True if every cut is one interval."""
         top = int(np.argmax(self.grade))
         rising, falling = self.grade[: top + 1], self.grade[top:]
         return all(a <= b for a, b in pairwise(rising)) and all(
@@ -73,8 +70,7 @@ class FuzzySet:
         return inside
 
     def cut(self, alpha: float) -> tuple[Cut, ...]:
-        """The α-cut as intervals from left to right: several where the set is not convex, none
-        above its height.
+        """The α-cut as intervals from left to right, several where not convex.
 
         Raises:
             ValueError: `alpha` lies outside (0, 1].
@@ -127,8 +123,7 @@ class FuzzySet:
 
 
 def from_data(values: Sequence[float] | Array, *, levels: int = 10) -> PiecewiseLinear:
-    """Fuzzy number from measured values: its cut at α holds the middle share 1 − α of them, its
-    modal value is their median.
+    """Fuzzy number from measured values: the middle share 1 − α at each α.
 
     This is the transformation of a probability into the possibility whose cuts are confidence
     intervals (Dubois, Foulloy, Mauris and Prade, Reliable Computing 10, 2004), with equal tails.

@@ -32,9 +32,7 @@ class Cut(NamedTuple):
 
 
 class Cuts(NamedTuple):
-    """Nested α-cuts between which the ends are linear: rising `alpha` from 0 to 1, `lower` rising,
-    `upper` falling.
-    """
+    """Nested α-cuts with linear ends between them: `alpha` rises from 0 to 1."""
 
     alpha: tuple[float, ...]
     lower: tuple[float, ...]

@@ -1,6 +1,4 @@
-"""Polynomials of several inputs in the Chebyshev basis of a box: evaluation, gradient, extremes
-over any box inside.
-"""
+"""Polynomials in the Chebyshev basis of a box: values, gradients, extremes."""
 
 from __future__ import annotations
 
@@ -106,9 +104,7 @@ class Polynomial:
 
 @dataclass(frozen=True)
 class _Search:
-    """A descent over a box in coordinates of the unit cube, the output in units of `scale`:
-    optimisers stop at absolute gradients.
-    """
+    """Descent over a box in unit coordinates, the output in units of `scale`."""
 
     polynomial: Polynomial
     lower: Array
@@ -151,9 +147,7 @@ class _Search:
 
 
 def basis(x: Array, degrees: NDArray[np.intp], *, derivative: int | None = None) -> Array:
-    """Products of Chebyshev polynomials at x (n, inputs) in [−1, 1], shape (n, terms); optionally
-    differentiated by one input.
-    """
+    """Products of Chebyshev polynomials at x (n, inputs), shape (n, terms), or a derivative."""
     terms = np.ones((len(x), len(degrees)))
     for i in range(x.shape[1]):
         highest = int(degrees[:, i].max(initial=0))
@@ -174,7 +168,7 @@ def corners(inputs: int) -> Array:
 
 
 def box_scan(lower: Array, upper: Array) -> Array:
-    """Corners of a box (up to 10 inputs) and 1,024 evenly spread points inside, shape (n, inputs)."""
+    """Corners (up to 10 inputs) and 1,024 even points of a box, shape (n, inputs)."""
     from scipy.stats import qmc
 
     inputs = len(lower)

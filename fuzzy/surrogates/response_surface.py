@@ -1,6 +1,4 @@
-"""Response surfaces: a polynomial through the samples of every output, with the error that it makes
-on samples left out (paper, Fig. 2).
-"""
+"""Response surfaces: fitted polynomials with their error on left-out samples (Fig. 2)."""
 
 from __future__ import annotations
 
@@ -35,8 +33,7 @@ class ResponseSurface:
 
     @classmethod
     def fit(cls, points: Array, values: Array, *, degree: int | None = None) -> ResponseSurface:
-        """Fit points (n, inputs) and values (n, outputs); without `degree`, the one that predicts
-        left-out samples best.
+        """Fit points (n, inputs), values (n, outputs); the degree by left-out samples.
 
         Raises:
             ValueError: There are too few samples for the degree.
