@@ -45,9 +45,7 @@ exit status:
 
 
 def parsers(program: str, commands: Mapping[str, ModuleType]) -> tuple[Parser, dict[str, Parser]]:
-    """The parser of a program with the given commands, and those of the commands, by their names
-    there.
-    """
+    """Parser of a program with the given commands, and the commands' parsers by name."""
     top = Parser(
         prog=program,
         description="From an uncertain microstructure to the fuzzy vibration of a structure.",
@@ -120,9 +118,7 @@ def main(
 
 
 def failed(error: Exception) -> int:
-    """One line about a computation that failed; under mpirun the other ranks are told to stop as
-    well.
-    """
+    """One line about a failed computation; other ranks under mpirun are stopped."""
     if os.environ.get("ALPHACUT_TRACEBACK"):
         raise error
     message = " ".join(str(error).split()) or type(error).__name__

@@ -9,9 +9,7 @@ from typing import Any
 
 
 def write(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """The rows as CSV, in UTF-8, whole or not at all, a key that a row lacks left empty; makes the
-    folder.
-    """
+    """Write rows as CSV, whole or not at all; makes the folder."""
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_suffix(".partial")
     with partial.open("w", newline="", encoding="utf-8") as file:

@@ -54,7 +54,7 @@ class Case:
         return cast(tuple[str, ...], self.values["stages"])
 
     def has(self, key: str) -> bool:
-        """Whether the key holds a value."""
+        """True if the key holds a value."""
         return self.values.get(key) is not None
 
     def need(self, key: str) -> object:

@@ -1,4 +1,4 @@
-"""What a case must fulfil as a whole, beyond each value being right on its own."""
+"""Checks of a case as a whole, beyond single values."""
 
 from __future__ import annotations
 
@@ -129,9 +129,7 @@ def as_text(case: Case, name: str) -> str:
 
 
 def order_of_stages(case: Case) -> Iterator[Problem]:
-    """Each stage hands on to the next, so they stand in this order; and no two studies write the
-    same file.
-    """
+    """Stages stand in the order in which each hands on to the next."""
     if list(case.stages) != sorted(case.stages, key=STAGES.index):
         yield Problem(
             "stages", "the stages are not in their order", str(list(case.stages)), ", ".join(STAGES)
@@ -168,7 +166,7 @@ def stress_curves(case: Case) -> Iterator[Problem]:
 
 
 def replaced(case: Case) -> bool:
-    """Whether something stands in for the computed modulus."""
+    """True if something stands in for the computed modulus."""
     return bool(stand_ins(case))
 
 

@@ -1,4 +1,4 @@
-"""What the particles and the radius map of a case must fulfil as a whole."""
+"""Checks of particles and radius map as a whole."""
 
 from __future__ import annotations
 
@@ -74,9 +74,7 @@ def sizes(case: Case) -> Iterator[Problem]:
 
 
 def radius(case: Case, alpha: float) -> Iterator[Problem]:
-    """r(θ) must stay inside (0, 1) in every corner of the α-cuts; r is linear in a1 … a4, so
-    corners suffice.
-    """
+    """r(θ) stays inside (0, 1) in every corner of the α-cuts; r is linear in a1 … a4."""
     theta = case.numbers("radius.theta")
     if len(theta) != 2 or not theta[0] < theta[1]:
         yield Problem(
@@ -100,9 +98,7 @@ def radius(case: Case, alpha: float) -> Iterator[Problem]:
 
 
 def guilty(corner: tuple[float, ...]) -> str:
-    """The slope to name when r(θ) leaves (0, 1): the one whose taming alone cures it, else the
-    steeper.
-    """
+    """Slope to name when r(θ) leaves (0, 1): the one whose change cures it, else the steeper."""
     a1, a2, a3, a4 = corner
     tame = a3 - a1
     for name, slope2, slope4 in (("a2", tame, a4), ("a4", a2, tame)):

@@ -1,6 +1,4 @@
-"""What a structure cannot do without although no single key of it is required: damping, and
-something that moves it.
-"""
+"""Needs of a structure that no single key states: damping, and something that moves it."""
 
 from __future__ import annotations
 
@@ -23,7 +21,7 @@ def incomplete(case: Case) -> Iterator[Problem]:
 
 
 def given(case: Case, section: str, *names: str) -> bool:
-    """Whether the file holds any of the keys."""
+    """True if the file holds any of the keys."""
     return any(f"{section}.{name}" in case.written for name in names)
 
 

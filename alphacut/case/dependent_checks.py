@@ -1,6 +1,4 @@
-"""What can be said of a case as a whole while some of its keys are broken: what no broken key has a
-part in.
-"""
+"""Checks of a whole case that no broken key has a part in."""
 
 from __future__ import annotations
 
@@ -12,8 +10,7 @@ from alphacut.io.problem import Problem
 
 
 class Watched(Mapping[str, object]):
-    """Values of a case that remember whether a broken key was asked for since `asked` was last set
-    to False.
+    """Values of a case that remember requests for a broken key.
 
     Args:
         values: The values that are right.

@@ -1,4 +1,4 @@
-"""What a key of a case file may hold: its kind, unit, range and default; and a section of keys.
+"""Kind, unit, range and default of a key of a case file; sections of keys.
 
 A key's kind says what the file may hold: ``fuzzy`` a crisp or fuzzy quantity, ``number`` a crisp
 one, ``fuzzy list`` and ``numbers`` arrays of them, ``integer``, ``text``, ``choice``, ``choices``
@@ -22,7 +22,7 @@ class Range:
     below: bool = False  # closed, but without its upper end
 
     def holds(self, value: float) -> bool:
-        """Whether `value` is allowed; never for nan."""
+        """True if `value` is allowed; never for nan."""
         if self.below:
             return self.lower <= value < self.upper
         return self.lower <= value <= self.upper if self.closed else self.lower < value < self.upper

@@ -1,4 +1,4 @@
-"""Where each key of a TOML text stands: tomllib tells values but not lines."""
+"""Lines of the keys of a TOML text, which tomllib does not tell."""
 
 from __future__ import annotations
 
@@ -9,9 +9,7 @@ ASSIGNMENT = re.compile(r"""\s*([A-Za-z0-9_.\-"' ]+?)\s*=""")
 
 
 def lines_of_keys(text: str) -> dict[str, int]:
-    """Full key name (``study[1].name`` in repeated tables) to its line, from 1; works on broken
-    TOML too.
-    """
+    """Full key name (``study[1].name`` in repeated tables) to its line, from 1."""
     found: dict[str, int] = {}
     counts: dict[str, int] = {}
     prefix, inside = "", ""
@@ -34,7 +32,7 @@ def lines_of_keys(text: str) -> dict[str, int]:
 
 
 def opened(rest: str) -> str:
-    """What closes a value that goes on over the following lines; empty if it ends on its own line."""
+    """Closing mark of a value that goes on over the next lines, or an empty text."""
     for quotes in ('"""', "'''"):
         if rest.count(quotes) % 2:
             return quotes

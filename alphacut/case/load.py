@@ -63,9 +63,7 @@ def load(
 
 
 def together(case: Case, single: Sequence[Problem], *, modal: bool) -> Iterator[Problem]:
-    """The problems of a case as a whole, where single values are wrong those that do not rest on
-    them.
-    """
+    """Problems of a case as a whole that do not rest on wrong single values."""
     if any(
         "." not in problem.key for problem in single
     ):  # a section or the stages: there is no telling what was meant
@@ -127,7 +125,7 @@ def parsed(path: Path, text: str) -> Raw:
 
 
 def cure(line: str) -> str:
-    """What to write instead of a broken line, where that is plain; else empty."""
+    """Cure of a broken line where that is plain; else empty."""
     name, _, value = (part.strip() for part in line.partition("#")[0].partition("="))
     if re.fullmatch(r"[\w\-]+", name) and not name.isascii():
         return "keys of plain letters, digits and _"
@@ -138,9 +136,7 @@ def cure(line: str) -> str:
 
 
 def broken_key(text: str, line: int) -> str:
-    """The key on a broken line: what stands before the = or, without one, the first word; else the
-    key the line belongs to.
-    """
+    """Key on a broken line: before the =, or the first word, or the key it belongs to."""
     key, at = key_at(text, line)
     broken = text.splitlines()[line - 1] if text else ""
     if section := re.match(r"\s*\[+\s*([\w.\-]+)\s*\]+", broken):
@@ -165,9 +161,7 @@ def checked(raw: Raw, values: dict[str, object], written: dict[str, object]) -> 
 
 
 def flattened(raw: Raw) -> Raw:
-    """The tree with nested sections such as ``[microstructure.packing]`` beside the one they stand
-    in.
-    """
+    """Tree with nested sections, ``[microstructure.packing]``, beside their parents."""
     flat = dict(raw)
     for name in SECTIONS:
         outer, _, inner = name.rpartition(".")
@@ -269,9 +263,7 @@ def as_written(value: object) -> str:
 def located(
     problem: Problem, path: Path, lines: Mapping[str, int], changed: Collection[str]
 ) -> Problem:
-    """The problem with its file and line; a missing key points at its section, one from the command
-    line at that.
-    """
+    """The problem with its file and line; a missing key points at its section."""
     if problem.key in changed:
         return Problem(
             problem.key,

@@ -1,6 +1,4 @@
-"""The names of a structure's inputs and outputs: as many values as floors, and no name that it does
-not have.
-"""
+"""Names of a structure's inputs and outputs."""
 
 from __future__ import annotations
 
@@ -24,7 +22,7 @@ OUTPUTS = {
 
 
 def floors(case: Case) -> Iterator[Problem]:
-    """Every array of the frame has one entry for each floor; one entry alone holds for all of them."""
+    """One entry for each floor in every array of the frame, or one for all floors."""
     count = len(case.fuzzies("frame.masses"))
     for name in ("lengths", "dampers", "displacements", "velocities", "second_moment", "columns"):
         found = len(

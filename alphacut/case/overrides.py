@@ -87,9 +87,7 @@ def no_key(name: str, change: str, raw: Raw) -> Problem:
 
 
 def table_of(raw: Raw, section: str, *, make: bool = False) -> Raw | None:
-    """The table of a section, ``microstructure.packing`` for one inside another; None where there
-    is none.
-    """
+    """Table of a section, ``microstructure.packing`` for a nested one, or None."""
     table: Any = raw
     for name in section.split(".") if section else ():
         if name not in table and make:
@@ -101,9 +99,7 @@ def table_of(raw: Raw, section: str, *, make: bool = False) -> Raw | None:
 
 
 def toml_or_text(value: str, key: Key) -> object:
-    """A value from a command line: TOML where it is TOML, else text; where an array is wanted,
-    ``E,m`` is one.
-    """
+    """Value from a command line: TOML where it is TOML, else text or an array, ``E,m``."""
     try:
         found = tomllib.loads(f"x = {value}")["x"]
     except tomllib.TOMLDecodeError:

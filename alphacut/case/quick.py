@@ -1,6 +1,4 @@
-"""The quick form of a case: the same stages, cut down to seconds, to see that everything runs; its
-numbers mean nothing.
-"""
+"""Quick form of a case: the same stages in seconds, with meaningless numbers."""
 
 from __future__ import annotations
 
@@ -38,9 +36,7 @@ PARTS = {
 
 
 def settings(case: Case) -> dict[str, object]:
-    """What the quick form of a case takes in place of the case's own values, of the stages that are
-    computed.
-    """
+    """Values of the quick form in place of the case's own."""
     keys = [
         key for key in case.values if (key in COARSE or key.endswith(".duration")) and case.has(key)
     ]
@@ -52,7 +48,7 @@ def settings(case: Case) -> dict[str, object]:
 
 
 def banner(found: Mapping[str, Any]) -> str:
-    """What to say above the results of a quick form, from `settings`."""
+    """Banner above the results of a quick form, from `settings`."""
     parts = []
     for key, value in found.items():
         words = (

@@ -1,6 +1,4 @@
-"""The case file's keys: one table that the checks, the JSON Schema, the help texts and the docs all
-read.
-"""
+"""Keys of the case file: one table for checks, JSON Schema, help and docs."""
 
 from __future__ import annotations
 

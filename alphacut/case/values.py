@@ -13,9 +13,7 @@ from alphacut.io.units import QUANTITIES
 
 
 class Unfit(ValueError):  # noqa: N818 - it names the value, not the program, as the culprit
-    """A value that its key cannot take; `allowed` says what it can, `nearest` names the choice that
-    was meant.
-    """
+    """Value that its key cannot take; `allowed` says what it can, `nearest` what was meant."""
 
     def __init__(self, what: str, allowed: str = "", nearest: str = "") -> None:
         super().__init__(what)
@@ -33,7 +31,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 
 def allowed(key: Key) -> str:
-    """What a key may hold, in words."""
+    """Allowed values of a key, in words."""
     if key.choices:
         return ("any of " if key.kind == "choices" else "") + ", ".join(key.choices)
     if key.kind in ("text", "choices"):

@@ -1,6 +1,4 @@
-"""``alphacut envelope``, also ``python -m frame envelope``: fuzzy forward dynamics of the
-structure.
-"""
+"""Command ``alphacut envelope``, also ``python -m frame envelope``: fuzzy dynamics."""
 
 from __future__ import annotations
 
@@ -238,9 +236,7 @@ def given_modulus(text: str | None) -> FuzzyNumber | None:
 
 
 def summary(found: Envelope, tried: Array | None = None) -> str:
-    """Extremes and fuzzy peaks at the lowest level as a small table; the lower ends of the peaks
-    those tried, shape (m,), where known.
-    """
+    """Extremes and fuzzy peaks at the lowest level as a small table."""
     from alphacut.frame.envelope import output_unit
     from alphacut.frame.exceedance import peaks
 
@@ -290,7 +286,7 @@ def error_in_words(found: Envelope) -> str:
 
 
 def proved(found: Envelope) -> str:
-    """What a certificate says, as a line; empty without one."""
+    """Line on the certificate; empty without one."""
     from alphacut.frame.envelope import output_unit
 
     if "gap" not in found.facts:

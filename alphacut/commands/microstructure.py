@@ -1,6 +1,4 @@
-"""``alphacut microstructure``, also ``python -m stochastic microstructure``: from particles to the
-fuzzy radius map.
-"""
+"""Command ``alphacut microstructure``: from particles to the fuzzy radius map."""
 
 from __future__ import annotations
 
@@ -84,9 +82,7 @@ def advise(fragment: str, folder: str | None) -> None:
 def write(
     found: Microstructure, folder: Path, said: Mapping[str, str | int], *, figures: bool = True
 ) -> list[str]:
-    """Write numbers, figures, the fragment and, last of all, the dataset; returns the paths from
-    `folder`.
-    """
+    """Write numbers, figures, fragment and dataset; returns the paths from `folder`."""
     write_text(folder / "microstructure.json", as_json(found.summary(), indent=2))
     drawn = found.draw(folder / "figures") if figures else {}
     write_text(folder / "radius.toml", found.fragment())

@@ -1,4 +1,4 @@
-"""``alphacut modulus``, also ``python -m fuzzy modulus``: the fuzzy effective modulus of the cell."""
+"""Command ``alphacut modulus``, also ``python -m fuzzy modulus``: the fuzzy modulus."""
 
 from __future__ import annotations
 

@@ -100,9 +100,7 @@ def refuse_petsc(command: str, petsc: Mapping[str, str]) -> None:
 
 
 def split_petsc(arguments: Sequence[str]) -> tuple[list[str], dict[str, str]]:
-    """Take PETSc's own options (``-rve_ksp_rtol 1e-10``) out of a command line; a flag's value is
-    empty.
-    """
+    """Take PETSc's own options (``-rve_ksp_rtol 1e-10``) out of a command line."""
     ours: list[str] = []
     petsc: dict[str, str] = {}
     rest = list(arguments)
@@ -144,9 +142,7 @@ def add_quiet(parser: argparse.ArgumentParser) -> None:
 def add_keys(
     parser: argparse.ArgumentParser, keys: dict[str, str], bare: Mapping[str, str] | None = None
 ) -> None:
-    """Options that stand for keys of the case, with help from the schema; `bare` says in which unit
-    those are that need none.
-    """
+    """Options that stand for keys; `bare` names the unit of those that need none."""
     known = every_key()
     for option, key in keys.items():
         entry = known[key]
@@ -177,9 +173,7 @@ def add_workers(parser: argparse.ArgumentParser, what: str = "the samples") -> N
 
 
 def changes(options: argparse.Namespace, keys: dict[str, str]) -> list[str]:
-    """What the options change in the case, as KEY=VALUE; ``--set`` comes first, so that a named
-    option wins.
-    """
+    """Changes of the case as KEY=VALUE; ``--set`` first, so that a named option wins."""
     named = {
         option: getattr(options, option.removeprefix("--").replace("-", "_")) for option in keys
     }

@@ -1,6 +1,4 @@
-"""``alphacut run``: every stage of a case, its files, figures and the table paper / here /
-difference.
-"""
+"""Command ``alphacut run``: all stages, files, figures and the comparison."""
 
 from __future__ import annotations
 

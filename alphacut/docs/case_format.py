@@ -1,5 +1,4 @@
-"""The case format and the commands as pages of the documentation, made from the same tables as the
-checks.
+"""Case format and commands as pages of the documentation.
 
 python -m alphacut.docs.case_format > docs/case-format.md
 python -m alphacut.case_format commands > docs/commands.md
@@ -85,7 +84,8 @@ def shown(value: object) -> str:
     if isinstance(value, tuple) and len(value) == 1:
         return shown(value[0])
     if isinstance(value, tuple):
-        return f"[{', '.join(f'{entry:g}' if isinstance(entry, float) else str(entry) for entry in value)}]"
+        entries = (f"{entry:g}" if isinstance(entry, float) else str(entry) for entry in value)
+        return f"[{', '.join(entries)}]"
     value = getattr(value, "value", value)
     return f"{value:g}" if isinstance(value, float) else str(value)
 

@@ -53,7 +53,7 @@ def key_schema(key: Key) -> dict[str, Any]:
 
 
 def value_schema(key: Key) -> dict[str, Any]:
-    """What a key's value looks like."""
+    """JSON Schema of a key's value."""
     if key.kind == "text":
         return {"type": "string"}
     if key.kind == "flag":

@@ -1,5 +1,4 @@
-"""The public names of the packages as a page of the documentation, a line each, from their own
-docstrings.
+"""Public names of the packages as a page, from their own docstrings.
 
 python -m alphacut.docs.library_page > docs/library.md
 """

@@ -94,9 +94,7 @@ def cell_fields(case: Case) -> meshio.Mesh:
 
 
 def by_phase(system: PrismSystem, phase: Array, stress: Array) -> tuple[Array, Array, Array]:
-    """Nodes apart by phase: which node each is, the wedges' new nodes, and the mean stress at each,
-    shape (n, 3, loads).
-    """
+    """Node of each wedge corner apart by phase, and mean stresses there, (n, 3, loads)."""
     numbered = system.grid.cells + phase[:, None] * len(system.positions)
     kept, cells = np.unique(numbered, return_inverse=True)
     cells = cells.reshape(numbered.shape)

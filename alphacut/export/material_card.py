@@ -21,9 +21,7 @@ PLANE = (
 
 
 def abaqus(result: Homogenised) -> str:
-    """Materials for Abaqus and CalculiX, in Pa: isotropic, and the plane-strain stiffness as
-    engineering constants.
-    """
+    """Materials for Abaqus and CalculiX, in Pa: isotropic, and engineering constants."""
     card = (
         f"{comments(result, '**')}*MATERIAL, NAME=HOMOGENISED\n*ELASTIC,"
         f" TYPE=ISOTROPIC\n{result.modulus:.9e}, {result.poisson:.9f}\n"
@@ -39,9 +37,7 @@ def abaqus(result: Homogenised) -> str:
 
 
 def aster(result: Homogenised) -> str:
-    """Materials for Code_Aster, in Pa: isotropic, and the plane-strain stiffness as an orthotropic
-    one.
-    """
+    """Materials for Code_Aster, in Pa: isotropic, and orthotropic."""
     card = (
         f"{comments(result, '#')}HOMOGENISED = DEFI_MATERIAU(ELAS=_F(E={result.modulus:.9e},"
         f" NU={result.poisson:.9f}))\n"
@@ -56,9 +52,7 @@ def aster(result: Homogenised) -> str:
 
 
 def ansys(result: Homogenised) -> str:
-    """Materials for Ansys Mechanical APDL, in Pa: 1 isotropic, 2 the plane-strain stiffness as an
-    orthotropic one.
-    """
+    """Materials for Ansys Mechanical APDL, in Pa: 1 isotropic, 2 orthotropic."""
     card = f"{comments(result, '!')}MP,EX,1,{result.modulus:.9e}\nMP,PRXY,1,{result.poisson:.9f}\n"
     if not (plane := constants(result)):
         return card
@@ -90,9 +84,7 @@ def numbers(result: Homogenised) -> str:
 
 
 def comments(result: Homogenised, mark: str) -> str:
-    """Lines of comment: what the isotropic constants are worth, and the stiffness, where it is
-    known.
-    """
+    """Lines of comment: worth of the isotropic constants, and the stiffness."""
     lines = [CONVENTION]
     if result.stiffness is not None:
         lines.append(shear_ratio_in_words(shear_ratio(result.stiffness)))
@@ -104,9 +96,7 @@ def comments(result: Homogenised, mark: str) -> str:
 
 
 def constants(result: Homogenised) -> dict[str, float]:
-    """Orthotropic constants of the plane-strain stiffness, moduli in Pa; empty where the model did
-    not compute it.
-    """
+    """Orthotropic constants of the plane-strain stiffness in Pa; empty without it."""
     return {} if result.stiffness is None else plane_constants(result.stiffness, result.poisson)
 
 

@@ -51,9 +51,7 @@ FIELDLESS = {".inp"}
 
 
 def prism_mesh(case: Case) -> meshio.Mesh:
-    """Quadratic wedges of the physical-stochastic domain at the modal radius map, with the phase of
-    each (0 matrix, 1 particle).
-    """
+    """Quadratic wedges at the modal radius map, with phases (0 matrix, 1 particle)."""
     import meshio
     from meshio._mesh import topological_dimension
 

@@ -98,7 +98,7 @@ def draw(results: Results, driving: xarray.Dataset, *, quiet: bool = False) -> l
 
 
 def particle_pictures(folder: Path, results: Results) -> list[str]:
-    """The figures that the microstructure stage has drawn: 03-04_two_point … 13_pbox, radius_map."""
+    """Figures of the microstructure stage: 03-04_two_point … 13_pbox, radius_map."""
     if "microstructure" not in results.case.stages:
         return []
     found = [path for path in sorted(folder.iterdir()) if re.match(r"\d|radius_map", path.name)]

@@ -1,6 +1,4 @@
-"""Words for what a run's files and numbers are called inside: captions of figures, inputs, sources
-of error, checks.
-"""
+"""Words for names of figures, inputs, sources of error and checks."""
 
 from __future__ import annotations
 
@@ -74,16 +72,12 @@ WORDS = {
 
 
 def in_words(name: str) -> str:
-    """A name inside the program in words; a hyphen or underscore becomes a space where there are
-    none.
-    """
+    """Name in words; a hyphen or underscore becomes a space where there are none."""
     return WORDS.get(name, name.replace("_", " "))
 
 
 def caption(stem: str, *, paper: bool) -> str:
-    """Words for a figure's file, ``fig18-modulus`` or ``10_cells``; with the paper's number where
-    the case is the paper's.
-    """
+    """Caption of a figure's file, with the paper's number where the case is the paper's."""
     found = re.fullmatch(r"(?:fig)?(\d+(?:-\d+)?)[-_](.+)", stem)
     number, name = (
         (" to ".join(str(int(n)) for n in found[1].split("-")), found[2]) if found else ("", stem)
@@ -102,9 +96,7 @@ def figure_words(name: str) -> str:
 
 
 def core(modulus: Mapping[str, Any]) -> str:
-    """The modal value of a summary's fuzzy modulus in GPa; where its cut at the highest level is an
-    interval, that interval.
-    """
+    """Modal value or core interval of a summary's fuzzy modulus, in GPa."""
     low, high = (float(modulus["E_GPa"][side][-1]) for side in ("lower", "upper"))
     if high - low <= 1e-9 * abs(high):
         return f"{modulus['modal_GPa']:.4f} GPa"

@@ -45,9 +45,7 @@ def drawings(study: Study, dataset: xarray.Dataset) -> Iterator[tuple[str, Calla
 
 
 def envelope(dataset: xarray.Dataset, output: str, study: Study) -> Figure:
-    """Nested bands between lower and upper envelope, the darker the higher α; the modal trajectory
-    as a line.
-    """
+    """Nested bands between lower and upper envelope, and the modal trajectory."""
     from alphacut.frame.envelope import output_unit
 
     drawn, axes = figure(7.2, 3.6)

@@ -1,6 +1,4 @@
-"""The structure drawn to scale (Fig. 26), a storey frame or a tower, and as a chain of masses,
-springs and dampers (Fig. 27).
-"""
+"""Structure to scale (Fig. 26), and as masses, springs and dampers (Fig. 27)."""
 
 from __future__ import annotations
 
@@ -104,9 +102,7 @@ def ground(axes: Axes, left: float, right: float) -> None:
 
 
 def chain(case: Case) -> Figure:
-    """Fig. 27: the frame with rigid floors and bending columns as masses on springs, with its
-    dampers if it has any.
-    """
+    """Fig. 27: the frame as masses on springs, with its dampers if it has any."""
     floors = len(case.fuzzies("frame.masses"))
     damped = case.has("frame.damper_placement") and any(
         d.support.upper > 0 for d in case.fuzzies("frame.dampers")

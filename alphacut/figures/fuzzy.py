@@ -1,6 +1,4 @@
-"""What a fuzzy number (Fig. 19) and a fuzzy mapping (Fig. 20) are, drawn with the case's own
-numbers.
-"""
+"""Fuzzy number (Fig. 19) and fuzzy mapping (Fig. 20), with the case's numbers."""
 
 from __future__ import annotations
 

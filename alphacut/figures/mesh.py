@@ -1,5 +1,4 @@
-"""Fig. 15: the prism mesh, cut open, drawn by PyVista off screen; a program of its own, since it
-wants a display.
+"""Fig. 15: the prism mesh, cut open, by PyVista in a process of its own.
 
 xvfb-run -a python -m alphacut.figure_mesh MESH.vtu PICTURE.png
 """
@@ -27,7 +26,7 @@ PIXELS = (1000, 1100)
 SHEETS, HEIGHT = (
     5,
     6.9,
-    # slices in the picture of stress, and their stack's height in halves of the cell: no slice hides
+    # slices in the picture of stress, and their stack's height in halves of the cell: none hides
     # another
 )
 FLATTENED = 0.6  # scale of the θ-axis in the picture
@@ -96,9 +95,7 @@ def mesh(file: str, picture: str) -> None:
 
 
 def edges(part: pyvista.UnstructuredGrid) -> pyvista.PolyData:
-    """The edges of quadratic wedges in VTK's order, each as two straight pieces through its
-    midpoint.
-    """
+    """Edges of quadratic wedges in VTK's order, each as two straight pieces."""
     import numpy as np
     import pyvista
 
@@ -108,7 +105,7 @@ def edges(part: pyvista.UnstructuredGrid) -> pyvista.PolyData:
 
 
 def stress(file: str, picture: str) -> None:
-    """Stress 11 under load 1 on slices at fixed θ: the stack of sheets that the product space is."""
+    """Stress 11 under load 1 on a stack of slices at fixed θ."""
     import numpy as np
     import pyvista
 

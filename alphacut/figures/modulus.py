@@ -1,6 +1,4 @@
-"""The fuzzy modulus: stress curves of all samples (Fig. 16), mean stress in α-cuts (Fig. 17), E
-(Fig. 18).
-"""
+"""Fuzzy modulus: stress curves (Fig. 16), mean stress (Fig. 17), E (Fig. 18)."""
 
 from __future__ import annotations
 
@@ -86,9 +84,7 @@ def mean_stress(dataset: xarray.Dataset) -> Figure:
 
 
 def fuzzy_modulus(dataset: xarray.Dataset, case: Case) -> Figure:
-    """Fig. 18: the fuzzy effective modulus; beside it the modulus that the case quotes for the
-    structure, if it does.
-    """
+    """Fig. 18: the fuzzy modulus, beside the modulus that the case quotes."""
     drawn, axes = figure()
     alpha, ends = dataset["alpha"].values, dataset["E"].values / GPA
     shaded_cuts(axes, alpha, ends[:, 0], ends[:, 1])

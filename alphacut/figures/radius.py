@@ -1,6 +1,4 @@
-"""The random radius: its law before tessellation (Fig. 11), the p-box of the map (Fig. 13), the
-cone over θ (Fig. 14).
-"""
+"""Random radius: its law (Fig. 11), the p-box (Fig. 13), the cone over θ (Fig. 14)."""
 
 from __future__ import annotations
 
@@ -64,9 +62,7 @@ def distribution(radius: HermiteMap, at: Array) -> Array:
 
 
 def p_box(case: Case) -> Figure:
-    """Fig. 13: lower and upper distribution of r_n over the supports of the fuzzy slopes, and the
-    modal one.
-    """
+    """Fig. 13: lower, upper and modal distribution of r_n over the fuzzy slopes."""
     drawn, axes = figure()
     corners = maps(case, 0.0)
     low, high = (
@@ -89,9 +85,7 @@ def p_box(case: Case) -> Figure:
 
 
 def cone(case: Case) -> Figure:
-    """Fig. 14: the particle in the physical-stochastic domain: every slice at one θ is a cell with
-    the radius r(θ).
-    """
+    """Fig. 14: the particle in the product domain, of radius r(θ) at every θ."""
     import matplotlib.pyplot as plt
 
     drawn = plt.figure(figsize=(5.0, 5.4))

@@ -1,6 +1,4 @@
-"""The cell's stress, random and fuzzy: its distribution between two bounds on each level, and its
-fuzzy quantiles.
-"""
+"""Random and fuzzy stress of the cell: distribution bounds and quantiles by level."""
 
 from __future__ import annotations
 

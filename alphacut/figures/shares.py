@@ -23,9 +23,7 @@ WINDOW = 1 / 40  # of the duration: the means wander less than the vibration
 
 
 def over_time(found: xarray.Dataset) -> Figure:
-    """Width lost when an input is fixed, over the width, for each output; below it the width
-    itself, grey.
-    """
+    """Share of width lost when an input is fixed, for each output, above the width."""
     import matplotlib.pyplot as plt
 
     outputs = [str(name) for name in found["output"].values][-MOST:]
@@ -83,9 +81,7 @@ def panel(axes: Axes, found: xarray.Dataset, output: str) -> None:
 
 
 def weighted(share: Array, width: Array) -> Array:
-    """Moving means of the share over a window around each time, weighted with the width; NaN where
-    there is no width at all.
-    """
+    """Moving means of the share over time, weighted with the width; NaN without width."""
     half = max(1, round(WINDOW * len(width) / 2))
     above, below = (
         np.convolve(values, np.ones(2 * half + 1))[half:-half]

@@ -1,6 +1,4 @@
-"""One look for all figures: sizes, colours that everyone can tell apart, the α scale, and saving as
-SVG and PNG.
-"""
+"""Style of all figures: sizes, colours, the α scale, and saving as SVG and PNG."""
 
 from __future__ import annotations
 
@@ -55,9 +53,7 @@ def save(drawn: Figure, stem: Path) -> list[Path]:
 
 
 def colours(alpha: Array) -> list[tuple[float, float, float, float]]:
-    """A colour for each level, the darker the higher: one hue's lightness, so it survives grey
-    print and colour blindness.
-    """
+    """Colour for each level, the darker the higher, fit for grey print."""
     from matplotlib import colormaps
 
     scale = colormaps["YlGnBu"]
@@ -77,9 +73,7 @@ def alpha_legend(axes: Axes, alpha: Array, **options: Any) -> None:
 
 
 def prefix_axis(axes: Axes, label: str, si: str) -> None:
-    """Label the vertical axis, with a prefix to its unit where the values on it are large or small;
-    the data stay in SI.
-    """
+    """Label the vertical axis, with a prefix to its unit; the data stay in SI."""
     factor, unit = axis_prefix(max(map(abs, axes.get_ylim())), si)
     axes.set_ylabel(f"{label}, {unit}")
     if factor != 1.0:

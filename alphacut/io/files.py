@@ -1,6 +1,4 @@
-"""What goes out: one JSON object on standard output and nothing else, files that are never half
-written, one rank that speaks.
-"""
+"""Output: one JSON object on standard output, whole files, one rank that speaks."""
 
 from __future__ import annotations
 
@@ -31,9 +29,7 @@ def ranks() -> int:
 
 @contextmanager
 def whole_file(path: Path | str) -> Iterator[Path]:
-    """A temporary name beside `path`, with the same ending, renamed to it once the block is
-    through.
-    """
+    """Temporary name beside `path`, renamed to it once the block is through."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
@@ -66,9 +62,7 @@ def plain(value: Any) -> Any:
 
 
 def as_json(document: Mapping[str, Any], *, indent: int | None = None) -> str:
-    """One JSON object, ending in a line feed; arrays of plain numbers stay on one line when
-    indented.
-    """
+    """One JSON object, ending in a line feed; arrays of numbers stay on one line."""
     return json.dumps(plain(document), indent=indent, allow_nan=False, ensure_ascii=False) + "\n"
 
 

@@ -1,6 +1,4 @@
-"""Reading stored results: every file tells the version of its format, and one that is too new is
-refused with what to do about it.
-"""
+"""Stored results: the version of their format, and refusal of newer ones."""
 
 from __future__ import annotations
 
@@ -19,8 +17,7 @@ if TYPE_CHECKING:
 
 
 def require_known(version: object, path: Path, *, key: str, maker: str = "") -> None:
-    """Refuse a format that this program does not know; files of every older version are read, as
-    are those that tell none.
+    """Refuse a format that this program does not know; older ones are read.
 
     Args:
         version: What the file says.
@@ -86,9 +83,7 @@ def read_dataset(path: Path | str, *, key: str = "file") -> xarray.Dataset:
 
 
 def upgraded(found: xarray.Dataset) -> xarray.Dataset:
-    """A dataset of format 1 as one of format 2: there the proved bounds of a certified envelope
-    stood beside the attained ones.
-    """
+    """Dataset of format 1 as one of format 2, with proved bounds as the bounds."""
     if "outer_lower" not in found:
         return found
     turned = found.rename({"lower": "inner_lower", "upper": "inner_upper"})

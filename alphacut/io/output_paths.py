@@ -1,6 +1,4 @@
-"""Where results are to go, looked at before anything is computed: a place that can be written, with
-an ending that is known.
-"""
+"""Output paths, checked before anything is computed."""
 
 from __future__ import annotations
 
@@ -56,9 +54,7 @@ def unknown_ending(option: str, kind: str, given: str) -> Iterator[Problem]:
 
 
 def unwritable(option: str, path: Path, *, folder: bool) -> Iterator[Problem]:
-    """The problem of a place that cannot be written: the wrong kind, or a folder that is read-only
-    or cannot be made.
-    """
+    """Problem of a place that cannot be written."""
     if path.is_dir() and not folder:
         yield Problem(
             option,
@@ -89,7 +85,7 @@ def unwritable(option: str, path: Path, *, folder: bool) -> Iterator[Problem]:
 
 
 def hint(path: Path) -> str:
-    """What the environment shows, for a path outside of it; empty where that cannot be why."""
+    """Folders that the environment shows, for a path outside of them; else empty."""
     if not os.environ.get("ALPHACUT_INSIDE"):
         return ""
     shown = [

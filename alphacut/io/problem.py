@@ -1,4 +1,4 @@
-"""What is wrong with an input, in one line each, and the one exception that carries it to the user."""
+"""Problems of an input, one line each, and the exception that carries them."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""Where a result comes from: versions, command, case; and the fingerprint by which it is known
-again.
-"""
+"""Origin of a result: versions, command, case, fingerprint."""
 
 from __future__ import annotations
 
@@ -68,9 +66,7 @@ def sources(package: str) -> list[tuple[str, Path]]:
 
 @cache
 def source_digest(packages: tuple[str, ...]) -> str:
-    """Digest of the source of some of this project's packages: a changed program does not trust
-    what an older one stored.
-    """
+    """Digest of the source of some of this project's packages."""
     digest = hashlib.sha256()
     for package in packages:
         for name, file in sources(package):
@@ -79,9 +75,7 @@ def source_digest(packages: tuple[str, ...]) -> str:
 
 
 def fingerprint(inputs: Mapping[str, Any], packages: Sequence[str]) -> str:
-    """Digest of everything that a result depends on: its inputs, the program's source, the versions
-    of the libraries.
-    """
+    """Digest of everything that a result depends on: inputs, source, library versions."""
     content = {
         "inputs": inputs,
         "source": source_digest(tuple(packages)),
@@ -100,16 +94,12 @@ def _canonical(value: object) -> object:
 
 
 def door() -> str:
-    """How this program is called here: ``./enter python -m alphacut`` inside the environment, else
-    ``alphacut``.
-    """
+    """Name of this program here: ``./enter python -m alphacut``, or ``alphacut``."""
     return "./enter python -m alphacut" if os.environ.get("ALPHACUT_INSIDE") else "alphacut"
 
 
 def command() -> str:
-    """The command line of this process as it would be typed: ``python -m alphacut run …``, without
-    the place of the program.
-    """
+    """Command line of this process as it would be typed, without the program's path."""
     program = Path(sys.argv[0])
     name = f"python -m {program.parent.name}" if program.name == "__main__.py" else program.name
     return f"{name} {shlex.join(sys.argv[1:])}".strip()

@@ -33,7 +33,8 @@ QUANTITIES = {  # SI unit: (name of the quantity, a value as a user would write 
     "rad/s": ("angular velocity", "0.1 rad/s"),
 }
 
-ACCEPTED = {  # units that the page on the case format lists; any other of the same dimension that pint knows is taken too
+# Units that the page on the case format lists; Pint's others of the same dimension are taken too.
+ACCEPTED = {
     "Pa": ("Pa", "kPa", "MPa", "GPa", "N/mm^2", "N/m^2", "kN/cm^2", "psi", "ksi"),
     "m": ("m", "mm", "cm", "um", "km", "inch", "ft"),
     "m^2": ("m^2", "cm^2", "mm^2"),
@@ -72,7 +73,7 @@ def registry() -> pint.UnitRegistry:
 
 @cache
 def factor(unit: str, si: str) -> Decimal:
-    """How many `si` one `unit` is.
+    """Size of one `unit` in `si`.
 
     Raises:
         ValueError: The unit is unknown, or measures something else.
@@ -114,8 +115,7 @@ PREFIXED = ("m", "m/s", "m/s^2", "N", "Pa", "s", "rad", "W", "J")
 
 
 def engineering(value: float, si: str, *, digits: int = 4, beside: float = 0.0) -> str:
-    """A value in `si` for people: ``−3.590 MN``; with the prefix of `beside` where that is larger,
-    so that a column has one unit.
+    """Value in `si` for people, ``−3.590 MN``, with the prefix of `beside` if larger.
 
     A unit that takes no prefix stands as it is.
     """
@@ -130,9 +130,7 @@ def engineering(value: float, si: str, *, digits: int = 4, beside: float = 0.0) 
 
 
 def largest_by_unit(values: Iterable[tuple[float, str]]) -> dict[str, float]:
-    """The largest magnitude among values of the same unit: what `engineering` takes as `beside` to
-    show them alike.
-    """
+    """Largest magnitude among values of the same unit, for `engineering`."""
     found: dict[str, float] = {}
     for value, si in values:
         found[si] = max(found.get(si, 0.0), abs(value))
@@ -140,9 +138,7 @@ def largest_by_unit(values: Iterable[tuple[float, str]]) -> dict[str, float]:
 
 
 def axis_prefix(largest: float, si: str) -> tuple[float, str]:
-    """Factor and unit for an axis whose values reach `largest`: with a prefix where plain numbers
-    would be long.
-    """
+    """Factor and unit for an axis whose values reach `largest`."""
     if si not in PREFIXED or not math.isfinite(largest) or largest <= 0 or 0.1 <= largest < 1000:
         return 1.0, si
     exponent = min(9, max(-9, 3 * math.floor(math.log10(largest) / 3)))

@@ -1,4 +1,4 @@
-"""What the program does otherwise than the paper, read from the heads of the modules that say so."""
+"""Differences from the paper, read from the heads of the modules."""
 
 from __future__ import annotations
 
@@ -14,9 +14,7 @@ MARK = "This differs from the paper in:"
 
 
 def differences(found: Mapping[str, Any] | None = None) -> Iterator[tuple[str, str]]:
-    """Subject of each module that differs, and its differences, "1. … 2. …"; only what concerns a
-    run, given its summary.
-    """
+    """Subject and differences of each module, "1. … 2. …", that concern a run."""
     for package in PACKAGES:
         for name, file in sources(package):
             if found is not None and not concerns(
@@ -31,7 +29,7 @@ def differences(found: Mapping[str, Any] | None = None) -> Iterator[tuple[str, s
 
 
 def concerns(module: str, found: Mapping[str, Any]) -> bool:
-    """Whether a run used the module, by its summary."""
+    """True if a run used the module, by its summary."""
     methods = {study["method"] for study in found.get("envelopes", {}).values()}
     if module == "stochastic.radius_map":
         return "modulus" in found or "microstructure" in found

@@ -43,9 +43,7 @@ def envelopes(summary: Mapping[str, Any], exceedance: str = "") -> str:
 
 
 def extremes(studies: Mapping[str, Any]) -> list[tuple[str, ...]]:
-    """Least and greatest value of each output, all of one unit with one prefix; the error where any
-    study estimated it.
-    """
+    """Least and greatest value of each output, and the error where one was estimated."""
     from alphacut.frame.envelope import output_unit
 
     each = [
@@ -114,9 +112,7 @@ def peaks(summary: Mapping[str, Any]) -> str:
 
 
 def peak_row(of: Mapping[str, Any], unit: str, largest: float) -> Iterator[str]:
-    """One peak: its bounds and the least one tried on the lowest level, and its interval on the
-    highest.
-    """
+    """Peak: its bounds, the least one tried, and its interval on the highest level."""
     yield engineering(of["lower"][0], unit, beside=largest)
     yield engineering(of["tried"][0], unit, beside=largest) if "tried" in of else "not tried"
     yield engineering(of["upper"][0], unit, beside=largest)
@@ -124,9 +120,7 @@ def peak_row(of: Mapping[str, Any], unit: str, largest: float) -> Iterator[str]:
 
 
 def between(lower: float, upper: float, unit: str, largest: float) -> str:
-    """An interval, or the one value where both ends are shown alike; with the prefix of the largest
-    in the table.
-    """
+    """Interval, or one value where both ends look alike, with the table's prefix."""
     ends = dict.fromkeys(
         (engineering(lower, unit, beside=largest), engineering(upper, unit, beside=largest))
     )

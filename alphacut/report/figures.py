@@ -25,9 +25,7 @@ SVG_LIMIT = 200_000  # bytes; a heavier figure goes into the page as PNG
 
 
 def listed(summary: Mapping[str, Any], folder: Path, name: str) -> str:
-    """A figure by its name without the paper's number, if this run has drawn it; an older one in
-    the folder is passed over.
-    """
+    """Figure by its name without the paper's number, if this run has drawn it."""
     for file in summary.get("figures", []):
         if re.fullmatch(rf"(fig\d+-)?{name}", Path(file).stem) and file.endswith(".svg"):
             return picture(

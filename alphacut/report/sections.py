@@ -127,7 +127,7 @@ def given(found: Mapping[str, Any]) -> str:
 
 
 def isotropy(found: Mapping[str, Any]) -> str:
-    """How far the array is from isotropic, in a sentence; empty where it was not computed."""
+    """Sentence on the array's anisotropy; empty where it was not computed."""
     from alphacut.rve.anisotropy import shear_ratio_in_words
 
     return (
@@ -155,7 +155,7 @@ def built(words: Mapping[str, Any], periods: str) -> str:
 
 
 def shares(found: Mapping[str, Any]) -> str:
-    """What drives the width."""
+    """Contributions of the inputs to the widths."""
     from alphacut.figures.envelope import WORDS
 
     words = (
@@ -194,7 +194,7 @@ def comparison(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def methods(summary: Mapping[str, Any]) -> str:
-    """Which method was used for each stage and what it cost."""
+    """Method and cost of each stage."""
     rows: list[tuple[object, ...]] = []
     if cell := summary.get("modulus"):
         rows.append(
@@ -225,7 +225,7 @@ def methods(summary: Mapping[str, Any]) -> str:
 
 
 def explained(rows: Sequence[tuple[object, ...]]) -> Iterator[str]:
-    """What each nature of bounds in the table means."""
+    """Meaning of each nature of bounds in the table."""
     yield from (
         NATURES[nature]
         for nature in dict.fromkeys(str(row[2]) for row in rows)
@@ -234,7 +234,7 @@ def explained(rows: Sequence[tuple[object, ...]]) -> Iterator[str]:
 
 
 def proofs(summary: Mapping[str, Any]) -> Iterator[str]:
-    """How narrowly each certified envelope is enclosed, and what that rests on."""
+    """Gap of each certified envelope, and what it rests on."""
     from alphacut.frame.envelope import output_unit
 
     for name, study in summary.get("envelopes", {}).items():
@@ -252,7 +252,7 @@ def proofs(summary: Mapping[str, Any]) -> Iterator[str]:
 
 
 def effort(study: Mapping[str, Any]) -> str:
-    """What an envelope cost: trajectories, or eigen-analyses where the modes stand for them."""
+    """Cost of an envelope: trajectories, or eigen-analyses."""
     return (
         f"{study['trajectories']}"
         f" {'eigen-analyses' if study['method'] == 'modal' else 'trajectories'}"
@@ -277,9 +277,7 @@ def case_text(summary: Mapping[str, Any]) -> str:
 
 
 def differing(summary: Mapping[str, Any]) -> str:
-    """What the program does otherwise than the paper, from the heads of the modules that the run
-    used.
-    """
+    """Differences from the paper in the modules that the run used."""
     found = tuple(differences(summary))
     rows = "".join(
         f"<li><strong>{html.escape(subject)}</strong>: {html.escape(text)}</li>"

@@ -1,4 +1,4 @@
-"""Ground acceleration from a CSV file with units in its header: ``time [s],acceleration [m/s^2]``."""
+"""Ground acceleration from a CSV file: ``time [s],acceleration [m/s^2]``."""
 
 from __future__ import annotations
 
@@ -53,9 +53,7 @@ def accelerogram(path: Path, key: str = "frame.accelerogram") -> Accelerogram:
 
 
 def table(path: Path, key: str) -> list[tuple[int, list[str]]]:
-    """Line and entries of every row that is neither empty nor a comment; at least a header and two
-    more.
-    """
+    """Line and entries of every row that is neither empty nor a comment."""
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError:

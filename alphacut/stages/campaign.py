@@ -1,6 +1,4 @@
-"""The campaign of a case: the cell as a function that any process can call, its fuzzy inputs, the
-plan of samples.
-"""
+"""Campaign of a case: the cell as a function, its fuzzy inputs, the plan."""
 
 from __future__ import annotations
 
@@ -38,8 +36,7 @@ def theta_shown(theta: tuple[float, ...]) -> Array:
 
 @dataclass(frozen=True)
 class CellTask:
-    """One task of the campaign: samples that share everything but the inclusion's modulus. Runs in
-    any process.
+    """Task of the campaign: samples that share all but the inclusion's modulus.
 
     Args:
         choice: Model of the cell.
@@ -52,9 +49,7 @@ class CellTask:
     theta: tuple[float, ...]
 
     def __call__(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float | Array]]:
-        """Outputs of each point: E, nu, mean stresses, stress curves, linear systems solved, errors
-        by source, certificate.
-        """
+        """Outputs of each point: E, nu, stresses, curves, systems, errors, certificate."""
         values = [{**self.crisp, **point} for point in points]
         radius, matrix, _ = parts(values[0], self.theta)
         inclusions = [parts(value, self.theta)[2] for value in values]
@@ -85,18 +80,14 @@ class CellTask:
         return outputs
 
     def judged(self, point: Mapping[str, float]) -> Homogenised | None:
-        """A sample once more with what the campaign leaves out to be quick: the prism's estimated
-        error, or auto's reason.
-        """
+        """A sample once more with its error estimate or the reason of auto."""
         if self.choice.method not in JUDGED:
             return None
         radius, matrix, inclusion = parts({**self.crisp, **point}, self.theta)
         return replace(self.choice, estimate=True).model().solve(radius, matrix, [inclusion])[0]
 
     def resampled(self, nodes: Array, stress: Array) -> Array:
-        """A stress curve at `SHOWN` points over θ, for pictures: models choose their own nodes, and
-        not the same for every sample.
-        """
+        """Stress curve at `SHOWN` points over θ, for pictures."""
         return between_nodes(nodes, stress, theta_shown(self.theta))
 
 
@@ -120,7 +111,7 @@ def fuzzy_inputs(case: Case) -> dict[str, FuzzyNumber]:
 
 @dataclass(frozen=True)
 class Campaign:
-    """What is to be run: the cell's task, its fuzzy inputs, the plan.
+    """Campaign to be run: the cell's task, its fuzzy inputs, the plan.
 
     Args:
         task: The function, for any process.
@@ -142,7 +133,7 @@ class Campaign:
 
     @property
     def identity(self) -> dict[str, Any] | None:
-        """What a sample depends on besides its fuzzy inputs; None without a store."""
+        """Origin of a sample besides its fuzzy inputs; None without a store."""
         return identity(self.task.choice, self.task.crisp, self.task.theta) if self.store else None
 
 
@@ -224,9 +215,7 @@ def known(case: Case, inputs: Mapping[str, FuzzyNumber]) -> Known:
 def identity(
     choice: CellChoice, crisp: Mapping[str, float], theta: tuple[float, ...]
 ) -> dict[str, Any]:
-    """What a sample depends on besides its fuzzy inputs: model, resolution, crisp inputs, the
-    program and its libraries.
-    """
+    """Origin of a sample besides its fuzzy inputs: model, resolution, program."""
     source = source_digest(("stochastic", "rve"))
     content = {
         "choice": asdict(choice),

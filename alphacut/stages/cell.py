@@ -41,7 +41,7 @@ def key_of(name: str) -> str:
 
 
 class CellModel(Protocol):
-    """What the front door needs of a model of the cell; `rve` has several."""
+    """Model of the cell as the front door needs it."""
 
     def solve(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
@@ -51,7 +51,7 @@ class CellModel(Protocol):
 
 @dataclass(frozen=True)
 class CellChoice:
-    """Which model of the cell, at which resolution; small enough to be sent to a worker process.
+    """Choice of a cell model and its resolution, small enough for workers.
 
     Args:
         method: prism, slices, table, series or auto.
@@ -145,9 +145,7 @@ def solve(case: Case, model: CellModel) -> Homogenised:
 
 
 def anisotropy(radius: HermiteMap, matrix: Phase, inclusion: Phase) -> float | None:
-    """Shear ratio of a cell (see `rve.anisotropy.shear_ratio`) by the series, whatever model gives
-    E; None where the series refuses.
-    """
+    """Shear ratio of a cell by the series; None where the series refuses."""
     from alphacut.rve.series.model import SeriesModel
 
     try:
@@ -158,8 +156,7 @@ def anisotropy(radius: HermiteMap, matrix: Phase, inclusion: Phase) -> float | N
 
 
 def directions(result: Homogenised) -> dict[str, Any] | None:
-    """What eq. 16 hides, over the direction, and the anisotropy of the shear modulus; None without
-    the stiffness.
+    """Moduli over the direction, and shear anisotropy; None without the stiffness.
 
     "young_GPa" is stress over strain in plane strain with free sides, 1/S11 of the planar
     compliance: E/(1 − ν²) in an isotropic material, so that E of eq. 16 lies below it.

@@ -1,6 +1,4 @@
-"""From the name of a cell model to the model: the only place of the front door that may bring in
-DOLFINx.
-"""
+"""From the name of a cell model to the model; may import DOLFINx."""
 
 from __future__ import annotations
 
@@ -16,9 +14,7 @@ from alphacut.stages.cell import CellChoice, CellModel
 
 
 def table_folder() -> Path | None:
-    """Where tables of the cell outlive a run: a cache folder that ALPHACUT_CACHE or XDG_CACHE_HOME
-    may move; None if it cannot be made.
-    """
+    """Cache folder of the cell's tables; None if it cannot be made."""
     base = (
         os.environ.get("ALPHACUT_CACHE")
         or Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "alphacut"

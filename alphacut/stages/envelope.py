@@ -1,6 +1,4 @@
-"""The envelopes of a case: the structure, its fuzzy inputs, and the result as a document and a
-dataset.
-"""
+"""Envelopes of a case: structure, fuzzy inputs, document and dataset."""
 
 from __future__ import annotations
 
@@ -64,16 +62,14 @@ class EnvelopeTask:
 
     @property
     def scheme(self) -> str:
-        """The time stepping of a linear structure: the integrator, or what the method takes where
-        none is named.
-        """
+        """Time stepping of a linear structure: integrator, or the method's own."""
         return self.integrator or ("exact" if self.method in ("auto", "modal") else "midpoint")
 
 
 def task_of(
     case: Case, *, fuzzy: Sequence[str] | None = None, duration: float | None = None
 ) -> EnvelopeTask:
-    """The envelope that [envelope] asks for, with other fuzzy inputs or another duration if given."""
+    """Envelope that [envelope] asks for, with other inputs or duration if given."""
     tolerance = "pendulum.tolerance" if case.has("pendulum.mass") else "envelope.tolerance"
     relative, method = case.has("envelope.relative_tolerance"), case.text("envelope.method")
     forces = (
@@ -174,8 +170,7 @@ def method_options(task: EnvelopeTask) -> dict[str, Any]:
 
 
 def document(found: Envelope, tried: Array) -> dict[str, Any]:
-    """The result as it is printed with ``--json``: extremes over time, one row for each α, one
-    column for each output, in SI.
+    """Result for ``--json``: extremes over time, (α, output), in SI.
 
     Args:
         found: The envelope.

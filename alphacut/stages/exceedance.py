@@ -1,6 +1,4 @@
-"""What an engineer reads off the envelopes: fuzzy peaks, and the fuzzy probability that an output
-exceeds a limit.
-"""
+"""Fuzzy peaks, and the fuzzy probability that an output exceeds a limit."""
 
 from __future__ import annotations
 
@@ -75,7 +73,7 @@ def with_peaks(found: Envelope, wanted: Structure, task: EnvelopeTask) -> xarray
 
 
 def peak_document(dataset: xarray.Dataset) -> dict[str, dict[str, Array]]:
-    """The fuzzy peak of each output: lower and upper ends and the least one tried, by level, in SI."""
+    """Fuzzy peak of each output by level, in SI: ends, and the least one tried."""
     found = {}
     for name in dataset["output"].values:
         found[str(name)] = {
@@ -87,8 +85,7 @@ def peak_document(dataset: xarray.Dataset) -> dict[str, dict[str, Array]]:
 
 
 def shaped_like(number: FuzzyNumber) -> Sampler:
-    """Random values whose density is proportional to the membership: a triangle's is triangular, an
-    interval's uniform.
+    """Random values with a density proportional to the membership.
 
     One value from each of `count` equally likely pieces, in random order (a Latin hypercube where
     several inputs are random): means over them scatter less than those of independent draws.
@@ -106,8 +103,7 @@ def shaped_like(number: FuzzyNumber) -> Sampler:
 
 
 def limit_of(case: Case) -> float:
-    """The limit in the SI unit of its output; for the drift of a storey also as a share of that
-    storey's modal height.
+    """Limit in the SI unit of its output; a drift also as a share of the height.
 
     Raises:
         BadInput: It is no positive quantity of that unit.
@@ -144,7 +140,7 @@ def storey_height(case: Case, output: str) -> float | None:
 
 
 def require_random(case: Case, wanted: Structure) -> None:
-    """Whether the inputs named as random can be.
+    """Refuse inputs that cannot be random.
 
     Raises:
         BadInput: One is crisp, or unknown.
@@ -167,9 +163,7 @@ def require_random(case: Case, wanted: Structure) -> None:
 def split_inputs(
     case: Case, wanted: Structure
 ) -> tuple[dict[str, FuzzyNumber], dict[str, Sampler]]:
-    """The inputs that stay fuzzy and those that are random; where none stays fuzzy, a crisp one
-    stands in for them.
-    """
+    """Inputs that stay fuzzy and those that are random; a crisp one stands in for none."""
     random = wanted.inputs(case.names("exceedance.random"))
     fuzzy = {
         name: number
@@ -185,8 +179,7 @@ def split_inputs(
 def exceedance(
     case: Case, handed: FuzzyNumber | None, progress: Tick | None = None
 ) -> xarray.Dataset:
-    """Fuzzy probability that an output's magnitude exceeds the case's limit within the duration of
-    [envelope].
+    """Fuzzy probability that an output exceeds the case's limit in the duration.
 
     Args:
         case: With the sections exceedance, envelope and a structure.

@@ -1,6 +1,4 @@
-"""Measured moduli from a CSV file with its unit in the header, ``E [GPa]``: they can stand in for
-the cell.
-"""
+"""Measured moduli from a CSV file with a unit, ``E [GPa]``, in place of the cell."""
 
 from __future__ import annotations
 
@@ -18,8 +16,7 @@ NAMES = r"E|E_?c?m?|E_?mod(ul(us)?)?|(young'?s?[\s_-]*)?modul(us|i)|elastic[\s_-
 
 
 def measured_modulus(path: Path, key: str = "modulus.measured") -> FuzzyNumber:
-    """The fuzzy modulus in Pa of measured values: its cut at α holds the middle share 1 − α of
-    them, its modal value is their median.
+    """Fuzzy modulus in Pa of measured values: the middle share 1 − α at each α.
 
     Raises:
         BadInput: The file is missing, its header has no unit, or a row is no positive number.

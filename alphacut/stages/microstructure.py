@@ -1,6 +1,4 @@
-"""The microstructure of a case: from particles, packed or measured, to the fuzzy radius map that
-the cell takes.
-"""
+"""Microstructure of a case: from particles to the fuzzy radius map."""
 
 from __future__ import annotations
 
@@ -28,7 +26,7 @@ SOURCES = ("packing", "circles", "image")
 
 
 def source(case: Case) -> Simulated | Measured:
-    """Where the discs come from."""
+    """Source of the discs."""
     from alphacut.stochastic.particles.circles_csv import CircleFile
     from alphacut.stochastic.particles.image import SectionImage
     from alphacut.stochastic.particles.packing import Packing
@@ -91,7 +89,7 @@ def radii_of(case: Case, key: str) -> RadiusLaw:
 
 
 def study_of(case: Case) -> Study:
-    """What the case asks for.
+    """Study that the case asks for.
 
     Raises:
         BadInput: A value lies outside its range.
@@ -179,9 +177,7 @@ def without_numbers(reason: str) -> str:
 
 
 def crisp_slopes(fragment: str) -> Iterator[str]:
-    """A warning for each slope that came out crisp: a band so wide that one map lies within it
-    needs no width.
-    """
+    """Warning for each slope that came out crisp, its band holding one map."""
     radius = tomllib.loads(fragment)["radius"]
     for name in ("a2", "a4"):
         ends = radius[name] if isinstance(radius[name], list) else [radius[name]]

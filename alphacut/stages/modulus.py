@@ -1,6 +1,4 @@
-"""The fuzzy modulus of a case: samples of the cell, rearranged into α-cuts; as a document, a
-dataset and a fuzzy number.
-"""
+"""Fuzzy modulus of a case: samples of the cell rearranged into α-cuts."""
 
 from __future__ import annotations
 
@@ -70,29 +68,23 @@ class FuzzyModulus:
 
     @property
     def nature(self) -> str:
-        """What the bounds of E are worth: guaranteed if they are on every level, else what they are
-        at least.
-        """
+        """Nature of the bounds of E: guaranteed if so on every level."""
         natures = sorted({str(nature) for nature in self.result.nature_of("E")})
         return natures[0] if len(natures) == 1 else str(self.result.nature)
 
     @property
     def reason(self) -> str:
-        """Which model method auto took at the modal point, and why; empty for any other method."""
+        """Choice of method auto at the modal point, with its reason; else empty."""
         return self.judged.reason if self.judged and self.choice.method == "auto" else ""
 
     @property
     def error(self) -> dict[str, float]:
-        """Estimated relative error of E by source: the largest of all samples, or that of the modal
-        one where each would cost too much.
-        """
+        """Estimated relative error of E by source, of all samples or the modal one."""
         return self.largest("error") or (dict(self.judged.error) if self.judged else {})
 
     @property
     def worth(self) -> str:
-        """One line: what the bounds of E are worth, and the error of the model, which they do not
-        count.
-        """
+        """Line on the worth of E's bounds, and the model's error beside them."""
         parts = ", ".join(f"{name} {value:.1e}" for name, value in self.error.items())
         whose = (
             "modal sample"
@@ -115,9 +107,7 @@ class FuzzyModulus:
         return int(self.result.values.output("systems").sum())
 
     def largest(self, kind: str) -> dict[str, float]:
-        """The largest of each error ("error") or each property of the certificate ("check") over
-        all samples.
-        """
+        """Largest of each error or property of the certificate over all samples."""
         values = self.result.values
         found = {
             name.partition(":")[2]: float(values.output(name).max())
@@ -157,9 +147,7 @@ class FuzzyModulus:
         }
 
     def dataset(self) -> xarray.Dataset:
-        """α-cuts of every quantity (alpha, bound), where they are reached, and all samples with
-        their stress curves.
-        """
+        """α-cuts of every quantity (alpha, bound), where reached, and all samples."""
         import xarray
 
         result = self.result
@@ -251,7 +239,7 @@ def compute(wanted: Campaign, *, workers: int = 1, progress: Tick | None = None)
 
 
 def explain(wanted: Campaign) -> Explanation:
-    """What `compute` would run and why."""
+    """Preview of `compute`: samples and reasons."""
     return fuzzy_explain(
         wanted.inputs,
         wanted.plan,
@@ -296,7 +284,7 @@ def read_number(path: Path | str, option: str = "--modulus") -> FuzzyNumber:
 
 
 def stand_in(case: Case) -> FuzzyNumber | None:
-    """The modulus in Pa that the case gives instead of having it computed; None if it gives none."""
+    """Modulus in Pa that the case gives; None if it gives none."""
     if case.has("modulus.value"):
         return case.fuzzy("modulus.value")
     if case.has("modulus.file"):

@@ -1,6 +1,4 @@
-"""The chain of a case: fuzzy modulus, then envelopes; each is taken from its file while nothing it
-depends on has changed.
-"""
+"""Chain of a case: fuzzy modulus, then envelopes, each kept while up to date."""
 
 from __future__ import annotations
 
@@ -50,7 +48,7 @@ class Study:
 
 @dataclass(frozen=True)
 class Chain:
-    """How a run is done.
+    """Settings of a run.
 
     Args:
         case: The case.
@@ -98,9 +96,7 @@ class Chain:
         return Results(self.case, self.folder, cell, envelopes, handed, stress, limit)
 
     def with_particles(self) -> Case:
-        """The case with the radius map of its particles; microstructure.nc, radius.toml and the
-        stage's figures are stored.
-        """
+        """Case with the radius map of its particles; the stage's files are stored."""
         inputs = {
             key: value
             for key, value in self.case.values.items()
@@ -200,9 +196,7 @@ class Chain:
         return self.stored("exceedance.nc", key, compute)
 
     def vibration(self, wanted: Mapping[str, Any], handed: FuzzyNumber | None) -> str:
-        """Fingerprint of something wanted of the structure: it depends on the structure, its record
-        and the modulus too.
-        """
+        """Fingerprint of a result for the structure, its record and the modulus."""
         inputs = {
             key: value
             for key, value in self.case.values.items()
@@ -232,7 +226,7 @@ class Chain:
 
 @dataclass(frozen=True)
 class Results:
-    """What a run has found.
+    """Findings of a run.
 
     Args:
         case: The case.

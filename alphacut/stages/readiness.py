@@ -1,6 +1,4 @@
-"""What a run would stumble over later, found before anything is computed: it reads the files that a
-case names and builds its structure.
-"""
+"""Readiness of a run: files that a case names, and its structure."""
 
 from __future__ import annotations
 
@@ -26,7 +24,7 @@ RECORDS = ("frame.accelerogram", "tower.accelerogram")
 
 @dataclass(frozen=True)
 class Readiness:
-    """What is to be said of a case that can be run.
+    """Remarks on a case that can be run.
 
     Args:
         warnings: Remarks.
@@ -133,9 +131,7 @@ def lacking(case: Case) -> Iterator[Problem]:
 
 
 def expected(case: Case) -> FuzzyNumber | None:
-    """In place of a modulus that is yet to be computed: the matrix's, between both phases; None
-    where the structure has its own.
-    """
+    """Modulus in place of one yet to be computed, between both phases; or None."""
     if "modulus" not in case.stages or case.has("frame.modulus") or not case.has("frame.masses"):
         return None
     matrix, inclusion = case.fuzzy("cell.matrix_modulus"), case.fuzzy("cell.inclusion_modulus")

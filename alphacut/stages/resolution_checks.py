@@ -1,6 +1,4 @@
-"""Settings that run and give rough envelopes: a time step or a tolerance that is coarse beside the
-motion.
-"""
+"""Settings that run and give rough envelopes: coarse steps or tolerances."""
 
 from __future__ import annotations
 
@@ -20,16 +18,14 @@ WITH_TOLERANCE = ("auto", "modal", "graph-follower", "improved-graph-follower")
 
 
 def rough(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
-    """What is coarse about an envelope."""
+    """Remarks on what is coarse about an envelope."""
     yield from coarse_step(wanted, task)
     yield from coarse_tolerance(wanted, task)
     yield from coarse_nodes(wanted, task)
 
 
 def coarse_step(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
-    """A step that cannot resolve the fastest mode, with the phase error that means; the exact
-    propagator needs none.
-    """
+    """Step that cannot resolve the fastest mode, with its phase error."""
     from alphacut.frame import guard
 
     if wanted.linear is None or task.scheme == "exact":
@@ -40,9 +36,7 @@ def coarse_step(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
 
 
 def coarse_tolerance(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
-    """A tolerance, or the gap of a certificate, that is more than a hundredth of the peak of an
-    output.
-    """
+    """Tolerance or gap that exceeds a hundredth of an output's peak."""
     from alphacut.frame.boxes import UnitFlow, boxes
     from alphacut.frame.checks.tolerance import tolerance_guard
 
@@ -79,9 +73,7 @@ def coarse_tolerance(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]
 
 
 def coarse_nodes(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
-    """Nodes so far apart that the peaks of the slowest mode may lie between them, by more than a
-    hundredth.
-    """
+    """Nodes so far apart that peaks may lie between them by over a hundredth."""
     from alphacut.frame.structures.linear import frequencies
 
     if wanted.linear is None:

@@ -1,5 +1,4 @@
-"""The cell's stress as what it is, random and fuzzy at once: its p-box, fuzzy quantiles and a fuzzy
-probability of exceeding a limit.
+"""Random and fuzzy stress of the cell: p-box, quantiles, exceedance.
 
 The mean stress of section 3.2 leaves out how the stress scatters with θ; every sample of the fuzzy
 modulus holds the whole curve.
@@ -62,9 +61,7 @@ def ends(result: FuzzyResult) -> np.ndarray[Any, Any]:
 
 
 def dataset(case: Case, modulus: xarray.Dataset) -> xarray.Dataset:
-    """p-box, fuzzy mean and quantiles and, where the case names a limit, the fuzzy probability of
-    exceeding it, by level; in SI.
-    """
+    """p-box, fuzzy mean and quantiles, and exceedance of a limit, by level, in SI."""
     import xarray
 
     response, about = random_response(case, modulus), CURVES[case.text("response.quantity")][1]
@@ -122,9 +119,7 @@ def dataset(case: Case, modulus: xarray.Dataset) -> xarray.Dataset:
 
 
 def deviation(case: Case, modulus: xarray.Dataset, response: RandomResponse) -> float:
-    """Largest relative difference between the mean over the stored curve and the model's own mean:
-    what storing curves costs.
-    """
+    """Largest relative difference of the stored curve's mean and the model's own."""
     own = modulus[f"{case.text('response.quantity')}_sample"].values
     return float(np.abs(response.ordered.mean(axis=1) / own - 1).max())
 

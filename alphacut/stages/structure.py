@@ -1,6 +1,4 @@
-"""The structure of a case: its model at modal values, and every parameter as a fuzzy number by the
-name that the model gives it.
-"""
+"""Structure of a case at modal values, and its parameters as fuzzy numbers."""
 
 from __future__ import annotations
 
@@ -67,8 +65,7 @@ class Structure:
         return self.model.outputs
 
     def members(self, name: str) -> tuple[str, ...]:
-        """The fuzzy parameters that a name stands for: ``m`` all masses of a frame, any other name
-        itself.
+        """Fuzzy parameters of a name: ``m`` all masses of a frame, others themselves.
 
         Raises:
             BadInput: It stands for nothing, or for nothing fuzzy.
@@ -103,9 +100,7 @@ class Structure:
     def flow(
         self, names: Sequence[str], duration: float, step: float, integrator: str | None = None
     ) -> Flow:
-        """Trajectories as a function of the named parameters, by the midpoint rule unless said
-        otherwise.
-        """
+        """Trajectories as a function of parameters, by the midpoint rule by default."""
         from alphacut.frame import INTEGRATORS, LinearFlow
         from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 
@@ -154,7 +149,7 @@ def pendulum(case: Case) -> Structure:
 
 
 def tower(case: Case) -> Structure:
-    """A plane beam frame, reduced to shapes that hold for the whole supports of its fuzzy inputs."""
+    """Plane beam frame, reduced for the whole supports of its fuzzy inputs."""
     from alphacut.frame.structures.beam import BeamFrame
 
     numbers = {name: case.fuzzy(f"tower.{name}") for name in OTHERS["tower"] if name != "zeta"}
@@ -243,9 +238,7 @@ def parameters(case: Case, modulus: FuzzyNumber) -> dict[str, FuzzyNumber]:
 
 
 def columns(case: Case) -> tuple[float, ...]:
-    """Columns of each storey; where second moments differ, as many of the first storey's as are as
-    stiff.
-    """
+    """Columns of each storey; differing second moments become numbers of columns."""
     floors = len(case.fuzzies("frame.masses"))
     number, moments = (
         case.numbers("frame.columns"),

@@ -36,9 +36,7 @@ COLUMNS = {
 
 
 def in_unit(number: FuzzyNumber, unit: str, si: str) -> str:
-    """A fuzzy number as it would be written in a case: ``30 t``, ``[28, 30, 34] t``; of many α-cuts
-    support and modal value.
-    """
+    """Fuzzy number as in a case: ``30 t``, ``[28, 30, 34] t``."""
     (low, high), (left, right) = number.support, number.cut(1.0)
     if isinstance(number, PiecewiseLinear) and low < high:
         ends = [
@@ -60,9 +58,7 @@ def in_unit(number: FuzzyNumber, unit: str, si: str) -> str:
 
 
 def structure_words(case: Case, wanted: Structure) -> dict[str, Any]:
-    """``sentences`` about the structure, ``head`` and ``rows`` of a table of its floors or its
-    inputs.
-    """
+    """Sentences on the structure, and head and rows of a table of its floors."""
     if wanted.frame is not None:
         return {"sentences": list(frame_sentences(case, wanted)), **floors(case, wanted)}
     ground = None if wanted.linear is None else wanted.linear.ground
@@ -143,7 +139,7 @@ def motion(file: str, ground: Accelerogram) -> str:
 
 
 def moves(case: Case) -> list[str]:
-    """Which of displacements and velocities are not zero at the start."""
+    """Names of displacements and velocities that are not zero at the start."""
     kinds = ("displacements", "velocities")
     return [
         kind
@@ -155,9 +151,7 @@ def moves(case: Case) -> list[str]:
 
 
 def floors(case: Case, wanted: Structure) -> dict[str, Any]:
-    """A row for each floor, from the ground up: mass, height of the storey below it, and what else
-    is not zero.
-    """
+    """Row for each floor, from the ground up: mass, height and what is not zero."""
     damped = any(number.support.upper > 0 for number in case.fuzzies("frame.dampers"))
     kinds: Sequence[str] = ["masses", "lengths", *(["dampers"] if damped else []), *moves(case)]
     columns = [

@@ -28,9 +28,7 @@ Row = dict[str, Any]
 
 
 def summary(results: Results) -> dict[str, Any]:
-    """Everything in numbers: inputs that follow, the fuzzy modulus, the extremes of each study, the
-    comparison.
-    """
+    """Everything in numbers: inputs, fuzzy modulus, extremes, comparison."""
     case = results.case
     words = {
         "case": case.name,
@@ -69,7 +67,7 @@ def summary(results: Results) -> dict[str, Any]:
 
 
 def area_fraction(results: Results) -> float:
-    """Mean area fraction of the particle at the modal map: E[π r²/4], the cell having the area 4."""
+    """Mean area fraction of the particle at the modal map: E[π r²/4]."""
     from alphacut.stochastic import gauss_rule
 
     case = results.case
@@ -142,9 +140,7 @@ def structure_numbers(results: Results) -> dict[str, Any]:
 
 
 def counted(model: LinearSystem) -> int:
-    """Parameters of the structure, initial conditions included; the factors that the paper's frame
-    does not have are left out.
-    """
+    """Parameters of the structure, initial conditions included."""
     from alphacut.frame import StoreyFrame
 
     left_out = (
@@ -154,7 +150,7 @@ def counted(model: LinearSystem) -> int:
 
 
 def envelope_numbers(dataset: xarray.Dataset) -> dict[str, Any]:
-    """Extremes over time at the lowest level, widths, estimated errors where there are any, cost."""
+    """Extremes over time at the lowest level, widths, errors, cost."""
     lowest = dataset.isel(alpha=0)
     names = [str(name) for name in dataset["output"].values]
     low, high = lowest["lower"].min("time").values, lowest["upper"].max("time").values

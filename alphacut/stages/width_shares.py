@@ -1,5 +1,4 @@
-"""What drives the width: the share of each input in the width of the modulus over α, and of the
-vibration over time.
+"""Shares of the inputs in the width of the modulus and of the vibration.
 
 The share of an input is the width lost when it alone is fixed at its modal value. For these
 additional propagations the cheap exact models
@@ -51,8 +50,7 @@ def modulus_shares(case: Case) -> Shares:
 
 
 def envelope_shares(results: Results, study: Study) -> tuple[Shares, Array]:
-    """Shares of a study's fuzzy inputs in the width of every output at the lowest level, (inputs,
-    times, outputs); the times.
+    """Shares of a study's inputs in every output's width, (inputs, times, outputs).
 
     Raises:
         ModalError: The modal method cannot treat the structure.
@@ -85,9 +83,7 @@ def envelope_shares(results: Results, study: Study) -> tuple[Shares, Array]:
 
 
 def dataset(results: Results) -> xarray.Dataset:
-    """Shares of every input, of the modulus by level and of the richest study by time and output,
-    where there are two inputs or more.
-    """
+    """Shares of every input, by level and by time, where there are two or more."""
     import xarray
 
     from alphacut.frame.structures.modes import ModalError
@@ -116,9 +112,7 @@ def dataset(results: Results) -> xarray.Dataset:
 
 
 def thinned(duration: float, step: float) -> float:
-    """A multiple of the step that divides the duration into some hundreds of nodes: enough to see,
-    where the exact propagator steps.
-    """
+    """Multiple of the step that leaves some hundreds of nodes."""
     steps = round(duration / step)
     return step * max(k for k in range(1, max(2, steps // 300)) if steps % k == 0)
 
@@ -133,9 +127,7 @@ def richest(results: Results) -> Study | None:
 
 
 def mean_shares(found: xarray.Dataset) -> dict[str, dict[str, float]]:
-    """Shares for a table: of E at the lowest level, of each output as the mean over time weighted
-    with the width.
-    """
+    """Mean shares for a table: of E at the lowest level, of outputs over time."""
     table: dict[str, dict[str, float]] = {}
     if "modulus_share" in found:
         lowest = found["modulus_share"].isel(alpha=0)

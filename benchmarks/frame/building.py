@@ -1,5 +1,4 @@
-"""The eight-storey building under its record, five fuzzy inputs: time of the envelope, and the full
-model's trajectories against it.
+"""Eight-storey building under its record: envelope time, and the full model.
 
 Trajectories of the exact propagator try to leave the envelope: all corners, then random ones, then,
 at some nodes, the best of these climbed further by exact gradients. Bounds are also computed anew
@@ -108,9 +107,7 @@ def measured(
 def _climbed(
     flow: UnitFlow, found: Envelope, best: Array, peak: Array, nodes: Array, outside: float
 ) -> tuple[float, float]:
-    """What the full model reaches from the best samples at some nodes, and what it gives where the
-    envelope says its bounds are.
-    """
+    """Values that the full model reaches from the best samples at some nodes."""
     wrong = 0.0
     for k, node in enumerate(nodes):
         output = k % len(peak)

@@ -1,5 +1,4 @@
-"""The certificate of the paper's frame: its time, its gap, and random trajectories that must never
-leave it.
+"""Certificate of the paper's frame: time, gap, and trajectories that try to leave it.
 
 Run `python -m benchmarks.frame.certificate --help`.
 """
@@ -21,8 +20,7 @@ CHUNK = 500
 def measured(
     duration: float, step: float, gap: float, trajectories: int, workers: int
 ) -> dict[str, float]:
-    """Certifies the support (α = 0), then lets trajectories try to leave it: all corners, then
-    uniform and Chebyshev density in turn.
+    """Certify the support (α = 0), then try to leave it with many trajectories.
 
     Returns:
         "seconds" and "gap" (m) of the certificate, "trajectories" tried, "outside": by how much

@@ -1,5 +1,4 @@
-"""Envelope error over trajectories and time for all methods on the paper's frame: CSV and figure in
-benchmarks/results/.
+"""Envelope error over cost for all methods on the paper's frame.
 
 Run `python -m benchmarks.frame.envelopes --help`, or from `make charts`.
 """
@@ -58,9 +57,7 @@ METHODS: list[tuple[str, str, dict[str, Any]]] = [
 
 
 def transformed(plan: General | Reduced, steps: int, duration: float, step: float) -> Envelope:
-    """The envelope at α = 0 of the points that a transformation method takes with `steps` steps of
-    membership.
-    """
+    """Envelope at α = 0 of a transformation method with `steps` steps of membership."""
     cuts = boxes(INPUTS, (0,))
     points = cuts.to_unit(plan.points(Domain(INPUTS, levels(steps))).points)
     return sample(
@@ -73,9 +70,7 @@ def transformed(plan: General | Reduced, steps: int, duration: float, step: floa
 def optimised(
     truth: Envelope, duration: float, step: float, optimiser: str, nodes: int
 ) -> dict[str, Any]:
-    """Error of a SciPy optimiser at a few nodes of the third floor, both bounds; its trajectories
-    as if it had run at every node.
-    """
+    """Error of a SciPy optimiser at a few nodes of the third floor."""
     cuts, output = boxes(INPUTS, (0,)), 2
     flow = UnitFlow(LinearFlow(FRAME, cuts.names, duration, step, Exact()), cuts)
     error, calls, begun = 0.0, 0, time.perf_counter()

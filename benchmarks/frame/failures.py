@@ -1,5 +1,4 @@
-"""Where the Graph Follower fails: its true error over time, width of the supports and number of
-fuzzy parameters.
+"""Failures of the Graph Follower over time, width and number of parameters.
 
 The paper's frame, third floor. The supports of all fuzzy parameters have the same half width, a
 share of their modal values (of the largest initial displacement or velocity where the modal value
@@ -97,9 +96,7 @@ def measured(
 
 
 def draw(over_time: list[dict[str, Any]], over_count: list[dict[str, Any]], path: Path) -> None:
-    """Two maps per method: error over time and width for four parameters, largest error over number
-    of parameters and width.
-    """
+    """Maps of the error over time, width and number of parameters, per method."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -150,9 +147,7 @@ def _millimetres(error: float) -> str:
 
 
 def _table(rows: list[dict[str, Any]], key: str) -> tuple[list[float], list[float], Array]:
-    """Values of `key` and of the width, and the largest error for each pair, shape (widths,
-    values).
-    """
+    """Largest error for values of `key` and of the width, shape (widths, values)."""
     across, widths = sorted({row[key] for row in rows}), sorted({row["half_width"] for row in rows})
     table = np.zeros((len(widths), len(across)))
     for row in rows:

@@ -1,5 +1,4 @@
-"""What each improvement of the Graph Follower gives by itself, on the paper's frame: CSV and figure
-in benchmarks/results/.
+"""Gain of each improvement of the Graph Follower on the paper's frame.
 
 The faithful method with one switch turned at a time, all switches together, and the method in
 rounds. Errors are against the certified envelope of the same exact trajectories.

@@ -1,6 +1,4 @@
-"""Error over step size, stability limits and energy drift of the integrators: CSV and figure in
-benchmarks/results/.
-"""
+"""Error over step, stability limits and energy drift of the integrators."""
 
 from __future__ import annotations
 
@@ -41,9 +39,7 @@ def errors(steps: list[float], duration: float) -> Iterator[dict[str, Any]]:
 
 
 def drift(steps: int, step: float) -> dict[str, Array]:
-    """Largest relative change so far of the energy of the undamped frame, for every integrator at
-    the steps `counts(steps)`.
-    """
+    """Largest energy change so far of the undamped frame, at the steps `counts(steps)`."""
     outputs = ("q1", "q2", "q3", "v1", "v2", "v3")
     free = replace(FRAME, dampers=(0, 0, 0), outputs=outputs)
     matrices, _ = evaluate(free, (), np.zeros((1, 0)), derivatives=False)
@@ -64,9 +60,7 @@ def counts(steps: int) -> Array:
 
 
 def growth(phase: Array) -> dict[str, Array]:
-    """Factor per step on an undamped oscillation at ω h = `phase` for every integrator: above 1 it
-    is unstable.
-    """
+    """Factor per step on an undamped oscillation at ω h = `phase`."""
     oscillator = StoreyFrame((1.0,), (1.0,), 1 / 24, 1.0)  # ω = 1 rad/s
     matrices, _ = evaluate(oscillator, (), np.zeros((1, 0)), derivatives=False)
     found = {}

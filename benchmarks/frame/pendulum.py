@@ -1,5 +1,4 @@
-"""The pendulum with six fuzzy parameters: envelopes of the bar's force against a dense, polished
-reference, on three supports.
+"""Pendulum with six fuzzy parameters against a dense, polished reference.
 
 The reference is kept in benchmarks/results/frame_pendulum_reference.csv; `--reference` makes it
 anew (five minutes). Run `python -m benchmarks.frame.pendulum --help`.

@@ -1,5 +1,4 @@
-"""The pendulum written out once more, for a reference that shares nothing with the methods it
-judges.
+"""Pendulum written out once more, for an independent reference.
 
 With γ = g/l and δ = d/(m l²) the motion depends on (γ, δ, φ0, ω0) only: a step needs four first and
 sixteen second derivatives, and thousands of trajectories advance together in a second.
@@ -37,9 +36,7 @@ class Swing:
         return self.forces(self._physical(unit))
 
     def jets(self, unit: Array, which: Array) -> Jet:
-        """The force of every point at its own node, with derivatives by the unit coordinates, V =
-        (S,).
-        """
+        """Force of every point at its own node, with unit derivatives, V = (S,)."""
         order, half = np.argsort(which, kind="stable"), (self.upper - self.lower) / 2
         back = np.argsort(order)
         jet = self.force_at(self._physical(unit)[order], which[order])[back]
@@ -55,9 +52,7 @@ class Swing:
         )
 
     def forces(self, points: Array) -> Array:
-        """The bar's force at all nodes, shape (S, T), in N, for points (S, 6) in the order of
-        `PARAMETERS`.
-        """
+        """Bar force at all nodes, shape (S, T), in N, for points (S, 6)."""
         m, length, d, g, angle, rate = points.T
         weight, damping = g / length, d / (m * length**2)
         out = np.empty((self.count, len(points)))
@@ -67,8 +62,7 @@ class Swing:
         return out.T
 
     def force_at(self, points: Array, nodes: Array) -> Jet:
-        """The force of every point at its own node with derivatives by the six parameters, V =
-        (S,).
+        """Force of every point at its own node with six derivatives, V = (S,).
 
         Args:
             points: Shape (S, 6).
@@ -88,9 +82,7 @@ class Swing:
     def _advance(
         self, angle: Array, rate: Array, weight: Array, damping: Array
     ) -> tuple[Array, Array, Array]:
-        """One step: (1 + hδ/2) v̄ + h/2 γ sin φ̄ = ω[k], ω[k+1] = 2 v̄ − ω[k]; returns φ[k+1],
-        ω[k+1] and φ̄.
-        """
+        """Step (1 + hδ/2) v̄ + h/2 γ sin φ̄ = ω[k], ω[k+1] = 2 v̄ − ω[k]."""
         h, c = self.step, (2 + self.step * damping) / self.step
         middle = angle + rate / c
         for _ in range(20):
@@ -104,7 +96,7 @@ class Swing:
     def _state_at(
         self, weight: Array, damping: Array, angle: Array, rate: Array, nodes: Array
     ) -> tuple[Jet, Jet]:
-        """Angle and rate of every trajectory at its own node, with derivatives by (γ, δ, φ0, ω0)."""
+        """Angle and rate of every trajectory at its node, with derivatives."""
         a, w = Jet.constant(angle, 4), Jet.constant(rate, 4)
         a.first[2], w.first[3] = 1.0, 1.0
         found = [Jet.constant(np.zeros(len(angle)), 4) for _ in range(2)]

@@ -1,5 +1,4 @@
-"""The promise of `auto` on random frames: true error against the tolerance, with and without the
-modal method.
+"""True error of `auto` on random frames against its tolerance.
 
 Run `python -m benchmarks.frame.random_frames --help`.
 """
@@ -64,9 +63,7 @@ def _around(middle: float, rng: np.random.Generator) -> FuzzyNumber:
 
 
 def certified(frame: StoreyFrame, inputs: Mapping[str, FuzzyNumber]) -> Envelope | None:
-    """The envelope with inner and outer bounds no further apart than `GAP`; None where the modes
-    are not smooth enough for it.
-    """
+    """Envelope with bounds within `GAP`; None where modes are not smooth enough."""
     try:
         return envelope(frame, inputs, method="modal", certify=GAP, **TIME)
     except ValueError:
@@ -76,9 +73,7 @@ def certified(frame: StoreyFrame, inputs: Mapping[str, FuzzyNumber]) -> Envelope
 def true_errors(
     frame: StoreyFrame, inputs: Mapping[str, FuzzyNumber], found: Sequence[Envelope]
 ) -> list[float]:
-    """Largest error of each envelope, in m: beyond the certified bounds, or against a dense,
-    polished reference at every 20th node.
-    """
+    """Largest error of each envelope, in m, by certificate or dense reference."""
     truth = certified(frame, inputs)
     if truth is None:
         cuts = boxes(inputs, (0,))

@@ -1,5 +1,4 @@
-"""True envelopes by brute force: dense sampling of the box, then Newton's method on exact
-derivatives from the best points of every node.
+"""True envelopes by dense sampling and Newton's method from the best points.
 
 No storage of graphs, no modes, no polynomials: what the methods are judged by shares nothing with
 them but the quadratic problem that proposes Newton's steps, and every value is that of a
@@ -90,8 +89,7 @@ class PolishedSearch:
         neighbour: int = 1,
         promising: float = np.inf,
     ) -> PolishedSearch:
-        """Samples the box, polishes the best points of every number and side, then passes optima on
-        between neighbours.
+        """Sample the box, polish the best points, pass optima on between neighbours.
 
         Args:
             samples: Points of the box.
@@ -109,9 +107,7 @@ class PolishedSearch:
         return self
 
     def _sampled(self, samples: int, candidates: int, seed: int) -> Array:
-        """The best point of every orthant of the parameters that matter most, shape (Q, 2,
-        candidates, d).
-        """
+        """Best point of every orthant of the main parameters, (Q, 2, candidates, d)."""
         points = spread(samples, self.dimension, seed)
         axes = self._important()[: int(np.log2(candidates))]
         orthant = (points[:, axes] > 0) @ (1 << np.arange(len(axes)))
@@ -139,18 +135,14 @@ class PolishedSearch:
         return order
 
     def polish(self, starts: Array, promising: float = np.inf) -> None:
-        """Newton's method from `starts` (Q, 2, d); those that begin more than `promising` short are
-        left out.
-        """
+        """Newton's method from `starts` (Q, 2, d) that are at most `promising` short."""
         number, side = np.repeat(np.arange(self.count), 2), np.tile([0, 1], self.count)
         flat = starts.reshape(-1, self.dimension)
         for which in np.array_split(np.arange(len(flat)), -(-len(flat) // self.chunk)):
             self._newton(flat[which], number[which], side[which], promising)
 
     def _newton(self, x: Array, number: Array, side: Array, promising: float) -> None:
-        """Newton's method with a trust region in the box, from points that begin less than
-        `promising` short.
-        """
+        """Newton's method with a trust region in the box."""
         value, g, H = self._model(x, number, side)
         keep = value > self.value[number, side] - promising
         x, number, side, value, g, H = (y[keep] for y in (x, number, side, value, g, H))
@@ -193,9 +185,7 @@ class PolishedSearch:
 
 
 def spread(samples: int, d: int, seed: int) -> Array:
-    """A Sobol sequence turned in thirds into corners, Chebyshev density and uniform density, shape
-    (samples, d) in [−1, 1].
-    """
+    """Sobol points as corners, Chebyshev and uniform density, (samples, d) in [−1, 1]."""
     share = qmc.Sobol(d, rng=np.random.default_rng(seed)).random(samples)
     kind = (np.arange(samples) % 3)[:, None]
     points: Array = np.select(
@@ -212,7 +202,7 @@ def true_envelope(
     seed: int = 1,
     promising: float = np.inf,
 ) -> TrueEnvelope:
-    """The envelope over the widest box at all nodes of `flow`; arguments as `PolishedSearch.run`."""
+    """Envelope over the widest box at all nodes of `flow`."""
     m = len(flow.outputs)
     search = PolishedSearch(
         FlowResponse(flow), len(flow.boxes.names), len(flow.time) * m, chunk=256
@@ -240,8 +230,7 @@ class TrueEnvelope:
         return (self.search.value * [-1, 1]).reshape(len(self.flow.time), -1, 2)
 
     def errors(self, found: Envelope) -> Array:
-        """Distance of both bounds at α = 0 from the truth, shape (T, m, 2), once the parameters
-        found are polished too.
+        """Distance of both bounds at α = 0 from the truth, shape (T, m, 2).
 
         The nodes of the reference are every n-th of `found`.
         """

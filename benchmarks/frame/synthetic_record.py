@@ -1,5 +1,4 @@
-"""A made-up earthquake record: filtered noise in the spectrum of Kanai and Tajimi, for cases that
-ship; no earthquake was like it.
+"""Synthetic earthquake record: noise in the spectrum of Kanai and Tajimi.
 
     python -m benchmarks.frame.synthetic_record > cases/building.record.csv
 

@@ -1,5 +1,4 @@
-"""A tower of 50 storeys and 10 bays under an earthquake record: envelopes of its reduced structure
-against the full one.
+"""Tower of 50 storeys and 10 bays: reduced envelopes against the full model.
 
 Run `python -m benchmarks.frame.tower --help`.
 """

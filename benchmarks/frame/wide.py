@@ -1,5 +1,4 @@
-"""Wide supports and many parameters: the paper's frame where the response has many basins, against
-dense, polished references.
+"""Wide supports and many parameters, against dense, polished references.
 
 Run `python -m benchmarks.frame.wide --help`.
 """
@@ -33,9 +32,7 @@ def wide(share: float) -> dict[str, FuzzyNumber]:
 
 
 def sixteen() -> dict[str, FuzzyNumber]:
-    """All sixteen parameters: the paper's E, masses ±5 %, lengths ±1 %, dampers ±20 %, q0 and v0
-    ±10 % (at least 1 mm, 0.01 m/s).
-    """
+    """Sixteen parameters: E, masses ±5 %, lengths ±1 %, dampers ±20 %, start ±10 %."""
     modal, shares = (
         FRAME.parameters,
         {"l": (0.01, 0.0), "d": (0.2, 0.0), "q0": (0.1, 0.001), "v0": (0.1, 0.01)},
@@ -74,9 +71,7 @@ def reference(
 
 
 def compared(found: Envelope, truth: TrueEnvelope) -> dict[str, float]:
-    """Largest and median error (m), share of nodes (of all outputs) whose error the estimate
-    covers, and the cost.
-    """
+    """Largest and median error (m), covered share of nodes, and cost."""
     every = (len(found.time) - 1) // (len(truth.flow.time) - 1)
     wrong = truth.errors(found).max(-1)
     assert found.error is not None

@@ -1,5 +1,4 @@
-"""Evaluations and wall time until all bounds of a fuzzy result are right to 1e-3 of its width, by
-plan, optimiser and package.
+"""Cost until all bounds are right to 1e-3 of the width, by plan and package.
 
 Every method gets the same fuzzy inputs and five α-levels, and more effort step by step until the
 worst bound of all levels is within 1e-3 of the width of the support's image; the first effort that
@@ -55,7 +54,7 @@ LIMIT = 200_000  # evaluations beyond which no effort is made
 
 @dataclass(frozen=True)
 class Problem:
-    """A function of arrays with its fuzzy inputs, and the signs of its effects if they are known."""
+    """Function of arrays with its fuzzy inputs, and the signs of its effects."""
 
     name: str
     function: Function
@@ -65,7 +64,7 @@ class Problem:
 
 @dataclass(frozen=True)
 class Row:
-    """What one method took on one problem; NaN where no effort was enough."""
+    """Cost of one method on one problem; NaN where no effort was enough."""
 
     problem: str
     method: str

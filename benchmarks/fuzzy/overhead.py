@@ -1,5 +1,4 @@
-"""What a campaign costs besides its model: time per sample and memory, with a store and without,
-for a model that costs nothing.
+"""Cost of a campaign besides its model: time per sample and memory.
 
 Writes benchmarks/results/fuzzy_overhead.csv and .png. The store is written with `synchronous =
 FULL`, so the time holds for this disk.
@@ -26,9 +25,7 @@ from alphacut.fuzzy.samples.model import Model
 
 @dataclass(frozen=True)
 class Row:
-    """One campaign: samples, time per sample in ms, memory of the process before and at its end,
-    and what its numbers alone take, in MB.
-    """
+    """Campaign: samples, time per sample in ms, memory in MB."""
 
     samples: int
     where: str

@@ -1,6 +1,4 @@
-"""The ways to one modulus that the charts compare: each a family of runs, from coarse to fine, on
-the paper's case at modal values.
-"""
+"""Families of ways to one modulus, from coarse to fine, for the charts."""
 
 from __future__ import annotations
 
@@ -148,8 +146,7 @@ def series(points: int) -> Way:
 
 
 def monte_carlo(samples: int) -> Way:
-    """The mean over θ by sampling: the root mean square error of 20 seeds, and the time of as many
-    planar cells.
+    """Mean over θ by sampling: root mean square error of 20 seeds, and time.
 
     Each cell is as cheap as a planar cell can be; the sampling error hides its discretisation.
     """
@@ -266,9 +263,7 @@ def families(*, small: bool = False) -> list[Family]:
 
 
 def measure(family: Family, *, exact: float, cap: float) -> Iterator[Run]:
-    """Run one family; what would take longer than `cap` seconds, five times the run before, is
-    marked and not run.
-    """
+    """Run one family up to `cap` seconds a run."""
     name, ways = family
     last, stopped = 0.0, False
     ways[0][1]()  # compilation and first imports are not what is compared

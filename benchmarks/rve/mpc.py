@@ -1,6 +1,4 @@
-"""The same planar cells by dolfinx_mpc: its periodic constraint and LU, for comparison in the
-charts alone.
-"""
+"""The same planar cells by dolfinx_mpc, for comparison."""
 
 from __future__ import annotations
 
@@ -31,9 +29,7 @@ def mpc_modulus(
     mesh_size: float,
     points: int,
 ) -> tuple[float, float, int]:
-    """E in Pa by Gauss nodes in θ, the processor seconds without compilation, and the unknowns of
-    the largest cell.
-    """
+    """E in Pa by Gauss nodes in θ, processor seconds, and largest unknowns."""
     rule = theta_rule(radius_map, points=points)
     solved = [
         _cell(float(r), matrix, inclusion, order=order, mesh_size=mesh_size)
@@ -50,9 +46,7 @@ def mpc_modulus(
 def _cell(
     radius: float, matrix: Phase, inclusion: Phase, *, order: int, mesh_size: float
 ) -> tuple[Array, float, int]:
-    """σ11 for ε11 = ε22 = 1 and σ12 for ε12 = 1, in Pa, the processor seconds without compilation,
-    and the unknowns.
-    """
+    """σ11 and σ12 of unit loads, in Pa, processor seconds, and unknowns."""
     import dolfinx_mpc
     from petsc4py import PETSc
 
@@ -95,9 +89,7 @@ def _periodic(space: Any) -> tuple[Any, Any]:
 
 
 class _Forms(NamedTuple):
-    """Compiled forms of a cell: stiffness, load under `strain`, and the mean stresses (11, 12) of
-    `displacement` over the cell's area.
-    """
+    """Compiled forms of a cell: stiffness, load, and mean stresses."""
 
     bilinear: Any
     linear: Any

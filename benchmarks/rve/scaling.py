@@ -1,5 +1,4 @@
-"""Whether the default solver's time per unknown and its iterations stay as mesh size, layers or
-contrast change, one at a time.
+"""Time per unknown and iterations over mesh size, layers and contrast.
 
 One process, one thread; set-up and both loads. Writes benchmarks/results/cell_scaling.csv; exit
 status 1 where a factor exceeds 1.5.
@@ -26,7 +25,7 @@ CHANGES: Mapping[str, tuple[float, ...]] = {
 
 
 def settings(change: str, value: float, mesh_size: float) -> dict[str, Any]:
-    """What `measure` needs for one point of a series."""
+    """Settings of `measure` for one point of a series."""
     chosen: dict[str, Any] = {
         "mesh_size": value if change == "mesh size" else mesh_size,
         "layers": int(value) if change == "layers" else 12,
@@ -48,9 +47,7 @@ def series(
 
 
 def spreads(rows: Sequence[tuple[str, float, Timing]]) -> dict[str, tuple[float, float]]:
-    """Largest over smallest time per unknown, and largest over smallest number of iterations, for
-    each change.
-    """
+    """Largest over smallest time per unknown and iterations, for each change."""
     out = {}
     for change in dict.fromkeys(row[0] for row in rows):
         own = [timing for name, _, timing in rows if name == change]

@@ -1,5 +1,4 @@
-"""The product-space cell's default linear solver against a sparse direct one and algebraic
-multigrid: `make bench-solver`.
+"""Default solver against a direct one and multigrid: `make bench-solver`.
 
 One process, one thread, both loads; set-up and solve are timed, assembly is the same for all.
 Ratios of times from one run. A solver that needs more than the cap is stopped there, and its time
@@ -53,9 +52,7 @@ class Timing:
 def measure(
     solver: str, *, mesh_size: float, layers: int = 12, repeat: int = 1, particle: Phase = PARTICLE
 ) -> Timing:
-    """Time one solver; the first run, which makes mesh and code, does not count when there are
-    more.
-    """
+    """Time one solver, without the first run when there are more."""
     from alphacut.rve.prism.model import PrismModel
 
     model = PrismModel(mesh_size=mesh_size, layers=layers, solver=solver)
@@ -75,9 +72,7 @@ def measure(
 def measure_capped(
     solver: str, first: Timing, *, cap: float, mesh_size: float, repeat: int
 ) -> Timing:
-    """Time one solver in a process of its own; stopped after `cap` seconds besides what `first`
-    spent outside its solver.
-    """
+    """Time one solver in a process of its own, stopped after `cap` seconds."""
     with ProcessPoolExecutor(1, mp_context=get_context("forkserver")) as executor:
         executor.submit(
             measure, solver, mesh_size=SMALL
@@ -92,7 +87,7 @@ def measure_capped(
 
 
 def compare(timings: Sequence[Timing]) -> list[str]:
-    """What falls short: a ratio below `AT_LEAST` or a modulus that differs."""
+    """Shortfalls: a ratio below `AT_LEAST` or a modulus that differs."""
     first, faults = timings[0], []
     for other in timings[1:]:
         if other.seconds < AT_LEAST.get(other.solver, 0) * first.seconds:
@@ -121,9 +116,7 @@ def _row(t: Timing, first: Timing) -> list[str | int]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the table, write the CSV file; exit 1 if the default solver is not as much faster as it
-    claims.
-    """
+    """Print the table, write the CSV file; exit 1 if the default is too slow."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -167,9 +160,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             row = _row(t, timings[0])
             writer.writerow(row)
             print(
-                "{:8s}{:>8} unknowns{:>10} s{:>6} iterations   E = {} GPa{:>8} times the default".format(
-                    *row
-                )
+                "{:8s}{:>8} unknowns{:>10} s{:>6} iterations   E = {} GPa{:>8} times".format(*row)
             )
     faults = compare(timings)
     print("\n".join(faults), file=sys.stderr, end="\n" if faults else "")

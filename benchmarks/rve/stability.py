@@ -1,4 +1,4 @@
-"""What the models of the cell do at their edges: `make stability`.
+"""Models of the cell at their edges: `make stability`.
 
 Every row is one edge and one model: the error declared and the true one (against the series), or
 the sentence of refusal. A row is wrong, and the program exits with 1, where a result came without a
@@ -113,9 +113,7 @@ LAYERS = (2, 3, 6, 12, 25, 50, 100, 200)
 
 @dataclass(frozen=True)
 class Row:
-    """One edge met by one model: errors relative in E; `declared` and `true` are nan where the
-    model refused.
-    """
+    """Edge met by one model; `declared` and `true` are nan where refused."""
 
     edge: str
     model: str

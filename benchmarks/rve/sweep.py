@@ -1,5 +1,4 @@
-"""Moduli of the square array over the particles' area fraction, 0 to 0.5: eq. 16, both shear
-moduli, and the bounds.
+"""Moduli of the square array over the area fraction, with bounds.
 
 By the series; a row of planar slices beside it would not be told apart.
 """

@@ -1,5 +1,4 @@
-"""Does the one-particle stochastic cell stand for the random material? Many-particle cells,
-homogenised directly, say.
+"""One-particle cell against many-particle cells, homogenised directly.
 
     ./enter python -m benchmarks.stochastic.many_particles --cells 30 --discs 60
 
@@ -49,9 +48,7 @@ def compare(
     size: float = 0.2,
     around: int = 20,
 ):
-    """Stiffness of each many-particle cell, shape (cells, 3, 3), and the averages over the r_n of
-    the same packings.
-    """
+    """Stiffness of each many-particle cell, (cells, 3, 3), and averages over r_n."""
     wish = Packing(discs, fraction, LogNormalRadii(1e-3, 1e-2), gap=1e-4)
     sample = reduced_radii(Simulated(wish, cells).sections(seed))
     task = partial(homogenised, size=size, around=around)
@@ -71,7 +68,7 @@ def compare(
 
 
 def sentence(moduli: np.ndarray, known: Averages) -> str:
-    """What the comparison says, in words."""
+    """The comparison in words."""
     mean, error = moduli.mean(), moduli.std(ddof=1) / np.sqrt(len(moduli))
     one, stress, single = (
         x.modulus / 1e9 for x in (known.one_particle, known.equal_stress, known.single)

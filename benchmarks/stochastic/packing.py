@@ -1,4 +1,4 @@
-"""How fast discs are packed and their Apollonius cells measured, over the number of discs.
+"""Time of packing discs and of their Apollonius cells, over their number.
 
     ./enter python -m benchmarks.stochastic.packing --discs 1000 10000 100000
 
@@ -28,9 +28,7 @@ KINDS = {"log-normal, 0.2": (0.2, 10.0), "log-normal, 0.6": (0.6, 10.0), "equal,
 
 @dataclass(frozen=True)
 class Timing:
-    """One packing: its kind (law of the radii, area fraction), size, wall times in s, and relative
-    error of the sum of areas.
-    """
+    """Packing: kind, size, wall times in s, and relative error of the areas' sum."""
 
     kind: str
     discs: int

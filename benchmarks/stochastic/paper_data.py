@@ -1,5 +1,4 @@
-"""The paper's statistics of r_n against packings of its data as described, and readings of that
-description that come nearer.
+"""The paper's statistics of r_n against packings of its data as described.
 
     ./enter python -m benchmarks.stochastic.paper_data
 

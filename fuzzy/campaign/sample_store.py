@@ -27,7 +27,8 @@ _SHARE = 10  # a transaction that took t is not followed by another within 10 t
 _FULL = 1000
 _SAVE = """
 INSERT INTO sample VALUES (?, ?, ?, ?, ?) ON CONFLICT (model, point)
-DO UPDATE SET outputs = excluded.outputs, error = excluded.error, seconds = excluded.seconds WHERE sample.outputs IS NULL
+DO UPDATE SET outputs = excluded.outputs, error = excluded.error, seconds = excluded.seconds
+WHERE sample.outputs IS NULL
 """
 
 

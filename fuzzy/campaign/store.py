@@ -24,7 +24,8 @@ _PATIENCE = 60.0  # seconds to wait for another campaign's transaction
 _SCHEMA = """
 CREATE TABLE model (id INTEGER PRIMARY KEY, identity TEXT NOT NULL UNIQUE, layout TEXT);
 CREATE TABLE sample (
-    model INTEGER NOT NULL REFERENCES model, point TEXT NOT NULL, outputs BLOB, error TEXT, seconds REAL,
+    model INTEGER NOT NULL REFERENCES model, point TEXT NOT NULL, outputs BLOB, error TEXT,
+    seconds REAL,
     PRIMARY KEY (model, point)
 ) WITHOUT ROWID;
 """
