@@ -208,7 +208,7 @@ class BranchAndBound:
         f, g, H = _signed_taylor(model, optima, cells.centre, j)
         better = f > optima.value[j] + 1e-10
         if better.any():
-            _improve(model, optima, j[better], cells.centre[better], f[better], lower, upper)
+            self._improve(model, optima, j[better], cells.centre[better], f[better], (lower, upper))
         r = cells.radius
         Tr = np.einsum("nijk,nk->nij", T, r)
         rest = np.einsum("nij,ni,nj->n", Tr, r, r) / 6
@@ -235,6 +235,20 @@ class BranchAndBound:
         weight = r * (np.einsum("nij,nj->ni", Tr, r) + 0.5 * np.einsum("nij,nj->ni", np.abs(H), r))
         halves = cells.take(split).halved(weight[split].argmax(1))
         return joined([cells.take(np.flatnonzero(open_ & collapse.any(1))), halves])
+
+    def _improve(
+        self,
+        model: ModalModel,
+        optima: Optima,
+        problem: Array,
+        points: Array,
+        values: Array,
+        box: tuple[Array, Array],
+    ) -> None:
+        """Takes over the best of the points found higher, then refines them."""
+        order = np.argsort(values)
+        optima.point[problem[order]], optima.value[problem[order]] = points[order], values[order]
+        refine(model, optima, np.unique(problem), *box, self.gap / 100)
 
     def _close_by_quadratic(
         self, f: Array, g: Array, H: Array, r: Array, rest: Array, target: Array, open_: Array
@@ -276,21 +290,6 @@ def _signed_taylor(
     side = optima.side[problem]
     f, g, H = model.at(points, optima.node[problem], optima.output[problem])
     return side * f, side[:, None] * g, side[:, None, None] * H
-
-
-def _improve(
-    model: ModalModel,
-    optima: Optima,
-    problem: Array,
-    points: Array,
-    values: Array,
-    lower: Array,
-    upper: Array,
-) -> None:
-    """Takes over the best of the points found higher, then refines them."""
-    order = np.argsort(values)
-    optima.point[problem[order]], optima.value[problem[order]] = points[order], values[order]
-    refine(model, optima, np.unique(problem), lower, upper)
 
 
 def _separable(g: Array, H: Array, r: Array) -> Array:

@@ -27,6 +27,8 @@ PORTION = 0.2
 """Share of the gap that the error of the modal model may take on either side."""
 USUAL = 10.0
 """Proved over sampled error, seldom less."""
+CONVERGED = 1e-3
+"""Share of the wanted error that Newton's method may leave."""
 ATTEMPTS = 5
 """Models of rising degree that are tried before the error is sampled instead of proved."""
 SEARCHED = 0.1
@@ -94,14 +96,14 @@ def modal(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> E
     model = fit_modes(
         flow.flow, flow.boxes, tolerance=method.tolerance, budget=method.budget, scale=flow.scale
     )
-    bounds, at = search_levels(model, ModalSearch.suited(model, method.seed), progress)
+    bounds, at, left = search_levels(flow, model, method, method.tolerance, progress)
     facts: dict[str, float | str] = {
         "model_error": float(model.error.max()),
         "degree": model.degree,
     }
     if (short := _short_of(model, method.tolerance, flow.scale)) is not None:
         facts["reason"] = short
-    error = np.broadcast_to(2 * model.error, bounds.shape[:-1]).copy()
+    error = 2 * model.error + left.max(-1)
     cost = {"trajectories": model.analyses, "seconds": time.perf_counter() - begun}
     return signed_envelope(
         flow, bounds, at, method="modal", nature="estimated", error=error, facts=facts, **cost
@@ -128,7 +130,7 @@ def _certified(
     model, error, unproved = _model_with_error(flow.flow, flow, method, gap)
     searched = progress and (lambda share: progress(SEARCHED * share))
     proved = progress and (lambda share: progress(SEARCHED + (1 - SEARCHED) * share))
-    bounds, at = search_levels(model, ModalSearch.suited(model, method.seed), searched)
+    bounds, at, _ = search_levels(flow, model, method, gap, searched)
     proof = certify(
         model,
         bounds,
@@ -211,19 +213,26 @@ def _model_with_error(
 
 
 def search_levels(
-    model: ModalModel, search: ModalSearch, progress: Callable[[float], None] | None
-) -> tuple[Array, Array]:
-    """Nested bounds (A, T, m, 2) and unit coordinates (A, T, m, 2, d) on all levels."""
-    cuts = model.boxes
+    flow: UnitFlow,
+    model: ModalModel,
+    method: Modal,
+    wanted: float,
+    progress: Callable[[float], None] | None,
+) -> tuple[Array, Array, Array]:
+    """Nested bounds (A, T, m, 2), unit coordinates (A, T, m, 2, d) and what is left to gain."""
+    cuts, scaled = model.boxes, model.in_units(flow.scale)
+    search = ModalSearch.suited(scaled, method.seed, CONVERGED * wanted)
     shape = (len(cuts.alpha), len(model.time), len(model.outputs), 2)
-    bounds, at = np.empty(shape), np.empty((*shape, len(cuts.names)))
+    bounds, at, left = np.empty(shape), np.empty((*shape, len(cuts.names))), np.empty(shape)
     for done, level in enumerate(reversed(range(shape[0]))):
         if progress:
             progress(done / shape[0])
-        bounds[level], at[level] = search.run(
-            model, *cuts.unit(level), np.zeros((0, len(cuts.names)))
+        box = cuts.unit(level)
+        bounds[level], at[level], left[level] = search.run(
+            scaled, *box, np.zeros((0, len(cuts.names)))
         )
         if done:
             kept = bounds[level + 1] > bounds[level]
             bounds[level][kept], at[level][kept] = bounds[level + 1][kept], at[level + 1][kept]
-    return bounds, at
+    unit = flow.scale[:, None]
+    return bounds * unit, at, left * unit

@@ -8,7 +8,7 @@ the Graph Follower: envelopes consist of segments of graphs) until nothing impro
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -25,6 +25,8 @@ CALM = 20.0
 """Change of phase (rad) over the box up to which the least effort finds the basins."""
 PIECE = 2000
 """Problems treated together; more would leave the cache."""
+ITERATIONS = 300
+"""Newton steps after which a problem that has not converged is left as it is."""
 
 
 @dataclass(eq=False)
@@ -37,6 +39,7 @@ class Optima:
         side: +1 for an upper bound, −1 for a lower, shape (N,).
         point: Unit coordinates, shape (N, d).
         value: side × output there, shape (N,).
+        left: What Newton's method last promised beyond it, shape (N,).
     """
 
     node: Array
@@ -44,15 +47,11 @@ class Optima:
     side: Array
     point: Array
     value: Array
+    left: Array
 
     def take(self, which: Array) -> Optima:
         """A copy of the problems `which`."""
-        return Optima(
-            *(
-                getattr(self, name)[which].copy()
-                for name in ("node", "output", "side", "point", "value")
-            )
-        )
+        return Optima(*(getattr(self, part.name)[which].copy() for part in fields(self)))
 
     def offer(self, model: ModalModel, points: Array, which: Array) -> Array:
         """Try `points` (W, d) on problems `which` (W,), keep and return the better ones."""
@@ -72,19 +71,19 @@ class ModalSearch:
     Args:
         samples: Trajectories of the modal model that find the basins.
         starts: Basins refined per problem.
-        iterations: Newton steps.
+        small: Gain that Newton's method leaves, in units of the outputs.
         resolution: Phase of the fastest mode (rad) between nodes that are searched anew.
         seed: Of the samples.
     """
 
     samples: int = 512
     starts: int = 2
-    iterations: int = 10
+    small: float = 1e-9
     resolution: float = 0.25
     seed: int = 0
 
     @classmethod
-    def suited(cls, model: ModalModel, seed: int = 0) -> ModalSearch:
+    def suited(cls, model: ModalModel, seed: int = 0, small: float = 1e-9) -> ModalSearch:
         """More samples and starts where phases vary much over the box."""
         middle, rest = model.eigenvalue.coefficients[0], model.eigenvalue.coefficients[1:]
         lasting = np.minimum(
@@ -92,12 +91,12 @@ class ModalSearch:
         )  # a mode that has died down has no basins
         turned = float((np.abs(rest).sum(0) * lasting).max())  # rad
         more = int(np.clip(np.log2(max(turned, 1.0) / CALM), 0, 2))
-        return cls(samples=512 * 2**more, starts=2 + more, seed=seed)
+        return cls(samples=512 * 2**more, starts=2 + more, small=small, seed=seed)
 
     def run(
         self, model: ModalModel, lower: Array, upper: Array, extra: Array
-    ) -> tuple[Array, Array]:
-        """Upper bounds of (−output, output) and their unit coordinates.
+    ) -> tuple[Array, Array, Array]:
+        """Upper bounds of (−output, output), their unit coordinates, and what is left to gain.
 
         Args:
             model: The modal model.
@@ -106,13 +105,15 @@ class ModalSearch:
             extra: Further points to try everywhere, shape (E, d).
 
         Returns:
-            Bounds, shape (T, m, 2), and points, shape (T, m, 2, d).
+            Bounds, shape (T, m, 2), points, shape (T, m, 2, d), and what Newton's method promises
+            beyond the bounds, shape (T, m, 2).
         """
         if not (upper > lower).any():
             values = model.values(lower[None])[0]
             return (
                 np.stack([-values, values], -1),
                 np.broadcast_to(lower, (*values.shape, 2, len(lower))).copy(),
+                np.zeros((*values.shape, 2)),
             )
         fastest = float(np.abs(model.eigenvalue.coefficients[0]).max())
         stride = max(1, int(self.resolution / (fastest * model.flow.step)))
@@ -130,7 +131,7 @@ class ModalSearch:
         nodes = np.unique(np.append(np.arange(0, len(model.time), stride), len(model.time) - 1))
         best = _best_of_pool(*pool, nodes, self.starts)
         for optima in best:
-            refine(model, optima, np.arange(len(optima.value)), lower, upper, self.iterations)
+            refine(model, optima, np.arange(len(optima.value)), lower, upper, self.small)
         found = replace(best[0], point=best[0].point.copy(), value=best[0].value.copy())
         for other in best[1:]:
             better = other.value > found.value
@@ -155,7 +156,7 @@ class ModalSearch:
             again = np.flatnonzero(changed)
             if not len(again):
                 return
-            refine(model, found, again, lower, upper, self.iterations)
+            refine(model, found, again, lower, upper, self.small)
             fresh = changed
 
     def _spread(
@@ -165,7 +166,7 @@ class ModalSearch:
         lower: Array,
         upper: Array,
         pool: tuple[Array, Array],
-    ) -> tuple[Array, Array]:
+    ) -> tuple[Array, Array, Array]:
         """Carry optima to all nodes, from either neighbour, then Newton; rivals likewise."""
         m, d, total = len(model.outputs), coarse[0].point.shape[1], len(model.time)
         nodes = coarse[0].node.reshape(-1, 2 * m)[:, 0]
@@ -183,7 +184,7 @@ class ModalSearch:
             return out
 
         found = carried(coarse[0])
-        refine(model, found, every, lower, upper, self.iterations)
+        refine(model, found, every, lower, upper, self.small)
         margin = RIVAL * np.abs(found.value).max()
         for rival in [
             *(carried(other) for other in coarse[1:]),
@@ -191,10 +192,12 @@ class ModalSearch:
         ]:
             apart = np.abs(rival.point - found.point).max(1) > 0.1 * (upper - lower).max()
             which = np.flatnonzero(apart & (rival.value > found.value - margin))
-            refine(model, rival, which, lower, upper, self.iterations)
+            refine(model, rival, which, lower, upper, self.small)
             found.offer(model, rival.point[which], which)
         self._contest(model, found, lower, upper)
-        return found.value.reshape(total, m, 2), found.point.reshape(total, m, 2, d)
+        refine(model, found, every, lower, upper, self.small)
+        shape = (total, m, 2)
+        return found.value.reshape(shape), found.point.reshape(*shape, d), found.left.reshape(shape)
 
     def _contest(self, model: ModalModel, found: Optima, lower: Array, upper: Array) -> None:
         """Refine either optimum at both nodes of a jump, until no jump moves."""
@@ -218,7 +221,7 @@ class ModalSearch:
                     if jump.any()
                     else 0.0
                 )
-                refine(model, rival, np.arange(len(rival.value)), lower, upper, self.iterations)
+                refine(model, rival, np.arange(len(rival.value)), lower, upper, self.small)
                 moved.append(found.offer(model, rival.point, here[jump]))
             open_[:] = False
             open_[np.concatenate(moved)] = True
@@ -253,7 +256,14 @@ def problems(nodes: Array, outputs: int, d: int) -> Optima:
         np.tile(np.repeat(np.arange(outputs), 2), len(nodes)),
         np.tile([-1.0, 1.0], len(nodes) * outputs),
     )
-    return Optima(node, output, side, np.zeros((len(node), d)), np.full(len(node), -np.inf))
+    return Optima(
+        node,
+        output,
+        side,
+        np.zeros((len(node), d)),
+        np.full(len(node), -np.inf),
+        np.zeros(len(node)),
+    )
 
 
 def _best_of_pool(pool: Array, values: Array, nodes: Array, starts: int) -> list[Optima]:
@@ -280,47 +290,51 @@ def _best_of_pool(pool: Array, values: Array, nodes: Array, starts: int) -> list
 
 
 def refine(
-    model: ModalModel,
-    optima: Optima,
-    which: Array,
-    lower: Array,
-    upper: Array,
-    iterations: int = 10,
+    model: ModalModel, optima: Optima, which: Array, lower: Array, upper: Array, small: float
 ) -> None:
-    """Newton's method with a trust region in the box on problems `which`."""
+    """Newton's method in the box on `which`, until none promises more than `small`."""
     for piece in np.array_split(which, -(-len(which) // PIECE) or 1):
-        _newton(model, optima, piece, lower, upper, iterations)
+        _newton(model, optima, piece, lower, upper, small)
 
 
 def _newton(
-    model: ModalModel, optima: Optima, which: Array, lower: Array, upper: Array, iterations: int
+    model: ModalModel, optima: Optima, which: Array, lower: Array, upper: Array, small: float
 ) -> None:
-    """Stops a problem when its quadratic model promises under 1e-9."""
-    if not len(which):
-        return
+    """End a problem when its model, not held back by the trust region, promises at most `small`.
+
+    What the models last promised is kept in `optima.left`.
+    """
     radius: Array = np.full(len(which), 0.5)
-    node, output, side = optima.node[which], optima.output[which], optima.side[which]
-    f, g, H = model.at(optima.point[which], node, output)
-    g, H = side[:, None] * g, side[:, None, None] * H
-    for _ in range(iterations):
+    f, g, H = _signed(model, optima, optima.point[which], which)
+    for _ in range(ITERATIONS):
         low = np.maximum(lower - optima.point[which], -radius[:, None])
         high = np.minimum(upper - optima.point[which], radius[:, None])
         step = local_maximum(g, H, low, high, rounds=2)
         promised = gain(g, H, step)
-        open_ = promised > 1e-9
-        which, radius, step, promised, g, H, low = (
-            x[open_] for x in (which, radius, step, promised, g, H, low)
+        optima.left[which] = promised
+        held = np.abs(step).max(1, initial=0.0) >= 0.999 * radius
+        open_ = (promised > small) | (held & (promised > 1e-3 * small))
+        which, radius, step, promised, g, H = (
+            x[open_] for x in (which, radius, step, promised, g, H)
         )
         if not len(which):
             return
         trial = np.clip(optima.point[which] + step, lower, upper)
-        f, g2, H2 = model.at(trial, optima.node[which], optima.output[which])
-        side = optima.side[which]
-        got = side * f - optima.value[which]
+        f, g2, H2 = _signed(model, optima, trial, which)
+        got = f - optima.value[which]
         better = got > 0
-        optima.point[which[better]], optima.value[which[better]] = trial[better], (side * f)[better]
-        g[better], H[better] = (side[:, None] * g2)[better], (side[:, None, None] * H2)[better]
+        optima.point[which[better]], optima.value[which[better]] = trial[better], f[better]
+        g[better], H[better] = g2[better], H2[better]
         ratio = got / promised
         radius = np.where(
             ratio > 0.75, 2 * radius, np.where(ratio < 0.25, 0.3 * np.abs(step).max(1), radius)
         )
+
+
+def _signed(
+    model: ModalModel, optima: Optima, points: Array, which: Array
+) -> tuple[Array, Array, Array]:
+    """Side × output with gradient and Hessian, of problems `which` at points (W, d)."""
+    side = optima.side[which]
+    f, g, H = model.at(points, optima.node[which], optima.output[which])
+    return side * f, side[:, None] * g, side[:, None, None] * H

@@ -186,7 +186,7 @@ def test_branch_and_bound_finds_what_a_search_missed() -> None:
         optima.point, optima.node, optima.output
     )  # starts from the middle only
     found = BranchAndBound(1e-6).run(model, lower, upper, optima)
-    bounds, _ = ModalSearch().run(model, lower, upper, np.zeros((0, 4)))
+    bounds, _, _ = ModalSearch().run(model, lower, upper, np.zeros((0, 4)))
     assert np.abs(found.value - bounds.ravel()).max() < 1e-6
 
 

@@ -1,0 +1,54 @@
+"""The search of the modal model: it ends when it has converged, and says what is left."""
+
+import numpy as np
+import pytest
+
+from alphacut.frame import Exact, LinearFlow, StoreyFrame
+from alphacut.frame.boxes import boxes
+from alphacut.frame.modal import search
+from alphacut.frame.modal.model import ModalModel, fit_modes
+from alphacut.fuzzy import Triangular
+
+RIDGED = StoreyFrame(
+    (2e3, 1e3, 500.0),
+    (2.5, 2.7, 2.7),
+    24.7561e9,
+    1e-6,
+    (50, 50, 50),
+    "storey",
+    (0.01, 0.03, 0.08),
+    (0, -0.5, -0.5),
+)
+"""Dampers between the floors: late bounds lie on long ridges, where Newton's method is slow."""
+INPUTS = {"E": Triangular(22.7626e9, 24.7561e9, 25.8312e9)} | {
+    f"m{i + 1}": Triangular(0.95 * m, m, 1.05 * m) for i, m in enumerate(RIDGED.masses)
+}
+SMALL = 1e-9
+
+
+def ridges(start: float) -> tuple[ModalModel, search.Optima]:
+    cuts = boxes(INPUTS, (0,))
+    model = fit_modes(LinearFlow(RIDGED, cuts.names, 30, 0.25, Exact()), cuts)
+    optima = search.problems(np.arange(len(model.time)), 3, 4)
+    optima.point[:] = start
+    optima.value[:] = optima.side * model.value_at(optima.point, optima.node, optima.output)
+    return model, optima
+
+
+def refined(start: float) -> search.Optima:
+    model, optima = ridges(start)
+    search.refine(model, optima, np.arange(len(optima.value)), -np.ones(4), np.ones(4), SMALL)
+    return optima
+
+
+def test_newton_ends_when_it_has_converged_and_not_after_a_count(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    settled = refined(0.3)
+    assert settled.left.max() <= SMALL
+    monkeypatch.setattr(search, "ITERATIONS", 10)
+    hasty = refined(0.3)
+    assert (settled.value - hasty.value).max() > 1e-5  # ten steps are too few here
+    assert hasty.left[settled.value > hasty.value + 1e-5].min() > SMALL  # and it is said
+    monkeypatch.setattr(search, "ITERATIONS", 3000)
+    assert np.abs(refined(0.3).value - settled.value).max() < 10 * SMALL
