@@ -27,7 +27,6 @@ from alphacut.rve.mesh.periodicity import mismatch
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import triangulate
 from alphacut.rve.prism.error_estimate import companion_size, space_error, theta_error, unresolved
-from alphacut.rve.prism.local_stress import LocalStress, local_stress
 from alphacut.rve.prism.system import PrismSystem, SliceMeans
 from alphacut.rve.prism.task import Displacements, PrismTask
 from alphacut.rve.result import Homogenised, StressCurve
@@ -148,15 +147,6 @@ class PrismModel:
             )
             for result, phase, space, theta in errors
         ]
-
-    def local_stress(self, radius_map: RadiusMap, matrix: Phase, inclusion: Phase) -> LocalStress:
-        """Spread of the stresses over cell and θ, and the interface tractions (loads of eq. 15)."""
-        watch = Stopwatch()
-        system = self._moved(radius_map, watch)
-        _, displacements = self._solved(
-            PrismTask(system, self.options, self._loads, watch), (matrix, inclusion)
-        )
-        return local_stress(system, displacements.total, (matrix, inclusion))
 
     def _moved(self, radius_map: RadiusMap, watch: Stopwatch) -> PrismSystem:
         with watch("mesh"):

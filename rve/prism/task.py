@@ -10,7 +10,6 @@ from petsc4py import PETSc
 from alphacut.rve.cell import Phase
 from alphacut.rve.prism.system import PrismSystem
 from alphacut.rve.solver.krylov import LinearSolver
-from alphacut.rve.solver.level_blocks import LevelBlocks
 from alphacut.rve.solver.options import SolverOptions
 from alphacut.rve.solver.stopwatch import Stopwatch
 from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
@@ -91,16 +90,13 @@ class PrismTask:
 
     def _solver(self, phases: tuple[Phase, Phase]) -> LinearSolver:
         operator = self._combined(self.matrices[0].copy(), self.matrices[1], phases)
-        if self.options.all["pc_type"] == "python" and self.options.solver == "theta":
+        if self.options.all["pc_type"] == "python":
             return LinearSolver(
                 operator, self.options, self._theta(phases), together=len(self.strains)
             )
         operator = operator.convert("aij")  # PETSc's own preconditioners want it
         operator.setOption(PETSc.Mat.Option.SPD, True)
-        blocks = self.options.solver == "blocks" and self.options.all["pc_type"] == "python"
-        return LinearSolver(
-            operator, self.options, LevelBlocks(self.system.numbering, operator) if blocks else None
-        )
+        return LinearSolver(operator, self.options, None)
 
     def _solve_loads(self, solver: LinearSolver, phases: tuple[Phase, Phase]) -> Displacements:
         size = max(phases[k].modulus * load.norm() for k in range(2) for load in self.loads[k])

@@ -1,8 +1,8 @@
 """The linear solvers of the product-space cell by name: PETSc options, readable in one place.
 
 `theta` is the default: conjugate gradients with this project's preconditioner
-(`rve.theta_preconditioner`). The others are there to compare with. `pc_type python` stands for the
-preconditioner of the set's own name. Options given under the prefix `-rve_` on the command line
+(`rve.theta_preconditioner`). The others are there to compare with. `pc_type python` stands for
+that preconditioner. Options given under the prefix `-rve_` on the command line
 override a named set.
 """
 
@@ -27,8 +27,6 @@ class OptionError(ValueError):
 SOLVERS: Mapping[str, Mapping[str, str]] = {
     # Kronecker-like in θ, exact Cholesky factors of each level
     "theta": {**_CG, "pc_type": "python"},
-    # one exact Cholesky block for each level of θ and for what lies between, added up
-    "blocks": {**_CG, "pc_type": "python"},
     # algebraic multigrid at its defaults
     "gamg": {**_CG, "pc_type": "gamg"},
     # sparse direct
