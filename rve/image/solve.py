@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from alphacut.rve.image.bounds import StiffnessBounds, inverse_below
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.side import DISPLACEMENT, STRESS, SideSolution, solve_side
+from alphacut.rve.image.phase_images import ModuliImages
 from alphacut.stochastic.theta.truncated_normal import Array
 
 
@@ -45,22 +46,47 @@ def solve_image(
         division: Parts along each side of a pixel.
         pixels: Keep the energy of each pixel.
     """
+    images = ModuliImages((bulk, bulk), (shear, shear), attained=True)
+    return solve_between(images, aspect=aspect, solver=solver, division=division, pixels=pixels)
+
+
+def solve_between(
+    images: ModuliImages,
+    *,
+    aspect: float = 1.0,
+    solver: ConjugateGradient | None = None,
+    division: int = 1,
+    start: CrispBounds | None = None,
+    pixels: bool = False,
+) -> CrispBounds:
+    """Proved bounds of the stiffness of every image between two: stresses in the lower, displacements in the upper.
+
+    Args:
+        images: Least and greatest moduli.
+        aspect: Height of a pixel over its width.
+        solver: Stopping rule.
+        division: Parts along each side of a pixel.
+        start: Result of a similar image of as many pixels and parts; its fields are the first guess.
+        pixels: Keep the energy of each pixel.
+    """
     rule = solver or ConjugateGradient()
     with ThreadPoolExecutor(2) as pool:
-        tasks = [
+        upper, lower = (
             pool.submit(
                 solve_side,
                 side,
-                bulk[None],
-                shear[None],
+                images.bulk[end][None],
+                images.shear[end][None],
                 solver=rule,
                 aspect=aspect,
                 division=division,
+                start=None if start is None else (start.lower, start.upper)[end].fields,
                 pixels=pixels,
             )
-            for side in (DISPLACEMENT, STRESS)
-        ]
-        upper, lower = (task.result() for task in tasks)
-    return CrispBounds(
-        StiffnessBounds(inverse_below(lower.energy.upper[0]), upper.energy.upper[0]), upper, lower
-    )
+            for side, end in ((DISPLACEMENT, 1), (STRESS, 0))
+        )
+    return CrispBounds(_bounds(lower.result(), upper.result()), upper.result(), lower.result())
+
+
+def _bounds(lower: SideSolution, upper: SideSolution) -> StiffnessBounds:
+    return StiffnessBounds(inverse_below(lower.energy.upper[0]), upper.energy.upper[0])

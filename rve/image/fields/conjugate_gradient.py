@@ -126,7 +126,7 @@ def _dots(first: Array, second: Array) -> Array:
     """Inner products, shape (tiles, loads)."""
     count = first.shape[0] * first.shape[1]
     products = np.einsum("bn,bn->b", first.reshape(count, -1), second.reshape(count, -1))
-    return products.reshape(first.shape[:2])
+    return np.asarray(products.reshape(first.shape[:2]))
 
 
 def _add(target: Array, factors: Array, term: Array) -> None:

@@ -85,22 +85,19 @@ def solve_side(
         solver: Stopping rule.
         aspect: Height of a pixel over its width.
         division: Parts along each side into which every pixel is divided; the fields of whole pixels are the start.
-        start: Fields to start from, on the undivided pixels.
+        start: Fields to start from, on the divided pixels.
         pixels: Keep the energy of each pixel.
     """
     began = perf_counter()
     element = side.element(aspect)
     modes = element.mean_modes(UNIT_LOADS)
     trace, deviator = side.coefficients(bulk, shear)
-    coarse = (
-        replace(solver, accuracy=min(0.1, COARSER * solver.accuracy)) if division > 1 else solver
-    )
-    fields, iterations = _fields(element, trace, deviator, modes, coarse, start)
-    if division > 1:
-        trace, deviator = divided(trace, division), divided(deviator, division)
-        fields, iterations = _fields(
-            element, trace, deviator, modes, solver, prolonged(element, fields, division)
-        )
+    if division > 1 and start is None:
+        coarse = replace(solver, accuracy=min(0.1, COARSER * solver.accuracy))
+        fields, _ = _fields(element, trace, deviator, modes, coarse, None)
+        start = prolonged(element, fields, division)
+    trace, deviator = divided(trace, division), divided(deviator, division)
+    fields, iterations = _fields(element, trace, deviator, modes, solver, start)
     result = energy(element, trace, deviator, fields, modes, pixels=pixels)
     return SideSolution(side, aspect, fields, result, iterations, perf_counter() - began)
 

@@ -1,0 +1,100 @@
+"""Guaranteed α-cuts of the stiffness of an image whose threshold and phases are fuzzy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.rve.image.bounds import StiffnessBounds
+from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
+from alphacut.rve.image.moduli import ModuliInterval
+from alphacut.rve.image.phase_images import moduli_images, threshold_ranges
+from alphacut.rve.image.solve import CrispBounds, solve_between
+from alphacut.stochastic.theta.truncated_normal import Array
+
+TWO_CORNERS = "guaranteed, at two corners"
+ENCLOSED = "guaranteed enclosure"
+
+
+@dataclass(frozen=True)
+class ImageBox:
+    """One α-cut of the input.
+
+    Args:
+        thresholds: Least and greatest grey value of each threshold, rising.
+        phases: Moduli of each phase, one more than thresholds; phase k has k thresholds at or below its grey values.
+
+    Raises:
+        ValueError: The numbers do not fit, or thresholds run backwards.
+    """
+
+    thresholds: Sequence[tuple[float, float]]
+    phases: Sequence[ModuliInterval]
+
+    def __post_init__(self) -> None:
+        if len(self.phases) != len(self.thresholds) + 1:
+            raise ValueError(
+                f"{len(self.thresholds)} thresholds part {len(self.thresholds) + 1} phases; "
+                f"{len(self.phases)} are given"
+            )
+        for end in (0, 1):
+            values = [threshold[end] for threshold in self.thresholds]
+            if values != sorted(values):
+                raise ValueError(f"the thresholds {values} do not rise")
+        if any(low > high for low, high in self.thresholds):
+            raise ValueError("the interval of a threshold runs backwards")
+
+
+@dataclass(frozen=True)
+class Cut:
+    """One α-cut of the stiffness.
+
+    Args:
+        bounds: Of every stiffness in the cut.
+        nature: `TWO_CORNERS` where both ends belong to possible materials, else `ENCLOSED`.
+        solution: Fields and costs.
+    """
+
+    bounds: StiffnessBounds
+    nature: str
+    solution: CrispBounds
+
+
+def solve_cuts(
+    grey: Array,
+    boxes: Sequence[ImageBox],
+    *,
+    aspect: float = 1.0,
+    solver: ConjugateGradient | None = None,
+    division: int = 1,
+) -> list[Cut]:
+    """One guaranteed cut for each box: one solve with stresses and one with displacements.
+
+    The order of the phases is needed at the two corners only. Where a pixel that the threshold leaves open may be of phases without
+    order, it takes the least of their K + G/3 and the least of their G: still a proof, but of an enclosure.
+
+    Args:
+        grey: Grey values, shape (rows, columns).
+        boxes: Cuts of the input, each inside the one before or the other way round; neighbours give the first guess.
+        aspect: Height of a pixel over its width.
+        solver: Stopping rule.
+        division: Parts along each side of a pixel.
+    """
+    cuts: list[Cut] = []
+    for box in boxes:
+        images = moduli_images(*threshold_ranges(grey, box.thresholds), box.phases)
+        before = cuts[-1].solution if cuts else None
+        solution = solve_between(
+            images, aspect=aspect, solver=solver, division=division, start=before
+        )
+        cuts.append(Cut(solution.bounds, TWO_CORNERS if images.attained else ENCLOSED, solution))
+    return cuts
+
+
+def nested(intervals: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Intervals in the order of falling α, each widened to hold those before it, which what it holds guarantees."""
+    lows = np.minimum.accumulate([low for low, _ in intervals])
+    highs = np.maximum.accumulate([high for _, high in intervals])
+    return [(float(low), float(high)) for low, high in zip(lows, highs, strict=True)]

@@ -1,0 +1,66 @@
+"""Images of moduli, least and greatest, from phases that are not certain.
+
+The stiffness of a composite grows in the Loewner order with the tensor of every point. So the image of the least K + G/3 and the
+least G of each pixel, over all phases it may be and all moduli that these may have, has a stiffness below every possible one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.rve.image.moduli import ModuliInterval
+from alphacut.stochastic.theta.truncated_normal import Array
+
+
+@dataclass(frozen=True)
+class ModuliImages:
+    """Moduli of each pixel below and above all possible ones, each of shape (rows, columns), in Pa.
+
+    Args:
+        bulk: Least and greatest plane-strain bulk modulus K + G/3.
+        shear: Least and greatest shear modulus.
+        attained: Both images are possible ones, so the bounds cannot be drawn closer.
+    """
+
+    bulk: tuple[Array, Array]
+    shear: tuple[Array, Array]
+    attained: bool
+
+
+def threshold_ranges(grey: Array, thresholds: Sequence[tuple[float, float]]) -> tuple[Array, Array]:
+    """Least and greatest number of each pixel's phase.
+
+    Args:
+        grey: Grey values, shape (rows, columns).
+        thresholds: Least and greatest value of each threshold, rising; a pixel is of phase k if k thresholds are ≤ its grey value.
+    """
+    first, last = (
+        np.searchsorted(np.array([t[end] for t in thresholds]), grey, side="right")
+        for end in (1, 0)
+    )
+    return first, last
+
+
+def moduli_images(first: Array, last: Array, phases: Sequence[ModuliInterval]) -> ModuliImages:
+    """Least and greatest moduli of pixels of the phases `first` … `last`, numbers of shape (rows, columns)."""
+    pairs = np.unique(first * len(phases) + last)
+    tables = np.zeros((4, len(phases), len(phases)))
+    attained = all(phase.attained for phase in phases)
+    for a, b in (divmod(int(pair), len(phases)) for pair in pairs):
+        bulks = [(p.lower.bulk, p.upper.bulk) for p in phases[a : b + 1]]
+        shears = [(p.lower.shear, p.upper.shear) for p in phases[a : b + 1]]
+        least, greatest = (
+            np.min([bulks, shears], axis=1)[:, 0],
+            np.max([bulks, shears], axis=1)[:, 1],
+        )
+        tables[:, a, b] = least[0], greatest[0], least[1], greatest[1]
+        ends = ((least, 0), (greatest, 1))
+        attained = attained and all(
+            any((k[e], g[e]) == tuple(value) for k, g in zip(bulks, shears, strict=True))
+            for value, e in ends
+        )
+    images = [table[first, last] for table in tables]
+    return ModuliImages((images[0], images[1]), (images[2], images[3]), attained)

@@ -1,0 +1,131 @@
+"""Reduced bases of an image, one for each side, from a few solves at moduli far from one another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+from scipy.linalg import eigh
+
+from alphacut.rve.image.bounds import inverse_below
+from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
+from alphacut.rve.image.fields.side import DISPLACEMENT, STRESS, Side, solve_side
+from alphacut.rve.image.reduced.basis import ReducedSide
+from alphacut.stochastic.theta.truncated_normal import Array
+
+PIECE = 4000  # parameter points worked on at once
+
+NEGLIGIBLE = 1e-10  # relative energy of a field that is no use
+
+
+@dataclass(frozen=True)
+class ReducedBounds:
+    """Proved bounds of the stiffness of an image for any moduli of its phases.
+
+    Args:
+        upper: Displacement side.
+        lower: Stress side.
+        points: Moduli of the solves, shape (solves, 2, phases): K + G/3 and G.
+        seconds: Wall time of the making.
+    """
+
+    upper: ReducedSide
+    lower: ReducedSide
+    points: Array
+    seconds: float
+
+    def bounds(self, bulk: Array, shear: Array) -> tuple[Array, Array]:
+        """Lower and upper stiffness, each of shape (m, 3, 3), in the unit of the moduli.
+
+        Args:
+            bulk: K + G/3 of the phases, shape (m, phases), positive; near the moduli of the solves the bounds are close.
+            shear: G of the phases, same shape.
+        """
+        lower, upper = np.empty((2, len(bulk), 3, 3))
+        for start in range(0, len(bulk), PIECE):
+            part = slice(start, start + PIECE)
+            upper[part] = self.upper.energy_above(self.upper.coefficients(bulk[part], shear[part]))
+            compliance = self.lower.energy_above(self.lower.coefficients(bulk[part], shear[part]))
+            lower[part] = inverse_below(compliance)
+        return lower, upper
+
+
+def widths(lower: Array, upper: Array) -> Array:
+    """Largest ratio of upper to lower energy minus one, shape (m,)."""
+    pairs = zip(lower, upper, strict=True)
+    return np.array([eigh(high, low, eigvals_only=True)[-1] - 1 for low, high in pairs])
+
+
+def reduced_bounds(
+    labels: Array,
+    bulk: Array,
+    shear: Array,
+    *,
+    solves: int = 12,
+    aspect: float = 1.0,
+    solver: ConjugateGradient | None = None,
+) -> ReducedBounds:
+    """Reduced bases of both sides, each solve at the candidate farthest from those before.
+
+    A common factor of all moduli changes nothing, so distances are between logarithms less their mean.
+
+    Args:
+        labels: Phase of each pixel, shape (rows, columns).
+        bulk: K + G/3 of candidates that cover the range of use, shape (m, phases).
+        shear: G of the candidates, same shape.
+        solves: Parameter points, each solved under three loads.
+        aspect: Height of a pixel over its width.
+        solver: Stopping rule.
+    """
+    began = perf_counter()
+    rule = solver or ConjugateGradient()
+    sides = [_empty(side, aspect, labels, bulk.shape[1]) for side in (DISPLACEMENT, STRESS)]
+    chosen = _far_apart(np.log(np.hstack([bulk, shear])), solves)
+    for k in chosen:
+        sides = [_extended(side, bulk[k], shear[k], rule) for side in sides]
+    points = np.stack([bulk[chosen], shear[chosen]], axis=1)
+    return ReducedBounds(sides[0], sides[1], points, perf_counter() - began)
+
+
+def _far_apart(logarithms: Array, number: int) -> list[int]:
+    """Rows one after another, each the farthest from those before it, the first the farthest from the middle."""
+    places = logarithms - logarithms.mean(axis=1, keepdims=True)
+    distance = np.linalg.norm(places - places.mean(axis=0), axis=1)
+    chosen = [int(np.argmax(distance))]
+    distance[:] = np.inf
+    while len(chosen) < number:
+        distance = np.minimum(distance, np.linalg.norm(places - places[chosen[-1]], axis=1))
+        chosen.append(int(np.argmax(distance)))
+    return chosen
+
+
+def _empty(side: Side, aspect: float, labels: Array, phases: int) -> ReducedSide:
+    fields = np.zeros((0, side.element(aspect).types, *labels.shape))
+    return ReducedSide.of(side, aspect, labels, phases, fields)
+
+
+def _extended(
+    reduced: ReducedSide, bulk: Array, shear: Array, solver: ConjugateGradient
+) -> ReducedSide:
+    """The side with what its best fields lack at these moduli, scaled to unit energy and made orthogonal."""
+    coefficients = reduced.coefficients(bulk[None], shear[None])
+    shares = reduced.combination(coefficients)[0, 3:]
+    start = np.tensordot(shares.T, reduced.fields, axes=1)
+    solution = solve_side(
+        reduced.side,
+        bulk[reduced.labels][None],
+        shear[reduced.labels][None],
+        solver=solver,
+        aspect=reduced.aspect,
+        start=start[None],
+    )
+    lacking = solution.fields[0] - start
+    raw = ReducedSide.of(reduced.side, reduced.aspect, reduced.labels, reduced.phases, lacking)
+    energies = np.tensordot(coefficients[0], raw.energies.value, axes=1)[3:, 3:]
+    values, vectors = np.linalg.eigh(energies)
+    uniform = np.tensordot(coefficients[0], raw.energies.value, axes=1)[:3, :3]
+    kept = values > NEGLIGIBLE * np.trace(uniform)
+    turned = np.tensordot((vectors[:, kept] / np.sqrt(values[kept])).T, lacking, axes=1)
+    fields = np.concatenate([reduced.fields, turned])
+    return ReducedSide.of(reduced.side, reduced.aspect, reduced.labels, reduced.phases, fields)
