@@ -8,6 +8,11 @@ from time import perf_counter
 
 import numpy as np
 
+from alphacut.rve.image.fields.clamped import (
+    ClampedOperator,
+    ClampedPreconditioner,
+    free_unknowns,
+)
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.division import divided, prolonged
 from alphacut.rve.image.fields.element import Element, airy_element, displacement_element
@@ -74,9 +79,10 @@ def solve_side(
     aspect: float = 1.0,
     division: int = 1,
     start: Array | None = None,
+    clamped: bool = False,
     pixels: bool = False,
 ) -> SideSolution:
-    """Fields of least energy under the three unit loads of periodic tiles.
+    """Fields of least energy under the three unit loads of tiles.
 
     Args:
         side: Space of the fields.
@@ -86,6 +92,7 @@ def solve_side(
         aspect: Height of a pixel over its width.
         division: Parts along each side into which every pixel is divided; the fields of whole pixels are the start.
         start: Fields to start from, on the divided pixels.
+        clamped: Fluctuations vanish on the edge of each tile; else they are periodic.
         pixels: Keep the energy of each pixel.
     """
     began = perf_counter()
@@ -94,10 +101,10 @@ def solve_side(
     trace, deviator = side.coefficients(bulk, shear)
     if division > 1 and start is None:
         coarse = replace(solver, accuracy=min(0.1, COARSER * solver.accuracy))
-        fields, _ = _fields(element, trace, deviator, modes, coarse, None)
+        fields, _ = _fields(element, trace, deviator, modes, coarse, None, clamped)
         start = prolonged(element, fields, division)
     trace, deviator = divided(trace, division), divided(deviator, division)
-    fields, iterations = _fields(element, trace, deviator, modes, solver, start)
+    fields, iterations = _fields(element, trace, deviator, modes, solver, start, clamped)
     result = energy(element, trace, deviator, fields, modes, pixels=pixels)
     return SideSolution(side, aspect, fields, result, iterations, perf_counter() - began)
 
@@ -109,13 +116,15 @@ def _fields(
     modes: Array,
     solver: ConjugateGradient,
     start: Array | None,
+    clamped: bool,
 ) -> tuple[Array, int]:
     """Fields of the unit loads and the most iterations; on large images one load at a time, which keeps the work space small."""
-    operator = Operator(element, trace, deviator)
+    periodic = Operator(element, trace, deviator)
     bulk, shear = (float(np.sqrt(c.min() * c.max())) for c in (trace, deviator))
-    preconditioner = FourierPreconditioner.of(
-        element, bulk, shear, (trace.shape[1], trace.shape[2])
-    )
+    kind = ClampedPreconditioner if clamped else FourierPreconditioner
+    preconditioner = kind.of(element, bulk, shear, (trace.shape[1], trace.shape[2]))
+    free = free_unknowns(element, (trace.shape[1], trace.shape[2]))
+    operator = ClampedOperator(periodic, free) if clamped else periodic
     scale = least_energy(element, trace, deviator, modes)
     loads = modes.shape[1]
     fields = np.empty((len(trace), loads, element.types, *trace.shape[1:]))

@@ -1,0 +1,109 @@
+"""Windows of a material: the bracket of a tiling, and the interval of the material that the scatter of its tiles allows.
+
+For a tiling of a periodic cell the harmonic mean of the tiles' stiffnesses under uniform traction (SUBC) and the arithmetic mean of
+those under uniform displacement (KUBC) bracket the cell's stiffness (Huet 1990). A window of a larger material is another sample:
+its bracket bounds its own apparent stiffness only, and the material's takes the scatter between tiles besides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import stdtrit
+
+from alphacut.rve.image.bounds import EQUAL, StiffnessBounds, inverse_below
+from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
+from alphacut.rve.image.fields.energy import UNIT
+from alphacut.rve.image.fields.side import DISPLACEMENT, STRESS, solve_side
+from alphacut.stochastic.theta.truncated_normal import Array
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Tiling:
+    """Bounds of the tiles.
+
+    Args:
+        stiffness: Above each tile's stiffness under uniform displacement, shape (tiles, 3, 3), in Pa.
+        compliance: Above each tile's compliance under uniform traction, shape (tiles, 3, 3), in 1/Pa.
+    """
+
+    stiffness: Array
+    compliance: Array
+
+    @property
+    def bracket(self) -> StiffnessBounds:
+        """Bounds of the stiffness of the periodic cell that the tiles fill; of one tile, of its apparent stiffness."""
+        return StiffnessBounds(inverse_below(_mean(self.compliance)), _mean(self.stiffness))
+
+    def material_modulus(self, confidence: float = CONFIDENCE) -> tuple[float, float]:
+        """Interval of E of eq. 16 of the material, from independent tiles: no proof, a confidence interval.
+
+        The bracket's ends, each moved out by t·s/√m, with s the scatter of E between m tiles to first order.
+
+        Raises:
+            ValueError: There is one tile only, or E has no bounds.
+        """
+        count = len(self.stiffness)
+        if count < 2:
+            raise ValueError("one tile has no scatter; divide the window into 2 × 2 tiles or more")
+        bracket = self.bracket
+        low, high = bracket.modulus
+        softer = -bracket.lower @ (self.compliance - self.compliance.mean(axis=0)) @ bracket.lower
+        stiffer = self.stiffness - self.stiffness.mean(axis=0)
+        quantile = float(stdtrit(count - 1, (1 + confidence) / 2)) / np.sqrt(count)
+        below, above = (
+            quantile * float(np.std(_change(centre, changes), ddof=1))
+            for centre, changes in ((bracket.lower, softer), (bracket.upper, stiffer))
+        )
+        return low - below, high + above
+
+
+def tiles_of(image: Array, along: int) -> Array:
+    """An image of shape (rows, columns) as along × along tiles, shape (tiles, rows/along, columns/along).
+
+    Raises:
+        ValueError: The image cannot be divided so.
+    """
+    rows, columns = image.shape
+    if along < 1 or rows % along or columns % along or min(rows, columns) < 2 * along:
+        raise ValueError(
+            f"an image of {rows} × {columns} pixels has no {along} × {along} equal tiles of "
+            "2 × 2 pixels or more; crop it or take another number"
+        )
+    blocks = image.reshape(along, rows // along, along, columns // along)
+    return np.ascontiguousarray(blocks.swapaxes(1, 2).reshape(-1, rows // along, columns // along))
+
+
+def solve_tiles(
+    bulk: Array, shear: Array, *, aspect: float = 1.0, solver: ConjugateGradient | None = None
+) -> Tiling:
+    """Bounds of tiles under uniform displacement and under uniform traction.
+
+    Args:
+        bulk: Plane-strain bulk modulus K + G/3 of each pixel, shape (tiles, rows, columns), in Pa.
+        shear: Shear modulus, same shape, in Pa.
+        aspect: Height of a pixel over its width.
+        solver: Stopping rule.
+    """
+    rule = solver or ConjugateGradient()
+    stiffness, compliance = (
+        solve_side(side, bulk, shear, solver=rule, aspect=aspect, clamped=True).energy.upper
+        for side in (DISPLACEMENT, STRESS)
+    )
+    return Tiling(stiffness, compliance)
+
+
+def _mean(matrices: Array) -> Array:
+    """Mean of matrices, not below the true one in the Loewner order."""
+    slack = 2 * len(matrices) * UNIT * np.abs(matrices).mean(axis=0).sum(axis=1)
+    return np.asarray(matrices.mean(axis=0) + np.diag(slack))
+
+
+def _change(centre: Array, changes: Array) -> Array:
+    """First-order change of E of eq. 16 with changes of the stiffness, shape (…, 3, 3)."""
+    shear, bulk = 2 * centre[2, 2], EQUAL @ centre @ EQUAL / 2
+    by_shear, by_bulk = 1.5 - shear / bulk, (shear / bulk) ** 2 / 2
+    return np.asarray(by_shear * 2 * changes[..., 2, 2] + by_bulk * (changes @ EQUAL) @ EQUAL / 2)
