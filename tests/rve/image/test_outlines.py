@@ -44,7 +44,9 @@ def test_an_inclined_laminate_is_bracketed(seed):
     rng = np.random.default_rng(seed)
     waves = rng.integers(1, 4, 2)
     share, phases = rng.uniform(0.2, 0.8), random_phases(rng)
-    stripes = Equation(f"cos(2*pi*({waves[0]}*x + {waves[1]}*y)) >= {float(np.cos(np.pi * share))!r}")
+    stripes = Equation(
+        f"cos(2*pi*({waves[0]}*x + {waves[1]}*y)) >= {float(np.cos(np.pi * share))!r}"
+    )
     angle = np.arctan2(waves[1], waves[0])
     exact = inclined(share, phases, angle)
     found = bracket(stripes, Grid(48, 48), phases)
