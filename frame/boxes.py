@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet
-from alphacut.frame.checks.numbers import require_numbers
+from alphacut.frame.calculus.numbers import require_numbers
 from alphacut.frame.dynamics.flow import Flow
-from alphacut.frame.envelope import output_unit
+from alphacut.frame.outputs import output_unit
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arguments import fuzzy_inputs
 

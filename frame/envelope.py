@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
+from alphacut.frame.outputs import output_unit
 
 if TYPE_CHECKING:
     import xarray
@@ -196,18 +197,3 @@ def _unit(name: str) -> str:
     """The unit after a number; nothing where it is not known."""
     unit = output_unit(name)
     return "" if unit == "SI" else f" {unit}"
-
-
-def output_unit(name: str) -> str:
-    """SI unit of an output by its name."""
-    kind = name.rstrip("0123456789")
-    return {
-        "q": "m",
-        "drift": "m",
-        "v": "m/s",
-        "shear": "N",
-        "base_shear": "N",
-        "roof": "m",
-        "force": "N",
-        "phi": "rad",
-    }.get(kind, "SI")

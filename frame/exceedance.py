@@ -194,7 +194,7 @@ def _flow(
 
 
 def _tried(cuts: Boxes, level: int, spread: int, *, corner: int = 8) -> Array:
-    from alphacut.frame.methods.sampling import corners
+    from alphacut.frame.calculus.low_discrepancy import corners
 
     lower, upper = cuts.unit(level)
     if not (upper > lower).any():

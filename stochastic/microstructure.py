@@ -12,9 +12,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
-from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,7 +27,7 @@ from alphacut.stochastic.tessellation.delaunay import Neighbours, cell_correlati
 from alphacut.stochastic.theta.truncated_normal import TruncatedNormal
 
 if TYPE_CHECKING:
-    import xarray
+    pass
 
 
 @dataclass(frozen=True)
@@ -121,30 +120,6 @@ class Microstructure:
     def share_kept(self) -> float:
         """Share of area within the limits."""
         return self.sample.share_within(*self.limits)
-
-    def summary(self) -> dict[str, Any]:
-        """Every number found, lengths in m, ready for JSON."""
-        from alphacut.stochastic.microstructure_summary import summary
-
-        return summary(self)
-
-    def fragment(self) -> str:
-        """The section [radius] of a case file."""
-        from alphacut.stochastic.microstructure_summary import fragment
-
-        return fragment(self)
-
-    def to_dataset(self) -> xarray.Dataset:
-        """Distribution, band and p-box of r_n over a grid, with the map as attributes."""
-        from alphacut.stochastic.microstructure_summary import to_dataset
-
-        return to_dataset(self)
-
-    def draw(self, folder: Path) -> dict[str, list[Path]]:
-        """Draw every figure into `folder` as SVG and PNG; name of each figure to its files."""
-        from alphacut.stochastic.figures.all import draw
-
-        return draw(self, folder)
 
 
 def study(

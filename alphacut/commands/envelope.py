@@ -237,8 +237,8 @@ def given_modulus(text: str | None) -> FuzzyNumber | None:
 
 def summary(found: Envelope, tried: Array | None = None) -> str:
     """Extremes and fuzzy peaks at the lowest level as a small table."""
-    from alphacut.frame.envelope import output_unit
     from alphacut.frame.exceedance import peaks
+    from alphacut.frame.outputs import output_unit
 
     of = peaks(found)
     units = [output_unit(name) for name in found.outputs]
@@ -273,7 +273,7 @@ def summary(found: Envelope, tried: Array | None = None) -> str:
 
 def error_in_words(found: Envelope) -> str:
     """The largest estimated error of each output; empty where none was estimated."""
-    from alphacut.frame.envelope import output_unit
+    from alphacut.frame.outputs import output_unit
 
     if found.error is None:
         return ""
@@ -287,7 +287,7 @@ def error_in_words(found: Envelope) -> str:
 
 def proved(found: Envelope) -> str:
     """Line on the certificate; empty without one."""
-    from alphacut.frame.envelope import output_unit
+    from alphacut.frame.outputs import output_unit
 
     if "gap" not in found.facts:
         return ""

@@ -5,17 +5,14 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 
 from alphacut.case.load import load
 from alphacut.commands.options import add_common, add_workers, check_workers
-from alphacut.io.files import as_json, say, whole_file, write_text
+from alphacut.io.files import as_json, say, write_text
 from alphacut.io.progress import progress
 from alphacut.io.provenance import attributes, door, fingerprint, versions
 from alphacut.stages import microstructure
-
-if TYPE_CHECKING:
-    from alphacut.stochastic.microstructure import Microstructure
 
 ABOUT = "from particles, packed or measured, to the random radius and its fuzzy map"
 
@@ -34,6 +31,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Compute, write, report."""
+    from alphacut.stochastic.microstructure_summary import fragment, summary
+
     check_workers(options.workers)
     case = load(options.case, options.set)
     case.need("microstructure.seed")
@@ -42,15 +41,16 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     written: list[str] = []
     if options.out:
         key = fingerprint(case.values, ("stochastic",))
-        written = write(
+        written = microstructure.write(
             found,
             Path(options.out),
             attributes(case.text_of_file, key),
             figures=not options.no_figures,
         )
+    section = fragment(found)
     document = {
-        **found.summary(),
-        "fragment": found.fragment(),
+        **summary(found),
+        "fragment": section,
         "files": written,
         "versions": versions(),
     }
@@ -61,8 +61,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     for remark in microstructure.left_out(found):
         say(remark)
     if options.json != "-" and not options.quiet:
-        out.write(found.fragment())
-        advise(found.fragment(), options.out)
+        out.write(section)
+        advise(section, options.out)
     return 0
 
 
@@ -77,19 +77,3 @@ def advise(fragment: str, folder: str | None) -> None:
         f"next: put {place} in place of [radius] of a case with [cell] and [mesh], then {door()}"
         " modulus CASE"
     )
-
-
-def write(
-    found: Microstructure, folder: Path, said: Mapping[str, str | int], *, figures: bool = True
-) -> list[str]:
-    """Write numbers, figures, fragment and dataset; returns the paths from `folder`."""
-    write_text(folder / "microstructure.json", as_json(found.summary(), indent=2))
-    drawn = found.draw(folder / "figures") if figures else {}
-    write_text(folder / "radius.toml", found.fragment())
-    with whole_file(folder / "microstructure.nc") as partial:
-        found.to_dataset().assign_attrs(said).to_netcdf(partial)
-    numbers = [
-        folder / name for name in ("microstructure.json", "microstructure.nc", "radius.toml")
-    ]
-    files = [*numbers, *(path for paths in drawn.values() for path in paths)]
-    return [str(path.relative_to(folder)) for path in files]

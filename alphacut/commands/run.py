@@ -113,7 +113,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
 
 def main_numbers(found: Mapping[str, Any]) -> str:
     """The fuzzy modulus and every study's extremes, a line each."""
-    from alphacut.frame.envelope import output_unit
+    from alphacut.frame.outputs import output_unit
 
     lines = []
     if cell := found.get("modulus"):

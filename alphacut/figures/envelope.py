@@ -46,7 +46,7 @@ def drawings(study: Study, dataset: xarray.Dataset) -> Iterator[tuple[str, Calla
 
 def envelope(dataset: xarray.Dataset, output: str, study: Study) -> Figure:
     """Nested bands between lower and upper envelope, and the modal trajectory."""
-    from alphacut.frame.envelope import output_unit
+    from alphacut.frame.outputs import output_unit
 
     drawn, axes = figure(7.2, 3.6)
     shown = dataset.sel(output=output)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def exceedance(found: xarray.Dataset) -> Figure:
     """The probability between its bounds on each level, and the case's limit."""
-    from alphacut.frame.envelope import output_unit
+    from alphacut.frame.outputs import output_unit
 
     drawn, axes = figure(7.2, 3.6)
     alpha, limits = found["alpha"].values, found["limit"].values

@@ -28,7 +28,7 @@ def follower(results: Results, study: Study) -> Figure:
     """Five panels: from the first guess to the envelope, for one output at the lowest level."""
     import matplotlib.pyplot as plt
 
-    from alphacut.frame.envelope import output_unit
+    from alphacut.frame.outputs import output_unit
 
     found, output = recorded(results, study)
     drawn, grid = plt.subplots(3, 2, figsize=(9.6, 9.0), sharex=True, sharey=True)

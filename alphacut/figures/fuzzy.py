@@ -50,7 +50,7 @@ def membership(dataset: xarray.Dataset) -> Figure:
 
 def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figure:
     """Fig. 20: trajectories for parameters inside an α-cut, and the envelope that encloses them."""
-    from alphacut.frame.envelope import output_unit
+    from alphacut.frame.outputs import output_unit
 
     study = next((s for s in results.studies if len(s.task.fuzzy) > 1), results.studies[0])
     dataset = results.envelopes[study.name].isel(alpha=0)

@@ -51,7 +51,7 @@ def over_time(found: xarray.Dataset) -> Figure:
 
 def panel(axes: Axes, found: xarray.Dataset, output: str) -> None:
     """The shares in one output's width."""
-    from alphacut.frame.envelope import output_unit
+    from alphacut.frame.outputs import output_unit
 
     time, width = found["time"].values, found["width"].values
     behind = axes.twinx()

@@ -44,7 +44,7 @@ def envelopes(summary: Mapping[str, Any], exceedance: str = "") -> str:
 
 def extremes(studies: Mapping[str, Any]) -> list[tuple[str, ...]]:
     """Least and greatest value of each output, and the error where one was estimated."""
-    from alphacut.frame.envelope import output_unit
+    from alphacut.frame.outputs import output_unit
 
     each = [
         (name, study, output, output_unit(output))
@@ -87,7 +87,7 @@ def natural(summary: Mapping[str, Any]) -> str:
 
 def peaks(summary: Mapping[str, Any]) -> str:
     """Fuzzy peaks of every study, and the fuzzy probability of exceeding the case's limit."""
-    from alphacut.frame.envelope import output_unit
+    from alphacut.frame.outputs import output_unit
 
     each = [
         (name, output, output_unit(output), of)

@@ -79,7 +79,7 @@ def plots(summary: Mapping[str, Any], folder: Path) -> list[dict[str, Any]]:
 
 def plot(name: str, study: Mapping[str, Any], dataset: xarray.Dataset) -> dict[str, Any]:
     """One study: lower and upper bounds by level and output, in base64."""
-    from alphacut.frame.envelope import output_unit
+    from alphacut.frame.outputs import output_unit
 
     time = dataset["time"].values
     bounds = {

@@ -235,7 +235,7 @@ def explained(rows: Sequence[tuple[object, ...]]) -> Iterator[str]:
 
 def proofs(summary: Mapping[str, Any]) -> Iterator[str]:
     """Gap of each certified envelope, and what it rests on."""
-    from alphacut.frame.envelope import output_unit
+    from alphacut.frame.outputs import output_unit
 
     for name, study in summary.get("envelopes", {}).items():
         if "gap" in study:

@@ -108,7 +108,7 @@ def limit_of(case: Case) -> float:
     Raises:
         BadInput: It is no positive quantity of that unit.
     """
-    from alphacut.frame.envelope import output_unit
+    from alphacut.frame.outputs import output_unit
 
     name, text = case.text("exceedance.output"), case.text("exceedance.limit")
     unit, height = output_unit(name), storey_height(case, name)
@@ -192,7 +192,7 @@ def exceedance(
     import xarray
 
     from alphacut.frame import exceedance as probabilities
-    from alphacut.frame.envelope import output_unit
+    from alphacut.frame.outputs import output_unit
 
     wanted, output = structure(case, handed), case.text("exceedance.output")
     model = wanted.model if wanted.frame is None else replace(wanted.frame, outputs=(output,))
@@ -244,7 +244,7 @@ def exceedance(
 
 def exceedance_document(found: xarray.Dataset) -> dict[str, Any]:
     """The probability as it is printed with ``--json``; the limit in SI."""
-    from alphacut.frame.envelope import output_unit
+    from alphacut.frame.outputs import output_unit
 
     sides = {str(side): found["exceedance"].sel(bound=side).values for side in ("lower", "upper")}
     return {

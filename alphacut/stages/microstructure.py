@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,7 @@ from alphacut.case.case import Case
 from alphacut.case.checks import beside
 from alphacut.case.schema import RADIUS
 from alphacut.case.values import read
-from alphacut.io.files import say
+from alphacut.io.files import as_json, say, whole_file, write_text
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
 
@@ -147,6 +147,7 @@ def compute(
     """
     from alphacut.fuzzy.campaign.workers import pool
     from alphacut.stochastic.microstructure import study
+    from alphacut.stochastic.microstructure_summary import fragment
 
     wanted = study_of(case)
     with pool(workers) as executor:
@@ -154,7 +155,7 @@ def compute(
             found = study(wanted, executor=executor, progress=progress)
         except ValueError as error:
             raise BadInput(Problem("microstructure", str(error), file=str(case.path))) from None
-    for remark in () if quiet else (*left_out(found), *crisp_slopes(found.fragment())):
+    for remark in () if quiet else (*left_out(found), *crisp_slopes(fragment(found))):
         say(remark)
     return found
 
@@ -204,3 +205,22 @@ def with_radius(case: Case, fragment: str) -> Case:
 def read_fragment(path: Path) -> str:
     """The fragment that a run has stored."""
     return path.read_text(encoding="utf-8")
+
+
+def write(
+    found: Microstructure, folder: Path, said: Mapping[str, str | int], *, figures: bool = True
+) -> list[str]:
+    """Write numbers, figures, fragment and dataset; returns the paths from `folder`."""
+    from alphacut.stochastic.figures.all import draw
+    from alphacut.stochastic.microstructure_summary import fragment, summary, to_dataset
+
+    write_text(folder / "microstructure.json", as_json(summary(found), indent=2))
+    drawn = draw(found, folder / "figures") if figures else {}
+    write_text(folder / "radius.toml", fragment(found))
+    with whole_file(folder / "microstructure.nc") as partial:
+        to_dataset(found).assign_attrs(said).to_netcdf(partial)
+    numbers = [
+        folder / name for name in ("microstructure.json", "microstructure.nc", "radius.toml")
+    ]
+    files = [*numbers, *(path for paths in drawn.values() for path in paths)]
+    return [str(path.relative_to(folder)) for path in files]

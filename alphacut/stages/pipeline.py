@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from alphacut.case.case import Case
 from alphacut.case.checks import FILES
 from alphacut.case.names import OTHERS
-from alphacut.commands.microstructure import write as write_microstructure
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import say, whole_file
 from alphacut.io.netcdf import require_known
@@ -19,6 +18,7 @@ from alphacut.io.provenance import attributes, fingerprint
 from alphacut.stages import envelope, microstructure, modulus, response
 from alphacut.stages import exceedance as outcomes
 from alphacut.stages.campaign import campaign
+from alphacut.stages.microstructure import write as write_microstructure
 from alphacut.stages.structure import structure
 
 if TYPE_CHECKING:

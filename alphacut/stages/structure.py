@@ -16,9 +16,9 @@ from alphacut.stages.accelerogram import accelerogram
 if TYPE_CHECKING:
     from alphacut.frame import StoreyFrame
     from alphacut.frame.dynamics.flow import Flow
+    from alphacut.frame.reduced.reduction import ReducedStructure
     from alphacut.frame.structures.lagrangian import LagrangianSystem
     from alphacut.frame.structures.linear import LinearSystem
-    from alphacut.frame.structures.reduction import ReducedStructure
 
 LISTS = {"m": "masses", "l": "lengths", "d": "dampers"}
 RAYLEIGH = ("rayleigh_mass", "rayleigh_stiffness")
@@ -150,7 +150,7 @@ def pendulum(case: Case) -> Structure:
 
 def tower(case: Case) -> Structure:
     """Plane beam frame, reduced for the whole supports of its fuzzy inputs."""
-    from alphacut.frame.structures.beam import BeamFrame
+    from alphacut.frame.reduced.beam import BeamFrame
 
     numbers = {name: case.fuzzy(f"tower.{name}") for name in OTHERS["tower"] if name != "zeta"}
     if case.has("tower.damping_ratio"):

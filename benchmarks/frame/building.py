@@ -17,7 +17,7 @@ from scipy.optimize import minimize
 from alphacut.frame import Envelope, Exact, LinearFlow, StoreyFrame, envelope
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.methods.sampling import corners
+from alphacut.frame.calculus.low_discrepancy import corners
 from alphacut.fuzzy import Triangular
 from benchmarks.frame.envelopes import RESULTS
 from benchmarks.frame.tower import recorded

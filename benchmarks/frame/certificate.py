@@ -11,7 +11,7 @@ import time
 import numpy as np
 
 from alphacut.frame import Exact, LinearFlow, envelope
-from alphacut.frame.methods.sampling import corners
+from alphacut.frame.calculus.low_discrepancy import corners
 from benchmarks.frame.envelopes import FRAME, INPUTS
 
 CHUNK = 500

@@ -13,8 +13,8 @@ import numpy as np
 
 from alphacut.frame import Accelerogram, envelope
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.methods.sampling import corners
-from alphacut.frame.structures.beam import BeamFrame
+from alphacut.frame.calculus.low_discrepancy import corners
+from alphacut.frame.reduced.beam import BeamFrame
 from alphacut.fuzzy import Triangular
 from benchmarks.frame.envelopes import RESULTS
 from benchmarks.rows import write

@@ -36,3 +36,9 @@ def chebyshev_points(dimension: int, count: int, *, skip: int = 1) -> Array:
     """Points of [−1, 1]^d of Chebyshev density, shape (count, dimension)."""
     points: Array = -np.cos(np.pi * halton(dimension, count, skip=skip))
     return points
+
+
+def corners(lower: Array, upper: Array) -> Array:
+    """All corners of a box, shape (2^d, d); axes without width count once."""
+    axes = [(low,) if low == high else (low, high) for low, high in zip(lower, upper, strict=True)]
+    return np.array(np.meshgrid(*axes, indexing="ij")).reshape(len(axes), -1).T

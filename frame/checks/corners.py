@@ -6,7 +6,7 @@ import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.methods.sampling import corners
+from alphacut.frame.calculus.low_discrepancy import corners
 
 CORNERS = 64
 """Corners of each box that are looked at, at most."""

@@ -13,10 +13,12 @@ from alphacut.frame.calculus.jet import Array
 from alphacut.frame.checks.corners import signs
 from alphacut.frame.checks.tolerance import LIMIT
 from alphacut.frame.dynamics.flow import Flow, LinearFlow, StepError
-from alphacut.frame.dynamics.integrators import Exact, state_matrix
+from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.dynamics.nonlinear import SCHEMES, LagrangianFlow
-from alphacut.frame.envelope import Envelope, output_unit
+from alphacut.frame.envelope import Envelope
+from alphacut.frame.outputs import output_unit
 from alphacut.frame.structures.linear import evaluate
+from alphacut.frame.structures.state_space import state_matrix
 
 CORNERS = 16
 """Corners of the widest box that are looked at, at most."""

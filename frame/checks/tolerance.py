@@ -8,7 +8,7 @@ from math import floor, log10
 import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
-from alphacut.frame.envelope import output_unit
+from alphacut.frame.outputs import output_unit
 
 LIMIT = 0.01
 """Largest share of an output's peak that passes without a warning."""

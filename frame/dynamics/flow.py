@@ -11,7 +11,7 @@ from typing import NoReturn, Protocol
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet, concatenate
-from alphacut.frame.checks.numbers import require_number
+from alphacut.frame.calculus.numbers import require_number
 from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint, StepMap
 from alphacut.frame.dynamics.spectral import LARGE, NearlyCriticalError, spectral_trajectory
 from alphacut.frame.structures.linear import LinearSystem, check_names, evaluate

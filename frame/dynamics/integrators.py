@@ -16,6 +16,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, concatenate, inverse
 from alphacut.frame.structures.linear import Matrices
+from alphacut.frame.structures.state_space import state_matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,18 +203,6 @@ def exponential(z: Jet) -> Jet:
     for _ in range(squarings):
         series = series @ series
     return series
-
-
-def state_matrix(m: Matrices) -> Jet:
-    """A with [q; v]˙ = A [q; v], shape (S, 2n, 2n) (eq. 23)."""
-    light = inverse(m.mass)
-    lower = concatenate([-(light @ m.stiffness), -(light @ m.damping)], -1)
-    n = m.mass.value.shape[-1]
-    upper = Jet.constant(
-        np.broadcast_to(np.hstack([np.zeros((n, n)), np.eye(n)]), lower.value.shape),
-        lower.directions,
-    )
-    return concatenate([upper, lower], -2)
 
 
 def _loaded_flow(m: Matrices, step: float) -> Jet:

@@ -7,9 +7,10 @@ from dataclasses import replace
 from typing import Any
 
 from alphacut.frame.boxes import UnitFlow
-from alphacut.frame.envelope import Envelope, output_unit
+from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.auto import cheapest
 from alphacut.frame.methods.modal import modal
+from alphacut.frame.outputs import output_unit
 
 TOLERANCE = 1e-4
 """Wanted error unless one is given, in m."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any
 
-from alphacut.frame.checks.numbers import require_number
+from alphacut.frame.calculus.numbers import require_number
 from alphacut.frame.methods.batch_graph_follower import BatchFollower
 from alphacut.frame.methods.graph_follower import GraphFollower
 from alphacut.frame.methods.modal import Modal

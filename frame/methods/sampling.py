@@ -9,6 +9,7 @@ import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.low_discrepancy import corners
 from alphacut.frame.envelope import Envelope, signed_envelope
 
 Progress = Callable[[float], None]
@@ -46,12 +47,6 @@ def sample(flow: UnitFlow, points_of: Callable[[Array, Array], Array], method: s
         trajectories=runs,
         seconds=time.perf_counter() - begun,
     )
-
-
-def corners(lower: Array, upper: Array) -> Array:
-    """All corners of a box, shape (2^d, d); axes without width count once."""
-    axes = [(low,) if low == high else (low, high) for low, high in zip(lower, upper, strict=True)]
-    return np.array(np.meshgrid(*axes, indexing="ij")).reshape(len(axes), -1).T
 
 
 def vertex(flow: UnitFlow, progress: Progress | None = None) -> Envelope:

@@ -50,7 +50,7 @@ class LagrangianSystem:
     force: Function | None = None
 
     def __post_init__(self) -> None:
-        require_dimensions(self)
+        require_dimensions(self.coordinates, self.parameters, self.observed)
         for row in self.symbols.mass.tolist():
             for entry in row:
                 if entry.free_symbols & set(self.symbols.v):

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from alphacut.frame.checks.numbers import require_number
-
-if TYPE_CHECKING:
-    from alphacut.frame.structures.lagrangian import LagrangianSystem
+from alphacut.frame.calculus.numbers import require_number
 
 SMOOTH = "use arithmetic and frame.jet.sin, cos and exp, which are smooth and take symbols"
 ROUGH = (
@@ -29,24 +26,24 @@ ROUGH = (
 """Functions of SymPy that have no second derivative everywhere."""
 
 
-def require_dimensions(system: LagrangianSystem) -> None:
+def require_dimensions(
+    coordinates: int, parameters: Mapping[str, float], observed: Mapping[str, object]
+) -> None:
     """Refuse systems without coordinates, parameters or outputs, and bad parameters.
 
     Raises:
         ValueError: It is one.
     """
-    if not isinstance(system.coordinates, int) or system.coordinates < 1:
+    if not isinstance(coordinates, int) or coordinates < 1:
         raise ValueError(
-            f"coordinates: {system.coordinates!r} is not allowed; it must be a whole number, 1 or"
-            " greater"
+            f"coordinates: {coordinates!r} is not allowed; it must be a whole number, 1 or greater"
         )
-    for name in ("parameters", "observed"):
-        if not isinstance(getattr(system, name), Mapping) or not getattr(system, name):
+    for name, named in (("parameters", parameters), ("observed", observed)):
+        if not isinstance(named, Mapping) or not named:
             raise ValueError(
-                f"{name}: {getattr(system, name)!r} is not allowed; it must map names to values,"
-                " one at least"
+                f"{name}: {named!r} is not allowed; it must map names to values, one at least"
             )
-    for name, value in system.parameters.items():
+    for name, value in parameters.items():
         require_number(f"parameter {name}", value, "SI units")
 
 

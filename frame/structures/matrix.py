@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet
-from alphacut.frame.checks.numbers import require_number, require_numbers
+from alphacut.frame.calculus.numbers import require_number, require_numbers
 from alphacut.frame.structures.damping import modal_damping
 from alphacut.frame.structures.linear import Accelerogram, Matrices
 from alphacut.frame.structures.matrix_factors import require_factors

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet, concatenate, inverse
-from alphacut.frame.dynamics.integrators import state_matrix
 from alphacut.frame.structures.linear import Matrices
+from alphacut.frame.structures.state_space import state_matrix
 
 DOUBLE = 1e-6
 """Distance of two eigenvalues, as a share of their size, below which they count as one."""

@@ -10,7 +10,7 @@ from typing import Literal, cast
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, stack
-from alphacut.frame.checks.numbers import require_number, require_numbers
+from alphacut.frame.calculus.numbers import require_number, require_numbers
 from alphacut.frame.structures.damping import modal_damping
 from alphacut.frame.structures.linear import Accelerogram, Matrices
 

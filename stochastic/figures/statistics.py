@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE, PALE
+from alphacut.stochastic.microstructure_summary import to_dataset
 from alphacut.stochastic.tessellation.delaunay import neighbouring_values
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -123,7 +124,7 @@ def draw_pbox(found: Microstructure) -> Figure:
     drawn, (axes, apart) = plt.subplots(
         2, 1, figsize=(6.4, 5.6), height_ratios=(3, 1.4), sharex=True
     )
-    table = found.to_dataset()
+    table = to_dataset(found)
     radius, share = table["r_n"].values, table["cdf"].values
     for panel, base in ((axes, 0 * share), (apart, table["fitted"].values)):
         scale = 1 if panel is axes else 100

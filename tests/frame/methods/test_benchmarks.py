@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from alphacut.frame import INTEGRATORS
-from alphacut.frame.structures.beam import BeamFrame
+from alphacut.frame.reduced.beam import BeamFrame
 from benchmarks.frame import certificate as frame_certificate
 from benchmarks.frame import envelopes as frame_envelopes
 from benchmarks.frame import failures as frame_failures

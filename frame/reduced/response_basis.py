@@ -8,19 +8,53 @@ for drifts, not only for the roof.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
-
-if TYPE_CHECKING:
-    from alphacut.frame.structures.reduction import AffineStructure
+from alphacut.frame.structures.linear import Accelerogram
 
 
-def response_shapes(
-    structure: AffineStructure, p: Mapping[str, float], frequencies: Array
-) -> Array:
+class LargeStructure(Protocol):
+    """Large linear structure: matrices at a parameter set, damping, loads and start."""
+
+    @property
+    def rayleigh(self) -> tuple[str, str]:
+        """Names of the parameters that multiply M and K."""
+        ...
+
+    @property
+    def ratio(self) -> str | None:
+        """Name of the damping ratio, or None."""
+        ...
+
+    @property
+    def ground(self) -> Accelerogram | None:
+        """Base excitation, or None."""
+        ...
+
+    @property
+    def excitation(self) -> Array:
+        """Rigid motion of the unknowns with the ground, shape (N,)."""
+        ...
+
+    @property
+    def q0(self) -> Array | None:
+        """Initial displacements, shape (N,), or None."""
+        ...
+
+    @property
+    def v0(self) -> Array | None:
+        """Initial velocities, shape (N,), or None."""
+        ...
+
+    def assembled(self, p: Mapping[str, float]) -> tuple[Any, Any]:
+        """Sparse M and K at one parameter set."""
+        ...
+
+
+def response_shapes(structure: LargeStructure, p: Mapping[str, float], frequencies: Array) -> Array:
     """Displacements under harmonic ground motion and of a free vibration, (N, k).
 
     Args:

@@ -9,7 +9,7 @@ import pytest
 from scipy.sparse.linalg import eigsh
 
 from alphacut.frame import Accelerogram, Exact, LinearFlow, StoreyFrame, envelope
-from alphacut.frame.structures.beam import BeamFrame
+from alphacut.frame.reduced.beam import BeamFrame
 from alphacut.frame.structures.classical import classical_modes
 from alphacut.frame.structures.linear import evaluate, frequencies
 from alphacut.fuzzy import Triangular

@@ -19,9 +19,9 @@ import numpy as np
 from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.dynamics.spectral import responses
+from alphacut.frame.reduced.response_basis import energy_basis, response_shapes
 from alphacut.frame.structures.damping import modal_damping
 from alphacut.frame.structures.linear import Accelerogram, Matrices
-from alphacut.frame.structures.response_basis import energy_basis, response_shapes
 
 Factor = Callable[[Mapping[str, Any]], Any]
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
+from alphacut.frame.reduced.reduction import AffineStructure
 from alphacut.frame.structures.linear import Accelerogram
-from alphacut.frame.structures.reduction import AffineStructure
 
 
 @dataclass(frozen=True, eq=False)
