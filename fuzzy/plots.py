@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+# Okabe and Ito: told apart by everyone
 _COLOURS = (
     "#0072B2",
     "#D55E00",
@@ -22,7 +23,7 @@ _COLOURS = (
     "#CC79A7",
     "#E69F00",
     "#56B4E9",
-)  # Okabe and Ito: told apart by everyone
+)
 
 
 def plot_membership(

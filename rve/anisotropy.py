@@ -29,9 +29,8 @@ def rotated(stiffness: Array, angle: ArrayLike) -> Array:
     strains = np.array(
         [[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]]
     )
-    turn = np.moveaxis(
-        strains, (0, 1), (-2, -1)
-    )  # strain in the turned axes from strain in the old ones
+    # strain in the turned axes from strain in the old ones
+    turn = np.moveaxis(strains, (0, 1), (-2, -1))
     back = np.linalg.inv(turn)
     return np.asarray(np.swapaxes(back, -1, -2) @ stiffness @ back)
 

@@ -10,12 +10,10 @@ from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.truncated_normal import Array
 
 STRAIN = 0.01  # eq. 15
-LOADS = np.array(
-    [[STRAIN, STRAIN, 0.0], [0.0, 0.0, 2 * STRAIN]]
-)  # eq. 15 as (ε11, ε22, 2 ε12); ε12 is the tensor component
-THREE_LOADS = np.vstack(
-    [LOADS, [[STRAIN, -STRAIN, 0.0]]]
-)  # with the third, the whole planar stiffness follows
+# eq. 15 as (ε11, ε22, 2 ε12); ε12 is the tensor component
+LOADS = np.array([[STRAIN, STRAIN, 0.0], [0.0, 0.0, 2 * STRAIN]])
+# with the third, the whole planar stiffness follows
+THREE_LOADS = np.vstack([LOADS, [[STRAIN, -STRAIN, 0.0]]])
 
 
 @dataclass(frozen=True)

@@ -64,9 +64,8 @@ def load(
 
 def together(case: Case, single: Sequence[Problem], *, modal: bool) -> Iterator[Problem]:
     """Problems of a case as a whole that do not rest on wrong single values."""
-    if any(
-        "." not in problem.key for problem in single
-    ):  # a section or the stages: there is no telling what was meant
+    # a section or the stages: there is no telling what was meant
+    if any("." not in problem.key for problem in single):
         return
     broken = {problem.key for problem in single}
     broken |= {
@@ -213,9 +212,8 @@ def checked_section(
         ]
         strangers = [replace(strangers[0], nearest=missing[0])] if len(missing) == 1 else strangers
     yield from strangers
-    meant = {
-        problem.nearest for problem in strangers
-    }  # a misspelt key is one problem, not a missing one besides
+    # a misspelt key is one problem, not a missing one besides
+    meant = {problem.nearest for problem in strangers}
     for key, entry in section.keys.items():
         full = dotted(name, key)
         if key not in table:

@@ -15,10 +15,11 @@ OTHERS = {  # structures beside the storey frame, and their inputs
     "pendulum": ("m", "l", "d", "g", "phi_0", "omega_0"),
     "tower": ("E_columns", "E_columns_top", "E_beams", "mass", "zeta", *RAYLEIGH),
 }
+# of structures beside the storey frame
 OUTPUTS = {
     "pendulum": ("force",),
     "tower": ("roof", "drift"),
-}  # of structures beside the storey frame
+}
 
 
 def floors(case: Case) -> Iterator[Problem]:

@@ -74,9 +74,8 @@ def no_key(name: str, change: str, raw: Raw) -> Problem:
             change,
             ", ".join(f"{name}.{key}" for key in SECTIONS[name].keys),
         )
-    here = [
-        key for key in every_key() if table_of(raw, key.rpartition(".")[0]) is not None
-    ]  # keys of the case's own sections come first
+    # keys of the case's own sections come first
+    here = [key for key in every_key() if table_of(raw, key.rpartition(".")[0]) is not None]
     return Problem(
         "--set",
         f"there is no key {name}",
@@ -103,9 +102,8 @@ def toml_or_text(value: str, key: Key) -> object:
     try:
         found = tomllib.loads(f"x = {value}")["x"]
     except tomllib.TOMLDecodeError:
-        found = (
-            float(value) if re.fullmatch(r"[+-]?(\d+\.|\.\d+)([eE][+-]?\d+)?", value) else value
-        )  # .3 and 3. are no TOML
+        # .3 and 3. are no TOML
+        found = float(value) if re.fullmatch(r"[+-]?(\d+\.|\.\d+)([eE][+-]?\d+)?", value) else value
     if (
         key.alone
         and not isinstance(found, list)

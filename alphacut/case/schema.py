@@ -289,15 +289,17 @@ SECTIONS: dict[str, Section] = {
     "envelope": ENVELOPE,
     "exceedance": EXCEEDANCE,
 }
+# sections that a stage cannot do without
 NEEDED = {
     "microstructure": ("microstructure",),
     "modulus": ("radius", "cell"),
     "envelope": ("envelope",),
-}  # sections that a stage cannot do without
+}
+# sections that hold their defaults where they are left out and the other one is there
 IMPLIED = {
     "mesh": "cell",
     "modulus": "cell",
-}  # sections that hold their defaults where they are left out and the other one is there
+}
 
 
 def dotted(section: str, key: str) -> str:

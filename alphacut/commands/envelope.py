@@ -44,12 +44,13 @@ KEYS = {
     "--certify": "envelope.certify",
 }
 OF_AUTO = ("modal", "improved-graph-follower")
+# options that may leave the unit out
 BARE = {
     "--duration": "s",
     "--step": "s",
     "--tolerance": "m",
     "--certify": "m",
-}  # options that may leave the unit out
+}
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

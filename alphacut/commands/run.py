@@ -74,9 +74,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     prepared = ready(case)
     if prepared.rough and options.strict:
         raise BadInput(prepared.rough)
-    for warning in (
-        prepared.warnings
-    ):  # of what is rough the stage itself warns, with the modulus that it gets
+    # of what is rough the stage itself warns, with the modulus that it gets
+    for warning in prepared.warnings:
         say(f"warning: {warning}")
     start = time.perf_counter()
     chain = Chain(

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 # From Basix's order of a wedge's edges to meshio's, Abaqus's and Gmsh's reader's: lower triangle,
 # upper triangle, vertical edges.
 ORDER = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11]
+# from there to VTK's: the lower triangle seen from outside
 MIRRORED = [
     0,
     2,
@@ -34,19 +35,21 @@ MIRRORED = [
     12,
     14,
     13,
-]  # from there to VTK's: the lower triangle seen from outside
+]
+# names of the element sets, where a format has sets in place of data
 PHASES = (
     "MATRIX",
     "PARTICLE",
-)  # names of the element sets, where a format has sets in place of data
+)
 VTK_ORDER = {".vtu", ".vtk", ".xdmf"}
+# read back, they give points, cells and phase
 FORMATS = {
     ".vtu": "vtu",
     ".vtk": "vtk",
     ".xdmf": "xdmf",
     ".msh": "gmsh",
     ".inp": "abaqus",
-}  # read back, they give points, cells and phase
+}
 FIELDLESS = {".inp"}
 
 
@@ -65,9 +68,8 @@ def prism_mesh(case: Case) -> meshio.Mesh:
         plane, case.integer("mesh.layers"), case.text("mesh.interface") == "conforming"
     )
     phase = np.tile(plane.inside.astype(np.int64), grid.layers)
-    topological_dimension.setdefault(
-        "wedge15", 3
-    )  # meshio 5.3 reads and writes this cell but has forgotten its dimension
+    # meshio 5.3 reads and writes this cell but has forgotten its dimension
+    topological_dimension.setdefault("wedge15", 3)
     return meshio.Mesh(
         grid.positions(radius), [("wedge15", grid.cells[:, ORDER])], cell_data={"phase": [phase]}
     )
@@ -110,8 +112,7 @@ def write_mesh(mesh: meshio.Mesh, path: Path) -> None:
     if path.suffix in FIELDLESS:
         sets = {name: [np.flatnonzero(phase[0] == number)] for number, name in enumerate(PHASES)}
         mesh = meshio.Mesh(mesh.points, [("wedge15", wedges)], cell_sets=sets)
-    own = (
-        {"data_format": "XML"} if path.suffix == ".xdmf" else {}
-    )  # else its numbers are in a second file, by the partial one's name
+    # else its numbers are in a second file, by the partial one's name
+    own = {"data_format": "XML"} if path.suffix == ".xdmf" else {}
     with whole_file(path) as partial:
         meshio.write(partial, mesh, file_format=FORMATS[path.suffix], **own)

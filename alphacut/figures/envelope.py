@@ -60,9 +60,8 @@ def envelope(dataset: xarray.Dataset, output: str, study: Study) -> Figure:
     axes.set_xlabel("time t, s")
     prefix_axis(axes, output, output_unit(output))
     axes.set_xlim(time[0], time[-1])
-    known = (
-        WORDS if output.startswith(("q", "v", "drift", "shear", "base", "roof")) else {}
-    )  # letters mean something else in a pendulum
+    # letters mean something else in a pendulum
+    known = WORDS if output.startswith(("q", "v", "drift", "shear", "base", "roof")) else {}
     words = ", ".join(known.get(name, name) for name in study.task.fuzzy)
     axes.set_title(fill(f"{output}, fuzzy {words}", 84), loc="left", fontsize=10)
     alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))

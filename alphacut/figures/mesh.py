@@ -30,6 +30,7 @@ SHEETS, HEIGHT = (
     # another
 )
 FLATTENED = 0.6  # scale of the θ-axis in the picture
+# end, middle, end
 EDGES = [
     [0, 6, 1],
     [1, 7, 2],
@@ -40,7 +41,7 @@ EDGES = [
     [0, 12, 3],
     [1, 13, 4],
     [2, 14, 5],
-]  # end, middle, end
+]
 
 
 def draw_mesh(case: Case, path: Path, kind: str = "mesh") -> bool:
@@ -80,9 +81,8 @@ def mesh(file: str, picture: str) -> None:
         if phase == 0:
             centres = part.cell_centers().points
             part = part.extract_cells(~((centres[:, 0] > 0) & (centres[:, 1] < 0)))
-        surface = part.extract_surface(
-            nonlinear_subdivision=1
-        )  # facets through the midpoints, where the edges run too
+        # facets through the midpoints, where the edges run too
+        surface = part.extract_surface(nonlinear_subdivision=1)
         plotter.add_mesh(surface, color=colour, smooth_shading=False, ambient=0.5, diffuse=0.6)
         plotter.add_mesh(
             edges(part), color="#54402c", line_width=1.6, render_lines_as_tubes=True, lighting=False

@@ -55,12 +55,13 @@ ACCEPTED = {
 }
 
 
+# units that are others than were meant
 MEANT = {
     ("m/s^2", "g"): "g_0",
     ("s", "m"): "min",
     ("kg", "T"): "t",
     ("Pa", "g"): "GPa",
-}  # units that are others than were meant
+}
 
 
 @cache
@@ -90,6 +91,7 @@ def factor(unit: str, si: str) -> Decimal:
         raise ValueError("the unit is missing")
     if re.search(r"\btons?\b", unit):
         raise ValueError(f'the unit "{unit}" means several things; write t for 1000 kg, or lb')
+    # pint's tokeniser raises whatever Python's does on text that is not a unit at all
     try:
         one = registry().Quantity(
             Decimal(1), registry().parse_units(re.sub(r"([A-Za-z])([234])(?!\w)", r"\1^\2", unit))
@@ -103,9 +105,7 @@ def factor(unit: str, si: str) -> Decimal:
         raise ValueError(
             f'the unit "{unit}" is wrong' + (f"; did you mean {close}?" if close else "")
         ) from None
-    except (
-        Exception
-    ):  # pint's tokeniser raises whatever Python's does on text that is not a unit at all
+    except Exception:
         raise ValueError(f'the unit "{unit}" cannot be read') from None
 
 

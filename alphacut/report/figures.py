@@ -12,15 +12,15 @@ from typing import Any
 from alphacut.figures.captions import caption
 from alphacut.report.tables import section
 
+# figures that stand in the section they belong to
 ELSEWHERE = (
     "fig18-modulus",
     "modulus",
     "response",
     "exceedance",
-)  # figures that stand in the section they belong to
-WIDE = re.compile(
-    r"envelope-|chain|record|shares-over-time|graph-follower"
-)  # figures that need the page's whole width
+)
+# figures that need the page's whole width
+WIDE = re.compile(r"envelope-|chain|record|shares-over-time|graph-follower")
 SVG_LIMIT = 200_000  # bytes; a heavier figure goes into the page as PNG
 
 

@@ -162,9 +162,8 @@ def shares(found: Mapping[str, Any]) -> str:
         "<p>Share of the width at α = 0 that is lost when an input is fixed at its modal value and"
         " all others are kept.</p>"
     )
-    kinds = dict.fromkeys(
-        tuple(entry) for entry in found.values()
-    )  # quantities that depend on the same inputs share a table
+    # quantities that depend on the same inputs share a table
+    kinds = dict.fromkeys(tuple(entry) for entry in found.values())
     tables = []
     for inputs in kinds:
         of = [name for name, entry in found.items() if tuple(entry) == inputs]
@@ -284,9 +283,8 @@ def differing(summary: Mapping[str, Any]) -> str:
         for subject, text in found
     )
     listed = f"<ul>{rows}</ul>"
-    if not summary.get(
-        "paper"
-    ):  # for a case of one's own they are no news, but they are what the numbers rest on
+    # for a case of one's own they are no news, but they are what the numbers rest on
+    if not summary.get("paper"):
         listed = (
             f"<details><summary>{len(found)} places where the methods differ from the paper they"
             f" follow</summary>{listed}</details>"

@@ -156,14 +156,12 @@ def campaign(
     crisp = {name: case.fuzzy(key_of(name)).modal for name in INPUTS if name not in inputs}
     support = case.fuzzy(key_of("inclusion_modulus")).cut(0.0)
     choice = cell_choice(case, exclude=exclude, petsc=petsc)
-    if (
-        choice.method in TABULATED
-    ):  # no other method's samples depend on the range, and a wider one may take them as they are
+    # no other method's samples depend on the range, and a wider one may take them as they are
+    if choice.method in TABULATED:
         choice = replace(choice, moduli=(support.lower, support.upper))
     if case.has("response.quantity") and choice.method == "auto" and "series" not in choice.exclude:
-        choice = replace(
-            choice, tolerance=min(choice.tolerance, OF_CURVES)
-        )  # a curve needs more nodes than its mean, and they cost little
+        # a curve needs more nodes than its mean, and they cost little
+        choice = replace(choice, tolerance=min(choice.tolerance, OF_CURVES))
     task = CellTask(choice, crisp, case.numbers("radius.theta"))
     shared = tuple(name for name in inputs if name in SHARED) or ("inclusion_modulus",)
     return Campaign(
@@ -224,7 +222,6 @@ def identity(
         "source": source,
         "versions": versions(),
     }
-    found: dict[str, Any] = json.loads(
-        json.dumps(content)
-    )  # tuples become lists, as they are when read again
+    # tuples become lists, as they are when read again
+    found: dict[str, Any] = json.loads(json.dumps(content))
     return found

@@ -30,9 +30,8 @@ INPUTS = (
     "inclusion_modulus",
     "inclusion_poisson",
 )
-SHARED = tuple(
-    name for name in INPUTS if name != "inclusion_modulus"
-)  # what samples of one task have in common
+# what samples of one task have in common
+SHARED = tuple(name for name in INPUTS if name != "inclusion_modulus")
 
 
 def key_of(name: str) -> str:

@@ -79,9 +79,8 @@ def coarse_nodes(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
     if wanted.linear is None:
         return
     slowest = float(frequencies(wanted.linear)[0])
-    missed = 1 - cos(
-        min(pi, slowest * task.step) / 2
-    )  # of a cosine whose peak lies in the middle between two nodes
+    # of a cosine whose peak lies in the middle between two nodes
+    missed = 1 - cos(min(pi, slowest * task.step) / 2)
     if missed > MISSED:
         what = (
             f"{task.step:g} s between nodes and a first natural period of {2 * pi / slowest:.3g} s:"

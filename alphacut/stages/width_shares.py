@@ -64,9 +64,8 @@ def envelope_shares(results: Results, study: Study) -> tuple[Shares, Array]:
     step = (
         study.task.step if model.ground is None else thinned(study.task.duration, study.task.step)
     )
-    options: dict[str, Any] = (
-        {} if model.ground is None else {"tolerance": 1e-2, "relative": True}
-    )  # a share needs two digits
+    # a share needs two digits
+    options: dict[str, Any] = {} if model.ground is None else {"tolerance": 1e-2, "relative": True}
     groups = {name: wanted.members(name) for name in study.task.fuzzy}
     times: list[Array] = []
 

@@ -40,9 +40,8 @@ class Run:
     capped: bool = False
 
 
-Way = Callable[
-    [], tuple[float, float | None, int]
-]  # → E in Pa, seconds if not those of the whole call, unknowns
+# → E in Pa, seconds if not those of the whole call, unknowns
+Way = Callable[[], tuple[float, float | None, int]]
 Family = tuple[str, list[tuple[str, Way]]]
 
 

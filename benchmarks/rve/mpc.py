@@ -56,9 +56,8 @@ def _cell(
     started = process_time()
     cell = PlanarCell(planar_mesh(radius, size=mesh_size), order)
     constraint, fixed = _periodic(cell.space)
-    begun = (
-        process_time()
-    )  # forms anew for every cell are this comparison's own cost of convenience: left out
+    # forms anew for every cell are this comparison's own cost of convenience: left out
+    begun = process_time()
     forms = _forms(cell, constraint, (matrix, inclusion))
     compiled = process_time() - begun
     system = dolfinx_mpc.assemble_matrix(forms.bilinear, constraint, bcs=[fixed])

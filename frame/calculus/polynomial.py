@@ -115,9 +115,8 @@ class Polynomial:
         B = basis(u, self.index)
         d, degree = self.index.shape[1], int(self.index.sum(1).max())
         second = np.empty((d, d, len(u), self.coefficients.shape[1]), self.coefficients.dtype)
-        lower, lowest = (
-            terms(d, max(degree - k, 0)) for k in (1, 2)
-        )  # a derivative has fewer terms
+        # a derivative has fewer terms
+        lower, lowest = (terms(d, max(degree - k, 0)) for k in (1, 2))
         for i in range(d):
             for j in range(i, d):
                 second[i, j] = second[j, i] = _product(B[:, :lowest], self.curve[i, j, :lowest])

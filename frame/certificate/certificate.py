@@ -80,9 +80,8 @@ def certify(
     model, unit = model.in_units(scale), scale[:, None]
     bounds = bounds / unit
     margin = model_error / scale + ROUNDING * np.abs(bounds).max()
-    slack = (1 - 1e-6) * gap - 2 * float(
-        margin.max()
-    )  # so that rounding does not lift the gap above what was asked for
+    # so that rounding does not lift the gap above what was asked for
+    slack = (1 - 1e-6) * gap - 2 * float(margin.max())
     if slack <= 0:
         limit = 2 * float(margin.max())
         raise ValueError(
@@ -108,9 +107,8 @@ def certify(
         )
         outer[level], boxes = found.proved.reshape(outer[level].shape), boxes + found.boxes
     wide = margin[None, :, :, None]
-    outer = np.minimum.accumulate(
-        outer, axis=0
-    )  # what holds on a wider box holds on those inside it
+    # what holds on a wider box holds on those inside it
+    outer = np.minimum.accumulate(outer, axis=0)
     return Certificate(
         (inner - wide) * unit, points, (outer + wide) * unit, _between(model), boxes, scale
     )

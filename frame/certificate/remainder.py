@@ -82,9 +82,10 @@ class Remainder:
         for part in parts(model, growth):
             share = [x.reshape((*x.shape[:-1], n, m)) for x in suprema(part.share, reach)]
             for k in range(n):
+                # (4, d, d, d, m)
                 bounds = np.stack(
                     _leibniz([x[..., k, :] for x in share], [x[..., k] for x in rate])
-                )  # (4, d, d, d, m)
+                )
                 out += np.einsum("rt,rxyzm->tmxyz", 2 * part.waves[..., k], bounds)
         return cls(out)
 
@@ -101,9 +102,8 @@ def _leibniz(c: list[Array], r: list[Array]) -> list[Array]:
     out[0] += c[3]
     out[1] += c[0] * r[3][..., None]
     out[3] += c[0] * np.einsum("i,j,k->ijk", r[1], r[1], r[1])[..., None]
-    for i, j, k in permutations(
-        range(3)
-    ):  # each unordered choice of one index of three appears twice
+    # each unordered choice of one index of three appears twice
+    for i, j, k in permutations(range(3)):
         axes = (i, j, k)
         single = np.einsum("ijm,k->ijkm", c[2], r[1]) + np.einsum("im,jk->ijkm", c[1], r[2])
         double = np.einsum("im,j,k->ijkm", c[1], r[1], r[1]) + np.einsum(

@@ -119,6 +119,7 @@ class LagrangianFlow(March):
         total, count = len(states), parameters.value.shape[-1]
         path = concatenate(states, -1)  # V = (2n, T S), node by node
         tiled = parameters.map(lambda x: np.tile(x, total))
+        # eq. 18: f(t; p) from the states
         out = observe.chain(concatenate([path, tiled], -2), [np.tile(c, total) for c in constants])
         return out.map(
             lambda x: np.moveaxis(
@@ -186,9 +187,8 @@ class Variational:
         """Derivatives of the implicit step with the converged Jacobian."""
         n, pi = self.n, state[self.n :]
         f, g, H = self.both.taylor([*new, *state.value[:n], *parameters.value, *constants])
-        known_first = np.concatenate(
-            [state.first[:, :n], parameters.first], 1
-        )  # by old q and parameters
+        # by old q and parameters
+        known_first = np.concatenate([state.first[:, :n], parameters.first], 1)
         inverse = np.moveaxis(np.linalg.inv(np.moveaxis(J, -1, 0)), 0, -1)
         right = pi.first - np.einsum("mas,das->dms", g[:n, n:], known_first)
         first = np.einsum("mas,das->dms", inverse, right)

@@ -272,9 +272,8 @@ class Pursuit:
                     break
                 point = np.clip(self.target[place], self.lower, self.upper)
                 if (np.abs(self.points - point).max(1) < 1e-7).any():
-                    self.promise[place] = self.value[
-                        place
-                    ]  # tried already: the model promised too much
+                    # tried already: the model promised too much
+                    self.promise[place] = self.value[place]
                 elif all(np.abs(point - other).max() > SPACING for other in chosen):
                     chosen.append(point)
                     break

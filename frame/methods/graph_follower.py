@@ -139,9 +139,8 @@ class GraphFollower:
                 if sweep and len(storage) == before:
                     break
             signed = _signed(storage.values)
-            out.best[level] = signed.argmax(
-                -1
-            )  # post-processing: the best of all graphs at every node (Fig. 24)
+            # post-processing: the best of all graphs at every node (Fig. 24)
+            out.best[level] = signed.argmax(-1)
             out.bounds[level] = np.take_along_axis(signed, out.best[level][..., None], -1)[..., 0]
             if self.corrected:
                 self._correct(out, level)

@@ -203,10 +203,11 @@ def _model_with_error(
             if largest <= PORTION * gap:
                 return model, error, ""
         reason = f"its bound, some {largest:.2g}, takes too much of the gap {gap:g}"
+        # a degree more divides it by ten or so
         model, before = (
             fitted(sampled * min(0.99, 4 * PORTION * gap / largest)),
             model.degree,
-        )  # a degree more divides it by ten or so
+        )
         if model.degree <= before:
             break
     return first, SAFETY * first.error, reason

@@ -237,24 +237,20 @@ def _moments(
     parts = ground.intervals(h)
     points, weights = np.polynomial.legendre.leggauss(8 + ceil(abs(middle).max() * h / parts))
     share = (points + 1) / 2
-    tau = h - (np.arange(parts)[:, None] + share).ravel() * (
-        h / parts
-    )  # from each point to the end of the step
-    fine = ground.at(
-        np.arange((len(time) - 1) * parts + 1) * (h / parts)
-    )  # as the exact propagator takes it
+    # from each point to the end of the step
+    tau = h - (np.arange(parts)[:, None] + share).ravel() * (h / parts)
+    # as the exact propagator takes it
+    fine = ground.at(np.arange((len(time) - 1) * parts + 1) * (h / parts))
     load = (fine[:-1, None] * (1 - share) + fine[1:, None] * share).reshape(len(time) - 1, -1)
     factorial = np.cumprod(np.concatenate([[1.0], np.arange(1, order)]))
     series = (tau[:, None] / window) ** np.arange(order) / factorial  # (Q, order)
     kernel = np.exp(middle[:, None] * tau) * np.tile(weights, parts) * (h / parts / 2)  # (n, Q)
     pushed = load @ (kernel.T[:, :, None] * series[:, None]).reshape(len(tau), -1)
     pushed = pushed.reshape(len(time) - 1, len(middle), order)
-    advance = (
-        np.exp(middle * h)[:, None] * (h / window) ** np.arange(order) / factorial
-    )  # (n, order)
-    product = np.zeros(
-        (len(middle), order, order), complex
-    )  # truncated product with `advance` as a matrix
+    # (n, order)
+    advance = np.exp(middle * h)[:, None] * (h / window) ** np.arange(order) / factorial
+    # truncated product with `advance` as a matrix
+    product = np.zeros((len(middle), order, order), complex)
     for i in range(order):
         product[:, i, i:] = advance[:, : order - i]
     out = np.zeros((len(time), len(middle), order), complex)

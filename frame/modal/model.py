@@ -274,9 +274,8 @@ def _needed(flow: LinearFlow, boxes: Boxes, allowed: Array) -> Array:
     ground = flow.system.ground
     if ground is not None:
         record = np.abs(ground.acceleration)
-        push = np.minimum(
-            record.sum() * ground.step, record.max() / np.maximum(-rate.real, 1e-300)
-        )  # bound of |R(t; λ)|
+        # bound of |R(t; λ)|
+        push = np.minimum(record.sum() * ground.step, record.max() / np.maximum(-rate.real, 1e-300))
         state += np.abs(Y[:, len(matrices.rigid) :] @ matrices.rigid) * push[:, None]
     upper = np.flatnonzero(rate.imag >= 0)
     size = (2 * np.abs(rows.value[0] @ X).T * state / allowed)[upper]

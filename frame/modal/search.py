@@ -86,9 +86,8 @@ class ModalSearch:
     def suited(cls, model: ModalModel, seed: int = 0, small: float = 1e-9) -> ModalSearch:
         """More samples and starts where phases vary much over the box."""
         middle, rest = model.eigenvalue.coefficients[0], model.eigenvalue.coefficients[1:]
-        lasting = np.minimum(
-            model.time[-1], 5 / np.maximum(-middle.real, 1e-300)
-        )  # a mode that has died down has no basins
+        # a mode that has died down has no basins
+        lasting = np.minimum(model.time[-1], 5 / np.maximum(-middle.real, 1e-300))
         turned = float((np.abs(rest).sum(0) * lasting).max())  # rad
         more = int(np.clip(np.log2(max(turned, 1.0) / CALM), 0, 2))
         return cls(samples=512 * 2**more, starts=2 + more, small=small, seed=seed)
@@ -230,9 +229,8 @@ class ModalSearch:
 
     def _samples(self, lower: Array, upper: Array) -> Array:
         d = len(lower)
-        count = 2 ** round(
-            np.log2(max(64, self.samples * ((upper - lower) / 2).max()))
-        )  # narrow boxes hold fewer basins
+        # narrow boxes hold fewer basins
+        count = 2 ** round(np.log2(max(64, self.samples * ((upper - lower) / 2).max())))
         unit = chebyshev_points(d, count, skip=1 + 7919 * self.seed)
         points = np.vstack([unit, tensor_points(d, count)])
         scaled: Array = (lower + upper) / 2 + (upper - lower) / 2 * points
@@ -270,9 +268,8 @@ def _best_of_pool(pool: Array, values: Array, nodes: Array, starts: int) -> list
     """Best points of the pool (P, d) for every problem, and rivals elsewhere."""
     m = values.shape[-1]
     chosen = (values if len(nodes) == values.shape[1] else values[:, nodes]).reshape(len(pool), -1)
-    reach = (
-        0.25 * np.ptp(pool, axis=0).max()
-    )  # points this near the best are taken out together with it
+    # points this near the best are taken out together with it
+    reach = 0.25 * np.ptp(pool, axis=0).max()
     out = [problems(nodes, m, pool.shape[1]) for _ in range(starts)]
     for column, sign in enumerate((-1.0, 1.0)):
         left: Array = chosen

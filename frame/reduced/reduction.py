@@ -83,9 +83,8 @@ class AffineStructure:
             for point in _points(self.parameters, bounds, samples)
         ]
         M, K = self.assembled(self.parameters)
-        always = (
-            [self.excitation] if self.ground is not None else []
-        )  # so that the rigid motion is projected without error
+        # so that the rigid motion is projected without error
+        always = [self.excitation] if self.ground is not None else []
         basis = energy_basis(
             np.hstack(shapes),
             M,
@@ -96,9 +95,8 @@ class AffineStructure:
         small = [
             [(f, basis.T @ (A @ basis)) for f, A in terms] for terms in (self.mass, self.stiffness)
         ]
-        push = basis.T @ (
-            M @ self.excitation
-        )  # V is orthonormal in M: the coordinates of the rigid motion
+        # V is orthonormal in M: the coordinates of the rigid motion
+        push = basis.T @ (M @ self.excitation)
         state = [
             np.zeros(basis.shape[1]) if x is None else basis.T @ (M @ x) for x in (self.q0, self.v0)
         ]

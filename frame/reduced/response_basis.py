@@ -67,16 +67,14 @@ def response_shapes(structure: LargeStructure, p: Mapping[str, float], frequenci
     M, K = structure.assembled(p)
     D = float(p[structure.rayleigh[0]]) * M + float(p[structure.rayleigh[1]]) * K
     shapes: list[Array] = []
-    loss = (
-        2j * float(p[structure.ratio]) if structure.ratio else 0.0
-    )  # modal damping has no sparse matrix: a loss factor of 2 ζ at resonance
+    # modal damping has no sparse matrix: a loss factor of 2 ζ at resonance
+    loss = 2j * float(p[structure.ratio]) if structure.ratio else 0.0
     for omega in frequencies:
         solve = splu((K * (1 + loss) + 1j * omega * D - omega**2 * M).tocsc()).solve
         loads = [] if structure.ground is None else [M @ structure.excitation]
         if structure.q0 is not None and structure.q0.any():
-            loads.append(
-                1j * omega * (M @ structure.q0) + D @ structure.q0
-            )  # Fourier transform of the free vibration
+            # Fourier transform of the free vibration
+            loads.append(1j * omega * (M @ structure.q0) + D @ structure.q0)
         if structure.v0 is not None and structure.v0.any():
             loads.append(M @ structure.v0)
         for x in (solve(load.astype(complex)) for load in loads):

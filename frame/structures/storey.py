@@ -239,9 +239,8 @@ class StoreyFrame:
         return stack(rows, p)
 
     def _columns(self, p: Mapping[str, Jet]) -> list[Entry]:
-        return [
-            12 * c * p["E"] * p["I"] * p[f"l{z + 1}"] ** -3 for z, c in enumerate(self.columns)
-        ]  # k_z; 24 E I / l³ in section 6.1
+        # k_z; 24 E I / l³ in section 6.1
+        return [12 * c * p["E"] * p["I"] * p[f"l{z + 1}"] ** -3 for z, c in enumerate(self.columns)]
 
     def _output(self, name: str) -> tuple[str, int]:
         found = re.fullmatch(

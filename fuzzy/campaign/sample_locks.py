@@ -15,11 +15,10 @@ from hashlib import sha256
 from pathlib import Path
 from threading import Lock
 
+# no record locks on this system: two campaigns on one store may run the same sample
 try:
     import fcntl
-except (
-    ImportError
-):  # no record locks on this system: two campaigns on one store may run the same sample
+except ImportError:
     fcntl = None  # type: ignore[assignment]
 
 

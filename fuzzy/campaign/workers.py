@@ -147,9 +147,8 @@ def _end_with_parent() -> None:
     from multiprocessing.connection import wait as wait_for
     from threading import Thread
 
-    signal.signal(
-        signal.SIGINT, signal.SIG_IGN
-    )  # Ctrl-C reaches the whole group; the parent decides
+    # Ctrl-C reaches the whole group; the parent decides
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = parent_process()
 
     def watch() -> None:

@@ -177,10 +177,11 @@ def _rising(function: Callable[[Array], Array]) -> Callable[[Pair], Pair]:
 def _cosine(v: Pair) -> Pair:
     """Range of the cosine, ±1 included where a multiple of π may lie between."""
     small = (np.abs(v[0]) < _LARGE) & (np.abs(v[1]) < _LARGE)
+    # beyond, round-off hides the phase: anything goes
     v = (
         np.where(small, v[0], 0.0),
         np.where(small, v[1], 2 * np.pi),
-    )  # beyond, round-off hides the phase: anything goes
+    )
     turns = np.ceil(v[0] / np.pi - _CLOSE), np.floor(v[1] / np.pi + _CLOSE)
     some, both = turns[0] <= turns[1], turns[0] < turns[1]
     even = some & (turns[0] % 2 == 0)

@@ -96,9 +96,8 @@ class BranchAndBound:
         return FuzzyResult(
             domain=domain,
             outputs=columns,
-            lower=np.maximum.accumulate(
-                proved[..., 0]
-            ),  # what is proved of a cut holds in all cuts inside
+            # what is proved of a cut holds in all cuts inside
+            lower=np.maximum.accumulate(proved[..., 0]),
             upper=np.minimum.accumulate(proved[..., 1]),
             lower_at=places[:, :, 0],
             upper_at=places[:, :, 1],
@@ -213,9 +212,8 @@ class _Search:
         steep = np.maximum(np.abs(slope[0]), np.abs(slope[1]))
         reach = (np.nan_to_num(steep * half, nan=np.inf) * _ROUND_OFF).sum(axis=0) * _ROUND_OFF
         effect = np.where(half > 0, np.minimum(steep, 1e300) * half + half * 1e-300, -1.0)
-        low_end = np.where(
-            slope[0].T >= 0, lower, np.where(slope[1].T <= 0, upper, middle)
-        )  # monotone inputs go to their end
+        # monotone inputs go to their end
+        low_end = np.where(slope[0].T >= 0, lower, np.where(slope[1].T <= 0, upper, middle))
         self._attain(low_end, value)
         mean_value = np.nextafter(about - reach, -np.inf)
         return _Boxes(

@@ -160,9 +160,8 @@ class TrainedBounds:
         ends = self.predict(np.clip(unit, 0, 1).reshape(len(unit), -1)).reshape(len(unit), 2, -1)
         least, most = ends.min(axis=1), ends.max(axis=1)
         nested = np.minimum.accumulate(least[::-1])[::-1], np.maximum.accumulate(most[::-1])[::-1]
-        places = np.full(
-            (*least.shape, lower.shape[1]), np.nan
-        )  # a metamodel of bounds does not say where they are reached
+        # a metamodel of bounds does not say where they are reached
+        places = np.full((*least.shape, lower.shape[1]), np.nan)
         return FuzzyResult(
             domain=domain,
             outputs=self.outputs,

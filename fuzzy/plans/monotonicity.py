@@ -177,9 +177,8 @@ class _Box:
     def _spread(self) -> Array:
         from scipy.stats import qmc
 
-        unit: Array = qmc.Halton(len(self.lower), scramble=False).random(self.rule.probes + 1)[
-            1:
-        ]  # the first is a corner
+        # the first is a corner
+        unit: Array = qmc.Halton(len(self.lower), scramble=False).random(self.rule.probes + 1)[1:]
         return self.lower + unit * (self.upper - self.lower)
 
     def _slopes(self, points: Array, inputs: Rows) -> Array:

@@ -148,9 +148,8 @@ class SparseGrid:
             else np.full(values.shape[1], np.inf)
         )
         self._active[level] = missed
-        for step in product(
-            *((0, 1) if one else (0,) for one in level)
-        ):  # the tensor product of differences of interpolants
+        # the tensor product of differences of interpolants
+        for step in product(*((0, 1) if one else (0,) for one in level)):
             self._add_tensor(
                 tuple(one - down for one, down in zip(level, step, strict=True)), (-1) ** sum(step)
             )

@@ -61,9 +61,8 @@ class ResponseSurface:
         )
         matrix = basis(unit, degrees)
         left, size, right = np.linalg.svd(matrix, full_matrices=False)
-        kept = (
-            size > size[0] * 1e-10
-        )  # nested samples can leave some terms undetermined: take the least of them
+        # nested samples can leave some terms undetermined: take the least of them
+        kept = size > size[0] * 1e-10
         coefficients = right[kept].T @ ((left[:, kept].T @ values) / size[kept, None])
         leverage = np.minimum((left[:, kept] ** 2).sum(axis=1), 1 - 1e-12)
         left_out = (values - matrix @ coefficients) / (1 - leverage)[:, None]

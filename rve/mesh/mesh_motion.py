@@ -20,9 +20,8 @@ def moved(mesh: Triangulation, radius: float) -> Array:
     points = _slide(mesh.points, mesh.radius, radius)
     straight = np.flatnonzero(_across_diagonal(mesh)) + mesh.vertices
     points[straight] = points[mesh.ends[straight - mesh.vertices]].mean(axis=1)
-    points[mesh.arc] *= radius / np.linalg.norm(
-        points[mesh.arc], axis=1, keepdims=True
-    )  # z = 0 of eq. 14
+    # z = 0 of eq. 14
+    points[mesh.arc] *= radius / np.linalg.norm(points[mesh.arc], axis=1, keepdims=True)
     return np.asarray(points)
 
 

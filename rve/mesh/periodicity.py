@@ -65,9 +65,8 @@ def identify(plane: Triangulation) -> Periodicity:
             "the mesh is not periodic: a node on one side of the cell has no partner on the"
             " opposite side"
         )
-    order = np.argsort(
-        np.where((abs(keys[first]) == 10**7).all(axis=1), -1, first)
-    )  # the corner first, then as numbered
+    # the corner first, then as numbered
+    order = np.argsort(np.where((abs(keys[first]) == 10**7).all(axis=1), -1, first))
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order)) - 1
     unknown = rank[label]

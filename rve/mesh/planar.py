@@ -80,9 +80,8 @@ def planar_mesh(
         square.bind_sides()
         gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
         gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)
-        gmsh.option.setNumber(
-            "Mesh.LcIntegrationPrecision", 1e-4
-        )  # of the size along a curve; the default asks for thousands of points
+        # of the size along a curve; the default asks for thousands of points
+        gmsh.option.setNumber("Mesh.LcIntegrationPrecision", 1e-4)
         gmsh.model.mesh.setSizeCallback(
             lambda dim, tag, x, y, z, lc: size * _grading(x - centre[0], y - centre[1], radius)
         )

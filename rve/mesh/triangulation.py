@@ -77,9 +77,8 @@ def _gmsh_triangles(size: float, radius: float) -> tuple[Array, Integers, NDArra
         gmsh.finalize()
     inside = np.concatenate([np.full(len(b), radius > 0 and k == 0) for k, b in enumerate(blocks)])
     triangles = np.concatenate(blocks)
-    used, packed = np.unique(
-        triangles, return_inverse=True
-    )  # the centres of the arcs are points without triangles
+    # the centres of the arcs are points without triangles
+    used, packed = np.unique(triangles, return_inverse=True)
     return xyz.reshape(-1, 3)[used, :2], packed.reshape(-1, 3), inside
 
 

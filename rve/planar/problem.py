@@ -74,9 +74,8 @@ class PlanarCell:
             metadata={"quadrature_degree": degree},
         )
         density = self._lame[0] * ufl.div(trial) * ufl.div(test)
-        density += (
-            2 * self._lame[1] * ufl.inner(ufl.sym(ufl.grad(trial)), ufl.sym(ufl.grad(test)))
-        )  # eq. 7
+        # eq. 7
+        density += 2 * self._lame[1] * ufl.inner(ufl.sym(ufl.grad(trial)), ufl.sym(ufl.grad(test)))
         self._forms = [fem.form(density * dx(tag)) for tag in (0, 1)]
         self.seconds["jit"] = perf_counter() - started
 

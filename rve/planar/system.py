@@ -137,9 +137,8 @@ class Pencil:
         self._factor = Cholesky(pattern.rows, pattern.columns)
         forces = fixed @ affine, unit @ affine
         self.loads = tuple(np.asarray(periodic.T @ force) for force in forces)
-        self.uniform = tuple(
-            np.asarray(affine.T @ force) for force in forces
-        )  # 3 × 3: energy without fluctuation
+        # 3 × 3: energy without fluctuation
+        self.uniform = tuple(np.asarray(affine.T @ force) for force in forces)
 
     def solve(self, modulus: float) -> tuple[Array, Array]:
         """Negative fluctuations, shape (unknowns, 3), and stiffness in Pa, shape (3, 3)."""

@@ -26,9 +26,8 @@ from alphacut.rve.mesh.wedge import slab_rule, tabulate, vector_wedge
 from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.truncated_normal import Array
 
-JIT = {
-    "cffi_extra_compile_args": ["-O3", "-ffast-math"]
-}  # twice as fast as the default -O2, equal to round-off
+# twice as fast as the default -O2, equal to round-off
+JIT = {"cffi_extra_compile_args": ["-O3", "-ffast-math"]}
 
 
 @dataclass
@@ -85,25 +84,24 @@ class PrismForm:
         self._load = fem.Constant(self.mesh, np.zeros(3))
         self._stiffness = [fem.Constant(self.mesh, np.zeros(3)) for _ in range(2)]
         self._share = self._point_function()
-        weight = (
-            ufl.exp(-(ufl.SpatialCoordinate(self.mesh)[2] ** 2) / 2) * self._law
-        )  # f_Θ of eq. 1
+        # f_Θ of eq. 1
+        weight = ufl.exp(-(ufl.SpatialCoordinate(self.mesh)[2] ** 2) / 2) * self._law
         shares = (1.0, 1.0) if self.grid.conforming else (1 - self._share, self._share)
         measure = self._measure()
         phases = zip(self._stiffness, shares, strict=True)
         parts = [(c, weight * part, measure(k)) for k, (c, part) in enumerate(phases)]
+        # eq. 7: the Galerkin projection (eq. 4) of −div σ (eq. 2, 5) on the wedges' basis (eq. 3)
         self._forms = [
             self._jit(w * ufl.inner(_stress(c, _strain(u)), _strain(v)) * dx) for c, w, dx in parts
-        ]  # eq. 7
+        ]
         self._loads = [
             self._jit(-w * ufl.inner(_stress(c, self._load), _strain(v)) * dx) for c, w, dx in parts
         ]
 
     @staticmethod
     def _jit(form: ufl.Form) -> fem.Form:
-        with (
-            warnings.catch_warnings()
-        ):  # UFL signs a form by the printed quadrature points; they print in full
+        # UFL signs a form by the printed quadrature points; they print in full
+        with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message="Applying str")
             return fem.form(form, jit_options=JIT)
 

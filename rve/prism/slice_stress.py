@@ -109,9 +109,8 @@ class SliceStress:
             np.stack([d, -b, -c, a], axis=-1).reshape(*a.shape, 2, 2) / determinant[..., None, None]
         )
         values = displacement[cells].reshape(len(cells), 1, NODES, -1)
-        gradient = (inverse @ table @ values).reshape(
-            *a.shape, 2, 2, -1
-        )  # (m, q, ∂, component, load)
+        # (m, q, ∂, component, load)
+        gradient = (inverse @ table @ values).reshape(*a.shape, 2, 2, -1)
         shear = gradient[..., 0, 1, :] + gradient[..., 1, 0, :]
         return (
             np.stack([gradient[..., 0, 0, :], gradient[..., 1, 1, :], shear], axis=-2),

@@ -84,9 +84,8 @@ class PrismSystem:
         if self.grid.conforming:
             return np.tile(self.grid.plane.inside, self.grid.layers)[:, None].astype(float)
         x = np.einsum("qn,cnd->cqd", self.form.shapes, self.positions[self.grid.cells])
-        return np.asarray(
-            np.hypot(x[..., 0], x[..., 1]) < self.map(x[..., 2]), float
-        )  # z < 0 in eq. 14
+        # z < 0 in eq. 14
+        return np.asarray(np.hypot(x[..., 0], x[..., 1]) < self.map(x[..., 2]), float)
 
     def stiffness(self, phase: int) -> PETSc.Mat:
         """Reduced K_m (phase 0) or K_i (phase 1) for a unit modulus."""

@@ -104,9 +104,8 @@ class PrismTask:
             self._combined(soft.copy(), hard, phases)
             for soft, hard in zip(*self.loads, strict=True)
         ]
-        if all(
-            load.norm() <= NO_LOAD * size for load in loads
-        ):  # equal phases: the affine field is the solution
+        # equal phases: the affine field is the solution
+        if all(load.norm() <= NO_LOAD * size for load in loads):
             return Displacements(self.affine, self.affine, (0,) * len(loads), 0.0)
         solutions = solver.solve(loads)
         fluctuation = np.stack(

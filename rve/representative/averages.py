@@ -100,9 +100,8 @@ def averages(radii: Array, weights: Array, matrix: Phase, inclusion: Phase) -> A
 
     fraction = float(np.pi / 4 * weights @ radii**2)  # eq. 10
     places = np.append(radii, np.sqrt(4 * fraction / np.pi))
-    grid = np.linspace(
-        0, max(float(places.max()), 0.05) + 1e-9, 120
-    )  # a smooth function of the radius: interpolated
+    # a smooth function of the radius: interpolated
+    grid = np.linspace(0, max(float(places.max()), 0.05) + 1e-9, 120)
     table = square_stiffness(grid, matrix, [inclusion]).matrix[:, 0]
     cells = _interpolated(places, grid, table)
     single, cells = cells[-1], cells[:-1]

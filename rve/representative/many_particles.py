@@ -62,9 +62,8 @@ def _stiffness(
     space = fem.functionspace(mesh, ("Lagrange", 2, (2,)))
     trial, test = ufl.TrialFunction(space), ufl.TestFunction(space)
     density = constants[0] * ufl.div(trial) * ufl.div(test)
-    density += (
-        2 * constants[1] * ufl.inner(ufl.sym(ufl.grad(trial)), ufl.sym(ufl.grad(test)))
-    )  # eq. 7
+    # eq. 7
+    density += 2 * constants[1] * ufl.inner(ufl.sym(ufl.grad(trial)), ufl.sym(ufl.grad(test)))
     form = fem.form(density * ufl.dx(metadata={"quadrature_degree": 4}))
     return fem.assemble_matrix(form).to_scipy().tocsr(), np.asarray(
         space.tabulate_dof_coordinates()[:, :2]

@@ -17,9 +17,8 @@ from scipy.special import gammaln, zeta
 from alphacut.stochastic.theta.truncated_normal import Array
 
 AREA = 4.0
-ZETA_PERIOD = (
-    np.pi / AREA
-)  # ζ(z + P) − ζ(z) = π conj(P) / area: Legendre's relation on the square lattice
+# ζ(z + P) − ζ(z) = π conj(P) / area: Legendre's relation on the square lattice
+ZETA_PERIOD = np.pi / AREA
 
 
 @dataclass(frozen=True)

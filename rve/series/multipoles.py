@@ -106,9 +106,8 @@ class Family:
 def _images(sums: LatticeSums, k: Array, n: Array) -> Array:
     """Taylor coefficient k of Σ' (z − P)^-n for odd n, shape (len(k), len(n))."""
     k, n = k[:, None], n[None, :]
-    halved = np.exp(
-        gammaln(n + k) - gammaln(n) - gammaln(k + 1) - (n + k) * np.log(2)
-    )  # binomial over 2^(n + k)
+    # binomial over 2^(n + k)
+    halved = np.exp(gammaln(n + k) - gammaln(n) - gammaln(k + 1) - (n + k) * np.log(2))
     return np.asarray(-halved * sums.plain[n + k])
 
 

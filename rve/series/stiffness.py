@@ -85,9 +85,8 @@ def square_stiffness(
     while todo.size:
         for count in np.unique(harmonics[todo]):
             for rows in _batches(todo[harmonics[todo] == count], shape[1] * count**2):
-                open_ = error[rows] > max(
-                    tolerance, _ROUND_OFF
-                )  # what is settled stays, whatever its companions need
+                # what is settled stays, whatever its companions need
+                open_ = error[rows] > max(tolerance, _ROUND_OFF)
                 values, left = _solve_batch(radius[rows], contrast, int(count), loads)
                 for load in loads:
                     found[load][rows] = np.where(open_, values[load], found[load][rows])

@@ -169,9 +169,8 @@ def _stress(z: Complex, first: Complex, second: Complex, psi: Complex) -> Array:
 def _unit_load(load: str, radius: float, matrix: Phase, inclusion: Phase) -> UnitLoad:
     """All coefficients for ε11 + ε22 = 1, ε11 − ε22 = 1 or ε12 = 1."""
     at, contrast = np.array([radius]), Contrast.of(matrix, [inclusion])
-    harmonics = (
-        int(square_stiffness(at, matrix, [inclusion]).harmonics.max()) * 2 + 2
-    )  # fields need twice what moduli do
+    # fields need twice what moduli do
+    harmonics = int(square_stiffness(at, matrix, [inclusion]).harmonics.max()) * 2 + 2
     harmonics = min(harmonics, MOST_HARMONICS)
     kind, a = (
         family(harmonics, hydrostatic=load == "hydrostatic"),

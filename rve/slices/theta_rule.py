@@ -123,9 +123,8 @@ def settle_rule(
             for three in zip(*(known[n] for n in counts), strict=True)
         ]
         for k, (curve, gap) in enumerate(zip(known[count], gaps, strict=True)):
-            if k not in settled and (
-                points or gap <= accuracy
-            ):  # each inclusion by itself, whatever its companions need
+            # each inclusion by itself, whatever its companions need
+            if k not in settled and (points or gap <= accuracy):
                 settled[k] = curve, gap
         if len(settled) == len(gaps):
             return [settled[k][0] for k in range(len(gaps))], [

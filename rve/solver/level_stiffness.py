@@ -10,9 +10,8 @@ import numpy as np
 from alphacut.rve.mesh.triangulation import Integers
 from alphacut.stochastic.theta.truncated_normal import Array
 
-_CORNERS = np.array(
-    [[1 / 6, 1 / 6], [2 / 3, 1 / 6], [1 / 6, 2 / 3]]
-)  # Strang's rule of degree 2, weights 1/6
+# Strang's rule of degree 2, weights 1/6
+_CORNERS = np.array([[1 / 6, 1 / 6], [2 / 3, 1 / 6], [1 / 6, 2 / 3]])
 
 
 def _gradients(nodes: int) -> Array:

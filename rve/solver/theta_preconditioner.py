@@ -34,9 +34,8 @@ from alphacut.rve.solver.level_stiffness import LevelPattern, element_stiffness
 from alphacut.rve.solver.theta_mass import theta_mass
 from alphacut.stochastic.theta.truncated_normal import Array, TruncatedNormal
 
-_LINEAR = np.kron(
-    np.vstack([np.eye(3), [[0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5]]]), np.eye(2)
-)  # a linear field on six nodes
+# a linear field on six nodes
+_LINEAR = np.kron(np.vstack([np.eye(3), [[0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5]]]), np.eye(2))
 
 
 def _with_components(unknown: Integers) -> Integers:
@@ -89,9 +88,8 @@ class ThetaPreconditioner:
         columns = residual.size // self.numbering.size
         level, middle = self._split(self._gather(residual.array_r.reshape(-1, columns)))
         vertices = middle.shape[1]
-        level[:-1, :vertices] += (
-            middle / 2
-        )  # from nodal values half-way to bubbles on top of the hats
+        # from nodal values half-way to bubbles on top of the hats
+        level[:-1, :vertices] += middle / 2
         level[1:, :vertices] += middle / 2
         own, between = (
             slice(self.levels.start, self.levels.stop),

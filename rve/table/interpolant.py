@@ -197,9 +197,10 @@ class Table:
         at_r, at_e = self.span.coordinates(radius, modulus)
         rows = chebyshev.chebvander(at_r, self.coefficients.shape[0] - 1)
         columns = chebyshev.chebvander(at_e, self.coefficients.shape[1] - 1)
+        # one by one: same bits in any company
         logarithms = [
             rows @ np.tensordot(column, self.coefficients, axes=(0, 1)) for column in columns
-        ]  # one by one: same bits in any company
+        ]
         return np.asarray(np.exp(np.stack(logarithms, axis=1)))
 
     def stiffness(self, radius: Array, modulus: Array) -> Array:

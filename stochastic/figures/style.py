@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+# Okabe & Ito
 INK, BLUE, ORANGE, GREEN, GREY, PALE = (
     "#1a1a1a",
     "#0072b2",
@@ -18,7 +19,7 @@ INK, BLUE, ORANGE, GREEN, GREY, PALE = (
     "#009e73",
     "#8c8c8c",
     "#dce9f2",
-)  # Okabe & Ito
+)
 SETTINGS: dict[str, Any] = {
     "font.size": 10,
     "axes.spines.top": False,

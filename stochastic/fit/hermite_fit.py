@@ -19,15 +19,13 @@ from alphacut.stochastic.radius_map import HermiteMap
 from alphacut.stochastic.theta.quadrature import gauss_rule
 from alphacut.stochastic.theta.truncated_normal import Array, TruncatedNormal
 
-SHAPES = np.array(
-    [[1.0, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]]
-)  # h1 … h4 of eq. 12 in powers of ξ
+# h1 … h4 of eq. 12 in powers of ξ
+SHAPES = np.array([[1.0, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]])
 XI = np.linspace(0, 1, 401)
 # least slope asked for at the points XI, in units of a3 − a1: keeps it positive between them
 MARGIN = 2e-5
-SLOPES = np.array(
-    [polynomial.polyval(XI, polynomial.polyder(h)) for h in SHAPES]
-)  # their slopes, shape (4, 201)
+# their slopes, shape (4, 201)
+SLOPES = np.array([polynomial.polyval(XI, polynomial.polyder(h)) for h in SHAPES])
 
 
 @dataclass(frozen=True)
@@ -54,9 +52,8 @@ class HermiteFit:
         cumulated = sample.cumulated if weights is None else np.minimum(np.cumsum(weights), 1.0)
         share = np.concatenate([[0.0], cumulated])
         share[-1] = 1.0
-        right = (
-            np.diff(self._integrals(share), axis=1) @ sample.values - self._ends
-        )  # ∫ h_i (Q − a1 h1 − a3 h3) f_Θ
+        # ∫ h_i (Q − a1 h1 − a3 h3) f_Θ
+        right = np.diff(self._integrals(share), axis=1) @ sample.values - self._ends
         best = np.linalg.solve(self._gram, right)
         steep = SLOPES[[1, 3]]
         floor = -self.rising  # monotone: steep.T @ (a2, a4) ≥ floor
@@ -144,9 +141,8 @@ class HermiteFit:
         inverse = np.linalg.inv(self._gram)
         lift = (floor - steep.T @ best) / np.einsum("ik,ij,jk->k", steep, inverse, steep)
         on_edges = (best[:, None] + inverse @ steep * lift)[:, lift > 0]
-        optimal = (steep.T @ on_edges >= floor[:, None] - 1e-9).all(
-            axis=0
-        )  # feasible with a positive multiplier
+        # feasible with a positive multiplier
+        optimal = (steep.T @ on_edges >= floor[:, None] - 1e-9).all(axis=0)
         if optimal.any():
             return np.asarray(on_edges[:, np.argmax(optimal)])
         corners = _corners(steep, floor)

@@ -55,10 +55,11 @@ class PBox:
         grid = np.linspace(self.fit.distribution.lower, self.fit.distribution.upper, 20_001)
         low, high = self.bounds(grid)
         share = self.fit.distribution.cdf(grid)
+        # bounds of the distribution function
         least, greatest = (
             np.interp(values, high, share),
             np.interp(values, low, share),
-        )  # bounds of the distribution function
+        )
         return float(max((least - before).max(), (after - greatest).max(), 0.0))
 
     def contains(self, sample: AreaWeighted, band: float) -> bool:

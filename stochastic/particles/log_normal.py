@@ -54,9 +54,10 @@ class LogNormalRadii:
 
     def __call__(self, theta: ArrayLike) -> Array:
         """Radius at `theta` (any shape), in m."""
+        # eq. 11
         return np.clip(
             np.exp(self.mu + self.sigma * np.asarray(theta, float)), self.smallest, self.largest
-        )  # eq. 11
+        )
 
     def cdf(self, radius: ArrayLike) -> Array:
         """P(r ≤ radius), any shape, `radius` in m."""

@@ -135,9 +135,8 @@ class Surroundings:
             counts = np.fromiter(map(len, found), int, len(found))
             image = np.fromiter((k for one in found for k in one), int, counts.sum())
             first, other = np.repeat(of, counts), second[image]
-            apart = (
-                discs.centres[other] - discs.centres[first] + shift[image]
-            )  # the same, with its sign, seen from j
+            # the same, with its sign, seen from j
+            apart = discs.centres[other] - discs.centres[first] + shift[image]
             distance, limit = np.hypot(apart[:, 0], apart[:, 1]), reach[first] + discs.radii[other]
             keep = ((distance <= limit) if closed else (distance < limit)) & (
                 (first != other) | (distance > 0)

@@ -208,9 +208,8 @@ def _bounds(discs: Discs, of: Array) -> Pairs:
     if discs.periodic:
         shifts = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]) * discs.size
         return Pairs(np.repeat(of, 8), np.repeat(of, 8), np.tile(shifts, (len(of), 1)))
-    centres = np.clip(
-        discs.centres[of], 1e-15 * discs.size, (1 - 1e-15) * discs.size
-    )  # off the edge, so that there is a mirror image
+    # off the edge, so that there is a mirror image
+    centres = np.clip(discs.centres[of], 1e-15 * discs.size, (1 - 1e-15) * discs.size)
     apart = np.zeros((len(of), 4, 2))
     apart[:, 0, 0], apart[:, 1, 0] = -2 * centres[:, 0], 2 * (discs.size[0] - centres[:, 0])
     apart[:, 2, 1], apart[:, 3, 1] = -2 * centres[:, 1], 2 * (discs.size[1] - centres[:, 1])

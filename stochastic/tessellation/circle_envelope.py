@@ -131,9 +131,8 @@ def _next_crossing(a: Array, b: Array, c: Array, phi: Array) -> tuple[Array, Arr
     value, scale = wave + c, np.abs(a) + np.abs(b)
     top = np.argmax(value, axis=1)
     level = value >= value[row, top][:, None] - 2e-15 * (scale + scale[row, top][:, None])
-    current = np.argmax(
-        np.where(level, slope, -np.inf), axis=1
-    )  # of those that are uppermost but for round-off, the one that rises
+    # of those that are uppermost but for round-off, the one that rises
+    current = np.argmax(np.where(level, slope, -np.inf), axis=1)
     wave -= wave[row, current][:, None]
     slope -= slope[row, current][:, None]
     constant = c - c[row, current][:, None]
@@ -144,8 +143,7 @@ def _next_crossing(a: Array, b: Array, c: Array, phi: Array) -> tuple[Array, Arr
         cotangent = np.where(slope >= 0, (slope + root) / below, bend / (root - slope))
     tangent = (below == 0) & (slope == 0)
     cotangent[tangent] = np.where(bend[tangent] > 0, np.inf, -np.inf)
-    same = (
-        np.abs(bend) + np.abs(slope) + below <= 1e-14 * scale
-    )  # one function twice, but for round-off
+    # one function twice, but for round-off
+    same = np.abs(bend) + np.abs(slope) + below <= 1e-14 * scale
     cotangent[np.isnan(cotangent) | same] = -np.inf
     return current, 2 * np.arctan2(1.0, cotangent.max(axis=1))

@@ -20,9 +20,8 @@ from alphacut.stochastic.errors import RefusedError
 from alphacut.stochastic.tessellation.apollonius import Apollonius
 from alphacut.stochastic.theta.truncated_normal import Array
 
-EDGES = np.array(
-    [np.pi, 0.0, -np.pi / 2, np.pi / 2]
-)  # directions of the left, right, lower and upper edge
+# directions of the left, right, lower and upper edge
+EDGES = np.array([np.pi, 0.0, -np.pi / 2, np.pi / 2])
 
 
 @dataclass(frozen=True, eq=False)

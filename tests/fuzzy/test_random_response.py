@@ -130,9 +130,8 @@ def test_ellipsoidal_interaction_of_a_sum(plan, correlation):
     inputs = {"a": Triangular(-1.0, 0.0, 1.0), "b": Triangular(-1.0, 0.0, 1.0)}
     interaction = Ellipsoidal({("a", "b"): correlation})
     result = propagate(lambda a, b: a + b, inputs, plan, interactions=[interaction])
-    expected = (1 - np.array(levels(4))) * np.sqrt(
-        2 + 2 * correlation
-    )  # support function of the ellipse
+    # support function of the ellipse
+    expected = (1 - np.array(levels(4))) * np.sqrt(2 + 2 * correlation)
     np.testing.assert_allclose(result.bounds()[1], expected, atol=2e-5)
     np.testing.assert_allclose(result.bounds()[0], -expected, atol=2e-5)
 

@@ -10,12 +10,13 @@ from benchmarks.rve.solvers import Timing
 
 def test_a_solver_that_takes_too_long_is_stopped_and_its_time_is_a_lower_bound(tmp_path, capsys):
     out = tmp_path / "solvers.csv"
+    # below 15 times
     assert (
         cell_solvers.main(
             ["--mesh-size", "0.5", "--solvers", "gamg", "--cap", "1e-9", "--out", str(out)]
         )
         == 1
-    )  # below 15 times
+    )
     with out.open() as file:
         first, stopped = csv.DictReader(file)
     assert stopped["seconds"].startswith(">")

@@ -295,9 +295,8 @@ def test_study_of_packings(found):
     numbers = summary(found)
     assert json.loads(json.dumps(numbers)) == numbers
     assert numbers["area_fraction"] == pytest.approx(0.2, abs=1e-12)
-    assert numbers["area_fraction_of_cells"] == pytest.approx(
-        0.2, abs=1e-12
-    )  # eq. 10 is an identity
+    # eq. 10 is an identity
+    assert numbers["area_fraction_of_cells"] == pytest.approx(0.2, abs=1e-12)
     assert numbers["neighbours"]["mean"] == 6
     assert numbers["cell_areas_sum_error"] < 1e-10
     assert numbers["mean_area_fraction_of_map"] == pytest.approx(0.2, abs=0.005)

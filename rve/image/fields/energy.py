@@ -100,9 +100,8 @@ def modes_of(
         shape = local.shape[1:]
         modes = (element.modes @ local.reshape(count, -1)).reshape(-1, *shape)
         np.abs(local, out=local)
-        doubt += (
-            (count + 12) * UNIT * local
-        )  # the product of matrices; entries of the matrix are right to 10 units
+        # the product of matrices; entries of the matrix are right to 10 units
+        doubt += (count + 12) * UNIT * local
         rounding = (absolute @ doubt.reshape(count, -1)).reshape(-1, *shape)
         modes += mean_modes[:, None, :, None, None]
         rounding += UNIT * np.abs(modes)

@@ -58,9 +58,8 @@ def test_cell_prints_what_it_promises(capfd):
 def test_crisp_options_reach_the_cell(capfd):
     crisp = ["--a1", "0.5", "--a3", "0.5", "--a2", "0", "--a4", "0", "--method", "series"]
     found = answer(["cell", PAPER, *crisp, "--inclusion-modulus", "80000 MPa"], capfd)
-    assert found["stress_GPa"]["s11"] == pytest.approx(
-        0.467852842132, rel=1e-9
-    )  # series solution at r = 0.5
+    # series solution at r = 0.5
+    assert found["stress_GPa"]["s11"] == pytest.approx(0.467852842132, rel=1e-9)
     same = answer(["cell", PAPER, *crisp, "--inclusion-modulus", "20 GPa"], capfd)
     assert same["E_GPa"] == pytest.approx(20, rel=1e-10)
 

@@ -32,9 +32,8 @@ def test_random_values_have_the_shape_of_the_membership(number):
     area = np.cumsum(number.membership(grid))
     share = np.interp(drawn, grid, area / area[-1])
     assert len(drawn) == 4000
-    assert np.abs(share - (np.arange(4000) + 0.5) / 4000).max() < 1.95 / np.sqrt(
-        4000
-    )  # Kolmogorov–Smirnov, 0.1 %
+    # Kolmogorov–Smirnov, 0.1 %
+    assert np.abs(share - (np.arange(4000) + 0.5) / 4000).max() < 1.95 / np.sqrt(4000)
 
 
 def test_without_random_inputs_the_probability_is_what_the_peaks_say(capfd):

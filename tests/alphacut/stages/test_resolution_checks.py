@@ -30,9 +30,8 @@ def test_the_guard_names_the_output_for_which_a_tolerance_is_coarsest():
     inputs = {"E": Triangular(4, 5, 6)}
     flow = UnitFlow(LinearFlow(FRAME, ("E",), 4, 0.05), boxes(inputs))
     peak = np.abs(flow.flow.values(np.array([[5.0]]))[0]).max(0)
-    found = tolerance_guard(
-        flow, 0.02 * peak[0]
-    )  # of mixed units the first output's; the others' in proportion
+    # of mixed units the first output's; the others' in proportion
+    found = tolerance_guard(flow, 0.02 * peak[0])
     assert found.share == pytest.approx(0.02)
     assert not found.ok
     assert tolerance_guard(flow, found.cure).ok

@@ -67,9 +67,8 @@ def test_the_modulus_command_prints_a_response_that_agrees_with_itself(capfd):
     assert (
         0 < limit["lower"][0] < limit["lower"][-1] == limit["upper"][-1] < limit["upper"][0] < 0.2
     )
-    for level in range(
-        len(found["alpha"])
-    ):  # the p-box at the limit is the exceedance's complement
+    # the p-box at the limit is the exceedance's complement
+    for level in range(len(found["alpha"])):
         for side, other in (("lower", "upper"), ("upper", "lower")):
             below = np.interp(0.6, box["stress_GPa"], box[side][level])
             assert 1 - below == pytest.approx(limit[other][level], abs=5e-3)

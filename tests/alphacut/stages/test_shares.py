@@ -17,9 +17,8 @@ SHORT = ['stages=["envelope"]', "envelope.fuzzy=E,m3"]
 
 def run(tmp_path, *changes, case="paper"):
     text = (CASES / f"{case}.toml").read_text(encoding="utf-8").partition("[[study]]")
-    whole = text[0] + (
-        "[envelope]" + text[2].partition("[envelope]")[2] if text[1] else ""
-    )  # without its studies
+    # without its studies
+    whole = text[0] + ("[envelope]" + text[2].partition("[envelope]")[2] if text[1] else "")
     (tmp_path / "case.toml").write_text(whole, encoding="utf-8")
     (tmp_path / "record.csv").write_bytes((CASES / "building.record.csv").read_bytes())
     words = [word for change in (*SHORT, *changes) for word in ("--set", change)]

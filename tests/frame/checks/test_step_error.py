@@ -150,9 +150,8 @@ def test_the_dominant_error_is_of_one_output_in_its_unit() -> None:
     assert " m of q2 against " in str(
         found.facts["dominant_error"]
     ) or " N of base_shear against " in str(found.facts["dominant_error"])
-    assert (
-        float(found.facts["step_error"]) < 0.01
-    )  # in metres, though the shear is hundreds of newtons
+    # in metres, though the shear is hundreds of newtons
+    assert float(found.facts["step_error"]) < 0.01
     assert found.error is not None
     assert found.error[0, :, 0].max() > float(found.facts["step_error"])
 

@@ -95,10 +95,11 @@ def test_exact_propagator_equals_the_matrix_exponential() -> None:
 @pytest.mark.parametrize("method", ALL, ids=str)
 def test_derivatives_are_those_of_the_scheme(method: Integrator) -> None:
     flow, p = LinearFlow(SHAKEN, NAMES, 8, 0.1, method), modal(NAMES)
+    # derivatives by relative changes of the parameters
     jet, size = (
         flow.taylor(p),
         p[0][:, None, None, None],
-    )  # derivatives by relative changes of the parameters
+    )
     for i, h in enumerate((3e-4, 1e-3, 3e-4, 3e-2, 0.3, 0.3)):  # weaker effects take longer steps
         far_below, below, above, far_above = (
             flow.taylor(p * (1 + k * h * np.eye(len(NAMES))[i])) for k in (-2, -1, 1, 2)

@@ -182,9 +182,8 @@ def test_branch_and_bound_finds_what_a_search_missed() -> None:
     from alphacut.frame.modal.search import problems
 
     optima = problems(np.arange(41), 3, 4)
-    optima.value[:] = optima.side * model.value_at(
-        optima.point, optima.node, optima.output
-    )  # starts from the middle only
+    # starts from the middle only
+    optima.value[:] = optima.side * model.value_at(optima.point, optima.node, optima.output)
     found = BranchAndBound(1e-6).run(model, lower, upper, optima)
     bounds, _, _ = ModalSearch().run(model, lower, upper, np.zeros((0, 4)))
     assert np.abs(found.value - bounds.ravel()).max() < 1e-6

@@ -24,9 +24,8 @@ def test_stiff_beams_and_light_columns_make_a_storey_frame() -> None:
     M, K = frame.structure().assembled(frame.structure().parameters)
     beam = np.sqrt(eigsh(K, 3, M, sigma=0.0, return_eigenvectors=False))
     mass = 2 * frame.width * frame.floor
-    storey = StoreyFrame(
-        [mass] * 3, [3.0] * 3, 30e9, 0.02 * 12 * 3 / 24
-    )  # three columns of 12 E I / h³
+    # three columns of 12 E I / h³
+    storey = StoreyFrame([mass] * 3, [3.0] * 3, 30e9, 0.02 * 12 * 3 / 24)
     assert np.sort(beam) == pytest.approx(frequencies(storey), rel=2e-3)
 
 
@@ -34,14 +33,12 @@ def test_rigid_motion_costs_no_energy_away_from_the_foot() -> None:
     structure = TOWER.structure()
     _, K = structure.assembled(structure.parameters)
     force = K @ structure.excitation
-    assert (
-        np.abs(force[3 * 3 :]).max() < 1e-6 * np.abs(force).max()
-    )  # only the first storey resists
+    # only the first storey resists
+    assert np.abs(force[3 * 3 :]).max() < 1e-6 * np.abs(force).max()
     M, _ = structure.assembled(structure.parameters)
     columns, beams = 3 * 6 * 3.0 * 2500 * 0.49, 2 * 6 * 6.0 * 12e3
-    foot = (
-        3 * 3.0 * 2500 * 0.49 * (1 - 1 / 2 + (156 / 420 - 1 / 2))
-    )  # the clamped joints take their share of the lowest columns
+    # the clamped joints take their share of the lowest columns
+    foot = 3 * 3.0 * 2500 * 0.49 * (1 - 1 / 2 + (156 / 420 - 1 / 2))
     assert structure.excitation @ (M @ structure.excitation) == pytest.approx(
         columns + beams - 3 * 3.0 * 2500 * 0.49 + foot, rel=0.02
     )

@@ -259,9 +259,8 @@ def test_store_gives_the_bits_back(tmp_path):
 def test_a_full_disk_stops_the_campaign_and_spoils_nothing(tmp_path):
     with Store(tmp_path / "s.db") as store:
         shelf_pages = store.database.execute("PRAGMA page_count").fetchone()[0]
-        store.database.execute(
-            f"PRAGMA max_page_count = {shelf_pages + 30}"
-        )  # the same error as a full disk
+        # the same error as a full disk
+        store.database.execute(f"PRAGMA max_page_count = {shelf_pages + 30}")
         with pytest.raises(
             StoreError, match=r"s.db cannot be used \(database or disk is full\): free some space"
         ):

@@ -105,9 +105,8 @@ def test_bounds_of_the_mean_have_their_closed_form(response):
     lower, upper = response.mean()
     for level, alpha in enumerate(levels(2)):
         m, s, b = MEAN.cut(alpha), SPREAD.cut(alpha), Triangular(-1, 0, 1).cut(alpha)
-        half = s.width / np.sqrt(
-            2 * np.pi
-        )  # each quantile takes the spread that suits it: E max(s z) = s̄ E z⁺ − s̲ E z⁻
+        # each quantile takes the spread that suits it: E max(s z) = s̄ E z⁺ − s̲ E z⁻
+        half = s.width / np.sqrt(2 * np.pi)
         assert lower[level] == pytest.approx(m.lower + b.lower - half, abs=5e-3)
         assert upper[level] == pytest.approx(m.upper + b.upper + half, abs=5e-3)
 

@@ -46,9 +46,8 @@ def first_passage(number, level, index, alpha):
     if index in (0, top - level):
         return ends[level].lower if index == 0 else ends[level].upper
     total = 0.0
-    for q in range(
-        level + 1, top + 1
-    ):  # stops at level q at its left end (after `index` steps left) or at its right end
+    # stops at level q at its left end (after `index` steps left) or at its right end
+    for q in range(level + 1, top + 1):
         steps = q - level
         to_left, to_right = index, top - level - index
         if (
@@ -118,9 +117,8 @@ def test_every_method_is_exact_on_a_monotone_model(plan):
         a2, a4, E = (number.cut(level) for number in PAPER.values())
         assert low == monotone(a2.lower, a4.upper, E.lower)["E"]
         assert high == monotone(a2.upper, a4.lower, E.upper)["E"]
-    assert result.nature is (
-        Nature.GUARANTEED if plan == Extended(tuple(PAPER)) else Nature.INNER
-    )  # there the caller states the property
+    # there the caller states the property
+    assert result.nature is (Nature.GUARANTEED if plan == Extended(tuple(PAPER)) else Nature.INNER)
     assert not result.enforced.any()
 
 

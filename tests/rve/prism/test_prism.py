@@ -11,11 +11,12 @@ from alphacut.stochastic import HermiteMap
 
 PAPER = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
 MATRIX, PARTICLE = Phase(20e9), Phase(80e9)
+# GPa
 EXACT = {
     0.2: (0.396401666057, 0.158812312491),
     0.5: (0.467852842132, 0.186140947852),
     0.8: (0.667472541097, 0.255628130639),
-}  # GPa
+}
 
 
 def solve(radius_map=PAPER, particle=PARTICLE, **options):
@@ -53,9 +54,8 @@ def test_one_set_up_serves_many_inclusions():
     particles = [Phase(e) for e in (75e9, 80e9, 85e9, 20e9 * 40)]
     together = PrismModel(mesh_size=0.3, layers=4).solve(PAPER, MATRIX, particles)
     alone = [solve(particle=p, mesh_size=0.3, layers=4) for p in particles]
-    assert [r.modulus for r in together] == [
-        r.modulus for r in alone
-    ]  # bit for bit: a resumed campaign must not differ
+    # bit for bit: a resumed campaign must not differ
+    assert [r.modulus for r in together] == [r.modulus for r in alone]
 
 
 def test_a_result_does_not_depend_on_what_was_solved_before():

@@ -60,9 +60,8 @@ def test_dilute_limit():
     cell = square_stiffness(np.array([radius]), MATRIX, [inclusion])
     km, ki = ((p.stiffness[0, 0] + p.stiffness[0, 1]) / 2 for p in (MATRIX, inclusion))
     gm = MATRIX.stiffness[2, 2]
-    exact = (
-        np.pi * radius**2 / 4 * (ki - km) * (km + gm) / (ki + gm)
-    )  # area fraction times the single inclusion's effect
+    # area fraction times the single inclusion's effect
+    exact = np.pi * radius**2 / 4 * (ki - km) * (km + gm) / (ki + gm)
     assert cell.bulk[0, 0] / 2 - km == pytest.approx(exact, rel=1e-5)
 
 

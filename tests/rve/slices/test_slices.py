@@ -153,9 +153,8 @@ def test_order_4_cures_the_locking_of_order_2(poissons):
         for order in (2, 4)
     }
     assert errors[4] < 2e-5
-    assert (errors[2] > 5e-3) == (
-        poissons[0] > 0.49
-    )  # a nearly incompressible particle alone does not lock
+    # a nearly incompressible particle alone does not lock
+    assert (errors[2] > 5e-3) == (poissons[0] > 0.49)
 
 
 @pytest.mark.parametrize("radius", [0.001, 0.3, 0.85, 0.98])
