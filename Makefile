@@ -35,7 +35,8 @@ bench-scaling:
 	$(IN) python -m benchmarks.rve.solvers --mesh-size 0.04 --solvers gamg --out benchmarks/results/cell_solvers_large.csv
 
 lint:
-	ruff check . && ruff format --check .
+	$(IN) ruff check .
+	$(IN) ruff format --check .
 	$(IN) mypy --strict alphacut
 
 charts:

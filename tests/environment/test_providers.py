@@ -1,0 +1,106 @@
+"""Every import has a provider that the environment's package list names."""
+
+import ast
+import re
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+FOLDERS = ("stochastic", "rve", "fuzzy", "frame", "alphacut", "tests", "benchmarks", "docs")
+DIRECT = {
+    "basix": "python3-dolfinx",
+    "cvxopt": "python3-cvxopt",
+    "dolfinx": "python3-dolfinx",
+    "dolfinx_mpc": "python3-dolfinx-mpc",
+    "gmsh": "python3-gmsh",
+    "hypothesis": "python3-hypothesis",
+    "jsonschema": "python3-jsonschema",
+    "matplotlib": "python3-matplotlib",
+    "meshio": "python3-meshio",
+    "mpi4py": "python3-mpi4py",
+    "netCDF4": "python3-netcdf4",
+    "numpy": "python3-numpy",
+    "petsc4py": "python3-petsc4py-real",
+    "pint": "python3-pint",
+    "pytest": "python3-pytest",
+    "pyvista": "python3-pyvista",
+    "rich": "python3-rich",
+    "scipy": "python3-scipy",
+    "skimage": "python3-skimage",
+    "sympy": "python3-sympy",
+    "ufl": "python3-dolfinx",
+    "xarray": "python3-xarray",
+}
+INDIRECT = {  # imported by others on this project's behalf
+    "cffi": "python3-cffi",  # DOLFINx, to compile forms
+    "h5py": "python3-h5py",  # meshio, to write .xdmf
+    "ipykernel": "python3-ipykernel",  # the notebook
+    "jinja2": "python3-jinja2",
+    "joblib": "python3-joblib",
+    "myst_parser": "python3-myst-parser",  # Sphinx, for the pages of docs
+    "nbclient": "python3-nbclient",
+    "notebook": "python3-notebook",
+    "pip": "python3-pip",  # enter, to install ruff
+    "pytest_cov": "python3-pytest-cov",  # pytest, for make coverage
+    "sphinx": "python3-sphinx",
+}
+FROM_PYPI = {"pyuncertainnumber": "benchmarks/fuzzy/requirements.txt"}  # one comparison needs it
+
+
+def imports_of(source: str) -> set[str]:
+    """Top-level names that a file imports, by statement or by a name given to pytest or importlib."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found.add(node.module)
+        elif isinstance(node, ast.Call) and node.args:
+            function = node.func
+            called = getattr(function, "attr", getattr(function, "id", ""))
+            first = node.args[0]
+            if called in ("importorskip", "import_module") and isinstance(first, ast.Constant):
+                found.add(first.value)
+    return {name.partition(".")[0] for name in found}
+
+
+def foreign_imports() -> set[str]:
+    """Names that the files of the project import and that neither it nor Python has."""
+    files = [file for folder in FOLDERS for file in (ROOT / folder).rglob("*.py")]
+    assert len(files) > 200
+    names = set().union(*(imports_of(file.read_text(encoding="utf-8")) for file in set(files)))
+    return names - sys.stdlib_module_names - set(FOLDERS)
+
+
+def environment_packages() -> set[str]:
+    """Debian packages that `enter` installs."""
+    text = (ROOT / "enter").read_text(encoding="utf-8")
+    listed = re.search(r"^packages=\((.*?)^\)", text, re.MULTILINE | re.DOTALL)
+    assert listed
+    return set(re.sub(r"#.*", "", listed[1]).split())
+
+
+def test_every_import_has_a_provider():
+    assert foreign_imports() - set(INDIRECT) == {*DIRECT, *FROM_PYPI} - set(INDIRECT)
+
+
+def test_every_provider_is_in_the_package_list():
+    assert {*DIRECT.values(), *INDIRECT.values()} <= environment_packages()
+    for name, file in FROM_PYPI.items():
+        assert name in (ROOT / file).read_text(encoding="utf-8").lower()
+
+
+@pytest.mark.parametrize("name", sorted({*DIRECT, *INDIRECT}))
+def test_the_environment_has_it_outside_the_home_folder(name):
+    spec = find_spec(name)
+    assert spec
+    assert spec.origin
+    assert not Path(spec.origin).is_relative_to(Path.home())
+
+
+def test_imports_by_any_way_would_be_seen():
+    source = "import a.b\nfrom c import d\npytest.importorskip('e.f')\nimport_module('g')\n"
+    assert imports_of(source) == {"a", "c", "e", "g"}
