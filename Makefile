@@ -1,6 +1,7 @@
 # make run         the paper's case, from microstructure to fuzzy vibration, into results/paper/
 # make test        the tests (slower ones: make test-slow)
 # make bench-solver, make bench-scaling, make charts, make stability    what the methods cost and where they end
+# make mutants     plants faults and sees that the tests turn red
 # make coverage    the lines of the five packages that the tests run, and those that they do not
 # make docs, make lint, make pictures    documentation, style and types, the README's picture
 # The environment is made on first use; make clean-env removes it.
@@ -12,7 +13,7 @@ IN = ./enter
 help:
 	@sed -n 's/^# //p' Makefile
 
-.PHONY: help run test test-slow coverage lint charts bench-solver bench-scaling stability docs pictures clean clean-env
+.PHONY: help run test test-slow coverage lint charts mutants bench-solver bench-scaling stability docs pictures clean clean-env
 
 run:
 	$(IN) python -m alphacut run $(CASE) --out $(OUT) --workers $(WORKERS) $(if $(FRESH),--fresh)
@@ -44,6 +45,9 @@ charts:
 	$(IN) python -m benchmarks.frame.integrators
 	$(IN) python -m benchmarks.frame.envelopes
 	$(IN) python -m benchmarks.frame.failures
+
+mutants:
+	$(IN) python -m benchmarks.mutation.mutants
 
 stability:
 	$(IN) python -m benchmarks.rve.stability
