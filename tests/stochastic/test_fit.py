@@ -219,3 +219,12 @@ def test_hopeless_samples_are_refused_with_the_reason():
         AreaWeighted.of([np.nan])
     with pytest.raises(ValueError, match="share of area to keep"):
         drawn(TRUE, 100, 0).limits(1.5)
+
+
+@pytest.mark.parametrize(("level", "limit"), [(0.5, 0.828), (0.95, 1.358)])
+def test_the_bootstrap_band_has_kolmogorovs_quantile(level, limit):
+    """√n sup |F* − F| tends to Kolmogorov's law, whose quantiles are tabulated."""
+    count = 900
+    sample = AreaWeighted.of(np.linspace(0.1, 0.9, count))
+    band = sample.band(level, 2000, np.random.default_rng(7))
+    assert np.sqrt(count) * band == pytest.approx(limit, rel=0.06)
