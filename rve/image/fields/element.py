@@ -39,6 +39,7 @@ class Element:
         anchors: For each local unknown the ones to subtract from it, which takes a field without strain or stress away.
         line: Coefficients of the basis functions along one side, of which the pixel's are products.
         order: Derivatives between the field and its modes.
+        orders: For each mode its part (0 trace, 1 difference, 2 shear) and Legendre orders along y, x.
         functionals: For each type its component, place (y, x) in its pixel and orders of its derivatives along y and x.
     """
 
@@ -54,6 +55,7 @@ class Element:
     anchors: tuple[tuple[int, ...], ...]
     line: tuple[tuple[int, ...], ...]
     order: int
+    orders: tuple[tuple[int, int, int], ...]
     functionals: tuple[tuple[int, float, float, int, int], ...]
 
     def mean_modes(self, loads: Array) -> Array:
@@ -81,7 +83,7 @@ def displacement_element(aspect: float = 1.0) -> Element:
         np.hstack([along_x, -along_y]),
         np.hstack([along_y, zero + along_x]),
     )
-    modes, bulk_rows, constants = _stacked(parts)
+    modes, bulk_rows, constants, orders = _stacked(parts)
     return Element(
         types=8,
         local_types=tuple(4 * c + 2 * (y % 2) + x % 2 for c, y, x in places),
@@ -95,6 +97,7 @@ def displacement_element(aspect: float = 1.0) -> Element:
         anchors=tuple((9 * c,) for c, _, _ in places),
         line=basis,
         order=1,
+        orders=orders,
         functionals=tuple((c, y / 2, x / 2, 0, 0) for c, y, x in product(range(2), repeat=3)),
     )
 
@@ -113,7 +116,7 @@ def airy_element(aspect: float = 1.0) -> Element:
     places = list(product(range(2), range(2), range(2), range(2)))  # y, slope in y, x, slope in x
     first = np.kron(table[2], table[0]) / aspect**2
     second = np.kron(table[0], table[2])
-    modes, bulk_rows, constants = _stacked(
+    modes, bulk_rows, constants, orders = _stacked(
         (first + second, first - second, -2 * np.kron(table[1], table[1]) / aspect)
     )
     number = {place: k for k, place in enumerate(places)}
@@ -137,6 +140,7 @@ def airy_element(aspect: float = 1.0) -> Element:
         ),
         line=basis,
         order=2,
+        orders=orders,
         functionals=tuple((0, 0.0, 0.0, dy, dx) for dy, dx in product(range(2), repeat=2)),
     )
 
@@ -180,12 +184,14 @@ def _integral(polynomial: Polynomial) -> Fraction:
     return sum((c / (n + 1) for n, c in enumerate(polynomial)), Fraction(0))
 
 
-def _stacked(parts: tuple[Array, Array, Array]) -> tuple[Array, int, tuple[int, int, int]]:
-    """Modes of trace, difference and shear in one matrix without the rows that vanish; where the trace ends; the constant rows."""
-    kept = [part[np.abs(part).max(axis=1) > 0] for part in parts]
-    starts = np.cumsum([0] + [len(part) for part in kept])
-    return (
-        np.ascontiguousarray(np.vstack(kept)),
-        int(starts[1]),
-        (int(starts[0]), int(starts[1]), int(starts[2])),
-    )
+def _stacked(
+    parts: tuple[Array, Array, Array],
+) -> tuple[Array, int, tuple[int, int, int], tuple[tuple[int, int, int], ...]]:
+    """Modes of trace, difference and shear without the rows that vanish; end of the trace; constant rows; orders."""
+    kept = [np.flatnonzero(np.abs(part).max(axis=1) > 0) for part in parts]
+    starts = np.cumsum([0] + [len(rows) for rows in kept])
+    modes = np.vstack([part[rows] for part, rows in zip(parts, kept, strict=True)])
+    line = round(len(parts[0]) ** 0.5)
+    orders = tuple((k, *divmod(int(row), line)) for k, rows in enumerate(kept) for row in rows)
+    constants = (int(starts[0]), int(starts[1]), int(starts[2]))
+    return np.ascontiguousarray(modes), int(starts[1]), constants, orders

@@ -27,7 +27,8 @@ class Energy:
     Args:
         value: Symmetric, shape (tiles, fields, fields).
         rounding: Bound of the absolute error of each entry, same shape.
-        pixels: Energy of each field in each pixel, shape (tiles, fields, rows, columns), or None.
+        pixels: Energies of all pairs in each pixel, shape (tiles, fields, fields, rows, columns), or
+            None.
     """
 
     value: Array
@@ -81,8 +82,11 @@ def energy(
     wrong = np.sqrt(SAFETY * error / (rows * columns))
     summed = (len(element.modes) + 16) * UNIT * _outer(size, size)
     bound = SAFETY * (_outer(size, wrong) + _outer(wrong, size) + _outer(wrong, wrong) + summed)
-    kept = density[:, range(count), range(count)] if pixels else None
-    return Energy(value, bound, kept)
+    if not pixels:
+        return Energy(value, bound)
+    for j, k in np.ndindex(count, count):
+        density[:, max(j, k), min(j, k)] = density[:, min(j, k), max(j, k)]
+    return Energy(value, bound, density)
 
 
 def modes_of(

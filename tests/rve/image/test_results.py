@@ -1,0 +1,185 @@
+"""Random threshold, directions, grains, the picture of the error, reading of images."""
+
+import numpy as np
+import pytest
+
+from alphacut.rve.anisotropy import directional_young
+from alphacut.rve.image.bounds import StiffnessBounds
+from alphacut.rve.image.directions import directions
+from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
+from alphacut.rve.image.gap import constitutive_gap
+from alphacut.rve.image.grains import grain_modulus
+from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
+from alphacut.rve.image.random_threshold import NormalThreshold, threshold_response
+from alphacut.rve.image.read import read_grey, require_memory, require_phases
+from alphacut.rve.image.solve import solve_image
+
+PHASES = [ModuliInterval.crisp(PlaneModuli.of_young(e, 0.3)) for e in (20.0, 80.0)]
+
+
+def ramp(size=16):
+    """Periodic grey values between 0 and 1, every pixel another."""
+    x, y = np.meshgrid(*(2 * np.pi * (np.arange(size) + 0.5) / size,) * 2)
+    return 0.5 + 0.2 * np.sin(x) + 0.2 * np.cos(2 * y + x) + 0.05 * np.sin(3 * y)
+
+
+@pytest.fixture(scope="module")
+def response():
+    return threshold_response(ramp(), np.linspace(0.2, 0.8, 9), PHASES)
+
+
+def test_the_mean_and_quantiles_hold_those_of_samples(response):
+    rng, grey = np.random.default_rng(0), ramp()
+    law = NormalThreshold((0.5, 0.5), (0.08, 0.08))
+    ends = []
+    for threshold in rng.normal(0.5, 0.08, 25):
+        moduli = [
+            np.where(grey >= threshold, b, a)
+            for a, b in zip(*((p.lower.bulk, p.lower.shear) for p in PHASES), strict=True)
+        ]
+        ends.append(solve_image(*moduli).bounds.modulus)
+    samples = np.mean(ends, axis=1)
+    error = samples.std(ddof=1) / np.sqrt(len(samples))
+    low, high = response.mean(law)
+    assert low - 4 * error < samples.mean() < high + 4 * error
+    assert high - low < 0.35 * samples.mean()
+    for share in (0.25, 0.5, 0.75):
+        low, high = response.quantile(law, share)
+        assert np.mean(samples <= low) < share + 0.2
+        assert np.mean(samples <= high) > share - 0.2
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_laws_within_an_interval_stay_within_its_bounds(response, seed):
+    rng = np.random.default_rng(seed)
+    mean, deviation = np.sort(rng.uniform(0.3, 0.7, 2)), np.sort(rng.uniform(0.01, 0.2, 2))
+    whole = NormalThreshold(tuple(mean), tuple(deviation))
+    for _ in range(20):
+        m, s = rng.uniform(*mean), rng.uniform(*deviation)
+        law = NormalThreshold((m, m), (s, s))
+        for share in (None, 0.1, 0.5, 0.95):
+            outer, inner = (
+                response.mean(x) if share is None else response.quantile(x, share)
+                for x in (whole, law)
+            )
+            assert outer[0] <= inner[0] + 1e-12
+            assert inner[1] <= outer[1] + 1e-12
+
+
+def test_a_random_threshold_needs_ordered_phases():
+    with pytest.raises(ValueError, match="brighter phase that is stiffer"):
+        threshold_response(ramp(8), [0.4, 0.6], PHASES[::-1])
+
+
+def test_the_constitutive_gap_is_nowhere_negative_and_sums_to_the_distance_of_the_bounds():
+    mask = ramp(16) > 0.5
+    moduli = [np.where(mask, b, a) for a, b in ((2.0, 30.0), (1.0, 20.0))]
+    found = solve_image(*moduli, solver=ConjugateGradient(1e-11), pixels=True)
+    for strain in (
+        np.array([1.0, 1.0, 0.0]),
+        np.array([0.0, 0.0, 1.0]),
+        np.array([1.0, -0.5, 0.3]),
+    ):
+        gap = constitutive_gap(found, strain)
+        distance = strain @ (found.bounds.upper - found.bounds.lower) @ strain
+        assert gap.min() > -1e-10 * gap.max()
+        assert np.isclose(gap.mean(), distance, rtol=1e-6)
+    assert gap.max() > 4 * gap.mean()
+
+
+def test_the_gap_needs_the_energies_of_the_pixels():
+    found = solve_image(np.ones((4, 4)), np.ones((4, 4)))
+    with pytest.raises(ValueError, match="pixels=True"):
+        constitutive_gap(found, np.ones(3))
+
+
+def test_directions_hold_the_moduli_of_a_stiffness_between():
+    root = np.random.default_rng(0).normal(size=(3, 3))
+    stiffness = 10 * np.eye(3) + root @ root.T
+    found = directions(StiffnessBounds(0.98 * stiffness, 1.03 * stiffness))
+    exact = directional_young(stiffness, found.angle)
+    assert (found.lower < exact).all()
+    assert (exact < found.upper).all()
+    assert found.least[0] <= exact.min() <= found.least[1]
+    assert found.greatest[0] <= exact.max() <= found.greatest[1]
+    assert found.distance > 0.01
+
+
+def test_an_isotropic_stiffness_is_its_own_nearest():
+    k, g = 7.0, 3.0
+    stiffness = np.array([[k + g, k - g, 0], [k - g, k + g, 0], [0, 0, g]])
+    found = directions(StiffnessBounds(stiffness, stiffness))
+    assert np.allclose(found.isotropic, (k, g))
+    assert found.distance < 1e-14
+
+
+def test_the_interval_of_grains_is_that_of_the_literature():
+    phases = [PlaneModuli.of_young(e, 0.3) for e in (20.0, 80.0)]
+    low, high = grain_modulus([1 - 0.2092, 0.2092], phases, phases)
+    assert abs(low - 25.78) < 0.005  # fibres of these phases have 24.77
+    assert low < high < 0.7908 * 20 + 0.2092 * 80
+
+
+def saved(folder, name, values, **options):
+    image = pytest.importorskip("PIL.Image")
+    path = folder / name
+    image.fromarray(values, **options).save(path)
+    return path
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.tif", "a.tiff"])
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+def test_eight_and_sixteen_bits_are_read_as_they_are(tmp_path, name, kind):
+    values = np.random.default_rng(0).integers(0, np.iinfo(kind).max, (5, 7)).astype(kind)
+    found = read_grey(saved(tmp_path, name, values))
+    assert np.array_equal(found, values[::-1])
+    assert found.dtype.itemsize >= values.dtype.itemsize
+
+
+def test_numpy_files_are_read(tmp_path):
+    values = np.random.default_rng(0).normal(size=(4, 6))
+    np.save(tmp_path / "a.npy", values)
+    assert np.array_equal(read_grey(tmp_path / "a.npy"), values[::-1])
+
+
+def test_images_that_are_not_plane_grey_are_refused(tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    colour = saved(tmp_path, "c.png", np.zeros((4, 4, 3), np.uint8))
+    with pytest.raises(ValueError, match=r"c\.png has several channels \(RGB\)"):
+        read_grey(colour)
+    image.open(colour).quantize(4).save(tmp_path / "p.png")
+    with pytest.raises(ValueError, match=r"p\.png has a palette"):
+        read_grey(tmp_path / "p.png")
+    (tmp_path / "t.png").write_text("no image")
+    with pytest.raises(ValueError, match=r"t\.png cannot be read"):
+        read_grey(tmp_path / "t.png")
+    np.save(tmp_path / "n.npy", np.array([[1.0, np.nan], [0.0, 1.0]]))
+    with pytest.raises(ValueError, match="1 values that are not finite"):
+        read_grey(tmp_path / "n.npy")
+    np.save(tmp_path / "l.npy", np.arange(5.0))
+    with pytest.raises(ValueError, match="one plane of 2 × 2"):
+        read_grey(tmp_path / "l.npy")
+
+
+def test_an_image_too_large_for_memory_is_told_with_a_window_that_fits():
+    with pytest.raises(ValueError, match=r"1000000 × 1000000 pixels .* GB .* crop a window of"):
+        require_memory(1_000_000, 1_000_000, 1)
+
+
+@pytest.mark.parametrize(
+    ("grey", "thresholds", "told"),
+    [
+        (np.full((2, 2), 7), ((3.0, 3.0),), "one grey value, 7"),
+        (np.arange(4).reshape(2, 2), ((9.0, 9.0),), r"threshold 9 is outside: .* from 0 to 3"),
+        (np.arange(4).reshape(2, 2), ((0.0, 2.0),), r"threshold \[0, 2\] is outside"),
+        (np.array([[10, 60000]], np.uint16), ((128.0, 128.0),), "one of 8 bits, the image has 16"),
+        (
+            np.array([[0, 9]]),
+            ((2.0, 3.0), (4.0, 5.0)),
+            "no pixel lies between the thresholds 3 and 4",
+        ),
+    ],
+)
+def test_thresholds_that_leave_a_phase_empty_are_refused(grey, thresholds, told):
+    with pytest.raises(ValueError, match=told):
+        require_phases(grey, thresholds)
