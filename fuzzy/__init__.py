@@ -3,7 +3,7 @@
 from alphacut.fuzzy.campaign.campaign import CampaignError
 from alphacut.fuzzy.campaign.store import Store, StoreError
 from alphacut.fuzzy.dry_run import Explanation, explain
-from alphacut.fuzzy.knowledge.interval_arithmetic import gradient_range
+from alphacut.fuzzy.knowledge.enclosure import gradient_range
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.alpha_cut_optimisation import Optimisation
 from alphacut.fuzzy.plans.branch_and_bound import BranchAndBound

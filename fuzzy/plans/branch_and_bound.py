@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from alphacut.fuzzy.knowledge.interval_arithmetic import Pair, enclose
+from alphacut.fuzzy.knowledge.enclosure import Enclosed
+from alphacut.fuzzy.knowledge.interval_arithmetic import Pair, negative
 from alphacut.fuzzy.samples.model import Model
 from alphacut.fuzzy.samples.result import FuzzyResult, Nature
 from alphacut.fuzzy.sets.boxes import Domain
@@ -44,7 +45,7 @@ class BranchAndBound:
             says.
     """
 
-    function: Callable[..., Any]
+    function: Callable[..., object]
     tolerance: float = 1e-4
     budget: int = 50_000
 
@@ -66,7 +67,8 @@ class BranchAndBound:
         tried = _tried(domain)
         first = model(tried)
         columns = first.columns
-        found = enclose(self.function, domain.names, tried, tried)
+        function = Enclosed(self.function, domain.names)
+        found = function(tried, tried)
         for name in columns:
             if name not in found:
                 raise ValueError(
@@ -86,7 +88,9 @@ class BranchAndBound:
         for level in reversed(range(len(domain.alpha))):
             for column, name in enumerate(columns):
                 for side, sign in enumerate((1.0, -1.0)):
-                    search = _Search(self, model, domain, level=level, output=name, sign=sign)
+                    search = _Search(
+                        self, model, domain, function=function, level=level, output=name, sign=sign
+                    )
                     search.run()
                     proved[level, column, side] = sign * search.proved
                     attained[level, column, side] = sign * search.best
@@ -148,17 +152,13 @@ class _Search:
         model: Model,
         domain: Domain,
         *,
+        function: Enclosed,
         level: int,
         output: str,
         sign: float,
     ) -> None:
-        self.plan, self.model, self.names, self.output, self.sign = (
-            plan,
-            model,
-            domain.names,
-            output,
-            sign,
-        )
+        self.plan, self.model, self.names, self.function = plan, model, domain.names, function
+        self.output, self.sign = output, sign
         self.best, self.worst, self.runs = np.inf, -np.inf, 0
         lower, upper = (ends[level : level + 1] for ends in domain.boxes)
         self.place: Array = lower[0]
@@ -225,9 +225,8 @@ class _Search:
 
     def _enclosed(self, lower: Array, upper: Array) -> tuple[Pair, Pair]:
         """Values (n,) and slopes (inputs, n) of sign · output over boxes."""
-        found = enclose(self.plan.function, self.names, lower, upper)[self.output]
-        found = found if self.sign > 0 else -found
-        return found.value, found.slope
+        found = self.function(lower, upper)[self.output]
+        return found if self.sign > 0 else (negative(found.value), negative(found.slope))
 
     def _attain(self, points: Array, enclosed: Pair) -> None:
         """Run the model, compare it with the enclosure, and remember the least value."""
