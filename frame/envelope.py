@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     from alphacut.frame.boxes import Boxes
 
-NATURES = ("inner", "estimated", "verified by sampling", "guaranteed")
-
 
 class Trajectories(Protocol):
     """Trajectories as an envelope needs them."""

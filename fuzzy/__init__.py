@@ -21,7 +21,8 @@ from alphacut.fuzzy.plans.sparse_chebyshev import Chebyshev
 from alphacut.fuzzy.plans.transformation import Extended, General, Reduced, Vertex
 from alphacut.fuzzy.propagation import propagate
 from alphacut.fuzzy.random_response import RandomResponse
-from alphacut.fuzzy.samples.result import FuzzyResult, Nature
+from alphacut.fuzzy.samples.nature import Nature
+from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.arithmetic import DependencyError, apply
 from alphacut.fuzzy.sets.boxes import Domain, levels
 from alphacut.fuzzy.sets.interaction import Ellipsoidal, Linear

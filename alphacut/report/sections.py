@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from alphacut.figures.captions import core, in_words
+from alphacut.fuzzy import Nature
 from alphacut.io.units import engineering
 from alphacut.report.citation import citation
 from alphacut.report.differences import differences
@@ -15,21 +16,6 @@ from alphacut.report.envelopes import envelopes, natural
 from alphacut.report.figures import gallery, listed
 from alphacut.report.tables import section, table
 from alphacut.stages import response
-
-NATURES = {
-    "inner": (
-        "Inner bounds are attained by the parameters stored with them, up to the error of the"
-        " model; a search may have missed more."
-    ),
-    "estimated": (
-        "Estimated bounds come from a model of the motion whose error was estimated, not proved."
-    ),
-    "verified by sampling": (
-        "Verified by sampling: the search is proved to leave nothing out, the error of its model is"
-        " sampled."
-    ),
-    "guaranteed": "Guaranteed bounds are proved to hold the true range.",
-}
 
 
 def sections(summary: Mapping[str, Any], folder: Path) -> Iterator[str]:
@@ -225,10 +211,11 @@ def methods(summary: Mapping[str, Any]) -> str:
 
 def explained(rows: Sequence[tuple[object, ...]]) -> Iterator[str]:
     """Meaning of each nature of bounds in the table."""
+    told = {nature.value: nature.sentence() for nature in Nature}
     yield from (
-        NATURES[nature]
+        f"{nature.capitalize()}: {told[nature]}."
         for nature in dict.fromkeys(str(row[2]) for row in rows)
-        if nature in NATURES
+        if nature in told
     )
 
 

@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alphacut.case.case import Case
-from alphacut.fuzzy import Crisp, Explanation, FuzzyNumber, FuzzyResult, PiecewiseLinear, propagate
+from alphacut.fuzzy import (
+    Crisp,
+    Explanation,
+    FuzzyNumber,
+    FuzzyResult,
+    Nature,
+    PiecewiseLinear,
+    propagate,
+)
 from alphacut.fuzzy import explain as fuzzy_explain
 from alphacut.io.files import whole_file
 from alphacut.io.netcdf import read_dataset
@@ -34,11 +42,6 @@ STRESSES = {
     "s12": ("Pa", "mean homogenised stress 12 under ε12 = 0.01"),
 }
 BOUNDS = QUANTITIES | STRESSES
-MEANING = {
-    "inner": "attained by samples, between which E may go further",
-    "estimated": "those of samples and of a model between them",
-    "guaranteed": "no value within the supports goes further",
-}
 
 
 @dataclass(frozen=True)
@@ -73,6 +76,11 @@ class FuzzyModulus:
         return natures[0] if len(natures) == 1 else str(self.result.nature)
 
     @property
+    def meaning(self) -> str:
+        """Sentence on the worth of E's bounds, with what a proof rests on."""
+        return Nature(self.nature).sentence(self.result.given)
+
+    @property
     def reason(self) -> str:
         """Choice of method auto at the modal point, with its reason; else empty."""
         return self.judged.reason if self.judged and self.choice.method == "auto" else ""
@@ -97,7 +105,7 @@ class FuzzyModulus:
             else "not estimated"
         )
         return (
-            f"bounds {self.nature}: {MEANING.get(self.nature, '')}; the error of the cell's model"
+            f"bounds {self.nature}: {self.meaning}; the error of the cell's model"
             f" comes on top, {error}"
         )
 

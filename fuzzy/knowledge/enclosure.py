@@ -134,9 +134,7 @@ def _entries(name: str, value: object) -> Iterator[tuple[str, object]]:
 def gradient_range(
     function: Function, names: Sequence[str]
 ) -> Callable[[Array, Array], Mapping[str, Pair]]:
-    """Function for `Known.gradient_range`, from the model itself: with it the signed plan proves the
-    signs that it uses.
-    """
+    """Range of the gradient for `Known.gradient_range`, proved from the model's own arithmetic."""
     enclosed = Enclosed(function, names)
 
     def ranges(lower: Array, upper: Array) -> Mapping[str, Pair]:

@@ -82,9 +82,7 @@ def rising(function: Callable[[Array], Array]) -> Map:
 
 
 def cosine(v: Pair) -> Pair:
-    """Range of the cosine: its ends, and ±1 where a multiple of π lies between (or so close that
-    round-off could tell).
-    """
+    """Range of the cosine: its ends, and ±1 where a multiple of π may lie between."""
     small = (np.abs(v[0]) < _LARGE) & (np.abs(v[1]) < _LARGE)
     v = (
         np.where(small, v[0], 0.0),

@@ -30,12 +30,24 @@ class Known:
         gradient_range: Function of the corners (lower, upper) of a box, two arrays (inputs,), that
             returns for each output (`y` where it has no name) a lower and an upper bound of its
             gradient over the box, two arrays (inputs,): it proves signs box by box.
+        source: Where the facts come from, named beside every guarantee that rests on them.
     """
 
     signs: Mapping[str, int | Mapping[str, int]] = field(default_factory=dict)
     monotone: tuple[str, ...] = ()
     derivatives: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     gradient_range: GradientRange | None = None
+    source: str = "as stated by the caller"
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Facts that proofs take as given, one sentence each."""
+        told = {
+            f"the signs of {', '.join(self.signs)} hold": self.signs,
+            f"the outputs are monotone in {', '.join(self.monotone)}": self.monotone,
+            "the range of the gradient holds": self.gradient_range,
+        }
+        return tuple(f"{fact}, {self.source}" for fact, there in told.items() if there)
 
     def check(self, inputs: Sequence[str]) -> None:
         """Refuse names that are no input and signs that are none.

@@ -46,11 +46,11 @@ class Trace:
 
 
 def path(call: Callable[[], Result]) -> tuple[Result, Path]:
-    """The result of a call with its path: for all code that it runs in Python, lines and kinds of
-    exceptions, caught ones included.
+    """The result of a call, with its path.
 
-    Two calls of a function that does the same arithmetic with numbers and with tracers take one
-    path through the code that both run.
+    A path holds for all code that runs in Python its lines and the kinds of its exceptions, caught
+    ones included. Two calls of a function that does the same arithmetic with numbers and with
+    tracers take one path through the code that both run.
     """
     found: Path = {}
 

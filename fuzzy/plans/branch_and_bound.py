@@ -11,7 +11,8 @@ import numpy as np
 from alphacut.fuzzy.knowledge.enclosure import Enclosed
 from alphacut.fuzzy.knowledge.interval_arithmetic import Pair, negative
 from alphacut.fuzzy.samples.model import Model
-from alphacut.fuzzy.samples.result import FuzzyResult, Nature
+from alphacut.fuzzy.samples.nature import Nature
+from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.numbers import Array, Rows
 
@@ -111,6 +112,7 @@ class BranchAndBound:
             error=np.abs(proved - attained).max(axis=2),
             proved=np.ones(shape[:2], bool),
             enforced=np.zeros(shape[:2], bool),
+            given=(f"the enclosed function is the model, as at all {runs} samples",),
         )
 
 

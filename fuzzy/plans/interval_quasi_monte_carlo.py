@@ -20,7 +20,8 @@ from alphacut.fuzzy.campaign.campaign import Campaign, Progress
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.plan import Plan
 from alphacut.fuzzy.plans.transformation import Reduced
-from alphacut.fuzzy.samples.result import FuzzyResult, Nature
+from alphacut.fuzzy.samples.nature import Nature
+from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.numbers import Array, FuzzyNumber, PiecewiseLinear
 

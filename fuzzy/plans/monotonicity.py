@@ -229,6 +229,7 @@ def verified(result: FuzzyResult, memo: Memo, effects: Effects) -> FuzzyResult:
     return replace(
         every,
         proved=proved,
+        given=memo.known.words,
         runs=result.runs,
         verification_runs=spent,
         notes=(*effects.notes(result.domain), *notes),

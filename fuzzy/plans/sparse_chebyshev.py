@@ -11,7 +11,8 @@ from alphacut.fuzzy.plans.monotonicity import primary
 from alphacut.fuzzy.samples.design import Design
 from alphacut.fuzzy.samples.evaluation_cache import Memo
 from alphacut.fuzzy.samples.model import Model
-from alphacut.fuzzy.samples.result import FuzzyResult, Nature
+from alphacut.fuzzy.samples.nature import Nature
+from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.numbers import Array, Rows
 from alphacut.fuzzy.surrogates.chebyshev_polynomial import Polynomial

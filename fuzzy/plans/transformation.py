@@ -103,7 +103,9 @@ class _Transformation:
         domain.require_free(type(self).__name__)
         design = self.points(domain)
         result = design.bounds(model(design.points), plan=type(self).__name__.lower())
-        return result.proving(lambda bounds: corners_suffice(bounds, model.known))
+        return result.proving(
+            lambda bounds: corners_suffice(bounds, model.known), model.known.words
+        )
 
 
 def corners_suffice(result: FuzzyResult, known: Known) -> Mask:
@@ -170,7 +172,8 @@ class Extended(_Transformation):
         """Find the monotone inputs, evaluate the samples, rearrange them into α-cuts."""
         if self.monotone is not None:
             known = replace(model.known, monotone=(*model.known.monotone, *self.monotone))
-            return super().run(model, domain).proving(lambda bounds: corners_suffice(bounds, known))
+            result = super().run(model, domain)
+            return result.proving(lambda bounds: corners_suffice(bounds, known), known.words)
         memo = Memo(model)
         effects = verify(memo, domain, self.verification, outputs=self.outputs)
         widest = effects.signs[0] != 0

@@ -18,13 +18,9 @@ class Nature(StrEnum):
         """The nature in words, with what it rests on.
 
         Args:
-            given: Facts that nobody proved, each as "the signs of x hold, as stated by the caller".
+            given: Facts that nobody proved, as "the signs of x hold, as stated by the caller".
         """
-        return f"{_MEANING[self]}{_condition(given)}"
-
-    def told(self, given: Sequence[str] = ()) -> str:
-        """The word, with what it rests on in the same breath."""
-        return f"{self.value}{_condition(given)}"
+        return f"{_MEANING[self]}{condition(given)}"
 
 
 _MEANING = {
@@ -35,5 +31,6 @@ _MEANING = {
 }
 
 
-def _condition(given: Sequence[str]) -> str:
-    return f", given that {' and '.join(given)}" if given else ""
+def condition(given: Sequence[str]) -> str:
+    """What a proof rests on, in brackets; empty where it rests on nothing."""
+    return f" (given that {' and '.join(given)})" if given else ""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from alphacut.fuzzy.knowledge.contradiction import contradictions
 from alphacut.fuzzy.knowledge.known import Signs
 from alphacut.fuzzy.samples.model import Values
+from alphacut.fuzzy.samples.nature import Nature, condition
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.numbers import Array, Mask, PiecewiseLinear
 from alphacut.fuzzy.surrogates.response_surface import ResponseSurface
@@ -22,14 +22,6 @@ if TYPE_CHECKING:
 
 
 _PRINTED = 50  # outputs that are printed
-
-
-class Nature(StrEnum):
-    """Nature of a bound."""
-
-    GUARANTEED = "guaranteed"  # proved: the true range lies inside
-    INNER = "inner"  # attained by the model: the true range reaches at least so far
-    ESTIMATED = "estimated"  # from a surrogate, with an estimate of its error
 
 
 def _shown(value: float) -> str:
@@ -55,6 +47,7 @@ class FuzzyResult:
         error: Estimated error of the bounds, shape (levels, outputs); zero where attained.
         proved: Where the true range is proved to lie inside the bounds, shape (levels, outputs).
         enforced: Where nesting had to be enforced, shape (levels, outputs).
+        given: Facts that the proof rests on and nobody proved, one sentence each.
         notes: What the plan found on its way, one sentence each.
         points: Samples of the model, shape (n, inputs).
         values: Outputs at `points`.
@@ -76,6 +69,7 @@ class FuzzyResult:
     error: Array = field(default_factory=lambda: np.zeros(0))
     proved: Mask = field(default_factory=lambda: np.zeros(0, bool))
     enforced: Mask = field(default_factory=lambda: np.zeros(0, bool))
+    given: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     points: Array = field(default_factory=lambda: np.zeros((0, 0)))
     values: Values = field(default_factory=lambda: Values((), np.zeros((0, 0))))
@@ -124,7 +118,9 @@ class FuzzyResult:
             values=values,
         )
 
-    def proving(self, holds: Callable[[FuzzyResult], Mask]) -> FuzzyResult:
+    def proving(
+        self, holds: Callable[[FuzzyResult], Mask], given: tuple[str, ...] = ()
+    ) -> FuzzyResult:
         """The same bounds, proved where `holds`, shape (levels, outputs), and samples agree."""
         proved = holds(self)
         refuted = [
@@ -137,6 +133,7 @@ class FuzzyResult:
         return replace(
             self,
             proved=self.proved | (proved & ~self.enforced.any(axis=0)),
+            given=given,
             notes=(*self.notes, *notes),
         )
 
@@ -153,7 +150,8 @@ class FuzzyResult:
 
     def __str__(self) -> str:
         """Bounds of the first 50 outputs, a line for each level, with nature and cost."""
-        lines = [f"{self.nature} bounds by the plan {self.plan}, {self.runs} runs"]
+        given = condition(self._rests_on)
+        lines = [f"{self.nature} bounds{given} by the plan {self.plan}, {self.runs} runs"]
         for column, name in enumerate(self.outputs[:_PRINTED]):
             cuts = zip(self.domain.alpha, self.lower[:, column], self.upper[:, column], strict=True)
             lines += [
@@ -168,6 +166,15 @@ class FuzzyResult:
     def nature(self) -> Nature:
         """Weakest nature of the bounds over all levels and outputs."""
         return Nature.GUARANTEED if self.proved.size and self.proved.all() else self.base
+
+    @property
+    def worth(self) -> str:
+        """Nature in one sentence, with what a proof rests on."""
+        return f"bounds {self.nature}: {self.nature.sentence(self._rests_on)}"
+
+    @property
+    def _rests_on(self) -> tuple[str, ...]:
+        return self.given if self.proved.any() else ()
 
     def nature_of(self, output: str = "y") -> tuple[Nature, ...]:
         """Nature of one output's bounds on each level."""
@@ -245,6 +252,7 @@ class FuzzyResult:
             attrs={
                 "plan": self.plan,
                 "nature": str(self.nature),
+                "worth": self.worth,
                 "runs": self.runs,
                 "verification_runs": self.verification_runs,
             },

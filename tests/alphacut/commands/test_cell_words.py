@@ -60,7 +60,7 @@ def test_the_modulus_says_what_its_bounds_are_worth_and_the_error_that_they_do_n
     error = json.loads(capfd.readouterr().out)["error"]
     assert main(["modulus", PAPER, "--method", "prism", *coarse]) == 0
     (line,) = [line for line in capfd.readouterr().out.splitlines() if line.startswith("bounds")]
-    assert line.startswith("bounds inner: attained by samples")
+    assert line.startswith("bounds inner: attained by the parameters")
     assert f"comes on top, estimated at {sum(error.values()):.1e} of E" in line
     assert "modal sample" in line
     assert main(["modulus", PAPER, "--method", "series", "--set", "modulus.alpha=[0, 1]"]) == 0

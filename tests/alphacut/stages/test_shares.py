@@ -57,7 +57,7 @@ def test_a_frame_under_an_earthquake_has_shares_and_its_report_names_periods(tmp
     assert main(["report", str(tmp_path / "out"), "--quiet"]) == 0
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "First natural periods at the modal values: 7, 3.12, 1.93 s" in page
-    assert "Inner bounds are attained" in page
+    assert "Inner: attained by the parameters" in page
     assert "error up to" not in page  # the Graph Follower estimates none
 
 
@@ -67,7 +67,7 @@ def test_a_modal_envelope_tells_its_error(tmp_path, capfd):
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "error up to" in page
     assert "eigen-analyses" in page
-    assert "Estimated bounds come from a model" in page
+    assert "Estimated: from a surrogate" in page
 
 
 def test_without_oscillating_modes_a_run_goes_on_without_shares(tmp_path, capfd):

@@ -189,3 +189,23 @@ def test_lists_are_enclosed_entry_by_entry(function):
     reference = propagate(function, POSITIVE)
     assert result.outputs == reference.outputs
     np.testing.assert_allclose(result.upper, reference.upper, atol=2e-3)
+
+
+def test_what_a_guarantee_rests_on_is_named_in_the_same_breath():
+    def function(x, y):
+        return x * y
+
+    proved = propagate(function, POSITIVE, BranchAndBound(function))
+    assert str(proved).startswith(
+        "guaranteed bounds (given that the enclosed function is the model, as at all"
+    )
+    facts = Known(signs={"x": 1}, monotone=("y",), source="by theory")
+    stated = propagate(function, POSITIVE, known=facts)
+    assert stated.worth == (
+        "bounds guaranteed: proved to hold the true range (given that the signs of x hold,"
+        " by theory and the outputs are monotone in y, by theory)"
+    )
+    ranges = Known(gradient_range=gradient_range(function, ("x", "y")))
+    signed = propagate(function, POSITIVE, Signed(), known=ranges)
+    assert "given that the range of the gradient holds, as stated by the caller" in str(signed)
+    assert "given" not in str(propagate(function, POSITIVE))
