@@ -64,7 +64,10 @@ def test_the_modulus_says_what_its_bounds_are_worth_and_the_error_that_they_do_n
     assert f"comes on top, estimated at {sum(error.values()):.1e} of E" in line
     assert "modal sample" in line
     assert main(["modulus", PAPER, "--method", "series", "--set", "modulus.alpha=[0, 1]"]) == 0
-    assert "bounds guaranteed: proved to hold the true range (given that the signs" in capfd.readouterr().out
+    assert (
+        "bounds guaranteed: proved to hold the true range (given that the signs"
+        in capfd.readouterr().out
+    )
 
 
 def test_a_cross_check_prints_the_difference_that_it_found(capfd):
