@@ -76,6 +76,9 @@ class Envelope:
     - degree: Of the polynomials of the modes. model_error: What trajectories of theirs are wrong by
       at most at held-out parameters, over all outputs; of a certified envelope the bound that went
       into it, in the unit.
+    - search_error: What the search may have missed, at most, in the unit: what Newton's method
+      still promises and what the last independent pass gained; the rest of `error` is that of the
+      polynomials and of time stepping.
     - estimated_error: Largest error, in the unit. missed_by_sample: By how much independent
       trajectories passed the bounds, in the unit.
     - gap: Largest distance of attained and proved bounds, in the unit, which is that of gap_output.

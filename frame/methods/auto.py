@@ -21,10 +21,6 @@ Progress = Callable[[float], None]
 CANDIDATES = ("modal", "improved-graph-follower")
 CHECKS = 512
 """Trajectories of the independent second pass."""
-FLOOR = 0.5
-"""Least estimate of the modal method at a node, as a share of its largest: held-out samples are few
-and miss the worst at single nodes.
-"""
 
 
 class ToleranceError(RuntimeError):
@@ -79,7 +75,7 @@ def cheapest(
     begun, refused = time.perf_counter(), [f"{name} excluded" for name in exclude]
     if "modal" not in exclude and isinstance(flow.flow, LinearFlow):
         try:
-            found = _levelled(modal(flow, progress, tolerance=fitted), flow)
+            found = modal(flow, progress, tolerance=fitted)
             if _estimate(found, flow) <= tolerance:
                 return _reported(
                     found,
@@ -144,13 +140,6 @@ def second_pass(found: Envelope, flow: UnitFlow, *, skip: int) -> float:
         beyond = np.maximum(values.max(0) - found.upper[0], found.lower[0] - values.min(0))
         worst = max(worst, float((beyond / flow.scale).max()))
     return worst
-
-
-def _levelled(found: Envelope, flow: UnitFlow) -> Envelope:
-    assert found.error is not None
-    return replace(
-        found, error=np.maximum(found.error, FLOOR * _estimate(found, flow) * flow.scale)
-    )
 
 
 def _estimate(found: Envelope, flow: UnitFlow) -> float:

@@ -21,14 +21,16 @@ from alphacut.frame.modal.search import ModalSearch
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 
 Progress = Callable[[float], None]
+MARGIN = 2.0
+"""Factor on the deviation of held-out trajectories up to a node."""
+FLOOR = 0.1
+"""Least deviation at a node, as a share of the output's largest."""
 SAFETY = 3.0
 """Factor on the model error sampled at held-out points."""
 PORTION = 0.2
 """Share of the gap that the error of the modal model may take on either side."""
 USUAL = 10.0
 """Proved over sampled error, seldom less."""
-CONVERGED = 1e-3
-"""Share of the wanted error that Newton's method may leave."""
 ATTEMPTS = 5
 """Models of rising degree that are tried before the error is sampled instead of proved."""
 SEARCHED = 0.1
@@ -103,11 +105,22 @@ def modal(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> E
     }
     if (short := _short_of(model, method.tolerance, flow.scale)) is not None:
         facts["reason"] = short
-    error = 2 * model.error + left.max(-1)
+    error = polynomial_error(model) + left.max(-1)
+    facts["search_error"] = float((left.max(-1) / flow.scale).max())
     cost = {"trajectories": model.analyses, "seconds": time.perf_counter() - begun}
     return signed_envelope(
         flow, bounds, at, method="modal", nature="estimated", error=error, facts=facts, **cost
     )
+
+
+def polynomial_error(model: ModalModel) -> Array:
+    """Estimated deviation of the model from the trajectories, shape (T, m).
+
+    Held-out trajectories are few, so a node takes the largest deviation up to it, and the floor.
+    """
+    so_far = np.maximum.accumulate(model.error, axis=0)
+    estimate: Array = MARGIN * np.maximum(so_far, FLOOR * so_far[-1])
+    return estimate
 
 
 def _short_of(model: ModalModel, tolerance: float, scale: Array) -> str | None:
@@ -222,16 +235,15 @@ def search_levels(
 ) -> tuple[Array, Array, Array]:
     """Nested bounds (A, T, m, 2), unit coordinates (A, T, m, 2, d) and what is left to gain."""
     cuts, scaled = model.boxes, model.in_units(flow.scale)
-    search = ModalSearch.suited(scaled, method.seed, CONVERGED * wanted)
+    search = ModalSearch.suited(scaled, method.seed, wanted)
     shape = (len(cuts.alpha), len(model.time), len(model.outputs), 2)
     bounds, at, left = np.empty(shape), np.empty((*shape, len(cuts.names))), np.empty(shape)
     for done, level in enumerate(reversed(range(shape[0]))):
         if progress:
             progress(done / shape[0])
         box = cuts.unit(level)
-        bounds[level], at[level], left[level] = search.run(
-            scaled, *box, np.zeros((0, len(cuts.names)))
-        )
+        bounds[level], at[level], left[level], gained = search.run(scaled, *box)
+        left[level] += gained[:, None]
         if done:
             kept = bounds[level + 1] > bounds[level]
             bounds[level][kept], at[level][kept] = bounds[level + 1][kept], at[level + 1][kept]

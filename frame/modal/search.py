@@ -25,6 +25,10 @@ CALM = 20.0
 """Change of phase (rad) over the box up to which the least effort finds the basins."""
 PIECE = 2000
 """Problems treated together; more would leave the cache."""
+SMALL = 1e-3
+"""Share of the wanted error that Newton's method may leave."""
+QUIET = 0.05
+"""Share of the wanted error that the last independent pass may gain."""
 ITERATIONS = 300
 """Newton steps after which a problem that has not converged is left as it is."""
 
@@ -72,6 +76,8 @@ class ModalSearch:
         samples: Trajectories of the modal model that find the basins.
         starts: Basins refined per problem.
         small: Gain that Newton's method leaves, in units of the outputs.
+        quiet: Gain of an independent pass that ends the search, in units of the outputs.
+        passes: Most independent passes.
         resolution: Phase of the fastest mode (rad) between nodes that are searched anew.
         seed: Of the samples.
     """
@@ -79,49 +85,69 @@ class ModalSearch:
     samples: int = 512
     starts: int = 2
     small: float = 1e-9
+    quiet: float = 1e-7
+    passes: int = 8
     resolution: float = 0.25
     seed: int = 0
 
     @classmethod
-    def suited(cls, model: ModalModel, seed: int = 0, small: float = 1e-9) -> ModalSearch:
+    def suited(cls, model: ModalModel, seed: int = 0, wanted: float = 1e-6) -> ModalSearch:
         """More samples and starts where phases vary much over the box."""
         middle, rest = model.eigenvalue.coefficients[0], model.eigenvalue.coefficients[1:]
         # a mode that has died down has no basins
         lasting = np.minimum(model.time[-1], 5 / np.maximum(-middle.real, 1e-300))
         turned = float((np.abs(rest).sum(0) * lasting).max())  # rad
         more = int(np.clip(np.log2(max(turned, 1.0) / CALM), 0, 2))
-        return cls(samples=512 * 2**more, starts=2 + more, small=small, seed=seed)
+        return cls(512 * 2**more, 2 + more, SMALL * wanted, QUIET * wanted, seed=seed)
 
     def run(
-        self, model: ModalModel, lower: Array, upper: Array, extra: Array
-    ) -> tuple[Array, Array, Array]:
-        """Upper bounds of (−output, output), their unit coordinates, and what is left to gain.
+        self, model: ModalModel, lower: Array, upper: Array
+    ) -> tuple[Array, Array, Array, Array]:
+        """Upper bounds of (−output, output), their unit coordinates, and what may be missing.
 
         Args:
             model: The modal model.
             lower: Lower ends of the box, shape (d,).
             upper: Upper ends.
-            extra: Further points to try everywhere, shape (E, d).
 
         Returns:
-            Bounds, shape (T, m, 2), points, shape (T, m, 2, d), and what Newton's method promises
-            beyond the bounds, shape (T, m, 2).
+            Bounds, shape (T, m, 2), points, shape (T, m, 2, d), what Newton's method promises
+            beyond the bounds, shape (T, m, 2), and what the last independent pass gained, shape
+            (m,).
         """
-        if not (upper > lower).any():
-            values = model.values(lower[None])[0]
-            return (
-                np.stack([-values, values], -1),
-                np.broadcast_to(lower, (*values.shape, 2, len(lower))).copy(),
-                np.zeros((*values.shape, 2)),
-            )
+        total, m, d = len(model.time), len(model.outputs), len(lower)
+        found, gained = problems(np.arange(total), m, d), np.zeros(m)
+        if (upper > lower).any():
+            pool = self._samples(lower, upper)
+            values = trajectories(model, pool)
+            coarse, rivals = self._search(model, lower, upper, (pool, values), self.stride(model))
+            found = self._spread(model, [coarse, *rivals], lower, upper, (pool, values))
+            gained = self._second_passes(model, found, lower, upper)
+            refine(model, found, np.arange(len(found.value)), lower, upper, self.small)
+        else:
+            found.offer(model, np.tile(lower, (2 * m * total, 1)), np.arange(2 * m * total))
+        shape = (total, m, 2)
+        value, left = found.value.reshape(shape), found.left.reshape(shape)
+        return value, found.point.reshape(*shape, d), left, gained
+
+    def stride(self, model: ModalModel) -> int:
+        """Nodes from one that is searched anew to the next."""
         fastest = float(np.abs(model.eigenvalue.coefficients[0]).max())
-        stride = max(1, int(self.resolution / (fastest * model.flow.step)))
-        pool = np.vstack([self._samples(lower, upper), extra])
-        values = np.concatenate(
-            [model.values(chunk) for chunk in np.array_split(pool, -(-len(pool) // 256))]
-        )
-        coarse, rivals = self._search(model, lower, upper, (pool, values), stride)
-        return self._spread(model, [coarse, *rivals], lower, upper, (pool, values))
+        return max(1, int(self.resolution / (fastest * model.flow.step)))
+
+    def _second_passes(self, model: ModalModel, found: Optima, lower: Array, upper: Array) -> Array:
+        """Independent passes over `found` until one gains nothing; the last one's gain, (m,)."""
+        gained = np.zeros(len(model.outputs))
+        for count in range(1, self.passes + 1):
+            before = found.value.copy()
+            improved = second_pass(model, found, lower, upper, self, count)
+            if improved.any():
+                self._follow(model, found, len(model.time), lower, upper, improved)
+                self._contest(model, found, lower, upper)
+            gained = (found.value - before).reshape(len(model.time), -1, 2).max((0, 2))
+            if gained.max() <= self.quiet:
+                break
+        return gained
 
     def _search(
         self, model: ModalModel, lower: Array, upper: Array, pool: tuple[Array, Array], stride: int
@@ -135,15 +161,20 @@ class ModalSearch:
         for other in best[1:]:
             better = other.value > found.value
             found.point[better], found.value[better] = other.point[better], other.value[better]
-        self._follow(model, found, len(nodes), lower, upper)
+        self._follow(model, found, len(nodes), lower, upper, np.ones(len(found.value), bool))
         return found, best
 
     def _follow(
-        self, model: ModalModel, found: Optima, nodes: int, lower: Array, upper: Array
+        self,
+        model: ModalModel,
+        found: Optima,
+        nodes: int,
+        lower: Array,
+        upper: Array,
+        fresh: Array,
     ) -> None:
         """Tries at every node what its neighbours found, near and far, until nothing improves."""
         grid = np.arange(len(found.value)).reshape(nodes, -1)
-        fresh = np.ones(len(found.value), bool)  # changed since it was last tried elsewhere
         for _ in range(8):
             changed = np.zeros(len(found.value), bool)
             for shift in (1, 2, 4, 8, 16, 32):
@@ -165,7 +196,7 @@ class ModalSearch:
         lower: Array,
         upper: Array,
         pool: tuple[Array, Array],
-    ) -> tuple[Array, Array, Array]:
+    ) -> Optima:
         """Carry optima to all nodes, from either neighbour, then Newton; rivals likewise."""
         m, d, total = len(model.outputs), coarse[0].point.shape[1], len(model.time)
         nodes = coarse[0].node.reshape(-1, 2 * m)[:, 0]
@@ -194,9 +225,7 @@ class ModalSearch:
             refine(model, rival, which, lower, upper, self.small)
             found.offer(model, rival.point[which], which)
         self._contest(model, found, lower, upper)
-        refine(model, found, every, lower, upper, self.small)
-        shape = (total, m, 2)
-        return found.value.reshape(shape), found.point.reshape(*shape, d), found.left.reshape(shape)
+        return found
 
     def _contest(self, model: ModalModel, found: Optima, lower: Array, upper: Array) -> None:
         """Refine either optimum at both nodes of a jump, until no jump moves."""
@@ -235,6 +264,51 @@ class ModalSearch:
         points = np.vstack([unit, tensor_points(d, count)])
         scaled: Array = (lower + upper) / 2 + (upper - lower) / 2 * points
         return scaled
+
+
+def second_pass(
+    model: ModalModel,
+    found: Optima,
+    lower: Array,
+    upper: Array,
+    search: ModalSearch,
+    count: int,
+) -> Array:
+    """Offer what fresh samples and fresh starts reach, without the optima found so far.
+
+    Args:
+        model: The modal model.
+        found: All problems, node by node, which keep what is better.
+        lower: Lower ends of the box, shape (d,).
+        upper: Upper ends.
+        search: Whose effort is repeated.
+        count: Which pass this is, from 1 on; each has samples and nodes of its own.
+
+    Returns:
+        Which problems improved, shape (N,).
+    """
+    rng = np.random.default_rng((search.seed, count))
+    stride, improved = search.stride(model), np.zeros(len(found.value), bool)
+    nodes = np.arange(rng.integers(stride), len(model.time), stride)
+    every = np.arange(len(found.value)).reshape(len(model.time), -1)
+    groups = [(np.arange(len(model.time)), search.samples // 2)]
+    groups += [(nodes, search.samples // 4**k) for k in range(search.starts)]
+    for chosen, size in groups:
+        pool = rng.uniform(lower, upper, (size, len(lower)))
+        faces = rng.random(pool.shape) < rng.choice([0.0, 0.3, 0.6], (size, 1))
+        pool[faces] = np.where(rng.random(pool.shape) < 0.5, lower, upper)[faces]
+        rival = _best_of_pool(pool, trajectories(model, pool, chosen), chosen, 1)[0]
+        which = every[chosen].ravel()
+        if len(chosen) == len(nodes):
+            refine(model, rival, np.arange(len(which)), lower, upper, search.quiet / 4)
+        improved[found.offer(model, rival.point, which)] = True
+    return improved
+
+
+def trajectories(model: ModalModel, points: Array, nodes: Array | None = None) -> Array:
+    """Values of the model at points (P, d) and the nodes, all unless given, shape (P, T, m)."""
+    pieces = [model.values(chunk) for chunk in np.array_split(points, -(-len(points) // 256))]
+    return np.concatenate([x if nodes is None else x[:, nodes] for x in pieces])
 
 
 def tensor_points(d: int, most: int) -> Array:

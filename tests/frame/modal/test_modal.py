@@ -185,7 +185,7 @@ def test_branch_and_bound_finds_what_a_search_missed() -> None:
     # starts from the middle only
     optima.value[:] = optima.side * model.value_at(optima.point, optima.node, optima.output)
     found = BranchAndBound(1e-6).run(model, lower, upper, optima)
-    bounds, _, _ = ModalSearch().run(model, lower, upper, np.zeros((0, 4)))
+    bounds = ModalSearch().run(model, lower, upper)[0]
     assert np.abs(found.value - bounds.ravel()).max() < 1e-6
 
 
@@ -229,7 +229,9 @@ def test_what_one_node_finds_reaches_all_others(monkeypatch) -> None:
     found.point[found.side > 0] = 0.0
     first = np.flatnonzero(found.side > 0)[0]
     found.point[first], found.value[first] = 0.7, 0.0
-    modal_search.ModalSearch()._follow(Flat(), found, count, np.array([-1.0]), np.array([1.0]))
+    modal_search.ModalSearch()._follow(
+        Flat(), found, count, np.array([-1.0]), np.array([1.0]), np.ones(len(found.value), bool)
+    )
     assert (found.point[found.side > 0] == 0.7).all()
     assert sum(offered) < 0.6 * len(offered) * len(found.value)  # only what changed is tried again
 

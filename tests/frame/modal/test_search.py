@@ -52,3 +52,25 @@ def test_newton_ends_when_it_has_converged_and_not_after_a_count(
     assert hasty.left[settled.value > hasty.value + 1e-5].min() > SMALL  # and it is said
     monkeypatch.setattr(search, "ITERATIONS", 3000)
     assert np.abs(refined(0.3).value - settled.value).max() < 10 * SMALL
+
+
+def test_independent_passes_find_the_basins_that_a_search_has_missed() -> None:
+    cuts = boxes(
+        {
+            "E": Triangular(0.7 * 24.7561e9, 24.7561e9, 1.3 * 24.7561e9),
+            **{f"m{k}": Triangular(0.7 * m, m, 1.3 * m) for k, m in ((1, 2e3), (3, 500.0))},
+        },
+        (0,),
+    )
+    model = fit_modes(LinearFlow(RIDGED, cuts.names, 12, 0.25, Exact()), cuts, tolerance=1e-3)
+    lower, upper = -np.ones(3), np.ones(3)
+    dense = search.trajectories(model, np.random.default_rng(5).uniform(-1, 1, (8000, 3)))
+    top = np.stack([-dense.min(0), dense.max(0)], -1)
+    alone = search.ModalSearch(8, 1, passes=0).run(model, lower, upper)
+    judged = search.ModalSearch(8, 1, passes=20).run(model, lower, upper)
+    assert (top - alone[0]).max() > 1e-3  # the search on its own misses basins
+    assert alone[3].max() == 0
+    assert (top - judged[0]).max() < 1e-5
+    once = search.ModalSearch(8, 1, passes=1).run(model, lower, upper)
+    assert once[3].max() > 1e-3  # a pass that still gains says so
+    assert once[3].max() == pytest.approx((once[0] - alone[0]).max())
