@@ -8,13 +8,14 @@ dτ, with g a bound of Re λ.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial
+from alphacut.frame.dynamics.record_load import Segments
 from alphacut.frame.modal.model import ModalModel
-from alphacut.frame.structures.linear import Accelerogram
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,16 +59,16 @@ def parts(model: ModalModel, growth: Array) -> list[Part]:
     ground = model.flow.system.ground
     if model.load is None or ground is None:
         return found
-    kernels = [
-        _largest(growth, model.flow.step, ground, len(model.time), power) for power in range(4)
-    ]
+    steps = len(model.time) - 1
+    parts = ceil(model.flow.step / ground.step - 1e-9)
+    h, count = model.flow.step / parts, parts * steps
+    kernels = [_largest(growth, h, count, power) for power in range(4)]
+    # ∫ exp(g s) ds to the end of each interval, at most
+    swell = np.cumsum(kernels[0], axis=0) * h
+    size = Segments.of(ground, h, count).magnitudes(count)
     waves, elapsed, push = (
-        _convolved(kernel, ground, model.time)
-        for kernel in (
-            np.stack(kernels),
-            _swell(kernels[0], model.time),
-            np.ones((len(kernels[0]), 1)),
-        )
+        _convolved(kernel, size)[..., ::parts, :]
+        for kernel in (np.stack(kernels), swell, np.ones((count, 1)))
     )
     return [
         *found,
@@ -75,16 +76,9 @@ def parts(model: ModalModel, growth: Array) -> list[Part]:
     ]
 
 
-def _swell(kernel: Array, time: Array) -> Array:
-    """∫ exp(g s) ds from 0 to the end of each interval, at most."""
-    grown: Array = np.cumsum(kernel, axis=0) * ((time[-1] - time[0]) / len(kernel))
-    return grown
-
-
-def _largest(growth: Array, step: float, ground: Accelerogram, nodes: int, power: int) -> Array:
-    """Largest τ^power exp(g τ) in each interval of a linear load, shape (J, n)."""
-    every = ground.intervals(step)
-    ends = (np.arange((nodes - 1) * every + 1) * (step / every))[:, None]
+def _largest(growth: Array, step: float, count: int, power: int) -> Array:
+    """Largest τ^power exp(g τ) in each of `count` intervals, shape (count, n)."""
+    ends = (np.arange(count + 1) * step)[:, None]
     value = ends**power * np.exp(growth * ends)
     peak = -power / np.where(growth < 0, growth, -1e-300)
     inside = (peak > ends[:-1]) & (peak < ends[1:])
@@ -93,15 +87,17 @@ def _largest(growth: Array, step: float, ground: Accelerogram, nodes: int, power
     return larger
 
 
-def _convolved(kernel: Array, ground: Accelerogram, time: Array) -> Array:
-    """Upper sums of ∫ kernel(τ) |a(t − τ)| dτ at all nodes, shape (…, T, n)."""
-    count = kernel.shape[-2]
-    h = (time[-1] - time[0]) / count
-    size = np.abs(ground.at(np.arange(count + 1) * h))
-    load = np.maximum(size[:-1], size[1:])
+def _convolved(kernel: Array, size: Array) -> Array:
+    """Upper sums of ∫ kernel(τ) |a(t − τ)| dτ at the ends of all intervals, (…, J + 1, n).
+
+    Args:
+        kernel: Its maxima over the intervals, shape (…, J, n).
+        size: ∫ |a| over them, shape (J,).
+    """
+    count = len(size)
     columns = np.moveaxis(kernel, -2, -1).reshape(-1, count)
-    sums = h * np.array([np.convolve(column, load)[:count] for column in columns])
+    sums = np.array([np.convolve(column, size)[:count] for column in columns])
     out = np.moveaxis(sums.reshape(*kernel.shape[:-2], kernel.shape[-1], count), -1, -2)
     start = np.zeros((*out.shape[:-2], 1, out.shape[-1]))
-    nodes: Array = np.concatenate([start, out], axis=-2)[..., :: count // (len(time) - 1), :]
-    return nodes
+    ends: Array = np.concatenate([start, out], axis=-2)
+    return ends

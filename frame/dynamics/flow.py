@@ -5,15 +5,16 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import isqrt
 from typing import NoReturn, Protocol
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet, concatenate
 from alphacut.frame.calculus.numbers import require_number
-from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint, StepMap
+from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint
+from alphacut.frame.dynamics.record_load import linear_load
 from alphacut.frame.dynamics.spectral import LARGE, NearlyCriticalError, spectral_trajectory
+from alphacut.frame.dynamics.transfer_powers import exact_response, trajectory
 from alphacut.frame.structures.linear import LinearSystem, check_names, evaluate
 
 
@@ -163,102 +164,19 @@ class LinearFlow(March):
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
         matrices, rows = evaluate(self.system, self.names, points, derivatives=derivatives)
-        load, every = self._load()
-        h = self.step / every
-        if isinstance(self.integrator, Exact) and rows.value.shape[-1] >= LARGE:
+        exact, ground = isinstance(self.integrator, Exact), self.system.ground
+        h, steps = self.step, len(self.time) - 1
+        if exact and rows.value.shape[-1] >= LARGE:
             try:
-                return spectral_trajectory(
-                    matrices, rows, load=load, step=h, every=every, count=len(self.time)
-                )
+                return spectral_trajectory(matrices, rows, ground=ground, step=h, steps=steps)
             except NearlyCriticalError:
                 pass  # powers of the transfer matrix need no eigenvectors
-        step_map = self.integrator.step_map(matrices, h)
         start = concatenate([matrices.q0, matrices.v0], -2)
-        found = trajectory(step_map, start, rows, load=load, count=(len(self.time) - 1) * every + 1)
-        return found if every == 1 else found[:, ::every]
-
-    def _load(self) -> tuple[Array | None, int]:
-        """Ground acceleration at the nodes, and for the exact propagator between them."""
-        ground = self.system.ground
         if ground is None:
-            return None, 1
-        every = ground.intervals(self.step) if isinstance(self.integrator, Exact) else 1
-        return ground.at(np.arange((len(self.time) - 1) * every + 1) * (self.step / every)), every
-
-
-def trajectory(step_map: StepMap, start: Jet, rows: Jet, *, load: Array | None, count: int) -> Jet:
-    """Outputs at `count` nodes, by powers of the step map in blocks of √count steps.
-
-    Args:
-        step_map: One step.
-        start: Initial state, V = (S, N, 1).
-        rows: Observation rows, V = (S, m, N).
-        load: Ground acceleration at the nodes, shape (count,), or None.
-        count: Number of nodes.
-
-    Returns:
-        Outputs, V = (S, count, m).
-    """
-    size = isqrt(count - 1) + 1
-    blocks = -(-count // size)
-    powers = _powers(step_map.transfer, size)
-    jump = step_map.transfer @ powers[:, -1]
-    observed = rows[:, None] @ powers  # C T^j, V = (S, size, m, N)
-    samples, m, n = len(start.value), rows.value.shape[-2], start.value.shape[-2]
-    flat = observed.map(lambda x: x.reshape((*x.shape[:-3], size * m, n)))
-    if load is None:
-        starts = _starts(jump, start, None, blocks)
-        out = flat @ starts
-    else:
-        steps = np.zeros((2 * size, blocks))  # a(t_k), a(t_{k+1}) for the steps of each block
-        padded = np.concatenate([load, np.zeros(size * blocks + 1 - count)])
-        steps[0::2], steps[1::2] = (
-            padded[i : i + size * blocks].reshape(blocks, size).T for i in (0, 1)
-        )
-        impulse = powers @ step_map.load[:, None]  # T^k G, V = (S, size, N, 2)
-        last = impulse.map(
-            lambda x: np.moveaxis(x[..., ::-1, :, :], -3, -2).reshape((*x.shape[:-3], n, 2 * size))
-        )
-        starts = _starts(jump, start, last @ steps, blocks)
-        out = flat @ starts + _convolution(rows[:, None] @ impulse, size) @ steps
-
-    def in_time(x: Array) -> Array:
-        lead = x.shape[:-3]
-        ordered = np.moveaxis(x.reshape((*lead, samples, size, m, blocks)), -1, -3)
-        cut: Array = ordered.reshape((*lead, samples, blocks * size, m))[..., :count, :]
-        return cut
-
-    return out.map(in_time)
-
-
-def _powers(transfer: Jet, count: int) -> Jet:
-    """T^0 … T^(count − 1) by doubling, V = (S, count, N, N)."""
-    eye = np.broadcast_to(np.eye(transfer.value.shape[-1]), transfer.value.shape)
-    powers = Jet.constant(eye, transfer.directions)[:, None]
-    top = transfer
-    while powers.value.shape[1] < count:
-        powers = concatenate([powers, powers @ top[:, None]], -3)
-        top = top @ top
-    return powers[:, :count]
-
-
-def _starts(jump: Jet, start: Jet, forced: Jet | None, blocks: int) -> Jet:
-    """States at the first node of every block, V = (S, N, blocks)."""
-    states = [start]
-    for b in range(blocks - 1):
-        following = jump @ states[-1]
-        states.append(following if forced is None else following + forced[..., b : b + 1])
-    return concatenate(states, -1)
-
-
-def _convolution(impulse: Jet, size: int) -> Jet:
-    """Response in a block to loads of earlier steps, V = (S, size, m, 2)."""
-    lag = np.arange(size)[:, None] - 1 - np.arange(size)[None, :]
-
-    def spread(x: Array) -> Array:
-        taken = x[..., np.maximum(lag, 0), :, :] * (lag >= 0)[:, :, None, None]  # (…, j, i, m, 2)
-        moved = np.moveaxis(taken, -2, -3)
-        toeplitz: Array = moved.reshape((*x.shape[:-3], size * x.shape[-2], 2 * size))
-        return toeplitz
-
-    return impulse.map(spread)
+            step_map, load = self.integrator.step_map(matrices, h), None
+        elif exact:
+            step_map, load = exact_response(matrices, ground, step=h, steps=steps)
+        else:
+            step_map = self.integrator.step_map(matrices, h)
+            load = linear_load(ground, h, steps)
+        return trajectory(step_map, start, rows, load=load, count=steps + 1)

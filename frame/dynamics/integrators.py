@@ -21,11 +21,12 @@ from alphacut.frame.structures.state_space import state_matrix
 
 @dataclass(frozen=True, eq=False)
 class StepMap:
-    """x[k+1] = T x[k] + G [a(t_k), a(t_{k+1})] with x = [q; v], a of the ground.
+    """x[k+1] = T x[k] + G load[k] with x = [q; v].
 
     Args:
         transfer: T, shape (S, 2n, 2n).
-        load: G, shape (S, 2n, 2).
+        load: G, shape (S, 2n, L); with L = 2 for the accelerations of the ground at the beginning
+            and the end of a step, linear between.
     """
 
     transfer: Jet

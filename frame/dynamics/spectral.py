@@ -1,19 +1,21 @@
 """Exact propagator by eigenvalues: every mode runs on its own.
 
-Each mode's answer to the ground is R(t; λ) = ∫ exp(λ (t − s)) a(s) ds, marched from sample to
-sample of a record that is linear between them. Powers of the whole transfer matrix are never
-formed, and overdamped modes are as good as others: all 2n eigenvalues are kept.
+Each mode's answer to the ground is R(t; λ) = ∫ exp(λ (t − s)) a(s) ds, marched over the segments
+between samples and nodes, in which the record is linear. Powers of the whole transfer matrix are
+never formed, and overdamped modes are as good as others: all 2n eigenvalues are kept.
 """
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import factorial
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet, concatenate
+from alphacut.frame.dynamics.record_load import SAME, Segments
 from alphacut.frame.structures.classical import ClassicalModes, classical_modes
-from alphacut.frame.structures.linear import Matrices
+from alphacut.frame.structures.linear import Accelerogram, Matrices
 from alphacut.frame.structures.modes import eigenvectors
 from alphacut.frame.structures.state_space import state_matrix
 
@@ -25,22 +27,25 @@ the structure.
 """
 
 
+KEPT = 64
+"""Lengths of segments whose exponentials are kept; commensurate steps have few."""
+
+
 class NearlyCriticalError(RuntimeError):
     """Two eigenvectors nearly coincide."""
 
 
 def spectral_trajectory(
-    matrices: Matrices, rows: Jet, *, load: Array | None, step: float, every: int, count: int
+    matrices: Matrices, rows: Jet, *, ground: Accelerogram | None, step: float, steps: int
 ) -> Jet:
-    """Outputs at `count` nodes, V = (S, count, m).
+    """Outputs at all nodes, V = (S, steps + 1, m).
 
     Args:
         matrices: The structure.
         rows: Observation rows, V = (S, m, 2n).
-        load: Ground acceleration at intervals `step`, shape ((count − 1) every + 1,), or None.
-        step: Interval of the load, in s.
-        every: Intervals from node to node.
-        count: Number of nodes.
+        ground: The ground's motion, or None.
+        step: Distance of nodes, in s.
+        steps: Number of steps.
 
     Raises:
         NearlyCriticalError: A pair of modes is so near to critical damping that its eigenvectors
@@ -49,7 +54,7 @@ def spectral_trajectory(
     deep = matrices.mass.directions > 0
     undamped = None if deep else classical_modes(matrices, rows)
     if undamped is not None:
-        return _superposed(undamped, load=load, step=step, every=every, count=count)
+        return _superposed(undamped, ground=ground, step=step, steps=steps)
     rate, right, left = eigenvectors(state_matrix(matrices))
     if (
         float((np.abs(right.value).sum(-2).max(-1) * np.abs(left.value).sum(-2).max(-1)).max())
@@ -60,38 +65,36 @@ def spectral_trajectory(
     start = concatenate([matrices.q0, matrices.v0], -2)
     parts = []
     if start.value.any() or start.first.any():
-        time = np.arange(count) * step * every
+        time = np.arange(steps + 1) * step
         wave = np.exp(rate.value[:, None, :] * time[:, None])
         waves = [wave, time[:, None] * wave, time[:, None] ** 2 * wave] if deep else [wave]
         parts.append(_summed(rate, seen * (left @ start), waves))
-    if load is not None:
+    if ground is not None:
         kick = np.concatenate([np.zeros_like(matrices.rigid), -matrices.rigid])
         parts.append(
             _summed(
                 rate,
                 seen * (left @ kick),
-                responses(rate.value, load, step, every=every, derivatives=deep),
+                responses(rate.value, ground, step, steps, derivatives=deep),
             )
         )
     if not parts:
         return Jet.constant(
-            np.zeros((len(seen.value), count, seen.value.shape[-1])), rate.directions
+            np.zeros((len(seen.value), steps + 1, seen.value.shape[-1])), rate.directions
         )
     return parts[0] if len(parts) == 1 else parts[0] + parts[1]
 
 
 def _superposed(
-    modes: ClassicalModes, *, load: Array | None, step: float, every: int, count: int
+    modes: ClassicalModes, *, ground: Accelerogram | None, step: float, steps: int
 ) -> Jet:
     """As `spectral_trajectory`, from modes that damping does not couple."""
-    out = np.zeros((len(modes.rate), count, modes.start.shape[-1]))
+    out = np.zeros((len(modes.rate), steps + 1, modes.start.shape[-1]))
     if modes.start.any():
-        out += (
-            np.exp(modes.rate[:, None, :] * (np.arange(count) * step * every)[:, None])
-            @ modes.start
-        ).real
-    if load is not None:
-        out += (responses(modes.rate, load, step, every=every)[0] @ modes.load).real
+        time = np.arange(steps + 1) * step
+        out += (np.exp(modes.rate[:, None, :] * time[:, None]) @ modes.start).real
+    if ground is not None:
+        out += (responses(modes.rate, ground, step, steps)[0] @ modes.load).real
     return Jet.constant(out, 0)
 
 
@@ -122,34 +125,47 @@ def _summed(rate: Jet, share: Jet, waves: list[Array]) -> Jet:
 
 
 def responses(
-    rate: Array, load: Array, step: float, *, every: int = 1, derivatives: bool = False
+    rate: Array, ground: Accelerogram, step: float, steps: int, *, derivatives: bool = False
 ) -> list[Array]:
-    """R and its derivatives by λ at every `every`-th sample, (S, T, K), for λ (S, K)."""
-    f = phi(rate * step, 4)
-    slopes = [[f[k], step * (f[k] - k * f[k + 1])] for k in (1, 2)]
-    for k, row in zip((1, 2), slopes, strict=True):
-        row.append(step**2 * (f[k] - 2 * k * f[k + 1] + k * (k + 1) * f[k + 2]))
+    """R and its derivatives by λ at all nodes, each shape (S, steps + 1, K), for λ (S, K)."""
+    cut = Segments.of(ground, step, steps)
+    lengths, alike = _alike(cut.length, step)
+    cached = lru_cache(maxsize=KEPT)(lambda i: _advance(rate, float(lengths[i]), derivatives))
     orders = 3 if derivatives else 1
-    old = [step * (a - b) for a, b in zip(*slopes, strict=True)][:orders]
-    new = [step * b for b in slopes[1]][:orders]
-    E = f[0]
     out: list[Array] = [
-        np.zeros((len(rate), (len(load) - 1) // every + 1, rate.shape[1]), complex)
-        for _ in range(orders)
+        np.zeros((len(rate), steps + 1, rate.shape[1]), complex) for _ in range(orders)
     ]
-    now = [np.zeros_like(E) for _ in range(orders)]
-    for j in range(1, len(load)):
+    now = [np.zeros(rate.shape, complex) for _ in range(orders)]
+    for j, index, first, last in zip(cut.step, alike, cut.first, cut.last, strict=True):
+        h, (E, old, new) = lengths[index], cached(index)
         moved = [E * now[0]]
         if derivatives:
-            moved += [
-                E * (now[1] + step * now[0]),
-                E * (now[2] + 2 * step * now[1] + step**2 * now[0]),
-            ]
-        now = [x + load[j - 1] * a + load[j] * b for x, a, b in zip(moved, old, new, strict=True)]
-        if j % every == 0:
-            for whole, x in zip(out, now, strict=True):
-                whole[:, j // every] = x
+            moved += [E * (now[1] + h * now[0]), E * (now[2] + 2 * h * now[1] + h**2 * now[0])]
+        now = [x + first * a + last * b for x, a, b in zip(moved, old, new, strict=True)]
+        for whole, x in zip(out, now, strict=True):
+            whole[:, j + 1] = x  # the last segment of the step remains
     return out
+
+
+def _alike(length: Array, step: float) -> tuple[Array, Array]:
+    """Means of lengths that differ by rounding alone, and which of them each one is."""
+    order = np.argsort(length)
+    group = np.cumsum(np.diff(length[order], prepend=length[order[0]]) > SAME * step)
+    index = np.empty(len(length), int)
+    index[order] = group
+    return np.bincount(index, length) / np.bincount(index), index
+
+
+def _advance(rate: Array, step: float, derivatives: bool) -> tuple[Array, list[Array], list[Array]]:
+    """exp(λ h), and what accelerations at both ends of a segment add to R and its derivatives."""
+    f = phi(rate * step, 4 if derivatives else 2)
+    slopes = [[f[k]] for k in (1, 2)]
+    if derivatives:
+        for k, row in zip((1, 2), slopes, strict=True):
+            row.append(step * (f[k] - k * f[k + 1]))
+            row.append(step**2 * (f[k] - 2 * k * f[k + 1] + k * (k + 1) * f[k + 2]))
+    old = [step * (a - b) for a, b in zip(*slopes, strict=True)]
+    return f[0], old, [step * b for b in slopes[1]]
 
 
 def phi(z: Array, top: int) -> list[Array]:

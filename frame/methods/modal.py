@@ -162,7 +162,7 @@ def _certified(
     }
     facts |= {
         "gap_output": flow.outputs[flow.reference],
-        "between_nodes": proof.between,
+        "between_nodes": float((proof.between / flow.scale).max()),
         "boxes": proof.boxes,
         "proof": f"the branch and bound is rigorous for the modal model; {PROVED}",
     }

@@ -11,6 +11,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial
+from alphacut.frame.dynamics.record_load import load_rule, parts_of
 from alphacut.frame.structures.linear import Accelerogram
 
 REACH = 6.0
@@ -62,7 +63,7 @@ class LoadTable:
         return cls(
             middle,
             1 / window,
-            _moments(ground, middle, time, starts, window, order),
+            _moments(ground, middle, time, starts, window, spread, order),
             starts,
             time,
             share,
@@ -225,28 +226,28 @@ def _divided(share: Polynomial, scale: Array) -> Polynomial:
 
 
 def _moments(
-    ground: Accelerogram, middle: Array, time: Array, starts: Array, window: float, order: int
+    ground: Accelerogram,
+    middle: Array,
+    time: Array,
+    starts: Array,
+    window: float,
+    reach: float,
+    order: int,
 ) -> Array:
     """Taylor coefficients of the window's own part of R_k, shape (T, n, order).
 
-    Per step: ∫ of exp((λ + x/window) τ) a over the step as a truncated series in x, by Gauss
-    quadrature to round-off; from node to node the series is multiplied by that of exp((λ +
-    x/window) h). A node that ends one window starts the next from nothing.
+    Per step: ∫ of exp((λ + x/window) τ) a over the step as a truncated series in x, by a rule that
+    takes the record as it is; from node to node the series is multiplied by that of exp((λ +
+    x/window) h). A node that ends one window starts the next from nothing. `reach` bounds what
+    |x|/window adds to |λ|, in 1/s.
     """
-    h = time[1] - time[0]
-    parts = ground.intervals(h)
-    points, weights = np.polynomial.legendre.leggauss(8 + ceil(abs(middle).max() * h / parts))
-    share = (points + 1) / 2
-    # from each point to the end of the step
-    tau = h - (np.arange(parts)[:, None] + share).ravel() * (h / parts)
-    # as the exact propagator takes it
-    fine = ground.at(np.arange((len(time) - 1) * parts + 1) * (h / parts))
-    load = (fine[:-1, None] * (1 - share) + fine[1:, None] * share).reshape(len(time) - 1, -1)
+    h, steps = time[1] - time[0], len(time) - 1
+    rule = load_rule(ground, h, steps, parts_of(float(np.abs(middle).max()) + reach, h))
     factorial = np.cumprod(np.concatenate([[1.0], np.arange(1, order)]))
-    series = (tau[:, None] / window) ** np.arange(order) / factorial  # (Q, order)
-    kernel = np.exp(middle[:, None] * tau) * np.tile(weights, parts) * (h / parts / 2)  # (n, Q)
-    pushed = load @ (kernel.T[:, :, None] * series[:, None]).reshape(len(tau), -1)
-    pushed = pushed.reshape(len(time) - 1, len(middle), order)
+    series = (rule.tau[:, None] / window) ** np.arange(order) / factorial  # (Q, order)
+    kernel = np.exp(middle * rule.tau[:, None])  # (Q, n)
+    pushed = rule.weight @ (kernel[:, :, None] * series[:, None]).reshape(len(rule.tau), -1)
+    pushed = pushed.reshape(steps, len(middle), order)
     # (n, order)
     advance = np.exp(middle * h)[:, None] * (h / window) ** np.arange(order) / factorial
     # truncated product with `advance` as a matrix

@@ -130,10 +130,8 @@ class AffineStructure:
         rows = np.array(list(self.observed.values())) @ shape
         h, out = time[1] - time[0], np.zeros((len(time), len(rows)), complex)
         if self.ground is not None:
-            every = self.ground.intervals(h)
-            load = self.ground.at(np.arange((len(time) - 1) * every + 1) * (h / every))
             share = -(shape.T @ (M @ self.excitation)) / (slow - fast)
-            two = responses(np.stack([slow, fast]), load, h / every, every=every)[0]
+            two = responses(np.stack([slow, fast]), self.ground, h, len(time) - 1)[0]
             out += ((two[0] - two[1]) * share) @ rows.T
         for x, parts in ((self.q0, (-fast, slow)), (self.v0, (1.0, -1.0))):
             if x is not None and x.any():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import ceil
 from typing import Protocol
 
 import numpy as np
@@ -42,12 +41,14 @@ class Matrices:
 class Accelerogram:
     """Acceleration of the ground, linear between its samples and zero outside them.
 
+    It jumps where it begins or ends on another value than zero.
+
     Args:
-        step: Time between samples, in s.
-        acceleration: Samples from t = 0 on, shape (n,), in m/s².
+        step: Time between samples, in s; it need not go into the step of the nodes.
+        acceleration: Samples from t = 0 on, at least two, shape (n,), in m/s².
 
     Raises:
-        ValueError: The step is not positive or a sample is not finite.
+        ValueError: The step is not positive, or there are not two samples, or one is not finite.
     """
 
     step: float
@@ -55,28 +56,25 @@ class Accelerogram:
 
     def __post_init__(self) -> None:
         if (
-            not self.step > 0
-            or not np.isfinite(self.acceleration).all()
+            not 0 < self.step < np.inf
             or np.ndim(self.acceleration) != 1
+            or np.size(self.acceleration) < 2
+            or not np.isfinite(self.acceleration).all()
         ):
             raise ValueError(
                 f"accelerogram: step {self.step:g} s must be positive and all"
-                f" {np.size(self.acceleration)} samples finite"
+                f" {np.size(self.acceleration)} samples finite, two or more"
             )
 
-    def at(self, time: Array) -> Array:
-        """Acceleration at `time`, any shape, in m/s²."""
-        samples = np.arange(len(self.acceleration)) * self.step
-        return np.interp(time, samples, self.acceleration, left=0.0, right=0.0)
-
-    def intervals(self, step: float) -> int:
-        """Number of equal parts of a step in which the record is linear, or nearly so."""
-        least = ceil(step / self.step - 1e-9)
-        for parts in range(least, 8 * least):
-            share = self.step * parts / step
-            if abs(share - round(share)) < 1e-9:
-                return parts
-        return 8 * least
+    @property
+    def extremes(self) -> tuple[float, float, float]:
+        """Largest magnitude (m/s²), slope between samples (m/s³) and jump at the end (m/s²)."""
+        a = np.asarray(self.acceleration)
+        return (
+            float(np.abs(a).max()),
+            float(np.abs(np.diff(a)).max()) / self.step,
+            abs(float(a[-1])),
+        )
 
     def band(self, share: float = 0.999) -> float:
         """Angular frequency below which `share` of the record's power lies, in rad/s."""

@@ -270,15 +270,13 @@ def test_waves_and_their_derivatives_stay_below_their_bounds() -> None:
     forced = parts(found, growth)[1]
     unit = np.random.default_rng(6).uniform(-1, 1, (40, 2))
     rate = found.eigenvalue(unit)
-    h = found.flow.step / SHAKEN.ground.intervals(found.flow.step)
-    every = SHAKEN.ground.intervals(found.flow.step)
-    load = SHAKEN.ground.at(np.arange((len(found.time) - 1) * every + 1) * h)
-    for order, wave in enumerate(responses(rate, load, h, every=every, derivatives=True)):
+    march = (rate, SHAKEN.ground, found.flow.step, len(found.time) - 1)
+    for order, wave in enumerate(responses(*march, derivatives=True)):
         size = np.abs(wave).max(0)
         assert (size <= forced.waves[order] * (1 + 1e-9) + 1e-15).all()
         assert size.max() > 0.05 * forced.waves[order].max()  # and the bounds are not idle
     walked = cumulative_trapezoid(
-        np.abs(responses(rate, load, h, every=every)[0]), dx=found.flow.step, axis=1, initial=0
+        np.abs(responses(*march)[0]), dx=found.flow.step, axis=1, initial=0
     )
     assert (walked.max(0) <= 1.02 * forced.elapsed + 1e-12).all()
 
@@ -301,11 +299,7 @@ def test_series_leave_out_of_the_load_response_no_more_than_they_say() -> None:
     assert found.load is not None
     unit = np.linspace(-1, 1, 21)[:, None]
     rate = found.eigenvalue(unit)
-    every = SHAKEN.ground.intervals(found.flow.step)
-    h = found.flow.step / every
-    truth = responses(
-        rate, SHAKEN.ground.at(np.arange((len(found.time) - 1) * every + 1) * h), h, every=every
-    )[0]
+    truth = responses(rate, SHAKEN.ground, found.flow.step, len(found.time) - 1)[0]
     assert found.load.truncation.max() > 0
     bound = (
         found.load.truncation

@@ -1,0 +1,107 @@
+"""Trajectories x[k+1] = T x[k] + G load[k] of many parameter sets, exact under a record."""
+
+from __future__ import annotations
+
+from math import isqrt
+
+import numpy as np
+
+from alphacut.frame.calculus.jet import Array, Jet, concatenate
+from alphacut.frame.dynamics.integrators import StepMap, exponential
+from alphacut.frame.dynamics.record_load import load_rule, parts_of
+from alphacut.frame.structures.linear import Accelerogram, Matrices
+from alphacut.frame.structures.state_space import state_matrix
+
+TERMS = 28
+"""Terms of exp(A τ) where |λ| τ ≤ 2: the next is 2^28 / 28! = 1e-21."""
+
+
+def exact_response(
+    matrices: Matrices, ground: Accelerogram, *, step: float, steps: int
+) -> tuple[StepMap, Array]:
+    """The exact step under a record, and what its load acts on, shape (steps, Q)."""
+    flow = state_matrix(matrices)
+    parts = parts_of(float(np.abs(np.linalg.eigvals(flow.value)).max()), step)
+    rule = load_rule(ground, step, steps, parts)
+    kick = np.concatenate([np.zeros_like(matrices.rigid), -matrices.rigid])
+    samples = len(flow.value)
+    term = Jet.constant(np.broadcast_to(kick, (samples, *kick.shape)), flow.directions)
+    series, short = [term], step / parts
+    for k in range(1, TERMS):
+        term = flow @ term * (short / k)
+        series.append(term)
+    share = rule.tau[: len(rule.tau) // parts] / short
+    columns = concatenate(series, -1) @ share ** np.arange(TERMS)[:, None]  # exp(A τ) B
+    transfer = exponential(flow * short)
+    for _ in range(parts.bit_length() - 1):
+        columns = concatenate([columns, transfer @ columns], -1)
+        transfer = transfer @ transfer
+    return StepMap(transfer, columns), rule.weight
+
+
+def trajectory(step_map: StepMap, start: Jet, rows: Jet, *, load: Array | None, count: int) -> Jet:
+    """Outputs at `count` nodes: blocks of √count steps march together from rest, then are joined.
+
+    Args:
+        step_map: One step, x[k+1] = T x[k] + G load[k].
+        start: Initial state, V = (S, N, 1).
+        rows: Observation rows, V = (S, m, N).
+        load: What G acts on in each step, shape (count − 1, L), or None.
+        count: Number of nodes.
+
+    Returns:
+        Outputs, V = (S, count, m).
+    """
+    size = isqrt(count - 1) + 1
+    blocks = -(-count // size)
+    powers = _powers(step_map.transfer, size)
+    jump = step_map.transfer @ powers[:, -1]
+    observed = rows[:, None] @ powers  # C T^j, V = (S, size, m, N)
+    samples, m, n = len(start.value), rows.value.shape[-2], start.value.shape[-2]
+    flat = observed.map(lambda x: x.reshape((*x.shape[:-3], size * m, n)))
+    if load is None:
+        out = flat @ _starts(jump, start, None, blocks)
+    else:
+        forced, ends = _forced(step_map, rows, load, size, blocks)
+        out = flat @ _starts(jump, start, ends, blocks) + forced
+
+    def in_time(x: Array) -> Array:
+        lead = x.shape[:-3]
+        ordered = np.moveaxis(x.reshape((*lead, samples, size, m, blocks)), -1, -3)
+        cut: Array = ordered.reshape((*lead, samples, blocks * size, m))[..., :count, :]
+        return cut
+
+    return out.map(in_time)
+
+
+def _forced(step_map: StepMap, rows: Jet, load: Array, size: int, blocks: int) -> tuple[Jet, Jet]:
+    """Outputs of blocks from rest, V = (S, size m, blocks), and last states, V = (S, N, blocks)."""
+    padded = np.zeros((blocks * size, load.shape[1]))
+    padded[: len(load)] = load
+    columns = padded.reshape(blocks, size, -1)
+    state = step_map.load @ np.zeros((load.shape[1], blocks))
+    seen = []
+    for k in range(size):
+        seen.append(rows @ state)
+        state = step_map.transfer @ state + step_map.load @ columns[:, k].T
+    return concatenate(seen, -2), state
+
+
+def _powers(transfer: Jet, count: int) -> Jet:
+    """T^0 … T^(count − 1) by doubling, V = (S, count, N, N)."""
+    eye = np.broadcast_to(np.eye(transfer.value.shape[-1]), transfer.value.shape)
+    powers = Jet.constant(eye, transfer.directions)[:, None]
+    top = transfer
+    while powers.value.shape[1] < count:
+        powers = concatenate([powers, powers @ top[:, None]], -3)
+        top = top @ top
+    return powers[:, :count]
+
+
+def _starts(jump: Jet, start: Jet, forced: Jet | None, blocks: int) -> Jet:
+    """States at the first node of every block, V = (S, N, blocks)."""
+    states = [start]
+    for b in range(blocks - 1):
+        following = jump @ states[-1]
+        states.append(following if forced is None else following + forced[..., b : b + 1])
+    return concatenate(states, -1)

@@ -1,0 +1,177 @@
+"""Motions under records of every kind against matrix exponentials at the union of nodes and samples,
+written without the program's own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from alphacut.frame import Accelerogram, Exact, LinearFlow, Midpoint, StoreyFrame, envelope
+from alphacut.frame.boxes import boxes
+from alphacut.frame.dynamics.integrators import Integrator, RungeKutta4
+from alphacut.frame.modal.model import fit_modes
+from alphacut.frame.structures.linear import evaluate
+from alphacut.fuzzy import Interval
+
+STEPS = [0.01, 0.017, 1 / 128, 1 / 256, 0.05, 0.3, np.pi / 50, 0.1 / 3]
+NODES = [0.1, 0.05, 0.02, 0.013]
+
+
+def random_record(rng: np.random.Generator) -> Accelerogram:
+    """Noise, a pulse or a sine, mostly cut where it is not zero, of an odd step and any length."""
+    step = float(rng.choice([*STEPS, rng.uniform(0.004, 0.4)]))
+    count = max(2, int(rng.uniform(0.3, 6) / step))
+    time = np.arange(count) * step
+    kind = rng.integers(4)
+    if kind == 0:
+        samples = rng.standard_normal(count)
+    elif kind == 1:
+        samples = np.full(count, rng.uniform(-3, 3))
+    elif kind == 2:
+        samples = np.sin(rng.uniform(1, 20) * time + rng.uniform(0, 6))
+    else:
+        samples = np.where(rng.random(count) < 0.1, rng.uniform(-5, 5, count), 0.0)
+        samples[0] = 2.0
+    return Accelerogram(step, samples)
+
+
+def random_structure(rng: np.random.Generator) -> StoreyFrame:
+    n = int(rng.integers(1, 5))
+    return StoreyFrame(
+        rng.uniform(1e3, 1e4, n),
+        rng.uniform(2.3, 3.2, n),
+        rng.uniform(20e9, 30e9),
+        10 ** rng.uniform(-6, -3.5),
+        rng.uniform(20, 3e4, n),
+        str(rng.choice(["ground", "storey"])),
+        rng.uniform(-0.01, 0.01, n),
+        rng.uniform(-0.1, 0.1, n),
+        outputs=("q1", f"q{n}", "v1", "shear1"),
+        ground=random_record(rng),
+    )
+
+
+def motion(frame: StoreyFrame, time: np.ndarray) -> np.ndarray:
+    """Outputs at the nodes, one matrix exponential from each time to the next."""
+    m, rows = evaluate(frame, (), np.zeros((1, 0)), derivatives=False)
+    M, D, K = (x.value[0] for x in (m.mass, m.damping, m.stiffness))
+    n, a, dt = len(M), frame.ground.acceleration, frame.ground.step
+    A = np.zeros((2 * n + 2, 2 * n + 2))
+    A[:n, n : 2 * n] = np.eye(n)
+    A[n : 2 * n, : 2 * n] = -np.linalg.solve(M, np.hstack([K, D]))
+    A[n : 2 * n, 2 * n] = -1.0
+    A[2 * n, 2 * n + 1] = 1.0
+    state = np.concatenate([m.q0.value[0, :, 0], m.v0.value[0, :, 0]])
+    samples = np.arange(len(a)) * dt
+    knots = np.union1d(time, samples[samples < time[-1]])
+    out, advance = [rows.value[0] @ state], {}
+    for begin, end in pairwise(knots):
+        k = int(np.floor((begin + end) / 2 / dt))
+        slope = (a[k + 1] - a[k]) / dt if k + 1 < len(a) else 0.0
+        level = a[k] + slope * (begin - k * dt) if k + 1 < len(a) else 0.0
+        length = round(end - begin, 14)
+        if length not in advance:
+            advance[length] = expm(A * length)
+        state = (advance[length] @ [*state, level, slope])[: 2 * n]
+        if end in time:
+            out.append(rows.value[0] @ state)
+    return np.array(out)
+
+
+def deviation(frame: StoreyFrame, step: float) -> float:
+    """Largest error of the exact propagator as a share of the peak, over outputs and ways to
+    compute them.
+    """
+    duration = round(4 / step) * step
+    flow, point = LinearFlow(frame, ("E",), duration, step, Exact()), np.array([[frame.modulus]])
+    truth = motion(frame, flow.time)
+    ways = [flow.values(point)[0], flow.taylor(point).value[0]]
+    return max(float((np.abs(v - truth).max(0) / np.abs(truth).max(0)).max()) for v in ways)
+
+
+@pytest.mark.parametrize("large", [40, 1], ids=["powers", "eigenvalues"])
+def test_motions_under_any_record_are_exact(large: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("alphacut.frame.dynamics.flow.LARGE", large)
+    rng = np.random.default_rng(0)
+    for _ in range(12):
+        frame = random_structure(rng)
+        assert deviation(frame, float(rng.choice(NODES))) < 1e-10
+
+
+@pytest.mark.slow
+def test_a_thousand_motions_under_any_record_are_exact() -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(1000):
+        assert deviation(random_structure(rng), float(rng.choice(NODES))) < 1e-10
+
+
+def test_tables_of_the_modes_are_exact_under_any_record() -> None:
+    rng = np.random.default_rng(2)
+    for _ in range(10):
+        frame = replace(random_structure(rng), dampers=())
+        step = float(rng.choice(NODES))
+        cuts = boxes({"E": Interval(frame.modulus, 1.0001 * frame.modulus)}, (0,))
+        flow = LinearFlow(frame, ("E",), round(4 / step) * step, step, Exact())
+        model = fit_modes(flow, cuts, tolerance=1e-16)
+        truth = motion(replace(frame, modulus=1.0001 * frame.modulus), flow.time)
+        everywhere = (np.ones((truth.size, 1)), *map(np.ravel, np.indices(truth.shape)))
+        for values in (model.values(np.ones((1, 1)))[0], model.value_at(*everywhere)):
+            wrong = np.abs(values.reshape(truth.shape) - truth).max(0)
+            assert (wrong < 1e-10 * np.abs(truth).max(0)).all()
+
+
+def test_certificates_at_several_steps_agree_and_hold_under_a_cut_record() -> None:
+    frame = StoreyFrame(
+        (2e3, 1e3),
+        (2.5, 2.5),
+        25e9,
+        1e-6,
+        (20, 20),
+        "ground",
+        ground=Accelerogram(0.017, 3 * np.cos(2.2 * np.arange(120) * 0.017)),
+    )
+    inputs = {"E": Interval(24e9, 26e9), "m1": Interval(1.9e3, 2.1e3)}
+    found = [
+        envelope(frame, inputs, duration=4, step=h, alpha=(0,), method="modal", certify=1e-5)
+        for h in (0.2, 0.08, 0.05)
+    ]
+    times = [np.round(e.time, 9) for e in found]
+    common = np.intersect1d(times[0], np.intersect1d(times[1], times[2]))
+    assert len(common) >= 10
+    at = [np.searchsorted(t, common) for t in times]
+    low = np.array([e.lower[0, k] for e, k in zip(found, at, strict=True)])
+    high = np.array([e.upper[0, k] for e, k in zip(found, at, strict=True)])
+    assert np.ptp(low, axis=0).max() <= 1e-5
+    assert np.ptp(high, axis=0).max() <= 1e-5
+    for E in (24e9, 25e9, 26e9):
+        for m in (1.9e3, 2.1e3):
+            true = motion(replace(frame, modulus=E, masses=(m, 1e3)), found[0].time)
+            assert (true <= found[0].upper[0]).all()
+            assert (true >= found[0].lower[0]).all()
+
+
+@pytest.mark.parametrize("method", [Midpoint(), RungeKutta4()], ids=str)
+def test_approximate_steps_keep_the_impulse_of_a_record_finer_than_they_are(
+    method: Integrator,
+) -> None:
+    """A quarter of the step, a sixteenth of the error, though the record is cut within a step."""
+    frame = StoreyFrame(
+        (2e3, 1e3),
+        (2.5, 2.5),
+        25e9,
+        1e-6,
+        (90, 90),
+        "ground",
+        ground=Accelerogram(0.003, np.cos(6 * np.arange(900) * 0.003)),
+    )
+    point = np.array([[frame.modulus]])
+    errors = []
+    for step in (0.08, 0.04, 0.02):
+        flow = LinearFlow(frame, ("E",), 4, step, method)
+        errors.append(np.abs(flow.values(point)[0] - motion(frame, flow.time)).max())
+    assert errors[0] / errors[2] > 12
