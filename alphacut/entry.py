@@ -14,6 +14,7 @@ from alphacut.commands import envelope as command_envelope
 from alphacut.commands import mesh as command_mesh
 from alphacut.commands import microstructure as command_microstructure
 from alphacut.commands import modulus as command_modulus
+from alphacut.commands import repair as command_repair
 from alphacut.commands import report as command_report
 from alphacut.commands import run as command_run
 from alphacut.commands.options import Parser, refuse_petsc, split_petsc
@@ -33,6 +34,7 @@ COMMANDS: dict[str, ModuleType] = {
     "modulus": command_modulus,
     "envelope": command_envelope,
     "report": command_report,
+    "repair": command_repair,
 }
 STATUSES = """\
 exit status:

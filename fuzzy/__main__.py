@@ -1,8 +1,8 @@
-"""Run ``python -m fuzzy modulus CASE``, the same as ``alphacut modulus``."""
+"""Run ``python -m fuzzy modulus`` or ``repair``, the same as those of ``alphacut``."""
 
 import sys
 
 from alphacut.entry import main
 
 if __name__ == "__main__":
-    sys.exit(main(program="python -m fuzzy", names={"modulus": "modulus"}))
+    sys.exit(main(program="python -m fuzzy", names={"modulus": "modulus", "repair": "repair"}))

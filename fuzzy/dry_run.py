@@ -123,7 +123,7 @@ def explain(
     known: Known | None = None,
     store: Store | str | Path | None = None,
     identity: Identity | None = None,
-    spot_check: bool = False,
+    spot_check: float = 0.05,
     progress: object = None,
 ) -> Explanation:
     """Preview of `propagate` with the same arguments; nothing is run or written.

@@ -20,6 +20,7 @@ from alphacut.fuzzy.arguments import (
 from alphacut.fuzzy.campaign.call import Call, Function
 from alphacut.fuzzy.campaign.campaign import Campaign, Progress
 from alphacut.fuzzy.campaign.sample_store import shelf
+from alphacut.fuzzy.campaign.spot_check import SpotCheck
 from alphacut.fuzzy.campaign.store import Identity, Store
 from alphacut.fuzzy.campaign.workers import pool, require_workers
 from alphacut.fuzzy.knowledge.known import Known
@@ -45,7 +46,7 @@ def propagate(
     known: Known | None = None,
     store: Store | str | Path | None = None,
     identity: Identity | None = None,
-    spot_check: bool = False,
+    spot_check: float = 0.05,
     progress: Progress | None = None,
 ) -> FuzzyResult:
     """Fuzzy outputs of a function of fuzzy inputs.
@@ -74,8 +75,9 @@ def propagate(
         identity: What a sample depends on besides its inputs (case, options, versions), as JSON can
             say it; a store needs it. The store
             cannot see that the function changed: say so here, by a version or a hash of its text.
-        spot_check: Whether the first sample found in the store is run again, and the store refused
-            if it gives something else.
+        spot_check: Time for running samples from the store again, as a share of the time that they
+            took: the modal point (or another, if it is not stored) in any case, then random ones.
+            The store is refused if one gives something else; 0 runs none.
         progress: Called with the share done, 0 … 1.
 
     Raises:
@@ -98,8 +100,9 @@ def propagate(
         nullcontext(executor) if executor else pool(workers) as running,
         shelf(store, identity, domain.names) as samples,
     ):
+        check = SpotCheck(spot_check, domain.modal)
         campaign = Campaign(
-            call, running, progress, known, samples, stepwise=plan.stepwise, spot_check=spot_check
+            call, running, progress, known, samples, stepwise=plan.stepwise, spot_check=check
         )
         result = plan.run(campaign, domain)
         result = result.confronted(known.stated(domain.names, result.outputs))

@@ -18,7 +18,7 @@ from alphacut.commands.options import (
     changes,
     check_workers,
 )
-from alphacut.fuzzy import Explanation
+from alphacut.fuzzy import Explanation, Store
 from alphacut.io.files import as_json, say, write_text
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import progress
@@ -104,15 +104,13 @@ def store_of(options: argparse.Namespace, case: Case) -> Path | None:
     if not (options.store or options.resume):
         return None
     path = Path(options.store or f"results/{case.name}/samples.db")
-    if path.is_file() and path.stat().st_size and not path.read_bytes()[:15] == b"SQLite format 3":
-        raise BadInput(
-            Problem(
-                "--store",
-                "this file holds something else than samples",
-                str(path),
-                "a new file, or a store of this program",
-            )
-        )
+    if path.is_file():
+        try:
+            Store(path).close()
+        except ValueError as error:
+            raise BadInput(
+                Problem("--store", str(error), str(path), "a new file, or a store of this program")
+            ) from None
     path.parent.mkdir(parents=True, exist_ok=True)
     return path
 

@@ -12,7 +12,7 @@ import numpy as np
 from alphacut.fuzzy.campaign.call import Call, Failure, Outcome, Sample, named_point
 from alphacut.fuzzy.campaign.memory_check import require
 from alphacut.fuzzy.campaign.sample_store import Shelf
-from alphacut.fuzzy.campaign.spot_check import require_same
+from alphacut.fuzzy.campaign.spot_check import SpotCheck
 from alphacut.fuzzy.campaign.workers import Task, completed
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.samples.model import Layout, Values
@@ -75,8 +75,7 @@ class Campaign:
         stepwise: Whether the plan itself reports the share done, since it asks for its samples
             batch by batch.
         layout: Names and shapes of the outputs, as the first sample had them.
-        spot_check: Whether the first sample taken from the store is run again to see that it still
-            holds.
+        spot_check: Runs some of the stored samples again; None runs none.
     """
 
     call: Call
@@ -89,7 +88,7 @@ class Campaign:
     calls: int = 0
     stepwise: bool = False
     layout: Layout = ()
-    spot_check: bool = False
+    spot_check: SpotCheck | None = None
     _before: float = field(default=0.0, repr=False)
     _told: float = field(default=0.0, repr=False)
 
@@ -138,6 +137,7 @@ class _Batch:
 
     def run(self) -> None:
         """Take what is stored, run the rest, wait for what other campaigns run."""
+        self._check()
         while self._left:
             before = self._left
             for rows, outcomes in completed(
@@ -163,20 +163,28 @@ class _Batch:
         keys = {shelf.key(self.points[row]): row for row in rows}
         mine, stored = shelf.claim(list(keys))
         for key, sample in stored.items():
-            if self.campaign.spot_check:
-                self.campaign.calls += 1
-                require_same(
-                    sample,
-                    self.campaign.call(self.points[[keys[key]]])[0],
-                    self.campaign.call.names,
-                    self.points[keys[key]],
-                )
-                self.campaign.spot_check = False
             self._take(keys[key], self._aligned(sample))
             self.campaign.reused += 1
         if stored:
             self._tell()
         return [row for key, row in keys.items() if key in mine]
+
+    def _check(self) -> None:
+        """Run some of the samples again that were stored before this campaign."""
+        shelf, check = self.campaign.shelf, self.campaign.spot_check
+        if shelf is None or check is None:
+            return
+        keys = {shelf.key(self.points[row]): row for row in range(len(self.points))}
+        old = shelf.old(keys)
+        rows = [keys[key] for key in old]
+        before, found = check.runs, list(old)
+        check.look(
+            self.campaign.call,
+            self.points[rows],
+            np.array(list(old.values())),
+            lambda row: shelf.stored([found[row]])[found[row]],
+        )
+        self.campaign.calls += check.runs - before
 
     def _record(self, rows: list[int], outcomes: list[Outcome]) -> None:
         self.campaign.calls += 1

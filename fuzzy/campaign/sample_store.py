@@ -3,62 +3,74 @@
 from __future__ import annotations
 
 import json
-import sqlite3
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
-from itertools import islice
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
 from alphacut.fuzzy.campaign.call import Failure, Outcome, Sample
 from alphacut.fuzzy.campaign.sample_locks import Claims
-from alphacut.fuzzy.campaign.store import Identity, Store, Stored, StoreError, canonical
+from alphacut.fuzzy.campaign.store import (
+    Identity,
+    Store,
+    Stored,
+    StoreError,
+    canonical,
+    content_of,
+    model_key,
+)
 from alphacut.fuzzy.samples.model import Layout
 from alphacut.fuzzy.sets.numbers import Array
 
-_CHUNK = 500  # points asked for in one query
-_PAUSE = 0.05  # seconds between two transactions at least
-_SHARE = 10  # a transaction that took t is not followed by another within 10 t
-# outcomes that wait for a transaction at most: what is gathered takes no more memory however large
+_PAUSE = 0.05  # seconds between two writes at least
+_SHARE = 10  # a write that took t is not followed by another within 10 t
+# outcomes that wait to be written at most: what is gathered takes no more memory however large
 # the store has grown
 _FULL = 1000
-_SAVE = """
-INSERT INTO sample VALUES (?, ?, ?, ?, ?) ON CONFLICT (model, point)
-DO UPDATE SET outputs = excluded.outputs, error = excluded.error, seconds = excluded.seconds
-WHERE sample.outputs IS NULL
-"""
+
+
+class _Place(NamedTuple):
+    """Where a sample is in the file, or why it failed."""
+
+    start: int
+    end: int
+    error: str
+    seconds: float
 
 
 class Shelf:
-    """The samples of one model in a store, as one campaign uses them.
+    """Samples of one model in a store, as one campaign uses them.
 
-    An outcome that took long is written at once. Quick ones are gathered and written together, a
-    transaction every twentieth of a second
-    or so, or every thousand outcomes: that much finished work is what a kill can cost.
+    An outcome that took long is written at once. Quick ones are gathered and written together every
+    twentieth of a second or so, or every thousand outcomes: that much finished work is what a kill
+    can cost.
 
     Args:
         store: The store.
         identity: What every sample depends on besides its inputs; text, numbers, lists and
             mappings.
         names: Names of the inputs.
+
+    Raises:
+        StoreError: The store is damaged.
     """
 
     def __init__(self, store: Store, identity: Identity, names: Sequence[str]) -> None:
-        self._store = store
+        self._store, self._identity = store, identity
         self._names = tuple(names)
         self._order = sorted(range(len(names)), key=lambda i: names[i])
+        self._model = model_key(identity)
         self._gathered: dict[str, Outcome] = {}
         self._written, self._cost, self._urgent = perf_counter(), 0.0, False
-        self._model: int = 0
+        self._places: dict[str, _Place] = {}
         self._layout: Layout = ()
-        self._identity = canonical(identity)
-        self._model, self._layout = self._known_model()
-        self._claims: Claims | None = (
-            None  # neither these nor the model's row are made before there is something to run
-        )
+        self._named, self._end = False, 0
+        self._claims: Claims | None = None  # not made before there is something to run
+        self._look()
+        self._begun = self._end
 
     def key(self, point: Array) -> str:
         """A point as text, exact to the last bit and the same whatever the order of the inputs."""
@@ -66,28 +78,48 @@ class Shelf:
             {self._names[i]: float(point[i]) + 0.0 for i in self._order}, separators=(",", ":")
         )
 
+    def _look(self) -> None:
+        """Note what has been written since the last look, by whomever."""
+        for end, entry in self._store.entries(self._model, self._end):
+            self._end = end
+            if entry is None:
+                continue
+            self._named |= "identity" in entry.head
+            error = entry.head.get("error", "")
+            if entry.point and (not error or entry.point not in self._places):
+                self._places[entry.point] = _Place(
+                    entry.start, entry.end, error, entry.head["seconds"]
+                )
+                self._layout = self._layout or _layout(entry.head)
+
     def stored(self, keys: Iterable[str]) -> dict[str, Sample]:
         """The samples that are there; failed ones are not."""
-        found: dict[str, Sample] = {}
-        with self._store.reported():
-            self._model, self._layout = self._known_model()
-            for key, blob, seconds in self._rows("outputs, seconds", keys, "outputs IS NOT NULL"):
-                found[key] = Sample(self._layout, np.frombuffer(blob, "<f8").astype(float), seconds)
-        return found
+        self._look()
+        found = {key: self._places[key] for key in keys if key in self._places}
+        return {key: self._sample(place) for key, place in found.items() if not place.error}
+
+    def _sample(self, place: _Place) -> Sample:
+        entry = self._store.entry(place.start, place.end)
+        row = np.frombuffer(entry.outputs, "<f8").astype(float)
+        return Sample(_layout(entry.head), row, entry.head["seconds"])
+
+    def old(self, keys: Iterable[str]) -> dict[str, float]:
+        """Samples that were there when the campaign began, with the seconds that they took."""
+        places = {key: self._places[key] for key in keys if key in self._places}
+        return {
+            key: place.seconds
+            for key, place in places.items()
+            if place.end <= self._begun and not place.error
+        }
 
     def failed(self, keys: Iterable[str]) -> dict[str, str]:
         """Errors of the samples that failed before."""
-        with self._store.reported():
-            return {key: error for key, error in self._rows("error", keys, "error IS NOT NULL")}
+        places = {key: self._places[key] for key in keys if key in self._places}
+        return {key: place.error for key, place in places.items() if place.error}
 
     def points(self) -> list[dict[str, float]]:
         """Inputs of all samples of this model, by name."""
-        query = "SELECT point FROM sample WHERE model = ? AND outputs IS NOT NULL"
-        with self._store.reported():
-            return [
-                json.loads(point)
-                for (point,) in self._store.database.execute(query, (self._model,))
-            ]
+        return [json.loads(key) for key, place in self._places.items() if not place.error]
 
     def models(self) -> list[Stored]:
         """All models of the store."""
@@ -102,19 +134,19 @@ class Shelf:
         """
         if self._claims is None:
             with self._store.reported():
-                self._claims = Claims(self._store.path, self._identity)
+                self._claims = Claims(self._store.path, canonical(self._identity))
         mine = self._claims.take(keys)
         stored = self.stored(keys)
         self._claims.release(mine & stored.keys())
         return mine - stored.keys(), stored
 
     def gather(self, key: str, outcome: Outcome) -> None:
-        """Keep an outcome for the next transaction."""
+        """Keep an outcome for the next write."""
         self._gathered[key] = outcome
         self._urgent |= outcome.seconds > _PAUSE
 
     def write(self, *, now: bool = False) -> None:
-        """Write the gathered outcomes, unless the last transaction was a moment ago."""
+        """Write what is gathered: now, or when the last write is long enough ago to cost little."""
         start = perf_counter()
         due = (
             now
@@ -130,21 +162,36 @@ class Shelf:
         self._cost = self._written - start
 
     def _commit(self, keys: list[str]) -> None:
-        """Write outcomes in one transaction; as many as fit where the disk is full."""
+        """Write gathered outcomes; where the disk is too full for all, as many as fit."""
+        contents = [] if self._named else [content_of(self._model, {"identity": self._identity})]
         try:
-            with self._store.transaction() as database:
-                self._save(database, keys)
-        except BaseException as error:
-            self._model, self._layout = 0, ()  # nothing of it was written
-            if not isinstance(error, StoreError) or len(keys) == 1:
+            self._store.append([*contents, *map(self._content, keys)])
+        except StoreError:
+            if len(keys) == 1:
                 raise
             self._commit(keys[: len(keys) // 2])
             self._commit(keys[len(keys) // 2 :])
             return
+        self._named = True
         if self._claims:
             self._claims.release(keys)
         for key in keys:
             del self._gathered[key]
+
+    def _content(self, key: str) -> bytes:
+        """A gathered outcome as the content of a record."""
+        outcome = self._gathered[key]
+        head: dict[str, object] = {"point": json.loads(key), "seconds": outcome.seconds}
+        if isinstance(outcome, Failure):
+            return content_of(self._model, {**head, "error": outcome.error or "failed"})
+        self._layout = self._layout or outcome.layout
+        if outcome.layout != self._layout:
+            raise ValueError(
+                f"the store holds the outputs {self._layout} for this model, a new sample has"
+                f" {outcome.layout}; a model that changed needs another identity"
+            )
+        outputs = outcome.row.astype("<f8").tobytes()
+        return content_of(self._model, {**head, "layout": outcome.layout}, outputs)
 
     def close(self) -> None:
         """Write what is gathered and give up all claims."""
@@ -154,62 +201,16 @@ class Shelf:
             if self._claims:
                 self._claims.close()
 
-    def _save(self, database: sqlite3.Connection, keys: Iterable[str]) -> None:
-        database.execute("INSERT OR IGNORE INTO model (identity) VALUES (?)", (self._identity,))
-        self._model, self._layout = self._known_model()
-        rows: list[tuple[int, str, bytes | None, str | None, float]] = []
-        for key in keys:
-            outcome = self._gathered[key]
-            if isinstance(outcome, Failure):
-                rows.append((self._model, key, None, outcome.error, outcome.seconds))
-            else:
-                self._require_layout(database, outcome.layout)
-                rows.append(
-                    (self._model, key, outcome.row.astype("<f8").tobytes(), None, outcome.seconds)
-                )
-        database.executemany(_SAVE, rows)
 
-    def _known_model(self) -> tuple[int, Layout]:
-        """Number of the model in the store (0 if it has none yet) and the layout of its outputs."""
-        if self._model and self._layout:
-            return self._model, self._layout
-        with self._store.reported():
-            query = "SELECT id, layout FROM model WHERE identity = ?"
-            number, layout = self._store.database.execute(query, (self._identity,)).fetchone() or (
-                0,
-                None,
-            )
-        return number, tuple((name, tuple(shape)) for name, shape in json.loads(layout or "[]"))
-
-    def _require_layout(self, database: sqlite3.Connection, layout: Layout) -> None:
-        if not self._layout:
-            database.execute(
-                "UPDATE model SET layout = ? WHERE id = ?", (json.dumps(layout), self._model)
-            )
-            self._layout = layout
-        if layout != self._layout:
-            outputs = (
-                f"the store holds the outputs {self._layout} for this model, a new sample has"
-                f" {layout}"
-            )
-            raise ValueError(f"{outputs}; a model that changed needs another identity")
-
-    def _rows(self, columns: str, keys: Iterable[str], condition: str) -> Iterator[tuple[Any, ...]]:
-        source = iter(keys)
-        while chunk := list(islice(source, _CHUNK)):
-            marks = ",".join("?" * len(chunk))
-            query = (
-                f"SELECT point, {columns} FROM sample WHERE model = ? AND point IN ({marks}) AND"
-                f" {condition}"
-            )
-            yield from self._store.database.execute(query, (self._model, *chunk)).fetchall()
+def _layout(head: dict[str, list[tuple[str, list[int]]]]) -> Layout:
+    return tuple((name, tuple(shape)) for name, shape in head.get("layout", []))
 
 
 @contextmanager
 def shelf(
     store: Store | str | Path | None, identity: Identity | None, names: Sequence[str]
 ) -> Iterator[Shelf | None]:
-    """Samples of one model in a store or at a path; None without a store.
+    """The samples of one model in a store or at its path; None where no store is asked for.
 
     Raises:
         ValueError: A store comes without an identity.

@@ -1,42 +1,45 @@
-"""A durable store of samples: an SQLite file that campaigns resume from and share.
+"""A durable store of samples: a file of checked records that campaigns resume from and share.
 
 Samples are keyed by what they depend on: the identity of the model (case, mesh options, versions:
-whatever the caller names) and the values of all inputs. Everything is written in transactions under
-a rollback journal, which needs no shared memory and no file besides the store to be read, so it
-also works where only file locks do, and on a full disk. A killed process loses what was not yet
-committed; with `synchronous = FULL` so does a power cut, and no more.
+whatever the caller names) and the values of all inputs. Records are only ever appended, under a
+lock, and written through to the disk. A killed process or a power cut loses what was not yet
+written. Damage is found by the checksum of every record, told, and dropped by `Store.repair`.
 """
 
 from __future__ import annotations
 
 import json
-import sqlite3
-from collections.abc import Iterator, Mapping
+import os
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from errno import ENOSPC
+from errno import EDQUOT, EFBIG, ENOSPC
+from hashlib import blake2b
 from pathlib import Path
+from threading import RLock
+from time import monotonic, sleep
 from typing import Any, NamedTuple
 
+from alphacut.fuzzy.campaign import records
+from alphacut.fuzzy.campaign.records import Damage, Record
+
+try:
+    import fcntl
+except ImportError:  # no locks on this system: one campaign on a store at a time
+    fcntl = None  # type: ignore[assignment]
+
 Identity = Mapping[str, Any]
-_APPLICATION = 0x616C7068  # "alph"
-_VERSION = 1
-_PATIENCE = 60.0  # seconds to wait for another campaign's transaction
-_SCHEMA = """
-CREATE TABLE model (id INTEGER PRIMARY KEY, identity TEXT NOT NULL UNIQUE, layout TEXT);
-CREATE TABLE sample (
-    model INTEGER NOT NULL REFERENCES model, point TEXT NOT NULL, outputs BLOB, error TEXT,
-    seconds REAL,
-    PRIMARY KEY (model, point)
-) WITHOUT ROWID;
-"""
+_PATIENCE = 60.0  # seconds to wait for another campaign's write
+_MODEL = 16  # bytes that tell a model's records
+_FULL = (ENOSPC, EDQUOT, EFBIG)
+_WRITING = RLock()  # campaigns in threads of one process
 
 
 class StoreError(RuntimeError):
-    """The store cannot be written or read; what is stored stays."""
+    """Trouble with a store's file: damage, no space, no right, or another campaign's lock."""
 
 
 class Stored(NamedTuple):
-    """Content of a store for one model."""
+    """Summary of one model's samples in a store."""
 
     identity: dict[str, Any]
     samples: int
@@ -44,20 +47,50 @@ class Stored(NamedTuple):
     mean_seconds: float
 
 
+class Repaired(NamedTuple):
+    """Outcome of a repair: records that are whole, damaged places, and their bytes."""
+
+    kept: int
+    places: int
+    size: int
+
+
+class Entry(NamedTuple):
+    """A record of a model.
+
+    Args:
+        head: What it says: `identity`, or `point`, `seconds` and either `error` or `layout`.
+        outputs: Outputs at the point, as bytes; empty without.
+        start: Where the record starts in the file.
+        end: Where it ends.
+    """
+
+    head: dict[str, Any]
+    outputs: bytes
+    start: int
+    end: int
+
+    @property
+    def point(self) -> str:
+        """Inputs as text; empty if the record is of no sample."""
+        return json.dumps(self.head["point"], separators=(",", ":")) if "point" in self.head else ""
+
+
 class Store:
-    """An SQLite file of samples.
+    """A file of samples, each with its checksum.
 
     Args:
         path: The file; made if there is none.
 
     Raises:
-        ValueError: The file is something else, or of a later format.
+        ValueError: The file is something else, or of another format.
         StoreError: It cannot be opened or made.
     """
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        self._database: sqlite3.Connection | None = None
+        self._handle: int | None = None
+        self._whole = 0  # up to here the file holds whole records
         if self.path.is_dir():
             raise ValueError(
                 f"{self.path} is a folder; give the store a file in it, such as"
@@ -65,73 +98,179 @@ class Store:
             )
         with self.reported():
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._database = sqlite3.connect(self.path, timeout=_PATIENCE, isolation_level=None)
-            try:
-                self._prepare(self._database)
-            except sqlite3.OperationalError:
-                raise
-            except sqlite3.DatabaseError:
-                raise ValueError(f"{self.path} is no store of samples; give another path") from None
+            self._handle = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
+        self._require_store()
 
-    def _prepare(self, database: sqlite3.Connection) -> None:
-        database.execute("PRAGMA journal_mode = TRUNCATE")
-        database.execute("PRAGMA synchronous = FULL")
-        with self.transaction() as database:
-            version = database.execute("PRAGMA user_version").fetchone()[0]
-            application = database.execute("PRAGMA application_id").fetchone()[0]
-            if version == 0 and not database.execute("SELECT 1 FROM sqlite_master").fetchone():
-                for statement in filter(str.strip, _SCHEMA.split(";")):
-                    database.execute(statement)
-                database.execute(f"PRAGMA application_id = {_APPLICATION}")
-                database.execute(f"PRAGMA user_version = {_VERSION}")
-            elif application != _APPLICATION:
-                raise ValueError(f"{self.path} is no store of samples; give another path")
-            elif version != _VERSION:
-                raise ValueError(
-                    f"{self.path} has format {version}, this program writes {_VERSION}; update the"
-                    " program or give another path"
-                )
+    def _require_store(self) -> None:
+        """Refuse a file that holds neither a record nor the mark of one."""
+        start = self._read(0, len(records.MARK))
+        if not start or start == records.MARK or start[:1] == records.VOID:
+            return
+        if any(isinstance(one, Record) for one in self._scan(0)):
+            return
+        self.close()
+        if start.startswith(records.NAME) and len(start) > len(records.NAME):
+            raise ValueError(
+                f"{self.path} has format {start[len(records.NAME)]}, this program writes"
+                f" {records.FORMAT}; update the program or give another path"
+            )
+        raise ValueError(f"{self.path} is no store of samples; give another path")
 
     @property
-    def database(self) -> sqlite3.Connection:
-        """The open connection.
+    def handle(self) -> int:
+        """The open file.
 
         Raises:
             ValueError: The store is closed.
         """
-        if self._database is None:
+        if self._handle is None:
             raise ValueError(f"the store {self.path} is closed; open it anew")
-        return self._database
+        return self._handle
+
+    def _read(self, start: int, count: int) -> bytes:
+        with self.reported():
+            return os.pread(self.handle, count, start)
+
+    def _scan(self, start: int) -> Iterator[Record | Damage]:
+        return records.scan(self._read, start, os.fstat(self.handle).st_size)
+
+    def entries(self, model: bytes, start: int = 0) -> Iterator[tuple[int, Entry | None]]:
+        """End of every record from the end of another on, with what it says if it is the model's.
+
+        Args:
+            model: Key of the model; empty for all.
+            start: Where to begin.
+
+        Raises:
+            StoreError: Something there is damaged; after the last record that is whole.
+        """
+        damage: list[Damage] = []
+        for one in self._scan(start):
+            if isinstance(one, Damage):
+                damage += [] if one.torn else [one]
+            else:
+                yield one.end, _entry(one) if one.content.startswith(model) else None
+        if damage:
+            raise StoreError(self._told(damage))
+
+    def entry(self, start: int, end: int) -> Entry:
+        """The record between two offsets, checked once more.
+
+        Raises:
+            StoreError: It has been damaged meanwhile.
+        """
+        one = next(records.scan(self._read, start, end), None)
+        if not isinstance(one, Record):
+            raise StoreError(self._told([one or Damage(start, b"", end - start, False)]))
+        return _entry(one)
+
+    def _told(self, damage: list[Damage]) -> str:
+        """The damage with the first sample that it names, and what to do."""
+        named = [text for text in map(_sample_in, damage) if text]
+        which = f"; among what is lost: the sample {named[0]}" if named else ""
+        return (
+            f"the store {self.path} is damaged at {len(damage)} places, the first at byte"
+            f" {damage[0].start}{which}: run `python -m alphacut repair {self.path}` (in Python:"
+            " fuzzy.Store(path).repair()), which drops what is lost; the next run computes only"
+            " that anew"
+        )
+
+    def append(self, contents: Iterable[bytes]) -> None:
+        """Write contents as records: all or none.
+
+        Raises:
+            StoreError: There is no space, or another campaign blocks the file.
+        """
+        data = b"".join(map(records.packed, contents))
+        with self._locked():
+            end = self._end()
+            try:
+                with self.reported():
+                    if os.write(self.handle, data) < len(data):
+                        raise OSError(ENOSPC, os.strerror(ENOSPC))
+                    os.fsync(self.handle)
+            except BaseException:
+                os.ftruncate(self.handle, end)
+                raise
+
+    def _end(self) -> int:
+        """Size of the file, without the torn end of a write that was killed."""
+        for one in self._scan(self._whole):
+            if isinstance(one, Damage) and one.torn:
+                os.ftruncate(self.handle, one.start)
+                break
+            self._whole = one.end
+        return os.fstat(self.handle).st_size
+
+    def repair(self) -> Repaired:
+        """Void whatever is damaged; whole records stay where they are.
+
+        Raises:
+            StoreError: The file cannot be written.
+        """
+        with self._locked():
+            kept, damage = 0, []
+            for one in self._scan(0):
+                damage += [one] if isinstance(one, Damage) else []
+                kept += isinstance(one, Record)
+            with self.reported():
+                handle = os.open(self.path, os.O_WRONLY)
+                try:
+                    for one in damage:
+                        os.pwrite(handle, records.VOID * one.size, one.start)
+                    os.fsync(handle)
+                finally:
+                    os.close(handle)
+        lost = [one for one in damage if not one.torn]
+        return Repaired(kept, len(lost), sum(one.size for one in lost))
 
     @contextmanager
-    def transaction(self) -> Iterator[sqlite3.Connection]:
-        """All or nothing; waits for other campaigns first."""
-        with self.reported():
-            self.database.execute("BEGIN IMMEDIATE")
+    def _locked(self) -> Iterator[None]:
+        """Nobody else writes meanwhile."""
+        if not _WRITING.acquire(timeout=_PATIENCE):
+            raise StoreError(self._blocked())
+        try:
+            until = monotonic() + _PATIENCE
+            while fcntl is not None:
+                try:
+                    fcntl.flock(self.handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    break
+                except OSError:
+                    if monotonic() > until:
+                        raise StoreError(self._blocked()) from None
+                    sleep(0.01)
             try:
-                yield self.database
-                self.database.execute("COMMIT")
-            except BaseException:
-                if self.database.in_transaction:
-                    self.database.execute("ROLLBACK")
-                raise
+                yield
+            finally:
+                if fcntl is not None:
+                    fcntl.flock(self.handle, fcntl.LOCK_UN)
+        finally:
+            _WRITING.release()
+
+    def _blocked(self) -> str:
+        return (
+            f"the store {self.path} cannot be used: another campaign has been writing to it for"
+            f" {_PATIENCE:g} s; see whether it hangs, and run again: what is stored stays"
+        )
 
     @contextmanager
     def reported(self) -> Iterator[None]:
         """Raise what goes wrong with the file as a StoreError."""
         try:
             yield
-        except (sqlite3.DatabaseError, OSError) as error:
-            cure = "free some space or find what blocks it, and run again: what is stored stays"
-            if _barred(error):
-                cure = "it cannot be written there: give another path, or the right to write"
-            raise StoreError(f"the store {self.path} cannot be used ({error}): {cure}") from error
+        except OSError as error:
+            cure = "it cannot be written there: give another path, or the right to write"
+            if error.errno in _FULL:
+                cure = "free some space and run again: what is stored stays"
+            raise StoreError(
+                f"the store {self.path} cannot be used ({error.strerror or error}): {cure}"
+            ) from error
 
     def close(self) -> None:
         """Close the file."""
-        if self._database is not None:
-            self._database.close()
-            self._database = None
+        if self._handle is not None:
+            os.close(self._handle)
+            self._handle = None
 
     def __enter__(self) -> Store:
         return self
@@ -140,23 +279,55 @@ class Store:
         self.close()
 
     def models(self) -> list[Stored]:
-        """Content of the store, model by model."""
-        query = """SELECT identity, COUNT(outputs), COUNT(error), COALESCE(AVG(seconds), 0)
-            FROM model LEFT JOIN sample ON sample.model = model.id GROUP BY model.id"""
+        """Summary of every model.
+
+        Raises:
+            StoreError: The file is damaged.
+        """
+        identities: dict[bytes, dict[str, Any]] = {}
+        samples: dict[bytes, dict[str, tuple[bool, float]]] = {}
+        for entry in (entry for _, entry in self.entries(b"") if entry):
+            rows = samples.setdefault(entry.head["model"], {})
+            if not entry.point:
+                identities[entry.head["model"]] = entry.head["identity"]
+            elif "layout" in entry.head or not rows.get(entry.point, (False,))[0]:
+                rows[entry.point] = "layout" in entry.head, entry.head["seconds"]
+        lost = {"identity": "lost to damage"}
         return [
-            Stored(json.loads(identity), *rest) for identity, *rest in self.database.execute(query)
+            _summary(identities.get(key, lost), [*rows.values()]) for key, rows in samples.items()
         ]
 
 
-def _barred(error: Exception) -> bool:
-    """True if the place of a store is the trouble, not its content or the space left."""
-    if isinstance(error, OSError):
-        return error.errno != ENOSPC
-    return any(words in str(error) for words in ("unable to open", "readonly database"))
+def _summary(identity: dict[str, Any], rows: list[tuple[bool, float]]) -> Stored:
+    done = sum(row[0] for row in rows)
+    return Stored(identity, done, len(rows) - done, sum(row[1] for row in rows) / max(len(rows), 1))
+
+
+def model_key(identity: Identity) -> bytes:
+    """Bytes that tell the records of a model from those of others."""
+    return blake2b(canonical(identity).encode(), digest_size=_MODEL).digest()
+
+
+def content_of(model: bytes, head: Mapping[str, object], outputs: bytes = b"") -> bytes:
+    """Content of a record."""
+    return model + json.dumps(head, separators=(",", ":")).encode() + b"\n" + outputs
+
+
+def _entry(record: Record) -> Entry:
+    head, _, outputs = record.content[_MODEL:].partition(b"\n")
+    return Entry(
+        {**json.loads(head), "model": record.content[:_MODEL]}, outputs, record.start, record.end
+    )
+
+
+def _sample_in(damage: Damage) -> str:
+    """Inputs of the sample in a damaged record, as far as they can be read."""
+    text = damage.content.partition(b'"point":{')[2].partition(b"}")[0]
+    return text.decode("utf-8", "replace").replace('"', "").replace(":", " = ").replace(",", ", ")
 
 
 def canonical(identity: Identity) -> str:
-    """An identity as text: the same for equal content, whatever the order of its keys.
+    """An identity as text, the same for equal content whatever the order of its keys.
 
     Raises:
         ValueError: It holds something that JSON does not.

@@ -71,7 +71,7 @@ class Optimisation:
         if self.method != "multistart":
             domain.require_free(self.method)
         memo = Memo(model)
-        modal = np.array([[number.modal for number in domain.inputs.values()]], float)
+        modal = domain.modal[None]
         columns = memo(modal).columns
         names = self.outputs or primary(columns, model.known)
         for level in reversed(range(len(domain.alpha))):

@@ -119,7 +119,7 @@ class BranchAndBound:
 def _tried(domain: Domain) -> Array:
     """Samples that compare function and model first: modal, corners, middle, (4, inputs)."""
     lower, upper = (ends[0] for ends in domain.boxes)
-    modal = np.array([number.modal for number in domain.inputs.values()], float)
+    modal = domain.modal
     return np.stack([modal, lower, upper, (lower + upper) / 2])
 
 

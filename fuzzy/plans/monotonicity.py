@@ -98,7 +98,7 @@ def verify(
         outputs: Outputs that matter; all but derivatives if none is named.
     """
     known = model.known
-    modal = np.array([[number.modal for number in domain.inputs.values()]], float)
+    modal = domain.modal[None]
     columns = model(modal).columns if known.gradient_range or not outputs else ()
     names = tuple(outputs) or primary(columns, known)
     signs = known.stated(domain.names, names)

@@ -49,7 +49,7 @@ class _Sampling:
 
     def run(self, model: Model, domain: Domain) -> FuzzyResult:
         """Evaluate the samples of all levels; each level uses all that lie in its cut."""
-        modal = np.array([[number.modal for number in domain.inputs.values()]], float)
+        modal = domain.modal[None]
         points = [modal, *(self._points(domain, level) for level in range(len(domain.alpha)))]
         design = Design.from_samples(domain, np.unique(np.concatenate(points), axis=0))
         return design.bounds(model(design.points), plan=type(self).__name__)

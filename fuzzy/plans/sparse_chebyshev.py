@@ -68,7 +68,7 @@ class Chebyshev:
 
         memo = Memo(model)
         grid = SparseGrid(memo, *(ends[0] for ends in domain.boxes))
-        memo(np.array([[number.modal for number in domain.inputs.values()]], float))
+        memo(domain.modal[None])
         missed, met = grid.refine(self.tolerance, self.budget)
         missed = _SAFETY * missed
         columns = memo.values.columns

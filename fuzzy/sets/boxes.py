@@ -78,6 +78,11 @@ class Domain:
         )
         return cuts[..., 0], cuts[..., 1]
 
+    @property
+    def modal(self) -> Array:
+        """Modal point of the inputs, shape (inputs,)."""
+        return np.array([number.modal for number in self.inputs.values()], float)
+
     def inside(self, points: Array) -> Mask:
         """Mask of points, shape (n, inputs), in the cut of each level, shape (levels, n)."""
         lower, upper = self.boxes

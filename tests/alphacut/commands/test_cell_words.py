@@ -120,5 +120,5 @@ def test_a_store_that_is_none_is_bad_input(tmp_path, capfd):
     path = tmp_path / "diameters.csv"
     path.write_text("d [mm]\n1.5\n", encoding="utf-8")
     assert main(["modulus", PAPER, "--method", "series", "--store", str(path)]) == 2
-    assert "holds something else than samples" in capfd.readouterr().err
+    assert "is no store of samples" in capfd.readouterr().err
     assert path.read_text(encoding="utf-8") == "d [mm]\n1.5\n"

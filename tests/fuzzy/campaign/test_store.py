@@ -1,14 +1,14 @@
 """The store: killed, shared, full or foreign, it loses nothing that was stored and repeats nothing."""
 
-import json
 import os
 import random
+import resource
 import signal
-import sqlite3
 import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -50,7 +50,7 @@ if __name__ == "__main__":
     inputs = {"a": Triangular(0.0, 0.3, 1.0), "b": Triangular(-1.0, 0.0, 2.0)}
     print("started", flush=True)
     found = propagate(model, inputs, General(), alpha=[k / 7 for k in range(8)], shared=("a",), workers=int(workers),
-                      store=store, identity={"model": "script"})
+                      store=store, identity={"model": "script"}, spot_check=0)
     with open(result, "w") as file:
         file.write(found.values.array.tobytes().hex() + found.lower.tobytes().hex() + found.upper_at.tobytes().hex())
 """
@@ -87,15 +87,11 @@ def stored(folder):
     """Points that another process finds in the store, as the log spells them."""
     if not (folder / "store.db").exists():
         return set()
-    with sqlite3.connect(folder / "store.db", timeout=60) as database:
-        if not database.execute("SELECT 1 FROM sqlite_master WHERE name = 'sample'").fetchone():
-            return set()
-        assert database.execute("PRAGMA integrity_check").fetchone() == ("ok",)
-        points = [
-            json.loads(row[0])
-            for row in database.execute("SELECT point FROM sample WHERE outputs IS NOT NULL")
-        ]
-    return {f"{point['a']!r} {point['b']!r}" for point in points}
+    with (
+        Store(folder / "store.db") as store,
+        closing(Shelf(store, {"model": "script"}, ["a", "b"])) as shelf,
+    ):
+        return {f"{point['a']!r} {point['b']!r}" for point in shelf.points()}
 
 
 def undisturbed(folder):
@@ -207,7 +203,7 @@ def test_more_levels_and_a_wider_support_reuse_what_is_there(tmp_path):
     store = tmp_path / "s.db"
     first = propagate(model, INPUTS, store=store, identity=IDENTITY)
     assert (first.runs, first.reused, first.calls) == (55, 0, 55)
-    again = propagate(model, INPUTS, store=store, identity=IDENTITY)
+    again = propagate(model, INPUTS, store=store, identity=IDENTITY, spot_check=0)
     assert (again.reused, again.calls) == (55, 0)
     assert (again.values.array == first.values.array).all()
     finer = propagate(model, INPUTS, alpha=levels(8), store=store, identity=IDENTITY)
@@ -237,7 +233,7 @@ def test_failed_samples_are_recorded_and_tried_again(tmp_path):
         propagate(fragile, INPUTS, store=tmp_path / "s.db", identity=IDENTITY)
     with Store(tmp_path / "s.db") as store:
         assert store.models()[0][:3] == (IDENTITY, 50, 5)
-    mended = propagate(model, INPUTS, store=tmp_path / "s.db", identity=IDENTITY)
+    mended = propagate(model, INPUTS, store=tmp_path / "s.db", identity=IDENTITY, spot_check=0)
     assert (mended.reused, mended.calls) == (50, 5)
     assert propagate(model, INPUTS, store=tmp_path / "s.db", identity=IDENTITY).reused == 55
 
@@ -251,47 +247,35 @@ def test_store_gives_the_bits_back(tmp_path):
         identity={},
     )
     second = propagate(
-        lambda a: 1 / 0, {"a": Interval(0, 1 / 3)}, store=tmp_path / "s.db", identity={}
+        lambda a: 1 / 0,
+        {"a": Interval(0, 1 / 3)},
+        store=tmp_path / "s.db",
+        identity={},
+        spot_check=0,
     )
     assert (first.values.array == second.values.array).all()
 
 
 def test_a_full_disk_stops_the_campaign_and_spoils_nothing(tmp_path):
-    with Store(tmp_path / "s.db") as store:
-        shelf_pages = store.database.execute("PRAGMA page_count").fetchone()[0]
-        # the same error as a full disk
-        store.database.execute(f"PRAGMA max_page_count = {shelf_pages + 30}")
+    def wide(a):
+        return np.full(2000, a)
+
+    kept = {"alpha": levels(40), "store": tmp_path / "s.db", "identity": IDENTITY}
+    room = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, room[1]))  # the same error as a full disk
+    try:
         with pytest.raises(
-            StoreError, match=r"s.db cannot be used \(database or disk is full\): free some space"
+            StoreError, match=r"s.db cannot be used \(.*\): free some space and run"
         ):
-            propagate(
-                lambda a: np.full(2000, a),
-                {"a": Interval(0, 1)},
-                alpha=levels(40),
-                store=store,
-                identity=IDENTITY,
-            )
-        store.database.execute("PRAGMA max_page_count = 1000000")
-        kept = store.models()[0].samples
-        assert kept > 0
-        resumed = propagate(
-            lambda a: np.full(2000, a),
-            {"a": Interval(0, 1)},
-            alpha=levels(40),
-            store=store,
-            identity=IDENTITY,
-        )
-    assert resumed.reused == kept
+            propagate(wide, {"a": Interval(0, 1)}, **kept)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, room)
+    with Store(tmp_path / "s.db") as store:
+        there = store.models()[0].samples
+    assert there == 18  # of 16 kB each
+    resumed = propagate(wide, {"a": Interval(0, 1)}, **kept)
+    assert resumed.reused == there
     assert resumed.values.array.shape == (resumed.runs, 2000)
-
-
-def test_a_damaged_file_is_an_error_of_the_store(tmp_path):
-    propagate(model, INPUTS, alpha=levels(12), store=tmp_path / "s.db", identity=IDENTITY)
-    content = bytearray((tmp_path / "s.db").read_bytes())
-    content[4096:] = b"x" * (len(content) - 4096)
-    (tmp_path / "s.db").write_bytes(content)
-    with pytest.raises(StoreError, match="cannot be used"):
-        propagate(model, INPUTS, store=tmp_path / "s.db", identity=IDENTITY)
 
 
 def test_interrupting_keeps_what_is_done(tmp_path):
@@ -314,17 +298,14 @@ def test_a_folder_is_no_store(tmp_path):
 
 
 def test_foreign_and_future_files_are_refused(tmp_path):
-    (tmp_path / "text").write_text("no database at all, but long enough to be read as one" * 20)
+    (tmp_path / "text").write_text("no store at all, but long enough to be read as one" * 20)
     with pytest.raises(ValueError, match="text is no store of samples"):
         Store(tmp_path / "text")
-    with sqlite3.connect(tmp_path / "other") as database:
-        database.execute("CREATE TABLE t (x)")
-    with pytest.raises(ValueError, match="other is no store of samples"):
-        Store(tmp_path / "other")
-    Store(tmp_path / "future").close()
-    with sqlite3.connect(tmp_path / "future") as database:
-        database.execute("PRAGMA user_version = 99")
-    with pytest.raises(ValueError, match="has format 99"):
+    (tmp_path / "old").write_bytes(b"SQLite format 3\0" * 300)
+    with pytest.raises(ValueError, match="old is no store of samples"):
+        Store(tmp_path / "old")
+    (tmp_path / "future").write_bytes(b"\xffcut\x63\0\r\n" + b"x" * 80)
+    with pytest.raises(ValueError, match="has format 99, this program writes 2"):
         Store(tmp_path / "future")
     with pytest.raises(StoreError, match="cannot be used"):
         Store(tmp_path / "text" / "below")
@@ -332,6 +313,7 @@ def test_foreign_and_future_files_are_refused(tmp_path):
     closed.close()
     with pytest.raises(ValueError, match="is closed; open it anew"):
         closed.models()
+    assert (tmp_path / "s.db").stat().st_size == 0
 
 
 def test_identity_is_needed_and_must_be_plain(tmp_path):
@@ -386,7 +368,7 @@ def test_a_sample_that_took_long_is_written_at_once(tmp_path):
     with Store(tmp_path / "s.db") as store:
         shelf = Shelf(store, IDENTITY, ["a"])
         for count, seconds in ((1, 5.0), (2, 5.0), (2, 1e-6)):
-            shelf.gather(f"{{{count}{seconds}}}", Sample((("y", ()),), np.ones(1), seconds))
+            shelf.gather(f'{{"a":{count}{seconds}}}', Sample((("y", ()),), np.ones(1), seconds))
             shelf.write()
             assert store.models()[0].samples == count
         shelf.close()
@@ -419,7 +401,7 @@ def test_a_store_where_nothing_may_be_written_says_so(tmp_path):
     [
         (
             lambda a, b: {"sum": a + b + 1e-3, "pair": [a, b]},
-            r"holds sum = -1 at a = 0, b = -1 where the function gives -0.999; a function",
+            r"holds sum = 0.3 at a = 0.3, b = 0 where the function gives 0.301; a function",
         ),
         (
             lambda a, b: {"new": a + b, "pair": [a, b]},
@@ -427,14 +409,38 @@ def test_a_store_where_nothing_may_be_written_says_so(tmp_path):
         ),
         (
             lambda a, b: 1 / 0,
-            r"holds a sample at a = 0, b = -1 where the function now fails \(ZeroDivisionError",
+            r"holds a sample at a = 0.3, b = 0 where the function now fails \(ZeroDivisionError",
         ),
     ],
 )
-def test_a_spot_check_finds_a_function_that_changed(tmp_path, changed, message):
+def test_a_spot_check_of_the_modal_point_finds_a_function_that_changed(tmp_path, changed, message):
     run = {"inputs": INPUTS, "store": tmp_path / "s.db", "identity": IDENTITY}
     propagate(model, **run)
-    same = propagate(lambda a, b: {"pair": [a, b], "sum": a + b}, **run, spot_check=True)
+    same = propagate(lambda a, b: {"pair": [a, b], "sum": a + b}, **run, spot_check=1e-9)
     assert (same.calls, same.reused) == (1, 55)
     with pytest.raises(ValueError, match=message):
-        propagate(changed, **run, spot_check=True)
+        propagate(changed, **run)
+    assert propagate(changed, **run, spot_check=0).calls == 0
+    with pytest.raises(ValueError, match="spot check has a share of 2"):
+        propagate(model, **run, spot_check=2)
+
+
+def test_random_spot_checks_keep_to_their_share_of_the_time(tmp_path):
+    def slow(a, b):
+        time.sleep(0.004)
+        return a + b
+
+    run = {"inputs": INPUTS, "store": tmp_path / "s.db", "identity": IDENTITY}
+    propagate(slow, **run)
+    again = propagate(slow, **run, spot_check=0.2)
+    assert 5 <= again.calls <= 12  # a fifth of 55
+    changed = propagate(lambda a, b: slow(a, b), **run)
+    assert 1 <= changed.calls <= 4
+
+
+def test_a_spot_check_sees_small_outputs_beside_large_ones(tmp_path):
+    run = {"inputs": INPUTS, "store": tmp_path / "s.db", "identity": IDENTITY}
+    propagate(lambda a, b: {"E": 24e9 + a, "nu": 0.2, "residual": 1e-13 * a}, **run)
+    propagate(lambda a, b: {"E": 24e9 + a, "nu": 0.2, "residual": 2e-13 * a}, **run)
+    with pytest.raises(ValueError, match=r"holds nu = 0.2 .* the function gives 0.21"):
+        propagate(lambda a, b: {"E": 24e9 + a, "nu": 0.21, "residual": 0.0}, **run)
