@@ -66,7 +66,7 @@ def test_a_wider_support_is_told_by_its_new_values(tmp_path):
     inputs = INPUTS | {"b": Triangular(-2.0, 0.0, 2.0)}
     found = ask(tmp_path / "s.db", inputs)
     again = run(tmp_path / "s.db", inputs)
-    assert len(found.missing) == again.calls
+    assert len(found.missing) == again.runs - again.reused
     assert found.reasons[0].startswith("b takes ")
     assert found.reasons[0].endswith("the first -2")
     assert found.seconds >= 0
