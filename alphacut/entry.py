@@ -17,7 +17,7 @@ from alphacut.commands import modulus as command_modulus
 from alphacut.commands import repair as command_repair
 from alphacut.commands import report as command_report
 from alphacut.commands import run as command_run
-from alphacut.commands.options import Parser, refuse_petsc, split_petsc
+from alphacut.commands.parser import Parser, refuse_petsc, split_petsc
 from alphacut.fuzzy import CampaignError
 from alphacut.io.files import rank, ranks, say, standard_output
 from alphacut.io.output_paths import check_destinations
@@ -66,7 +66,18 @@ def parsers(program: str, commands: Mapping[str, ModuleType]) -> tuple[Parser, d
             name, help=about, description=f"{about[:1].upper()}{about[1:]}.", allow_abbrev=False
         )
         module.arguments(made[name])
+        made[name].usage = usage(f"{program} {name}", made[name])
     return top, made
+
+
+def usage(command: str, parser: Parser) -> str:
+    """One line: what a command cannot do without."""
+    needed = [
+        " ".join(filter(None, [*action.option_strings[:1], str(action.metavar)]))
+        for action in parser._actions
+        if action.required
+    ]
+    return " ".join([command, *needed, "[OPTIONS]"])
 
 
 def main(

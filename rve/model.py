@@ -67,8 +67,12 @@ def cross_check(
     """The largest relative difference in E between two models' results of the same cells.
 
     Raises:
+        ValueError: Both are results of one model.
         CrossCheckError: The difference is above `tolerance`.
     """
+    same = {a.method for a in first} & {b.method for b in second}
+    if same:
+        raise ValueError(f"cross_check: both results are of the model {min(same)}; take two models")
     gaps = [abs(a.modulus - b.modulus) / abs(b.modulus) for a, b in zip(first, second, strict=True)]
     worst = max(range(len(gaps)), key=gaps.__getitem__)
     if not gaps[worst] <= tolerance:

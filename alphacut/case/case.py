@@ -21,12 +21,14 @@ class Case:
         values: Full key name to value, in SI; keys that were left out hold their default.
         written: Full key name to what the user wrote, for reports.
         lines: Full key name to its line in the file.
+        changed: Full names of the keys that the command line changed.
     """
 
     path: Path
     values: Mapping[str, object]
     written: Mapping[str, object]
     lines: Mapping[str, int]
+    changed: frozenset[str] = frozenset()
 
     @property
     def name(self) -> str:
@@ -56,6 +58,10 @@ class Case:
     def has(self, key: str) -> bool:
         """True if the key holds a value."""
         return self.values.get(key) is not None
+
+    def asked(self, key: str) -> bool:
+        """Whether the file or the command line gives the key, so that no default stands in."""
+        return key in self.written
 
     def need(self, key: str) -> object:
         """The value of a key that this command cannot do without."""

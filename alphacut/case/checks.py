@@ -11,6 +11,7 @@ from pathlib import Path
 from alphacut.case.case import Case
 from alphacut.case.checks_material import particles, radius
 from alphacut.case.checks_structure import incomplete
+from alphacut.case.idle import idle_envelope
 from alphacut.case.names import OTHERS, OUTPUTS, floors, named_inputs, study_count
 from alphacut.case.schema import ENVELOPE_METHODS, INTEGRATORS, NEEDED, NONLINEAR, STAGES
 from alphacut.case.values import nearest
@@ -49,6 +50,7 @@ def checks(*, modal: bool = False) -> Iterator[Check]:
     yield where("envelope.step", times)
     yield tolerances
     yield where("envelope.method", methods)
+    yield idle_envelope
     yield where("exceedance.output", exceedance)
 
 

@@ -13,7 +13,7 @@ from alphacut.case.checks import checks
 from alphacut.case.dependent_checks import undoubted
 from alphacut.case.key import Key, Section
 from alphacut.case.line_numbers import key_at, lines_of_keys
-from alphacut.case.overrides import Raw, apply_change, table_of
+from alphacut.case.overrides import Raw, apply_changes, table_of
 from alphacut.case.schema import IMPLIED, SECTIONS, dotted, every_key
 from alphacut.case.values import Unfit, allowed, nearest, read
 from alphacut.io.output_paths import hint
@@ -46,11 +46,11 @@ def load(
     lines = lines_of_keys(text)
     for section, _, key in (name.rpartition(".") for name in without):
         (table_of(raw, section) or {}).pop(key, None)
-    changed = {apply_change(raw, change) for change in changes}
+    changed = apply_changes(raw, changes)
     values: dict[str, object] = {}
     written: dict[str, object] = {}
     single = list(checked(raw, values, written))
-    case = Case(path, values, written, lines)
+    case = Case(path, values, written, lines, frozenset(changed))
     problems = [*single, *together(case, single, modal=modal)]
     if problems:
         raise BadInput(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Sequence
 from typing import Any
 
 from alphacut.case.key import Key
@@ -14,6 +15,23 @@ from alphacut.io.quantity import NUMBER
 
 Raw = dict[str, Any]
 ARRAYS = ("fuzzy list", "numbers", "choices")  # kinds of keys that hold arrays
+
+
+def apply_changes(raw: Raw, changes: Sequence[str]) -> dict[str, str]:
+    """Put every change into the tree; returns the keys' full names with their changes.
+
+    Raises:
+        BadInput: A key is unknown, or changed twice.
+    """
+    made: dict[str, str] = {}
+    for change in changes:
+        key = apply_change(raw, change)
+        if key in made:
+            raise BadInput(
+                Problem(key, f"changed twice: {made[key]} and {change}", allowed="one of them")
+            )
+        made[key] = change
+    return made
 
 
 def apply_change(raw: Raw, change: str) -> str:

@@ -3,53 +3,63 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TextIO
 
+from alphacut.case.case import Case
+from alphacut.case.idle import idle_mesh, require_read
 from alphacut.case.load import load
 from alphacut.case.schema import CELL_METHODS
-from alphacut.commands.options import CELL_OPTIONS, add_common, add_keys, changes
+from alphacut.commands.options import (
+    MESH,
+    MODEL,
+    SAMPLE,
+    add_common,
+    add_exclude,
+    add_keys,
+    answer,
+    changes,
+    refuse_beside,
+)
 from alphacut.export.material_card import check_format, export
-from alphacut.io.files import as_json, ranks, say, write_text
+from alphacut.io.files import ranks, say
 from alphacut.io.problem import BadInput, Problem
 from alphacut.rve.anisotropy import ISOTROPIC_ENOUGH, shear_ratio_in_words
+from alphacut.rve.auto.model import ORDER
 from alphacut.rve.cell import STRAIN
 from alphacut.rve.model import cross_check
 from alphacut.rve.result import Homogenised
 from alphacut.stages import cell
+from alphacut.stages.contract import keep_modulus, require_choice
 
 ABOUT = "homogenise the cell at crisp values; a fuzzy input takes its modal value"
+
+
+KEYS = {**SAMPLE, **MESH, **MODEL}
+READ = ("radius", "cell", "mesh", "modulus.method", "modulus.tolerance")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_common(parser)
-    add_keys(parser, CELL_OPTIONS)
-    parser.add_argument(
-        "--exclude",
-        metavar="NAMES",
-        default="",
-        help="models that method auto must not take, separated by commas",
-    )
+    add_keys(parser, KEYS)
+    add_exclude(parser, ", ".join(ORDER))
     parser.add_argument(
         "--stiffness",
         action="store_true",
-        help="with method prism, solve a third load for the whole planar stiffness",
+        help="a third load for the whole planar stiffness: prism",
     )
     parser.add_argument(
         "--export",
         metavar="FILE",
-        help=(
-            "write the material and its plane-strain stiffness for another program: .inp, .comm,"
-            " .mac or .json"
-        ),
+        help="material and plane-strain stiffness for other programs: .inp, .comm, .mac or .json",
     )
     parser.add_argument(
         "--cross-check",
         metavar="A,B",
         default="",
-        help="run two models; fail if their moduli differ by more than --tolerance",
+        help="run two models; fail if E differs by more than --tolerance (1e-4)",
     )
 
 
@@ -81,46 +91,100 @@ def named_pair(text: str) -> tuple[str, ...]:
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Solve and report."""
-    case = load(options.case, changes(options, CELL_OPTIONS), modal=True)
+    case = load(options.case, changes(options, KEYS), modal=True)
+    require_read(case, READ, "cell")
     if options.export:
         check_format(options.export)
     pair = named_pair(options.cross_check)
-    choice = cell.cell_choice(case, exclude=named_models("--exclude", options.exclude), petsc=petsc)
+    models = pair or (case.text("modulus.method"),)
+    require_effect(options, case, models)
+    excluded = named_models("--exclude", options.exclude)
+    choice = cell.cell_choice(case, exclude=excluded, petsc=petsc)
+    full = options.stiffness or bool(options.export)
     choice = replace(
         choice,
         parallel=ranks() > 1,
+        named=choice.named or full or ranks() > 1,
         estimate=True,
-        stiffness=options.stiffness or bool(options.export),
+        stiffness=full,
     )
-    result = cell.solve(case, replace(choice, method=pair[0] if pair else choice.method).model())
-    difference = None
     if pair:
-        difference = cross_check(
-            [result],
-            [cell.solve(case, replace(choice, method=pair[1]).model())],
-            tolerance=choice.tolerance,
-        )
+        result, difference = compared(case, choice, pair)
+    else:
+        result, difference = cell.solve(case, choice.model()), None
+        keep_modulus(case, result.method, result.error, best_effort=options.best_effort)
     if options.export:
         export(result, options.export)
     found = {**cell.document(result), **({} if difference is None else {"difference": difference})}
-    document = as_json(found, indent=None if options.json == "-" else 2)
-    if options.json == "-":
-        out.write(document)
-    elif options.json:
-        write_text(options.json, document)
-    if options.json != "-" and not options.quiet:
-        out.write(summary(result))
-        if difference is not None:
-            out.write(
-                f"{' and '.join(pair)} differ by {difference:.1e} of E; {choice.tolerance:.1e} is"
-                " allowed\n"
-            )
-        out.write(
-            remark(
-                cell.anisotropy(*cell.parts(cell.modal_values(case), case.numbers("radius.theta")))
-            )
-        )
+    if answer(options, found, out, summary(result)):
+        out.write(agreement(pair, difference, allowed_difference(case)))
+        modal = cell.parts(cell.modal_values(case), case.numbers("radius.theta"))
+        out.write(remark(cell.anisotropy(*modal)))
     return 0
+
+
+def require_effect(options: argparse.Namespace, case: Case, models: Sequence[str]) -> None:
+    """Refuse options that none of the models to be run has.
+
+    Raises:
+        BadInput: One problem for each option.
+    """
+    problems = list(idle_mesh(case, models))
+    if options.cross_check and "modulus.method" in case.changed:
+        what = "this has no effect beside --cross-check, which names both models"
+        problems.append(Problem("modulus.method", what, case.text("modulus.method")))
+    if options.exclude and "auto" not in models:
+        what = f"the method is {' and '.join(models)}, and only method auto leaves a choice"
+        problems.append(Problem("--exclude", what, options.exclude, "beside --method auto"))
+    if options.stiffness and (options.export or "prism" not in models):
+        beside = "--export, which solves it" if options.export else f"method {models[0]}"
+        problems.append(Problem("--stiffness", f"this has no effect beside {beside}"))
+    if problems:
+        raise BadInput(problems)
+    if options.cross_check:
+        refuse_beside(options, "--cross-check", {"--best-effort": ""})
+    elif options.best_effort:
+        require_choice(case, modulus=True, envelope=False)
+
+
+def allowed_difference(case: Case) -> float:
+    """The relative difference of E that ``--cross-check`` allows."""
+    return case.number("modulus.tolerance")
+
+
+def compared(case: Case, choice: cell.CellChoice, pair: Sequence[str]) -> tuple[Homogenised, float]:
+    """The first model's result, and its relative difference in E from the second's.
+
+    Raises:
+        BadInput: Method auto took the model that it is compared with.
+        CrossCheckError: The difference is above the tolerance.
+    """
+    results = [
+        cell.solve(
+            case,
+            replace(
+                choice,
+                method=name,
+                tolerance=choice.tolerance if name == "auto" else None,
+                exclude=choice.exclude if name == "auto" else (),
+                petsc=choice.petsc if name == "prism" else {},
+            ).model(),
+        )
+        for name in pair
+    ]
+    first, second = results
+    if first.method == second.method:
+        what = f"method auto takes {first.method} here, so both are one model"
+        cure = f"auto with --exclude {first.method}, or two names of {', '.join(ORDER)}"
+        raise BadInput(Problem("--cross-check", what, ",".join(pair), cure))
+    return first, cross_check([first], [second], tolerance=allowed_difference(case))
+
+
+def agreement(pair: Sequence[str], difference: float | None, allowed: float) -> str:
+    """The difference of two models as a line; empty without."""
+    if difference is None:
+        return ""
+    return f"{' and '.join(pair)} differ by {difference:.1e} of E; {allowed:.1e} is allowed\n"
 
 
 def remark(ratio: float | None) -> str:

@@ -8,8 +8,8 @@ from dataclasses import asdict
 from typing import TextIO
 
 from alphacut.case.load import load
-from alphacut.commands.options import add_common
-from alphacut.io.files import as_json, say, write_text
+from alphacut.commands.options import add_common, answer
+from alphacut.io.files import say
 from alphacut.io.problem import BadInput
 from alphacut.stages.readiness import ready
 
@@ -65,11 +65,3 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
             f" {case.text('title')}{period}{over}\n"
         )
     return 0
-
-
-def answer(options: argparse.Namespace, document: Mapping[str, object], out: TextIO) -> None:
-    """Write the JSON answer where it is wanted."""
-    if options.json == "-":
-        out.write(as_json(document))
-    elif options.json:
-        write_text(options.json, as_json(document, indent=2))

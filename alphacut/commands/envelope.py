@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TextIO
@@ -10,19 +11,29 @@ from typing import TYPE_CHECKING, Any, TextIO
 import numpy as np
 
 from alphacut.case.case import Case
+from alphacut.case.idle import require_read
 from alphacut.case.load import load
 from alphacut.case.schema import ENVELOPE_METHODS
 from alphacut.case.values import nearest
-from alphacut.commands.options import add_common, add_keys, add_workers, changes, check_workers
+from alphacut.commands.options import (
+    KeyOption,
+    add_common,
+    add_exclude,
+    add_keys,
+    add_workers,
+    answer,
+    changes,
+    check_workers,
+)
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io import quantity
-from alphacut.io.files import as_json, write_text
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import progress
 from alphacut.io.provenance import fingerprint
 from alphacut.io.units import engineering, largest_by_unit
 from alphacut.stages import envelope
 from alphacut.stages import exceedance as outcomes
+from alphacut.stages.contract import require_choice
 from alphacut.stages.modulus import read_number, stand_in
 from alphacut.stages.structure import structure
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -32,60 +43,45 @@ if TYPE_CHECKING:
 
 ABOUT = "lower and upper envelopes of the structure's vibration on every α-cut"
 KEYS = {
-    "--fuzzy": "envelope.fuzzy",
-    "--duration": "envelope.duration",
-    "--step": "envelope.step",
-    "--alpha": "envelope.alpha",
-    "--method": "envelope.method",
-    "--integrator": "envelope.integrator",
-    "--order": "envelope.order",
-    "--tolerance": "envelope.tolerance",
-    "--relative-tolerance": "envelope.relative_tolerance",
-    "--certify": "envelope.certify",
+    "--fuzzy": KeyOption("envelope.fuzzy", "inputs that are fuzzy, as E,m", "NAMES"),
+    "--duration": KeyOption("envelope.duration", "length of the simulation", bare="s"),
+    "--step": KeyOption("envelope.step", "time step", bare="s"),
+    "--alpha": KeyOption("envelope.alpha", "levels, as 0,0.5,1", "LIST"),
+    "--method": KeyOption("envelope.method", ", ".join(ENVELOPE_METHODS), "CHOICE"),
+    "--tolerance": KeyOption("envelope.tolerance", "error that must be kept", bare="m"),
+    "--certify": KeyOption("envelope.certify", "gap of proved bounds", bare="m"),
 }
+READ = ("frame", "pendulum", "tower", "envelope", "exceedance")
+GIVEN = ("modulus.value", "modulus.file", "modulus.measured")
 OF_AUTO = ("modal", "improved-graph-follower")
-# options that may leave the unit out
-BARE = {
-    "--duration": "s",
-    "--step": "s",
-    "--tolerance": "m",
-    "--certify": "m",
-}
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_common(parser)
-    add_keys(parser, KEYS, BARE)
+    add_keys(parser, KEYS)
     parser.add_argument(
         "--modulus",
         metavar="QUANTITY|FILE.nc",
-        help="Young's modulus: '[22, 24, 26] GPa' or the α-cuts of a file (default: the case's)",
+        help="Young's modulus: '[22, 24, 26] GPa', or α-cuts (default: the case's)",
     )
-    parser.add_argument(
-        "--exclude",
-        metavar="NAMES",
-        default="",
-        help="methods that method auto must not take, separated by commas",
-    )
-    add_workers(parser, "the proof of a certificate")
+    add_exclude(parser, " or ".join(OF_AUTO))
+    add_workers(parser, "the proof of --certify")
     parser.add_argument(
         "--strict",
         action="store_true",
-        help="refuse a time step or tolerance too coarse for the motion",
+        help="refuse a step or tolerance too coarse for the motion",
     )
-    parser.add_argument(
-        "--out", metavar="FILE.nc", help="write envelopes and where they are reached as NetCDF"
-    )
+    parser.add_argument("--out", metavar="FILE.nc", help="write the envelopes as NetCDF")
 
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Compute and report."""
-    add_units(options)
     check_workers(options.workers)
     if options.certify is not None and options.method is None:
         options.method = "modal"  # the one that can
     case = load(options.case, changes(options, KEYS), without=replaced(options))
+    require_read(case, (*READ, *GIVEN), "envelope")
     handed = given_modulus(options.modulus) or stand_in(case)
     task = replace(envelope.task_of(case), exclude=excluded(options.exclude))
     contradictions(options, case, task)
@@ -101,28 +97,17 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
             progress=tick,
         )
     dataset = outcomes.with_peaks(found, structure(case, handed), task)
+    envelope.keep_tolerance(case, dataset, best_effort=options.best_effort)
     if options.out:
         key = fingerprint(
             {"case": case.values, "task": task, "modulus": handed}, ("fuzzy", "frame")
         )
         envelope.write(dataset, options.out, case_text=case.text_of_file, key=key)
     limit = exceeded(options, case, handed)
-    document = as_json(
-        {
-            **envelope.document(found, dataset["peak_tried"].values),
-            **({"exceedance": limit} if limit else {}),
-        },
-        indent=None if options.json == "-" else 2,
-    )
-    if options.json == "-":
-        out.write(document)
-    elif options.json:
-        write_text(options.json, document)
-    if options.json != "-" and not options.quiet:
-        out.write(
-            summary(found, dataset["peak_tried"].values[0])
-            + (outcomes.sentence(limit) if limit else "")
-        )
+    tried = dataset["peak_tried"].values
+    document = {**envelope.document(found, tried), **({"exceedance": limit} if limit else {})}
+    text = summary(found, tried[0]) + (outcomes.sentence(limit) if limit else "")
+    answer(options, document, out, text)
     return 0
 
 
@@ -136,52 +121,41 @@ def exceeded(
         return outcomes.exceedance_document(outcomes.exceedance(case, handed, tick))
 
 
-def add_units(options: argparse.Namespace) -> None:
-    """``--duration 30`` means 30 s, ``--step 0.01`` 0.01 s, ``--tolerance 1e-4`` 1e-4 m."""
-    for option, unit in BARE.items():
-        name = option.removeprefix("--")
-        text = getattr(options, name)
-        if (
-            text is not None
-            and quantity.SINGLE.fullmatch(text.strip())
-            and not text.strip()[-1].isalpha()
-        ):
-            setattr(options, name, f"{text} {unit}")
-
-
 def replaced(options: argparse.Namespace) -> tuple[str, ...]:
-    """The case's tolerance, where an option gives the other kind."""
-    if options.tolerance is not None and options.relative_tolerance is None:
+    """The case's tolerance, where the command line gives the other kind."""
+    shares = [text for text in options.set if re.match(r"(envelope\.)?relative.tolerance *=", text)]
+    if options.tolerance is not None and not shares:
         return ("envelope.relative_tolerance",)
-    return (
-        ("envelope.tolerance", "pendulum.tolerance")
-        if options.relative_tolerance is not None and options.tolerance is None
-        else ()
-    )
+    lengths = [text for text in options.set if re.match(r"(\w+\.)?tolerance *=", text)]
+    if shares and options.tolerance is None and not lengths:
+        return ("envelope.tolerance", "pendulum.tolerance")
+    return ()
 
 
 def contradictions(options: argparse.Namespace, case: Case, task: envelope.EnvelopeTask) -> None:
-    """Refuse options that have no meaning together.
+    """Refuse options that have no effect together.
 
     Raises:
-        BadInput: A modulus for a structure that takes none, or methods left out where none is
-            chosen.
+        BadInput: A modulus for a structure that takes none or gets another one, methods left out
+            where none is chosen, processes where nothing is proved, or a tolerance that none can
+            miss.
     """
-    if options.modulus is not None and not case.has("frame.masses"):
-        raise BadInput(
-            Problem(
-                "--modulus",
-                "this structure takes no modulus",
-                options.modulus,
-                "with a storey frame",
-            )
-        )
+    problems = []
+    given = [key for key in (*GIVEN, "frame.modulus") if key in case.changed]
+    if options.modulus is not None and (given or not case.has("frame.masses")):
+        what = f"{given[0]} is given besides" if given else "this structure takes no modulus"
+        allowed = "one of them" if given else "with a storey frame"
+        problems.append(Problem("--modulus", what, options.modulus, allowed))
     if task.exclude and task.method != "auto":
-        raise BadInput(
-            Problem(
-                "--exclude", f"the method is {task.method}", options.exclude, "with --method auto"
-            )
-        )
+        what = f"the method is {task.method}"
+        problems.append(Problem("--exclude", what, options.exclude, "with --method auto"))
+    if options.workers > 1 and task.certify is None:
+        what = "this has no effect: only a proof is shared by processes"
+        problems.append(Problem("--workers", what, str(options.workers), "with --certify"))
+    if problems:
+        raise BadInput(problems)
+    if options.best_effort:
+        require_choice(case, modulus=False, envelope=True)
 
 
 def excluded(text: str) -> tuple[str, ...]:

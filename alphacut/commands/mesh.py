@@ -7,47 +7,44 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TextIO
 
+from alphacut.case.idle import require_read
 from alphacut.case.load import load
-from alphacut.commands.options import CELL_OPTIONS, add_common, add_keys, changes
+from alphacut.commands.options import MESH, add_common, add_keys, answer, changes
 from alphacut.export.fields import cell_fields
 from alphacut.export.prism_mesh import check_ending, prism_mesh, write_mesh
-from alphacut.io.files import as_json
 
 ABOUT = (
     "write the prism mesh of the cell at modal values: VTU for ParaView, .msh for Gmsh, .inp for"
     " Abaqus and CalculiX"
 )
-KEYS = {option: key for option, key in CELL_OPTIONS.items() if key.startswith(("radius.", "mesh."))}
+READ = ("radius", "cell", "mesh")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_common(parser)
-    add_keys(parser, KEYS)
+    add_keys(parser, MESH)
     parser.add_argument(
         "--fields",
         action="store_true",
-        help="solve, and write displacements and stresses of both loads as well (not with .inp)",
+        help="solve, and write displacements and stresses as well (not with .inp)",
     )
     parser.add_argument(
         "--out",
         metavar="FILE",
         required=True,
-        help="the mesh; its ending names the format: .vtu, .vtk, .xdmf, .msh or .inp",
+        help="the mesh, in the format of its ending: .vtu, .vtk, .xdmf, .msh or .inp",
     )
 
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Mesh and write."""
-    case = load(options.case, changes(options, KEYS), modal=True)
+    case = load(options.case, changes(options, MESH), modal=True)
+    require_read(case, READ if options.fields else ("radius", "mesh"), "mesh")
     check_ending(Path(options.out), fields=options.fields)
     mesh = cell_fields(case) if options.fields else prism_mesh(case)
     write_mesh(mesh, Path(options.out))
     counts = {"nodes": len(mesh.points), "wedges": len(mesh.cells[0].data), "file": options.out}
-    if options.json == "-":
-        out.write(as_json(counts))
-    elif not options.quiet:
-        out.write(
-            f"{counts['nodes']} nodes and {counts['wedges']} quadratic wedges in {options.out}\n"
-        )
+    text = f"{counts['nodes']} nodes and {counts['wedges']} quadratic wedges in {options.out}\n"
+    answer(options, counts, out, text)
     return 0

@@ -7,9 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TextIO
 
+from alphacut.case.idle import require_read
 from alphacut.case.load import load
-from alphacut.commands.options import add_common, add_workers, check_workers
-from alphacut.io.files import as_json, say, write_text
+from alphacut.commands.options import add_common, add_workers, answer, check_workers
+from alphacut.io.files import say
+from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import progress
 from alphacut.io.provenance import attributes, door, fingerprint, versions
 from alphacut.stages import microstructure
@@ -36,6 +38,11 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     check_workers(options.workers)
     case = load(options.case, options.set)
     case.need("microstructure.seed")
+    require_read(case, ("microstructure",), "microstructure")
+    if options.no_figures and not options.out:
+        raise BadInput(
+            Problem("--no-figures", "there are none without --out", allowed="beside --out")
+        )
     with progress("Microstructure", quiet=options.quiet) as tick:
         found = microstructure.compute(case, workers=options.workers, progress=tick, quiet=True)
     written: list[str] = []
@@ -54,14 +61,9 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         "files": written,
         "versions": versions(),
     }
-    if options.json == "-":
-        out.write(as_json(document))
-    elif options.json:
-        write_text(options.json, as_json(document, indent=2))
     for remark in microstructure.left_out(found):
         say(remark)
-    if options.json != "-" and not options.quiet:
-        out.write(section)
+    if answer(options, document, out, section):
         advise(section, options.out)
     return 0
 

@@ -8,55 +8,64 @@ from pathlib import Path
 from typing import TextIO
 
 from alphacut.case.case import Case
+from alphacut.case.idle import idle_mesh, require_read
 from alphacut.case.load import load
+from alphacut.case.schema import PLANS
 from alphacut.commands.cell import named_models, remark
 from alphacut.commands.options import (
-    CELL_OPTIONS,
+    MODEL,
+    KeyOption,
     add_common,
+    add_exclude,
     add_keys,
     add_workers,
+    answer,
     changes,
     check_workers,
+    refuse_beside,
 )
-from alphacut.fuzzy import Explanation, Store
-from alphacut.io.files import as_json, say, write_text
+from alphacut.fuzzy import Store
+from alphacut.io.files import say
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import progress
 from alphacut.io.provenance import fingerprint
+from alphacut.rve.auto.model import ORDER
 from alphacut.stages import modulus, response
 from alphacut.stages.campaign import campaign
 from alphacut.stages.cell import GPA
+from alphacut.stages.contract import keep_modulus, require_choice
 
 ABOUT = "fuzzy effective modulus by the transformation method over all fuzzy inputs of the cell"
-KEYS = {**CELL_OPTIONS, "--plan": "modulus.plan", "--alpha": "modulus.alpha"}
+KEYS = {
+    **MODEL,
+    "--plan": KeyOption("modulus.plan", ", ".join(PLANS), "CHOICE"),
+    "--alpha": KeyOption("modulus.alpha", "levels, as 0,0.5,1", "LIST"),
+}
+READ = ("radius", "cell", "mesh", "modulus", "response")
+UNEXPLAINED = {"--out": "", "--workers": "1", "--best-effort": ""}
+"""Options without an effect where nothing is run."""
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_common(parser)
     add_keys(parser, KEYS)
+    add_exclude(parser, ", ".join(ORDER))
     add_workers(parser)
-    parser.add_argument(
-        "--out", metavar="FILE.nc", help="write the α-cuts and all samples as NetCDF"
-    )
-    parser.add_argument(
+    parser.add_argument("--out", metavar="FILE.nc", help="write α-cuts and samples as NetCDF")
+    place = parser.add_mutually_exclusive_group()
+    place.add_argument(
         "--store",
         metavar="FILE",
-        help="keep every sample here; the same command then goes on where it was stopped",
+        help="keep every sample; the same command goes on where it was stopped",
     )
-    parser.add_argument(
+    place.add_argument(
         "--resume",
         action="store_true",
-        help="keep and take samples in results/NAME-OF-THE-CASE/samples.db",
+        help="the same in results/NAME-OF-THE-CASE/samples.db",
     )
     parser.add_argument(
         "--explain", action="store_true", help="say what would be run and why, and run nothing"
-    )
-    parser.add_argument(
-        "--exclude",
-        metavar="NAMES",
-        default="",
-        help="models that method auto must not take, separated by commas",
     )
 
 
@@ -64,13 +73,22 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     """Compute and report."""
     check_workers(options.workers)
     case = load(options.case, changes(options, KEYS))
+    require_read(case, READ, "modulus")
+    if problems := list(idle_mesh(case, (case.text("modulus.method"),))):
+        raise BadInput(problems)
+    if options.explain:
+        refuse_beside(options, "--explain", UNEXPLAINED)
+    elif options.best_effort:
+        require_choice(case, modulus=True, envelope=False)
     exclude = named_models("--exclude", options.exclude)
     wanted = campaign(case, petsc=petsc, exclude=exclude, store=store_of(options, case))
     if options.explain:
-        explain(modulus.explain(wanted), options, out)
+        words = f"{modulus.explain(wanted)}\n{wanted.task.choice.words}"
+        answer(options, {"explanation": words}, out, f"{words}\n")
         return 0
     with progress("Fuzzy modulus", quiet=options.quiet) as tick:
         found = modulus.compute(wanted, workers=options.workers, progress=tick)
+    keep_modulus(case, found.choice.method, found.error, best_effort=options.best_effort)
     if options.out:
         key = fingerprint(case.values, ("stochastic", "rve", "fuzzy"))
         modulus.write(found, options.out, case_text=case.text_of_file, key=key)
@@ -79,19 +97,13 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         if case.has("response.quantity")
         else None
     )
-    answer = {**found.document(), **({"response": stress} if stress else {})}
-    document = as_json(answer, indent=None if options.json == "-" else 2)
-    if options.json == "-":
-        out.write(document)
-    elif options.json:
-        write_text(options.json, document)
-    if options.json != "-" and not options.quiet:
-        out.write(summary(found) + (f"\n{response.text(stress)}" if stress else ""))
-        if not options.out:
-            say(
-                "to keep this and hand it on: the same command with --out modulus.nc, then alphacut"
-                " envelope CASE --modulus modulus.nc"
-            )
+    document = {**found.document(), **({"response": stress} if stress else {})}
+    text = summary(found) + (f"\n{response.text(stress)}" if stress else "")
+    if answer(options, document, out, text) and not options.out:
+        say(
+            "to keep this and hand it on: the same command with --out modulus.nc, then alphacut"
+            " envelope CASE --modulus modulus.nc"
+        )
     return 0
 
 
@@ -113,13 +125,6 @@ def store_of(options: argparse.Namespace, case: Case) -> Path | None:
             ) from None
     path.parent.mkdir(parents=True, exist_ok=True)
     return path
-
-
-def explain(explanation: Explanation, options: argparse.Namespace, out: TextIO) -> None:
-    """Print what would be run."""
-    out.write(
-        as_json({"explanation": str(explanation)}) if options.json == "-" else f"{explanation}\n"
-    )
 
 
 def summary(found: modulus.FuzzyModulus) -> str:

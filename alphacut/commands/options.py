@@ -4,116 +4,52 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Mapping, Sequence
-from typing import NoReturn
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TextIO
 
-from alphacut.case.schema import every_key
-from alphacut.case.values import nearest
+from alphacut.case.schema import CELL_METHODS
+from alphacut.io.files import as_json, write_text
 from alphacut.io.problem import BadInput, Problem
-from alphacut.io.units import QUANTITIES
+from alphacut.io.quantity import NUMBER
 
-RADIUS_OPTIONS = {f"--{name}": f"radius.{name}" for name in ("a1", "a2", "a3", "a4")}
-CELL_OPTIONS = {
-    **RADIUS_OPTIONS,
-    "--matrix-modulus": "cell.matrix_modulus",
-    "--matrix-poisson": "cell.matrix_poisson",
-    "--inclusion-modulus": "cell.inclusion_modulus",
-    "--inclusion-poisson": "cell.inclusion_poisson",
-    "--layers": "mesh.layers",
-    "--mesh-size": "mesh.size",
-    "--interface": "mesh.interface",
-    "--method": "modulus.method",
-    "--tolerance": "modulus.tolerance",
+
+@dataclass(frozen=True)
+class KeyOption:
+    """A key of the case that is typed often enough to have an option.
+
+    Args:
+        key: Full name of the key.
+        about: Its help, short.
+        metavar: What it takes.
+        bare: Unit of a bare number; empty where the unit must be written.
+    """
+
+    key: str
+    about: str
+    metavar: str = "QUANTITY"
+    bare: str = ""
+
+
+SAMPLE = {
+    "--a1": KeyOption("radius.a1", "radius at the lower end of θ", "NUMBER"),
+    "--a2": KeyOption("radius.a2", "slope there", "NUMBER"),
+    "--a3": KeyOption("radius.a3", "radius at the upper end of θ", "NUMBER"),
+    "--a4": KeyOption("radius.a4", "slope there", "NUMBER"),
+    "--matrix-modulus": KeyOption("cell.matrix_modulus", "as '20 GPa'"),
+    "--inclusion-modulus": KeyOption("cell.inclusion_modulus", "as '80 GPa'"),
 }
-PETSC_PREFIX = "-rve_"
-METAVARS = {"integer": "INTEGER", "choice": "CHOICE", "choices": "NAMES", "numbers": "LIST"}
-FORMS = {"numbers": ", as 0,0.5,1 or '[0, 0.5, 1]'", "choices": ", separated by commas"}
-EXAMPLES = {"envelope.step": "0.01 s", "envelope.tolerance": "0.1 mm"}
-
-
-class Parser(argparse.ArgumentParser):
-    """An argument parser whose complaints are one line, like those about a case."""
-
-    def error(self, message: str) -> NoReturn:
-        """Raise instead of printing usage and leaving."""
-        raise BadInput(self.complaint(message))
-
-    def complaint(self, message: str) -> Problem:
-        """A complaint of argparse in this project's words."""
-        if match := re.match(
-            r"argument COMMAND: invalid choice: '(.*?)' \(choose from (.*)\)", message
-        ):
-            known = [name.strip(" '") for name in match[2].split(",")]
-            return Problem(
-                "command",
-                "there is no such command",
-                match[1],
-                f"{', '.join(known)}; see --help",
-                nearest(match[1], known),
-            )
-        if match := re.match(r"argument (\S+): invalid int value: '(.*)'", message):
-            return Problem(
-                match[1], "this is no whole number", match[2], "a whole number such as 2"
-            )
-        return Problem(
-            self.prog.removeprefix("alphacut ") if self.prog != "alphacut" else "command line",
-            f"{message}; see --help",
-        )
-
-    def stranger(self, word: str, known: Sequence[str]) -> Problem:
-        """The problem of a word that is no option, with what was meant."""
-        here, what = self.prog.removeprefix("alphacut "), f"there is no such option: {word}"
-        if not word.startswith("-"):
-            return Problem(
-                here,
-                "there is one argument too many",
-                word,
-                "one case; other values stand behind their options",
-            )
-        if re.match(r"-(ksp|pc|mat|snes|mg|sub|log|options)_", word):
-            return Problem(
-                here, what, allowed=f"PETSc's options with their prefix: {PETSC_PREFIX}{word[1:]}"
-            )
-        close = nearest(word.partition("=")[0], known)
-        return Problem(here, what, allowed="" if close else ", ".join(known), nearest=close)
-
-    def refuse(self, words: Sequence[str]) -> NoReturn:
-        """Complain about words that are no options of this command, with the nearest that is."""
-        known = [name for name in self._option_string_actions if name.startswith("--")]
-        raise BadInput([self.stranger(word, known) for word in words])
-
-
-def refuse_petsc(command: str, petsc: Mapping[str, str]) -> None:
-    """Refuse PETSc's options with a command that solves nothing with PETSc."""
-    if petsc and command not in ("cell", "modulus", "run"):
-        allowed = "with the commands cell, modulus and run"
-        raise BadInput(
-            [
-                Problem(
-                    f"{PETSC_PREFIX}{name}",
-                    f"command {command} does not use PETSc",
-                    allowed=allowed,
-                )
-                for name in petsc
-            ]
-        )
-
-
-def split_petsc(arguments: Sequence[str]) -> tuple[list[str], dict[str, str]]:
-    """Take PETSc's own options (``-rve_ksp_rtol 1e-10``) out of a command line."""
-    ours: list[str] = []
-    petsc: dict[str, str] = {}
-    rest = list(arguments)
-    while rest:
-        word = rest.pop(0)
-        if not word.startswith(PETSC_PREFIX):
-            ours.append(word)
-            continue
-        takes_value = (
-            bool(rest) and not re.match(r"--?[A-Za-z_]", rest[0]) and not rest[0].endswith(".toml")
-        )
-        petsc[word.removeprefix(PETSC_PREFIX)] = rest.pop(0) if takes_value else ""
-    return ours, petsc
+MESH = {
+    "--layers": KeyOption("mesh.layers", "element layers in θ: prism", "INTEGER"),
+    "--mesh-size": KeyOption("mesh.size", "element size: prism, slices", "NUMBER"),
+    "--interface": KeyOption("mesh.interface", "conforming or sign: prism", "CHOICE"),
+}
+MODEL = {
+    "--method": KeyOption("modulus.method", ", ".join(CELL_METHODS), "CHOICE"),
+    "--tolerance": KeyOption(
+        "modulus.tolerance", "relative error of E that must be kept", "NUMBER"
+    ),
+}
 
 
 def add_common(parser: argparse.ArgumentParser) -> None:
@@ -124,7 +60,7 @@ def add_common(parser: argparse.ArgumentParser) -> None:
         metavar="KEY=VALUE",
         action="append",
         default=[],
-        help="change any key of the case; may be repeated",
+        help="change a key of the case; may be repeated",
     )
     add_quiet(parser)
 
@@ -134,31 +70,36 @@ def add_quiet(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--json",
         metavar="FILE",
-        help="write the result as one JSON object; - for standard output, with nothing else on it",
+        help="write the result as JSON; - for standard output, with nothing else on it",
     )
-    parser.add_argument("--quiet", action="store_true", help="no progress and no table")
+    parser.add_argument(
+        "--quiet", action="store_true", help="no progress and no table, as with --json -"
+    )
 
 
-def add_keys(
-    parser: argparse.ArgumentParser, keys: dict[str, str], bare: Mapping[str, str] | None = None
-) -> None:
-    """Options that stand for keys; `bare` names the unit of those that need none."""
-    known = every_key()
-    for option, key in keys.items():
-        entry = known[key]
-        example = (
-            f", for example '{EXAMPLES.get(key) or QUANTITIES[entry.unit][1]}'"
-            if entry.unit
-            else FORMS.get(entry.kind, "")
-        )
-        example += f", or a bare number of {bare[option]}" if bare and option in bare else ""
-        choices = f": {', '.join(entry.choices)}" if entry.choices else ""
-        metavar = METAVARS.get(entry.kind) or ("QUANTITY" if entry.unit else "NUMBER")
-        parser.add_argument(
-            option,
-            metavar=metavar,
-            help=f"{entry.about}{choices}{example} (default: {key} of the case)",
-        )
+def add_keys(parser: argparse.ArgumentParser, keys: Mapping[str, KeyOption]) -> None:
+    """Options that stand for keys of the case."""
+    group = parser.add_argument_group("keys of the case, others by --set")
+    for option, entry in keys.items():
+        bare = f"; a bare number is in {entry.bare}" if entry.bare else ""
+        group.add_argument(option, metavar=entry.metavar, help=f"{entry.about}{bare}")
+
+
+def add_exclude(parser: argparse.ArgumentParser, known: str) -> None:
+    """``--exclude`` and ``--best-effort``."""
+    parser.add_argument(
+        "--exclude", metavar="NAMES", default="", help=f"not to be taken by method auto: {known}"
+    )
+    add_best_effort(parser)
+
+
+def add_best_effort(parser: argparse.ArgumentParser) -> None:
+    """``--best-effort``."""
+    parser.add_argument(
+        "--best-effort",
+        action="store_true",
+        help="take a result whose error is above the tolerance",
+    )
 
 
 def add_workers(parser: argparse.ArgumentParser, what: str = "the samples") -> None:
@@ -168,19 +109,69 @@ def add_workers(parser: argparse.ArgumentParser, what: str = "the samples") -> N
         metavar="N",
         type=int,
         default=1,
-        help=f"processes that share {what} (default 1)",
+        help=f"processes for {what} (default 1)",
     )
 
 
-def changes(options: argparse.Namespace, keys: dict[str, str]) -> list[str]:
-    """Changes of the case as KEY=VALUE; ``--set`` first, so that a named option wins."""
+def changes(options: argparse.Namespace, keys: Mapping[str, KeyOption]) -> list[str]:
+    """Changes of the case by ``--set`` and by the options that stand for keys, as KEY=VALUE."""
     named = {
-        option: getattr(options, option.removeprefix("--").replace("-", "_")) for option in keys
+        entry: getattr(options, option.removeprefix("--").replace("-", "_"))
+        for option, entry in keys.items()
     }
     return [
         *options.set,
-        *(f"{keys[option]}={value}" for option, value in named.items() if value is not None),
+        *(
+            f"{entry.key}={with_unit(value, entry.bare)}"
+            for entry, value in named.items()
+            if value is not None
+        ),
     ]
+
+
+def with_unit(text: str, unit: str) -> str:
+    """A quantity whose unit may be left out: ``30`` means 30 s where `unit` is s."""
+    plain = re.fullmatch(NUMBER, text.strip())
+    return f"{text} {unit}" if unit and plain else text
+
+
+def refuse_beside(options: argparse.Namespace, first: str, others: Mapping[str, str]) -> None:
+    """Refuse options that have no effect beside another one.
+
+    Args:
+        options: The options given.
+        first: The option beside which the others have none.
+        others: Those options, each with the value that it has where it is not given.
+
+    Raises:
+        BadInput: One problem for each that is given.
+    """
+    problems = []
+    for name, default in others.items():
+        value = getattr(options, name.removeprefix("--").replace("-", "_"))
+        if value not in (None, False, [], "") and str(value) != default:
+            shown = "" if value is True else str(value)
+            problems.append(Problem(name, f"this has no effect beside {first}", shown))
+    if problems:
+        raise BadInput(problems)
+
+
+def answer(
+    options: argparse.Namespace, document: Mapping[str, object], out: TextIO, text: str = ""
+) -> bool:
+    """Write the result: as JSON where it is wanted, else `text` on standard output.
+
+    Returns:
+        Whether people are spoken to: no JSON on standard output, and not quiet.
+    """
+    if options.json == "-":
+        out.write(as_json(document))
+    elif options.json:
+        write_text(options.json, as_json(document, indent=2))
+    spoken = options.json != "-" and not options.quiet
+    if spoken:
+        out.write(text)
+    return spoken
 
 
 def check_workers(count: int) -> None:

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TextIO
 
-from alphacut.io.files import as_json, write_text
+from alphacut.commands.options import add_quiet, answer
+from alphacut.io.files import write_text
 from alphacut.report.page import report
 
 ABOUT = "one self-contained HTML page of a run's results, with interactive envelopes"
@@ -21,12 +22,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", metavar="FILE.html", help="where the page goes (default: FOLDER/report.html)"
     )
-    parser.add_argument(
-        "--json",
-        metavar="FILE",
-        help="write the page's path and size as JSON; - for standard output",
-    )
-    parser.add_argument("--quiet", action="store_true", help="print nothing")
+    add_quiet(parser)
 
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
@@ -35,11 +31,5 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     path = Path(options.out) if options.out else folder / "report.html"
     page = report(folder)
     write_text(path, page)
-    document = as_json({"file": str(path), "bytes": len(page.encode())})
-    if options.json == "-":
-        out.write(document)
-    elif options.json:
-        write_text(options.json, document)
-    if options.json != "-" and not options.quiet:
-        out.write(f"{path}\n")
+    answer(options, {"file": str(path), "bytes": len(page.encode())}, out, f"{path}\n")
     return 0

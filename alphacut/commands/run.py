@@ -9,10 +9,19 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TextIO
 
-from alphacut.case.checks import FILES
+from alphacut.case.case import Case
+from alphacut.case.checks import FILES, replaced
+from alphacut.case.idle import idle_mesh, require_read
 from alphacut.case.load import load
 from alphacut.case.quick import banner, quick, settings
-from alphacut.commands.options import add_common, add_workers, check_workers
+from alphacut.commands.options import (
+    add_best_effort,
+    add_common,
+    add_workers,
+    answer,
+    check_workers,
+    refuse_beside,
+)
 from alphacut.figures import all as figures
 from alphacut.figures.captions import core
 from alphacut.io.files import as_json, say, whole_file, write_text
@@ -23,6 +32,7 @@ from alphacut.io.units import engineering, largest_by_unit
 from alphacut.stages import exceedance as outcomes
 from alphacut.stages import summary
 from alphacut.stages import width_shares as shares
+from alphacut.stages.contract import require_choice
 from alphacut.stages.pipeline import Chain, Results
 from alphacut.stages.readiness import ready
 
@@ -53,12 +63,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--strict",
         action="store_true",
-        help="refuse a time step or tolerance too coarse for the motion",
+        help="refuse a step or tolerance too coarse for the motion",
     )
+    add_best_effort(parser)
     parser.add_argument(
         "--quick",
         action="store_true",
-        help="the quick form: same stages in seconds on coarse meshes; numbers mean nothing",
+        help="all stages in seconds, coarse: numbers mean nothing",
     )
     parser.add_argument("--no-figures", action="store_true", help="numbers only")
 
@@ -67,6 +78,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     """Compute, draw, compare."""
     check_workers(options.workers)
     case = load(options.case, options.set)
+    require_read(case, read_by(case), "run")
+    require_effect(options, case)
     case = quick(case) if options.quick else case
     folder = Path(options.out or f"results/{case.name}{'-quick' if options.quick else ''}")
     if problems := list(unwritable("--out", folder, folder=True)):
@@ -79,7 +92,14 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         say(f"warning: {warning}")
     start = time.perf_counter()
     chain = Chain(
-        case, folder, options.workers, options.fresh, options.quiet, petsc, options.strict
+        case,
+        folder,
+        options.workers,
+        options.fresh,
+        options.quiet,
+        petsc,
+        options.strict,
+        options.best_effort or options.quick,
     )
     results = chain.run()
     driving = chain.stored("shares.nc", *driven(chain, results))
@@ -92,22 +112,46 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         "figures": drawn,
         "seconds": time.perf_counter() - start,
     }
-    document = as_json(found, indent=2)
-    write_text(folder / "summary.json", document)
-    if options.json == "-":
-        out.write(as_json(found))
-    elif options.json:
-        write_text(options.json, document)
-    if options.json != "-" and not options.quiet:
-        out.write(f"{banner(found['quick'])}\n" if options.quick else "")
-        out.write(summary.table(found["paper"]) if found["paper"] else "")
-        out.write(main_numbers(found))
+    write_text(folder / "summary.json", as_json(found, indent=2))
+    text = f"{banner(found['quick'])}\n" if options.quick else ""
+    text += summary.table(found["paper"]) if found["paper"] else ""
+    if answer(options, found, out, text + main_numbers(found)):
         say(
             f"results are in {folder}, {len(drawn)} figures among them, after"
             f" {found['seconds']:.0f} s"
         )
         say(f"next: {door()} report {shlex.quote(str(folder))}")
     return 0
+
+
+PARTS = {
+    "microstructure": ("microstructure",),
+    "modulus": ("radius", "cell", "mesh", "modulus", "response"),
+    "envelope": ("frame", "pendulum", "tower", "envelope", "exceedance", "modulus"),
+}
+"""Sections that a stage reads."""
+
+
+def read_by(case: Case) -> tuple[str, ...]:
+    """Sections and keys that the stages of a case read."""
+    own = (section for stage in case.stages for section in PARTS[stage])
+    return ("stages", "title", "about", *dict.fromkeys(own))
+
+
+def require_effect(options: argparse.Namespace, case: Case) -> None:
+    """Refuse options that have no effect on this case.
+
+    Raises:
+        BadInput: One is given.
+    """
+    computed = "modulus" in case.stages and not replaced(case)
+    models = (case.text("modulus.method"),) if computed else ()
+    if computed and (problems := list(idle_mesh(case, models))):
+        raise BadInput(problems)
+    if options.quick:
+        refuse_beside(options, "--quick", {"--best-effort": ""})
+    if options.best_effort:
+        require_choice(case, modulus=computed, envelope="envelope" in case.stages)
 
 
 def main_numbers(found: Mapping[str, Any]) -> str:

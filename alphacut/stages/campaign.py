@@ -159,9 +159,11 @@ def campaign(
     # no other method's samples depend on the range, and a wider one may take them as they are
     if choice.method in TABULATED:
         choice = replace(choice, moduli=(support.lower, support.upper))
+    if choice.tolerance is not None and choice.named:
+        choice = replace(choice, estimate=True)  # so that every sample can be held to it
     if case.has("response.quantity") and choice.method == "auto" and "series" not in choice.exclude:
         # a curve needs more nodes than its mean, and they cost little
-        choice = replace(choice, tolerance=min(choice.tolerance, OF_CURVES))
+        choice = replace(choice, tolerance=min(choice.tolerance or 1.0, OF_CURVES))
     task = CellTask(choice, crisp, case.numbers("radius.theta"))
     shared = tuple(name for name in inputs if name in SHARED) or ("inclusion_modulus",)
     return Campaign(

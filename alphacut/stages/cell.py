@@ -13,13 +13,13 @@ from alphacut.io.problem import BadInput, Problem
 from alphacut.io.provenance import versions
 from alphacut.rve.anisotropy import directional_shear, directional_young, shear_ratio
 from alphacut.rve.cell import Phase
+from alphacut.stages.contract import resolution_named
 from alphacut.stochastic import HermiteMap, RadiusMap, TruncatedNormal
 
 if TYPE_CHECKING:
     from alphacut.rve.result import Homogenised
 
 GPA = 1e9
-LEAST_TOLERANCE, MOST_TOLERANCE = 1e-10, 0.1  # of E, see rve.choice.AutoModel
 INPUTS = (
     "a1",
     "a2",
@@ -57,7 +57,9 @@ class CellChoice:
         layers: Element layers in θ.
         size: Element size over half the cell's side.
         interface: conforming, or sign.
-        tolerance: Relative tolerance on E, for method auto.
+        tolerance: Relative error of E asked for; None for each model's own accuracy, and 1e-4 of
+            method auto.
+        named: Whether the resolution is named, so that no tolerance refines it.
         exclude: Models that method auto must not take.
         petsc: PETSc options that override the solver's, without their prefix.
         parallel: Whether all MPI ranks work on one cell together.
@@ -71,13 +73,25 @@ class CellChoice:
     layers: int = 12
     size: float = 0.15
     interface: str = "conforming"
-    tolerance: float = 1e-4
+    tolerance: float | None = None
+    named: bool = True
     exclude: tuple[str, ...] = ()
     petsc: Mapping[str, str] = field(default_factory=dict)
     parallel: bool = False
     moduli: tuple[float, float] | None = None
     estimate: bool = False
     stiffness: bool = False
+
+    @property
+    def words(self) -> str:
+        """One line: the model of each sample, and what it is to keep."""
+        mesh = f", {self.layers} layers" if self.method == "prism" else ""
+        mesh = f", mesh size {self.size:g}{mesh}" if self.method in ("prism", "slices") else ""
+        mesh += f", interface {self.interface}" if self.method == "prism" else ""
+        asked = "" if self.tolerance is None else f", relative error of E up to {self.tolerance:g}"
+        refined = self.tolerance is not None and not self.named
+        without = f", without {', '.join(self.exclude)}" if self.exclude else ""
+        return f"each sample by method {self.method}{'' if refined else mesh}{asked}{without}"
 
     def model(self) -> CellModel:
         """The model itself; this is where DOLFINx may be imported."""
@@ -92,26 +106,20 @@ def cell_choice(
     """The model that a case asks for.
 
     Raises:
-        BadInput: The case names its model, so that none can be excluded; or auto is asked for what
-            no model reaches.
+        BadInput: The case names its model, so that none can be excluded.
     """
-    method, tolerance = case.text("modulus.method"), case.number("modulus.tolerance")
+    method = case.text("modulus.method")
+    tolerance = case.number("modulus.tolerance") if case.asked("modulus.tolerance") else None
     if exclude and method != "auto":
         what = f"the method is {method}, and only method auto leaves a choice"
         raise BadInput(Problem("--exclude", what, ", ".join(exclude), "beside --method auto"))
-    if method == "auto" and not LEAST_TOLERANCE <= tolerance <= MOST_TOLERANCE:
-        allowed = f"from {LEAST_TOLERANCE:g} to {MOST_TOLERANCE:g} with method auto"
-        raise BadInput(
-            Problem(
-                "modulus.tolerance", "out of range", f"{tolerance:g}", allowed, file=str(case.path)
-            )
-        )
     return CellChoice(
         method,
         case.integer("mesh.layers"),
         case.number("mesh.size"),
         case.text("mesh.interface"),
         tolerance,
+        resolution_named(case) or bool(petsc),
         exclude,
         petsc or {},
     )

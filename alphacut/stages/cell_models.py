@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import os
-from dataclasses import fields
 from importlib import import_module
 from pathlib import Path
-from typing import Any, cast
 
 from alphacut.io.problem import BadInput, Problem
-from alphacut.rve.model import MODELS, named
+from alphacut.rve.auto.model import AutoModel
+from alphacut.rve.auto.refined import RefinedModel
+from alphacut.rve.series.model import SeriesModel
+from alphacut.rve.table.model import TableModel
 from alphacut.stages.cell import CellChoice, CellModel
+
+SHARE = 0.4
+"""Of the tolerance, for the series at each θ and again for its rule in θ."""
 
 
 def table_folder() -> Path | None:
@@ -33,14 +37,18 @@ def cell_model(choice: CellChoice) -> CellModel:
     Raises:
         BadInput: The model needs what is not installed, or refuses an option.
     """
-    module, maker = MODELS[choice.method]
+    if choice.petsc and choice.method != "prism":
+        what = f"method {choice.method} does not use PETSc"
+        raise BadInput(
+            [Problem(f"-rve_{name}", what, allowed="--method prism") for name in choice.petsc]
+        )
     try:
-        known = {field.name for field in fields(getattr(import_module(module), maker))}
         if choice.method in ("slices", "prism") or (
             choice.method == "auto" and "series" in choice.exclude
         ):
             # DOLFINx is loaded before the clock starts: times are those of computing
             import_module("alphacut.rve.planar.problem")
+        return made(choice)
     except ImportError as error:
         what = (
             f"this model cannot be loaded ({error}); ./enter brings an environment that has"
@@ -49,30 +57,52 @@ def cell_model(choice: CellChoice) -> CellModel:
         raise BadInput(
             Problem("modulus.method", what, choice.method, "series needs NumPy and SciPy alone")
         ) from None
-    if choice.petsc and "petsc" not in known:
-        what = f"method {choice.method} does not use PETSc"
-        raise BadInput(
-            [Problem(f"-rve_{name}", what, allowed="--method prism") for name in choice.petsc]
-        )
-    offered: dict[str, Any] = {
-        "layers": choice.layers,
-        "mesh_size": choice.size,
-        "interface": choice.interface,
-        "petsc": dict(choice.petsc),
-        "tolerance": choice.tolerance,
-        "exclude": choice.exclude,
-        "parallel": choice.parallel,
-        "cache": table_folder(),
-        "moduli": choice.moduli,
-        "estimate": choice.estimate,
-        "stiffness": choice.stiffness,
-    }
-    try:
-        return cast(
-            CellModel,
-            named(
-                choice.method, **{name: value for name, value in offered.items() if name in known}
-            ),
-        )
     except ValueError as error:
-        raise BadInput(Problem("mesh", str(error))) from None
+        keys = {"exclude": "--exclude", "accuracy": "modulus.tolerance"}
+        key = next((key for word, key in keys.items() if word in str(error)), "mesh")
+        raise BadInput(Problem(key, str(error))) from None
+
+
+def made(choice: CellChoice) -> CellModel:
+    """The model itself.
+
+    Raises:
+        ValueError: An option of it is out of range.
+        ImportError: It needs what is not installed.
+    """
+    tolerance = choice.tolerance
+    if choice.method == "auto":
+        return AutoModel(
+            AutoModel.tolerance if tolerance is None else tolerance,
+            choice.exclude,
+            table_folder(),
+            choice.moduli,
+        )
+    if choice.method == "series":
+        own = SeriesModel.accuracy if tolerance is None else max(SHARE * tolerance, 1e-12)
+        return SeriesModel(accuracy=own)
+    if choice.method == "table":
+        accuracy = TableModel.accuracy if tolerance is None else tolerance
+        return TableModel(accuracy, table_folder(), moduli=choice.moduli)
+    if tolerance is not None and not choice.named:
+        return RefinedModel(choice.method, tolerance)
+    return meshed(choice)
+
+
+def meshed(choice: CellChoice) -> CellModel:
+    """Finite elements of the resolution that is named."""
+    if choice.method == "slices":
+        from alphacut.rve.slices.model import SlicesModel
+
+        return SlicesModel(mesh_size=choice.size)
+    from alphacut.rve.prism.model import PrismModel
+
+    return PrismModel(
+        choice.size,
+        choice.layers,
+        choice.interface,
+        petsc=dict(choice.petsc),
+        parallel=choice.parallel,
+        stiffness=choice.stiffness,
+        estimate=choice.estimate,
+    )

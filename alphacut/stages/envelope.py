@@ -16,8 +16,9 @@ from alphacut.io.files import say, whole_file
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
 from alphacut.io.provenance import attributes, versions
+from alphacut.stages.contract import keep
 from alphacut.stages.resolution_checks import guard_against
-from alphacut.stages.structure import structure
+from alphacut.stages.structure import Structure, structure
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
     from alphacut.frame import Envelope
 
+TOLERANCES = ("envelope.relative_tolerance", "envelope.tolerance", "pendulum.tolerance")
 SHARE = 1e-3  # the tolerance where no output is a displacement: of their peaks
 
 
@@ -193,6 +195,45 @@ def document(found: Envelope, tried: Array) -> dict[str, Any]:
         "facts": dict(found.facts),
         "versions": versions(),
     }
+
+
+def reached(found: Envelope, wanted: Structure, task: EnvelopeTask) -> float | None:
+    """The largest declared error over what the tolerance allows of its output, times the
+    tolerance; None where no error is declared.
+    """
+    from alphacut.frame.boxes import UnitFlow, boxes
+
+    if found.error is None:
+        return None
+    cuts = boxes(wanted.inputs(task.fuzzy), task.alpha)
+    scheme = task.scheme if wanted.linear is not None else task.integrator
+    flow = wanted.flow(cuts.names, task.duration, task.step, scheme)
+    scale = UnitFlow(flow, cuts, task.relative and task.certify is None).scale
+    return float((found.error.max((0, 1)) / scale).max())
+
+
+def keep_tolerance(case: Case, dataset: xarray.Dataset, *, best_effort: bool) -> None:
+    """Require the declared error of an envelope within the case's tolerance, where it names one.
+
+    Args:
+        case: The case.
+        dataset: The envelope, of which `with_peaks` keeps what was reached.
+        best_effort: Only warn.
+
+    Raises:
+        ToleranceMissedError: The error is larger.
+    """
+    asked = [key for key in TOLERANCES if case.asked(key)]
+    if not asked or "reached" not in dataset.attrs:
+        return
+    unit = {"envelope.tolerance": " m", "pendulum.tolerance": " N"}.get(asked[0], " of a peak")
+    keep(
+        float(dataset.attrs["reached"]),
+        case.number(asked[0]),
+        of=f"the error of the envelope by method {dataset.attrs['method']}, in{unit},",
+        cure="--method auto reaches it",
+        best_effort=best_effort,
+    )
 
 
 def write(dataset: xarray.Dataset, path: Path | str, *, case_text: str, key: str) -> None:

@@ -46,6 +46,7 @@ def with_peaks(found: Envelope, wanted: Structure, task: EnvelopeTask) -> xarray
     """
     from alphacut.frame.boxes import boxes
     from alphacut.frame.exceedance import peaks, tried_peaks
+    from alphacut.stages.envelope import reached
 
     of, cuts = peaks(found), boxes(wanted.inputs(task.fuzzy), task.alpha)
     tried = tried_peaks(
@@ -67,8 +68,11 @@ def with_peaks(found: Envelope, wanted: Structure, task: EnvelopeTask) -> xarray
             "least peak among trajectories tried; the true one lies between the bound and this"
         ),
     }
-    return dataset.assign(peak_tried=(("alpha", "output"), tried, least)).assign_coords(
-        bound=["lower", "upper"]
+    error = reached(found, wanted, task)
+    return (
+        dataset.assign(peak_tried=(("alpha", "output"), tried, least))
+        .assign_coords(bound=["lower", "upper"])
+        .assign_attrs({} if error is None else {"reached": error})
     )
 
 

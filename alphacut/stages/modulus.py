@@ -266,6 +266,16 @@ def write(modulus: FuzzyModulus, path: Path | str, *, case_text: str, key: str) 
         dataset.to_netcdf(partial)
 
 
+def listed(dataset: xarray.Dataset, kind: str) -> dict[str, float]:
+    """Named numbers of a dataset, such as errors by source."""
+    if kind not in dataset:
+        return {}
+    return {
+        str(name): float(value)
+        for name, value in zip(dataset[f"{kind}_name"].values, dataset[kind].values, strict=True)
+    }
+
+
 def read_number(path: Path | str, option: str = "--modulus") -> FuzzyNumber:
     """The fuzzy modulus in Pa from a file that `write` made.
 

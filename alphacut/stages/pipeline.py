@@ -18,6 +18,7 @@ from alphacut.io.provenance import attributes, fingerprint
 from alphacut.stages import envelope, microstructure, modulus, response
 from alphacut.stages import exceedance as outcomes
 from alphacut.stages.campaign import campaign
+from alphacut.stages.contract import keep_modulus
 from alphacut.stages.microstructure import write as write_microstructure
 from alphacut.stages.structure import structure
 
@@ -58,6 +59,7 @@ class Chain:
         quiet: No progress.
         petsc: PETSc options that override the solver's.
         strict: Refuse a time step that cannot resolve the fastest mode.
+        best_effort: Take results whose error is above the tolerance.
     """
 
     case: Case
@@ -67,6 +69,7 @@ class Chain:
     quiet: bool = False
     petsc: Mapping[str, str] = field(default_factory=dict)
     strict: bool = False
+    best_effort: bool = False
 
     def file(self, name: str) -> Path:
         """A file among the results."""
@@ -140,7 +143,10 @@ class Chain:
                 found = modulus.compute(wanted, workers=self.workers, progress=tick)
             modulus.write(found, path, case_text=self.case.text_of_file, key=key)
 
-        return self.stored("modulus.nc", key, compute)
+        found = self.stored("modulus.nc", key, compute)
+        error = modulus.listed(found, "error")
+        keep_modulus(self.case, str(found.attrs["method"]), error, best_effort=self.best_effort)
+        return found
 
     def response(self, cell: xarray.Dataset) -> xarray.Dataset:
         """The random and fuzzy stress of the cell, in response.nc."""
@@ -177,7 +183,9 @@ class Chain:
             dataset = outcomes.with_peaks(found, structure(self.case, handed), study.task)
             envelope.write(dataset, path, case_text=self.case.text_of_file, key=key)
 
-        return self.stored(f"envelope_{study.name}.nc", key, compute)
+        found = self.stored(f"envelope_{study.name}.nc", key, compute)
+        envelope.keep_tolerance(self.case, found, best_effort=self.best_effort)
+        return found
 
     def exceedance(self, handed: FuzzyNumber | None) -> xarray.Dataset:
         """The fuzzy probability of exceeding the case's limit, in exceedance.nc."""

@@ -13,7 +13,7 @@ import numpy as np
 from alphacut.case.checks import stand_ins
 from alphacut.io.provenance import FORMAT, command, versions
 from alphacut.stages import exceedance as outcomes
-from alphacut.stages import response
+from alphacut.stages import modulus, response
 from alphacut.stages.cell import GPA, SHARED, key_of, parts
 from alphacut.stages.pipeline import Results
 from alphacut.stages.structure import structure
@@ -93,7 +93,7 @@ def modulus_numbers(dataset: xarray.Dataset) -> dict[str, Any]:
     }
     cost["reason"] = dataset.attrs.get("reason", "")
     cost |= {name: dataset.attrs[name] for name in ("shear_ratio",) if name in dataset.attrs}
-    budget = {"error": listed(dataset, "error"), "checks": listed(dataset, "check")}
+    budget = {"error": modulus.listed(dataset, "error"), "checks": modulus.listed(dataset, "check")}
     return {**cuts, **support, **cost, **budget}
 
 
@@ -107,16 +107,6 @@ def given(results: Results) -> Row:
         "of": f"{key} = {results.case.written.get(key, '')}",
         "alpha": alpha,
         "E_GPa": {"lower": cuts[:, 0], "upper": cuts[:, 1]},
-    }
-
-
-def listed(dataset: xarray.Dataset, kind: str) -> dict[str, float]:
-    """Named numbers of a dataset, such as errors by source."""
-    if kind not in dataset:
-        return {}
-    return {
-        str(name): float(value)
-        for name, value in zip(dataset[f"{kind}_name"].values, dataset[kind].values, strict=True)
     }
 
 

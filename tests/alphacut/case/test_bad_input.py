@@ -118,12 +118,15 @@ def test_a_bad_case_is_one_line_per_problem_and_status_2(name, tmp_path, capfd):
         (["cell", "."], "this is a folder"),
         (["cell", str(PAPER), "--layers", "0"], "mesh.layers = 0"),
         (
-            ["cell", str(PAPER), "--inclusion-modulus", "80"],
+            ["cell", str(PAPER), "--set", "cell.inclusion_modulus=80"],
             "inclusion_modulus = 80: the unit is missing",
         ),
-        (["cell", str(PAPER), "--a2", "9"], r"must stay inside \(0, 1\)"),
+        (["cell", str(PAPER), "--set", "radius.a2=9"], r"must stay inside \(0, 1\)"),
         (["cell", str(PAPER), "--layer", "3"], "no such option.*mean --layers"),
-        (["cell", str(PAPER), "--exclude", "serie"], "--exclude.*no model serie"),
+        (
+            ["cell", str(PAPER), "--method", "auto", "--exclude", "serie"],
+            "--exclude.*no model serie",
+        ),
         (
             ["cell", str(PAPER), "--set", "matrix_modulis=20 GPa"],
             "--set.*no key matrix_modulis.*mean cell.matrix_modulus",
@@ -222,7 +225,7 @@ KNOWN = ["--modulus", "[24, 25, 26] GPa", "--fuzzy", "m8"]
             r"envelope.step: 1 s between nodes and a first natural period of 0.96 s: up to \d+ %",
         ),
         (
-            ["--certify", "1 mm", "--integrator", "newmark"],
+            ["--certify", "1 mm", "--set", "envelope.integrator=newmark"],
             2,
             "envelope.integrator = newmark: a certificate is of the exact motion",
         ),

@@ -77,6 +77,8 @@ def test_a_fuzzy_ratio_widens_the_envelope_from_the_command_line(tmp_path, capfd
             "0",
             "--method",
             "modal",
+            "--tolerance",
+            "1 mm",
             "--json",
             "-",
         ]

@@ -44,11 +44,17 @@ def refused(arguments, pattern, capfd):
             ["envelope", PAPER, "-rve_ksp_rtol", "1e-3"],
             "-rve_ksp_rtol: command envelope does not use PETSc",
         ),
-        (["cell", PAPER, "--a2", "0,1"], "write 0.1 with a point"),
-        (["cell", PAPER, "--matrix-modulus", "22,5 GPa"], "write 22.5 with a point"),
-        (["cell", PAPER, "--inclusion-modulus", "[90,5, 95, 105] GPa"], "write 90.5 with a point"),
-        (["cell", PAPER, "--inclusion-modulus", "80 gpa"], "did you mean GPa"),
-        (["cell", PAPER, "--inclusion-modulus", "[95, 90, 105] GPa"], "lower ≤ modal ≤ upper"),
+        (["cell", PAPER, "--set", "radius.a2=0,1"], "write 0.1 with a point"),
+        (["cell", PAPER, "--set", "cell.matrix_modulus=22,5 GPa"], "write 22.5 with a point"),
+        (
+            ["cell", PAPER, "--set", "cell.inclusion_modulus=[90,5, 95, 105] GPa"],
+            "write 90.5 with a point",
+        ),
+        (["cell", PAPER, "--set", "cell.inclusion_modulus=80 gpa"], "did you mean GPa"),
+        (
+            ["cell", PAPER, "--set", "cell.inclusion_modulus=[95, 90, 105] GPa"],
+            "lower ≤ modal ≤ upper",
+        ),
         (["envelope", PAPER, "--set", "frame.masses=['20 t', '10 gt', '5 t']"], 'entry 2, "10 gt"'),
         (
             ["envelope", PAPER, "--set", "frame.masses=['20 t', '-10 t', '5 t']"],

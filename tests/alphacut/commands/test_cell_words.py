@@ -9,18 +9,18 @@ from alphacut.entry import main
 
 PAPER = str(Path(__file__).parents[3] / "cases" / "paper.toml")
 STIFF = [
-    "--inclusion-modulus",
-    "70 GPa",
-    "--matrix-modulus",
-    "3 GPa",
-    "--a1",
-    "0.79",
-    "--a2",
-    "0.02",
-    "--a3",
-    "0.81",
-    "--a4",
-    "0.02",
+    "--set",
+    "cell.inclusion_modulus=70 GPa",
+    "--set",
+    "cell.matrix_modulus=3 GPa",
+    "--set",
+    "radius.a1=0.79",
+    "--set",
+    "radius.a2=0.02",
+    "--set",
+    "radius.a3=0.81",
+    "--set",
+    "radius.a4=0.02",
 ]
 
 
@@ -47,10 +47,10 @@ def test_a_modulus_that_no_isotropic_composite_has_comes_with_a_warning(command,
 def test_the_modulus_says_what_its_bounds_are_worth_and_the_error_that_they_do_not_count(capfd):
     pytest.importorskip("dolfinx")
     coarse = [
-        "--mesh-size",
-        "0.5",
-        "--layers",
-        "3",
+        "--set",
+        "mesh.size=0.5",
+        "--set",
+        "mesh.layers=3",
         "--plan",
         "reduced",
         "--set",

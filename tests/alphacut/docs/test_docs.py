@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from alphacut.commands.options import split_petsc
+from alphacut.commands.parser import split_petsc
 from alphacut.docs import library_page
 from alphacut.docs.case_format import commands, page
 from alphacut.entry import COMMANDS, main, parsers

@@ -81,18 +81,18 @@ def test_a_material_card_holds_the_plane_stiffness_without_being_asked(
 def test_an_isotropic_card_says_how_isotropic_it_is(ending, mark, tmp_path):
     path = tmp_path / f"material{ending}"
     stiff = [
-        "--inclusion-modulus",
-        "70 GPa",
-        "--matrix-modulus",
-        "3 GPa",
-        "--a1",
-        "0.79",
-        "--a2",
-        "0.02",
-        "--a3",
-        "0.81",
-        "--a4",
-        "0.02",
+        "--set",
+        "cell.inclusion_modulus=70 GPa",
+        "--set",
+        "cell.matrix_modulus=3 GPa",
+        "--set",
+        "radius.a1=0.79",
+        "--set",
+        "radius.a2=0.02",
+        "--set",
+        "radius.a3=0.81",
+        "--set",
+        "radius.a4=0.02",
     ]
     assert (
         main(["cell", PAPER, "--method", "series", *stiff, "--quiet", "--export", str(path)]) == 0

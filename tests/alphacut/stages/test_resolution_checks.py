@@ -59,13 +59,11 @@ def test_a_coarse_tolerance_warns_and_is_refused_under_strict(capfd):
                 "envelope",
                 PAPER,
                 *SHORT,
-                "--tolerance",
-                "1 cm",
                 "--method",
                 "vertex",
                 "--strict",
-                "--integrator",
-                "exact",
+                "--set",
+                "envelope.integrator=exact",
             ]
         )
         == 0
@@ -96,13 +94,14 @@ def test_a_tolerance_may_be_a_share_of_each_peak(capfd):
     assert (task.tolerance, task.relative) == (0.001, True)
     found = {}
     for option, value in (
-        ("--relative-tolerance", "0.0001"),
+        ("--set", "envelope.relative_tolerance=0.0001"),
         ("--tolerance", "1 um"),
-        ("--relative-tolerance", "0.01"),
+        ("--set", "envelope.relative_tolerance=0.01"),
     ):
         assert main(["envelope", PAPER, *SHORT, option, value, "--json", "-"]) == 0
         found[value] = json.loads(capfd.readouterr().out)["trajectories"]
-    assert found["0.01"] < found["0.0001"] <= found["1 um"]
+    assert found["envelope.relative_tolerance=0.01"] < found["envelope.relative_tolerance=0.0001"]
+    assert found["envelope.relative_tolerance=0.0001"] <= found["1 um"]
 
 
 @pytest.mark.parametrize(

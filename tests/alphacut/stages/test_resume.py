@@ -28,10 +28,13 @@ def test_a_wider_support_and_other_plans_take_what_is_stored(tmp_path, capfd):
     whole = run([*SERIES, *store], capfd)
     assert 0 < whole["reused"] < whole["samples"] == 225
     wider = run(
-        [*SERIES, *store, "--plan", "reduced", "--inclusion-modulus", "[70, 80, 85] GPa"], capfd
+        [*SERIES, *store, "--plan", "reduced", "--set", "cell.inclusion_modulus=[70, 80, 85] GPa"],
+        capfd,
     )
     assert wider["reused"] > 0
-    other = run([*SERIES, *store, "--plan", "reduced", "--matrix-modulus", "21 GPa"], capfd)
+    other = run(
+        [*SERIES, *store, "--plan", "reduced", "--set", "cell.matrix_modulus=21 GPa"], capfd
+    )
     assert other["reused"] == 0
 
 

@@ -1,0 +1,90 @@
+"""Keys that have no effect beside the method that is chosen, and changes that no command reads."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+
+from alphacut.case.case import Case
+from alphacut.io.problem import BadInput, Problem
+
+STEERED = ("auto", "modal", "graph-follower", "improved-graph-follower")
+FOLLOWERS = ("graph-follower", "improved-graph-follower")
+OF_MODELS = {
+    "mesh.layers": ("prism",),
+    "mesh.size": ("prism", "slices"),
+    "mesh.interface": ("prism",),
+}
+"""Keys of the mesh with the models of the cell that have them; `alphacut mesh` has them always."""
+OF_ENVELOPES = {
+    "envelope.order": FOLLOWERS,
+    "envelope.tolerance": STEERED,
+    "envelope.relative_tolerance": STEERED,
+    "pendulum.tolerance": STEERED,
+}
+"""Keys with the methods of an envelope that have them."""
+
+
+def idle_mesh(case: Case, models: Collection[str]) -> Iterator[Problem]:
+    """Changed keys of the mesh that none of the models has; those of the file stay for the other
+    models and for `alphacut mesh`.
+    """
+    for key, known in OF_MODELS.items():
+        if key in case.changed and not set(models) & set(known):
+            named = " and ".join(models)
+            yield Problem(
+                key,
+                f"method {named} has no such option",
+                str(case.written[key]),
+                f"beside method {' or '.join(known)}",
+                file="command line",
+            )
+
+
+def idle_envelope(case: Case) -> Iterator[Problem]:
+    """Keys that the method of the envelope does not have; where the command line changes the method
+    those of the file are passed over.
+    """
+    if not case.has("envelope.method"):
+        return
+    method = case.text("envelope.method")
+    for key, known in OF_ENVELOPES.items():
+        if not case.asked(key) or method in known:
+            continue
+        if key in case.changed or "envelope.method" not in case.changed:
+            yield Problem(
+                key,
+                f"method {method} has no such option",
+                str(case.written[key]),
+                f"beside method {', '.join(known)}",
+            )
+
+
+def require_read(case: Case, sections: Collection[str], command: str) -> None:
+    """Refuse changes of keys that a command does not read.
+
+    Args:
+        case: The case.
+        sections: Sections and full names of keys that the command reads.
+        command: Name of the command, for the message.
+
+    Raises:
+        BadInput: One problem for each key.
+    """
+    unread = [
+        key
+        for key in sorted(case.changed)
+        if key not in sections and not any(key.startswith(f"{name}.") for name in sections)
+    ]
+    if unread:
+        raise BadInput(
+            [
+                Problem(
+                    key,
+                    f"command {command} does not read this key",
+                    str(case.written[key]),
+                    f"keys of {', '.join(sections)}",
+                    file="command line",
+                )
+                for key in unread
+            ]
+        )

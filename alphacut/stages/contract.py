@@ -1,0 +1,89 @@
+"""A tolerance is a contract: a result whose declared error is above what was asked for is an error,
+unless it is taken all the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from alphacut.case.case import Case
+from alphacut.io.files import say
+from alphacut.io.problem import BadInput, Problem
+
+STEERED = ("auto", "table", "series")
+"""Models of the cell that a tolerance always steers."""
+
+
+class ToleranceMissedError(RuntimeError):
+    """A result's declared error is above the tolerance that was asked for."""
+
+
+def keep(reached: float, asked: float, *, of: str, cure: str, best_effort: bool) -> None:
+    """Require a declared error within the tolerance; with `best_effort` only warn.
+
+    Args:
+        reached: Declared error.
+        asked: Tolerance, in the same unit.
+        of: Whose error it is, for the message.
+        cure: What would reach the tolerance.
+        best_effort: Take the result all the same.
+
+    Raises:
+        ToleranceMissedError: The error is larger, and `best_effort` is not set.
+    """
+    if reached <= asked * (1 + 1e-9):
+        return
+    message = f"{of} is up to {reached:.2g}, {asked:.2g} is asked for; {cure}"
+    if not best_effort:
+        raise ToleranceMissedError(f"{message}, or --best-effort takes this result")
+    say(f"warning: {message}")
+
+
+def keep_modulus(case: Case, method: str, error: Mapping[str, float], *, best_effort: bool) -> None:
+    """Require the declared error of E within the case's tolerance, where it names one.
+
+    Raises:
+        ToleranceMissedError: It is larger.
+    """
+    if not case.asked("modulus.tolerance"):
+        return
+    cure = "--method auto reaches it"
+    if method in ("prism", "slices"):
+        cure = f"without mesh.size and mesh.layers method {method} is refined; {cure}"
+    keep(
+        sum(error.values()),
+        case.number("modulus.tolerance"),
+        of=f"the relative error of E by method {method}",
+        cure=cure,
+        best_effort=best_effort,
+    )
+
+
+def resolution_named(case: Case) -> bool:
+    """Whether the case names the mesh that its model of the cell is to have."""
+    return any(case.asked(f"mesh.{name}") for name in ("layers", "size", "interface"))
+
+
+def require_choice(case: Case, *, modulus: bool, envelope: bool) -> None:
+    """Refuse ``--best-effort`` where nothing can miss a tolerance.
+
+    Args:
+        case: The case.
+        modulus: A modulus is computed.
+        envelope: Envelopes are computed.
+
+    Raises:
+        BadInput: No tolerance is asked for, or every method is steered by it.
+    """
+    fixed = modulus and case.asked("modulus.tolerance") and resolution_named(case)
+    fixed = fixed and case.text("modulus.method") not in STEERED
+    keys = ("envelope.tolerance", "envelope.relative_tolerance", "pendulum.tolerance")
+    own = envelope and any(case.asked(key) for key in keys)
+    if not fixed and not (own and case.text("envelope.method") != "auto"):
+        raise BadInput(
+            Problem(
+                "--best-effort",
+                "no tolerance can be missed here",
+                allowed="beside a tolerance and a method of a named resolution",
+            )
+        )

@@ -1,0 +1,60 @@
+"""A finite-element model steered by a tolerance: prism or slices, refined until their own estimate
+of the error is small enough.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from alphacut.rve.auto.model import ChoiceError
+from alphacut.rve.cell import Phase
+from alphacut.rve.result import Homogenised
+from alphacut.stochastic import RadiusMap
+
+STEERED = ("prism", "slices")
+
+
+@dataclass(frozen=True)
+class RefinedModel:
+    """The model `name`, refined until the estimated error of E is below `tolerance`.
+
+    Args:
+        name: prism or slices.
+        tolerance: Relative error of E allowed, in [1e-10, 0.1].
+
+    Raises:
+        ValueError: A value lies outside its range.
+    """
+
+    name: str
+    tolerance: float
+
+    def __post_init__(self) -> None:
+        if self.name not in STEERED:
+            raise ValueError(f"model {self.name!r} cannot be refined; allowed: prism, slices")
+        if not 1e-10 <= self.tolerance <= 0.1:
+            raise ValueError(
+                f"the tolerance on E is {self.tolerance:g}; it must lie in [1e-10, 0.1]"
+            )
+
+    def solve(
+        self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
+    ) -> list[Homogenised]:
+        """One result for each of `inclusions`, in their order, all within the tolerance.
+
+        Raises:
+            ChoiceError: The finest resolution leaves more.
+        """
+        from alphacut.rve.auto.refine_prism import refined_prism
+        from alphacut.rve.auto.refine_slices import refined_slices
+
+        refined = refined_prism if self.name == "prism" else refined_slices
+        results = refined(radius_map, matrix, inclusions, tolerance=self.tolerance)
+        worst = max(result.estimated_error for result in results)
+        if not worst <= self.tolerance:
+            raise ChoiceError(
+                f"method {self.name} reaches a relative error of {worst:.1e} in E,"
+                f" {self.tolerance:.1e} is asked for; allow more, or take method auto"
+            )
+        return results

@@ -1,0 +1,332 @@
+"""Every pair of options of every command changes the result, is refused by name, or is explained.
+
+The pairs are those of the parsers themselves: an option that is new has to be given a value here.
+"""
+
+import itertools
+import json
+import re
+import shutil
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+
+import pytest
+
+from alphacut.entry import COMMANDS, main, parsers
+
+CASE = """
+schema = 1
+title = "cheap"
+about = "Coarse enough for hundreds of runs."
+stages = {stages}
+
+[radius]
+a1 = 0.3
+a2 = [0.05, 0.1, 0.15]
+a3 = 0.5
+a4 = 0.1
+
+[cell]
+matrix_modulus = "20 GPa"
+matrix_poisson = 0.3
+inclusion_modulus = "80 GPa"
+inclusion_poisson = 0.3
+
+[mesh]
+layers = 2
+size = 0.6
+
+[modulus]
+method = "series"
+plan = "reduced"
+alpha = [0, 1]
+tolerance = 0.1
+
+[frame]
+second_moment = "1e-6 m^4"
+masses = ["[9, 10, 11] t"]
+lengths = "[2.4, 2.5, 2.6] m"
+dampers = "50 N s/m"
+damper_placement = "ground"
+displacements = "10 mm"
+velocities = "0 m/s"
+{modulus}
+[envelope]
+fuzzy = ["m"]
+alpha = [0]
+method = "auto"
+duration = "2 s"
+step = "0.5 s"
+"""
+PACKED = """
+schema = 1
+title = "packed"
+about = "A few discs."
+stages = ["microstructure"]
+
+[microstructure]
+seed = 1
+bootstrap = 100
+
+[microstructure.packing]
+packings = 5
+discs = 40
+area_fraction = 0.2
+smallest_radius = "1 mm"
+largest_radius = "2 mm"
+"""
+VALUES = {
+    "--json": ("-", "out.json"),
+    "--quiet": ((),),
+    "--a1": ("0.31",),
+    "--a2": ("0.11",),
+    "--a3": ("0.51",),
+    "--a4": ("0.11",),
+    "--matrix-modulus": ("21 GPa",),
+    "--inclusion-modulus": ("81 GPa",),
+    "--layers": ("3",),
+    "--mesh-size": ("0.5",),
+    "--interface": ("sign",),
+    "--plan": ("general",),
+    "--alpha": ("0.5",),
+    "--fuzzy": ("m,l",),
+    "--duration": ("3",),
+    "--step": ("0.25",),
+    "--certify": ("1e-3",),
+    "--modulus": ("25 GPa",),
+    "--exclude": ("modal",),
+    "--best-effort": ((),),
+    "--stiffness": ((),),
+    "--export": ("card.json",),
+    "--cross-check": ("series,prism",),
+    "--workers": ("2",),
+    "--resume": ((),),
+    "--fresh": ((),),
+    "--strict": ((),),
+    "--quick": ((),),
+    "--no-figures": ((),),
+    "--explain": ((),),
+    "--fields": ((),),
+}
+"""Values of every option, none for a flag."""
+OWN = {
+    ("cell", "--set"): ("cell.matrix_poisson=0.25",),
+    ("cell", "--method"): ("prism",),
+    ("cell", "--tolerance"): ("1e-6",),
+    ("cell", "--exclude"): ("table",),
+    ("mesh", "--set"): ("radius.a2=0.12",),
+    ("mesh", "--out"): ("other.vtu",),
+    ("modulus", "--set"): ("cell.matrix_poisson=0.25",),
+    ("modulus", "--method"): ("auto",),
+    ("modulus", "--tolerance"): ("1e-6",),
+    ("modulus", "--exclude"): ("table",),
+    ("modulus", "--store"): ("kept.db",),
+    ("modulus", "--out"): ("modulus.nc",),
+    ("envelope", "--set"): ("frame.dampers=60 N s/m",),
+    ("envelope", "--method"): ("vertex",),
+    ("envelope", "--tolerance"): ("1e-5",),
+    ("envelope", "--out"): ("envelope.nc",),
+    ("run", "--set"): ("frame.dampers=60 N s/m",),
+    ("run", "--out"): ("other",),
+    ("check", "--set"): ("frame.masses=20 t",),
+    ("microstructure", "--set"): ("microstructure.seed=2",),
+    ("microstructure", "--out"): ("particles",),
+    ("report", "--out"): ("page.html",),
+}
+EXPLAINED = {
+    ("--quiet", "--json"): "as with --json -",
+    ("--resume", "--fresh"): "the default",
+    ("--resume", ""): "the default",
+}
+"""An option, beside which other one (or any) it may be idle, and where its help says so."""
+BASE = {"mesh": ["--out", "mesh.vtu"]}
+NEEDS_RESULTS = ("--fresh", "--resume", "--store")
+
+
+def choices(command, parser):
+    """Every option with each of its values, as a list of words."""
+    found = []
+    for action in parser._actions:
+        name = action.option_strings[-1] if action.option_strings else ""
+        if name in ("", "--help"):
+            continue
+        values = OWN.get((command, name)) or VALUES.get(name)
+        assert values, f"{command} {name} has no value in this test"
+        found += [[name, *([value] if value else [])] for value in values]
+    return found
+
+
+class Watched:
+    """Runs of one command, each in a folder of its own, with all that they do and compute."""
+
+    def __init__(self, command, folder, monkeypatch, capfd):
+        self.command, self.folder, self.monkeypatch, self.capfd = (
+            command,
+            folder,
+            monkeypatch,
+            capfd,
+        )
+        self.events, self.known = [], {}
+        self.watch()
+        self.results = folder / "results"
+        self.results.mkdir()
+        self.prepare(self.results)
+
+    def prepare(self, place):
+        """Results of earlier runs, for options that go on from them."""
+        self.monkeypatch.chdir(place)
+        self.write_case(place)
+        if self.command == "modulus":
+            assert main(["modulus", "case.toml", "--store", "kept.db", "--quiet"]) == 0
+            assert main(["modulus", "case.toml", "--resume", "--quiet"]) == 0
+        if self.command in ("run", "report"):
+            for more in ([], ["--out", "other"], ["--quick"]):
+                if not more or self.command == "run":
+                    assert main(["run", "case.toml", "--quiet", *more]) == 0
+
+    def write_case(self, place):
+        """The case of the command."""
+        stages = '["modulus", "envelope"]' if self.command in ("run", "check") else '["envelope"]'
+        stages = '["modulus"]' if self.command == "modulus" else stages
+        own = 'modulus = "25.5 GPa"\n' if self.command == "envelope" else ""
+        text = CASE.format(stages=stages, modulus=own)
+        if self.command == "report":
+            text = CASE.format(stages='["envelope"]', modulus='modulus = "25.5 GPa"\n')
+        text = PACKED if self.command == "microstructure" else text
+        (place / "case.toml").write_text(text, encoding="utf-8")
+
+    def watch(self):
+        """Remember what is computed, whatever is then told; draw no figures."""
+        from alphacut import frame
+        from alphacut.commands import options
+        from alphacut.figures import all as figures
+        from alphacut.fuzzy.campaign import workers
+        from alphacut.io import progress
+        from alphacut.stages import modulus
+
+        real_answer, real_envelope, real_propagate = (
+            options.answer,
+            frame.envelope,
+            modulus.propagate,
+        )
+
+        def answer(given, document, out, text=""):
+            self.events.append(("answer", told(json.dumps(document, default=str))))
+            return real_answer(given, document, out, text)
+
+        @contextmanager
+        def pool(count):
+            self.events.append(("pool", count))
+            with ThreadPoolExecutor(1) as executor:
+                yield executor
+
+        @contextmanager
+        def bar(title, *, quiet=False):
+            self.events.append((title, quiet))
+            yield None
+
+        def envelope(*given, workers=1, **named):
+            self.events.append(("envelope", workers))
+            return real_envelope(*given, **named)
+
+        def propagate(*given, workers=1, **named):
+            self.events.append(("propagate", workers))
+            return real_propagate(*given, **named)
+
+        self.monkeypatch.setattr(progress, "progress", bar)
+        self.monkeypatch.setattr(workers, "pool", pool)
+        self.monkeypatch.setattr(frame, "envelope", envelope)
+        self.monkeypatch.setattr(modulus, "propagate", propagate)
+        self.monkeypatch.setattr(
+            figures, "draw", lambda *_, **__: self.events.append("figures") or ["a.png"]
+        )
+        for module in COMMANDS.values():
+            if hasattr(module, "answer"):
+                self.monkeypatch.setattr(module, "answer", answer)
+            if hasattr(module, "progress"):
+                self.monkeypatch.setattr(module, "progress", bar)
+        from alphacut.stages import pipeline
+
+        self.monkeypatch.setattr(pipeline, "progress", bar)
+
+    def run(self, *words, results=False):
+        """Exit status, output, files and computations of one run."""
+        key = (*words, results)
+        if key not in self.known:
+            place = self.folder / str(len(self.known))
+            if results or self.command == "report":
+                shutil.copytree(self.results, place)
+            else:
+                place.mkdir()
+                self.write_case(place)
+            self.monkeypatch.chdir(place)
+            self.events.clear()
+            subject = "results/case" if self.command == "report" else "case.toml"
+            before = set(place.rglob("*"))
+            status = main([self.command, subject, *BASE.get(self.command, []), *words])
+            out, err = self.capfd.readouterr()
+            files = sorted(
+                f"{path.relative_to(place)} {path.stat().st_size if path.suffix != '.json' else ''}"
+                for path in set(place.rglob("*")) - before
+                if path.is_file() and path.suffix != ".part"
+            )
+            self.known[key] = (status, told(out), told(err), files, list(self.events))
+            shutil.rmtree(place)
+        return self.known[key]
+
+
+def told(text):
+    """A text without the time that a run took and the command line that it tells."""
+    text = re.sub(r'"command": "[^"]*"', "", text)
+    text = re.sub(r'"[a-z_]*seconds[a-z_]*": ([^,{}\[\]]+|\{[^}]*\})', "", text)
+    text = re.sub(r"seconds: .*", "", text)
+    text = re.sub(r"CASE --modulus .*", "", text)
+    return re.sub(r"\d+(\.\d+)? s\b", "", text)
+
+
+def explained(parser, option, other):
+    """Whether the help of an option says that it may be idle beside another one."""
+    words = EXPLAINED.get((option, other)) or EXPLAINED.get((option, ""))
+    about = [a.help for a in parser._actions if option in a.option_strings]
+    return bool(words) and words in about[0]
+
+
+def ignored(watched, parser, first, second):
+    """Those of two options that change nothing beside the other one."""
+    needed = any(option[0] in NEEDS_RESULTS for option in (first, second))
+    for one, other in ((first, second), (second, first)):
+        both = watched.run(*first, *second, results=needed)
+        if both[0] == 2:
+            assert both[2].startswith("alphacut: ")
+            return
+        if both == watched.run(*other, results=needed) and not explained(parser, one[0], other[0]):
+            yield f"{' '.join(one)} beside {' '.join(other)}"
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_no_option_is_ignored_beside_another(command, tmp_path, monkeypatch, capfd):
+    if command in ("cell", "mesh"):
+        pytest.importorskip("dolfinx")
+    parser = parsers("alphacut", COMMANDS)[1][command]
+    watched = Watched(command, tmp_path, monkeypatch, capfd)
+    wrong = []
+    for first, second in itertools.combinations(choices(command, parser), 2):
+        if first[0] != second[0]:
+            wrong += ignored(watched, parser, first, second)
+    assert not wrong
+
+
+def test_an_ignored_option_would_be_seen(tmp_path, monkeypatch, capfd):
+    parser = parsers("alphacut", COMMANDS)[1]["check"]
+    watched = Watched("check", tmp_path, monkeypatch, capfd)
+    first, second = ["--json", "-"], ["--set", "frame.masses=20 t"]
+    watched.known[(*first, *second, False)] = watched.run(*first)
+    assert list(ignored(watched, parser, first, second)) == [
+        "--set frame.masses=20 t beside --json -"
+    ]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_fits_on_a_screen(command, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert len(parsers("alphacut", COMMANDS)[1][command].format_help().splitlines()) <= 40
