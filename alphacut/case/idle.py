@@ -25,9 +25,7 @@ OF_ENVELOPES = {
 
 
 def idle_mesh(case: Case, models: Collection[str]) -> Iterator[Problem]:
-    """Changed keys of the mesh that none of the models has; those of the file stay for the other
-    models and for `alphacut mesh`.
-    """
+    """Changed keys of the mesh that no model has; `alphacut mesh` reads those of the file."""
     for key, known in OF_MODELS.items():
         if key in case.changed and not set(models) & set(known):
             named = " and ".join(models)
@@ -41,9 +39,7 @@ def idle_mesh(case: Case, models: Collection[str]) -> Iterator[Problem]:
 
 
 def idle_envelope(case: Case) -> Iterator[Problem]:
-    """Keys that the method of the envelope does not have; where the command line changes the method
-    those of the file are passed over.
-    """
+    """Keys that the method does not have; a changed method passes over those of the file."""
     if not case.has("envelope.method"):
         return
     method = case.text("envelope.method")

@@ -31,7 +31,7 @@ from alphacut.rve.cell import STRAIN
 from alphacut.rve.model import cross_check
 from alphacut.rve.result import Homogenised
 from alphacut.stages import cell
-from alphacut.stages.contract import keep_modulus, require_choice
+from alphacut.stages.contract import contract, keep_modulus, require_choice
 
 ABOUT = "homogenise the cell at crisp values; a fuzzy input takes its modal value"
 
@@ -116,6 +116,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     if options.export:
         export(result, options.export)
     found = {**cell.document(result), **({} if difference is None else {"difference": difference})}
+    found["model"] = choice.words
+    found["tolerance"] = contract(case, sum(result.error.values()) if result.error else None)
     if answer(options, found, out, summary(result)):
         out.write(agreement(pair, difference, allowed_difference(case)))
         modal = cell.parts(cell.modal_values(case), case.numbers("radius.theta"))

@@ -105,7 +105,12 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         envelope.write(dataset, options.out, case_text=case.text_of_file, key=key)
     limit = exceeded(options, case, handed)
     tried = dataset["peak_tried"].values
-    document = {**envelope.document(found, tried), **({"exceedance": limit} if limit else {})}
+    contract = {"asked": task.tolerance, "reached": dataset.attrs.get("reached")}
+    document = {
+        **envelope.document(found, tried),
+        "tolerance": contract,
+        **({"exceedance": limit} if limit else {}),
+    }
     text = summary(found, tried[0]) + (outcomes.sentence(limit) if limit else "")
     answer(options, document, out, text)
     return 0

@@ -33,7 +33,7 @@ from alphacut.rve.auto.model import ORDER
 from alphacut.stages import modulus, response
 from alphacut.stages.campaign import campaign
 from alphacut.stages.cell import GPA
-from alphacut.stages.contract import keep_modulus, require_choice
+from alphacut.stages.contract import contract, keep_modulus, require_choice
 
 ABOUT = "fuzzy effective modulus by the transformation method over all fuzzy inputs of the cell"
 KEYS = {
@@ -83,7 +83,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     exclude = named_models("--exclude", options.exclude)
     wanted = campaign(case, petsc=petsc, exclude=exclude, store=store_of(options, case))
     if options.explain:
-        words = f"{modulus.explain(wanted)}\n{wanted.task.choice.words}"
+        crisp = ", ".join(f"{name} {value:.6g}" for name, value in wanted.task.crisp.items())
+        words = f"{modulus.explain(wanted)}\n{wanted.task.choice.words}; crisp (SI): {crisp}"
         answer(options, {"explanation": words}, out, f"{words}\n")
         return 0
     with progress("Fuzzy modulus", quiet=options.quiet) as tick:
@@ -97,7 +98,12 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         if case.has("response.quantity")
         else None
     )
-    document = {**found.document(), **({"response": stress} if stress else {})}
+    reached = sum(found.error.values()) if found.error else None
+    document = {
+        **found.document(),
+        "tolerance": contract(case, reached),
+        **({"response": stress} if stress else {}),
+    }
     text = summary(found) + (f"\n{response.text(stress)}" if stress else "")
     if answer(options, document, out, text) and not options.out:
         say(

@@ -1,6 +1,4 @@
-"""A tolerance is a contract: a result whose declared error is above what was asked for is an error,
-unless it is taken all the same.
-"""
+"""A tolerance is a contract: a declared error above it is a failure, unless it is accepted."""
 
 from __future__ import annotations
 
@@ -57,6 +55,12 @@ def keep_modulus(case: Case, method: str, error: Mapping[str, float], *, best_ef
         cure=cure,
         best_effort=best_effort,
     )
+
+
+def contract(case: Case, reached: float | None) -> dict[str, float | None]:
+    """The tolerance of E that is asked for and the error that is declared, for JSON."""
+    asked = case.number("modulus.tolerance") if case.asked("modulus.tolerance") else None
+    return {"asked": asked, "reached": reached}
 
 
 def resolution_named(case: Case) -> bool:

@@ -188,6 +188,7 @@ def document(found: Envelope, tried: Array) -> dict[str, Any]:
         "min": found.minimum,
         "max": found.maximum,
         "peak": {"lower": of.lower, "tried": tried, "upper": of.upper},
+        "error": None if found.error is None else found.error.max(1),
         "trajectories": found.trajectories,
         "seconds": found.seconds,
         "method": found.method,
@@ -198,9 +199,7 @@ def document(found: Envelope, tried: Array) -> dict[str, Any]:
 
 
 def reached(found: Envelope, wanted: Structure, task: EnvelopeTask) -> float | None:
-    """The largest declared error over what the tolerance allows of its output, times the
-    tolerance; None where no error is declared.
-    """
+    """Largest declared error in the tolerance's measure; None where no error is declared."""
     from alphacut.frame.boxes import UnitFlow, boxes
 
     if found.error is None:

@@ -1,6 +1,4 @@
-"""A finite-element model steered by a tolerance: prism or slices, refined until their own estimate
-of the error is small enough.
-"""
+"""A finite-element model steered by a tolerance: refined until its estimated error is within."""
 
 from __future__ import annotations
 

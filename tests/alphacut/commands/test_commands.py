@@ -14,6 +14,7 @@ from alphacut.case.schema import ENVELOPE_METHODS
 from alphacut.commands.parser import split_petsc
 from alphacut.entry import COMMANDS, main, parsers
 from alphacut.io.files import as_json, rank, standard_output, whole_file
+from alphacut.io.problem import BadInput
 from alphacut.stages.envelope import method_options, task_of
 
 CASES = Path(__file__).parents[3] / "cases"
@@ -316,6 +317,8 @@ def test_a_second_run_takes_what_is_up_to_date(tmp_path, monkeypatch, capfd):
 
 
 def test_another_structure_or_record_is_computed_anew(tmp_path, capfd):
+    import xarray
+
     from alphacut.stages.pipeline import Chain, studies
 
     record = tmp_path / "building.record.csv"

@@ -3,6 +3,7 @@
 The pairs are those of the parsers themselves: an option that is new has to be given a value here.
 """
 
+import hashlib
 import itertools
 import json
 import re
@@ -29,7 +30,7 @@ a4 = 0.1
 [cell]
 matrix_modulus = "20 GPa"
 matrix_poisson = 0.3
-inclusion_modulus = "80 GPa"
+inclusion_modulus = "[75, 80, 85] GPa"
 inclusion_poisson = 0.3
 
 [mesh]
@@ -114,7 +115,7 @@ OWN = {
     ("cell", "--method"): ("prism",),
     ("cell", "--tolerance"): ("1e-6",),
     ("cell", "--exclude"): ("table",),
-    ("mesh", "--set"): ("radius.a2=0.12",),
+    ("mesh", "--set"): ("radius.a1=0.45",),
     ("mesh", "--out"): ("other.vtu",),
     ("modulus", "--set"): ("cell.matrix_poisson=0.25",),
     ("modulus", "--method"): ("auto",),
@@ -135,12 +136,12 @@ OWN = {
 }
 EXPLAINED = {
     ("--quiet", "--json"): "as with --json -",
-    ("--resume", "--fresh"): "the default",
+    ("--best-effort", ""): "above the tolerance",
     ("--resume", ""): "the default",
 }
 """An option, beside which other one (or any) it may be idle, and where its help says so."""
 BASE = {"mesh": ["--out", "mesh.vtu"]}
-NEEDS_RESULTS = ("--fresh", "--resume", "--store")
+NEEDS_RESULTS = ("--fresh", "--store")
 
 
 def choices(command, parser):
@@ -240,6 +241,9 @@ class Watched:
         self.monkeypatch.setattr(
             figures, "draw", lambda *_, **__: self.events.append("figures") or ["a.png"]
         )
+        self.monkeypatch.setattr(
+            "alphacut.stochastic.figures.all.draw", lambda *_: self.events.append("figures") or {}
+        )
         for module in COMMANDS.values():
             if hasattr(module, "answer"):
                 self.monkeypatch.setattr(module, "answer", answer)
@@ -262,17 +266,29 @@ class Watched:
             self.monkeypatch.chdir(place)
             self.events.clear()
             subject = "results/case" if self.command == "report" else "case.toml"
-            before = set(place.rglob("*"))
+            before = {path: stamp(path) for path in place.rglob("*")}
             status = main([self.command, subject, *BASE.get(self.command, []), *words])
             out, err = self.capfd.readouterr()
             files = sorted(
-                f"{path.relative_to(place)} {path.stat().st_size if path.suffix != '.json' else ''}"
-                for path in set(place.rglob("*")) - before
-                if path.is_file() and path.suffix != ".part"
+                f"{path.relative_to(place)} {content(path)}"
+                for path in place.rglob("*")
+                if path.is_file() and before.get(path) != stamp(path)
             )
             self.known[key] = (status, told(out), told(err), files, list(self.events))
             shutil.rmtree(place)
         return self.known[key]
+
+
+def stamp(path):
+    """When a file was written."""
+    return path.stat().st_mtime_ns
+
+
+def content(path):
+    """Digest of a file whose bytes tell no time; else its size, nothing of a database."""
+    if path.suffix in (".json", ".db", ".nc", ".html"):
+        return told(path.read_text(encoding="utf-8")) if path.suffix == ".json" else ""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def told(text):
@@ -313,7 +329,7 @@ def test_no_option_is_ignored_beside_another(command, tmp_path, monkeypatch, cap
     for first, second in itertools.combinations(choices(command, parser), 2):
         if first[0] != second[0]:
             wrong += ignored(watched, parser, first, second)
-    assert not wrong
+    assert "\n".join(wrong) == ""
 
 
 def test_an_ignored_option_would_be_seen(tmp_path, monkeypatch, capfd):

@@ -1,0 +1,89 @@
+"""A tolerance is a contract: kept, or exit status 1 in one line, or taken on request."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from alphacut.entry import main
+
+PAPER = str(Path(__file__).parents[3] / "cases" / "paper.toml")
+COARSE = ["--method", "prism", "--mesh-size", "0.5", "--layers", "3"]
+SHORT = ["envelope", PAPER, "--fuzzy", "E", "--duration", "1", "--alpha", "0"]
+
+
+def lines(capfd):
+    """What was said on standard error."""
+    return capfd.readouterr().err.splitlines()
+
+
+def test_a_named_resolution_that_misses_the_tolerance_fails_in_one_line(capfd):
+    pytest.importorskip("dolfinx")
+    assert main(["cell", PAPER, *COARSE, "--tolerance", "1e-6"]) == 1
+    (line,) = lines(capfd)
+    assert "1e-06 is asked for" in line
+    assert "--method auto reaches it" in line
+    assert main(["cell", PAPER, *COARSE, "--tolerance", "1e-6", "--best-effort"]) == 0
+    assert any(line.startswith("alphacut: warning:") for line in lines(capfd))
+    assert main(["cell", PAPER, *COARSE, "--tolerance", "0.1"]) == 0
+
+
+def test_a_campaign_of_a_named_resolution_is_held_to_every_sample(capfd, tmp_path):
+    pytest.importorskip("dolfinx")
+    coarse = ["--set", "mesh.size=0.5", "--set", "mesh.layers=3", "--alpha", "0", "--json", "-"]
+    asked = ["modulus", PAPER, "--method", "prism", "--plan", "reduced", *coarse]
+    out = ["--out", str(tmp_path / "modulus.nc")]
+    assert main([*asked, *out, "--tolerance", "1e-6"]) == 1
+    assert not list(tmp_path.iterdir())
+    capfd.readouterr()
+    assert main([*asked, "--tolerance", "0.1"]) == 0
+    found = json.loads(capfd.readouterr().out)
+    assert found["tolerance"]["asked"] == 0.1
+    assert 0 < found["tolerance"]["reached"] <= 0.1
+
+
+@pytest.mark.parametrize("method", ["series", "slices", "prism"])
+def test_a_model_without_a_named_resolution_is_steered(method, capfd, tmp_path):
+    pytest.importorskip("dolfinx")
+    text = Path(PAPER).read_text(encoding="utf-8")
+    start, end = text.index("[mesh]"), text.index("[modulus]")
+    case = tmp_path / "case.toml"
+    case.write_text(text[:start] + text[end:], encoding="utf-8")
+    assert main(["cell", str(case), "--method", method, "--tolerance", "2e-2", "--json", "-"]) == 0
+    found = json.loads(capfd.readouterr().out)
+    assert found["tolerance"]["reached"] <= 2e-2
+    assert found["method"] == method
+
+
+def test_an_envelope_that_misses_its_tolerance_fails_in_one_line(capfd):
+    asked = [*SHORT, "--method", "improved-graph-follower", "--tolerance", "1e-6"]
+    assert main(asked) == 1
+    assert "--method auto reaches it" in lines(capfd)[-1]
+    assert main([*asked, "--best-effort"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["cell", PAPER, "--method", "series", "--layers", "3"], "mesh.layers = 3: method series"),
+        (["cell", PAPER, "--method", "table", "--interface", "sign"], "mesh.interface = sign"),
+        (["cell", PAPER, "--method", "auto", "--mesh-size", "0.3"], "mesh.size = 0.3"),
+        (["cell", PAPER, "--method", "auto", "--cross-check", "series,slices"], "modulus.method"),
+        (["cell", PAPER, "--cross-check", "auto,series"], "method auto takes series here"),
+        (["cell", PAPER, "--method", "series", "--stiffness"], "--stiffness: this has no effect"),
+        (["cell", PAPER, "--set", "envelope.step=0.1 s"], "envelope.step"),
+        (["cell", PAPER, "--a1", "0.3", "--set", "radius.a1=0.2"], "changed twice"),
+        (["cell", PAPER, "--best-effort"], "no tolerance can be missed here"),
+        (["modulus", PAPER, "--explain", "--out", "x.nc"], "--out = x.nc: this has no effect"),
+        (["modulus", PAPER, "--explain", "--workers", "2"], "--workers = 2"),
+        ([*SHORT, "--workers", "2"], "--workers = 2: this has no effect"),
+        ([*SHORT, "--method", "vertex", "--tolerance", "1 mm"], "envelope.tolerance"),
+        ([*SHORT, "--integrator", "exact"], "--set envelope.integrator=VALUE"),
+        (["run", PAPER, "--best-effort", "--quick"], "--best-effort"),
+    ],
+)
+def test_what_has_no_effect_is_refused_by_name(words, told, capfd, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(words) == 2
+    assert told in "\n".join(lines(capfd))
+    assert not list(tmp_path.iterdir())
