@@ -108,6 +108,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     contract = {"asked": task.tolerance, "reached": dataset.attrs.get("reached")}
     document = {
         **envelope.document(found, tried),
+        "duration": task.duration,
+        "step": task.step,
         "tolerance": contract,
         **({"exceedance": limit} if limit else {}),
     }

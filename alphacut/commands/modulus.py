@@ -101,6 +101,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     reached = sum(found.error.values()) if found.error else None
     document = {
         **found.document(),
+        "model": wanted.task.choice.words,
         "tolerance": contract(case, reached),
         **({"response": stress} if stress else {}),
     }

@@ -40,7 +40,7 @@ size = 0.6
 [modulus]
 method = "series"
 plan = "reduced"
-alpha = [0, 1]
+alpha = [0, 0.5, 1]
 tolerance = 0.1
 
 [frame]
@@ -89,7 +89,7 @@ VALUES = {
     "--mesh-size": ("0.5",),
     "--interface": ("sign",),
     "--plan": ("general",),
-    "--alpha": ("0.5",),
+    "--alpha": ("0.4",),
     "--fuzzy": ("m,l",),
     "--duration": ("3",),
     "--step": ("0.25",),
@@ -141,7 +141,7 @@ EXPLAINED = {
 }
 """An option, beside which other one (or any) it may be idle, and where its help says so."""
 BASE = {"mesh": ["--out", "mesh.vtu"]}
-NEEDS_RESULTS = ("--fresh", "--store")
+NEEDS_RESULTS = {"run": ("--fresh",), "modulus": ("--store", "--resume")}
 
 
 def choices(command, parser):
@@ -309,7 +309,8 @@ def explained(parser, option, other):
 
 def ignored(watched, parser, first, second):
     """Those of two options that change nothing beside the other one."""
-    needed = any(option[0] in NEEDS_RESULTS for option in (first, second))
+    needs = NEEDS_RESULTS.get(watched.command, ())
+    needed = any(option[0] in needs for option in (first, second))
     for one, other in ((first, second), (second, first)):
         both = watched.run(*first, *second, results=needed)
         if both[0] == 2:
