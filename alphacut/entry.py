@@ -20,6 +20,7 @@ from alphacut.commands import run as command_run
 from alphacut.commands.parser import Parser, refuse_petsc, split_petsc
 from alphacut.fuzzy import CampaignError
 from alphacut.io.files import rank, ranks, say, standard_output
+from alphacut.io.missing import missing
 from alphacut.io.output_paths import check_destinations
 from alphacut.io.problem import BadInput
 from alphacut.io.provenance import own_version
@@ -134,7 +135,8 @@ def failed(error: Exception) -> int:
     """One line about a failed computation; other ranks under mpirun are stopped."""
     if os.environ.get("ALPHACUT_TRACEBACK"):
         raise error
-    message = " ".join(str(error).split()) or type(error).__name__
+    told = missing(error) if isinstance(error, ModuleNotFoundError) else str(error)
+    message = " ".join(told.split()) or type(error).__name__
     if ranks() > 1 and "mpi4py.MPI" in sys.modules:
         print(f"alphacut: rank {rank()}: {message}", file=sys.stderr, flush=True)
         sys.modules["mpi4py.MPI"].COMM_WORLD.Abort(1)

@@ -5,4 +5,5 @@ import sys
 from alphacut.entry import main
 
 if __name__ == "__main__":
-    sys.exit(main(program="python -m fuzzy", names={"modulus": "modulus", "repair": "repair"}))
+    commands = {"modulus": "modulus", "repair": "repair"}
+    sys.exit(main(program=f"python -m {__package__}", names=commands))

@@ -5,4 +5,4 @@ import sys
 from alphacut.entry import main
 
 if __name__ == "__main__":
-    sys.exit(main(program="python -m stochastic", names={"microstructure": "microstructure"}))
+    sys.exit(main(program=f"python -m {__package__}", names={"microstructure": "microstructure"}))

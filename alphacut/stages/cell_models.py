@@ -6,6 +6,7 @@ import os
 from importlib import import_module
 from pathlib import Path
 
+from alphacut.io.missing import missing
 from alphacut.io.problem import BadInput, Problem
 from alphacut.rve.auto.model import AutoModel
 from alphacut.rve.auto.refined import RefinedModel
@@ -50,12 +51,10 @@ def cell_model(choice: CellChoice) -> CellModel:
             import_module("alphacut.rve.planar.problem")
         return made(choice)
     except ImportError as error:
-        what = (
-            f"this model cannot be loaded ({error}); ./enter brings an environment that has"
-            " everything"
-        )
         raise BadInput(
-            Problem("modulus.method", what, choice.method, "series needs NumPy and SciPy alone")
+            Problem(
+                "modulus.method", missing(error), choice.method, "series, which needs none of it"
+            )
         ) from None
     except ValueError as error:
         keys = {"exclude": "--exclude", "accuracy": "modulus.tolerance"}
