@@ -33,8 +33,12 @@ def many_mesh(discs: Discs, *, size: float, around: int = 12) -> tuple[Any, Arra
         ValueError: The discs touch or overlap, or the box is not a periodic square.
         RuntimeError: Gmsh made no valid mesh.
     """
-    from dolfinx.io import gmshio
     from mpi4py import MPI
+
+    try:
+        from dolfinx.io import gmsh as reader
+    except ImportError:  # its name before DOLFINx 0.10
+        from dolfinx.io import gmshio as reader
 
     if not discs.periodic or discs.size[0] != discs.size[1]:
         raise ValueError("the cell must be a periodic square")
@@ -58,7 +62,7 @@ def many_mesh(discs: Discs, *, size: float, around: int = 12) -> tuple[Any, Arra
         surfaces = [tag for _, tag in gmsh.model.getEntities(2)]
         gmsh.model.addPhysicalGroup(2, [tag for tag in surfaces if tag not in inside], 1)
         gmsh.model.addPhysicalGroup(2, [tag for tag in surfaces if tag in inside], 2)
-        mesh, tags, _ = gmshio.model_to_mesh(gmsh.model, MPI.COMM_SELF, 0, gdim=2)
+        mesh, tags = reader.model_to_mesh(gmsh.model, MPI.COMM_SELF, 0, gdim=2)[:2]
     finally:
         gmsh.finalize()
     values = np.empty(mesh.topology.index_map(2).size_local, int)
