@@ -60,14 +60,17 @@ class Envelope:
             shape (A, T, m). None without a certificate.
         inner_upper: The same for the upper bound. Where it lies below `inner_lower`, no width is
             proved.
+        between: What an output may exceed the bounds at both ends of the step to a node by, within
+            the step, shape (T, m), in the units of the outputs: proved where the bounds are
+            guaranteed, else estimated from some trajectories. None where none was made.
         facts: Further numbers and words by name, see below.
 
     The facts that are there depend on the method. "The unit" is that of the first displacement
     among the outputs, else of the first output; where the tolerance was relative, it is a share of
     each output's peak.
 
-    - integrator: Name of the time stepping. step_error: What it is wrong by at most at the modal
-      parameters and the widest box's corners, in the unit of the first displacement; added to
+    - integrator: Name of the time stepping. step_error: Estimate of what it is wrong by, from the
+      modal parameters and the widest box's corners, in the unit of the first displacement; added to
       `error`, for each output in its own unit, where that was estimated.
     - dominant_error: Said where time stepping adds more to an output than the search.
     - tolerance: What the Graph Follower computed a graph for, in the unit. order: Degree of its
@@ -82,9 +85,9 @@ class Envelope:
     - estimated_error: Largest error, in the unit. missed_by_sample: By how much independent
       trajectories passed the bounds, in the unit.
     - gap: Largest distance of attained and proved bounds, in the unit, which is that of gap_output.
-      between_nodes: How far an output may stray from a straight line between two nodes, in the
-      unit. boxes: Parts of the parameters' box that the proof looked at, a count.
+      boxes: Parts of the parameters' box that the proof looked at, a count.
       proof: What is proved and what sampled.
+    - between_nodes: Largest value of `between`, in the unit.
     - reason: Why the method was taken, or what it fell short of.
     """
 
@@ -103,6 +106,7 @@ class Envelope:
     error: Array | None = None
     inner_lower: Array | None = None
     inner_upper: Array | None = None
+    between: Array | None = None
     facts: Mapping[str, float | str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
@@ -158,6 +162,8 @@ class Envelope:
             for name in ("error", "inner_lower", "inner_upper")
             if getattr(self, name) is not None
         }
+        if self.between is not None:
+            data["between"] = (("time", "output"), self.between)
         axes = {
             "alpha": self.alpha,
             "time": self.time,

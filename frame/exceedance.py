@@ -10,6 +10,7 @@ import numpy as np
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
+from alphacut.frame.checks.between_nodes import stray
 from alphacut.frame.dynamics.flow import Flow, LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
@@ -18,7 +19,10 @@ from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy import FuzzyNumber
 
-LIMITS = 201  # for which the probability is told besides
+LIMITS = 201
+"""Limits for which the probability is computed besides."""
+LOOKED_AT = 4
+"""Fuzzy points, and draws of each, whose motion between nodes is looked at."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,33 +32,66 @@ class FuzzyPeaks:
     Args:
         alpha: Levels, shape (A,).
         lower: What the peak is at least, shape (A, m).
-        upper: What it is at most, shape (A, m).
+        upper: What it is at most at the nodes, shape (A, m).
+        error: What the peak may lie outside these by: between nodes and, where the envelope is not
+            guaranteed, by its own error; shape (A, m). None where the envelope has no estimate.
     """
 
     alpha: Array
     lower: Array
     upper: Array
+    error: Array | None = None
 
 
 def peaks(envelope: Envelope) -> FuzzyPeaks:
     """Fuzzy peaks of |output|: upper ends of the envelope, lower ends from below.
 
-    No trajectory peaks higher than the envelope; and each has, at every node, at least the
-    magnitude that its band is away from zero.
+    At the nodes no trajectory peaks higher than the envelope, and each has at least the magnitude
+    that its band is away from zero; `error` says what the steps between may add.
     """
-    upper = np.maximum(envelope.upper, -envelope.lower).max(1)
-    lower = np.maximum(np.maximum(envelope.lower, -envelope.upper), 0.0).max(1)
-    return FuzzyPeaks(envelope.alpha, lower, upper)
+    size = np.maximum(envelope.upper, -envelope.lower)
+    least = np.maximum(np.maximum(envelope.lower, -envelope.upper), 0.0)
+    upper, lower = size.max(1), least.max(1)
+    if envelope.between is None:
+        return FuzzyPeaks(envelope.alpha, lower, upper)
+    own = 0.0 if envelope.inner_lower is not None or envelope.error is None else envelope.error
+    error = np.maximum(
+        within_steps(size + own, envelope.between).max(1) - upper,
+        lower - np.maximum(least - own, 0.0).max(1),
+    )
+    return FuzzyPeaks(envelope.alpha, lower, upper, error)
 
 
-def tried_peaks(flow: Flow, cuts: Boxes, *, spread: int = 32) -> Array:
+def within_steps(size: Array, between: Array) -> Array:
+    """Bound of a magnitude in the step to each node, shape (…, T, m).
+
+    Args:
+        size: The magnitude at the nodes, shape (…, T, m).
+        between: What it may exceed both ends of each step by, shape (T, m).
+    """
+    out = size.copy()
+    out[..., 1:, :] = np.maximum(size[..., 1:, :], size[..., :-1, :]) + between[1:]
+    return out
+
+
+def tried_peaks(
+    flow: Flow, cuts: Boxes, between: Array | None = None, *, spread: int = 32
+) -> Array:
     """Least peak of |output| among points tried on each level, shape (A, m).
 
     The true lower end of the fuzzy peak lies between that of `peaks` and this.
+
+    Args:
+        flow: The trajectories.
+        cuts: The boxes.
+        between: What trajectories may add within the step to each node, shape (T, m); nothing when
+            None.
+        spread: Points tried besides corners, on each level.
     """
     least, found = np.full(len(flow.outputs), np.inf), []
     for level in reversed(range(len(cuts.alpha))):
-        peak = np.abs(flow.values(_tried(cuts, level, spread, corner=5))).max(1)
+        size = np.abs(flow.values(_tried(cuts, level, spread, corner=5)))
+        peak = (size if between is None else within_steps(size, between)).max(1)
         least = np.minimum(least, peak.min(0))
         found.append(least)
     return np.array(found[::-1])
@@ -75,6 +112,8 @@ class FuzzyProbability:
             output's unit.
         curve_lower: Least probability of exceeding each of them, shape (A, L).
         curve_upper: Greatest probability, shape (A, L).
+        error: What the bounds may be short by, since trajectories may peak between nodes, shape
+            (A,); estimated from some trajectories.
     """
 
     alpha: Array
@@ -85,6 +124,7 @@ class FuzzyProbability:
     limits: Array
     curve_lower: Array
     curve_upper: Array
+    error: Array
 
 
 def exceedance(
@@ -143,16 +183,21 @@ def exceedance(
     )
     flow = _flow(system, (*cuts.names, *random), duration, step)
     tried = [_tried(cuts, level, spread) for level in range(len(cuts.alpha))]
-    total, found = sum(map(len, tried)), []
+    total, found, higher = sum(map(len, tried)), [], []
+    spaced = tried[0][:: -(-len(tried[0]) // LOOKED_AT)]
+    few = np.array([[*point, *draw] for point in spaced for draw in draws[:LOOKED_AT]])
+    between = stray(flow, few)
     for point in np.concatenate(tried):
-        values = flow.values(np.hstack([np.tile(point, (len(draws), 1)), draws]))[:, :, output]
-        found.append(np.abs(values).max(1))
+        size = np.abs(flow.values(np.hstack([np.tile(point, (len(draws), 1)), draws])))
+        found.append(size[:, :, output].max(1))
+        higher.append(within_steps(size, between)[:, :, output].max(1))
         if progress:
             progress(len(found) / total)
     peak = np.sort(found, axis=1)
     limits = np.linspace(0.95 * peak.min(), 1.05 * peak.max(), LIMITS)
     of = np.repeat(np.arange(len(tried)), [len(points) for points in tried])
     low, high = _bounds(peak, of, np.append(limits, limit))
+    more = _bounds(np.sort(higher, axis=1), of, np.array([limit]))
     deviation = (
         max(_deviation(share, len(draws)) for share in (*low[:, -1], *high[:, -1]))
         if random
@@ -167,6 +212,7 @@ def exceedance(
         limits,
         low[:, :-1],
         high[:, :-1],
+        np.maximum(more[0][:, 0] - low[:, -1], more[1][:, 0] - high[:, -1]),
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from alphacut.frame.boxes import ALPHA, UnitFlow, boxes
 from alphacut.frame.checks.admissible import require_admissible
+from alphacut.frame.checks.between_nodes import with_stray
 from alphacut.frame.checks.step_error import require_stable, step_error, with_step_error
 from alphacut.frame.checks.tolerance import LIMIT
 from alphacut.frame.dynamics.flow import LinearFlow
@@ -115,6 +116,7 @@ def envelope(
     over = UnitFlow(flow, cuts, relative)
     steps = step_error(over)
     found = with_step_error(propagate(over, progress, **options), over, scheme, steps)
+    found = with_stray(found, over)
     if method == "modal":
         warn_of_roughness(found)
     return found

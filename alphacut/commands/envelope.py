@@ -229,6 +229,7 @@ def summary(found: Envelope, tried: Array | None = None) -> str:
         list(map(float, row))
         for row in np.stack([found.minimum[0], found.maximum[0], least, of.upper[0]], axis=1)
     ]
+    errors = [None if of.error is None else float(of.error[0, k]) for k in range(len(units))]
     largest = largest_by_unit(
         (value, unit) for unit, values in zip(units, columns, strict=True) for value in values
     )
@@ -238,8 +239,8 @@ def summary(found: Envelope, tried: Array | None = None) -> str:
     ]
     rows = [(name, *values) for name, values in zip(found.outputs, shown, strict=True)]
     lines = [
-        f"{name:>14}  {low:>12}  {high:>12}   {least} … {most}\n"
-        for name, low, high, least, most in rows
+        f"{name:>14}  {low:>12}  {high:>12}   {least} … {most}{beyond(error, name)}\n"
+        for (name, low, high, least, most), error in zip(rows, errors, strict=True)
     ]
     effort = "eigen-analyses" if found.method == "modal" else "trajectories"
     cost = (
@@ -251,6 +252,13 @@ def summary(found: Envelope, tried: Array | None = None) -> str:
         f" {found.alpha[0]:g})\n"
     )
     return f"{head}{''.join(lines)}{cost}\n{proved(found)}"
+
+
+def beyond(error: float | None, output: str) -> str:
+    """Words on how far a peak may lie outside its bounds."""
+    from alphacut.frame.outputs import output_unit
+
+    return "" if error is None else f", within {engineering(error, output_unit(output), digits=2)}"
 
 
 def error_in_words(found: Envelope) -> str:

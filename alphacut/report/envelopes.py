@@ -97,25 +97,26 @@ def peaks(summary: Mapping[str, Any]) -> str:
     largest = largest_by_unit((of["upper"][0], unit) for _, _, unit, of in each)
     rows = [(name, output, *peak_row(of, unit, largest[unit])) for name, output, unit, of in each]
     words = (
-        "<p>Fuzzy peak of each output's magnitude at the nodes; what may lie between them is said"
-        " under methods where it is known. On the lowest level no trajectory peaks below the first"
-        " value or above the last; the second is the least peak among some tried, so the least of"
-        " all lies between the first two.</p>"
+        "<p>Fuzzy peak of each output's magnitude at the nodes. On the lowest level no trajectory"
+        " peaks below the first value or above the last by more than the error, which covers what"
+        " lies between nodes; the second is the least peak among some tried, so the least of all"
+        " lies between the first two.</p>"
     )
     limit = (
         f"<p>P{html.escape(outcomes.sentence(summary['exceedance'])[1:].rstrip())}.</p>"
         if "exceedance" in summary
         else ""
     )
-    head = ("study", "output", "not below", "least tried", "greatest", "highest α")
+    head = ("study", "output", "not below", "least tried", "greatest", "error up to", "highest α")
     return "<h3>Peaks</h3>" + words + table(head, rows, numbers=2) + limit if rows else limit
 
 
 def peak_row(of: Mapping[str, Any], unit: str, largest: float) -> Iterator[str]:
-    """Peak: its bounds, the least one tried, and its interval on the highest level."""
+    """Peak: its bounds, the least one tried, its error, and its interval on the highest level."""
     yield engineering(of["lower"][0], unit, beside=largest)
     yield engineering(of["tried"][0], unit, beside=largest) if "tried" in of else "not tried"
     yield engineering(of["upper"][0], unit, beside=largest)
+    yield engineering(of["error"][0], unit, digits=2) if "error" in of else "not estimated"
     yield between(of["tried" if "tried" in of else "lower"][-1], of["upper"][-1], unit, largest)
 
 

@@ -187,7 +187,7 @@ def document(found: Envelope, tried: Array) -> dict[str, Any]:
         "parameters": list(found.parameters),
         "min": found.minimum,
         "max": found.maximum,
-        "peak": {"lower": of.lower, "tried": tried, "upper": of.upper},
+        "peak": {"lower": of.lower, "tried": tried, "upper": of.upper, "error": of.error},
         "error": None if found.error is None else found.error.max(1),
         "trajectories": found.trajectories,
         "seconds": found.seconds,

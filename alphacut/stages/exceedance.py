@@ -30,6 +30,7 @@ FACTS = (
     "fuzzy",
     "random",
     "deviation",
+    "between_nodes",
     "samples",
     "step",
     "trajectories",
@@ -41,8 +42,9 @@ NATURE = "inner: attained at the fuzzy points tried, with the sampling deviation
 def with_peaks(found: Envelope, wanted: Structure, task: EnvelopeTask) -> xarray.Dataset:
     """The envelope's dataset with the fuzzy peak of each output's magnitude.
 
-    ``peak`` (alpha, bound, output) holds bounds of it, ``peak_tried`` (alpha, output) the least
-    peak among some trajectories.
+    ``peak`` (alpha, bound, output) holds bounds of it at the nodes, ``peak_error`` (alpha, output)
+    what it may lie outside them by, and ``peak_tried`` (alpha, output) the least peak among some
+    trajectories, with what they may add between nodes.
     """
     from alphacut.frame.boxes import boxes
     from alphacut.frame.exceedance import peaks, tried_peaks
@@ -54,10 +56,11 @@ def with_peaks(found: Envelope, wanted: Structure, task: EnvelopeTask) -> xarray
             cuts.names, task.duration, task.step, task.scheme if wanted.linear else task.integrator
         ),
         cuts,
+        found.between,
     )
     words = {
         "units": "SI, by output",
-        "long_name": "largest magnitude over time; the lower end is a bound from below",
+        "long_name": "largest magnitude at the nodes; the lower end is a bound from below",
     }
     dataset = found.to_dataset().assign(
         peak=(("alpha", "bound", "output"), np.stack([of.lower, of.upper], axis=1), words)
@@ -68,6 +71,12 @@ def with_peaks(found: Envelope, wanted: Structure, task: EnvelopeTask) -> xarray
             "least peak among trajectories tried; the true one lies between the bound and this"
         ),
     }
+    if of.error is not None:
+        beyond = {
+            "units": "SI, by output",
+            "long_name": "what a peak may lie outside its bounds by",
+        }
+        dataset = dataset.assign(peak_error=(("alpha", "output"), of.error, beyond))
     error = reached(found, wanted, task)
     return (
         dataset.assign(peak_tried=(("alpha", "output"), tried, least))
@@ -77,14 +86,15 @@ def with_peaks(found: Envelope, wanted: Structure, task: EnvelopeTask) -> xarray
 
 
 def peak_document(dataset: xarray.Dataset) -> dict[str, dict[str, Array]]:
-    """Fuzzy peak of each output by level, in SI: ends, and the least one tried."""
+    """Fuzzy peak of each output by level, in SI: ends, error, and the least one tried."""
     found = {}
     for name in dataset["output"].values:
         found[str(name)] = {
             side: dataset["peak"].sel(bound=side, output=name).values for side in ("lower", "upper")
         }
-        if "peak_tried" in dataset:
-            found[str(name)]["tried"] = dataset["peak_tried"].sel(output=name).values
+        for key in ("tried", "error"):
+            if f"peak_{key}" in dataset:
+                found[str(name)][key] = dataset[f"peak_{key}"].sel(output=name).values
     return found
 
 
@@ -229,6 +239,7 @@ def exceedance(
         "output": output,
         "limit": limit_of(case),
         "deviation": found.deviation,
+        "between_nodes": float(found.error.max()),
         "nature": NATURE,
         **drawn,
     }
@@ -252,7 +263,7 @@ def exceedance_document(found: xarray.Dataset) -> dict[str, Any]:
 
     sides = {str(side): found["exceedance"].sel(bound=side).values for side in ("lower", "upper")}
     return {
-        **{name: found.attrs[name] for name in FACTS},
+        **{name: found.attrs[name] for name in FACTS if name in found.attrs},
         "unit": output_unit(found.attrs["output"]),
         "alpha": found["alpha"].values,
         **sides,
@@ -268,6 +279,8 @@ def sentence(found: Mapping[str, Any]) -> str:
     )
     random = f" with random {found['random']}" if found["random"] else ""
     nodes = f", at nodes every {found['step']:g} s" if "step" in found else ""
+    if "between_nodes" in found:
+        nodes += f", up to {found['between_nodes']:.2g} more with peaks between them"
     drawn = (
         f"{found['samples']} random draws at each fuzzy point tried"
         if "samples" in found

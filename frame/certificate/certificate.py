@@ -28,7 +28,7 @@ class Certificate:
             2).
         at: Their unit coordinates, shape (A, T, m, 2, d).
         outer: Proved upper bounds, shape (A, T, m, 2).
-        between: Bound of how far each output strays from a straight line between nodes, shape (m,),
+        between: Bound of what each output exceeds both ends of the step to a node by, shape (T, m),
             in its unit.
         boxes: Boxes of parameters looked at.
         scale: Size of each output beside the first, shape (m,).
@@ -109,32 +109,47 @@ def certify(
     wide = margin[None, :, :, None]
     # what holds on a wider box holds on those inside it
     outer = np.minimum.accumulate(outer, axis=0)
+    between = _between(model) + _growth(model, margin)
     return Certificate(
-        (inner - wide) * unit, points, (outer + wide) * unit, _between(model) * scale, boxes, scale
+        (inner - wide) * unit, points, (outer + wide) * unit, between * scale, boxes, scale
     )
 
 
 def _between(model: ModalModel) -> Array:
-    """Bound of how far each output strays from a straight line between nodes, shape (m,).
+    """Bound of how far outputs stray from straight lines in the step to each node, shape (T, m).
 
     It is h²/8 times a bound of the second time derivative, and h/4 times a kink where the record
     jumps.
     """
     reach, h = np.ones(len(model.boxes.names)), model.flow.step
     rate, growth = suprema(model.eigenvalue, reach)[0], largest_growth(model.eigenvalue, reach)
-    stray = np.zeros(len(model.outputs))
+    curve = np.zeros((len(model.time), len(model.outputs)))
+    kink = np.zeros_like(curve)
     ground = model.flow.system.ground
     for part in parts(model, growth):
         share = suprema(part.share, reach)[0].reshape(model.count, -1)
-        # between nodes a wave is at most exp(|g| h) times what it is at the next one
-        wave = part.waves[0].max(0) * np.exp(np.maximum(-growth, 0.0) * h if part.forced else 0.0)
-        stray += 2 * (wave * rate**2) @ share * h**2 / 8
+        wave = part.waves[0].copy()
         if part.forced and ground is not None:  # R'' = λ² R + λ a + a', and a' acts on Σ C_k alone
+            # within a step a wave is at most exp(|g| h) times what it is at the end
+            wave *= np.exp(np.maximum(-growth, 0.0) * h)
             size, slope, jump = ground.extremes
             together = Polynomial(
                 part.share.index,
-                2 * part.share.coefficients.reshape(-1, model.count, len(stray)).sum(1).real,
+                2 * part.share.coefficients.reshape(-1, model.count, curve.shape[1]).sum(1).real,
             )
-            stray += 2 * size * rate @ share * h**2 / 8
-            stray += (slope * h**2 / 8 + jump * h / 4) * suprema(together, reach)[0]
+            curve += 2 * size * rate @ share + slope * suprema(together, reach)[0]
+            kink += jump * suprema(together, reach)[0]
+        wave[1:] = np.maximum(wave[1:], wave[:-1])
+        curve += 2 * (wave * rate**2) @ share
+    stray: Array = h**2 / 8 * curve + h / 4 * kink
+    stray[0] = 0.0
     return stray
+
+
+def _growth(model: ModalModel, margin: Array) -> Array:
+    """Bound of what the model's error, `margin` at the nodes (T, m), exceeds it by in between."""
+    growth = largest_growth(model.eigenvalue, np.ones(len(model.boxes.names)))
+    swell = float(np.exp(np.maximum(-growth, 0.0).max() * model.flow.step))
+    more = np.zeros_like(margin)
+    more[1:] = swell * np.maximum(margin[1:], margin[:-1]) - np.minimum(margin[1:], margin[:-1])
+    return more

@@ -22,6 +22,8 @@ from alphacut.frame.structures.state_space import state_matrix
 
 CORNERS = 16
 """Corners of the widest box that are looked at, at most."""
+MARGIN = 1.5
+"""Factor on the largest error at these, since other points of the box may exceed it."""
 GROWTH = 1e-6
 """Growth of a motion within a step that counts as rounding."""
 DIVERGED = 10.0
@@ -37,7 +39,7 @@ def probes(cuts: Boxes) -> Array:
 
 
 def step_error(flow: UnitFlow) -> Array:
-    """Largest time-stepping error so far at modal values and corners, shape (T, m).
+    """Estimate of the largest time-stepping error so far, from modal values and corners, (T, m).
 
     Of a linear structure the distance from the exact propagator; else the distance from half the
     step, extrapolated by the scheme's order.
@@ -56,7 +58,7 @@ def step_error(flow: UnitFlow) -> Array:
                 f"step: its error, {reached:.2g}, passes the peak of {name}, {least:.2g}, many"
                 " times; take a smaller step"
             )
-    return so_far
+    return MARGIN * so_far
 
 
 @singledispatch

@@ -180,6 +180,7 @@ def _certified(
         method="modal",
         nature="verified by sampling" if unproved else "guaranteed",
         error=(proof.outer - proof.bounds).max(-1),
+        between=proof.between,
         trajectories=model.analyses,
         seconds=time.perf_counter() - begun,
         facts=facts,

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from alphacut.frame import LinearFlow, StoreyFrame, envelope
+from alphacut.frame import Accelerogram, LinearFlow, StoreyFrame, envelope
 from alphacut.frame.boxes import boxes
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.exceedance import exceedance, peaks, tried_peaks
-from alphacut.fuzzy import Triangular
+from alphacut.fuzzy import Interval, Triangular
 
 FRAME = StoreyFrame(
     (9e3, 7e3),
@@ -89,3 +89,54 @@ def test_few_draws_leave_the_probability_uncertain(limit: float, share: float) -
     assert one.lower[0] == one.upper[0] == many.upper[0] == share
     assert one.deviation > 0.2
     assert 0 < many.deviation < 0.01
+
+
+@pytest.mark.parametrize("certify", [None, 1e-4])
+def test_peaks_between_nodes_are_within_the_error(certify: float | None) -> None:
+    """A step of 0.1 s misses a peak by a millimetre, which the error covers and does not dwarf."""
+    frame = StoreyFrame(
+        (2e3, 1e3),
+        (2.5, 2.7),
+        25e9,
+        1e-6,
+        (5, 5),
+        "ground",
+        (0.0, 0.0),
+        (0.3, -0.6),
+        outputs=("q1", "q2", "v2"),
+        ground=Accelerogram(0.017, 0.5 * np.ones(150)),
+    )
+    inputs = {"E": Interval(24e9, 26e9), "m2": Interval(9.8e2, 1.02e3)}
+    options = {} if certify is None else {"method": "modal", "certify": certify}
+    found = peaks(envelope(frame, inputs, duration=6, step=0.1, alpha=(0,), **options))
+    share = np.random.default_rng(0).random((300, 2))
+    share[:4] = [[0, 0], [0, 1], [1, 0], [1, 1]]
+    points = np.array([24e9, 9.8e2]) + share * np.array([2e9, 40.0])
+    true = np.abs(LinearFlow(frame, tuple(inputs), 6, 0.002, Exact()).values(points)).max((0, 1))
+    assert found.error is not None
+    excess = true - found.upper[0]
+    assert excess[0] > 5e-4
+    assert (excess <= found.error[0]).all()
+    assert found.error[0, 0] <= (8 if certify is None else 60) * excess[0]
+
+
+@pytest.mark.parametrize("certify", [None, 1e-3])
+def test_the_error_between_nodes_is_that_of_a_peak_in_the_middle(certify: float | None) -> None:
+    """The velocity's sine peaks halfway between two nodes."""
+    swing = StoreyFrame((1.0,), (1.0,), 1 / 24, 1.0, v0=(1.0,))  # sin t
+    options = {} if certify is None else {"method": "modal", "certify": certify}
+    step, inputs = np.pi / 5, {"E": Interval(1 / 24, 1.0001 / 24)}
+    found = peaks(envelope(swing, inputs, duration=5 * step, step=step, alpha=(0,), **options))
+    assert found.error is not None
+    assert 1 <= found.error[0, 0] / (1 - found.upper[0, 0]) <= 1.8
+
+
+def test_an_exceedance_counts_peaks_between_nodes() -> None:
+    """The limit lies between the peak at the nodes and the true one."""
+    swing = StoreyFrame((1.0,), (1.0,), 1 / 24, 1.0, v0=(1.0,))  # sin t
+    inputs = {"E": Interval(1 / 24, 1.0001 / 24)}
+    exceeded = exceedance(swing, inputs, {}, limit=0.998, duration=2.8, step=0.7, alpha=(0,))
+    assert exceeded.upper[0] == 0
+    assert exceeded.error[0] == 1
+    below = exceedance(swing, inputs, {}, limit=1.5, duration=2.8, step=0.7, alpha=(0,))
+    assert below.error[0] == 0

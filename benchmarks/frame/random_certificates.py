@@ -1,0 +1,158 @@
+"""Exact trajectories against certificates of random frames, half of them under cut, odd records.
+
+Run `python -m benchmarks.frame.random_certificates --help`.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from alphacut.frame import Accelerogram, Envelope, Exact, LinearFlow, StoreyFrame, envelope
+from alphacut.frame.calculus.jet import Array
+from alphacut.fuzzy import FuzzyNumber
+from benchmarks.frame.random_frames import random_frame
+from benchmarks.rows import write
+
+RESULTS = Path(__file__).parents[1] / "results"
+DURATION = 12.0
+STEPS = (0.05, 0.1)
+"""Distances of nodes, in s: two certificates of each frame."""
+RECORD_STEPS = (0.01, 0.017, 1 / 128, 1 / 256, 0.05, 0.3, 0.1 / 3)
+GAP = 1e-4
+"""Gap asked for, as a share of each output's peak."""
+CHUNK = 2000
+
+
+def random_record(rng: np.random.Generator) -> Accelerogram:
+    """Noise, a pulse or a sine of an odd step, mostly cut where it is not zero."""
+    step = float(rng.choice([*RECORD_STEPS, rng.uniform(0.004, 0.4)]))
+    time = np.arange(max(2, int(rng.uniform(0.5, 1.2 * DURATION) / step))) * step
+    kind = rng.integers(3)
+    if kind == 0:
+        return Accelerogram(step, 0.3 * rng.standard_normal(len(time)))
+    if kind == 1:
+        return Accelerogram(step, np.full(len(time), rng.uniform(-0.3, 0.3)))
+    return Accelerogram(step, 0.3 * np.sin(rng.uniform(1, 20) * time + rng.uniform(0, 6)))
+
+
+def drawn(seed: int) -> tuple[StoreyFrame, dict[str, FuzzyNumber]]:
+    """The random frame of a seed; those of odd seeds are shaken."""
+    frame, inputs = random_frame(seed)
+    rng = np.random.default_rng([seed, 1])
+    return (replace(frame, ground=random_record(rng)) if seed % 2 else frame), inputs
+
+
+def certified(
+    frame: StoreyFrame, inputs: Mapping[str, FuzzyNumber], step: float
+) -> Envelope | None:
+    """A guaranteed envelope; None where there is none."""
+    try:
+        found = envelope(
+            frame,
+            inputs,
+            duration=DURATION,
+            step=step,
+            alpha=(0,),
+            method="modal",
+            certify=GAP,
+            relative=True,
+        )
+    except (ValueError, RuntimeError):
+        return None
+    return found if found.nature == "guaranteed" else None
+
+
+def violation(
+    found: Envelope, frame: StoreyFrame, inputs: Mapping[str, FuzzyNumber], points: Array
+) -> float:
+    """Largest distance by which exact trajectories leave the bounds, as a share of the peak.
+
+    Args:
+        found: A certificate of the lowest level.
+        frame: Its structure.
+        inputs: Its fuzzy inputs.
+        points: Shares of the supports, shape (S, d).
+    """
+    flow = LinearFlow(frame, tuple(inputs), DURATION, float(found.time[1]), Exact())
+    low, high = np.array([number.cut(0) for number in inputs.values()]).T
+    peak = np.maximum(np.abs(found.lower), np.abs(found.upper)).max((0, 1))
+    worst = -np.inf
+    for part in np.array_split(points, -(-len(points) // CHUNK)):
+        values = flow.values(low + (high - low) * part)
+        beyond = np.maximum(values.max(0) - found.upper[0], found.lower[0] - values.min(0))
+        worst = max(worst, float((beyond / peak).max()))
+    return worst
+
+
+def disagreement(a: Envelope, b: Envelope) -> float:
+    """Distance of the bounds of two certificates where both have nodes, as a share of the peak."""
+    every = round(b.time[1] / a.time[1])
+    peak = np.maximum(np.abs(a.lower), np.abs(a.upper)).max((0, 1))
+    off = [np.abs(getattr(a, side)[:, ::every] - getattr(b, side)) for side in ("lower", "upper")]
+    return float((np.maximum(*off) / peak).max())
+
+
+def points_of(count: int, d: int, seed: int) -> Array:
+    """Corners and random points of the unit cube, half of them near its faces, shape (S, d)."""
+    rng = np.random.default_rng([seed, 2])
+    corners = np.array(np.meshgrid(*[[0.0, 1.0]] * d)).reshape(d, -1).T
+    inner = rng.random((count, d))
+    edge = rng.random((count, d)) < 0.3
+    inner[edge] = np.round(inner[edge])
+    return np.vstack([corners, inner])
+
+
+def judged(seed: int, trajectories: int) -> dict[str, Any]:
+    """One row: what the certificates of a frame promise, and what trajectories do."""
+    frame, inputs = drawn(seed)
+    row = {"seed": seed, "storeys": frame.floors, "fuzzy": " ".join(inputs)}
+    row |= {"record_step": frame.ground.step if frame.ground else 0.0}
+    found = [certified(frame, inputs, step) for step in STEPS]
+    if found[0] is None or found[1] is None:
+        return row | {"violation": np.nan, "disagreement": np.nan, "gap": np.nan}
+    points = points_of(trajectories, len(inputs), seed)
+    worst = max(violation(e, frame, inputs, points) for e in found if e is not None)
+    gap = max(float(e.facts["gap"]) for e in found if e is not None)
+    return row | {
+        "violation": worst,
+        "disagreement": disagreement(found[0], found[1]),
+        "gap": gap,
+    }
+
+
+def measured(first: int, frames: int, trajectories: int) -> Iterator[dict[str, Any]]:
+    """One row per frame."""
+    for seed in range(first, first + frames):
+        yield judged(seed, trajectories)
+
+
+def main() -> None:
+    """Measures, prints, writes; exit status 1 where a certificate is violated."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--first", type=int, default=0, help="first seed (0)")
+    parser.add_argument("--frames", type=int, default=100, help="number of frames (100)")
+    parser.add_argument("--trajectories", type=int, default=100_000, help="of each (100000)")
+    options = parser.parse_args()
+    rows = []
+    for row in measured(options.first, options.frames, options.trajectories):
+        rows.append(row)
+        print(", ".join(f"{key} {value}" for key, value in row.items()), flush=True)
+    proved = [row for row in rows if np.isfinite(row["violation"])]
+    broken = [row["seed"] for row in proved if row["violation"] > 0]
+    apart = [row["seed"] for row in proved if row["disagreement"] > row["gap"]]
+    print(f"{len(proved)} of {len(rows)} guaranteed; violated: {broken}; contradicting: {apart}")
+    RESULTS.mkdir(exist_ok=True)
+    write(rows, RESULTS / "frame_certificates.csv")
+    raise SystemExit(bool(broken or apart))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,75 @@
+"""Estimates of what outputs do between nodes beyond a straight line."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import singledispatch
+
+import numpy as np
+
+from alphacut.frame.boxes import UnitFlow
+from alphacut.frame.calculus.jet import Array
+from alphacut.frame.checks.step_error import probes
+from alphacut.frame.dynamics.flow import Flow, LinearFlow
+from alphacut.frame.dynamics.integrators import Exact
+from alphacut.frame.dynamics.nonlinear import LagrangianFlow
+from alphacut.frame.envelope import Envelope
+
+PARTS = 4
+"""Parts of a step that are looked at in a linear structure; a general one is looked at halfway."""
+SAFETY = 1.5
+"""Factor on the largest stray of the trajectories looked at."""
+FLOOR = 0.1
+"""Least stray of a step, as a share of the largest of all steps."""
+
+
+def with_stray(found: Envelope, flow: UnitFlow) -> Envelope:
+    """The envelope with an estimate of what lies between its nodes; a proof is left as it is."""
+    if found.between is not None:
+        return found
+    between = stray(flow.flow, probes(flow.boxes))
+    facts = {**found.facts, "between_nodes": float((between / flow.scale).max())}
+    return replace(found, between=between, facts=facts)
+
+
+def stray(flow: Flow, points: Array) -> Array:
+    """Estimate of how far outputs stray from straight lines between nodes, shape (T, m).
+
+    Row j is that of the step that ends at node j, 0 for the first node.
+
+    Args:
+        flow: The trajectories.
+        points: Parameters of those that are looked at, shape (S, d), in SI units.
+    """
+    fine, parts = _finer(flow, points)
+    ends = fine[:, ::parts]
+    share = (np.arange(1, parts) / parts)[:, None]
+    inner = fine[:, :-1].reshape(len(fine), -1, parts, fine.shape[-1])[:, :, 1:]
+    straight = ends[:, :-1, None] * (1 - share) + ends[:, 1:, None] * share
+    off = np.abs(inner - straight).max((0, 2))
+    # where the trajectories looked at are straight, others are not
+    spread = [
+        off,
+        np.roll(off, 1, 0),
+        np.roll(off, -1, 0),
+        np.broadcast_to(FLOOR * off.max(0), off.shape),
+    ]
+    found: Array = np.concatenate([np.zeros((1, off.shape[1])), SAFETY * np.max(spread, 0)])
+    return found
+
+
+@singledispatch
+def _finer(flow: Flow, points: Array) -> tuple[Array, int]:
+    """Trajectories at nodes a part of a step apart, shape (S, parts (T − 1) + 1, m), and parts."""
+    return flow.values(points), 1
+
+
+@_finer.register
+def _(flow: LinearFlow, points: Array) -> tuple[Array, int]:
+    finer = replace(flow, step=flow.step / PARTS, integrator=Exact())
+    return finer.values(points), PARTS
+
+
+@_finer.register
+def _(flow: LagrangianFlow, points: Array) -> tuple[Array, int]:
+    return flow.halved().values(points), 2
