@@ -88,6 +88,7 @@ class Envelope:
       boxes: Parts of the parameters' box that the proof looked at, a count.
       proof: What is proved and what sampled.
     - between_nodes: Largest value of `between`, in the unit.
+    - claim: What the cuts claim of how often they hold, and which parameters are opinions.
     - reason: Why the method was taken, or what it fell short of.
     """
 
@@ -128,9 +129,9 @@ class Envelope:
         count = (
             f"{self.trajectories} {'eigen-analyses' if self.method == 'modal' else 'trajectories'}"
         )
-        return "\n".join(
-            [*lines, f"  {self.method}: {count}, {self.seconds:.2g} s, bounds {self.nature}"]
-        )
+        cost = f"  {self.method}: {count}, {self.seconds:.2g} s, bounds {self.nature}"
+        claim = [f"  {self.facts['claim']}"] if "claim" in self.facts else []
+        return "\n".join([*lines, cost, *claim])
 
     @property
     def minimum(self) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,8 @@ from alphacut.frame.methods.modal import modal
 from alphacut.frame.methods.sampling import monte_carlo, quasi_monte_carlo, vertex
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
-from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy import FuzzyNumber, JointClaim
+from alphacut.fuzzy.arguments import fuzzy_inputs
 
 Progress = Callable[[float], None]
 
@@ -117,6 +119,8 @@ def envelope(
     steps = step_error(over)
     found = with_step_error(propagate(over, progress, **options), over, scheme, steps)
     found = with_stray(found, over)
+    claim = str(JointClaim.of(fuzzy_inputs(inputs)).resting_on(found.nature))
+    found = replace(found, facts={**found.facts, "claim": claim}) if claim else found
     if method == "modal":
         warn_of_roughness(found)
     return found

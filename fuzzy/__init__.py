@@ -4,7 +4,10 @@ from alphacut.fuzzy.campaign.campaign import CampaignError
 from alphacut.fuzzy.campaign.store import Store, StoreError
 from alphacut.fuzzy.dry_run import Explanation, explain
 from alphacut.fuzzy.knowledge.enclosure import gradient_range
+from alphacut.fuzzy.knowledge.from_data import from_data
+from alphacut.fuzzy.knowledge.joint import JointClaim, jointly
 from alphacut.fuzzy.knowledge.known import Known
+from alphacut.fuzzy.knowledge.order_statistics import least_alpha, values_needed
 from alphacut.fuzzy.plans.alpha_cut_optimisation import Optimisation
 from alphacut.fuzzy.plans.branch_and_bound import BranchAndBound
 from alphacut.fuzzy.plans.interval_quasi_monte_carlo import (
@@ -25,8 +28,9 @@ from alphacut.fuzzy.samples.nature import Nature
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.arithmetic import DependencyError, apply
 from alphacut.fuzzy.sets.boxes import Domain, levels
+from alphacut.fuzzy.sets.claimed import Claim, Claimed
 from alphacut.fuzzy.sets.interaction import Ellipsoidal, Linear
-from alphacut.fuzzy.sets.membership import FuzzySet, from_data
+from alphacut.fuzzy.sets.membership import FuzzySet
 from alphacut.fuzzy.sets.numbers import (
     Crisp,
     Cut,
@@ -36,6 +40,7 @@ from alphacut.fuzzy.sets.numbers import (
     Trapezoidal,
     Triangular,
 )
+from alphacut.fuzzy.sets.stepwise import Stepwise
 from alphacut.fuzzy.surrogates.response_surface import ResponseSurface
 from alphacut.fuzzy.width_contributions import Shares, width_shares
 
@@ -43,6 +48,8 @@ __all__ = [
     "BranchAndBound",
     "CampaignError",
     "Chebyshev",
+    "Claim",
+    "Claimed",
     "Crisp",
     "Cut",
     "DependencyError",
@@ -57,6 +64,7 @@ __all__ = [
     "Interval",
     "IntervalQuasiMonteCarlo",
     "IntervalResponse",
+    "JointClaim",
     "Known",
     "Linear",
     "Metamodel",
@@ -72,6 +80,7 @@ __all__ = [
     "ResponseSurface",
     "Shares",
     "Signed",
+    "Stepwise",
     "Store",
     "StoreError",
     "TrainedBounds",
@@ -83,7 +92,10 @@ __all__ = [
     "explain",
     "from_data",
     "gradient_range",
+    "jointly",
+    "least_alpha",
     "levels",
     "propagate",
+    "values_needed",
     "width_shares",
 ]

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
 from typing import Any
 
+from alphacut.fuzzy.knowledge.joint import joined_once
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.interaction import Interaction
@@ -16,17 +17,18 @@ from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber
 
 
 def fuzzy_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNumber]:
-    """The inputs by name; a plain number is a crisp one.
+    """The inputs by name, a plain number as a crisp one, claims joined (`jointly`).
 
     Raises:
-        ValueError: The inputs are no mapping, or a value is neither a fuzzy number nor a number.
+        ValueError: The inputs are no mapping, a value is neither a fuzzy number nor a number, or
+            claims of different kinds are joined without a meaning.
     """
     if not isinstance(inputs, Mapping):
         raise ValueError(
             f"the inputs are a {type(inputs).__name__}; they must map names to fuzzy numbers, as"
             " {'E': Triangular(24, 25, 26)}"
         )
-    return {name: _fuzzy(name, value) for name, value in inputs.items()}
+    return joined_once({name: _fuzzy(name, value) for name, value in inputs.items()})
 
 
 def _fuzzy(name: str, value: object) -> FuzzyNumber:
@@ -43,8 +45,9 @@ def _fuzzy(name: str, value: object) -> FuzzyNumber:
 def shared_numbers(domain: Domain) -> tuple[str, ...]:
     """Note for each fuzzy number that stands for several independent inputs."""
     names: dict[int, list[str]] = {}
-    for name, number in domain.inputs.items():
-        if number.support.width > 0:
+    lower, upper = domain.boxes
+    for column, (name, number) in enumerate(domain.inputs.items()):
+        if (upper > lower)[:, column].any():
             names.setdefault(id(number), []).append(name)
     cure = "where they are one quantity, make it one input"
     return tuple(

@@ -246,6 +246,20 @@ MODULUS = Section(
         "value": Key("a known modulus instead of a computed one", unit="Pa", allowed=POSITIVE),
         "file": Key("α-cuts from a NetCDF file instead of computed ones", "text"),
         "measured": Key("CSV file of measured moduli instead of computed ones", "text"),
+        "claim": Key(
+            "what the cuts of measured moduli hold with probability 1 - α: next value, mean,"
+            " median or quantile Q",
+            "text",
+            default="next value",
+        ),
+        "bounds": Key(
+            "physically possible moduli, two numbers; needed with measured ones",
+            unit="Pa",
+            allowed=POSITIVE,
+        ),
+        "law": Key(
+            "law of measured moduli, where it is known", "choice", choices=("normal", "log-normal")
+        ),
     },
 )
 

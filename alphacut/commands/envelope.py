@@ -251,7 +251,8 @@ def summary(found: Envelope, tried: Array | None = None) -> str:
         "        output           min           max   peak: least tried … greatest   (α ="
         f" {found.alpha[0]:g})\n"
     )
-    return f"{head}{''.join(lines)}{cost}\n{proved(found)}"
+    claim = f"{found.facts['claim']}\n" if "claim" in found.facts else ""
+    return f"{head}{''.join(lines)}{cost}\n{proved(found)}{claim}"
 
 
 def beyond(error: float | None, output: str) -> str:

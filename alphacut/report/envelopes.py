@@ -108,7 +108,15 @@ def peaks(summary: Mapping[str, Any]) -> str:
         else ""
     )
     head = ("study", "output", "not below", "least tried", "greatest", "error up to", "highest α")
-    return "<h3>Peaks</h3>" + words + table(head, rows, numbers=2) + limit if rows else limit
+    told = claims(summary["envelopes"])
+    return "<h3>Peaks</h3>" + words + table(head, rows, numbers=2) + told + limit if rows else limit
+
+
+def claims(studies: Mapping[str, Any]) -> str:
+    """What the cuts claim of how often they hold, and which inputs are opinions, study by study."""
+    each = {name: study["claim"] for name, study in studies.items() if "claim" in study}
+    rows = [f"<li>{html.escape(name)}: {html.escape(claim)}</li>" for name, claim in each.items()]
+    return f"<h3>How often the cuts hold</h3><ul>{''.join(rows)}</ul>" if rows else ""
 
 
 def peak_row(of: Mapping[str, Any], unit: str, largest: float) -> Iterator[str]:

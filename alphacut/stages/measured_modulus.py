@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
+from typing import cast
 
-from alphacut.fuzzy import FuzzyNumber
+from alphacut.case.case import Case
+from alphacut.fuzzy import FuzzyNumber, from_data
+from alphacut.fuzzy.knowledge.named_law import Law
 from alphacut.io.output_paths import hint
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.units import factor
@@ -15,14 +18,30 @@ HEADER = "E [GPa]"
 NAMES = r"E|E_?c?m?|E_?mod(ul(us)?)?|(young'?s?[\s_-]*)?modul(us|i)|elastic[\s_-]modulus"
 
 
-def measured_modulus(path: Path, key: str = "modulus.measured") -> FuzzyNumber:
-    """Fuzzy modulus in Pa of measured values: the middle share 1 − α at each α.
+def measured_modulus(case: Case, key: str = "modulus.measured") -> FuzzyNumber:
+    """The fuzzy modulus in Pa of measured values, with the claim that the case names.
+
+    Raises:
+        BadInput: The file is missing, its header has no unit, a row is no positive number, or the
+            values do not decide what is claimed.
+    """
+    values = measured_values(case.path.parent / case.text(key), key)
+    bounds = case.fuzzy("modulus.bounds").support if case.has("modulus.bounds") else None
+    law = cast(Law, case.text("modulus.law")) if case.has("modulus.law") else None
+    try:
+        number = from_data(values, case.text("modulus.claim"), bounds=bounds, law=law)
+        number.cut(0.0)
+    except ValueError as error:
+        raise case.refuse(key, str(error), 'bounds such as bounds = "[10, 60] GPa"') from None
+    return number
+
+
+def measured_values(path: Path, key: str = "modulus.measured") -> list[float]:
+    """Measured moduli in Pa, shape (n,).
 
     Raises:
         BadInput: The file is missing, its header has no unit, or a row is no positive number.
     """
-    from alphacut.fuzzy.sets.membership import from_data
-
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError:
@@ -46,17 +65,7 @@ def measured_modulus(path: Path, key: str = "modulus.measured") -> FuzzyNumber:
             Problem(key, "the file needs a header and one value or more", str(path), HEADER)
         )
     scale = unit_of(rows[0][1], path, key)
-    values = [scale * positive(text, path, number, key) for number, text in rows[1:]]
-    if len(values) == 1:
-        raise BadInput(
-            Problem(
-                key,
-                "the file holds one value, which has no spread",
-                rows[1][1],
-                "two values or more; or modulus.value",
-            )
-        )
-    return from_data(values)
+    return [scale * positive(text, path, number, key) for number, text in rows[1:]]
 
 
 def unit_of(header: str, path: Path, key: str) -> float:

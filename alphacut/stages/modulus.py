@@ -65,7 +65,7 @@ class FuzzyModulus:
     shear_ratio: float | None = None
 
     @property
-    def number(self) -> PiecewiseLinear:
+    def number(self) -> FuzzyNumber:
         """The fuzzy modulus in Pa, to be handed on."""
         return self.result.number("E")
 
@@ -308,5 +308,5 @@ def stand_in(case: Case) -> FuzzyNumber | None:
     if case.has("modulus.file"):
         return read_number(case.path.parent / case.text("modulus.file"), "modulus.file")
     if case.has("modulus.measured"):
-        return measured_modulus(case.path.parent / case.text("modulus.measured"))
+        return measured_modulus(case)
     return None

@@ -156,6 +156,7 @@ def envelope_numbers(dataset: xarray.Dataset) -> dict[str, Any]:
             for name in ("gap", "gap_output", "between_nodes", "proof")
             if name in dataset.attrs
         }
+    cost |= {name: dataset.attrs[name] for name in ("claim",) if name in dataset.attrs}
     if "error" in dataset:
         numbers["error"] = dict(
             zip(names, map(float, lowest["error"].max("time").values), strict=True)

@@ -10,11 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alphacut.fuzzy.knowledge.contradiction import contradictions
+from alphacut.fuzzy.knowledge.joint import JointClaim
 from alphacut.fuzzy.knowledge.known import Signs
 from alphacut.fuzzy.samples.model import Values
 from alphacut.fuzzy.samples.nature import Nature, condition
 from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.fuzzy.sets.claimed import Claimed
 from alphacut.fuzzy.sets.numbers import Array, Mask, PiecewiseLinear
+from alphacut.fuzzy.sets.stepwise import outer_steps
 from alphacut.fuzzy.surrogates.response_surface import ResponseSurface
 
 if TYPE_CHECKING:
@@ -160,7 +163,14 @@ class FuzzyResult:
             ]
         hidden = len(self.outputs) - _PRINTED
         more = [f"… and {hidden:,} outputs more: bounds(NAME) has them"] if hidden > 0 else []
-        return "\n".join([*lines, *more, *self.notes])
+        said = [str(self.claim)] if str(self.claim) else []
+        return "\n".join([*lines, *more, *self.notes, *said])
+
+    @property
+    def claim(self) -> JointClaim:
+        """What the cuts claim, and which inputs are opinions."""
+        joint = JointClaim.of(self.domain.inputs)
+        return joint.resting_on(self.nature, interactions=bool(self.domain.interactions))
 
     @property
     def nature(self) -> Nature:
@@ -208,13 +218,15 @@ class FuzzyResult:
         column = self.column(output)
         return self.lower[:, column], self.upper[:, column]
 
-    def number(self, output: str = "y") -> PiecewiseLinear:
-        """One output as a fuzzy number, linear between its α-cuts.
+    def number(self, output: str = "y") -> PiecewiseLinear | Claimed:
+        """One output as a fuzzy number: linear between its α-cuts, in steps where it has a claim.
 
         Raises:
-            ValueError: The levels do not reach from 0 to 1.
+            ValueError: The levels do not reach from 0 to 1, and nothing is claimed.
         """
         lower, upper = self.bounds(output)
+        if (claim := self.claim.claim) is not None:
+            return Claimed(outer_steps(self.alpha, lower, upper), claim, float(self.alpha[0]))
         if self.alpha[0] != 0 or self.alpha[-1] != 1:
             shown = ", ".join(f"{level:g}" for level in self.alpha)
             raise ValueError(
@@ -255,5 +267,6 @@ class FuzzyResult:
                 "worth": self.worth,
                 "runs": self.runs,
                 "verification_runs": self.verification_runs,
+                "claim": str(self.claim),
             },
         )

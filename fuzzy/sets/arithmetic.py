@@ -15,6 +15,7 @@ from operator import add, mul, sub, truediv
 
 import numpy as np
 
+from alphacut.fuzzy.sets.claimed import Claimed
 from alphacut.fuzzy.sets.numbers import Array, Crisp, Cut, Cuts, FuzzyNumber
 
 Binary = Callable[[float, float], float]
@@ -23,7 +24,7 @@ _OPERATIONS: dict[str, Binary] = {"+": add, "-": sub, "*": mul, "/": truediv}
 
 
 class DependencyError(ValueError):
-    """A fuzzy number occurs more than once in an expression."""
+    """An expression that arithmetic by α-cuts gets wrong: a number occurs twice, or two claim."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +65,7 @@ def combine(sign: str, left: FuzzyNumber | float, right: FuzzyNumber | float) ->
     """Left + right, left - right, left * right or left / right.
 
     Raises:
-        DependencyError: A number occurs on both sides.
+        DependencyError: A number occurs on both sides, or two have claims.
         ValueError: The divisor's support holds 0.
     """
     operands = [
@@ -80,6 +81,11 @@ def combine(sign: str, left: FuzzyNumber | float, right: FuzzyNumber | float) ->
         )
         raise DependencyError(
             f"{twice[0]} occurs on both sides of {texts[0]} {sign} {texts[1]}; {cure}"
+        )
+    if sum(isinstance(number, Claimed) for number in (*sources[0], *sources[1])) > 1:
+        raise DependencyError(
+            f"{texts[0]} {sign} {texts[1]} joins numbers with claims, whose cuts at one α hold all"
+            " of them less often than each: use propagate on the whole expression"
         )
     if sign == "/" and operands[1].support.lower <= 0 <= operands[1].support.upper:
         raise ValueError(

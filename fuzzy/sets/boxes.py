@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alphacut.fuzzy.sets.claimed import from_level
 from alphacut.fuzzy.sets.interaction import Interaction
 from alphacut.fuzzy.sets.numbers import Array, FuzzyNumber, Mask
 
@@ -61,6 +62,8 @@ class Domain:
         rising = all(np.diff(self.alpha) > 0) and len(self.alpha) > 0
         if not (rising and self.alpha[0] >= 0 and self.alpha[-1] <= 1):
             raise ValueError(f"the α-levels are {list(self.alpha)}; they must rise within [0, 1]")
+        decided = {name: from_level(number, self.alpha[0]) for name, number in self.inputs.items()}
+        object.__setattr__(self, "inputs", decided)
         object.__setattr__(self, "interactions", tuple(self.interactions))
         for interaction in self.interactions:
             interaction.check(self.names)

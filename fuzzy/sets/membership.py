@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from numbers import Integral
 from typing import NoReturn
 
 import numpy as np
@@ -119,36 +117,4 @@ class FuzzySet:
 
     __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = (
         _refuse
-    )
-
-
-def from_data(values: Sequence[float] | Array, *, levels: int = 10) -> PiecewiseLinear:
-    """Fuzzy number from measured values: the middle share 1 − α at each α.
-
-    This is the transformation of a probability into the possibility whose cuts are confidence
-    intervals (Dubois, Foulloy, Mauris and Prade, Reliable Computing 10, 2004), with equal tails.
-
-    Args:
-        values: Measured values, one at least.
-        levels: Steps between the α-levels.
-
-    Raises:
-        ValueError: There is no value, one is not finite, or there is no step.
-    """
-    if not isinstance(levels, Integral) or levels < 1:
-        raise ValueError(
-            f"the number of steps between α-levels is {levels!r}; it must be a whole number, 1 or"
-            " more"
-        )
-    data = np.asarray(values, float).ravel()
-    if not len(data) or not np.isfinite(data).all():
-        finite = int(np.isfinite(data).sum())
-        raise ValueError(
-            f"the data hold {len(data)} values, {finite} of them finite; one or more, all finite,"
-            " are needed"
-        )
-    alpha = np.linspace(0, 1, levels + 1)
-    lower, upper = np.quantile(data, alpha / 2), np.quantile(data, 1 - alpha / 2)
-    return PiecewiseLinear(
-        tuple(alpha), tuple(np.minimum(lower, upper)), tuple(np.maximum(lower, upper))
     )

@@ -11,7 +11,6 @@ from alphacut.fuzzy import (
     RandomInput,
     Signed,
     Triangular,
-    from_data,
     propagate,
 )
 
@@ -130,11 +129,6 @@ def test_one_level_is_no_fuzzy_number():
         ValueError, match=r"the α-levels of the result are 0; a fuzzy number needs some from 0 to 1"
     ):
         propagate(total, GOOD, alpha=[0.0]).number()
-    with pytest.raises(
-        ValueError,
-        match="number of steps between α-levels is 0; it must be a whole number, 1 or more",
-    ):
-        from_data([1, 2, 3], levels=0)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.io.problem import BadInput
 from alphacut.stages.accelerogram import accelerogram
-from alphacut.stages.measured_modulus import measured_modulus
+from alphacut.stages.measured_modulus import measured_values
 from alphacut.stages.modulus import stand_in
 from benchmarks.frame.synthetic_record import SyntheticRecord, text
 
@@ -64,9 +64,30 @@ def test_measured_values_stand_in(tmp_path):
     (tmp_path / "cores.csv").write_text(
         "# cores\nE [GPa]\n24.1\n25.2\n23.9\n26.0\n25.0\n", encoding="utf-8"
     )
-    number = stand_in(load(with_modulus(tmp_path, 'measured = "cores.csv"')))
+    written = 'measured = "cores.csv"\nbounds = "[10, 60] GPa"'
+    number = stand_in(load(with_modulus(tmp_path, written)))
     assert number.modal == pytest.approx(25.0e9)
-    assert number.support == pytest.approx((23.9e9, 26.0e9))
+    assert number.support == pytest.approx((10e9, 60e9))
+    assert number.cut(1 / 3) == pytest.approx((23.9e9, 26.0e9))
+    normal = stand_in(load(with_modulus(tmp_path, written + '\nclaim = "mean"\nlaw = "normal"')))
+    assert normal.claim.about == "mean"
+    assert normal.cut(0.05).width < 3e9
+
+
+@pytest.mark.parametrize(
+    ("written", "pattern"),
+    [
+        ("", "decide the cuts of the next value from α = 0.3333 on, not at α = 0: give bounds"),
+        ('claim = "mode"', "the claim is 'mode'; it must be 'next value', 'mean'"),
+        ('claim = "mean"', "no number of values decides a mean without a law or bounds"),
+        ('bounds = "[25, 60] GPa"', "lies outside the bounds"),
+    ],
+)
+def test_what_measured_values_do_not_decide_is_refused(written, pattern, tmp_path):
+    (tmp_path / "cores.csv").write_text("E [GPa]\n24.1\n25.2\n23.9\n26.0\n25.0\n", encoding="utf-8")
+    case = load(with_modulus(tmp_path, f'measured = "cores.csv"\n{written}'))
+    with pytest.raises(BadInput, match=pattern):
+        stand_in(case)
 
 
 def test_an_earlier_run_stands_in(tmp_path, capfd):
@@ -103,7 +124,7 @@ def test_an_earlier_run_stands_in(tmp_path, capfd):
 def test_measured_nonsense_is_refused_with_row_and_reason(content, pattern, tmp_path):
     (tmp_path / "m.csv").write_text(content, encoding="utf-8")
     with pytest.raises(BadInput, match=pattern):
-        measured_modulus(tmp_path / "m.csv")
+        measured_values(tmp_path / "m.csv")
 
 
 @pytest.mark.parametrize(
@@ -150,7 +171,8 @@ def test_the_report_tells_the_measured_modulus_by_its_cuts(tmp_path, capfd):
     )
     text = (CASES / "building.toml").read_text(encoding="utf-8")
     text = text.replace(
-        'method = "auto"\ntolerance = 1e-5\nplan = "signed"', 'measured = "cylinders.csv"'
+        'method = "auto"\ntolerance = 1e-5\nplan = "signed"',
+        'measured = "cylinders.csv"\nbounds = "[27, 34] GPa"',
     )
     (tmp_path / "building.record.csv").write_bytes((CASES / "building.record.csv").read_bytes())
     (tmp_path / "own.toml").write_text(text, encoding="utf-8")
@@ -168,5 +190,6 @@ def test_the_report_tells_the_measured_modulus_by_its_cuts(tmp_path, capfd):
     assert main(["report", str(folder), "--quiet"]) == 0
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "<code>modulus.measured = cylinders.csv</code>" in page
-    assert '<td>0</td><td class="number">27.9000</td><td class="number">33.0000</td>' in page
+    assert '<td>0</td><td class="number">27.0000</td><td class="number">34.0000</td>' in page
+    assert "result of the next value of E lies in its α-cut with P &gt;= 1 - α" in page
     assert '<td>1</td><td class="number">30.1000</td><td class="number">30.1000</td>' in page

@@ -1,4 +1,4 @@
-"""Fuzzy sets that are no numbers, numbers from data, arithmetic and pictures."""
+"""Fuzzy sets that are no numbers, arithmetic and pictures."""
 
 import math
 
@@ -15,7 +15,6 @@ from alphacut.fuzzy import (
     Reduced,
     Triangular,
     apply,
-    from_data,
     levels,
     propagate,
 )
@@ -75,22 +74,11 @@ def test_convex_normal_sets_become_numbers():
         (lambda: FuzzySet((1, 0), (0, 1)), "must be finite and not fall"),
         (lambda: FuzzySet((0, 1), (0, 1.2)), r"must lie in \[0, 1\]"),
         (lambda: FuzzySet((0, 1), (0, 1)).cut(0), r"α of a cut is 0; it must lie in \(0, 1\]"),
-        (lambda: from_data([]), "the data hold 0 values"),
-        (lambda: from_data([1, np.nan]), "2 values, 1 of them finite"),
     ],
 )
 def test_wrong_sets_are_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
-
-
-def test_numbers_from_data_hold_the_middle_share():
-    data = np.random.default_rng(2).normal(10, 2, 4001)
-    number = from_data(data)
-    assert number.modal == np.median(data)
-    for alpha in (0.0, 0.3, 0.8):
-        lower, upper = number.cut(alpha)
-        assert np.mean((data >= lower) & (data <= upper)) == pytest.approx(1 - alpha, abs=2e-3)
 
 
 @settings(deadline=None)

@@ -1,0 +1,165 @@
+"""Joint claims: cuts of several claimed inputs that all hold together as often as one says.
+
+With m claims, the joint cut at α is the box of their cuts at β: of independent sources 1 − (1 −
+β)^m = α, of unknown dependence m β = α (Bonferroni). The box at β = α, the minimum of the
+memberships, holds all of them less often than 1 − α.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from alphacut.fuzzy.sets.claimed import Claim, Claimed, Joint
+from alphacut.fuzzy.sets.numbers import FuzzyNumber
+from alphacut.fuzzy.sets.stepwise import Stepwise
+
+
+def jointly(
+    inputs: Mapping[str, FuzzyNumber | float], *, independent: bool = False, means: str = ""
+) -> dict[str, FuzzyNumber | float]:
+    """The inputs, claimed ones widened so that their box at α holds all with P >= 1 − α.
+
+    Args:
+        inputs: Fuzzy numbers by name; plain numbers are crisp.
+        independent: Whether the samples behind different inputs are independent of each other;
+            unknown dependence if not stated.
+        means: What the joint claim means; needed where the claims are of different kinds.
+
+    Raises:
+        ValueError: Claims of different kinds are joined without a meaning, or one number stands for
+            several independent inputs.
+    """
+    claimed = {name: number for name, number in inputs.items() if isinstance(number, Claimed)}
+    if not claimed:
+        return dict(inputs)
+    rule = Joint(tuple(claimed), independent, means or _common(claimed), named=bool(means))
+    if independent:
+        _require_apart(claimed)
+    return {
+        name: _widened(number, rule) if isinstance(number, Claimed) else number
+        for name, number in inputs.items()
+    }
+
+
+def joined_once(inputs: Mapping[str, FuzzyNumber]) -> dict[str, FuzzyNumber]:
+    """The inputs with claims joined, unless they are so already; of unknown dependence.
+
+    Raises:
+        ValueError: As `jointly`.
+    """
+    rules = {number.joint for number in inputs.values() if isinstance(number, Claimed)}
+    if len(rules) == 1 and None not in rules:
+        return dict(inputs)
+    return {
+        name: number for name, number in jointly(inputs).items() if isinstance(number, FuzzyNumber)
+    }
+
+
+def _common(claimed: Mapping[str, Claimed]) -> str:
+    kinds = {number.claim.about for number in claimed.values()}
+    if len(kinds) > 1:
+        shown = ", ".join(f"{name}: {number.claim.about}" for name, number in claimed.items())
+        cure = "say what the joint one means: jointly(inputs, means='drift of the next frame')"
+        raise ValueError(f"the inputs claim different things ({shown}); {cure}")
+    return kinds.pop()
+
+
+def _require_apart(claimed: Mapping[str, Claimed]) -> None:
+    names = list(claimed)
+    for i, name in enumerate(names):
+        for other in names[:i]:
+            if claimed[name].number is claimed[other].number or claimed[name] == claimed[other]:
+                raise ValueError(
+                    f"inputs {other} and {name} rest on the same values and are not independent;"
+                    f" leave independent=True out"
+                )
+
+
+def _widened(number: Claimed, rule: Joint) -> Claimed:
+    """The number with its cuts at their joint levels."""
+    steps = number.number
+    level = rule.joined(np.asarray(steps.alpha))
+    last = np.flatnonzero(
+        np.append(np.diff(level) > 0, True) & (level <= 1)
+    )  # of equal levels the last cut
+    moved = Stepwise(
+        tuple(level[last]),
+        tuple(np.asarray(steps.lower)[last]),
+        tuple(np.asarray(steps.upper)[last]),
+    )
+    decided = float(rule.joined(np.asarray(number.decided)))
+    return replace(number, number=moved, decided=decided, joint=rule)
+
+
+@dataclass(frozen=True)
+class JointClaim:
+    """What a result of several inputs claims.
+
+    Args:
+        rule: How the claims were joined; None where no input has one.
+        given: Conditions of all claims.
+        opinions: Fuzzy inputs without a claim.
+    """
+
+    rule: Joint | None
+    given: tuple[str, ...]
+    opinions: tuple[str, ...]
+
+    @classmethod
+    def of(cls, inputs: Mapping[str, FuzzyNumber]) -> JointClaim:
+        """The claim of a result by its inputs."""
+        claimed = {name: number for name, number in inputs.items() if isinstance(number, Claimed)}
+        opinions = tuple(
+            name
+            for name, number in inputs.items()
+            if name not in claimed and number.support.width > 0
+        )
+        given = [
+            f"{name}: {', '.join(number.claim.given)}"
+            for name, number in claimed.items()
+            if number.claim.given
+        ]
+        rule = next(
+            (
+                number.joint or Joint((name,), False, number.claim.about)
+                for name, number in claimed.items()
+            ),
+            None,
+        )
+        held = (
+            [
+                f"{', '.join(opinions)} in {'their cuts' if len(opinions) > 1 else 'its cut'} at"
+                f" α (opinions)"
+            ]
+            if opinions
+            else []
+        )
+        return cls(rule, (*given, *([rule.words] if rule and rule.words else []), *held), opinions)
+
+    def resting_on(self, nature: str, *, interactions: bool = False) -> JointClaim:
+        """The claim of a result whose bounds are of a nature, perhaps under interactions."""
+        more = [] if nature == "guaranteed" else [f"the {nature} bounds are the true ones"]
+        more += ["the interactions hold"] if interactions else []
+        return self if self.rule is None else replace(self, given=(*self.given, *more))
+
+    @property
+    def claim(self) -> Claim | None:
+        """The claim of a number computed from the inputs; None where no input has one."""
+        return None if self.rule is None else Claim(self.rule.means, self.given)
+
+    def __str__(self) -> str:
+        """The claim in one sentence; empty where nothing is fuzzy."""
+        if self.rule is None:
+            return (
+                f"{', '.join(self.opinions)}: opinions, no cut says how often it holds"
+                if self.opinions
+                else ""
+            )
+        names = ", ".join(self.rule.names)
+        subject = (
+            self.rule.means if self.rule.named else f"result of the {self.rule.means} of {names}"
+        )
+        return str(Claim(subject, self.given))

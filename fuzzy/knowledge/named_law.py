@@ -1,0 +1,161 @@
+"""Exact cuts under a named law: normal, or log-normal through the logarithms of the values.
+
+Next value and mean by Student's t, quantiles by the non-central t, the mean of a log-normal law by
+a joint region of both parameters of the logarithms (Mood and Graybill): wider than need be, never
+too narrow.
+
+Source: Hahn and Meeker, Statistical Intervals, chapters 4 and 14.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+
+from alphacut.fuzzy.knowledge.observations import Observations
+from alphacut.fuzzy.knowledge.order_statistics import Side
+from alphacut.fuzzy.sets.numbers import Array
+from alphacut.fuzzy.sets.stepwise import Stepwise
+
+Law = Literal["normal", "log-normal"]
+LEVELS = np.unique(
+    np.round(np.concatenate([np.geomspace(1e-9, 1, 600), np.linspace(0.0025, 1, 400)]), 12)
+)
+"""Levels at which the cuts are exact: hundredths and quarters of them among others. Between two of
+them the wider cut holds.
+"""
+
+
+def law_cuts(
+    data: Observations, law: Law, quantile: float | None, side: Side, *, mean: bool
+) -> tuple[Stepwise, float]:
+    """Cuts under a named law, and the least level at which they are finite without physical bounds.
+
+    Args:
+        data: The values.
+        law: Name of the law.
+        quantile: Probability of a quantile; None for the next value, or for the mean.
+        side: Ends that move.
+        mean: Whether the mean is meant.
+
+    Raises:
+        ValueError: The values do not fit the law: fewer than two, all equal, not positive, or
+            censored without an end.
+    """
+    logarithmic = law == "log-normal"
+    if logarithmic and not (data.lower > 0).all():
+        raise ValueError(f"a value is {data.lower[0]:g}; values of a log-normal law are positive")
+    about = data.mapped(np.log) if logarithmic else data
+    _require_scatter(about, law)
+    if logarithmic and mean:
+        lower, upper = _log_normal_mean(about, side)
+    else:
+        lower, upper = _student(about, 0.5 if mean else quantile, side)
+        with np.errstate(over="ignore"):
+            lower, upper = (np.exp(lower), np.exp(upper)) if logarithmic else (lower, upper)
+    return _within(lower, upper, data.bounds, side)
+
+
+def _require_scatter(data: Observations, law: str) -> None:
+    if data.count < 2:
+        raise ValueError(
+            f"there is {data.count} value; a {law} law needs 2 or more to tell its scatter:"
+            f" leave it out, or measure more"
+        )
+    if not (np.isfinite(data.lower).all() and np.isfinite(data.upper).all()):
+        raise ValueError(
+            f"a censored value has no other end; a {law} law needs one: give bounds=(lower,"
+            f" upper), or leave the law out"
+        )
+    if data.lower[0] == data.lower[-1] and data.exact:
+        raise ValueError(
+            f"all {data.count} values are {data.lower[0]:g}, which a {law} law does not give:"
+            f" say to what resolution= they are rounded"
+        )
+
+
+def _student(data: Observations, quantile: float | None, side: Side) -> tuple[Array, Array]:
+    """Ends mean + factor · scatter over the levels, worst over the values' intervals."""
+    below, above = _factors(data.count, quantile, side)
+    scatter = _scatter(data)
+    least, most = scatter
+    lower = data.lower.mean() + below * np.where(below < 0, most, least)
+    upper = data.upper.mean() + above * np.where(above > 0, most, least)
+    return lower, upper
+
+
+def _scatter(data: Observations) -> tuple[float, float]:
+    """Bounds of the standard deviation of values within intervals, by the triangle inequality."""
+    middle, half = (data.lower + data.upper) / 2, (data.upper - data.lower) / 2
+    spread, give = float(middle.std(ddof=1)), float(np.sqrt((half**2).sum() / (data.count - 1)))
+    return max(spread - give, 0.0), spread + give
+
+
+@lru_cache(maxsize=64)
+def _factors(n: int, quantile: float | None, side: Side) -> tuple[Array, Array]:
+    """Factors of the standard deviation for the lower and the upper end at every level."""
+    tail = LEVELS / 2 if side == "both" else LEVELS
+    if quantile is None or quantile == 0.5:
+        from scipy.stats import t
+
+        reach = np.maximum(t.isf(tail, n - 1), 0.0) * np.sqrt(
+            (1 + 1 / n) if quantile is None else 1 / n
+        )
+        return -reach, reach
+    from scipy.stats import nct, norm
+
+    shift = norm.ppf(quantile) * np.sqrt(n)
+    return nct.ppf(tail, n - 1, shift) / np.sqrt(n), nct.isf(tail, n - 1, shift) / np.sqrt(n)
+
+
+def _log_normal_mean(data: Observations, side: Side) -> tuple[Array, Array]:
+    """Least and greatest exp(μ + σ²/2) over the region of (μ, σ)."""
+    reach, narrow, wide = _region(data.count, side)
+    scatter = _scatter(data)
+    least, most = scatter[0] * narrow, scatter[1] * wide
+    at = np.clip(reach, least, most)  # where x − reach σ + σ²/2 is least
+    with np.errstate(over="ignore"):
+        return np.exp(data.lower.mean() - reach * at + at**2 / 2), np.exp(
+            data.upper.mean() + reach * most + most**2 / 2
+        )
+
+
+@lru_cache(maxsize=64)
+def _region(n: int, side: Side) -> tuple[Array, Array, Array]:
+    """Bounds of |μ − mean| / σ, and of σ / s from below and above, at every level.
+
+    Both hold with probability √(1 − α), independently.
+    """
+    from scipy.stats import chi2, norm
+
+    part = -np.expm1(np.log1p(-LEVELS[:-1]) / 2)
+    part = np.append(part, 1.0)
+    reach = norm.isf(part / 2) / np.sqrt(n)
+    return (
+        reach,
+        np.sqrt((n - 1) / chi2.isf(part / 2, n - 1)),
+        np.sqrt((n - 1) / chi2.ppf(part / 2, n - 1)),
+    )
+
+
+def _within(
+    lower: Array, upper: Array, bounds: tuple[float, float], side: Side
+) -> tuple[Stepwise, float]:
+    """Steps from 0 to 1 within the bounds, and the least level at which they are finite."""
+    low, high = bounds
+    lower = np.full_like(lower, low) if side == "upper" else np.clip(lower, low, high)
+    upper = np.minimum.accumulate(
+        np.full_like(upper, high) if side == "lower" else np.clip(upper, low, high)
+    )
+    lower = np.minimum(
+        np.maximum.accumulate(lower), upper[-1]
+    )  # at α = 1 both are one point, to round-off
+    first = int((np.isfinite(lower) & np.isfinite(upper)).argmax())
+    whole = bool(np.isfinite(bounds).all())
+    ends = (low, high) if whole else (lower[first], upper[first])
+    lower[:first], upper[:first] = lower[first], upper[first]
+    return Stepwise((0.0, *LEVELS), (ends[0], *lower), (ends[1], *upper)), 0.0 if whole else float(
+        LEVELS[first]
+    )

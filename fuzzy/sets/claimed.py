@@ -1,0 +1,136 @@
+"""Fuzzy numbers that claim how often their cuts hold the true value, and on what that rests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from alphacut.fuzzy.sets.numbers import Array, Cut, Cuts, FuzzyNumber
+from alphacut.fuzzy.sets.stepwise import Stepwise
+
+
+@dataclass(frozen=True)
+class Claim:
+    """P(quantity in the cut at α) >= 1 − α at every α, over repeated samples.
+
+    Args:
+        about: The quantity: "next value", "mean", "median", "quantile 0.9", or what a joint claim
+            means.
+        given: Conditions under which it holds, one each.
+    """
+
+    about: str
+    given: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        conditions = f", given {'; '.join(self.given)}" if self.given else ""
+        return (
+            f"the {self.about} lies in its α-cut with P >= 1 - α over repeated samples{conditions}"
+        )
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Rule by which claims are joined.
+
+    Args:
+        names: The claimed inputs.
+        independent: Whether their sources are independent; unknown dependence otherwise.
+        means: What the joint claim means: the kind of all claims, or a name given by the user.
+        named: Whether the user gave it.
+    """
+
+    names: tuple[str, ...]
+    independent: bool
+    means: str
+    named: bool = False
+
+    def joined(self, beta: Array) -> Array:
+        """Joint level of the cuts at levels `beta`, any shape; 1 at most."""
+        m = len(self.names)
+        inside = np.minimum(beta, 1 - 1e-16)
+        joint: Array = (
+            -np.expm1(m * np.log1p(-inside)) if self.independent else np.minimum(m * beta, 1.0)
+        )
+        return np.asarray(beta, float) if m == 1 else joint
+
+    @property
+    def words(self) -> str:
+        """The rule in words."""
+        m = len(self.names)
+        if m == 1:
+            return ""
+        return (
+            f"{m} independent sources" if self.independent else f"{m} sources of unknown dependence"
+        )
+
+
+@dataclass(frozen=True)
+class Claimed(FuzzyNumber):
+    """A fuzzy number with a claim.
+
+    Args:
+        number: The cuts; below `decided` they repeat the first one that the values decide.
+        claim: What the cuts hold, how often, and given what.
+        decided: Least α at which the values decide both ends of the cut; 0 where they do
+            everywhere, or physical bounds fill in.
+        enough: Number of values that would decide the cut at a level, in words, for messages.
+        joint: Rule by which its cuts were widened to hold together with others; None where they
+            hold by themselves.
+
+    Raises:
+        ValueError: `decided` lies outside [0, 1].
+    """
+
+    number: Stepwise
+    claim: Claim
+    decided: float = 0.0
+    enough: str = ""
+    joint: Joint | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.decided <= 1:
+            raise ValueError(f"the least decided α is {self.decided:g}; it must lie in [0, 1]")
+
+    @property
+    def cuts(self) -> Cuts:
+        """The cuts at all levels.
+
+        Raises:
+            ValueError: Some are not decided by the values.
+        """
+        self.cut(0.0)
+        return self.number.cuts
+
+    def cut(self, alpha: float) -> Cut:
+        """The cut at `alpha` in [0, 1].
+
+        Raises:
+            ValueError: `alpha` lies outside [0, 1], or the values do not decide the cut there.
+        """
+        if 0 <= alpha < self.decided:
+            cure = (
+                "give bounds=(lower, upper), what is physically possible, or take only levels"
+                " from there"
+            )
+            raise ValueError(
+                f"the values decide the cuts of the {self.claim.about} from α ="
+                f" {self.decided:.4g} on, not at α = {alpha:g}: {cure}{self.enough}"
+            )
+        return self.number.cut(alpha)
+
+    def __str__(self) -> str:
+        return f"{type(self).__name__}({self.claim.about})"
+
+
+def from_level(number: FuzzyNumber, alpha: float) -> FuzzyNumber:
+    """The number for use from a level on: what the values do not decide lies below.
+
+    Raises:
+        ValueError: The values do not decide the cut at `alpha`.
+    """
+    if not isinstance(number, Claimed):
+        return number
+    number.cut(alpha)
+    return replace(number, decided=0.0)
