@@ -1,9 +1,10 @@
-"""Source archive with the links alphacut/rve -> ../rve, … kept as links."""
+"""Source archive with the links alphacut/rve -> ../rve, … kept as links; wheels built afresh."""
 
 import shutil
 from pathlib import Path
 
 from setuptools import setup
+from setuptools.command.build_py import build_py
 from setuptools.command.sdist import sdist
 
 LINKS = [path for path in Path("alphacut").iterdir() if path.is_symlink()]
@@ -21,4 +22,13 @@ class LinkedArchive(sdist):
             copy.symlink_to(link.readlink())
 
 
-setup(cmdclass={"sdist": LinkedArchive})
+class FreshBuild(build_py):
+    """Build without the files of an earlier one, of which some may be gone since."""
+
+    def run(self) -> None:
+        """Copy the files into an empty folder."""
+        shutil.rmtree(self.build_lib, ignore_errors=True)
+        super().run()
+
+
+setup(cmdclass={"sdist": LinkedArchive, "build_py": FreshBuild})

@@ -83,8 +83,12 @@ def archive(venv, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def wheel(venv, archive):
-    """The wheel, built from the source archive."""
-    venv.run("pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", archive.parent, archive)
+    """The wheel, built from the unpacked source archive, where an earlier build has left a file."""
+    shutil.unpack_archive(archive, archive.parent)
+    source = archive.parent / archive.name.removesuffix(".tar.gz")
+    (source / "build" / "lib" / "alphacut").mkdir(parents=True)
+    (source / "build" / "lib" / "alphacut" / "gone.py").touch()
+    venv.run("pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", archive.parent, source)
     (file,) = archive.parent.glob("*.whl")
     return file
 
