@@ -12,6 +12,7 @@ from alphacut.case.case import Case
 from alphacut.case.checks_material import particles, radius
 from alphacut.case.checks_structure import incomplete
 from alphacut.case.idle import idle_envelope
+from alphacut.case.limits import limit_of, storey_height
 from alphacut.case.names import OTHERS, OUTPUTS, floors, named_inputs, study_count
 from alphacut.case.schema import ENVELOPE_METHODS, INTEGRATORS, NEEDED, NONLINEAR, STAGES
 from alphacut.case.values import nearest
@@ -286,8 +287,6 @@ def methods(case: Case) -> Iterator[Problem]:
 
 def exceedance(case: Case) -> Iterator[Problem]:
     """A limit is for an output of the structure in vibration, and in its unit."""
-    from alphacut.stages.exceedance import limit_of, storey_height
-
     if not case.has("envelope.step"):
         yield Problem("exceedance", "a probability needs the section [envelope]")
     for section, outputs in OUTPUTS.items():

@@ -31,6 +31,7 @@ from alphacut.rve.cell import STRAIN
 from alphacut.rve.model import cross_check
 from alphacut.rve.result import Homogenised
 from alphacut.stages import cell
+from alphacut.stages.cell_models import cell_model
 from alphacut.stages.contract import contract, keep_modulus, require_choice
 
 ABOUT = "homogenise the cell at crisp values; a fuzzy input takes its modal value"
@@ -111,7 +112,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     if pair:
         result, difference = compared(case, choice, pair)
     else:
-        result, difference = cell.solve(case, choice.model()), None
+        result, difference = cell.solve(case, cell_model(choice)), None
         keep_modulus(case, result.method, result.error, best_effort=options.best_effort)
     if options.export:
         export(result, options.export)
@@ -164,13 +165,15 @@ def compared(case: Case, choice: cell.CellChoice, pair: Sequence[str]) -> tuple[
     results = [
         cell.solve(
             case,
-            replace(
-                choice,
-                method=name,
-                tolerance=choice.tolerance if name == "auto" else None,
-                exclude=choice.exclude if name == "auto" else (),
-                petsc=choice.petsc if name == "prism" else {},
-            ).model(),
+            cell_model(
+                replace(
+                    choice,
+                    method=name,
+                    tolerance=choice.tolerance if name == "auto" else None,
+                    exclude=choice.exclude if name == "auto" else (),
+                    petsc=choice.petsc if name == "prism" else {},
+                )
+            ),
         )
         for name in pair
     ]

@@ -34,8 +34,9 @@ from alphacut.io.units import engineering, largest_by_unit
 from alphacut.stages import envelope
 from alphacut.stages import exceedance as outcomes
 from alphacut.stages.contract import require_choice
+from alphacut.stages.envelope_task import EnvelopeTask, task_of
 from alphacut.stages.modulus import read_number, stand_in
-from alphacut.stages.structure import structure
+from alphacut.stages.structure import Structure, structure
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
@@ -83,27 +84,27 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     case = load(options.case, changes(options, KEYS), without=replaced(options))
     require_read(case, (*READ, *GIVEN), "envelope")
     handed = given_modulus(options.modulus) or stand_in(case)
-    task = replace(envelope.task_of(case), exclude=excluded(options.exclude))
+    task = replace(task_of(case), exclude=excluded(options.exclude))
     contradictions(options, case, task)
+    wanted = structure(case, handed)
     if case.has("exceedance.output"):
-        outcomes.require_random(case, structure(case, handed))  # before anything is computed
+        outcomes.require_random(case, wanted)  # before anything is computed
     with progress("Envelopes", quiet=options.quiet) as tick:
         found = envelope.compute(
-            case,
+            wanted,
             task,
-            modulus=handed,
             strict=options.strict,
             workers=options.workers,
             progress=tick,
         )
-    dataset = outcomes.with_peaks(found, structure(case, handed), task)
+    dataset = outcomes.with_peaks(found, wanted, task)
     envelope.keep_tolerance(case, dataset, best_effort=options.best_effort)
     if options.out:
         key = fingerprint(
             {"case": case.values, "task": task, "modulus": handed}, ("fuzzy", "frame")
         )
         envelope.write(dataset, options.out, case_text=case.text_of_file, key=key)
-    limit = exceeded(options, case, handed)
+    limit = exceeded(options, case, wanted)
     tried = dataset["peak_tried"].values
     contract = {"asked": task.tolerance, "reached": dataset.attrs.get("reached")}
     document = {
@@ -118,14 +119,12 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     return 0
 
 
-def exceeded(
-    options: argparse.Namespace, case: Case, handed: FuzzyNumber | None
-) -> dict[str, Any] | None:
+def exceeded(options: argparse.Namespace, case: Case, wanted: Structure) -> dict[str, Any] | None:
     """The fuzzy probability of exceeding the case's limit; None where it names none."""
     if not case.has("exceedance.output"):
         return None
     with progress("Exceedance", quiet=options.quiet) as tick:
-        return outcomes.exceedance_document(outcomes.exceedance(case, handed, tick))
+        return outcomes.exceedance_document(outcomes.exceedance(case, wanted, tick))
 
 
 def replaced(options: argparse.Namespace) -> tuple[str, ...]:
@@ -139,7 +138,7 @@ def replaced(options: argparse.Namespace) -> tuple[str, ...]:
     return ()
 
 
-def contradictions(options: argparse.Namespace, case: Case, task: envelope.EnvelopeTask) -> None:
+def contradictions(options: argparse.Namespace, case: Case, task: EnvelopeTask) -> None:
     """Refuse options that have no effect together.
 
     Raises:

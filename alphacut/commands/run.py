@@ -100,6 +100,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         petsc,
         options.strict,
         options.best_effort or options.quick,
+        prepared.structure,
     )
     results = chain.run()
     driving = chain.stored("shares.nc", *driven(chain, results))

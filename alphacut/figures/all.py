@@ -20,7 +20,6 @@ from alphacut.figures import shares as figure_shares
 from alphacut.figures.style import save, style
 from alphacut.io.progress import progress
 from alphacut.stages.pipeline import Results
-from alphacut.stages.structure import structure
 
 if TYPE_CHECKING:
     import xarray
@@ -52,7 +51,7 @@ def drawings(results: Results) -> Iterator[Drawing]:
         yield "fig27-chain", lambda: figure_frame.chain(results.case)
     if results.envelopes and results.case.has("tower.storeys"):
         yield "tower", lambda: figure_frame.tower(results.case)
-    model = structure(results.case, results.handed).linear if results.envelopes else None
+    model = None if results.structure is None else results.structure.linear
     if model is not None and (shaken := model.ground) is not None:
         yield "record", lambda: figure_record.record(shaken)
     if (

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from alphacut.figures.style import BLUE, GREY, INK, ORANGE, prefix_axis
 from alphacut.stages.pipeline import Results, Study
-from alphacut.stages.structure import structure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -90,7 +89,8 @@ def recorded(results: Results, study: Study) -> tuple[FollowerRecord, str]:
     from alphacut.frame.boxes import UnitFlow, boxes
     from alphacut.frame.methods.follower_record import record_flow
 
-    wanted = structure(results.case, results.handed)
+    wanted = results.structure
+    assert wanted is not None
     cuts = boxes(wanted.inputs(study.task.fuzzy), (0.0,))
     steps = max(
         1, min(round(DURATION / study.task.step), round(study.task.duration / study.task.step))

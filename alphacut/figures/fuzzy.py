@@ -9,7 +9,6 @@ import numpy as np
 from alphacut.figures.style import BLUE, INK, ORANGE, figure, membership_axes, prefix_axis
 from alphacut.stages.cell import GPA
 from alphacut.stages.pipeline import Results
-from alphacut.stages.structure import structure
 
 if TYPE_CHECKING:
     import xarray
@@ -55,7 +54,8 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
     study = next((s for s in results.studies if len(s.task.fuzzy) > 1), results.studies[0])
     dataset = results.envelopes[study.name].isel(alpha=0)
     output = str(dataset["output"].values[-1 if "q" in str(dataset["output"].values[-1]) else 0])
-    wanted = structure(results.case, results.handed)
+    wanted = results.structure
+    assert wanted is not None
     inputs = wanted.inputs(study.task.fuzzy)
     end = min(duration, study.task.duration)
     end = round(end / study.task.step) * study.task.step

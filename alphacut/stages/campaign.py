@@ -14,6 +14,7 @@ from alphacut.case.case import Case
 from alphacut.fuzzy import Extended, FuzzyNumber, General, Known, Plan, Reduced, Signed
 from alphacut.io.provenance import source_digest, versions
 from alphacut.stages.cell import INPUTS, SHARED, CellChoice, cell_choice, key_of, parts
+from alphacut.stages.cell_models import cell_model
 from alphacut.stochastic.theta.interpolation import between_nodes
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -53,7 +54,7 @@ class CellTask:
         values = [{**self.crisp, **point} for point in points]
         radius, matrix, _ = parts(values[0], self.theta)
         inclusions = [parts(value, self.theta)[2] for value in values]
-        results = self.choice.model().solve(radius, matrix, inclusions)
+        results = cell_model(self.choice).solve(radius, matrix, inclusions)
         outputs: list[dict[str, float | Array]] = []
         for result in results:
             s11, s12 = result.curve.mean
@@ -84,7 +85,8 @@ class CellTask:
         if self.choice.method not in JUDGED:
             return None
         radius, matrix, inclusion = parts({**self.crisp, **point}, self.theta)
-        return replace(self.choice, estimate=True).model().solve(radius, matrix, [inclusion])[0]
+        model = cell_model(replace(self.choice, estimate=True))
+        return model.solve(radius, matrix, [inclusion])[0]
 
     def resampled(self, nodes: Array, stress: Array) -> Array:
         """Stress curve at `SHOWN` points over θ, for pictures."""

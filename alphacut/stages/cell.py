@@ -93,12 +93,6 @@ class CellChoice:
         without = f", without {', '.join(self.exclude)}" if self.exclude else ""
         return f"each sample by method {self.method}{'' if refined else mesh}{asked}{without}"
 
-    def model(self) -> CellModel:
-        """The model itself; this is where DOLFINx may be imported."""
-        from alphacut.stages.cell_models import cell_model
-
-        return cell_model(self)
-
 
 def cell_choice(
     case: Case, *, exclude: tuple[str, ...] = (), petsc: Mapping[str, str] | None = None

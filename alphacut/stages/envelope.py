@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from alphacut.case.case import Case
-from alphacut.case.checks import displacements
-from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import say, whole_file
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
 from alphacut.io.provenance import attributes, versions
 from alphacut.stages.contract import keep
+from alphacut.stages.envelope_task import TOLERANCES, EnvelopeTask
 from alphacut.stages.resolution_checks import guard_against
-from alphacut.stages.structure import Structure, structure
+from alphacut.stages.structure import Structure
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
@@ -26,83 +25,11 @@ if TYPE_CHECKING:
 
     from alphacut.frame import Envelope
 
-TOLERANCES = ("envelope.relative_tolerance", "envelope.tolerance", "pendulum.tolerance")
-SHARE = 1e-3  # the tolerance where no output is a displacement: of their peaks
-
-
-@dataclass(frozen=True)
-class EnvelopeTask:
-    """One envelope to be computed.
-
-    Args:
-        fuzzy: Fuzzy inputs as the user names them: E, m, m1 …
-        duration: Length of the simulation, in s.
-        step: Time step, in s.
-        alpha: Levels, rising.
-        method: How the envelope is found.
-        integrator: Time stepping; None leaves it to the method.
-        order: Order κ of the Taylor models.
-        tolerance: Gain that is worth a new trajectory, or the error wanted of auto, in the unit of
-            the outputs.
-        exclude: Methods that auto must not take.
-        certify: Gap between attained and proved bounds that is wanted, in the unit of the outputs;
-            None for no certificate.
-        relative: Whether the tolerance is a share of each output's peak.
-    """
-
-    fuzzy: tuple[str, ...]
-    duration: float
-    step: float
-    alpha: tuple[float, ...]
-    method: str
-    integrator: str | None
-    order: int
-    tolerance: float
-    exclude: tuple[str, ...] = ()
-    certify: float | None = None
-    relative: bool = False
-
-    @property
-    def scheme(self) -> str:
-        """Time stepping of a linear structure: integrator, or the method's own."""
-        return self.integrator or ("exact" if self.method in ("auto", "modal") else "midpoint")
-
-
-def task_of(
-    case: Case, *, fuzzy: Sequence[str] | None = None, duration: float | None = None
-) -> EnvelopeTask:
-    """Envelope that [envelope] asks for, with other inputs or duration if given."""
-    tolerance = "pendulum.tolerance" if case.has("pendulum.mass") else "envelope.tolerance"
-    relative, method = case.has("envelope.relative_tolerance"), case.text("envelope.method")
-    forces = (
-        case.has("frame.masses") and bool(case.names("frame.outputs")) and not displacements(case)
-    )
-    certify = case.number("envelope.certify") if case.has("envelope.certify") else None
-    return EnvelopeTask(
-        tuple(fuzzy) if fuzzy else case.names("envelope.fuzzy"),
-        duration or case.number("envelope.duration"),
-        case.number("envelope.step"),
-        case.numbers("envelope.alpha"),
-        "modal" if certify is not None and method == "auto" else method,
-        case.text("envelope.integrator") if case.has("envelope.integrator") else None,
-        case.integer("envelope.order"),
-        (
-            case.number("envelope.relative_tolerance")
-            if relative
-            else SHARE
-            if forces
-            else case.number(tolerance)
-        ),
-        certify=certify,
-        relative=relative or forces,
-    )
-
 
 def compute(
-    case: Case,
+    wanted: Structure,
     task: EnvelopeTask,
     *,
-    modulus: FuzzyNumber | None = None,
     strict: bool = False,
     workers: int = 1,
     progress: Tick | None = None,
@@ -110,16 +37,14 @@ def compute(
     """The envelope of all outputs on all levels.
 
     Args:
-        case: With the sections envelope and frame or pendulum.
+        wanted: The structure.
         task: What is wanted.
-        modulus: Handed on from the stage before, in Pa.
         strict: Refuse a step or tolerance that is coarse beside the motion instead of warning.
         workers: Processes that share the proof, where a certificate is wanted.
         progress: Told the share done.
     """
     from alphacut import frame
 
-    wanted = structure(case, modulus)
     inputs = wanted.inputs(task.fuzzy)
     guard_against(wanted, task, strict=strict)
     try:
@@ -196,19 +121,6 @@ def document(found: Envelope, tried: Array) -> dict[str, Any]:
         "facts": dict(found.facts),
         "versions": versions(),
     }
-
-
-def reached(found: Envelope, wanted: Structure, task: EnvelopeTask) -> float | None:
-    """Largest declared error in the tolerance's measure; None where no error is declared."""
-    from alphacut.frame.boxes import UnitFlow, boxes
-
-    if found.error is None:
-        return None
-    cuts = boxes(wanted.inputs(task.fuzzy), task.alpha)
-    scheme = task.scheme if wanted.linear is not None else task.integrator
-    flow = wanted.flow(cuts.names, task.duration, task.step, scheme)
-    scale = UnitFlow(flow, cuts, task.relative and task.certify is None).scale
-    return float((found.error.max((0, 1)) / scale).max())
 
 
 def keep_tolerance(case: Case, dataset: xarray.Dataset, *, best_effort: bool) -> None:

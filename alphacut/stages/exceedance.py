@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alphacut.case.case import Case
+from alphacut.case.limits import limit_of
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.io import quantity
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
 from alphacut.io.units import engineering
-from alphacut.stages.structure import Structure, structure
+from alphacut.stages.structure import Structure
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     import xarray
 
     from alphacut.frame import Envelope
-    from alphacut.stages.envelope import EnvelopeTask
+    from alphacut.stages.envelope_task import EnvelopeTask
 
 Sampler = Callable[[np.random.Generator, int], Array]
 FACTS = (
@@ -48,7 +48,6 @@ def with_peaks(found: Envelope, wanted: Structure, task: EnvelopeTask) -> xarray
     """
     from alphacut.frame.boxes import boxes
     from alphacut.frame.exceedance import peaks, tried_peaks
-    from alphacut.stages.envelope import reached
 
     of, cuts = peaks(found), boxes(wanted.inputs(task.fuzzy), task.alpha)
     tried = tried_peaks(
@@ -85,6 +84,19 @@ def with_peaks(found: Envelope, wanted: Structure, task: EnvelopeTask) -> xarray
     )
 
 
+def reached(found: Envelope, wanted: Structure, task: EnvelopeTask) -> float | None:
+    """Largest declared error in the tolerance's measure; None where no error is declared."""
+    from alphacut.frame.boxes import UnitFlow, boxes
+
+    if found.error is None:
+        return None
+    cuts = boxes(wanted.inputs(task.fuzzy), task.alpha)
+    scheme = task.scheme if wanted.linear is not None else task.integrator
+    flow = wanted.flow(cuts.names, task.duration, task.step, scheme)
+    scale = UnitFlow(flow, cuts, task.relative and task.certify is None).scale
+    return float((found.error.max((0, 1)) / scale).max())
+
+
 def peak_document(dataset: xarray.Dataset) -> dict[str, dict[str, Array]]:
     """Fuzzy peak of each output by level, in SI: ends, error, and the least one tried."""
     found = {}
@@ -114,43 +126,6 @@ def shaped_like(number: FuzzyNumber) -> Sampler:
         return values
 
     return draw
-
-
-def limit_of(case: Case) -> float:
-    """Limit in the SI unit of its output; a drift also as a share of the height.
-
-    Raises:
-        BadInput: It is no positive quantity of that unit.
-    """
-    from alphacut.frame.outputs import output_unit
-
-    name, text = case.text("exceedance.output"), case.text("exceedance.limit")
-    unit, height = output_unit(name), storey_height(case, name)
-    try:
-        share = height is not None and text.rstrip().endswith("%")
-        limit = (
-            height * quantity.number(text, "") if share and height else quantity.number(text, unit)
-        )
-    except ValueError as error:
-        kind = f"a quantity in {unit}, as the output is" + (
-            ", or a share of the storey's height such as 0.5 %" if height else ""
-        )
-        raise case.refuse("exceedance.limit", str(error), kind) from None
-    if not limit > 0:
-        raise case.refuse("exceedance.limit", "out of range", "greater than 0")
-    return limit
-
-
-def storey_height(case: Case, output: str) -> float | None:
-    """The height in m of the storey whose drift an output is; None for any other output."""
-    kind, floor = output.rstrip("0123456789"), output.lstrip("abcdefghijklmnopqrstuvwxyz_")
-    if kind != "drift":
-        return None
-    if case.has("tower.height"):
-        return case.number("tower.height")
-    lengths = case.fuzzies("frame.lengths") if case.has("frame.lengths") else ()
-    index = 0 if len(lengths) == 1 else int(floor or 1) - 1
-    return lengths[index].modal if 0 <= index < len(lengths) else None
 
 
 def require_random(case: Case, wanted: Structure) -> None:
@@ -190,14 +165,12 @@ def split_inputs(
     }
 
 
-def exceedance(
-    case: Case, handed: FuzzyNumber | None, progress: Tick | None = None
-) -> xarray.Dataset:
+def exceedance(case: Case, wanted: Structure, progress: Tick | None = None) -> xarray.Dataset:
     """Fuzzy probability that an output exceeds the case's limit in the duration.
 
     Args:
         case: With the sections exceedance, envelope and a structure.
-        handed: Modulus of the stage before, in Pa.
+        wanted: The structure.
         progress: Told the share done.
 
     Raises:
@@ -208,7 +181,7 @@ def exceedance(
     from alphacut.frame import exceedance as probabilities
     from alphacut.frame.outputs import output_unit
 
-    wanted, output = structure(case, handed), case.text("exceedance.output")
+    output = case.text("exceedance.output")
     model = wanted.model if wanted.frame is None else replace(wanted.frame, outputs=(output,))
     if output not in model.outputs:
         raise case.refuse(

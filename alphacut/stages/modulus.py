@@ -26,6 +26,7 @@ from alphacut.io.progress import Tick
 from alphacut.io.provenance import attributes, versions
 from alphacut.stages.campaign import Campaign, theta_shown
 from alphacut.stages.cell import GPA, CellChoice, anisotropy, parts
+from alphacut.stages.cell_models import cell_model
 from alphacut.stages.measured_modulus import measured_modulus
 
 if TYPE_CHECKING:
@@ -226,7 +227,9 @@ def compute(wanted: Campaign, *, workers: int = 1, progress: Tick | None = None)
             mpi4py.futures`` all of those are used.
         progress: Told the share done.
     """
-    wanted.task.choice.model()  # a model that cannot be had is one problem, not one for each sample
+    cell_model(
+        wanted.task.choice
+    )  # a model that cannot be had is one problem, not one for each sample
     result = propagate(
         wanted.task,
         wanted.inputs,

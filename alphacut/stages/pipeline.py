@@ -19,13 +19,13 @@ from alphacut.stages import envelope, microstructure, modulus, response
 from alphacut.stages import exceedance as outcomes
 from alphacut.stages.campaign import campaign
 from alphacut.stages.contract import keep_modulus
+from alphacut.stages.envelope_task import EnvelopeTask, task_of
 from alphacut.stages.microstructure import write as write_microstructure
-from alphacut.stages.structure import structure
+from alphacut.stages.structure import Structure, structure
 
 if TYPE_CHECKING:
     import xarray
 
-    from alphacut.stages.envelope import EnvelopeTask
 
 MODULUS_SECTIONS = ("radius", "cell", "mesh", "modulus")
 
@@ -60,6 +60,7 @@ class Chain:
         petsc: PETSc options that override the solver's.
         strict: Refuse a time step that cannot resolve the fastest mode.
         best_effort: Take results whose error is above the tolerance.
+        built: The structure, if it is built; its modulus may be another.
     """
 
     case: Case
@@ -70,6 +71,7 @@ class Chain:
     petsc: Mapping[str, str] = field(default_factory=dict)
     strict: bool = False
     best_effort: bool = False
+    built: Structure | None = None
 
     def file(self, name: str) -> Path:
         """A file among the results."""
@@ -87,16 +89,19 @@ class Chain:
         handed = modulus.stand_in(self.case)
         cell = self.modulus() if "modulus" in self.case.stages and handed is None else None
         handed = modulus.read_number(self.file("modulus.nc")) if cell is not None else handed
-        envelopes = {}
+        wanted, envelopes = None, {}
         if "envelope" in self.case.stages:
-            envelopes = {study.name: self.envelope(study, handed) for study in studies(self.case)}
+            wanted = (self.built or structure(self.case, handed)).with_modulus(handed)
+            envelopes = {
+                study.name: self.envelope(study, handed, wanted) for study in studies(self.case)
+            }
         stress = (
             self.response(cell) if cell is not None and self.case.has("response.quantity") else None
         )
-        limit = (
-            self.exceedance(handed) if envelopes and self.case.has("exceedance.output") else None
-        )
-        return Results(self.case, self.folder, cell, envelopes, handed, stress, limit)
+        limit = None
+        if wanted is not None and self.case.has("exceedance.output"):
+            limit = self.exceedance(handed, wanted)
+        return Results(self.case, self.folder, cell, envelopes, handed, stress, limit, wanted)
 
     def with_particles(self) -> Case:
         """Case with the radius map of its particles; the stage's files are stored."""
@@ -166,39 +171,40 @@ class Chain:
 
         return self.stored("response.nc", key, compute)
 
-    def envelope(self, study: Study, handed: FuzzyNumber | None) -> xarray.Dataset:
+    def envelope(
+        self, study: Study, handed: FuzzyNumber | None, wanted: Structure
+    ) -> xarray.Dataset:
         """One study's envelope, in envelope_NAME.nc."""
         key = self.vibration({"task": study.task, "holds": ("bounds", "peaks", "tried")}, handed)
 
         def compute(path: Path) -> None:
             with progress(f"Envelope {study.name}", quiet=self.quiet) as tick:
                 found = envelope.compute(
-                    self.case,
+                    wanted,
                     study.task,
-                    modulus=handed,
                     strict=self.strict,
                     workers=self.workers,
                     progress=tick,
                 )
-            dataset = outcomes.with_peaks(found, structure(self.case, handed), study.task)
+            dataset = outcomes.with_peaks(found, wanted, study.task)
             envelope.write(dataset, path, case_text=self.case.text_of_file, key=key)
 
         found = self.stored(f"envelope_{study.name}.nc", key, compute)
         envelope.keep_tolerance(self.case, found, best_effort=self.best_effort)
         return found
 
-    def exceedance(self, handed: FuzzyNumber | None) -> xarray.Dataset:
+    def exceedance(self, handed: FuzzyNumber | None, wanted: Structure) -> xarray.Dataset:
         """The fuzzy probability of exceeding the case's limit, in exceedance.nc."""
-        wanted = {
+        asked = {
             key: value
             for key, value in self.case.values.items()
             if key.partition(".")[0] in ("exceedance", "envelope")
         }
-        key = self.vibration({"wanted": wanted}, handed)
+        key = self.vibration({"wanted": asked}, handed)
 
         def compute(path: Path) -> None:
             with progress("Exceedance", quiet=self.quiet) as tick:
-                found = outcomes.exceedance(self.case, handed, tick)
+                found = outcomes.exceedance(self.case, wanted, tick)
             envelope.write(found, path, case_text=self.case.text_of_file, key=key)
 
         return self.stored("exceedance.nc", key, compute)
@@ -245,6 +251,7 @@ class Results:
             own.
         response: Dataset of response.nc; None where the case does not ask for it.
         exceedance: Dataset of exceedance.nc; None where the case names no limit.
+        structure: The structure with that modulus; None where none vibrates.
     """
 
     case: Case
@@ -254,6 +261,7 @@ class Results:
     handed: FuzzyNumber | None
     response: xarray.Dataset | None = None
     exceedance: xarray.Dataset | None = None
+    structure: Structure | None = None
 
     @property
     def studies(self) -> tuple[Study, ...]:
@@ -285,11 +293,11 @@ def studies(case: Case) -> tuple[Study, ...]:
     """The studies of a case: its [[study]] tables, or one made of [envelope]."""
     count: Any = case.values.get("study", 0)
     if not count:
-        return (Study("all", envelope.task_of(case)),)
+        return (Study("all", task_of(case)),)
     found = []
     for index in range(count):
         key = f"study[{index}]"
-        task = envelope.task_of(
+        task = task_of(
             case, fuzzy=case.names(f"{key}.fuzzy"), duration=case.number(f"{key}.duration")
         )
         found.append(

@@ -5,17 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from alphacut.case.case import Case
-from alphacut.case.checks import beside, replaced, stand_ins
+from alphacut.case.checks import replaced, stand_ins
 from alphacut.case.names import fuzzy_keys
 from alphacut.fuzzy import FuzzyNumber, Triangular
 from alphacut.io.problem import BadInput, Problem
 from alphacut.stages import modulus
-from alphacut.stages.accelerogram import accelerogram
 from alphacut.stages.pipeline import studies
 from alphacut.stages.resolution_checks import rough
 from alphacut.stages.structure import Structure, structure
+
+if TYPE_CHECKING:
+    from alphacut.frame import Accelerogram
 
 PERIODS = (0.02, 30.0)  # s, from a stiff machine frame to the slenderest towers
 STRONGEST = 50.0  # m/s², more than any ground acceleration recorded
@@ -32,11 +35,13 @@ class Readiness:
             strictly.
         period: First natural period at the modal values, in s; None where no linear structure
             vibrates.
+        structure: The structure, with the modulus expected; None where none vibrates.
     """
 
     warnings: tuple[str, ...] = ()
     rough: tuple[Problem, ...] = ()
     period: float | None = None
+    structure: Structure | None = None
 
 
 def ready(case: Case) -> Readiness:
@@ -76,9 +81,9 @@ def ready(case: Case) -> Readiness:
         problem for study in studies(case) for problem in rough(wanted, study.task)
     )
     period = first_period(wanted)
-    return Readiness(
-        (*outlasted(case), *unlikely(case, period), *unproved(case)), tuple(found), period
-    )
+    ground = None if wanted.linear is None else wanted.linear.ground
+    remarks = (*outlasted(case, ground), *unlikely(case, ground, period), *unproved(case))
+    return Readiness(remarks, tuple(found), period, wanted)
 
 
 def first_period(wanted: Structure) -> float | None:
@@ -98,7 +103,7 @@ def unproved(case: Case) -> Iterator[str]:
         )
 
 
-def unlikely(case: Case, period: float | None) -> Iterator[str]:
+def unlikely(case: Case, ground: Accelerogram | None, period: float | None) -> Iterator[str]:
     """Remarks on values of which one has most likely the wrong unit."""
     if period is not None and not PERIODS[0] <= period <= PERIODS[1]:
         yield (
@@ -106,8 +111,8 @@ def unlikely(case: Case, period: float | None) -> Iterator[str]:
             " of masses, lengths and moduli"
         )
     for key in RECORDS:
-        if case.has(key):
-            peak = float(abs(accelerogram(beside(case, case.text(key)), key).acceleration).max())
+        if case.has(key) and ground is not None:
+            peak = float(abs(ground.acceleration).max())
             if peak > STRONGEST:
                 yield (
                     f"{key}: a peak of {peak:.3g} m/s² is above any earthquake recorded; check the"
@@ -157,11 +162,10 @@ def crisp_names(case: Case, wanted: Structure) -> Iterator[Problem]:
                 )
 
 
-def outlasted(case: Case) -> Iterator[str]:
+def outlasted(case: Case, record: Accelerogram | None) -> Iterator[str]:
     """A remark on durations that are longer than the record."""
     for key in RECORDS:
-        if case.has(key):
-            record = accelerogram(beside(case, case.text(key)), key)
+        if case.has(key) and record is not None:
             end = (len(record.acceleration) - 1) * record.step
             longest = max(study.task.duration for study in studies(case))
             if longest > end + 0.5 * record.step:

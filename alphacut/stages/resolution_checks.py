@@ -11,7 +11,7 @@ from alphacut.io.problem import BadInput, Problem
 from alphacut.stages.structure import Structure
 
 if TYPE_CHECKING:
-    from alphacut.stages.envelope import EnvelopeTask
+    from alphacut.stages.envelope_task import EnvelopeTask
 
 MISSED = 0.01  # of a peak, between two nodes
 WITH_TOLERANCE = ("auto", "modal", "graph-follower", "improved-graph-follower")

@@ -64,6 +64,12 @@ class Structure:
         """Names of the observed quantities."""
         return self.model.outputs
 
+    def with_modulus(self, number: FuzzyNumber | None) -> Structure:
+        """The structure with another Young's modulus in Pa, if it is a storey frame."""
+        if number is None or self.frame is None:
+            return self
+        return Structure(replace(self.frame, modulus=number.modal), {**self.numbers, "E": number})
+
     def members(self, name: str) -> tuple[str, ...]:
         """Fuzzy parameters of a name: ``m`` all masses of a frame, others themselves.
 

@@ -16,7 +16,6 @@ from alphacut.stages import exceedance as outcomes
 from alphacut.stages import modulus, response
 from alphacut.stages.cell import GPA, SHARED, key_of, parts
 from alphacut.stages.pipeline import Results
-from alphacut.stages.structure import structure
 from alphacut.stages.structure_words import structure_words
 
 if TYPE_CHECKING:
@@ -114,7 +113,8 @@ def structure_numbers(results: Results) -> dict[str, Any]:
     """The structure in words, and natural frequencies at the modal values where it has any."""
     from alphacut.frame.structures.linear import frequencies
 
-    wanted = structure(results.case, results.handed)
+    wanted = results.structure
+    assert wanted is not None
     words = {"words": structure_words(results.case, wanted)}
     if wanted.linear is None:
         return words

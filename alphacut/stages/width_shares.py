@@ -18,7 +18,6 @@ from alphacut.fuzzy import Crisp, FuzzyNumber, Reduced, propagate
 from alphacut.io.files import say
 from alphacut.stages.campaign import campaign
 from alphacut.stages.pipeline import Results, Study
-from alphacut.stages.structure import structure
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
@@ -58,7 +57,8 @@ def envelope_shares(results: Results, study: Study) -> tuple[Shares, Array]:
     from alphacut import frame
     from alphacut.fuzzy.width_contributions import width_shares
 
-    wanted = structure(results.case, results.handed)
+    wanted = results.structure
+    assert wanted is not None
     assert wanted.linear is not None
     model, inputs = wanted.linear, wanted.inputs(study.task.fuzzy)
     step = (

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import product
 from operator import add, mul, sub, truediv
 
 import numpy as np
 
 from alphacut.fuzzy.sets.claimed import Claimed
-from alphacut.fuzzy.sets.numbers import Array, Crisp, Cut, Cuts, FuzzyNumber
+from alphacut.fuzzy.sets.numbers import OPERATORS, Array, Crisp, Cut, Cuts, FuzzyNumber
 
 Binary = Callable[[float, float], float]
 _SAMPLED = 64  # steps by which a curved membership is shown
@@ -100,7 +101,7 @@ def combine(sign: str, left: FuzzyNumber | float, right: FuzzyNumber | float) ->
     return Expression(at, f"({texts[0]} {sign} {texts[1]})", sources[0] + sources[1])
 
 
-def power(base: FuzzyNumber, exponent: int) -> Expression:
+def power(base: FuzzyNumber, exponent: float) -> Expression:
     """Base ** exponent for a whole exponent; the even powers of a number around 0 start at 0.
 
     Raises:
@@ -108,6 +109,7 @@ def power(base: FuzzyNumber, exponent: int) -> Expression:
     """
     if int(exponent) != exponent:
         raise ValueError(f"the exponent is {exponent}; it must be a whole number")
+    exponent = int(exponent)
     if exponent < 0:
         return combine("/", 1.0, power(base, -exponent))
 
@@ -169,3 +171,12 @@ def _sources(number: FuzzyNumber) -> tuple[FuzzyNumber, ...]:
     if isinstance(number, Expression):
         return number.sources
     return (number,) if number.support.width > 0 else ()
+
+
+def _power(base: FuzzyNumber | float, exponent: FuzzyNumber | float) -> Expression:
+    if not isinstance(base, FuzzyNumber) or isinstance(exponent, FuzzyNumber):
+        raise TypeError("a fuzzy number is raised to a whole number, not to a fuzzy one")
+    return power(base, exponent)
+
+
+OPERATORS |= {sign: partial(combine, sign) for sign in _OPERATIONS} | {"**": _power}

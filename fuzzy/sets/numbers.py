@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from abc import ABC, abstractmethod
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from numbers import Real
@@ -108,15 +108,15 @@ class FuzzyNumber(ABC):
         return _combine("-", 0.0, self)
 
     def __pow__(self, exponent: int) -> FuzzyNumber:
-        from alphacut.fuzzy.sets.arithmetic import power
+        return OPERATORS["**"](self, exponent)
 
-        return power(self, exponent)
+
+OPERATORS: dict[str, Callable[[FuzzyNumber | float, FuzzyNumber | float], FuzzyNumber]] = {}
+"""Functions behind the signs; `fuzzy.sets.arithmetic` enters its own."""
 
 
 def _combine(sign: str, left: FuzzyNumber | float, right: FuzzyNumber | float) -> FuzzyNumber:
-    from alphacut.fuzzy.sets.arithmetic import combine
-
-    return combine(sign, left, right)
+    return OPERATORS[sign](left, right)
 
 
 def _interpolate(alpha: float, levels: Sequence[float], ends: Sequence[float]) -> float:

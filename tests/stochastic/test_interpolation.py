@@ -11,6 +11,7 @@ from alphacut.case.load import load
 from alphacut.rve import Phase
 from alphacut.stages.campaign import campaign
 from alphacut.stages.cell import CellChoice
+from alphacut.stages.cell_models import cell_model
 from alphacut.stochastic import HermiteMap, TruncatedNormal, gauss_rule, layered_rule
 from alphacut.stochastic.theta.interpolation import between_nodes, lebesgue
 
@@ -55,7 +56,7 @@ def test_a_response_has_curves_good_to_four_digits_whatever_its_modulus_needs():
         Phase(20e9, 0.3),
         Phase(80e9, 0.3),
     )
-    exact = CellChoice("series").model().solve(radius, matrix, [particle])[0].curve
+    exact = cell_model(CellChoice("series")).solve(radius, matrix, [particle])[0].curve
     truth = between_nodes(exact.theta, exact.s11, AT)
     errors = []
     for limited in (False, True):
@@ -67,11 +68,7 @@ def test_a_response_has_curves_good_to_four_digits_whatever_its_modulus_needs():
         case = load(CASES / "porous.toml", changes)
         assert case.has("response.quantity") == limited
         choice = campaign(case).task.choice
-        own = (
-            CellChoice("auto", tolerance=choice.tolerance)
-            .model()
-            .solve(radius, matrix, [particle])[0]
-            .curve
-        )
+        model = cell_model(CellChoice("auto", tolerance=choice.tolerance))
+        own = model.solve(radius, matrix, [particle])[0].curve
         errors.append(np.abs(between_nodes(own.theta, own.s11, AT) / truth - 1).max())
     assert errors[1] < 1e-4 < 1e-2 < errors[0]

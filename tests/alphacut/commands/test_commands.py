@@ -15,7 +15,8 @@ from alphacut.commands.parser import split_petsc
 from alphacut.entry import COMMANDS, main, parsers
 from alphacut.io.files import as_json, rank, standard_output, whole_file
 from alphacut.io.problem import BadInput
-from alphacut.stages.envelope import method_options, task_of
+from alphacut.stages.envelope import method_options
+from alphacut.stages.envelope_task import task_of
 
 CASES = Path(__file__).parents[3] / "cases"
 PAPER = str(CASES / "paper.toml")
@@ -333,7 +334,7 @@ def test_another_structure_or_record_is_computed_anew(tmp_path, capfd):
         object.__setattr__(
             chain, "stored", lambda name, key, compute: keys.append(key) or xarray.Dataset()
         )
-        chain.envelope(studies(chain.case)[0], None)
+        chain.envelope(studies(chain.case)[0], None, None)
         return keys[0]
 
     for changes in ([], ["tower.mass=12 t/m"], ["envelope.step=0.04 s"]):

@@ -9,15 +9,24 @@ import numpy as np
 import pytest
 import xarray
 
+from alphacut.case.limits import limit_of
 from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.fuzzy import Interval, Trapezoidal, Triangular
 from alphacut.io.problem import BadInput
-from alphacut.stages.exceedance import exceedance, limit_of, shaped_like
+from alphacut.stages import exceedance as outcomes
+from alphacut.stages.exceedance import shaped_like
 from alphacut.stages.structure import structure
 
 CASES = Path(__file__).parents[3] / "cases"
 PAPER = CASES / "paper.toml"
+
+
+def exceedance(case, handed):
+    """The dataset of a case's probability."""
+    return outcomes.exceedance(case, structure(case, handed))
+
+
 SHORT = ["envelope.duration=1 s", "envelope.alpha=[0, 1]", "exceedance.output=q3"]
 
 
