@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from alphacut.stochastic.theta.truncated_normal import Array
 
 ISOTROPIC_ENOUGH = 0.1  # difference of the shear ratio from 1 that is not worth a warning
-CONSTANTS = ("E1", "E2", "E3", "nu12", "nu13", "nu23", "G12", "G13", "G23")
 
 
 def rotated(stiffness: Array, angle: ArrayLike) -> Array:
@@ -62,34 +61,4 @@ def shear_ratio_in_words(ratio: float) -> str:
     return (
         f"{told}; E of eq. 16 takes that along the axes and can lie {side} that of any isotropic"
         " composite of these phases"
-    )
-
-
-def plane_constants(stiffness: Array, poisson: float) -> dict[str, float]:
-    """Orthotropic constants of `stiffness` along the axes, named as in `CONSTANTS`, in Pa.
-
-    What does not act in plane strain is isotropic: stiffnesses 13, 23 and 33, and the shears 13 and
-    23, are those of the in-plane bulk modulus and of Poisson's ratio by eq. 16. So does σ33 follow,
-    which the cell does not compute.
-
-    Args:
-        stiffness: Mean plane-strain stiffness of the square array, Voigt order, shape (3, 3), in
-            Pa.
-        poisson: Poisson's ratio of eq. 16.
-    """
-    bulk = (stiffness[0, 0] + stiffness[0, 1]) / 2
-    lateral, shear = 2 * poisson * bulk, (1 - 2 * poisson) * bulk
-    normal = np.array(
-        [
-            [stiffness[0, 0], stiffness[0, 1], lateral],
-            [stiffness[1, 0], stiffness[1, 1], lateral],
-            [lateral, lateral, 0],
-        ]
-    )
-    normal[2, 2] = lateral + 2 * shear
-    give = np.linalg.inv(normal)
-    moduli = 1 / np.diag(give)
-    ratios = [-give[0, 1] * moduli[0], -give[0, 2] * moduli[0], -give[1, 2] * moduli[1]]
-    return dict(
-        zip(CONSTANTS, map(float, [*moduli, *ratios, stiffness[2, 2], shear, shear]), strict=True)
     )

@@ -46,3 +46,22 @@ def hashin_shtrikman_bulk(fraction: Array, matrix: Phase, inclusion: Phase) -> t
 
     ends = around(0, share), around(1, 1 - share)
     return np.minimum(*ends), np.maximum(*ends)
+
+
+def mori_tanaka(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
+    """Moduli of round aligned fibres by Mori and Tanaka (1973), exact where particles are few.
+
+    Returns:
+        C11 + C12, C11 − C12 and C33 in Pa, shape (…, 3) for area fractions of shape (…).
+    """
+    bulk = [float(bulk_modulus(phase.stiffness)) for phase in (matrix, inclusion)]
+    shear = [float(phase.stiffness[2, 2]) for phase in (matrix, inclusion)]
+    share = np.asarray(fraction)
+
+    def mixed(values: list[float], resistance: float) -> Array:
+        contrast = values[1] - values[0]
+        return np.asarray(values[0] + share * contrast / (1 + contrast * (1 - share) * resistance))
+
+    polar = (bulk[0] + 2 * shear[0]) / (2 * shear[0] * (bulk[0] + shear[0]))
+    in_plane, axial = mixed(bulk, 1 / (bulk[0] + shear[0])), mixed(shear, polar)
+    return np.stack([2 * in_plane, 2 * axial, axial], axis=-1)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from itertools import product
 
 import numpy as np
 
-from alphacut.rve.cell import STRAIN
+from alphacut.rve.cell import STRAIN, Cell
 from alphacut.stochastic.theta.truncated_normal import Array
 
 
@@ -37,6 +38,7 @@ class StressCurve:
         s12: σ12 under load 2 at the nodes, shape (n,), in Pa.
         stiffness: The whole planar stiffness at the nodes, Voigt order (11, 22, 12 with 2 ε12),
             shape (n, 3, 3), in Pa, if known.
+        error: Declared relative errors of s11 and s12 at the nodes, shape (n, 2), if estimated.
     """
 
     theta: Array
@@ -44,6 +46,7 @@ class StressCurve:
     s11: Array
     s12: Array
     stiffness: Array | None = None
+    error: Array | None = None
 
     @property
     def mean(self) -> tuple[float, float]:
@@ -62,10 +65,12 @@ class Homogenised:
         unknowns: Unknowns of one linear system after elimination of constraints.
         iterations: Iterations of the linear solver, one number per load.
         seconds: Wall time by stage: mesh, assemble, setup, solve, total, jit.
-        error: Estimated relative error of E by source: space, theta, table; empty where none was
-            made.
+        errors: Declared relative errors of the mean moduli by source (space, theta, table): of
+            C11 + C12, C11 − C12 and C33, shape (3,), nan for a modulus that was not computed; empty
+            where none were estimated.
         reason: Why this model and resolution were taken.
         checks: Certificate: name of each property to its measured violation, within its bound.
+        cell: What was homogenised.
     """
 
     curve: StressCurve
@@ -74,9 +79,10 @@ class Homogenised:
     unknowns: int = 0
     iterations: tuple[int, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
-    error: Mapping[str, float] = field(default_factory=dict)
+    errors: Mapping[str, Array] = field(default_factory=dict)
     reason: str = ""
     checks: Mapping[str, float] = field(default_factory=dict)
+    cell: Cell | None = None
 
     @property
     def modulus(self) -> float:
@@ -99,9 +105,69 @@ class Homogenised:
         )
 
     @property
+    def modulus_errors(self) -> Array:
+        """Declared relative errors of the mean C11 + C12, C11 − C12 and C33, shape (3,).
+
+        All sources together; nan where unknown.
+        """
+        if not self.errors:
+            return np.full(3, np.nan)
+        return np.asarray(np.prod([1 + error for error in self.errors.values()], axis=0) - 1)
+
+    @property
     def estimated_error(self) -> float:
-        """Estimated relative error of E, all sources together; nan where none was made."""
-        return sum(self.error.values()) if self.error else float("nan")
+        """Declared relative error of E, all sources together; nan where none was made."""
+        return self._error_of_modulus(self.modulus_errors)
+
+    @property
+    def error(self) -> dict[str, float]:
+        """Declared relative error of E by source; their sum is `estimated_error`."""
+        shares = {name: self._error_of_modulus(part) for name, part in self.errors.items()}
+        scale = self.estimated_error / (sum(shares.values()) or 1.0)
+        return {name: scale * share for name, share in shares.items()}
+
+    @property
+    def largest_error(self) -> float:
+        """The largest declared error of what is printed and exported; nan where none was made.
+
+        Relative for E, mean stresses and moduli, absolute for Poisson's ratio.
+        """
+        if not self.errors:
+            return float("nan")
+        means, errors = np.array(self.curve.mean), self.modulus_errors
+        nu = spread(lambda s: effective_modulus(*s)[1], means, errors[[0, 2]])
+        return float(np.nanmax([*errors, self.estimated_error, nu]))
+
+    def _error_of_modulus(self, errors: Array) -> float:
+        """Relative error of E from those of the moduli."""
+        modulus = self.modulus
+        means = np.array(self.curve.mean)
+
+        def ratio(stresses: Array) -> Array:
+            other = effective_modulus(*stresses)[0]
+            return np.array([other / modulus, modulus / other if other > 0 else np.inf])
+
+        return float(spread(ratio, means, errors[[0, 2]]).max())
+
+
+def spread(function: Callable[[Array], Array | float], values: Array, errors: Array) -> Array:
+    """Largest change of `function` over a box of its arguments, seen at the corners.
+
+    Each value runs from value/(1 + error) to value·(1 + error).
+
+    Args:
+        function: Takes an array like `values`; monotone in each of them over the box.
+        values: Positive, shape (n,).
+        errors: Relative, shape (n,).
+
+    Returns:
+        Absolute, of the function's shape; nan where an error is.
+    """
+    if not np.isfinite(errors).all():
+        return np.full(np.shape(function(values)), np.nan)
+    centre = np.asarray(function(values))
+    ends = product(*((1 / (1 + error), 1 + error) for error in errors))
+    return np.max([abs(np.asarray(function(values * factor)) - centre) for factor in ends], axis=0)
 
 
 def relative(value: float, reference: float) -> float:

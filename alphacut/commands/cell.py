@@ -28,6 +28,7 @@ from alphacut.io.problem import BadInput, Problem
 from alphacut.rve.anisotropy import ISOTROPIC_ENOUGH, shear_ratio_in_words
 from alphacut.rve.auto.model import ORDER
 from alphacut.rve.cell import STRAIN
+from alphacut.rve.declared import error_of_means
 from alphacut.rve.model import cross_check
 from alphacut.rve.result import Homogenised
 from alphacut.stages import cell
@@ -192,32 +193,38 @@ def agreement(pair: Sequence[str], difference: float | None, allowed: float) -> 
     return f"{' and '.join(pair)} differ by {difference:.1e} of E; {allowed:.1e} is allowed\n"
 
 
-def remark(ratio: float | None) -> str:
-    """The square array's anisotropy as a line; where it matters, a warning besides."""
+def remark(ratio: tuple[float, float] | None) -> str:
+    """The square array's shear ratio as a line; where it matters, a warning besides."""
     if ratio is None:
         return ""
-    if abs(ratio - 1) > ISOTROPIC_ENOUGH:
+    value, error = ratio
+    if abs(value - 1) > ISOTROPIC_ENOUGH:
         say(
-            f"warning: {shear_ratio_in_words(ratio)}; --export and --stiffness give the whole"
+            f"warning: {shear_ratio_in_words(value)}; --export and --stiffness give the whole"
             " plane-strain stiffness"
         )
     return (
-        f"shear_ratio = {ratio:.4f}: shear modulus along the diagonals over that along the axes, 1"
-        " in an isotropic plane\n"
+        f"shear_ratio = {value:.4f} ± {error:.1e}: shear modulus along the diagonals over that"
+        " along the axes, 1 in an isotropic plane\n"
     )
 
 
 def summary(result: Homogenised) -> str:
-    """The result in a few lines for people."""
+    """The result in a few lines for people, every number with its declared error."""
     s11, s12 = (stress / cell.GPA for stress in result.curve.mean)
     seconds = ", ".join(f"{name} {value:.3f}" for name, value in result.seconds.items())
     parts = ", ".join(f"{name} {value:.1e}" for name, value in result.error.items())
-    error = (
-        f"estimated relative error of E: {result.estimated_error:.1e} ({parts})\n" if parts else ""
-    )
+    error, off = "", [""] * 4
+    if parts:
+        error = f"estimated relative error of E: {result.estimated_error:.1e} ({parts})\n"
+        units = (cell.GPA, 1.0, cell.GPA, cell.GPA)
+        absolute = zip(error_of_means(result), units, strict=True)
+        off = [f" ± {value / unit:.1e}" for value, unit in absolute]
+    iterations = ", ".join(map(str, result.iterations)) or "none"
     return (
-        f"E = {result.modulus / cell.GPA:.6f} GPa, nu = {result.poisson:.6f} (eq. 16)\n{error}mean"
-        f" s11 = {s11:.9f} GPa under ε11 = ε22 = {STRAIN:g}, mean s12 = {s12:.9f} GPa under ε12 ="
-        f" {STRAIN:g}\n{result.method}, {result.unknowns} unknowns, {result.solver}, iterations"
-        f" {', '.join(map(str, result.iterations)) or 'none'}\nseconds: {seconds}\n"
+        f"E = {result.modulus / cell.GPA:.6f}{off[0]} GPa, nu = {result.poisson:.6f}{off[1]}"
+        f" (eq. 16)\n{error}mean s11 = {s11:.9f}{off[2]} GPa under ε11 = ε22 = {STRAIN:g}, mean"
+        f" s12 = {s12:.9f}{off[3]} GPa under ε12 = {STRAIN:g}\n{result.method},"
+        f" {result.unknowns} unknowns, {result.solver}, iterations {iterations}\nseconds:"
+        f" {seconds}\n"
     )

@@ -13,13 +13,16 @@ from alphacut.io.problem import BadInput, Problem
 from alphacut.io.provenance import versions
 from alphacut.rve.anisotropy import directional_shear, directional_young, shear_ratio
 from alphacut.rve.cell import Phase
+from alphacut.rve.declared import error_of_means, error_of_stiffness
 from alphacut.stages.contract import resolution_named
 from alphacut.stochastic import HermiteMap, RadiusMap, TruncatedNormal
+from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     from alphacut.rve.result import Homogenised
 
 GPA = 1e9
+DIRECTIONS = np.arange(0, 91, 15)  # in degrees
 INPUTS = (
     "a1",
     "a2",
@@ -145,15 +148,19 @@ def solve(case: Case, model: CellModel) -> Homogenised:
     return model.solve(radius, matrix, [inclusion])[0]
 
 
-def anisotropy(radius: HermiteMap, matrix: Phase, inclusion: Phase) -> float | None:
-    """Shear ratio of a cell by the series; None where the series refuses."""
+def anisotropy(radius: HermiteMap, matrix: Phase, inclusion: Phase) -> tuple[float, float] | None:
+    """Shear ratio of a cell and its declared error, by the series whatever model gives E.
+
+    None where the series refuses. See `rve.anisotropy.shear_ratio`.
+    """
     from alphacut.rve.series.model import SeriesModel
 
     try:
-        stiffness = SeriesModel(accuracy=1e-4).solve(radius, matrix, [inclusion])[0].stiffness
+        result = SeriesModel(accuracy=1e-4).solve(radius, matrix, [inclusion])[0]
     except (RuntimeError, ValueError):
         return None
-    return None if stiffness is None else shear_ratio(stiffness)
+    stiffness = np.asarray(result.stiffness)
+    return shear_ratio(stiffness), float(error_of_stiffness(result, shear_ratio))
 
 
 def directions(result: Homogenised) -> dict[str, Any] | None:
@@ -164,14 +171,49 @@ def directions(result: Homogenised) -> dict[str, Any] | None:
     """
     if result.stiffness is None:
         return None
-    degrees = np.arange(0, 91, 15)
-    angle = np.deg2rad(degrees)
+    young, shear = _over_directions(result.stiffness)
     return {
-        "angle_deg": degrees,
-        "young_GPa": directional_young(result.stiffness, angle) / GPA,
-        "shear_GPa": directional_shear(result.stiffness, angle) / GPA,
+        "angle_deg": DIRECTIONS,
+        "young_GPa": young / GPA,
+        "shear_GPa": shear / GPA,
         "shear_ratio": shear_ratio(result.stiffness),
     }
+
+
+def _over_directions(stiffness: Array) -> Array:
+    """Young's and the shear modulus along `DIRECTIONS` in Pa, shape (2, n)."""
+    angle = np.deg2rad(DIRECTIONS)
+    return np.stack([directional_young(stiffness, angle), directional_shear(stiffness, angle)])
+
+
+def declared_errors(result: Homogenised) -> dict[str, Any] | None:
+    """Declared error of every number of `document`, absolute and in its unit; None without any."""
+    if not result.errors:
+        return None
+    modulus, nu, s11, s12 = error_of_means(result)
+    found: dict[str, Any] = {
+        "E_GPa": modulus / GPA,
+        "nu": nu,
+        "stress_GPa": {"s11": s11 / GPA, "s12": s12 / GPA},
+        "stiffness_GPa": None,
+        "directions": None,
+        "curve": None,
+    }
+    if result.curve.error is not None:
+        first, second = result.curve.error.T
+        found["curve"] = {
+            "s11": first * result.curve.s11 / GPA,
+            "s12": second * result.curve.s12 / GPA,
+        }
+    if result.stiffness is not None:
+        young, shear = error_of_stiffness(result, _over_directions) / GPA
+        found["stiffness_GPa"] = error_of_stiffness(result, np.asarray) / GPA
+        found["directions"] = {
+            "young_GPa": young,
+            "shear_GPa": shear,
+            "shear_ratio": float(error_of_stiffness(result, shear_ratio)),
+        }
+    return found
 
 
 def document(result: Homogenised) -> dict[str, Any]:
@@ -195,6 +237,7 @@ def document(result: Homogenised) -> dict[str, Any]:
         "method": result.method,
         "solver": result.solver,
         "error": dict(result.error),
+        "declared_error": declared_errors(result),
         "reason": result.reason,
         "checks": dict(result.checks),
         "versions": versions(),

@@ -63,7 +63,7 @@ class FuzzyModulus:
     choice: CellChoice
     theta: tuple[float, ...] = (-3.0, 3.0)
     judged: Homogenised | None = None
-    shear_ratio: float | None = None
+    shear_ratio: tuple[float, float] | None = None
 
     @property
     def number(self) -> FuzzyNumber:
@@ -150,7 +150,8 @@ class FuzzyModulus:
             "method": self.choice.method,
             "reason": self.reason,
             "error": self.error,
-            "shear_ratio": self.shear_ratio,
+            "shear_ratio": self.shear_ratio and self.shear_ratio[0],
+            "shear_ratio_error": self.shear_ratio and self.shear_ratio[1],
             "checks": self.largest("check"),
             "versions": versions(),
         }
@@ -210,7 +211,9 @@ class FuzzyModulus:
             "seconds": result.seconds,
             "nature": self.nature,
         }
-        numbers |= {} if self.shear_ratio is None else {"shear_ratio": self.shear_ratio}
+        if self.shear_ratio is not None:
+            names_of_ratio = ("shear_ratio", "shear_ratio_error")
+            numbers |= dict(zip(names_of_ratio, self.shear_ratio, strict=True))
         return xarray.Dataset(
             variables,
             coordinates,

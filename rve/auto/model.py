@@ -33,7 +33,8 @@ class AutoModel:
     """The cheapest model that reaches `tolerance`.
 
     Args:
-        tolerance: Relative error of E allowed, in [1e-10, 0.1].
+        tolerance: Error allowed, in [1e-10, 0.1]: relative for E, mean stresses and moduli of the
+            plane, absolute for Poisson's ratio. Stress curves declare errors of their own.
         exclude: Names of models not to take, of series, table, slices, prism.
         cache: Folder where tables are kept; None keeps them in the process.
         moduli: Moduli of the particle that a table is to cover, in Pa, where further ones will be
@@ -53,9 +54,7 @@ class AutoModel:
 
     def __post_init__(self) -> None:
         if not 1e-10 <= self.tolerance <= 0.1:
-            raise ValueError(
-                f"the tolerance on E is {self.tolerance:g}; it must lie in [1e-10, 0.1]"
-            )
+            raise ValueError(f"the tolerance is {self.tolerance:g}; it must lie in [1e-10, 0.1]")
         unknown = [name for name in self.exclude if name not in ORDER]
         if unknown:
             raise ValueError(
@@ -88,7 +87,7 @@ class AutoModel:
                 continue
             return [replace(r, reason=self._reason(r, refusals)) for r in results]
         raise ChoiceError(
-            f"no model reaches a relative error of {self.tolerance:g} in E: {'; '.join(refusals)}"
+            f"no model reaches a relative error of {self.tolerance:g}: {'; '.join(refusals)}"
         )
 
     def _take(
@@ -118,14 +117,15 @@ class AutoModel:
             from alphacut.rve.auto.refine_prism import refined_prism
 
             results = refined_prism(radius_map, matrix, inclusions, tolerance=self.tolerance)
-        worst = max(r.estimated_error for r in results)
+        worst = max(r.largest_error for r in results)
         if not worst <= self.tolerance:
-            raise ChoiceError(f"its estimated error is {worst:.1e}")
+            raise ChoiceError(f"its declared error is {worst:.1e}")
         return results
 
     def _reason(self, result: Homogenised, refusals: list[str]) -> str:
         before = f" ({'; '.join(refusals)})" if refusals else ""
         return (
-            f"{result.method} reaches a relative error of {self.tolerance:g} in E{before}:"
+            f"{result.method} reaches a relative error of {self.tolerance:g} in E, stresses and"
+            f" stiffness{before}:"
             f" {_WHY[result.method]}; {result.reason}"
         )

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from alphacut.rve.cell import Phase
 from alphacut.rve.result import Homogenised
 from alphacut.stochastic import RadiusMap
@@ -35,8 +37,8 @@ def refined_prism(
                 raise
             layers = round(layers * _MORE_LAYERS)
             continue
-        worst = max(results, key=lambda r: r.estimated_error)
-        if worst.estimated_error <= tolerance:
+        worst = max(results, key=lambda r: r.largest_error)
+        if worst.largest_error <= tolerance:
             return [
                 replace(
                     r,
@@ -49,9 +51,9 @@ def refined_prism(
         if size <= _FINEST or layers >= _MOST_LAYERS:
             raise RuntimeError(
                 f"mesh size {size:.3g} with {layers} layers leaves a relative error of"
-                f" {worst.estimated_error:.1e}"
+                f" {worst.largest_error:.1e}"
             )
-        if worst.error["theta"] > worst.error["space"]:
+        if np.nanmax(worst.errors["theta"]) > np.nanmax(worst.errors["space"]):
             layers = round(layers * _MORE_LAYERS)
         else:
             size = max(_FINEST, size / _FINER_MESH)

@@ -55,10 +55,10 @@ def refined_slices(
     model = SlicesModel(mesh_size=min(sizes), points=max(counts), progress=progress)
     for _ in range(_TRIES):
         results = model.solve(radius_map, matrix, inclusions)
-        if max(r.estimated_error for r in results) <= tolerance:
+        if max(r.largest_error for r in results) <= tolerance:
             break
-        worst = max(results, key=lambda r: r.estimated_error).error
-        if worst["theta"] > worst["space"]:
+        worst = max(results, key=lambda r: r.largest_error).errors
+        if worst["theta"].max() > worst["space"].max():
             model = replace(model, points=model.points + 3)
         else:
             model = replace(model, mesh_size=0.8 * model.mesh_size)

@@ -1,65 +1,119 @@
-"""Error of a product-space result, estimated from companions on other meshes."""
+"""Error of a product-space result, measured against planar elements of order 4.
+
+The product space has no θ-derivative, so its exact solution at each θ is a planar cell. A table of
+such cells over the radius is a reference that shares neither elements nor mesh with the wedges; its
+own declared error is added. Where planar cells have no mesh (particles in touch) bounds take their
+place.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from alphacut.rve.cell import Phase
+from alphacut.rve.bounds import hashin_shtrikman_bulk, reuss, voigt
+from alphacut.rve.cell import STRAIN, Phase
 from alphacut.rve.result import Homogenised, StressCurve
-from alphacut.rve.series.stiffness import square_stiffness
-from alphacut.rve.slices.curve import modulus_error
+from alphacut.rve.slices.theta_rule import extreme_radii, theta_rule
+from alphacut.rve.square import square_moduli
+from alphacut.rve.table.cache import stored_table
+from alphacut.rve.table.interpolant import TableRange
 from alphacut.stochastic import RadiusMap
+from alphacut.stochastic.theta.truncated_normal import Array
 
-# taken for E in mesh size and layer height, to be on the safe side; quadratic wedges reach 3 to 4
-ORDER = 2.0
-SAFETY = 5.0
-_ROUGH = 0.25  # mesh size above which a coarser mesh would tell nothing
+_FINE = 128  # nodes in θ that leave nothing out
+_ACCURACIES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # of the reference
+_SHARE = 0.2  # of an error, that the reference may leave
 
-
-def companion_size(mesh_size: float) -> float:
-    """Mesh size of the companion: twice as coarse, or twice as fine where that is no mesh."""
-    return 2 * mesh_size if mesh_size <= _ROUGH else mesh_size / 2
+Moduli = Callable[[Array], Array]  # at radii (n,), shape (n, 3)
 
 
-def space_error(results: Sequence[Homogenised], companions: Sequence[Homogenised]) -> list[float]:
-    """Relative error of E from the mesh, for each result, from companions of another mesh size."""
-    return [
-        _gap(own, other, (own.unknowns / other.unknowns) ** (ORDER / 2))
-        for own, other in zip(results, companions, strict=True)
-    ]
+def judged(
+    result: Homogenised, radius_map: RadiusMap, phases: tuple[Phase, Phase], *, layers: Array
+) -> Homogenised:
+    """The result with its declared errors.
+
+    Args:
+        result: Of the product space.
+        radius_map: Its map.
+        phases: Its matrix and inclusion.
+        layers: About the relative errors that the layers in θ leave in the mean moduli, shape (3,);
+            the rest is booked to the mesh.
+    """
+    for accuracy in _ACCURACIES:
+        try:
+            exact, left = _reference(radius_map, phases, accuracy)
+        except RuntimeError:  # no planar mesh, or none fine enough
+            mean, nodes = _within_bounds(result.curve, radius_map, phases)
+            break
+        fine = theta_rule(radius_map, points=_FINE)
+        moduli = moduli_of(result.curve)
+        own, other = result.curve.weights @ moduli, fine.weights @ exact(radius_map(fine.nodes))
+        mean, noise = _apart(own, other), left(radius_map(fine.nodes)).max(axis=0)
+        nodes = _apart(moduli, exact(radius_map(result.curve.theta)))
+        nodes = (1 + nodes) * (1 + left(radius_map(result.curve.theta))) - 1
+        settled = (noise <= _SHARE * mean)[np.isfinite(mean)].all()
+        mean = (1 + mean) * (1 + noise) - 1
+        if settled:
+            break
+    layers = np.minimum(layers, mean)
+    return replace(
+        result,
+        curve=replace(result.curve, error=nodes[:, [0, 2]]),
+        errors={"space": (1 + mean) / (1 + layers) - 1, "theta": layers},
+    )
 
 
-def theta_error(results: Sequence[Homogenised], thick: Sequence[Homogenised]) -> list[float]:
-    """Relative error of E from the layers, from companions with half of them."""
-    return [
-        _gap(own, other, (own.unknowns / other.unknowns) ** ORDER)
-        for own, other in zip(results, thick, strict=True)
-    ]
+def moduli_of(curve: StressCurve) -> Array:
+    """C11 + C12, C11 − C12 and C33 at the nodes, shape (n, 3), in Pa.
+
+    The second is nan where no third load was solved.
+    """
+    if curve.stiffness is None:
+        known = curve.s11 / STRAIN, np.full(curve.s11.size, np.nan), curve.s12 / (2 * STRAIN)
+        return np.stack(known, axis=-1)
+    moduli = square_moduli(curve.stiffness)
+    moduli[:, 0] = curve.s11 / STRAIN
+    return moduli
 
 
-def _gap(own: Homogenised, other: Homogenised, gain: float) -> float:
-    """Error of `own`, with the safety factor, where that of `other` is `gain` times as large."""
-    return SAFETY * abs(other.modulus / own.modulus - 1) / max(abs(gain - 1), 0.1)
-
-
-def unresolved(
-    radius_map: RadiusMap, curve: StressCurve, phases: tuple[Phase, Phase], *, mesh_size: float
-) -> float:
-    """Relative change of E, tenfold, by particles too small for the mesh."""
-    radius = radius_map(curve.theta)
-    small = radius < mesh_size / 4
-    if not small.any():
-        return 0.0
+def _reference(
+    radius_map: RadiusMap, phases: tuple[Phase, Phase], accuracy: float
+) -> tuple[Moduli, Moduli]:
+    """Moduli at radii by a table of planar cells, and their declared relative errors."""
     matrix, inclusion = phases
-    cells, bare = (
-        square_stiffness(radius[small], matrix, [inclusion], loads=("hydrostatic", "shear")),
-        matrix.stiffness,
+    low, high = (float(r) for r in extreme_radii(radius_map))
+    span = TableRange(matrix, inclusion.poisson, (low, high), (inclusion.modulus,) * 2)
+    table, _ = stored_table(span, None, accuracy=accuracy)
+    modulus = np.array([inclusion.modulus])
+
+    def exact(radius: Array) -> Array:
+        return np.asarray(table.moduli(radius, modulus)[:, 0])
+
+    def left(radius: Array) -> Array:
+        return np.asarray(table.space_error(radius) + table.interpolation)
+
+    return exact, left
+
+
+def _within_bounds(
+    curve: StressCurve, radius_map: RadiusMap, phases: tuple[Phase, Phase]
+) -> tuple[Array, Array]:
+    """Errors of the mean moduli and of those at the nodes that no exact value can exceed."""
+    fraction = np.pi / 4 * radius_map(curve.theta) ** 2
+    moduli = moduli_of(curve)
+    bounds = [square_moduli(bound(fraction, *phases)) for bound in (reuss, voigt)]
+    for bound, bulk in zip(bounds, hashin_shtrikman_bulk(fraction, *phases), strict=True):
+        bound[:, 0] = 2 * bulk
+    nodes = np.max([_apart(moduli, bound) for bound in bounds], axis=0)
+    mean = np.max(
+        [_apart(curve.weights @ moduli, curve.weights @ bound) for bound in bounds], axis=0
     )
-    change = np.zeros_like(radius)
-    change[small] = np.maximum(
-        abs(cells.bulk[:, 0] / (bare[0, 0] + bare[0, 1]) - 1),
-        abs(cells.shear[:, 0] / bare[2, 2] - 1),
-    )
-    return 10 * modulus_error(curve, change)
+    return mean, nodes
+
+
+def _apart(first: Array, second: Array) -> Array:
+    """Relative distance by the larger of both ratios."""
+    return np.maximum(first / second, second / first) - 1

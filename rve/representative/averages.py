@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alphacut.rve import bounds
 from alphacut.rve.bounds import hashin_shtrikman_bulk, reuss, voigt
 from alphacut.rve.cell import Phase
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -47,19 +48,8 @@ class Isotropic:
 
 def mori_tanaka(fraction: float, matrix: Phase, inclusion: Phase) -> Isotropic:
     """Round aligned fibres in plane strain (Mori & Tanaka 1973)."""
-    outer, inner = Isotropic.of(matrix.stiffness), Isotropic.of(inclusion.stiffness)
-    bulk = outer.bulk + fraction * _over(
-        inner.bulk - outer.bulk, (1 - fraction) / (outer.bulk + outer.shear)
-    )
-    polar = (outer.bulk + 2 * outer.shear) / (2 * outer.shear * (outer.bulk + outer.shear))
-    return Isotropic(
-        bulk, outer.shear + fraction * _over(inner.shear - outer.shear, (1 - fraction) * polar)
-    )
-
-
-def _over(contrast: float, resistance: float) -> float:
-    """1/(1/contrast + resistance), also where the contrast vanishes."""
-    return contrast / (1 + contrast * resistance)
+    moduli = bounds.mori_tanaka(np.asarray(fraction), matrix, inclusion)
+    return Isotropic(float(moduli[0]) / 2, float(moduli[2]))
 
 
 @dataclass(frozen=True)

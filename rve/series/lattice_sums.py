@@ -55,6 +55,15 @@ def lattice_sums(highest: int) -> LatticeSums:
     return LatticeSums(plain, conjugate)
 
 
+def lattice_images(sums: LatticeSums, k: Array, n: Array) -> Array:
+    """Taylor coefficient k of Σ' (z − P)^-n for odd n, shape (len(k), len(n))."""
+    k, n = k[:, None], n[None, :]
+    halved = np.exp(
+        gammaln(n + k) - gammaln(n) - gammaln(k + 1) - (n + k) * np.log(2)
+    )  # binomial over 2^(n + k)
+    return np.asarray(-halved * sums.plain[n + k])
+
+
 def _lipschitz(n: int, power: int) -> float:
     """Σ_q (2π)^n q^(n−1) / (n−1)! · e^(−2πq) / (1 − e^(−2πq))^power, by Lipschitz' formula."""
     q = np.arange(1.0, 40.0)

@@ -9,10 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
+import numpy as np
+
 from alphacut.rve.cell import Phase
 from alphacut.rve.result import Homogenised
 from alphacut.rve.series.stiffness import square_stiffness
-from alphacut.rve.slices.curve import certified
+from alphacut.rve.slices.curve import certified, mean_errors, with_errors
 from alphacut.rve.slices.theta_rule import settle_rule
 from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -58,33 +60,28 @@ class SeriesModel:
 
         def stiffness_at(radii: Array) -> Array:
             cells = square_stiffness(radii, matrix, inclusions, tolerance=self.accuracy)
-            used.update(
-                (float(r), (e, n))
-                for r, e, n in zip(radii, cells.error, cells.harmonics, strict=True)
-            )
+            for radius, error, harmonics in zip(radii, cells.errors, cells.harmonics, strict=True):
+                used[float(radius)] = error, harmonics
             return cells.matrix
 
         curves, gaps = settle_rule(
             radius_map, stiffness_at, points=self.points, accuracy=self.accuracy
         )
-        spent = [[used[float(r)] for r in radius_map(curve.theta)] for curve in curves]
-        error = [
-            float(curve.weights @ [cell[0][k] for cell in spent[k]])
-            for k, curve in enumerate(curves)
-        ]
-        harmonics = [max(int(cell[1][k]) for cell in spent[k]) for k in range(len(curves))]
         seconds = {"solve": perf_counter() - start, "total": perf_counter() - start}
-        results = [
-            Homogenised(
-                curve=curve,
-                method=self.name,
-                unknowns=harmonics[k],
-                seconds=seconds,
-                error={"space": error[k], "theta": gaps[k]},
-                reason=f"{curve.theta.size} nodes in θ, {harmonics[k]} harmonics",
+        results = []
+        for k, (curve, gap) in enumerate(zip(curves, gaps, strict=True)):
+            spent = [used[float(r)] for r in radius_map(curve.theta)]
+            error, harmonics = np.array([e[k] for e, _ in spent]), max(int(n[k]) for _, n in spent)
+            results.append(
+                Homogenised(
+                    curve=with_errors(curve, error),
+                    method=self.name,
+                    unknowns=harmonics,
+                    seconds=seconds,
+                    errors={"space": mean_errors(curve, error), "theta": gap},
+                    reason=f"{curve.theta.size} nodes in θ, {harmonics} harmonics",
+                )
             )
-            for k, curve in enumerate(curves)
-        ]
         return [
             certified(r, radius_map, matrix, phase)
             for r, phase in zip(results, inclusions, strict=True)

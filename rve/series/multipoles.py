@@ -29,7 +29,7 @@ import numpy as np
 from scipy.special import gammaln
 
 from alphacut.rve.cell import Phase
-from alphacut.rve.series.lattice_sums import ZETA_PERIOD, LatticeSums, lattice_sums
+from alphacut.rve.series.lattice_sums import ZETA_PERIOD, LatticeSums, lattice_images, lattice_sums
 from alphacut.stochastic.theta.truncated_normal import Array
 
 MOST_HARMONICS = 160  # per potential and load; reaches r = 0.999
@@ -103,14 +103,6 @@ class Family:
     b_to_q: Array
 
 
-def _images(sums: LatticeSums, k: Array, n: Array) -> Array:
-    """Taylor coefficient k of Σ' (z − P)^-n for odd n, shape (len(k), len(n))."""
-    k, n = k[:, None], n[None, :]
-    # binomial over 2^(n + k)
-    halved = np.exp(gammaln(n + k) - gammaln(n) - gammaln(k + 1) - (n + k) * np.log(2))
-    return np.asarray(-halved * sums.plain[n + k])
-
-
 def _conjugate_images(sums: LatticeSums, k: Array, n: Array) -> Array:
     """Taylor coefficient k of n Σ' conj(P) (z − P)^(-n-1) for odd n."""
     k, n = k[:, None], n[None, :]
@@ -124,9 +116,14 @@ def family(harmonics: int, *, hydrostatic: bool) -> Family:
     sums = _sums()
     a = 4 * np.arange(harmonics) + (3 if hydrostatic else 1)
     b = 4 * np.arange(harmonics) + (1 if hydrostatic else 3)
-    to_next = (a + 2)[:, None] * _images(sums, a + 2, a)
+    to_next = (a + 2)[:, None] * lattice_images(sums, a + 2, a)
     return Family(
-        a, b, _images(sums, b, a), to_next, _conjugate_images(sums, a, a), _images(sums, a, b)
+        a,
+        b,
+        lattice_images(sums, b, a),
+        to_next,
+        _conjugate_images(sums, a, a),
+        lattice_images(sums, a, b),
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from alphacut.rve.cell import Phase
 from alphacut.rve.series.multipoles import LOADS, MOST_HARMONICS, Contrast, modulus, multipoles
+from alphacut.rve.square import square_voigt
 from alphacut.stochastic.theta.truncated_normal import Array
 
 _BATCH = 2_000_000  # entries of one batch of matrices
@@ -24,29 +25,20 @@ class SquareStiffness:
         bulk: C11 + C12, from ε11 = ε22.
         deviator: C11 − C12, from ε11 = −ε22.
         shear: C33, σ12 over 2 ε12.
-        error: Estimated relative truncation error, the largest of the three.
+        errors: Declared relative truncation errors of the three, shape (…, 3).
         harmonics: Harmonics per potential that reached it.
     """
 
     bulk: Array
     deviator: Array
     shear: Array
-    error: Array
+    errors: Array
     harmonics: Array
 
     @property
     def matrix(self) -> Array:
         """Voigt matrices (11, 22, 12 with 2 ε12), shape (…, 3, 3)."""
         return square_voigt(self.bulk, self.deviator, self.shear)
-
-
-def square_voigt(bulk: Array, deviator: Array, shear: Array) -> Array:
-    """Voigt matrices (…, 3, 3) of square symmetry from C11 + C12, C11 − C12 and C33."""
-    voigt = np.zeros((*bulk.shape, 3, 3))
-    voigt[..., 0, 0] = voigt[..., 1, 1] = (bulk + deviator) / 2
-    voigt[..., 0, 1] = voigt[..., 1, 0] = (bulk - deviator) / 2
-    voigt[..., 2, 2] = shear
-    return voigt
 
 
 def square_stiffness(
@@ -80,25 +72,25 @@ def square_stiffness(
     contrast = Contrast.of(matrix, inclusions)
     shape = (radius.size, len(inclusions))
     found = {load: np.full(shape, np.nan) for load in loads}
-    error, used = np.full(shape, np.inf), np.zeros(shape, int)
+    errors, used = np.full((*shape, len(LOADS)), np.inf), np.zeros(shape, int)
+    allowed = max(tolerance, _ROUND_OFF)
     todo, harmonics = np.arange(radius.size), _first_guess(radius, tolerance)
     while todo.size:
         for count in np.unique(harmonics[todo]):
             for rows in _batches(todo[harmonics[todo] == count], shape[1] * count**2):
                 # what is settled stays, whatever its companions need
-                open_ = error[rows] > max(tolerance, _ROUND_OFF)
+                open_ = errors[rows].max(axis=2) > allowed
                 values, left = _solve_batch(radius[rows], contrast, int(count), loads)
                 for load in loads:
                     found[load][rows] = np.where(open_, values[load], found[load][rows])
-                error[rows], used[rows] = (
-                    np.where(open_, left, error[rows]),
-                    np.where(open_, count, used[rows]),
-                )
-        todo = todo[error[todo].max(axis=1) > max(tolerance, _ROUND_OFF)]
-        _refuse_touching(radius[todo], harmonics[todo], error[todo], tolerance)
+                errors[rows] = np.where(open_[..., None], left, errors[rows])
+                used[rows] = np.where(open_, count, used[rows])
+        worst = errors[todo].max(axis=(1, 2))
+        todo, worst = todo[worst > allowed], worst[worst > allowed]
+        _refuse_touching(radius[todo], harmonics[todo], worst, tolerance)
         harmonics[todo] = np.minimum(harmonics[todo] * 4 // 3 + 2, MOST_HARMONICS)
     bulk, deviator, shear = (found.get(load, np.full(shape, np.nan)) for load in LOADS)
-    return SquareStiffness(bulk, deviator, shear, error, used)
+    return SquareStiffness(bulk, deviator, shear, errors, used)
 
 
 def _first_guess(radius: Array, tolerance: float) -> Array:
@@ -118,14 +110,15 @@ def _batches(rows: Array, entries: int) -> list[Array]:
 def _solve_batch(
     radius: Array, contrast: Contrast, count: int, loads: Sequence[str]
 ) -> tuple[dict[str, Array], Array]:
-    """Moduli by load and their largest estimated relative error, all of shape (rows, m).
+    """Moduli by load, shape (rows, m), and the declared relative errors, shape (rows, m, 3).
 
     A harmonic changes a modulus by all but the factor `fade` of the error that it leaves; fade is
     what the last two changes show, and at least exp(−5 arccosh(1/r)), the slowest decay met at
     moderate contrasts. Doubled for safety.
     """
     least = np.exp(-5 * np.arccosh(1 / np.maximum(radius, 1e-3)))[:, None]
-    values, error = {}, np.full((radius.size, contrast.kappa_i.size), _ROUND_OFF / 10)
+    values = {}
+    errors = np.full((radius.size, contrast.kappa_i.size, len(LOADS)), _ROUND_OFF / 10)
     for load in loads:
         last, before, first = (
             modulus(load, multipoles(load, radius, contrast, harmonics=count - n), radius, contrast)
@@ -136,11 +129,9 @@ def _solve_batch(
             change / np.maximum(earlier, _ROUND_OFF / 10), least, np.maximum(least, _SLOWEST)
         )
         values[load] = last
-        error = np.maximum(
-            error,
-            _ROUND_OFF / 10 + 2 * np.maximum(change, earlier * least**1.5) * fade / (1 - fade),
-        )
-    return values, error
+        left = 2 * np.maximum(change, earlier * least**1.5) * fade / (1 - fade)
+        errors[..., LOADS.index(load)] += left
+    return values, errors
 
 
 class SeriesError(RuntimeError):

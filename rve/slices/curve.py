@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from alphacut.rve.cell import STRAIN, Phase
+from alphacut.rve.cell import STRAIN, Cell, Phase
 from alphacut.rve.certificate import ROUND_OFF, Limits, require, stiffness_checks
 from alphacut.rve.result import Homogenised, StressCurve
+from alphacut.rve.square import square_moduli
 from alphacut.stochastic import RadiusMap, ThetaRule
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -25,15 +26,24 @@ def curve_of(rule: ThetaRule, stiffness: Array) -> StressCurve:
     return StressCurve(rule.nodes, rule.weights, *stresses(stiffness), stiffness)
 
 
-def modulus_error(curve: StressCurve, error: Array) -> float:
-    """Relative error of E of eq. 16 from those of C11 + C12 and C33, shape (n,)."""
-    s11, s12 = curve.mean
-    bulk, shear = (
-        float(curve.weights @ (s * error)) / mean
-        for s, mean in ((curve.s11, s11), (curve.s12, s12))
-    )
-    ratio = s12 / s11
-    return (abs(ratio) * bulk + abs(3 - 2 * ratio) * shear) / abs(3 - ratio)  # E = A (3 − A/B) / 2
+def with_errors(curve: StressCurve, error: Array) -> StressCurve:
+    """The curve with the declared relative errors of its stresses.
+
+    Args:
+        curve: With its stiffness.
+        error: Relative errors of C11 + C12, C11 − C12 and C33 at the nodes, shape (n, 3).
+    """
+    moduli = square_moduli(np.asarray(curve.stiffness))
+    uneven = abs(STRAIN * moduli[:, 0] / curve.s11 - 1)  # of the mesh: x1 is not quite x2
+    return replace(curve, error=np.stack([error[:, 0] + uneven, error[:, 2]], axis=-1))
+
+
+def mean_errors(curve: StressCurve, error: Array) -> Array:
+    """Relative errors of the mean moduli, shape (3,), from those at the nodes, shape (n, 3)."""
+    moduli = square_moduli(np.asarray(curve.stiffness))
+    mean, uneven = curve.weights @ moduli, np.zeros(3)
+    uneven[0] = abs(STRAIN * mean[0] / curve.mean[0] - 1)  # of the mesh: x1 is not quite x2
+    return np.asarray(curve.weights @ (moduli * error) / mean + uneven)
 
 
 def certified(
@@ -49,6 +59,5 @@ def certified(
         return result
     fraction = np.pi / AREA * radius_map(curve.theta) ** 2
     checks = stiffness_checks(curve.stiffness, fraction, curve.weights, (matrix, inclusion))
-    return replace(
-        result, checks=require(checks, Limits(discretisation=ROUND_OFF + result.estimated_error))
-    )
+    limits = Limits(discretisation=ROUND_OFF + result.largest_error)
+    return replace(result, checks=require(checks, limits), cell=Cell(matrix, inclusion, radius_map))

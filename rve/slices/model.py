@@ -14,8 +14,9 @@ import numpy as np
 
 from alphacut.rve.cell import Phase
 from alphacut.rve.result import Homogenised
-from alphacut.rve.slices.curve import certified, curve_of, modulus_error, stresses
+from alphacut.rve.slices.curve import certified, curve_of, mean_errors, with_errors
 from alphacut.rve.slices.theta_rule import DIGITS, extreme_radii, theta_error, theta_rule
+from alphacut.rve.square import square_moduli
 from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -94,10 +95,14 @@ class SlicesModel:
                 np.array([s.error[m] for s in slices]),
             )
             curve = curve_of(rule, stiffness[nodes])
-            error = {
-                "space": modulus_error(curve, error_of_slice[nodes]),
+            errors = {
+                "space": mean_errors(curve, error_of_slice[nodes]),
                 "theta": theta_error(
-                    radius_map, rule, radii=radii, stress=np.stack(stresses(stiffness), axis=1)
+                    radius_map,
+                    rule,
+                    radii=radii,
+                    moduli=square_moduli(stiffness),
+                    phases=(matrix, inclusions[m]),
                 ),
             }
             reason = (
@@ -105,13 +110,13 @@ class SlicesModel:
                 f" {self.mesh_size:g}"
             )
             result = Homogenised(
-                curve,
+                with_errors(curve, error_of_slice[nodes]),
                 self.name,
                 slices[0].solver,
                 max(s.unknowns for s in slices),
                 (),
                 seconds,
-                error,
+                errors,
                 reason,
             )
             results.append(certified(result, radius_map, matrix, inclusions[m]))
@@ -145,25 +150,21 @@ class Slice:
 
     @property
     def gaps(self) -> Array:
-        """Relative change of C11 + C12 and C33 by each rise of order, (orders − 1, m, 2)."""
-        moduli = np.stack(
-            [self.by_order[..., 0, 0] + self.by_order[..., 0, 1], self.by_order[..., 2, 2]], axis=-1
-        )
+        """Relative change of the three moduli by each rise of order, (orders − 1, m, 3)."""
+        moduli = square_moduli(self.by_order)
         return np.asarray(np.abs(moduli[:-1] / moduli[1:] - 1))
 
     @property
     def error(self) -> Array:
-        """Estimated relative error of C11 + C12 and C33, shape (m,): tail of the orders, trebled.
+        """Declared relative errors of C11 + C12, C11 − C12 and C33, shape (m, 3).
 
-        What one order more leaves of the last change is what the last rise left of the one before;
-        orders below 4 are not yet regular.
+        The geometric series of further orders, trebled. What one order more leaves of the last
+        change is what the last rise left of the one before; orders below 4 are not yet regular.
         """
-        gaps = self.gaps.max(axis=2)
-        fade = (
-            np.clip(gaps[-1] / np.maximum(gaps[-2], 1e-300), 0.01, 0.5)
-            if len(gaps) > 1
-            else np.zeros(gaps.shape[1])
-        )
+        gaps = self.gaps
+        fade = np.zeros(gaps.shape[1:])
+        if len(gaps) > 1:
+            fade = np.clip(gaps[-1] / np.maximum(gaps[-2], 1e-300), 0.01, 0.5)
         if self.order < 4:
             fade = np.maximum(fade, _IRREGULAR_FADE)
         return np.asarray(3 * gaps[-1] * fade / (1 - fade) + _ROUND_OFF)

@@ -7,8 +7,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from alphacut.rve.result import StressCurve, effective_modulus
+from alphacut.rve.bounds import mori_tanaka
+from alphacut.rve.cell import Phase
+from alphacut.rve.result import StressCurve
 from alphacut.rve.slices.curve import curve_of
+from alphacut.rve.square import square_moduli
 from alphacut.stochastic import HermiteMap, RadiusMap, ThetaRule, gauss_rule
 from alphacut.stochastic.theta.truncated_normal import Array, TruncatedNormal
 
@@ -16,6 +19,8 @@ _SAMPLES = 2049
 _LEAST_JUMP, _LEAST_BEND = 1e-3, 1e-8  # in radii, over one or two steps of the sampling
 _FINE = 128
 _MOST_POINTS = 1200
+SAFETY = 1.6  # of the estimates in θ
+_NOISE = 1e-13  # of a declared error: what rounding leaves
 DIGITS = 12  # radii equal to so many decimals are one slice
 
 
@@ -98,43 +103,45 @@ def settle_rule(
     *,
     points: int | None,
     accuracy: float,
-) -> tuple[list[StressCurve], list[float]]:
-    """Curves and their errors by rules refined until E settles within `accuracy`.
+) -> tuple[list[StressCurve], list[Array]]:
+    """Curves whose nodes are added until the mean moduli settle, and their declared errors.
 
-    Two finer rules tell how large the error of a rule is: its distance from them, doubled.
+    Two finer rules tell how large the error of a rule is: its distance from them, with a margin.
 
     Args:
         radius_map: The map.
         stiffness_at: Stiffness at n radii for m inclusions, shape (n, m, 3, 3); cheap.
         points: Nodes, or None to have them found.
-        accuracy: Relative error of E that counts as settled.
+        accuracy: Relative error of every mean modulus that counts as settled.
+
+    Returns:
+        For each inclusion its curve and the errors of C11 + C12, C11 − C12 and C33, shape (3,).
 
     Raises:
         RuleError: No rule in reach settles.
     """
     count = points or max(6, int(np.ceil(1 - 0.75 * np.log10(accuracy))))
     known: dict[int, list[StressCurve]] = {}
-    settled: dict[int, tuple[StressCurve, float]] = {}
+    settled: dict[int, tuple[StressCurve, Array]] = {}
     while True:
         counts = [count, _finer(count), _finer(_finer(count))]
         _add_curves(known, [n for n in counts if n not in known], radius_map, stiffness_at)
         gaps = [
-            _gap(*(effective_modulus(*curve.mean)[0] for curve in three))
+            _gap(*map(_mean_moduli, three))
             for three in zip(*(known[n] for n in counts), strict=True)
         ]
         for k, (curve, gap) in enumerate(zip(known[count], gaps, strict=True)):
-            # each inclusion by itself, whatever its companions need
-            if k not in settled and (points or gap <= accuracy):
-                settled[k] = curve, gap
+            if k not in settled and (points or gap.max() <= accuracy):
+                settled[k] = curve, gap  # each inclusion by itself, whatever its companions need
         if len(settled) == len(gaps):
             return [settled[k][0] for k in range(len(gaps))], [
                 settled[k][1] for k in range(len(gaps))
             ]
         if counts[-1] >= _MOST_POINTS:
             raise RuleError(
-                f"the rule of {count} nodes in θ leaves a relative error of {max(gaps):.1e} in E"
-                f" and {accuracy:.1e} is wanted: the radius map is not smooth; allow a larger"
-                " error, or give the number of nodes"
+                f"the rule of {count} nodes in θ leaves a relative error of {np.max(gaps):.1e} and"
+                f" {accuracy:.1e} is wanted: the radius map is not smooth; allow a larger error, or"
+                " give the number of nodes"
             )
         count = counts[1]
 
@@ -158,9 +165,15 @@ def _finer(count: int) -> int:
     return count + max(2, count // 3)
 
 
-def _gap(value: float, finer: float, finest: float) -> float:
-    """Estimated relative error of `value`, from two finer ones."""
-    return 2 * max(abs(finer - value), abs(finest - value)) / abs(finest)
+def _mean_moduli(curve: StressCurve) -> Array:
+    """Mean C11 + C12, C11 − C12 and C33 of a curve with its stiffness, shape (3,), in Pa."""
+    return square_moduli(np.tensordot(curve.weights, np.asarray(curve.stiffness), axes=1))
+
+
+def _gap(value: Array, finer: Array, finest: Array) -> Array:
+    """Declared relative errors of `value`, from two finer ones."""
+    gap = np.maximum(abs(finer - value), abs(finest - value)) / finest
+    return np.asarray(SAFETY * gap + _NOISE)
 
 
 def extreme_radii(radius_map: RadiusMap) -> Array:
@@ -174,37 +187,49 @@ def extreme_radii(radius_map: RadiusMap) -> Array:
     return np.array([low, high])
 
 
-def theta_error(radius_map: RadiusMap, rule: ThetaRule, *, radii: Array, stress: Array) -> float:
-    """Estimated relative error of E by `rule`, from slices already solved.
+def theta_error(
+    radius_map: RadiusMap,
+    rule: ThetaRule,
+    *,
+    radii: Array,
+    moduli: Array,
+    phases: tuple[Phase, Phase],
+) -> Array:
+    """Declared relative errors of the mean moduli by `rule`, shape (3,), from slices solved.
 
-    The logarithm of the stress is smoother in √(1 − r²) than in θ: polynomials through the slices
-    at the nodes and at the extreme radii are averaged by a rule so fine that it leaves nothing out,
-    and compared with the average over the nodes. The largest gap of several degrees, doubled.
+    The logarithm of a modulus over that of Mori and Tanaka is smooth in √(1 − r²), also where soft
+    particles or an incompressible matrix make the modulus itself steep: polynomials through the
+    slices at the nodes and at the extreme radii are averaged by a rule so fine that it leaves
+    nothing out, and compared with the average over the nodes. The largest gap of several degrees,
+    with a margin.
 
     Args:
         radius_map: The map.
         rule: Its n nodes.
         radii: Radii solved, shape (m,): those of the nodes and the two extreme ones.
-        stress: σ11 of load 1 and σ12 of load 2 at `radii`, shape (m, 2).
+        moduli: C11 + C12, C11 − C12 and C33 at `radii`, shape (m, 3).
+        phases: Matrix and inclusion.
     """
     places = np.searchsorted(radii, np.round(radius_map(rule.nodes), DIGITS))
     weights = np.maximum(np.bincount(places, rule.weights, minlength=radii.size), 1e-6)
+    root = np.sqrt(weights)[:, None]
     fine = theta_rule(radius_map, points=_FINE)
-    touch, target, logarithm = (
-        np.sqrt(1 - radii**2),
-        np.sqrt(1 - radius_map(fine.nodes) ** 2),
-        np.log(stress),
-    )
+    between = radius_map(fine.nodes)
+    scale, logarithm = _dilute(between, phases), np.log(moduli / _dilute(radii, phases))
     low, high, span = logarithm.min(axis=0), logarithm.max(axis=0), np.ptp(logarithm, axis=0)
-    own = effective_modulus(*(rule.weights @ stress[places]))[0]
-    gaps = []
-    for degree in range(min(max(0, radii.size - 4), 9), min(radii.size, 13)):
+    touch, target = np.sqrt(1 - radii**2), np.sqrt(1 - between**2)
+    own, gaps = rule.weights @ moduli[places], []
+    for degree in range(min(max(0, radii.size - 4), 9), min(radii.size, 15)):
         basis, carried = (_chebyshev(x, touch.min(), touch.max(), degree) for x in (touch, target))
-        root = np.sqrt(weights)[:, None]
         coefficients = np.linalg.lstsq(basis * root, logarithm * root, rcond=1e-14)[0]
-        refined = np.exp(np.clip(carried @ coefficients, low - span, high + span))
-        gaps.append(effective_modulus(*(fine.weights @ refined))[0] / own - 1)
-    return float(2 * np.abs(gaps).max())
+        refined = scale * np.exp(np.clip(carried @ coefficients, low - span, high + span))
+        gaps.append(fine.weights @ refined / own - 1)
+    return np.asarray(SAFETY * np.abs(gaps).max(axis=0) + _NOISE)
+
+
+def _dilute(radii: Array, phases: tuple[Phase, Phase]) -> Array:
+    """The moduli of Mori and Tanaka at radii, shape (n, 3)."""
+    return mori_tanaka(np.pi / 4 * radii**2, *phases)
 
 
 def _chebyshev(x: Array, low: float, high: float, degree: int) -> Array:

@@ -12,6 +12,7 @@ import numpy as np
 from alphacut.rve.cell import Phase
 from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.rve.slices.model import solve_slice
+from alphacut.rve.square import square_moduli
 from alphacut.rve.table.interpolant import Table, TableRange, coefficients, tail
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -48,7 +49,7 @@ class SeriesSource:
     span: TableRange
     accuracy: float
     mesh_size: float = 0.0
-    space: Array = field(default_factory=lambda: np.array([[0.5], [1e-13]]))
+    space: Array = field(default_factory=lambda: np.array([[0.5], [1e-13], [1e-13], [1e-13]]))
     unknowns: int = 0
     systems: int = 0
 
@@ -74,22 +75,24 @@ class PlanarSource:
 
     def __post_init__(self) -> None:
         radii = np.unique(np.clip([0.3, 0.6, 0.72, 0.85, *self.span.radii], *self.span.radii))
-        rough = np.array([self._error(radius, _ROUGH) for radius in radii])
-        worst = int(rough.argmax())
-        size, error = _ROUGH, rough[worst]
-        while error > self.accuracy:
+        rough = np.array([self._errors(radius, _ROUGH) for radius in radii])
+        worst = int(rough.max(axis=1).argmax())
+        size, errors = _ROUGH, rough[worst]
+        while errors.max() > self.accuracy:
             if size <= _FINEST:
                 raise TableError(
-                    f"planar cells at r = {radii[worst]:.4g} leave a relative error of {error:.1e}"
-                    f" on the finest mesh ({_FINEST:g}) and {self.accuracy:.1e} is wanted: allow a"
-                    " larger error, or take the series"
+                    f"planar cells at r = {radii[worst]:.4g} leave a relative error of"
+                    f" {errors.max():.1e} on the finest mesh ({_FINEST:g}) and {self.accuracy:.1e}"
+                    " is wanted: allow a larger error, or take the series"
                 )
-            size = max(_FINEST, size * min(0.9, (0.8 * self.accuracy / error) ** (1 / _RATE)))
-            error = self._error(radii[worst], size)
-        self.mesh_size, self.space = size, np.stack([radii, rough * error / rough[worst]])
+            finer = min(0.9, (0.8 * self.accuracy / errors.max()) ** (1 / _RATE))
+            size = max(_FINEST, size * finer)
+            errors = self._errors(radii[worst], size)
+        self.mesh_size = size
+        self.space = np.vstack([radii, (rough * errors / rough[worst]).T])
 
-    def _error(self, radius: float, size: float) -> float:
-        """Estimated relative error of the moduli at one radius and the two extreme inclusions."""
+    def _errors(self, radius: float, size: float) -> Array:
+        """Declared relative errors at one radius of both extreme inclusions, shape (3,)."""
         phases = self._phases(np.unique(self.span.moduli))
         solved = solve_slice(
             radius,
@@ -99,7 +102,7 @@ class PlanarSource:
             mesh_size=size,
         )
         self.systems += 3 * solved.factorisations
-        return float(solved.error.max())
+        return np.asarray(solved.error.max(axis=0))
 
     def _phases(self, modulus: Array) -> list[Phase]:
         return [Phase(float(e), self.span.poisson) for e in modulus]
@@ -123,8 +126,7 @@ class PlanarSource:
         )
         self.systems += 3 * solved.factorisations
         self.unknowns = max(self.unknowns, solved.unknowns)
-        c = solved.stiffness
-        return np.stack([c[:, 0, 0] + c[:, 0, 1], c[:, 0, 0] - c[:, 0, 1], c[:, 2, 2]], axis=-1)
+        return square_moduli(solved.stiffness)
 
 
 SOURCES: dict[str, Callable[[TableRange, float], Source]] = {
@@ -163,13 +165,13 @@ def build_table(
         radii, moduli = span.nodes(counts)
         for k, radius in enumerate(radii):
             if radius not in known:
-                known[radius] = np.log(supply.moduli(float(radius), moduli))
+                known[radius] = _logarithms(span, supply.moduli, float(radius), moduli)
             if progress:
                 progress((k + 1) / radii.size)
         found = coefficients(np.array([known[radius] for radius in radii]))
-        noise = float(supply.space[1].max())
+        noise = supply.space[1:].max(axis=1)
         tails = tail(found, 0, noise=noise), tail(found, 1, noise=noise)
-        if sum(tails) <= allowed:
+        if sum(tails).max() <= allowed:
             return Table(
                 span,
                 found,
@@ -181,14 +183,22 @@ def build_table(
             )
         if max(counts) >= _MOST_NODES:
             raise TableError(
-                f"the table's coefficients leave a relative error of {sum(tails):.1e} with"
+                f"the table's coefficients leave a relative error of {sum(tails).max():.1e} with"
                 f" {counts[0]} radii and {counts[1]} moduli and {allowed:.1e} is wanted: cover"
                 " less, or allow a larger error"
             )
-        if tails[0] >= tails[1]:
+        if tails[0].max() >= tails[1].max():
             counts = (counts[0] + 2, counts[1])
         else:
             counts, known = (counts[0], counts[1] + 2), {}
+
+
+def _logarithms(
+    span: TableRange, moduli: Callable[[float, Array], Array], radius: float, modulus: Array
+) -> Array:
+    """Logarithms of the moduli over those of Mori and Tanaka at one radius, shape (m, 3)."""
+    dilute = span.dilute(np.array([radius]), modulus)[0]
+    return np.asarray(np.log(moduli(radius, modulus) / dilute))
 
 
 def _moduli_needed(span: TableRange, supply: Source, allowed: float) -> int:
@@ -198,7 +208,7 @@ def _moduli_needed(span: TableRange, supply: Source, allowed: float) -> int:
     found: list[Array] = []
     for count in range(2, _MOST_NODES):
         _, moduli = span.nodes((1, count))
-        found.extend(np.log(supply.rough(span.radii[1], moduli[len(found) :])))
-        if tail(coefficients(np.array(found)[None]), 1) <= allowed:
+        found.extend(_logarithms(span, supply.rough, span.radii[1], moduli[len(found) :]))
+        if tail(coefficients(np.array(found)[None]), 1).max() <= allowed:
             return count
     return _MOST_NODES

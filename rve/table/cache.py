@@ -19,7 +19,16 @@ from alphacut.rve.table.build import build_table
 from alphacut.rve.table.interpolant import Table, TableRange
 
 # The code a table comes from.
-_PROGRAMS = ("cell.py", "mesh/*.py", "planar/*.py", "series/*.py", "slices/*.py", "table/*.py")
+_PROGRAMS = (
+    "bounds.py",
+    "cell.py",
+    "square.py",
+    "mesh/*.py",
+    "planar/*.py",
+    "series/*.py",
+    "slices/*.py",
+    "table/*.py",
+)
 _PACKAGES = ("numpy", "scipy", "fenics-dolfinx", "fenics-basix", "fenics-ffcx", "petsc4py", "gmsh")
 
 

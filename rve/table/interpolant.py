@@ -2,8 +2,9 @@
 
 The variables are u = √(1 − r²), which takes the sting out of nearly touching particles (polynomials
 in r² need three times the degree), and t = ln(E_i / E_m), in which a stiffness is analytic in the
-strip |Im t| < π. What is interpolated is the logarithm of each modulus, so that absolute errors of
-the interpolant are relative errors of the modulus.
+strip |Im t| < π. What is interpolated is the logarithm of each modulus over that of Mori and
+Tanaka: it is of the second order in the particle's area, and absolute errors of the interpolant are
+relative errors of the modulus.
 """
 
 from __future__ import annotations
@@ -13,11 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from alphacut.rve.bounds import mori_tanaka
 from alphacut.rve.cell import Phase
-from alphacut.rve.series.stiffness import square_voigt
+from alphacut.rve.square import square_voigt
 from alphacut.stochastic.theta.truncated_normal import Array
 
 _SLACK = 1e-9
+_TINY = 1e-300
+_SHARED = np.array([0.1, 1.0, 1.0])  # C11 + C12 hardly depends on the arrangement
 
 
 @dataclass(frozen=True)
@@ -88,6 +92,11 @@ class TableRange:
         radii = np.clip(np.sqrt((1 - u) * (1 + u)), *self.radii)
         return radii, np.clip(self.matrix.modulus * np.exp(t), *self.moduli)
 
+    def dilute(self, radius: Array, modulus: Array) -> Array:
+        """C11 + C12, C11 − C12 and C33 by Mori and Tanaka in Pa, shape (n, m, 3)."""
+        share, phases = np.pi / 4 * radius**2, [Phase(float(e), self.poisson) for e in modulus]
+        return np.stack([mori_tanaka(share, self.matrix, phase) for phase in phases], axis=1)
+
 
 def _touch(radius: Array) -> Array:
     return np.asarray(np.sqrt((1 - radius) * (1 + radius)))
@@ -126,8 +135,12 @@ def coefficients(values: Array) -> Array:
     return values
 
 
-def tail(coefficients: Array, axis: int, *, noise: float = 0.0) -> float:
-    """Estimated interpolation error along `axis`: the tail of the coefficients, fourfold.
+def tail(coefficients: Array, axis: int, *, noise: Array | float = 0.0) -> Array:
+    """Declared interpolation errors along `axis`, shape (moduli,).
+
+    The geometric series that the last coefficients begin, fivefold for the points. Coefficients
+    change signs, so that one modulus may show none where another does: each counts at least a share
+    of the largest.
 
     Args:
         coefficients: Shape (n_r, n_E, moduli).
@@ -135,23 +148,19 @@ def tail(coefficients: Array, axis: int, *, noise: float = 0.0) -> float:
         noise: Error of the values themselves: where the last coefficients are no larger, they tell
             of nothing else, and count once.
     """
-    size = (
-        np.abs(np.moveaxis(coefficients, axis, 0))
-        .reshape(coefficients.shape[axis], -1, coefficients.shape[-1])
-        .sum(axis=1)
-        .max(axis=1)
-    )
-    if size.size == 1:
-        return 0.0
-    if size.size == 2:  # the constant tells nothing of a decay
-        last, fade = size[-1], 0.7
-    elif size.size < 5:
-        last, fade = size[-1], size[-1] / size[-2]
+    size = np.abs(np.moveaxis(coefficients, axis, 0)).sum(axis=1)
+    if len(size) == 1:
+        return np.zeros(size.shape[1])
+    if len(size) == 2:  # the constant tells nothing of a decay
+        last, fade = size[-1], np.full(size.shape[1], 0.7)
+    elif len(size) < 5:
+        last, fade = size[-1], size[-1] / np.maximum(size[-2], _TINY)
     else:
-        last = size[-2:].max()
-        fade = np.sqrt(last / size[-4:-2].max())
-    fade = np.clip(fade, 0.1, 0.7)
-    return float(last if last <= noise else 4 * last * fade / (1 - fade))
+        last = size[-2:].max(axis=0)
+        fade = np.sqrt(last / np.maximum(size[-4:-2].max(axis=0), _TINY))
+    fade = np.clip(fade, 0.3, 0.7)
+    found = np.where(last <= noise, last, 5 * last * fade / (1 - fade))
+    return np.asarray(np.maximum(found, found.max() * _SHARED))
 
 
 @dataclass(frozen=True)
@@ -160,10 +169,10 @@ class Table:
 
     Args:
         span: What it covers.
-        coefficients: Of ln(C11 + C12), ln(C11 − C12) and ln C33 (in Pa) over u and t, shape (n_r,
-            n_E, 3).
-        space: Estimated relative error of the moduli that it interpolates, at some radii: radius
-            and error, shape (2, k).
+        coefficients: Over u and t, of the logarithms of C11 + C12, C11 − C12 and C33 over those of
+            `TableRange.dilute`, shape (n_r, n_E, 3).
+        space: Declared relative errors of the three moduli that it interpolates, at some radii:
+            radius and errors, shape (4, k).
         mesh_size: Of the planar cells behind it; 0 for the series.
         unknowns: Of their linear systems.
         systems: Number of linear systems solved to build it.
@@ -179,14 +188,15 @@ class Table:
     seconds: float
 
     @property
-    def interpolation(self) -> float:
-        """Estimated relative error of interpolation."""
-        noise = float(self.space[1].max())
+    def interpolation(self) -> Array:
+        """Declared relative errors of interpolation, of the three moduli, shape (3,)."""
+        noise = self.space[1:].max(axis=1)
         return tail(self.coefficients, 0, noise=noise) + tail(self.coefficients, 1, noise=noise)
 
     def space_error(self, radius: Array) -> Array:
-        """Estimated relative error of the interpolated moduli at `radius`, any shape."""
-        return np.asarray(np.exp(np.interp(radius, self.space[0], np.log(self.space[1]))))
+        """Declared relative errors of the interpolated moduli at n radii, shape (n, 3)."""
+        places, errors = self.space[0], np.log(self.space[1:])
+        return np.exp(np.stack([np.interp(radius, places, error) for error in errors], axis=-1))
 
     def moduli(self, radius: Array, modulus: Array) -> Array:
         """C11 + C12, C11 − C12 and C33 in Pa at n radii times m moduli, shape (n, m, 3).
@@ -200,8 +210,8 @@ class Table:
         # one by one: same bits in any company
         logarithms = [
             rows @ np.tensordot(column, self.coefficients, axes=(0, 1)) for column in columns
-        ]
-        return np.asarray(np.exp(np.stack(logarithms, axis=1)))
+        ]  # one by one: same bits in any company
+        return np.exp(np.stack(logarithms, axis=1)) * self.span.dilute(radius, modulus)
 
     def stiffness(self, radius: Array, modulus: Array) -> Array:
         """Voigt matrices in Pa at n radii times m moduli, shape (n, m, 3, 3)."""

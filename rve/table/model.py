@@ -11,7 +11,7 @@ import numpy as np
 
 from alphacut.rve.cell import Phase
 from alphacut.rve.result import Homogenised
-from alphacut.rve.slices.curve import certified, modulus_error
+from alphacut.rve.slices.curve import certified, mean_errors, with_errors
 from alphacut.rve.slices.theta_rule import extreme_radii, settle_rule
 from alphacut.rve.table.cache import stored_table
 from alphacut.rve.table.interpolant import Table, TableRange
@@ -114,25 +114,29 @@ class TableModel:
             else f"built in {table.seconds:.2f} s from {table.systems} linear solves"
         )
         shape = f"{table.coefficients.shape[0]} radii by {table.coefficients.shape[1]} moduli"
-        return [
-            Homogenised(
-                curve=curve,
-                method=self.name,
-                solver="none",
-                unknowns=table.unknowns,
-                seconds=seconds,
-                error={
-                    "space": modulus_error(curve, table.space_error(radius_map(curve.theta))),
-                    "theta": gap,
-                    "table": table.interpolation,
-                },
-                reason=(
-                    f"table of {shape}, mesh size {table.mesh_size:.3g}, {origin};"
-                    f" {curve.theta.size} nodes in θ"
-                ),
+        results = []
+        for curve, gap in zip(curves, gaps, strict=True):
+            space = table.space_error(radius_map(curve.theta))
+            errors = {
+                "space": mean_errors(curve, space),
+                "theta": gap,
+                "table": table.interpolation,
+            }
+            results.append(
+                Homogenised(
+                    curve=with_errors(curve, space + table.interpolation),
+                    method=self.name,
+                    solver="none",
+                    unknowns=table.unknowns,
+                    seconds=seconds,
+                    errors=errors,
+                    reason=(
+                        f"table of {shape}, mesh size {table.mesh_size:.3g}, {origin};"
+                        f" {curve.theta.size} nodes in θ"
+                    ),
+                )
             )
-            for curve, gap in zip(curves, gaps, strict=True)
-        ]
+        return results
 
 
 def _rounded_radii(low: float, high: float) -> tuple[float, float]:

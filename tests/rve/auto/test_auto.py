@@ -88,8 +88,8 @@ def test_reason_names_model_tolerance_and_what_was_excluded():
     result = AutoModel(1e-3, exclude=("series",)).solve(PAPER, MATRIX, [Phase(80e9)])[0]
     assert result.method == "table"
     assert result.reason.startswith(
-        "table reaches a relative error of 0.001 in E (series excluded): planar cells over r and"
-        " E_i once"
+        "table reaches a relative error of 0.001 in E, stresses and stiffness (series excluded):"
+        " planar cells over r and E_i once"
     )
     assert set(result.error) == {"space", "theta", "table"}
     assert AutoModel(1e-3).solve(PAPER, MATRIX, [Phase(80e9)])[0].method == "series"

@@ -44,7 +44,7 @@ def test_coefficients_of_a_polynomial_are_exact():
 def test_tail_of_a_geometric_series():
     series = (0.2 ** np.arange(12.0))[:, None, None]
     rest = 0.2**12 / 0.8
-    assert rest < tail(series, 0) < 100 * rest
+    assert rest < tail(series, 0).max() < 100 * rest
     assert tail(series, 1) == 0
     assert tail(np.full((8, 1, 1), 1e-9), 0, noise=2e-9) == 1e-9
 
@@ -61,13 +61,13 @@ def test_tail_of_a_geometric_series():
 def test_declared_interpolation_error_holds(span, accuracy):
     table = build_table(span, accuracy=accuracy, source="series")
     true = errors(table, np.linspace(*span.radii, 41), np.geomspace(*span.moduli, 13)).max()
-    assert true < table.interpolation + 1e-12 <= accuracy + 1e-12
+    assert true < table.interpolation.max() + 1e-12 <= accuracy + 1e-12
 
 
 def test_planar_table_reaches_its_accuracy():
     table = build_table(SPAN, accuracy=1e-5)
     true = errors(table, np.linspace(0.13, 0.87, 25), np.linspace(75e9, 85e9, 5)).max()
-    declared = table.interpolation + table.space[1].max()
+    declared = (table.interpolation + table.space[1:].max(axis=1)).max()
     assert true < declared < 1e-5
     assert table.systems > 0
     assert table.unknowns > 1000

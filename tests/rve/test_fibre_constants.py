@@ -1,0 +1,101 @@
+"""Constants along the fibres, against finite elements, duality and limits."""
+
+import numpy as np
+import pytest
+
+from alphacut.rve import Phase
+from alphacut.rve.fibre_constants import fibre_constants
+from alphacut.rve.series.antiplane import longitudinal_shear
+from alphacut.rve.series.model import SeriesModel
+from alphacut.stochastic import HermiteMap
+
+PAPER = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
+PAIRS = [
+    (Phase(20e9, 0.2), Phase(80e9, 0.4)),
+    (Phase(20e9, 0.4999), Phase(20e6, 0.1)),
+    (Phase(20e9, 0.1), Phase(2e12, 0.45)),
+]
+
+
+def stiffness_of(values):
+    """Normal stiffness (3, 3) of orthotropic constants, as other programs read them."""
+    e1, e2, e3, nu12, nu13, nu23 = list(values.values())[:6]
+    give = [
+        [1 / e1, -nu12 / e1, -nu13 / e1],
+        [-nu12 / e1, 1 / e2, -nu23 / e2],
+        [-nu13 / e1, -nu23 / e2, 1 / e3],
+    ]
+    return np.linalg.inv(give)
+
+
+@pytest.mark.parametrize(("matrix", "inclusion"), PAIRS)
+def test_stresses_along_the_fibres_are_those_of_finite_elements(matrix, inclusion):
+    """C13 and C33 from the field under ε33, which the cell's models do not solve."""
+    planar = pytest.importorskip("alphacut.rve.planar.problem")
+    from scipy.sparse.linalg import spsolve
+
+    from alphacut.rve.mesh.planar import planar_mesh
+
+    cell, phases = planar.PlanarCell(planar_mesh(0.7, size=0.2), 4), (matrix, inclusion)
+    parts = [p.modulus * cell._stiffness_of(k, p.poisson) for k, p in enumerate(phases)]
+    periodic, uniform = cell.periodic, cell.affine[:, 0] + cell.affine[:, 1]
+    system = (periodic.T @ (parts[0] + parts[1]) @ periodic).tocsc()
+    force = sum(p.poisson * (part @ uniform) for p, part in zip(phases, parts, strict=True))
+    load = np.stack(
+        [periodic.T @ force, periodic.T @ ((parts[0] + parts[1]) @ cell.affine[:, 0])], axis=1
+    )
+    motion = spsolve(system, load)
+    share = np.pi / 4 * 0.7**2
+    lateral, axial = (force @ cell.affine[:, 0] - load[:, 0] @ motion[:, 1]) / 4, 0.0
+    axial = (1 - share) * matrix.stiffness[0, 0] + share * inclusion.stiffness[0, 0]
+    axial -= load[:, 0] @ motion[:, 0] / 4
+    result = SeriesModel().solve(HermiteMap(0.7, 0, 0.7, 0), matrix, [inclusion])[0]
+    found = stiffness_of(fibre_constants(result).values)
+    assert found[0, 2] == pytest.approx(lateral, rel=2e-5)
+    assert found[2, 2] == pytest.approx(axial, rel=2e-5)
+    assert found[:2, :2] == pytest.approx(result.stiffness[:2, :2], rel=1e-9)
+
+
+def test_equal_poissons_ratios_mix_the_modulus_along_the_fibres_exactly():
+    result = SeriesModel().solve(PAPER, Phase(20e9), [Phase(80e9)])[0]
+    constants = fibre_constants(result)
+    rule = result.curve
+    share = rule.weights @ (np.pi / 4 * PAPER(rule.theta) ** 2)
+    assert constants.values["E3"] == pytest.approx(20e9 + share * 60e9, rel=1e-10)
+    assert constants.errors["E3"] < 1e-9 * constants.values["E3"]
+
+
+def test_phases_of_one_bulk_modulus_leave_what_the_bounds_leave():
+    """The plane then tells nothing of C33; the declared error is the width of the bounds."""
+    matrix = Phase(20e9, 0.2)
+    poisson = 0.35
+    bulk = (matrix.stiffness[0, 0] + matrix.stiffness[0, 1]) / 2
+    inclusion = Phase(2 * bulk * (1 + poisson) * (1 - 2 * poisson), poisson)
+    result = SeriesModel().solve(PAPER, matrix, [inclusion])[0]
+    near = SeriesModel().solve(PAPER, matrix, [Phase(inclusion.modulus * 1.001, poisson)])[0]
+    vague, clear = fibre_constants(result), fibre_constants(near)
+    assert vague.values["E3"] != clear.values["E3"]
+    for name, error in vague.errors.items():
+        assert abs(vague.values[name] - clear.values[name]) <= error + 2e-3 * vague.values[name]
+    assert 0 < vague.errors["E3"] < 1e-3 * vague.values["E3"]
+
+
+def test_longitudinal_shear_is_dual_and_dilute():
+    """Keller: moduli of a contrast and of its inverse multiply to the matrix' squared."""
+    radius = np.array([0.2, 0.5, 0.9, 0.99])
+    matrix = Phase(20e9)
+    stiff, error = longitudinal_shear(radius, matrix, Phase(80e9))
+    soft, _ = longitudinal_shear(radius, matrix, Phase(5e9))
+    assert stiff * soft == pytest.approx(np.full(4, matrix.stiffness[2, 2] ** 2), rel=1e-10)
+    assert (error < 1e-9).all()
+    share = np.pi / 4 * 0.01**2
+    thin, _ = longitudinal_shear(np.array([0.01]), matrix, Phase(80e9))
+    assert thin[0] / matrix.stiffness[2, 2] == pytest.approx(1 + 2 * share * 3 / 5, rel=1e-7)
+
+
+def test_without_a_plane_stiffness_there_are_no_constants():
+    from dataclasses import replace
+
+    result = SeriesModel().solve(PAPER, Phase(20e9), [Phase(80e9)])[0]
+    with pytest.raises(ValueError, match="solve the third load"):
+        fibre_constants(replace(result, cell=None))
