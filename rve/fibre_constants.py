@@ -56,7 +56,7 @@ def fibre_constants(result: Homogenised) -> FibreConstants:
     shear13, error13 = _mean_longitudinal_shear(result.cell)
     slack = _Slack.of(result.cell)
     z, *ends = slack.between(moduli[0] / 2, errors[0])
-    values = _constants(moduli[0] / 2, z, *moduli[1:], shear13, slack=slack)
+    values = _constants(moduli[0] / 2, z, moduli[1], moduli[2], shear13, slack=slack)
     changes = [
         _constants(
             slack.bulk(end),

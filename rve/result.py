@@ -167,7 +167,8 @@ def spread(function: Callable[[Array], Array | float], values: Array, errors: Ar
         return np.full(np.shape(function(values)), np.nan)
     centre = np.asarray(function(values))
     ends = product(*((1 / (1 + error), 1 + error) for error in errors))
-    return np.max([abs(np.asarray(function(values * factor)) - centre) for factor in ends], axis=0)
+    changes = [abs(np.asarray(function(values * factor)) - centre) for factor in ends]
+    return np.asarray(np.max(changes, axis=0))
 
 
 def relative(value: float, reference: float) -> float:

@@ -21,10 +21,11 @@ from pathlib import Path
 import numpy as np
 
 from alphacut.rve.cell import Phase
-from alphacut.rve.representative.averages import Averages, Isotropic, averages
+from alphacut.rve.representative.averages import Averages, Isotropic, averages, mori_tanaka
 from alphacut.stochastic.particles.discs import Discs
 from alphacut.stochastic.particles.log_normal import LogNormalRadii
 from alphacut.stochastic.particles.packing import Packing, packings
+from alphacut.stochastic.radius_map import HermiteMap
 from alphacut.stochastic.sections import Simulated, reduced_radii
 
 RESULTS = Path(__file__).parents[1] / "results"
@@ -67,23 +68,56 @@ def compare(
     return np.array(stiffness), known
 
 
-def sentence(moduli: np.ndarray, known: Averages) -> str:
-    """The comparison in words."""
+def sentences(moduli: np.ndarray, known: Averages, *, mesh: float, fraction: float) -> list[str]:
+    """What the comparison says, one sentence for each number; moduli in GPa.
+
+    Args:
+        moduli: Of the many-particle cells.
+        known: Averages over the r_n of the same packings.
+        mesh: Relative change of a cell's modulus by a finer mesh.
+        fraction: Area fraction of the packings.
+    """
     mean, error = moduli.mean(), moduli.std(ddof=1) / np.sqrt(len(moduli))
-    one, stress, single = (
-        x.modulus / 1e9 for x in (known.one_particle, known.equal_stress, known.single)
-    )
-    middle = (one + stress) / 2
+    named = {
+        "eq. 16 on the r_n of the same discs": known.equation_16,
+        "mean of both shear moduli, equal strain": known.one_particle,
+        "mean of both shear moduli, equal stress": known.equal_stress,
+        "one square cell of the mean fraction, both shear moduli": known.single,
+        "Mori-Tanaka, the lower bound of Hashin and Shtrikman": known.mori_tanaka,
+    }
+    return [
+        f"{len(moduli)} cells of area fraction {fraction:g}: E = {mean:.3f} ± {error:.3f} GPa"
+        f" (standard error; cell to cell {moduli.std(ddof=1):.3f})",
+        f"a mesh of half the size changes E by {mesh:+.3%}, {1000 * mesh * mean:+.1f} MPa",
+        *(
+            f"{name}: {one.modulus / 1e9:.3f} GPa, {one.modulus / 1e9 / mean - 1:+.2%}"
+            for name, one in named.items()
+        ),
+    ]
+
+
+def of_the_paper(moduli: np.ndarray) -> str:
+    """E of eq. 16 for the paper's own map beside the bound at its mean area fraction."""
+    from alphacut.rve.series.model import SeriesModel
+
+    radius = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
+    result = SeriesModel().solve(radius, MATRIX, [INCLUSION])[0]
+    curve = result.curve
+    fraction = float(np.pi / 4 * curve.weights @ radius(curve.theta) ** 2)
+    bound = mori_tanaka(fraction, MATRIX, INCLUSION).modulus / 1e9
+    own = result.modulus / 1e9
     return (
-        f"Over {len(moduli)} many-particle cells E = {mean:.3f} ± {error:.3f} GPa (standard error;"
-        f" cell to cell {moduli.std(ddof=1):.3f}). The one-particle model gives {one:.3f} GPa,"
-        f" {one / mean - 1:+.2%}: it averages its cells at equal strain. The same cells at equal"
-        f" stress give {stress:.3f} GPa ({stress / mean - 1:+.2%}), the mean of both {middle:.3f}"
-        f" GPa ({middle / mean - 1:+.2%}): the kind of average explains"
-        f" {(one - middle) / (one - mean):.0%} of the difference. One square cell of the same area"
-        f" fraction gives {single:.3f} GPa ({single / mean - 1:+.2%}), Mori-Tanaka"
-        f" {known.mori_tanaka.modulus / 1e9:.3f} GPa."
+        f"the paper's map, area fraction {fraction:.4f}: eq. 16 gives {own:.3f} GPa,"
+        f" {own / moduli.mean() - 1:+.2%}; the lower bound there is {bound:.3f} GPa"
     )
+
+
+def mesh_change(discs: Discs, *, size: float, around: int) -> float:
+    """Relative change of one cell's modulus by a mesh of half the size."""
+    coarse, fine = (
+        Isotropic.of(homogenised(discs, size=size / k, around=k * around)).modulus for k in (1, 2)
+    )
+    return fine / coarse - 1
 
 
 def draw(moduli: np.ndarray, known: Averages, folder: Path) -> None:
@@ -94,6 +128,7 @@ def draw(moduli: np.ndarray, known: Averages, folder: Path) -> None:
 
     lines = [
         ("one-particle model (equal strain)", known.one_particle, ORANGE, "-"),
+        ("E of eq. 16 on the same r_n", known.equation_16, GREEN, ":"),
         ("its cells at equal stress", known.equal_stress, ORANGE, ":"),
         ("one square cell", known.single, GREEN, "-"),
         ("Mori–Tanaka = lower bound", known.mori_tanaka, INK, "--"),
@@ -136,6 +171,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     parser.add_argument("--cells", type=int, default=30, help="many-particle cells (30)")
     parser.add_argument("--discs", type=int, default=60, help="discs in each (60)")
+    parser.add_argument("--fraction", type=float, default=0.2, help="area fraction (0.2)")
     parser.add_argument("--seed", type=int, default=1, help="seed of the packings (1)")
     parser.add_argument("--workers", type=int, default=1, help="processes (1)")
     parser.add_argument(
@@ -147,6 +183,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     stiffness, known = compare(
         cells=options.cells,
         discs=options.discs,
+        fraction=options.fraction,
         seed=options.seed,
         workers=options.workers,
         size=options.size,
@@ -164,7 +201,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 [name, *(f"{x / 1e9:.6f}" for x in (value.modulus, value.bulk, value.shear))]
             )
     draw(moduli, known, options.out)
-    print(sentence(moduli, known))
+    wish = Packing(options.discs, options.fraction, LogNormalRadii(1e-3, 1e-2), gap=1e-4)
+    first = next(iter(packings(wish, 1, seed=options.seed)))
+    mesh = mesh_change(first, size=options.size, around=options.around)
+    print("\n".join(sentences(moduli, known, mesh=mesh, fraction=options.fraction)))
+    print(of_the_paper(moduli))
 
 
 if __name__ == "__main__":

@@ -58,6 +58,8 @@ class Averages:
 
     Args:
         one_particle: Voigt average of the square cells over the sample of r_n: the paper's model.
+        equation_16: The same mean with the shear modulus along the array's axes alone, as eq. 16
+            takes it; so E of `alphacut cell` is made.
         equal_stress: Reuss average of the same cells.
         single: Square cell of the mean area fraction.
         mori_tanaka: Estimate for round fibres; for stiffer particles the isotropic lower bound.
@@ -68,6 +70,7 @@ class Averages:
     """
 
     one_particle: Isotropic
+    equation_16: Isotropic
     equal_stress: Isotropic
     single: Isotropic
     mori_tanaka: Isotropic
@@ -100,6 +103,7 @@ def averages(radii: Array, weights: Array, matrix: Phase, inclusion: Phase) -> A
     low, high = hashin_shtrikman_bulk(np.asarray(fraction), matrix, inclusion)
     return Averages(
         Isotropic.of(mean),
+        Isotropic(Isotropic.of(mean).bulk, float(mean[2, 2])),
         Isotropic.of(compliant),
         Isotropic.of(single),
         mori_tanaka(fraction, matrix, inclusion),

@@ -198,4 +198,4 @@ def _swelling_pole(a: Array, radius: Array, contrast: Contrast) -> Array:
 
 
 def _sums() -> LatticeSums:
-    return lattice_sums(8 * MOST_HARMONICS + 8)
+    return lattice_sums(12 * MOST_HARMONICS + 8)

@@ -22,6 +22,8 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 _IRREGULAR_FADE = 0.15  # least share of a change that is taken to be left by orders below 4
 _ROUND_OFF = 1e-13
+_SAFETY = 3.3
+_SHARED = np.array([0.03, 0.5, 0.5])  # C11 + C12 is the easiest by far
 
 
 @dataclass(frozen=True)
@@ -158,8 +160,9 @@ class Slice:
     def error(self) -> Array:
         """Declared relative errors of C11 + C12, C11 − C12 and C33, shape (m, 3).
 
-        The geometric series of further orders, trebled. What one order more leaves of the last
-        change is what the last rise left of the one before; orders below 4 are not yet regular.
+        The geometric series of further orders, times a safety factor. What one order more leaves
+        of the last change is what the last rise left of the one before; orders below 4 are not yet
+        regular. One modulus may change little by chance: each counts a share of the largest error.
         """
         gaps = self.gaps
         fade = np.zeros(gaps.shape[1:])
@@ -167,7 +170,9 @@ class Slice:
             fade = np.clip(gaps[-1] / np.maximum(gaps[-2], 1e-300), 0.01, 0.5)
         if self.order < 4:
             fade = np.maximum(fade, _IRREGULAR_FADE)
-        return np.asarray(3 * gaps[-1] * fade / (1 - fade) + _ROUND_OFF)
+        found = _SAFETY * gaps[-1] * fade / (1 - fade)
+        shared = _SHARED * found.max(axis=1, keepdims=True)
+        return np.asarray(np.maximum(found, shared) + _ROUND_OFF)
 
 
 def solve_slice(

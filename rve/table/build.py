@@ -89,7 +89,7 @@ class PlanarSource:
             size = max(_FINEST, size * finer)
             errors = self._errors(radii[worst], size)
         self.mesh_size = size
-        self.space = np.vstack([radii, (rough * errors / rough[worst]).T])
+        self.space = np.vstack([radii, rough.T * (errors / rough[worst]).max()])
 
     def _errors(self, radius: float, size: float) -> Array:
         """Declared relative errors at one radius of both extreme inclusions, shape (3,)."""
@@ -171,7 +171,8 @@ def build_table(
         found = coefficients(np.array([known[radius] for radius in radii]))
         noise = supply.space[1:].max(axis=1)
         tails = tail(found, 0, noise=noise), tail(found, 1, noise=noise)
-        if sum(tails).max() <= allowed:
+        both = float((tails[0] + tails[1]).max())
+        if both <= allowed:
             return Table(
                 span,
                 found,
@@ -183,8 +184,8 @@ def build_table(
             )
         if max(counts) >= _MOST_NODES:
             raise TableError(
-                f"the table's coefficients leave a relative error of {sum(tails).max():.1e} with"
-                f" {counts[0]} radii and {counts[1]} moduli and {allowed:.1e} is wanted: cover"
+                f"the table's coefficients leave a relative error of {both:.1e} with {counts[0]}"
+                f" radii and {counts[1]} moduli and {allowed:.1e} is wanted: cover"
                 " less, or allow a larger error"
             )
         if tails[0].max() >= tails[1].max():

@@ -196,7 +196,9 @@ class Table:
     def space_error(self, radius: Array) -> Array:
         """Declared relative errors of the interpolated moduli at n radii, shape (n, 3)."""
         places, errors = self.space[0], np.log(self.space[1:])
-        return np.exp(np.stack([np.interp(radius, places, error) for error in errors], axis=-1))
+        return np.asarray(
+            np.exp(np.stack([np.interp(radius, places, one) for one in errors], axis=-1))
+        )
 
     def moduli(self, radius: Array, modulus: Array) -> Array:
         """C11 + C12, C11 − C12 and C33 in Pa at n radii times m moduli, shape (n, m, 3).
