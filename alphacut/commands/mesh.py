@@ -44,7 +44,17 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     check_ending(Path(options.out), fields=options.fields)
     mesh = cell_fields(case) if options.fields else prism_mesh(case)
     write_mesh(mesh, Path(options.out))
-    counts = {"nodes": len(mesh.points), "wedges": len(mesh.cells[0].data), "file": options.out}
-    text = f"{counts['nodes']} nodes and {counts['wedges']} quadratic wedges in {options.out}\n"
+    counts: dict[str, object] = {
+        "nodes": len(mesh.points),
+        "wedges": len(mesh.cells[0].data),
+        "file": options.out,
+    }
+    text = f"{counts['nodes']} nodes and {counts['wedges']} quadratic wedges in {options.out}
+"
+    if options.fields:
+        counts["declared_error"] = mesh.info or None
+        parts = ", ".join(f"{name} {error:.1e}" for name, error in (mesh.info or {}).items())
+        text += f"relative errors in L²: {parts or 'not known, particles nearly touch'}
+"
     answer(options, counts, out, text)
     return 0

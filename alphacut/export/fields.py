@@ -9,6 +9,7 @@ import numpy as np
 from alphacut.case.case import Case
 from alphacut.export.prism_mesh import ORDER
 from alphacut.io.problem import BadInput, Problem
+from alphacut.rve.cell import LOADS, Phase
 from alphacut.stages.cell import modal_values, parts
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 VERTICES = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1)]
 EDGES = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5)]  # Basix's order
 COMPONENTS = ("11", "22", "12")
+SIZES = (("displacement", 2), ("stress", 3))
 
 
 def reference_nodes() -> Array:
@@ -44,7 +46,6 @@ def cell_fields(case: Case) -> meshio.Mesh:
     from meshio._mesh import topological_dimension
     from mpi4py import MPI
 
-    from alphacut.rve.cell import LOADS
     from alphacut.rve.mesh.prism_grid import PrismGrid
     from alphacut.rve.mesh.triangulation import triangulate
     from alphacut.rve.prism.model import reference_radius
@@ -88,9 +89,75 @@ def cell_fields(case: Case) -> meshio.Mesh:
         for row, name in enumerate(COMPONENTS)
     }
     topological_dimension.setdefault("wedge15", 3)  # see alphacut.prism_mesh
+    errors = relative_errors(system, (matrix, inclusion), nodes, cells, phase, data)
     return meshio.Mesh(
-        system.positions[nodes], [("wedge15", cells[:, ORDER])], data, {"phase": [phase]}
+        system.positions[nodes],
+        [("wedge15", cells[:, ORDER])],
+        data,
+        {"phase": [phase]},
+        info=errors,
     )
+
+
+def relative_errors(
+    system: PrismSystem,
+    phases: tuple[Phase, Phase],
+    nodes: Array,
+    cells: Array,
+    phase: Array,
+    data: dict[str, Array],
+) -> dict[str, float]:
+    """Relative error of each load's displacement and stress in L², weighted with f_Θ.
+
+    The truth is the multipole series at every node; empty where it refuses.
+
+    Args:
+        system: What the fields were computed on.
+        phases: Matrix and inclusion.
+        nodes: Node of the grid that each exported one is, shape (n,).
+        cells: Exported nodes of the wedges, shape (m, 15).
+        phase: Of each wedge, shape (m,).
+        data: The fields at the exported nodes by name.
+    """
+    from alphacut.rve.series.field import SeriesField
+    from alphacut.rve.series.stiffness import SeriesError
+
+    points, inside = system.positions[nodes], np.zeros(len(nodes), bool)
+    inside[cells[phase == 1]] = True
+    volume = system.slice_stress.determinants() @ system.form.weights
+    weight = np.zeros(len(nodes))
+    np.add.at(weight, cells, volume[:, None])
+    weight *= system.map.distribution.pdf(points[:, 2])
+    exact = {
+        f"{what}_{load + 1}": np.empty((len(nodes), size))
+        for what, size in SIZES
+        for load in (0, 1)
+    }
+    for theta in np.unique(points[:, 2]):
+        at = np.flatnonzero(points[:, 2] == theta)
+        field = SeriesField(float(system.map(theta)), *phases)
+        for load, strain in enumerate(LOADS):
+            for what, function in (("displacement", field.displacement), ("stress", field.stress)):
+                try:
+                    values = function(points[at, :2], strain, inside=inside[at])
+                except SeriesError:
+                    return {}
+                exact[f"{what}_{load + 1}"][at] = values
+    return {name: _relative(_own(data, name), truth, weight) for name, truth in exact.items()}
+
+
+def _own(data: dict[str, Array], name: str) -> Array:
+    """A field of the export, shape (n, 2) or (n, 3)."""
+    if name.startswith("stress"):
+        return np.stack([data[f"{name}_{part}_Pa"] for part in COMPONENTS], axis=-1)
+    return data[f"{name}_in_half_sides"][:, :2]
+
+
+def _relative(own: Array, exact: Array, weight: Array) -> float:
+    """Relative distance in L²; of stresses as tensors, σ12 counted twice."""
+    twice = np.array([1.0, 1.0, 2.0])[: exact.shape[1]]
+    apart, size = (weight @ (field**2 @ twice) for field in (own - exact, exact))
+    return float(np.sqrt(apart / size))
 
 
 def by_phase(system: PrismSystem, phase: Array, stress: Array) -> tuple[Array, Array, Array]:

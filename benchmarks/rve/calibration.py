@@ -18,6 +18,7 @@ import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -99,7 +100,7 @@ def judge(result: Homogenised, truth: Homogenised) -> Iterator[Judgement]:
     if declared is None:
         raise ValueError(f"{result.method} declares no error")
     own, exact = document(result), document(truth)
-    yield from _compare("", own, exact, declared)
+    yield from _compare("", own, exact, declared, declared_errors(truth))
     if result.stiffness is not None:
         first, second = fibre_constants(result), fibre_constants(truth)
         for name, error in first.errors.items():
@@ -110,16 +111,17 @@ def judge(result: Homogenised, truth: Homogenised) -> Iterator[Judgement]:
     yield from _judge_curve(result)
 
 
-def _compare(place: str, own: object, exact: object, declared: object) -> Iterator[Judgement]:
-    if isinstance(declared, dict) and isinstance(own, dict) and isinstance(exact, dict):
+def _compare(place: str, own: Any, exact: Any, declared: Any, unsure: Any) -> Iterator[Judgement]:
+    if isinstance(declared, dict):
         for name, inner in declared.items():
             if name != "curve":
-                yield from _compare(f"{place} {name}".strip(), own[name], exact[name], inner)
+                within = (values[name] for values in (own, exact))
+                yield from _compare(f"{place} {name}".strip(), *within, inner, unsure[name])
     elif declared is not None:
         values, truths = np.atleast_1d(own), np.atleast_1d(exact)
-        noise = ROUND_OFF * np.abs(truths).max()
+        noise = ROUND_OFF * np.abs(truths).max() + np.atleast_1d(unsure)
         for k, error in np.ndenumerate(np.atleast_1d(declared)):
-            yield Judgement(place, float(error), float(abs(values[k] - truths[k])), float(noise))
+            yield Judgement(place, float(error), float(abs(values[k] - truths[k])), float(noise[k]))
 
 
 def _judge_curve(result: Homogenised) -> Iterator[Judgement]:

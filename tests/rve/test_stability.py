@@ -42,7 +42,8 @@ def test_locking_is_declared_by_order_2_and_cured_by_order_4():
 def test_a_silent_wrong_number_is_called_wrong():
     def overstated(radius_map, matrix, particle):
         return replace(
-            SeriesModel(points=3).solve(radius_map, matrix, [particle])[0], errors={"theta": np.full(3, 1e-9)}
+            SeriesModel(points=3).solve(radius_map, matrix, [particle])[0],
+            errors={"theta": np.full(3, 1e-9)},
         )
 
     row = cell_stability.meet(cell_stability.EDGES[-1], "series", overstated)

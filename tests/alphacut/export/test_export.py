@@ -188,6 +188,17 @@ def test_stress_jumps_across_the_interface_and_displacement_does_not():
     )
 
 
+def test_fields_come_with_errors_that_fall_with_the_mesh(tmp_path, capfd):
+    pytest.importorskip("dolfinx")
+    found = []
+    for size in ("0.5", "0.25"):
+        words = ["--mesh-size", size, "--layers", "6", "--fields", "--json", "-"]
+        assert main(["mesh", PAPER, *words, "--out", str(tmp_path / "cell.vtu")]) == 0
+        found.append(json.loads(capfd.readouterr().out)["declared_error"])
+    for name in ("displacement_1", "displacement_2", "stress_1", "stress_2"):
+        assert 0 < found[1][name] < 0.6 * found[0][name] < 0.2
+
+
 COARSE = ["mesh", PAPER, "--mesh-size", "0.5", "--layers", "3", "--quiet"]
 
 

@@ -1,8 +1,8 @@
-"""Stresses in the cell by the multipole series, and their spread.
+"""Displacements and stresses anywhere in the cell by the multipole series.
 
-σ11 + σ22 = 4 Re φ' and σ22 − σ11 + 2i σ12 = 2 (conj(z) φ'' + ψ'). Of the images, the eight nearest
-are summed one by one, the others by their Taylor series around the cell's centre, which converges
-everywhere in the cell.
+2μ (u1 + i u2) = κφ − z conj(φ') − conj(ψ), σ11 + σ22 = 4 Re φ', σ22 − σ11 + 2i σ12 = 2 (conj(z) φ''
++ ψ'). Of the images, the eight nearest are summed one by one, the others by their Taylor series
+around the cell's centre, which converges everywhere in the cell.
 """
 
 from __future__ import annotations
@@ -45,23 +45,6 @@ class UnitLoad:
 
 
 @dataclass(frozen=True)
-class Spread:
-    """Stress components (11, 22, 12) over a cell, in Pa; every array has shape (3,).
-
-    Args:
-        mean: Mean over the cell.
-        deviation: Standard deviation over the cell.
-        least: Smallest value found.
-        greatest: Largest value found.
-    """
-
-    mean: Array
-    deviation: Array
-    least: Array
-    greatest: Array
-
-
-@dataclass(frozen=True)
 class SeriesField:
     """The elastic field of one cell.
 
@@ -75,51 +58,32 @@ class SeriesField:
     matrix: Phase
     inclusion: Phase
 
-    def stress(self, points: Array, strain: Array) -> Array:
-        """Stress at points of the cell [−1, 1]².
+    def stress(self, points: Array, strain: Array, *, inside: NDArray[np.bool_]) -> Array:
+        """Stress (σ11, σ22, σ12) at points in Pa, shape (n, 3); arguments as of `displacement`."""
+        z, stress = points[:, 0] + 1j * points[:, 1], np.empty((len(points), 3))
+        for part, chosen in ((self._inside, inside), (self._outside, ~inside)):
+            stress[chosen] = part(z[chosen], strain)
+        return stress
+
+    def displacement(self, points: Array, strain: Array, *, inside: NDArray[np.bool_]) -> Array:
+        """Displacement at points, zero at the cell's centre, in halves of its side, shape (n, 2).
 
         Args:
             points: Shape (n, 2).
             strain: Mean strain (ε11, ε22, 2 ε12), shape (3,).
-
-        Returns:
-            (σ11, σ22, σ12) in Pa, shape (n, 3).
+            inside: Whether a point belongs to the particle, shape (n,); on the interface either.
         """
-        z = points[:, 0] + 1j * points[:, 1]
-        inside = np.abs(z) <= self.radius
-        found = np.empty((len(z), 3))
-        for part, chosen in ((self._inside, inside), (self._outside, ~inside)):
-            found[chosen] = part(z[chosen], strain)
-        return found
-
-    def interface(self, angle: Array, strain: Array, *, outside: bool = True) -> Array:
-        """Normal and shear traction on the interface in Pa, shape (n, 2), from either side."""
-        normal = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        z = self.radius * (normal[:, 0] + 1j * normal[:, 1])
-        s11, s22, s12 = (self._outside if outside else self._inside)(z, strain).T
-        traction = np.stack(
-            [s11 * normal[:, 0] + s12 * normal[:, 1], s12 * normal[:, 0] + s22 * normal[:, 1]],
-            axis=-1,
-        )
-        tangent = np.stack([-normal[:, 1], normal[:, 0]], axis=-1)
-        return np.stack(
-            [(traction * normal).sum(axis=1), (traction * tangent).sum(axis=1)], axis=-1
-        )
-
-    def spread(self, strain: Array, *, points: int = 24) -> Spread:
-        """Mean, deviation and extremes of the stress under a mean strain (3,)."""
-        places, weights = _cell_rule(self.radius, points)
-        angle = np.linspace(0, 2 * np.pi, 16 * points, endpoint=False)
-        z = self.radius * np.exp(1j * angle)
-        field, rim = (
-            self.stress(places, strain),
-            [self._inside(z, strain), self._outside(z, strain)],
-        )
-        mean = weights @ field
-        extremes = np.concatenate([field, *rim])
-        return Spread(
-            mean, np.sqrt(weights @ (field - mean) ** 2), extremes.min(axis=0), extremes.max(axis=0)
-        )
+        z, motion = points[:, 0] + 1j * points[:, 1], np.empty(len(points), complex)
+        for phase, chosen, potentials in (
+            (self.matrix, ~inside, self._potentials_outside),
+            (self.inclusion, inside, self._potentials_inside),
+        ):
+            at = z[chosen]
+            phi, slope, psi = potentials(at, strain)
+            kappa = 3 - 4 * phase.poisson
+            motion[chosen] = kappa * phi - at * slope.conj() - psi.conj()
+            motion[chosen] /= 2 * phase.stiffness[2, 2]
+        return np.stack([motion.real, motion.imag], axis=-1)
 
     def _loads(self) -> list[UnitLoad]:
         return [_unit_load(load, self.radius, self.matrix, self.inclusion) for load in LOADS]
@@ -155,6 +119,27 @@ class SeriesField:
             )
             parts += amount * np.stack([first, second, psi])
         return _stress(z, *parts)
+
+    def _potentials_inside(self, z: Complex, strain: Array) -> Complex:
+        """The particle's φ, φ' and ψ at `z`, shape (3, n)."""
+        t, parts = (z / self.radius)[:, None], np.zeros((3, z.size), complex)
+        for amount, load in zip(self._amounts(strain), self._loads(), strict=True):
+            (m, n), (phi, psi) = load.orders, load.inside
+            slope = t ** (n - 1) @ (n * phi) / self.radius
+            parts += amount * np.stack([t**n @ phi, slope, t**m @ psi])
+        return parts
+
+    def _potentials_outside(self, z: Complex, strain: Array) -> Complex:
+        """The matrix' φ, φ' and ψ at `z`, shape (3, n)."""
+        parts = np.zeros((3, z.size), complex)
+        for amount, load in zip(self._amounts(strain), self._loads(), strict=True):
+            (a, b), (n, m) = load.outside, load.orders
+            phi = load.far[0] * z + _images(z, n, self.radius) @ a
+            slope = load.far[0] - _images(z, n + 1, self.radius) @ (n * a) / self.radius
+            psi = load.far[1] * z + _images(z, m, self.radius) @ b
+            psi += _images(z, n + 1, self.radius, conjugate=True) @ (n * a) / self.radius
+            parts += amount * np.stack([phi, slope, psi])
+        return parts
 
 
 def _stress(z: Complex, first: Complex, second: Complex, psi: Complex) -> Array:
@@ -209,7 +194,7 @@ def _strain(load: str, a: Array, b: Array, radius: float, contrast: Contrast) ->
         return float((kappa - 1 - ZETA_PERIOD * radius * b[0]) / mu)
     turn, g = (
         ZETA_PERIOD * radius * a[0],
-        lattice_sums(8 * MOST_HARMONICS + 8).natanzon_period * radius * a[0],
+        lattice_sums(12 * MOST_HARMONICS + 8).natanzon_period * radius * a[0],
     )
     return float(
         (kappa * turn - 1 - g) / mu if load == "deviator" else (kappa * turn + 1 + g) / (2 * mu)
@@ -235,30 +220,9 @@ def _images(
 @cache
 def _far_taylor(powers: tuple[int, ...], conjugate: bool) -> Array:
     """Taylor coefficients of the images beyond the eight nearest, shape (terms, powers)."""
-    sums, half = lattice_sums(8 * MOST_HARMONICS + 8), _NEAR / 2
+    sums, half = lattice_sums(12 * MOST_HARMONICS + 8), _NEAR / 2
     m, k = np.array(powers)[None, :], np.arange(_TERMS)[:, None]
     total = (2 * sums.conjugate if conjugate else sums.plain)[m + k]
     near = sum((2 * p.conj() if conjugate else 1) * p ** -(m + k).astype(float) for p in half)
     binomial = np.exp(gammaln(m + k) - gammaln(m) - gammaln(k + 1))
     return np.asarray((-1.0) ** m * binomial * (total - near.real))
-
-
-def _cell_rule(radius: float, points: int) -> tuple[Array, Array]:
-    """Gauss points of the cell (n, 2) and weights of sum 1 on rays cut at the interface."""
-    x, w = np.polynomial.legendre.leggauss(points)
-    angle = ((np.arange(8)[:, None] + (1 + x) / 2) * np.pi / 4).ravel()
-    side = 1 / np.maximum(np.abs(np.cos(angle)), np.abs(np.sin(angle)))
-    places, weights = [], []
-    for start, stop in (
-        (np.zeros_like(side), np.full_like(side, radius)),
-        (np.full_like(side, radius * (1 + 1e-14)), side),
-    ):
-        half = (stop - start) / 2
-        ray = start[:, None] + half[:, None] * (1 + x)
-        places.append(
-            np.stack([ray * np.cos(angle)[:, None], ray * np.sin(angle)[:, None]], axis=-1).reshape(
-                -1, 2
-            )
-        )
-        weights.append((np.tile(w, 8)[:, None] * np.pi / 8 * half[:, None] * w * ray).ravel())
-    return np.concatenate(places), np.concatenate(weights) / 4
