@@ -49,12 +49,10 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         "wedges": len(mesh.cells[0].data),
         "file": options.out,
     }
-    text = f"{counts['nodes']} nodes and {counts['wedges']} quadratic wedges in {options.out}
-"
+    text = f"{counts['nodes']} nodes and {counts['wedges']} quadratic wedges in {options.out}\n"
     if options.fields:
         counts["declared_error"] = mesh.info or None
         parts = ", ".join(f"{name} {error:.1e}" for name, error in (mesh.info or {}).items())
-        text += f"relative errors in L²: {parts or 'not known, particles nearly touch'}
-"
+        text += f"relative errors in L²: {parts or 'not known, particles nearly touch'}\n"
     answer(options, counts, out, text)
     return 0
