@@ -11,6 +11,7 @@ from types import ModuleType
 from alphacut.commands import cell as command_cell
 from alphacut.commands import check as command_check
 from alphacut.commands import envelope as command_envelope
+from alphacut.commands import image as command_image
 from alphacut.commands import mesh as command_mesh
 from alphacut.commands import microstructure as command_microstructure
 from alphacut.commands import modulus as command_modulus
@@ -31,6 +32,7 @@ COMMANDS: dict[str, ModuleType] = {
     "check": command_check,
     "microstructure": command_microstructure,
     "cell": command_cell,
+    "image": command_image,
     "mesh": command_mesh,
     "modulus": command_modulus,
     "envelope": command_envelope,

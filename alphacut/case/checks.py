@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from alphacut.case.case import Case
+from alphacut.case.checks_image import image
 from alphacut.case.checks_material import particles, radius
 from alphacut.case.checks_structure import incomplete
 from alphacut.case.idle import idle_envelope
@@ -26,6 +27,8 @@ FILES = (
     "microstructure.packing.file",
     "microstructure.circles.file",
     "microstructure.image.file",
+    "image.file",
+    "image.polygons",
     "modulus.file",
     "modulus.measured",
     "frame.accelerogram",
@@ -43,7 +46,8 @@ def checks(*, modal: bool = False) -> Iterator[Check]:
     yield where("radius.a1", partial(radius, alpha=1.0 if modal else 0.0))
     yield where("response.quantity", stress_curves)
     yield one_modulus
-    for section in ("modulus", "envelope"):
+    yield where("image.alpha", image)
+    for section in ("modulus", "image", "envelope"):
         yield where(f"{section}.alpha", partial(levels, key=f"{section}.alpha"))
     yield where("frame.masses", floors)
     yield other_structures
@@ -61,7 +65,14 @@ def where(key: str, check: Check) -> Check:
 
 
 def one_modulus(case: Case) -> Iterator[Problem]:
-    """At most one thing stands in for the computed modulus."""
+    """At most one thing stands in for the computed modulus, and an image is one."""
+    if "image" in case.stages and ("modulus" in case.stages or replaced(case)):
+        yield Problem(
+            "stages",
+            "stage image gives the modulus, and so does another",
+            ", ".join(["image", *stand_ins(case)]),
+            "one of stage image, stage modulus, modulus.value, modulus.file, modulus.measured",
+        )
     if len(stand_ins(case)) > 1:
         yield Problem(
             stand_ins(case)[1],

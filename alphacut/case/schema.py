@@ -14,6 +14,7 @@ from alphacut.case.key import (
     Range,
     Section,
 )
+from alphacut.case.schema_image import IMAGE_CELL
 from alphacut.case.schema_structure import (
     ALPHA,
     ENVELOPE,
@@ -28,7 +29,7 @@ from alphacut.case.schema_structure import INTEGRATORS as INTEGRATORS
 from alphacut.case.schema_structure import NONLINEAR as NONLINEAR
 
 VERSION = 1
-STAGES = ("microstructure", "modulus", "envelope")
+STAGES = ("microstructure", "modulus", "image", "envelope")
 PLANS = ("general", "reduced", "extended", "signed")
 CELL_METHODS = ("prism", "slices", "table", "series", "auto")
 
@@ -293,6 +294,7 @@ SECTIONS: dict[str, Section] = {
     "microstructure.image": IMAGE,
     "radius": RADIUS,
     "cell": CELL,
+    "image": IMAGE_CELL,
     "mesh": MESH,
     "modulus": MODULUS,
     "response": RESPONSE,
@@ -307,6 +309,7 @@ SECTIONS: dict[str, Section] = {
 NEEDED = {
     "microstructure": ("microstructure",),
     "modulus": ("radius", "cell"),
+    "image": ("image",),
     "envelope": ("envelope",),
 }
 # sections that hold their defaults where they are left out and the other one is there

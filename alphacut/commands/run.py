@@ -164,6 +164,12 @@ def main_numbers(found: Mapping[str, Any]) -> str:
         lines.append(
             f"E = {core(cell)}, support [{cell['lower_GPa']:.4f}, {cell['upper_GPa']:.4f}] GPa"
         )
+    if picture := found.get("image"):
+        cuts = picture["cuts"]["E_GPa"]
+        lines.append(
+            f"E = [{cuts['lower'][-1]:.4f}, {cuts['upper'][-1]:.4f}] GPa, support"
+            f" [{cuts['lower'][0]:.4f}, {cuts['upper'][0]:.4f}] GPa, {picture['nature']}"
+        )
     for name, study in found.get("envelopes", {}).items():
         ends = [
             (output, output_unit(output), float(low), float(study["max"][output]))

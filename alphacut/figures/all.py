@@ -12,6 +12,7 @@ from alphacut.figures import exceedance as figure_exceedance
 from alphacut.figures import follower as figure_follower
 from alphacut.figures import frame as figure_frame
 from alphacut.figures import fuzzy as figure_fuzzy
+from alphacut.figures import image as figure_image
 from alphacut.figures import modulus as figure_modulus
 from alphacut.figures import radius as figure_radius
 from alphacut.figures import record as figure_record
@@ -42,6 +43,8 @@ def drawings(results: Results) -> Iterator[Drawing]:
         yield "fig18-modulus", lambda: figure_modulus.fuzzy_modulus(modulus, results.case)
         if results.case.quoted:
             yield "fig19-membership", lambda: figure_fuzzy.membership(modulus)
+    if (picture := results.image) is not None:
+        yield "image", lambda: figure_image.image(picture)
     if (stress := results.response) is not None:
         yield "response", lambda: figure_response.response(stress)
     if results.envelopes:

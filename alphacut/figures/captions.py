@@ -18,6 +18,7 @@ FIGURES = {
     "stress-curves": "Homogenised stress over θ, a curve for each fuzzy sample",
     "mean-stress": "Mean homogenised stress of every sample, rearranged into α-cuts",
     "modulus": "Fuzzy effective modulus",
+    "image": "The image, the error of its two fields pixel by pixel, and the bounds of E",
     "membership": "Membership function of a fuzzy parameter and one of its α-cuts",
     "mapping": "Fuzzy mapping: trajectories inside an α-cut, and the envelope that encloses them",
     "graph-follower": "The Graph Follower, step by step",

@@ -16,6 +16,7 @@ from alphacut.report.tables import section
 ELSEWHERE = (
     "fig18-modulus",
     "modulus",
+    "image",
     "response",
     "exceedance",
 )

@@ -24,6 +24,8 @@ def sections(summary: Mapping[str, Any], folder: Path) -> Iterator[str]:
         yield microstructure(summary["microstructure"])
     if "modulus" in summary:
         yield modulus(summary["modulus"], listed(summary, folder, "modulus"))
+    if "image" in summary:
+        yield image(summary["image"], listed(summary, folder, "image"))
     if "given_modulus" in summary:
         yield given(summary["given_modulus"])
     if "response" in summary:
@@ -112,6 +114,44 @@ def given(found: Mapping[str, Any]) -> str:
     return section("Fuzzy modulus", words, table(("α", "lower E, GPa", "upper E, GPa"), rows))
 
 
+def image(found: Mapping[str, Any], drawn: str) -> str:
+    """The bounds of an image's modulus, what they are worth, and what widens them."""
+    cuts = found["cuts"]
+    ends = zip(
+        cuts["alpha"], cuts["E_GPa"]["lower"], cuts["E_GPa"]["upper"], cuts["nature"], strict=True
+    )
+    rows = [(f"{a:g}", f"{low:.4f}", f"{high:.4f}", nature) for a, low, high, nature in ends]
+    grains, least, greatest = (
+        f"[{pair['lower']:.3f}, {pair['upper']:.3f}] GPa"
+        for pair in (
+            found["grains_E_GPa"],
+            found["directions_E_GPa"]["least"],
+            found["directions_E_GPa"]["greatest"],
+        )
+    )
+    apparent = found.get("apparent_E_GPa")
+    own = (
+        f" The window as it is has E in [{apparent['lower']:.3f}, {apparent['upper']:.3f}] GPa;"
+        " that is proved, and bounds its apparent stiffness only."
+        if apparent
+        else ""
+    )
+    words = (
+        "<p>Plane strain: every section of the material is the image, as with fibres. If the"
+        f" particles are grains, the Hashin–Shtrikman interval of E is {grains}. The plane-strain"
+        f" Young's modulus of the softest direction lies in {least}, of the stiffest in"
+        f" {greatest}.{own} {html.escape(sentence(found['advice']))}</p>"
+    )
+    widths = [(name, f"{width:.4f}") for name, width in found["contributions_GPa"].items()]
+    return section(
+        "Stiffness of the image",
+        words,
+        drawn,
+        table(("α", "lower E, GPa", "upper E, GPa", "nature"), rows),
+        "<h3>What widens E</h3>" + table(("source alone", "width of E, GPa"), widths),
+    )
+
+
 def isotropy(found: Mapping[str, Any]) -> str:
     """Sentence on the array's anisotropy; empty where it was not computed."""
     from alphacut.rve.anisotropy import shear_ratio_in_words
@@ -191,6 +231,9 @@ def methods(summary: Mapping[str, Any]) -> str:
                 f"{cell['seconds']:.1f}",
             )
         )
+    if picture := summary.get("image"):
+        cost = f"{picture['iterations']} iterations"
+        rows.append(("image", "trial fields", picture["nature"], cost, f"{picture['seconds']:.1f}"))
     for name, study in summary.get("envelopes", {}).items():
         rows.append(
             (

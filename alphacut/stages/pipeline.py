@@ -15,7 +15,7 @@ from alphacut.io.files import say, whole_file
 from alphacut.io.netcdf import require_known
 from alphacut.io.progress import progress
 from alphacut.io.provenance import attributes, fingerprint
-from alphacut.stages import envelope, microstructure, modulus, response
+from alphacut.stages import envelope, image, microstructure, modulus, response
 from alphacut.stages import exceedance as outcomes
 from alphacut.stages.campaign import campaign
 from alphacut.stages.contract import keep_modulus
@@ -89,6 +89,8 @@ class Chain:
         handed = modulus.stand_in(self.case)
         cell = self.modulus() if "modulus" in self.case.stages and handed is None else None
         handed = modulus.read_number(self.file("modulus.nc")) if cell is not None else handed
+        picture = self.image() if "image" in self.case.stages else None
+        handed = modulus.read_number(self.file("image.nc")) if picture is not None else handed
         wanted, envelopes = None, {}
         if "envelope" in self.case.stages:
             wanted = (self.built or structure(self.case, handed)).with_modulus(handed)
@@ -101,7 +103,9 @@ class Chain:
         limit = None
         if wanted is not None and self.case.has("exceedance.output"):
             limit = self.exceedance(handed, wanted)
-        return Results(self.case, self.folder, cell, envelopes, handed, stress, limit, wanted)
+        return Results(
+            self.case, self.folder, cell, envelopes, handed, stress, limit, wanted, picture
+        )
 
     def with_particles(self) -> Case:
         """Case with the radius map of its particles; the stage's files are stored."""
@@ -152,6 +156,23 @@ class Chain:
         error = modulus.listed(found, "error")
         keep_modulus(self.case, str(found.attrs["method"]), error, best_effort=self.best_effort)
         return found
+
+    def image(self) -> xarray.Dataset:
+        """The proved bounds of the image's modulus, in image.nc."""
+        inputs = {key: value for key, value in self.case.values.items() if key.startswith("image.")}
+        files = [
+            self.case.digest(key)
+            for key in FILES
+            if key.startswith("image.") and self.case.has(key)
+        ]
+        key = fingerprint({"case": inputs, "files": files}, ("stochastic", "rve", "fuzzy"))
+
+        def compute(path: Path) -> None:
+            with progress("Image", quiet=self.quiet) as tick:
+                found = image.compute(image.study_of(self.case), progress=tick)
+            image.write(found, path, attributes(self.case.text_of_file, key))
+
+        return self.stored("image.nc", key, compute)
 
     def response(self, cell: xarray.Dataset) -> xarray.Dataset:
         """The random and fuzzy stress of the cell, in response.nc."""
@@ -252,6 +273,7 @@ class Results:
         response: Dataset of response.nc; None where the case does not ask for it.
         exceedance: Dataset of exceedance.nc; None where the case names no limit.
         structure: The structure with that modulus; None where none vibrates.
+        image: Dataset of image.nc; None where the case shows none.
     """
 
     case: Case
@@ -262,6 +284,7 @@ class Results:
     response: xarray.Dataset | None = None
     exceedance: xarray.Dataset | None = None
     structure: Structure | None = None
+    image: xarray.Dataset | None = None
 
     @property
     def studies(self) -> tuple[Study, ...]:

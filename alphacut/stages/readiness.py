@@ -13,6 +13,7 @@ from alphacut.case.names import fuzzy_keys
 from alphacut.fuzzy import FuzzyNumber, Triangular
 from alphacut.io.problem import BadInput, Problem
 from alphacut.stages import modulus
+from alphacut.stages.image import expected_modulus, study_of
 from alphacut.stages.pipeline import studies
 from alphacut.stages.resolution_checks import rough
 from alphacut.stages.structure import Structure, structure
@@ -52,10 +53,13 @@ def ready(case: Case) -> Readiness:
             is crisp.
     """
     if "microstructure" in case.stages:
-        from alphacut.stages.microstructure import require_readable, study_of
+        from alphacut.stages.microstructure import require_readable
+        from alphacut.stages.microstructure import study_of as particles_of
 
-        study_of(case)
+        particles_of(case)
         require_readable(case)
+    if "image" in case.stages:
+        study_of(case)
     stand_in = modulus.stand_in(case) if "modulus" in case.stages or replaced(case) else None
     if "envelope" not in case.stages:
         if "modulus" in case.stages and replaced(case):
@@ -125,7 +129,7 @@ def lacking(case: Case) -> Iterator[Problem]:
     if (
         case.has("frame.masses")
         and not case.has("frame.modulus")
-        and "modulus" not in case.stages
+        and not {"modulus", "image"} & set(case.stages)
         and not replaced(case)
     ):
         what = (
@@ -137,8 +141,12 @@ def lacking(case: Case) -> Iterator[Problem]:
 
 def expected(case: Case) -> FuzzyNumber | None:
     """Modulus in place of one yet to be computed, between both phases; or None."""
-    if "modulus" not in case.stages or case.has("frame.modulus") or not case.has("frame.masses"):
+    computed = {"modulus", "image"} & set(case.stages)
+    if not computed or case.has("frame.modulus") or not case.has("frame.masses"):
         return None
+    if "image" in computed:
+        low, middle, high = expected_modulus(case)
+        return Triangular(low, middle, max(high, low * (1 + 1e-9)))
     matrix, inclusion = case.fuzzy("cell.matrix_modulus"), case.fuzzy("cell.inclusion_modulus")
     ends = sorted([*matrix.support, *inclusion.support])
     return Triangular(ends[0], matrix.modal, max(ends[-1], ends[0] * (1 + 1e-9)))

@@ -48,6 +48,8 @@ def summary(results: Results) -> dict[str, Any]:
         found["area_fraction"] = area_fraction(results)
     if results.modulus is not None:
         found["modulus"] = modulus_numbers(results.modulus)
+    elif results.image is not None:
+        found["image"] = json.loads(results.image.attrs["document"])
     elif results.handed is not None:
         found["given_modulus"] = given(results)
     if results.response is not None:

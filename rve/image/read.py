@@ -15,17 +15,18 @@ BYTES_PER_PIXEL = 1400  # of both sides together, measured at 1024 × 1024
 EIGHT_BITS = 255
 
 
-def read_grey(path: Path, *, division: int = 1) -> Array:
+def read_grey(path: Path, *, division: int = 1, square: bool = True) -> Array:
     """Grey values of an image, shape (rows, columns), row 0 at the bottom.
 
     Args:
         path: A file ``.png``, ``.tif`` … or ``.npy``.
         division: Parts along each side of a pixel that the solver will make.
+        square: Refuse a file that says that its pixels are not square.
 
     Raises:
         ValueError: The file is no plane grey image, holds no numbers, or is too large for memory.
     """
-    values = _array(path) if path.suffix == ".npy" else _picture(path, division)
+    values = _array(path) if path.suffix == ".npy" else _picture(path, division, square)
     if values.ndim != 2 or min(values.shape) < 2:
         raise ValueError(
             f"{path.name} has the shape {values.shape}; it takes one plane of 2 × 2 pixels or more"
@@ -47,13 +48,15 @@ def _array(path: Path) -> Array:
         raise ValueError(f"{path.name} cannot be read as a NumPy array: {error}") from error
 
 
-def _picture(path: Path, division: int) -> Array:
+def _picture(path: Path, division: int, square: bool) -> Array:
     from PIL import Image, UnidentifiedImageError
 
     Image.MAX_IMAGE_PIXELS = None  # the memory is checked here, before the pixels are read
     try:
         with Image.open(path) as picture:
             _require_plane(path, picture.mode, getattr(picture, "n_frames", 1))
+            if square:
+                _require_square(path, picture.info.get("dpi"))
             require_memory(picture.height, picture.width, division)
             return np.asarray(picture)
     except (UnidentifiedImageError, OSError, SyntaxError) as error:
@@ -73,6 +76,14 @@ def _require_plane(path: Path, mode: str, frames: int) -> None:
         )
     if frames > 1:
         raise ValueError(f"{path.name} has {frames} pages; save the one that is meant")
+
+
+def _require_square(path: Path, resolution: tuple[float, float] | None) -> None:
+    if resolution and abs(float(resolution[0]) / float(resolution[1]) - 1) > 0.01:
+        raise ValueError(
+            f"{path.name} says that its pixels are not square, {float(resolution[0]):g} by "
+            f"{float(resolution[1]):g} per inch; give their height as image.pixel_height"
+        )
 
 
 def require_memory(rows: int, columns: int, division: int) -> None:

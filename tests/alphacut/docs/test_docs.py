@@ -29,6 +29,7 @@ PAGES = sorted(
 )
 DOORS = {
     "rve solve": "cell",
+    "rve image": "image",
     "fuzzy modulus": "modulus",
     "frame envelope": "envelope",
     "stochastic microstructure": "microstructure",

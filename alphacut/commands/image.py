@@ -1,0 +1,80 @@
+"""Command ``alphacut image``, also ``python -m rve image``: proved stiffness of an image."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TextIO
+
+from alphacut.case.load import load
+from alphacut.commands.options import add_common
+from alphacut.io.files import as_json, say, write_text
+from alphacut.io.progress import progress
+from alphacut.io.provenance import attributes, fingerprint
+from alphacut.stages import image
+
+ABOUT = "proved bounds of the stiffness of the material whose every section is an image"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    add_common(parser)
+    parser.add_argument("--out", metavar="FILE.nc", help="write bounds and pictures as NetCDF")
+
+
+def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
+    """Compute and report."""
+    case = load(options.case, options.set)
+    study = image.study_of(case)
+    with progress("Image", quiet=options.quiet) as tick:
+        found = image.compute(study, progress=tick)
+    if options.out:
+        key = fingerprint(case.values, ("stochastic", "rve", "fuzzy"))
+        image.write(found, Path(options.out), attributes(case.text_of_file, key))
+    numbers = image.document(found)
+    document = as_json(numbers, indent=None if options.json == "-" else 2)
+    if options.json == "-":
+        out.write(document)
+    elif options.json:
+        write_text(options.json, document)
+    if options.json != "-" and not options.quiet:
+        out.write(summary(numbers))
+        if not options.out:
+            say("to hand this on: the same command with --out image.nc, then modulus.file")
+    return 0
+
+
+def summary(found: Mapping[str, Any]) -> str:
+    """The bounds in a few lines for people."""
+    cuts = found["cuts"]
+    rows = "".join(
+        f"{alpha:5.2f}  {low:10.5f}  {high:10.5f}  {nature}\n"
+        for alpha, low, high, nature in zip(
+            cuts["alpha"],
+            cuts["E_GPa"]["lower"],
+            cuts["E_GPa"]["upper"],
+            cuts["nature"],
+            strict=True,
+        )
+    )
+    bulk, grains, own = (
+        found[key] for key in ("plane_strain_bulk_GPa", "grains_E_GPa", "apparent_E_GPa")
+    )
+    apparent = (
+        f"the window's own apparent E, proved: {_interval(own)}, not that of the material\n"
+        if own
+        else ""
+    )
+    return (
+        f"alpha  lower GPa   upper GPa   (E of eq. 16, plane strain)\n{rows}"
+        f"width of the stiffness's bounds at the top level: {found['width']:.2e}\n"
+        f"plane-strain bulk modulus: {_interval(bulk)}\n"
+        f"{apparent}if the particles are grains, E (Hashin-Shtrikman): {_interval(grains)}\n"
+        f"{found['advice']}\n"
+        f"{found['iterations']} iterations, {found['seconds']:.1f} s\n"
+    )
+
+
+def _interval(pair: Mapping[str, float]) -> str:
+    return f"[{pair['lower']:.4f}, {pair['upper']:.4f}] GPa"

@@ -1,0 +1,223 @@
+"""The command ``image`` and the stage of a run: cases, results, bad input."""
+
+import json
+
+import numpy as np
+import pytest
+
+from alphacut.entry import main
+from alphacut.io.problem import BadInput
+
+HEAD = 'schema = 1\ntitle = "t"\nabout = "a"\nstages = ["image"]\n'
+IMAGE = {
+    "file": '"a.png"',
+    "pixel": '"2 µm"',
+    "threshold": "[[120, 130, 140]]",
+    "modulus": '["20 GPa", "80 GPa"]',
+    "poisson": "[0.3]",
+    "alpha": "[0, 1]",
+}
+FRAME = """
+[frame]
+second_moment = "1e-6 m^4"
+masses = ["20 t"]
+lengths = ["2.5 m"]
+displacements = ["10 mm"]
+velocities = ["0 m/s"]
+damping_ratio = "5 %"
+
+[envelope]
+fuzzy = ["E"]
+duration = "0.5 s"
+step = "0.01 s"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    places = (np.arange(32) + 0.5) / 32 - 0.5
+    distance = np.hypot(places, places[:, None])
+    grey = np.clip(60 + 900 * (0.3 - distance), 60, 200).astype(np.uint8)
+    image.fromarray(grey).save(tmp_path / "a.png")
+    return tmp_path
+
+
+def written(folder, head=HEAD, tail="", **changes):
+    """A case file with changed keys; None leaves one out."""
+    keys = {k: v for k, v in (IMAGE | changes).items() if v is not None}
+    text = head + "\n[image]\n" + "".join(f"{k} = {v}\n" for k, v in keys.items()) + tail
+    (folder / "case.toml").write_text(text, encoding="utf-8")
+    return str(folder / "case.toml")
+
+
+def solved(folder, capfd, **changes):
+    assert main(["image", written(folder, **changes), "--json", "-", "--quiet"]) == 0
+    return json.loads(capfd.readouterr().out)
+
+
+def test_the_keys_of_the_result(folder, capfd):
+    found = solved(folder, capfd)
+    lower, upper = (np.array(found[f"{end}_GPa"]) for end in ("lower", "upper"))
+    assert np.linalg.eigvalsh(upper - lower)[0] > 0
+    assert 0 < found["width"] < 0.05
+    assert found["E_GPa"]["lower"] < found["E_GPa"]["upper"]
+    assert found["nature"] == "guaranteed, at two corners"
+    cuts = found["cuts"]["E_GPa"]
+    assert cuts["lower"][0] < cuts["lower"][1] < cuts["upper"][1] < cuts["upper"][0]
+    assert set(found["contributions_GPa"]) == {"discretisation", "threshold"}
+    assert found["grains_E_GPa"]["lower"] > found["E_GPa"]["upper"]
+    assert found["iterations"] >= 1
+    assert found["seconds"] > 0
+
+
+def test_bulk_and_shear_moduli_say_the_same_as_young_and_poisson(folder, capfd):
+    young = solved(folder, capfd, threshold="[130]", alpha="[0, 1]")
+    bulk = solved(
+        folder,
+        capfd,
+        threshold="[130]",
+        modulus=None,
+        poisson=None,
+        bulk=f'["{20 / 1.2!r} GPa", "{80 / 1.2!r} GPa"]',
+        shear=f'["{20 / 2.6!r} GPa", "{80 / 2.6!r} GPa"]',
+    )
+    assert np.allclose(young["lower_GPa"], bulk["lower_GPa"], rtol=1e-8, atol=1e-8)
+
+
+def test_a_fuzzy_poisson_ratio_is_told_to_be_enclosed(folder, capfd):
+    found = solved(folder, capfd, poisson="[[0.25, 0.3, 0.35], 0.3]")
+    assert found["cuts"]["nature"] == ["guaranteed enclosure", "guaranteed, at two corners"]
+
+
+def test_labels_and_an_inequality_give_what_a_threshold_does(folder, capfd):
+    image = pytest.importorskip("PIL.Image")
+    grey = np.asarray(image.open(folder / "a.png"))
+    image.fromarray(np.where(grey >= 130, 7, 3).astype(np.uint8)).save(folder / "labels.png")
+    crisp = solved(folder, capfd, threshold="[130]")
+    labelled = solved(folder, capfd, file='"labels.png"', threshold=None, labels="[3, 7]")
+    assert crisp["lower_GPa"] == labelled["lower_GPa"]
+    outline = {"file": None, "pixel": None, "threshold": None, "size": '["1 m", "1 m"]'}
+    drawn = {"inequality": '"(x - 0.5)**2 + (y - 0.5)**2 <= 0.05"', "pixels": "32"}
+    found = solved(folder, capfd, **outline, **drawn)
+    assert found["nature"] == "guaranteed, at two corners"
+    corners = 0.5 + np.sqrt(0.05) * np.array(
+        [(np.cos(a), np.sin(a)) for a in np.linspace(0, 6.28, 400)]
+    )
+    rows = "\n".join(f"{x!r},{y!r}" for x, y in corners.tolist())
+    (folder / "disc.csv").write_text(f"x [m],y [m]\n{rows}\n")
+    polygon = solved(folder, capfd, **outline, polygons='"disc.csv"', pixels="32")
+    assert np.allclose(polygon["lower_GPa"], found["lower_GPa"], rtol=0.02)
+
+
+def test_a_window_gives_a_confidence_interval_and_says_so(folder, capfd):
+    found = solved(folder, capfd, boundary='"window"', tiles="2", threshold="[130]")
+    assert found["nature"] == "95 % confidence interval of the material, no proof"
+    assert found["E_GPa"]["lower"] < found["apparent_E_GPa"]["lower"]
+    assert found["apparent_E_GPa"]["upper"] < found["E_GPa"]["upper"]
+    assert list(found["contributions_GPa"]) == ["finite window"]
+    assert main(["image", written(folder, boundary='"window"', tiles="2"), "--quiet"]) == 0
+
+
+def test_the_words_name_the_plane_strain_bulk_modulus(folder, capfd):
+    assert main(["image", written(folder)]) == 0
+    told = capfd.readouterr().out
+    assert "plane-strain bulk modulus: [" in told
+    assert "if the particles are grains, E (Hashin-Shtrikman): [" in told
+    assert "widening E most: threshold" in told
+
+
+def test_a_run_hands_the_modulus_on_to_the_frame_and_keeps_it(folder, capfd):
+    head = HEAD.replace('["image"]', '["image", "envelope"]')
+    case = written(folder, head, FRAME)
+    out = str(folder / "out")
+    assert main(["run", case, "--out", out, "--no-figures", "--json", "-", "--quiet"]) == 0
+    found = json.loads(capfd.readouterr().out)
+    cuts = found["image"]["cuts"]["E_GPa"]
+    assert cuts["lower"][0] < cuts["lower"][-1]
+    assert found["envelopes"]["all"]["min"]["q1"] < 0
+    assert main(["report", out]) == 0
+    page = (folder / "out" / "report.html").read_text(encoding="utf-8")
+    assert "Stiffness of the image" in page
+    assert "guaranteed, at two corners" in page
+    capfd.readouterr()
+    assert main(["run", case, "--out", out, "--no-figures"]) == 0
+    assert "image.nc is up to date" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"file": None}, "got 0 pictures"),
+        ({"file": '"b.png"'}, "there is no such file"),
+        ({"inequality": '"x <= 1"'}, "got 2 pictures"),
+        ({"pixel": None}, "missing: the width of a pixel"),
+        ({"threshold": None}, "nothing tells the phases apart"),
+        ({"labels": "[0, 1]"}, "two things tell the phases apart"),
+        (
+            {"threshold": "[250]"},
+            "the threshold 250 is outside: the grey values lie from 60 to 200",
+        ),
+        ({"threshold": "[[50, 130, 140]]"}, r"the threshold [50, 140] is outside"),
+        ({"threshold": "[100, 130]"}, "got 2 values for 3 phases"),
+        ({"modulus": None}, "image.modulus: missing beside image.poisson"),
+        ({"bulk": '["1 GPa", "2 GPa"]'}, "both E, ν and K, G are given"),
+        ({"poisson": "[0.3, 0.3, 0.3]"}, "got 3 values for 2 phases"),
+        ({"window": '["64 µm", "70 µm"]'}, "image.window says 7e-05 m"),
+        ({"pixel": '"-1 µm"'}, "greater than 0"),
+        ({"threshold": None, "labels": "[60, 200]"}, "which is none of image.labels"),
+        ({"threshold": None, "labels": "[60]"}, "there is one phase"),
+        ({"threshold": None, "labels": "[60, 60]"}, "a label stands twice"),
+        ({"boundary": '"window"', "tiles": "5"}, "no 5 × 5 equal tiles"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(folder, capfd, changes, told):
+    assert main(["image", written(folder, **changes)]) == 2
+    lines = [line for line in capfd.readouterr().err.splitlines() if line]
+    assert any(told in line for line in lines), lines
+    assert len(lines) <= 2
+    assert all(line.startswith("alphacut: ") for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"inequality": '"x**2 + y"'}, "is no inequality"),
+        ({"inequality": '"x >= 5"'}, "leaves one phase only"),
+        ({"inequality": '"x <= 0.5"', "size": None}, "needs the width and height of its cell"),
+        ({"inequality": '"x <= 0.5"', "pixel": '"1 m"'}, "this is for image.file"),
+        ({"polygons": '"none.csv"'}, "there is no such file"),
+    ],
+)
+def test_bad_outlines_are_one_line_and_status_2(folder, capfd, changes, told):
+    outline = {"file": None, "pixel": None, "threshold": None, "size": '["1 m", "1 m"]'}
+    assert main(["image", written(folder, **(outline | changes))]) == 2
+    assert told in capfd.readouterr().err
+
+
+def test_pixels_that_the_file_says_are_not_square_need_their_height(folder, capfd):
+    image = pytest.importorskip("PIL.Image")
+    image.open(folder / "a.png").save(folder / "b.png", dpi=(300, 150))
+    assert main(["image", written(folder, file='"b.png"')]) == 2
+    assert "give their height as image.pixel_height" in capfd.readouterr().err
+    found = solved(folder, capfd, file='"b.png"', pixel_height='"4 µm"')
+    assert (
+        found["directions_E_GPa"]["greatest"]["upper"] > found["directions_E_GPa"]["least"]["upper"]
+    )
+
+
+def test_an_image_and_another_modulus_are_refused(folder, capfd):
+    case = written(folder, HEAD, '\n[modulus]\nvalue = "20 GPa"\n')
+    assert main(["run", case, "--out", str(folder / "out")]) == 2
+    assert "stage image gives the modulus, and so does another" in capfd.readouterr().err
+
+
+def test_study_of_a_case_without_image_is_refused(folder):
+    from alphacut.case.load import load
+    from alphacut.stages.image import study_of
+
+    (folder / "c.toml").write_text(
+        HEAD.replace('"image"', '"modulus"') + '[modulus]\nvalue = "2 GPa"\n'
+    )
+    with pytest.raises(BadInput, match=r"needs section \[image\]"):
+        study_of(load(folder / "c.toml"))
