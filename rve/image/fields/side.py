@@ -22,6 +22,9 @@ from alphacut.rve.image.fields.preconditioner import FourierPreconditioner
 from alphacut.stochastic.theta.truncated_normal import Array
 
 UNIT_LOADS = np.eye(3)
+# the loads that are solved: near an isotropic stiffness's own, so that the soft ones are not
+# drowned in the stiff ones where ν is near 1/2 or −1
+SOLVED_LOADS = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 1.0]])
 SMALL = 1 << 17  # pixels up to which the loads are solved together
 COARSER = 10.0  # accuracy of a start on whole pixels over that asked for
 
@@ -97,7 +100,8 @@ def solve_side(
     """
     began = perf_counter()
     element = side.element(aspect)
-    modes = element.mean_modes(UNIT_LOADS)
+    modes = element.mean_modes(SOLVED_LOADS)
+    start = None if start is None else _of_solved_loads(start)
     trace, deviator = side.coefficients(bulk, shear)
     if division > 1 and start is None:
         coarse = replace(solver, accuracy=min(0.1, COARSER * solver.accuracy))
@@ -105,6 +109,8 @@ def solve_side(
         start = prolonged(element, fields, division)
     trace, deviator = divided(trace, division), divided(deviator, division)
     fields, iterations = _fields(element, trace, deviator, modes, solver, start, clamped)
+    fields = _of_unit_loads(fields)
+    modes = element.mean_modes(UNIT_LOADS)
     result = energy(element, trace, deviator, fields, modes, pixels=pixels)
     return SideSolution(side, aspect, fields, result, iterations, perf_counter() - began)
 
@@ -139,6 +145,20 @@ def _fields(
         fields[:, part] = solution.fields
         iterations = max(iterations, solution.iterations)
     return fields, iterations
+
+
+def _of_solved_loads(fields: Array) -> Array:
+    """Fields under `SOLVED_LOADS` from those under `UNIT_LOADS`."""
+    first, second = fields[:, 0], fields[:, 1]
+    return np.stack([first + second, first - second, fields[:, 2]], axis=1)
+
+
+def _of_unit_loads(fields: Array) -> Array:
+    """Fields under `UNIT_LOADS` from those under `SOLVED_LOADS`, in place; rounded, they are fields all the same."""
+    fields[:, 0] += fields[:, 1]
+    fields[:, 0] *= 0.5
+    np.subtract(fields[:, 0], fields[:, 1], out=fields[:, 1])
+    return fields
 
 
 def least_energy(element: Element, trace: Array, deviator: Array, modes: Array) -> Array:
