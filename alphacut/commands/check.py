@@ -56,9 +56,10 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     for warning in warnings:
         say(warning)
     if options.json != "-" and not options.quiet:
-        about = "about " if "modulus" in case.stages else ""  # the modulus is yet to be computed
+        # the modulus is yet to be computed
+        about = "about " if {"modulus", "image"} & set(case.stages) else ""
         period = f"; first natural period {about}{found.period:.3g} s" if found.period else ""
-        passed = "modulus" in case.stages and "frame.modulus" in case.written
+        passed = {"modulus", "image"} & set(case.stages) and "frame.modulus" in case.written
         over = "; frame.modulus is passed over, stage modulus hands its own on" if passed else ""
         out.write(
             f"{options.case}: no problems; stages {', '.join(case.stages)};"
