@@ -24,9 +24,11 @@ DURATION = 12.0
 STEPS = (0.05, 0.1)
 """Distances of nodes, in s: two certificates of each frame."""
 RECORD_STEPS = (0.01, 0.017, 1 / 128, 1 / 256, 0.05, 0.3, 0.1 / 3)
-GAP = 1e-4
+GAP = 1e-5
 """Gap asked for, as a share of each output's peak."""
 CHUNK = 2000
+OPTIMA = 100
+"""Nodes and outputs whose best parameters are tried, and points next to them."""
 
 
 def random_record(rng: np.random.Generator) -> Accelerogram:
@@ -77,17 +79,26 @@ def violation(
         found: A certificate of the lowest level.
         frame: Its structure.
         inputs: Its fuzzy inputs.
-        points: Shares of the supports, shape (S, d).
+        points: Shares of the supports, shape (S, d); points next to the optima are added.
     """
     flow = LinearFlow(frame, tuple(inputs), DURATION, float(found.time[1]), Exact())
     low, high = np.array([number.cut(0) for number in inputs.values()]).T
     peak = np.maximum(np.abs(found.lower), np.abs(found.upper)).max((0, 1))
+    points = np.vstack([points, near_optima(found, low, high)])
     worst = -np.inf
     for part in np.array_split(points, -(-len(points) // CHUNK)):
         values = flow.values(low + (high - low) * part)
         beyond = np.maximum(values.max(0) - found.upper[0], found.lower[0] - values.min(0))
         worst = max(worst, float((beyond / peak).max()))
     return worst
+
+
+def near_optima(found: Envelope, low: Array, high: Array) -> Array:
+    """Parameters of some attained bounds and points next to them, as shares of the supports."""
+    rng = np.random.default_rng(len(found.time))
+    at = np.concatenate([found.lower_at[0], found.upper_at[0]]).reshape(-1, len(low))
+    best = (rng.permutation(at)[:OPTIMA] - low) / (high - low)
+    return np.clip(np.vstack([best, best + rng.normal(0, 0.01, best.shape)]), 0, 1)
 
 
 def disagreement(a: Envelope, b: Envelope) -> float:
@@ -108,17 +119,24 @@ def points_of(count: int, d: int, seed: int) -> Array:
     return np.vstack([corners, inner])
 
 
-def judged(seed: int, trajectories: int) -> dict[str, Any]:
-    """One row: what the certificates of a frame promise, and what trajectories do."""
+def judged(seed: int, counts: tuple[int, int]) -> dict[str, Any]:
+    """One row: what the certificates of a frame promise, and what trajectories do.
+
+    Args:
+        seed: Of the frame.
+        counts: Trajectories at all nodes of the fine certificate and of the coarse one.
+    """
     frame, inputs = drawn(seed)
-    row = {"seed": seed, "storeys": frame.floors, "fuzzy": " ".join(inputs)}
-    row |= {"record_step": frame.ground.step if frame.ground else 0.0}
+    row: dict[str, Any] = {"seed": seed, "storeys": frame.floors, "fuzzy": " ".join(inputs)}
+    row |= {"record_step_s": frame.ground.step if frame.ground else 0.0}
     found = [certified(frame, inputs, step) for step in STEPS]
     if found[0] is None or found[1] is None:
         return row | {"violation": np.nan, "disagreement": np.nan, "gap": np.nan}
-    points = points_of(trajectories, len(inputs), seed)
-    worst = max(violation(e, frame, inputs, points) for e in found if e is not None)
-    gap = max(float(e.facts["gap"]) for e in found if e is not None)
+    fine, coarse = (points_of(count, len(inputs), seed) for count in counts)
+    worst = max(
+        violation(found[0], frame, inputs, fine), violation(found[1], frame, inputs, coarse)
+    )
+    gap = max(float(found[k].facts["gap"]) for k in (0, 1))
     return row | {
         "violation": worst,
         "disagreement": disagreement(found[0], found[1]),
@@ -126,10 +144,10 @@ def judged(seed: int, trajectories: int) -> dict[str, Any]:
     }
 
 
-def measured(first: int, frames: int, trajectories: int) -> Iterator[dict[str, Any]]:
+def measured(first: int, frames: int, counts: tuple[int, int]) -> Iterator[dict[str, Any]]:
     """One row per frame."""
     for seed in range(first, first + frames):
-        yield judged(seed, trajectories)
+        yield judged(seed, counts)
 
 
 def main() -> None:
@@ -139,10 +157,15 @@ def main() -> None:
     )
     parser.add_argument("--first", type=int, default=0, help="first seed (0)")
     parser.add_argument("--frames", type=int, default=100, help="number of frames (100)")
-    parser.add_argument("--trajectories", type=int, default=100_000, help="of each (100000)")
+    parser.add_argument(
+        "--fine", type=int, default=2000, help=f"trajectories, step {STEPS[0]:g} s (2000)"
+    )
+    parser.add_argument(
+        "--coarse", type=int, default=100_000, help=f"trajectories, step {STEPS[1]:g} s (100000)"
+    )
     options = parser.parse_args()
     rows = []
-    for row in measured(options.first, options.frames, options.trajectories):
+    for row in measured(options.first, options.frames, (options.fine, options.coarse)):
         rows.append(row)
         print(", ".join(f"{key} {value}" for key, value in row.items()), flush=True)
     proved = [row for row in rows if np.isfinite(row["violation"])]

@@ -175,3 +175,10 @@ def test_approximate_steps_keep_the_impulse_of_a_record_finer_than_they_are(
         flow = LinearFlow(frame, ("E",), 4, step, method)
         errors.append(np.abs(flow.values(point)[0] - motion(frame, flow.time)).max())
     assert errors[0] / errors[2] > 12
+
+
+@pytest.mark.parametrize("turn", [1.99, 7.9, 31.0])
+def test_fast_motions_turn_as_far_in_a_step_as_its_rule_allows(turn: float) -> None:
+    noise = Accelerogram(0.013, np.random.default_rng(4).standard_normal(250))
+    frame = StoreyFrame((1.0,), (1.0,), (turn / 0.1) ** 2 / 24, 1.0, outputs=("q1", "v1"))
+    assert deviation(replace(frame, ground=noise), 0.1) < 1e-10
