@@ -1,0 +1,179 @@
+"""Declared errors of envelopes against exact inner bounds, on random frames and on the paper's.
+
+Half of the random frames stand on a record (odd steps, cut ends among them); two to eight storeys,
+one to six fuzzy inputs of ±5, ±10 or ±20 %, undamped, with dampers or Rayleigh's damping. All
+nodes, outputs and sides are compared. Run `python -m benchmarks.frame.calibration --help`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from alphacut.frame import Accelerogram, Exact, LinearFlow, StoreyFrame, envelope
+from alphacut.frame.boxes import UnitFlow, boxes
+from alphacut.fuzzy import FuzzyNumber, Triangular
+from benchmarks.frame.envelopes import FRAME, INPUTS
+from benchmarks.frame.exact_modes import inner_bounds
+from benchmarks.rows import write
+
+RESULTS = Path(__file__).parents[1] / "results"
+ROUNDING = 1e-9
+"""Share of an output's peak by which exact trajectories themselves are rounded."""
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A structure with fuzzy inputs, and how long and how finely it is followed.
+
+    Args:
+        name: For the table.
+        frame: The structure.
+        inputs: Its fuzzy inputs.
+        duration: In s.
+        step: Of the nodes, in s.
+        alpha: Levels.
+    """
+
+    name: str
+    frame: StoreyFrame
+    inputs: Mapping[str, FuzzyNumber]
+    duration: float
+    step: float
+    alpha: tuple[float, ...]
+
+
+def around(middle: float, share: float) -> FuzzyNumber:
+    """A triangular number, `share` to either side."""
+    return Triangular(middle - share * abs(middle), middle, middle + share * abs(middle))
+
+
+def random_record(rng: np.random.Generator) -> Accelerogram:
+    """Noise that swells and fades; one in two is cut before it has faded."""
+    step = float(rng.choice([0.02, 0.01, 0.017, 1 / 128]))
+    count = int(rng.integers(200, 500))
+    end = count if rng.random() < 0.5 else int(0.6 * count)
+    swell = np.sin(np.pi * np.arange(count) / (count - 1))
+    return Accelerogram(step, (rng.normal(size=count) * swell)[:end])
+
+
+def random_case(seed: int) -> Case:
+    """All of it from `seed`."""
+    rng = np.random.default_rng(seed)
+    n, damping = int(rng.integers(2, 9)), str(rng.choice(["no", "ground", "storey", "rayleigh"]))
+    dampers = damping in ("ground", "storey")
+    frame = StoreyFrame(
+        rng.uniform(4e3, 3e4, n),
+        rng.uniform(2.3, 3.2, n),
+        rng.uniform(20e9, 30e9),
+        10 ** rng.uniform(-6.3, -4.8),
+        rng.uniform(20, 500, n) if dampers else (),
+        damping if damping == "storey" else "ground",  # type: ignore[arg-type]
+        rng.uniform(-0.1, 0.1, n),
+        rng.uniform(-0.5, 0.5, n),
+        rayleigh=(rng.uniform(0, 0.2), rng.uniform(0, 2e-3)) if damping == "rayleigh" else (0, 0),
+        ground=random_record(rng) if seed % 2 else None,
+    )
+    names = ["E", *(x for g in ("m", "l", "q0", "v0") for x in frame.group(g))]
+    names += frame.group("d") if dampers else ()
+    chosen = rng.choice(names, int(rng.integers(1, 7)), replace=False)
+    share = float(rng.choice([0.05, 0.1, 0.2]))
+    inputs = {str(name): around(frame.parameters[str(name)], share) for name in chosen}
+    label = f"{n} storeys, {len(chosen)} inputs ±{share:.0%}, damping {damping}"
+    return Case(f"{seed}: {label}{', record' * (seed % 2)}", frame, inputs, 8.0, 0.04, (0.0,))
+
+
+def named_cases(step: float) -> list[Case]:
+    """The paper's frame, and a stiff one with storey dampers, at five levels."""
+    light = replace(FRAME, masses=(2e3, 1e3, 500.0), damper_placement="storey")
+    levels = (0.0, 0.25, 0.5, 0.75, 1.0)
+    cases = []
+    for name, frame in (("paper's", FRAME), ("light", light)):
+        masses = {f"m{k + 1}": around(m, 0.05) for k, m in enumerate(frame.masses)}
+        e = {"E": INPUTS["E"]}
+        for fuzzy, inputs in (("E", e), ("m", masses), ("E, m", {**e, **masses})):
+            cases.append(Case(f"{name} frame, {fuzzy}", frame, inputs, 30.0, step, levels))
+    for share in (0.1, 0.2, 0.5):
+        wide = {name: around(FRAME.parameters[name], share) for name in INPUTS}
+        cases.append(Case(f"paper's frame ±{share:.0%}", FRAME, wide, 30.0, step, (0.0,)))
+    return cases
+
+
+def judged(case: Case, *, samples: int, starts: int, seed: int, **options: Any) -> dict[str, Any]:
+    """Compare one envelope with inner bounds: errors in shares of the outputs' modal peaks."""
+    begun = time.perf_counter()
+    common: dict[str, Any] = {"duration": case.duration, "step": case.step, "alpha": case.alpha}
+    found = envelope(case.frame, case.inputs, relative=True, **common, **options)
+    seconds = time.perf_counter() - begun
+    cuts = boxes(case.inputs, case.alpha)
+    exact = LinearFlow(case.frame, cuts.names, case.duration, case.step, Exact())
+    flow = UnitFlow(exact, cuts, relative=True)
+    assert found.error is not None
+    ratio, wrong, outside = [], 0.0, 0
+    for level in range(len(case.alpha)):
+        inner = inner_bounds(flow, level, samples=samples, starts=starts, seed=seed)
+        given = np.stack([-found.lower[level], found.upper[level]], -1)
+        missed = (inner - given) / flow.scale[:, None]
+        error = (found.error[level] / flow.scale)[..., None]
+        wrong = max(wrong, float(missed.max()))
+        outside += int((missed > error + ROUNDING).sum())
+        ratio.append((error / np.maximum(np.abs(missed), ROUNDING)).ravel())
+    return {
+        "case": case.name,
+        "method": found.method,
+        "error": wrong,
+        "declared": float((found.error / flow.scale).max()),
+        "values": found.lower.size * 2,
+        "above_declared": outside,
+        "median_declared_over_true": float(np.median(np.concatenate(ratio))),
+        "seconds": seconds,
+    }
+
+
+def measured(cases: list[Case], tolerances: list[float], **effort: int) -> Iterator[dict[str, Any]]:
+    """One row per case and tolerance of `auto`."""
+    for case in cases:
+        for tolerance in tolerances:
+            row = judged(case, method="auto", tolerance=tolerance, **effort)
+            kept = row["error"] <= tolerance and not row["above_declared"]
+            print(
+                f"{case.name}; auto at {tolerance:g}: error {row['error']:.1e}, declared"
+                f" {row['declared']:.1e} by {row['method']}, {row['above_declared']} of"
+                f" {row['values']} above it, median ratio"
+                f" {row['median_declared_over_true']:.2g}, {row['seconds']:.1f} s"
+                f"{'' if kept else '  BROKEN'}",
+                flush=True,
+            )
+            yield {"tolerance": tolerance, **row, "kept": kept}
+
+
+def main() -> None:
+    """Measure, print, write."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--first", type=int, default=0, help="first seed (0)")
+    parser.add_argument("--frames", type=int, default=100, help="number of random frames (100)")
+    parser.add_argument(
+        "--tolerance", type=float, nargs="+", default=[1e-3], help="relative (1e-3)"
+    )
+    parser.add_argument("--named", action="store_true", help="the named frames instead")
+    parser.add_argument("--step", type=float, default=0.05, help="nodes of the named, s (0.05)")
+    parser.add_argument("--samples", type=int, default=3000, help="of each reference (3000)")
+    parser.add_argument("--starts", type=int, default=4, help="polished per bound (4)")
+    o = parser.parse_args()
+    seeds = range(o.first, o.first + o.frames)
+    cases = named_cases(o.step) if o.named else [random_case(seed) for seed in seeds]
+    rows = list(measured(cases, o.tolerance, samples=o.samples, starts=o.starts, seed=o.first + 1))
+    print(f"{sum(row['kept'] for row in rows)} of {len(rows)} kept")
+    write(rows, RESULTS / f"frame_calibration{'_named' if o.named else ''}.csv")
+
+
+if __name__ == "__main__":
+    main()
