@@ -14,7 +14,8 @@ from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.follower_record import FollowerRecord, record
 from alphacut.frame.methods.graph_follower import GraphFollower
-from alphacut.frame.propagation import METHODS, envelope
+from alphacut.frame.methods.named import METHODS
+from alphacut.frame.propagation import envelope
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 from alphacut.frame.structures.linear import Accelerogram
 from alphacut.frame.structures.matrix import MatrixStructure

@@ -73,9 +73,10 @@ class Envelope:
       modal parameters and the widest box's corners, in the unit of the first displacement; added to
       `error`, for each output in its own unit, where that was estimated.
     - dominant_error: Said where time stepping adds more to an output than the search.
-    - tolerance: What the Graph Follower computed a graph for, in the unit. order: Degree of its
-      Taylor models. recomputed: Derivatives
-      computed again. corners: Trajectories at corners, beside `trajectories`.
+    - tolerance: What the Graph Follower computed a graph for, or what auto keeps, in the unit.
+      judged_by: What `error` was found with, where the method itself has no estimate.
+      order: Degree of its Taylor models. recomputed: Derivatives computed again.
+      corners: Trajectories at corners, beside `trajectories`.
     - degree: Of the polynomials of the modes. model_error: What trajectories of theirs are wrong by
       at most at held-out parameters, over all outputs; of a certified envelope the bound that went
       into it, in the unit.

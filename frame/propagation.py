@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -18,14 +17,9 @@ from alphacut.frame.checks.tolerance import LIMIT
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import INTEGRATORS, Integrator
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
-from alphacut.frame.envelope import Envelope, signed_envelope
-from alphacut.frame.methods.auto import auto
-from alphacut.frame.methods.batch_graph_follower import pursue
-from alphacut.frame.methods.default_method import default
-from alphacut.frame.methods.graph_follower import Followed, GraphFollower
-from alphacut.frame.methods.method_options import require_options
-from alphacut.frame.methods.modal import modal
-from alphacut.frame.methods.sampling import monte_carlo, quasi_monte_carlo, vertex
+from alphacut.frame.envelope import Envelope
+from alphacut.frame.methods.judged import judged
+from alphacut.frame.methods.named import named
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy import FuzzyNumber, JointClaim
@@ -77,12 +71,10 @@ def envelope(
     - improved-graph-follower: `tolerance` (promised gain worth a trajectory, 7e-5), `budget` (most
       trajectories, 5000), `spread` (first points on each level, 64), `batch` (computed together,
       32), `reach` (trust region, share of the box, 0.6), `order` (2), `contests`.
-    - graph-follower: `order` (of the Taylor models, 1 or 2), `tolerance` (1e-4), `sweeps` (1),
-      `exact` (False), `models` (1), `corrected` (False), `budget` (none), `record` (False); see
-      `GraphFollower`.
+    - graph-follower: `order` (of the Taylor models, 1 or 2), `tolerance` (1e-4), `budget` (none),
+      `record` (False); see `GraphFollower`.
     - vertex: none. monte-carlo, quasi-monte-carlo: `samples` on each level (1000, 1024), `seed`.
-    - Where no method is named: those of auto; `certify`, `seed`, `boxes` or `workers` ask for
-      modal.
+    - Where no method is named: those of auto.
 
     Raises:
         ValueError: An unknown name or option, a value outside its range, a support that reaches
@@ -101,10 +93,10 @@ def envelope(
             f"model: {model!r} is no structure; take a StoreyFrame, a MatrixStructure or a"
             " LagrangianSystem"
         )
-    if method is None and isinstance(model, LagrangianSystem):
-        method = "improved-graph-follower"
-    propagate = default if method is None else _method(method)
-    require_options(method, auto if method is None else propagate, options)
+    if method is None:
+        nonlinear = isinstance(model, LagrangianSystem)
+        method = "improved-graph-follower" if nonlinear else "auto"
+    way = named(method, options)
     cuts = boxes(inputs, alpha)
     flow: LagrangianFlow | LinearFlow
     if isinstance(model, LagrangianSystem):
@@ -117,7 +109,9 @@ def envelope(
     require_stable(flow, cuts)
     over = UnitFlow(flow, cuts, relative)
     steps = step_error(over)
-    found = with_step_error(propagate(over, progress, **options), over, scheme, steps)
+    found = with_step_error(way.run(over, progress), over, scheme, steps)
+    if method.endswith("graph-follower"):
+        found = judged(found, over, steps)
     found = with_stray(found, over)
     claim = str(JointClaim.of(fuzzy_inputs(inputs)).resting_on(found.nature))
     found = replace(found, facts={**found.facts, "claim": claim}) if claim else found
@@ -126,10 +120,10 @@ def envelope(
     return found
 
 
-def _integrator(given: str | Integrator | None, method: str | None) -> Integrator:
+def _integrator(given: str | Integrator | None, method: str) -> Integrator:
     """The time stepping of a linear structure."""
     if given is None:
-        given = "exact" if method is None or method in EXACT_BY_DEFAULT else "midpoint"
+        given = "exact" if method in EXACT_BY_DEFAULT else "midpoint"
     if isinstance(given, str) and given not in INTEGRATORS:
         raise ValueError(f"integrator: '{given}' is unknown; allowed are {', '.join(INTEGRATORS)}")
     if not isinstance(given, str) and not hasattr(given, "step_map"):
@@ -149,52 +143,4 @@ def warn_of_roughness(found: Envelope) -> None:
         warnings.warn(f"envelope: {found.facts['reason']}", stacklevel=3)
 
 
-def _method(name: str) -> Callable[..., Envelope]:
-    if name not in METHODS:
-        raise ValueError(f"method: '{name}' is unknown; allowed are {', '.join(METHODS)}")
-    return METHODS[name]
-
-
-def follow(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> Envelope:
-    """Envelope by the Graph Follower; options are the fields of `GraphFollower`."""
-    follower = GraphFollower(**options)
-    begun = time.perf_counter()
-    followed = follower.run(flow, progress=progress)
-    return followed_envelope(flow, follower, followed, time.perf_counter() - begun)
-
-
-def followed_envelope(
-    flow: UnitFlow, follower: GraphFollower, followed: Followed, seconds: float
-) -> Envelope:
-    """The envelope of a finished Graph Follower."""
-    facts: dict[str, float | str] = {
-        "order": follower.order,
-        "tolerance": follower.tolerance,
-        "recomputed": followed.storage.recomputed,
-    }
-    if followed.exhausted:
-        facts["reason"] = f"stopped at the budget of {follower.budget} trajectories"
-    return signed_envelope(
-        flow,
-        followed.bounds + followed.correction,
-        followed.storage.points[followed.best],
-        method="graph-follower",
-        nature="estimated" if follower.corrected else "inner",
-        trajectories=len(followed.storage),
-        seconds=seconds,
-        error=followed.correction.max(-1) if follower.corrected else None,
-        facts=facts,
-    )
-
-
 EXACT_BY_DEFAULT = ("auto", "modal")
-
-METHODS: dict[str, Callable[..., Envelope]] = {
-    "auto": auto,
-    "modal": modal,
-    "graph-follower": follow,
-    "improved-graph-follower": pursue,
-    "vertex": vertex,
-    "monte-carlo": monte_carlo,
-    "quasi-monte-carlo": quasi_monte_carlo,
-}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -80,16 +79,9 @@ def told_once() -> Iterator[None]:
 
 def method_options(task: EnvelopeTask) -> dict[str, Any]:
     """Those of the task's options that its method has."""
-    import inspect
+    from alphacut.frame.methods.named import options_of
 
-    from alphacut.frame import METHODS, GraphFollower
-    from alphacut.frame.methods.modal import Modal
-
-    taken = set(inspect.signature(METHODS[task.method]).parameters)
-    if task.method.endswith("graph-follower"):
-        taken |= {field.name for field in fields(GraphFollower)}
-    if task.method == "modal":
-        taken |= {field.name for field in fields(Modal)}
+    taken = options_of(task.method)
     offered = {"order": task.order, "tolerance": task.tolerance, "exclude": task.exclude}
     if task.certify is not None:
         return {"tolerance": task.tolerance, "certify": task.certify}

@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
+from alphacut.frame.checks.step_error import step_error
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.envelope import Envelope
-from alphacut.frame.methods.batch_graph_follower import pursue
-from alphacut.frame.methods.modal import modal
+from alphacut.frame.envelope import Envelope, output_unit
+from alphacut.frame.methods.batch_graph_follower import BatchFollower
+from alphacut.frame.methods.modal import Modal
 from alphacut.frame.structures.modes import ModalError
 
 Progress = Callable[[float], None]
+TOLERANCE = 1e-4
+"""Wanted error unless one is given, in m."""
+SHARE = 1e-3
+"""Wanted error where no output is a displacement, as a share of each output's peak."""
 CANDIDATES = ("modal", "improved-graph-follower")
 CHECKS = 512
 """Trajectories of the independent second pass."""
@@ -27,81 +32,79 @@ class ToleranceError(RuntimeError):
     """No method left reaches the wanted error."""
 
 
-def auto(
-    flow: UnitFlow,
-    progress: Progress | None = None,
-    *,
-    tolerance: float = 1e-4,
-    exclude: Sequence[str] = (),
-    budget: int = 20000,
-) -> Envelope:
-    """Envelope with an estimated error below `tolerance`.
+@dataclass(frozen=True)
+class Auto:
+    """Envelope whose error, all of it, stays below a tolerance.
 
     Modal intervening variables come first, since tens of eigen-analyses cost less than any number
     of trajectories; where their error estimate is too large, the Graph Follower in rounds, made
     stricter until an independent sample finds nothing above the tolerance.
 
     Args:
-        flow: The trajectories.
-        progress: Called with the fraction done.
-        tolerance: Wanted envelope error, in units of the (first) output.
+        tolerance: Wanted envelope error, in units of the first displacement, else of the first
+            output; unless given `TOLERANCE`, or where no output is a displacement `SHARE`.
         exclude: Methods that must not be taken, out of `CANDIDATES`.
         budget: Most trajectories of the Graph Follower.
 
     Raises:
         ValueError: An excluded name is unknown, or the tolerance is not positive.
-        ToleranceError: No method left reaches the tolerance.
     """
-    return cheapest(
-        flow, progress, tolerance=tolerance, fitted=tolerance / 8, exclude=exclude, budget=budget
-    )
 
+    tolerance: float | None = None
+    exclude: Sequence[str] = ()
+    budget: int = 20000
 
-def cheapest(
-    flow: UnitFlow,
-    progress: Progress | None,
-    *,
-    tolerance: float,
-    fitted: float,
-    exclude: Sequence[str] = (),
-    budget: int = 20000,
-) -> Envelope:
-    """As `auto`, with the modal model's own error `fitted` apart from the tolerance."""
-    for name in exclude:
-        if name not in CANDIDATES:
-            raise ValueError(f"exclude: '{name}' is unknown; allowed are {', '.join(CANDIDATES)}")
-    if not tolerance > 0:
-        raise ValueError(f"tolerance: {tolerance:g} is not allowed; it must be positive")
-    begun, refused = time.perf_counter(), [f"{name} excluded" for name in exclude]
-    if "modal" not in exclude and isinstance(flow.flow, LinearFlow):
-        try:
-            found = modal(flow, progress, tolerance=fitted)
-            if _estimate(found, flow) <= tolerance:
-                return _reported(
-                    found,
-                    flow,
-                    begun,
-                    "modal: polynomials of the modes reach the tolerance with the fewest"
-                    " eigen-analyses",
+    def __post_init__(self) -> None:
+        for name in self.exclude:
+            if name not in CANDIDATES:
+                raise ValueError(
+                    f"exclude: '{name}' is unknown; allowed are {', '.join(CANDIDATES)}"
                 )
-            refused.append(f"modal estimates {_estimate(found, flow):.2g}")
-        except ModalError as error:
-            refused.append(str(error))
-    if "improved-graph-follower" not in exclude:
-        followed = _followed(flow, tolerance, budget, progress)
-        if followed is not None:
-            return _reported(
-                followed,
-                flow,
-                begun,
-                "improved-graph-follower, since"
-                f" {'; '.join(refused) or 'the system is not linear'}",
+        if self.tolerance is not None and not self.tolerance > 0:
+            raise ValueError(f"tolerance: {self.tolerance:g} is not allowed; it must be positive")
+
+    def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
+        """Envelope of all outputs on all levels.
+
+        Raises:
+            ToleranceError: No method left reaches the tolerance.
+        """
+        flow, tolerance = self.wanted(flow)
+        steps, begun = step_error(flow), time.perf_counter()
+        reached = float((steps / flow.scale).max())
+        left, refused = tolerance - reached, [f"{name} excluded" for name in self.exclude]
+        if left <= 0:
+            raise ToleranceError(
+                f"auto: the error of time stepping, {reached:.2g}, is above the tolerance"
+                f" {tolerance:g}; take the integrator exact, a smaller step or a larger tolerance"
             )
-        refused.append(f"improved-graph-follower needs more than {budget} trajectories")
-    raise ToleranceError(
-        f"auto: no method reaches {tolerance:g} ({'; '.join(refused)}); allow more methods, a"
-        " larger budget or tolerance"
-    )
+        if "modal" not in self.exclude and isinstance(flow.flow, LinearFlow):
+            try:
+                found = Modal(tolerance=left / 8).run(flow, progress)
+                if _estimate(found, flow) <= left:
+                    why = "modal: polynomials of the modes reach the tolerance with the fewest"
+                    return _reported(found, flow, begun, f"{why} eigen-analyses")
+                refused.append(f"modal estimates {_estimate(found, flow):.2g}")
+            except ModalError as error:
+                refused.append(str(error))
+        if "improved-graph-follower" not in self.exclude:
+            followed = _followed(flow, left, self.budget, progress)
+            if followed is not None:
+                why = "; ".join(refused) or "the system is not linear"
+                return _reported(followed, flow, begun, f"improved-graph-follower, since {why}")
+            refused.append(f"improved-graph-follower needs more than {self.budget} trajectories")
+        raise ToleranceError(
+            f"auto: no method reaches {tolerance:g} ({'; '.join(refused)}); allow more methods, a"
+            " larger budget or tolerance"
+        )
+
+    def wanted(self, flow: UnitFlow) -> tuple[UnitFlow, float]:
+        """The flow with the scale of the tolerance, and the tolerance."""
+        if self.tolerance is not None:
+            return flow, self.tolerance
+        if flow.relative or any(output_unit(name) == "m" for name in flow.outputs):
+            return flow, TOLERANCE
+        return replace(flow, relative=True), SHARE
 
 
 def _followed(
@@ -110,7 +113,8 @@ def _followed(
     """The Graph Follower, begun with more points until an independent sample agrees."""
     spread, strict, used = 256, tolerance / 4, 0
     for attempt in range(4):
-        found = pursue(flow, progress, tolerance=strict, budget=budget, spread=spread, contests=3)
+        method = BatchFollower(strict, budget, spread, contests=3)
+        found = method.run(flow, progress)
         used += found.trajectories
         if "reason" in found.facts:
             return None

@@ -12,7 +12,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -66,7 +65,43 @@ class BatchFollower:
                 f" {self.reach:g}: out of range"
             )
 
-    def run(self, flow: UnitFlow, *, progress: Progress | None = None) -> Pursuit:
+    def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
+        """Envelope, corrected by what the last models still promise.
+
+        The error is twice what these models promise, below the tolerance, or above it where the
+        budget ended the search, and by how much the corners of the boxes pass the bounds, which
+        then take them in. The fact "corners" counts these, which need no derivatives.
+        """
+        begun = time.perf_counter()
+        found = self.pursue(flow, progress=progress)
+        bounds, where, missed, corners = taken_in(
+            flow, found.bounds + found.correction, found.where
+        )
+        promised = np.maximum(found.correction, found.open_gain).max(-1)
+        error = SAFETY * (promised + self.tolerance / 2 * flow.scale) + missed[:, None]
+        facts: dict[str, float | str] = {
+            "tolerance": self.tolerance,
+            "order": 2,
+            "corners": corners,
+        }
+        if found.open_gain.any():
+            facts["reason"] = (
+                f"stopped at the budget of {self.budget} trajectories; models promise"
+                f" {found.open_gain.max():.2g} more"
+            )
+        return signed_envelope(
+            flow,
+            bounds,
+            where,
+            method="improved-graph-follower",
+            nature="estimated",
+            error=error,
+            facts=facts,
+            trajectories=len(found.points),
+            seconds=time.perf_counter() - begun,
+        )
+
+    def pursue(self, flow: UnitFlow, *, progress: Progress | None = None) -> Pursuit:
         """Pursues all levels of `flow.boxes`, from the narrowest box to the widest."""
         levels = len(flow.boxes.alpha)
         out = Pursuit.empty(flow)
@@ -292,35 +327,3 @@ TRIES = 40
 """Proposals looked at per window of time."""
 SPACING = 0.02
 """Distance in unit coordinates between graphs of one batch."""
-
-
-def pursue(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> Envelope:
-    """Envelope by the Graph Follower in rounds; options are fields of `BatchFollower`.
-
-    The error is twice what these models promise, below the tolerance, or above it where the budget
-    ended the search, and by how much the corners of the boxes pass the bounds, which then take them
-    in. A basin that neither a model nor a corner shows is not in it. The fact "corners" counts
-    these, which need no derivatives.
-    """
-    method, begun = BatchFollower(**options), time.perf_counter()
-    found = method.run(flow, progress=progress)
-    bounds, where, missed, corners = taken_in(flow, found.bounds + found.correction, found.where)
-    error = (
-        SAFETY
-        * (
-            np.maximum(found.correction, found.open_gain).max(-1)
-            + method.tolerance / 2 * flow.scale
-        )
-        + missed[:, None]
-    )
-    facts: dict[str, float | str] = {"tolerance": method.tolerance, "order": 2, "corners": corners}
-    if found.open_gain.any():
-        facts["reason"] = (
-            f"stopped at the budget of {method.budget} trajectories; models promise"
-            f" {found.open_gain.max():.2g} more"
-        )
-    cost = {"trajectories": len(found.points), "seconds": time.perf_counter() - begun}
-    name = "improved-graph-follower"
-    return signed_envelope(
-        flow, bounds, where, method=name, nature="estimated", error=error, facts=facts, **cost
-    )

@@ -85,7 +85,7 @@ def record_flow(flow: UnitFlow, *, output: int = 0, tolerance: float = 1e-4) -> 
             f"output: {output!r} is not allowed; it must be from 0 to {len(flow.outputs) - 1}, for"
             f" {', '.join(flow.outputs)}"
         )
-    followed = GraphFollower(tolerance=tolerance, record=True).run(flow)
+    followed = GraphFollower(tolerance=tolerance, record=True).follow(flow)
     steps = tuple(step for step in followed.steps if step.output == output and step.level == 0)
     graphs = followed.storage.values[:, output].T
     local = {+1: np.full(len(flow.time), -np.inf), -1: np.full(len(flow.time), np.inf)}

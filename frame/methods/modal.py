@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -74,43 +73,47 @@ class Modal:
         if self.certify is not None and not self.certify > 0:
             raise ValueError(f"certify: {self.certify:g} is not allowed; the gap must be positive")
 
+    def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
+        """Envelope of a linear structure from a polynomial modal model over the widest box.
 
-def modal(flow: UnitFlow, progress: Progress | None = None, **options: Any) -> Envelope:
-    """Envelope of a linear structure from a polynomial modal model over the widest box.
+        Where the polynomials do not reach the tolerance, `error` says what they do, and the fact
+        "reason" that it is more.
 
-    Args:
-        flow: Trajectories of a `LinearFlow`.
-        progress: Called with the fraction done.
-        options: Fields of `Modal`.
+        Args:
+            flow: Trajectories of a `LinearFlow`.
+            progress: Called with the fraction done.
 
-    Where the polynomials do not reach the tolerance, `error` says what they do, and the fact
-    "reason" that it is more.
-
-    Raises:
-        ModalError: The structure has no smooth oscillating modes over the box.
-        ValueError: The flow is not that of a linear structure.
-    """
-    if not isinstance(flow.flow, LinearFlow):
-        raise ValueError("method: 'modal' needs a linear structure; take graph-follower")
-    method, begun = Modal(**options), time.perf_counter()
-    if method.certify is not None:
-        return _certified(flow, method, method.certify, begun, progress)
-    model = fit_modes(
-        flow.flow, flow.boxes, tolerance=method.tolerance, budget=method.budget, scale=flow.scale
-    )
-    bounds, at, left = search_levels(flow, model, method, method.tolerance, progress)
-    facts: dict[str, float | str] = {
-        "model_error": float(model.error.max()),
-        "degree": model.degree,
-    }
-    if (short := _short_of(model, method.tolerance, flow.scale)) is not None:
-        facts["reason"] = short
-    error = polynomial_error(model) + left.max(-1)
-    facts["search_error"] = float((left.max(-1) / flow.scale).max())
-    cost = {"trajectories": model.analyses, "seconds": time.perf_counter() - begun}
-    return signed_envelope(
-        flow, bounds, at, method="modal", nature="estimated", error=error, facts=facts, **cost
-    )
+        Raises:
+            ModalError: The structure has no smooth oscillating modes over the box.
+            ValueError: The flow is not that of a linear structure.
+        """
+        linear, begun = flow.flow, time.perf_counter()
+        if not isinstance(linear, LinearFlow):
+            raise ValueError("method: 'modal' needs a linear structure; take graph-follower")
+        if self.certify is not None:
+            return _certified(flow, self, self.certify, begun, progress)
+        model = fit_modes(
+            linear, flow.boxes, tolerance=self.tolerance, budget=self.budget, scale=flow.scale
+        )
+        bounds, at, left = search_levels(flow, model, self.seed, self.tolerance, progress)
+        facts: dict[str, float | str] = {
+            "model_error": float(model.error.max()),
+            "degree": model.degree,
+            "search_error": float((left.max(-1) / flow.scale).max()),
+        }
+        if (short := _short_of(model, self.tolerance, flow.scale)) is not None:
+            facts["reason"] = short
+        return signed_envelope(
+            flow,
+            bounds,
+            at,
+            method="modal",
+            nature="estimated",
+            error=polynomial_error(model) + left.max(-1),
+            facts=facts,
+            trajectories=model.analyses,
+            seconds=time.perf_counter() - begun,
+        )
 
 
 def polynomial_error(model: ModalModel) -> Array:
@@ -143,7 +146,7 @@ def _certified(
     model, error, unproved = _model_with_error(flow.flow, flow, method, gap)
     searched = progress and (lambda share: progress(SEARCHED * share))
     proved = progress and (lambda share: progress(SEARCHED + (1 - SEARCHED) * share))
-    bounds, at, _ = search_levels(flow, model, method, gap, searched)
+    bounds, at, _ = search_levels(flow, model, method.seed, gap, searched)
     proof = certify(
         model,
         bounds,
@@ -230,13 +233,13 @@ def _model_with_error(
 def search_levels(
     flow: UnitFlow,
     model: ModalModel,
-    method: Modal,
+    seed: int,
     wanted: float,
     progress: Callable[[float], None] | None,
 ) -> tuple[Array, Array, Array]:
     """Nested bounds (A, T, m, 2), unit coordinates (A, T, m, 2, d) and what is left to gain."""
     cuts, scaled = model.boxes, model.in_units(flow.scale)
-    search = ModalSearch.suited(scaled, method.seed, wanted)
+    search = ModalSearch.suited(scaled, seed, wanted)
     shape = (len(cuts.alpha), len(model.time), len(model.outputs), 2)
     bounds, at, left = np.empty(shape), np.empty((*shape, len(cuts.names))), np.empty(shape)
     for done, level in enumerate(reversed(range(shape[0]))):

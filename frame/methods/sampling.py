@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -49,30 +50,56 @@ def sample(flow: UnitFlow, points_of: Callable[[Array, Array], Array], method: s
     )
 
 
-def vertex(flow: UnitFlow, progress: Progress | None = None) -> Envelope:
+@dataclass(frozen=True)
+class Vertex:
     """Envelope of the corners of each box: the vertex method."""
-    return sample(flow, corners, "vertex")
+
+    def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
+        """Envelope of all outputs on all levels."""
+        return sample(flow, corners, "vertex")
 
 
-def monte_carlo(
-    flow: UnitFlow, progress: Progress | None = None, *, samples: int = 1000, seed: int = 0
-) -> Envelope:
-    """Envelope of `samples` uniform random trajectories per level."""
-    rng = np.random.default_rng(seed)
-    return sample(
-        flow, lambda lower, upper: rng.uniform(lower, upper, (samples, len(lower))), "monte-carlo"
-    )
+@dataclass(frozen=True)
+class MonteCarlo:
+    """Envelope of uniform random trajectories.
+
+    Args:
+        samples: On each level.
+        seed: Of the points.
+    """
+
+    samples: int = 1000
+    seed: int = 0
+
+    def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
+        """Envelope of all outputs on all levels."""
+        rng = np.random.default_rng(self.seed)
+
+        def points(lower: Array, upper: Array) -> Array:
+            return rng.uniform(lower, upper, (self.samples, len(lower)))
+
+        return sample(flow, points, "monte-carlo")
 
 
-def quasi_monte_carlo(
-    flow: UnitFlow, progress: Progress | None = None, *, samples: int = 1024, seed: int = 0
-) -> Envelope:
-    """Envelope of a scrambled Sobol sequence of Chebyshev density per level."""
-    from scipy.stats import qmc
+@dataclass(frozen=True)
+class QuasiMonteCarlo:
+    """Envelope of a scrambled Sobol sequence of Chebyshev density.
 
-    def points(lower: Array, upper: Array) -> Array:
-        unit = qmc.Sobol(len(lower), rng=np.random.default_rng(seed)).random(samples)
-        chebyshev: Array = (lower + upper) / 2 - (upper - lower) / 2 * np.cos(np.pi * unit)
-        return chebyshev
+    Args:
+        samples: On each level.
+        seed: Of the scrambling.
+    """
 
-    return sample(flow, points, "quasi-monte-carlo")
+    samples: int = 1024
+    seed: int = 0
+
+    def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
+        """Envelope of all outputs on all levels."""
+        from scipy.stats import qmc
+
+        def points(lower: Array, upper: Array) -> Array:
+            unit = qmc.Sobol(len(lower), rng=np.random.default_rng(self.seed)).random(self.samples)
+            chebyshev: Array = (lower + upper) / 2 - (upper - lower) / 2 * np.cos(np.pi * unit)
+            return chebyshev
+
+        return sample(flow, points, "quasi-monte-carlo")

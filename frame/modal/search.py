@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from alphacut.frame.calculus.box_quadratic import gain, local_maximum
+from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_maximum
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.modal.model import ModalModel
@@ -29,6 +29,8 @@ SMALL = 1e-3
 """Share of the wanted error that Newton's method may leave."""
 QUIET = 0.05
 """Share of the wanted error that the last independent pass may gain."""
+USUAL = 6
+"""Newton steps after which quadratic models are maximised over all faces: the rest is on ridges."""
 ITERATIONS = 300
 """Newton steps after which a problem that has not converged is left as it is."""
 
@@ -377,10 +379,14 @@ def _newton(
     """
     radius: Array = np.full(len(which), 0.5)
     f, g, H = _signed(model, optima, optima.point[which], which)
-    for _ in range(ITERATIONS):
+    for count in range(ITERATIONS):
         low = np.maximum(lower - optima.point[which], -radius[:, None])
         high = np.minimum(upper - optima.point[which], radius[:, None])
-        step = local_maximum(g, H, low, high, rounds=2)
+        step = (
+            local_maximum(g, H, low, high, rounds=2)
+            if count < USUAL
+            else global_maximum(g, H, low, high)
+        )
         promised = gain(g, H, step)
         optima.left[which] = promised
         held = np.abs(step).max(1, initial=0.0) >= 0.999 * radius
@@ -398,7 +404,9 @@ def _newton(
         g[better], H[better] = g2[better], H2[better]
         ratio = got / promised
         radius = np.where(
-            ratio > 0.75, 2 * radius, np.where(ratio < 0.25, 0.3 * np.abs(step).max(1), radius)
+            ratio > 0.75,
+            np.minimum(2 * radius, 2.0),
+            np.where(ratio < 0.25, 0.3 * np.abs(step).max(1), radius),
         )
 
 

@@ -8,7 +8,7 @@ import re
 import pytest
 
 from alphacut.frame import METHODS, Envelope, MatrixStructure, StoreyFrame, envelope
-from alphacut.frame.methods.method_options import options_of
+from alphacut.frame.methods.named import options_of
 from alphacut.fuzzy import Triangular
 
 FRAME = StoreyFrame(
@@ -45,7 +45,7 @@ def test_outputs_without_a_known_unit_have_none() -> None:
 def test_the_documentation_names_every_option_and_default(method: str) -> None:
     text = inspect.getdoc(envelope)
     assert text is not None
-    for name in options_of(method, METHODS[method]):
+    for name in options_of(method):
         assert f"`{name}`" in text
 
 

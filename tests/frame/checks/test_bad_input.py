@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from alphacut.frame import MatrixStructure, StoreyFrame, envelope, pendulum, record
-from alphacut.frame.methods.method_options import options_of
-from alphacut.frame.propagation import METHODS
+from alphacut.frame.methods.named import METHODS, options_of
 from alphacut.fuzzy import Interval, Triangular
 
 FRAME = StoreyFrame((2e4, 1e4), (3.0, 3.0), 25e9, 1e-6, q0=(0.0, 0.01), damping_ratio=0.02)
@@ -78,10 +77,7 @@ def test_fuzzy_parameters_without_a_meaning(inputs: Any, message: str) -> None:
         ),
         (
             {"smaples": 5},
-            (
-                "unknown to the default method; it takes tolerance, exclude, budget, seed, certify,"
-                " boxes, workers"
-            ),
+            ("unknown to the method auto; it takes tolerance, exclude, budget"),
         ),
         (
             {"method": "auto", "exclude": "modal"},
@@ -188,7 +184,7 @@ def test_a_record_is_of_an_output_that_there_is_and_of_any_system() -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_names_its_options(method: str) -> None:
-    names = options_of(method, METHODS[method])
+    names = options_of(method)
     assert ("tolerance" in names) == (
         method in ("auto", "modal", "graph-follower", "improved-graph-follower")
     )

@@ -63,11 +63,3 @@ def test_forces_alone_are_told_to_a_share_of_their_peaks() -> None:
     assert found.method == "modal"
     assert found.error is not None
     assert (found.error.max((0, 1)) < 1e-3 * np.abs(found.lower).max((0, 1))).all()
-
-
-def test_an_option_of_the_modal_method_asks_for_it() -> None:
-    inputs = {"E": Triangular(24e9, 25e9, 26e9)}
-    found = envelope(FRAME, inputs, duration=1.0, step=0.1, alpha=(0,), certify=1e-5)
-    assert found.nature == "guaranteed"
-    with pytest.raises(ModalError, match="same frequency"):
-        envelope(DOUBLE, {"k": Triangular(9, 10, 12)}, duration=1.0, step=0.01, seed=1)

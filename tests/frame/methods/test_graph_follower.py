@@ -134,7 +134,7 @@ def test_quadratics_over_boxes() -> None:
     [
         ({"order": 3}, "order: 3"),
         ({"tolerance": -1.0}, "tolerance: -1"),
-        ({"sweeps": 0}, "sweeps 0"),
+        ({"budget": 0}, "budget: 0"),
     ],
 )
 def test_wrong_switches_are_refused(option: dict[str, float], message: str) -> None:

@@ -1,0 +1,78 @@
+"""What an envelope of the Graph Follower may be wrong by, judged by what it did not use."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from alphacut.frame.boxes import UnitFlow
+from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.low_discrepancy import chebyshev_points
+from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.integrators import Exact
+from alphacut.frame.envelope import Envelope
+from alphacut.frame.methods.modal import polynomial_error, search_levels
+from alphacut.frame.modal.model import fit_modes
+from alphacut.frame.structures.modes import ModalError
+
+SAMPLES = 64
+"""Independent trajectories on each level, where the modes cannot judge."""
+SAFETY = 2.0
+"""Factor on what they find beyond the bounds."""
+FITTED = 0.125
+"""Wanted error of the modal model that judges, as a share of the tolerance."""
+
+
+def judged(found: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
+    """The envelope with one error for search, polynomials and time stepping.
+
+    The distance from the envelope of the exact motion by modes, plus its own error; where the modes
+    do not resolve the tolerance, what an independent sample finds beyond the bounds.
+
+    Args:
+        found: An envelope of the Graph Follower, whose tolerance is among its facts.
+        flow: Its trajectories.
+        steps: Error of time stepping, shape (T, m).
+    """
+    error = _by_modes(found, flow)
+    judge = "the envelope of the exact motion by modes"
+    if error is None:
+        judge = f"{SAMPLES} independent trajectories on each level"
+        own = float(found.facts["tolerance"]) * flow.scale if found.error is None else found.error
+        missed = np.array([_missed(found, flow, level) for level in range(len(found.alpha))])
+        error = np.broadcast_to(own, found.lower.shape) + SAFETY * missed[:, None]
+        error = error + (steps if found.error is None else 0.0)
+    facts = {**found.facts, "judged_by": judge, "estimated_error": (error / flow.scale).max()}
+    return replace(found, error=error, facts=facts)
+
+
+def _by_modes(found: Envelope, flow: UnitFlow) -> Array | None:
+    """Distance from the modal envelope and the error of that; None where it resolves too little."""
+    if not isinstance(flow.flow, LinearFlow):
+        return None
+    wanted = FITTED * float(found.facts["tolerance"])
+    exact = replace(flow.flow, integrator=Exact())
+    try:
+        model = fit_modes(exact, flow.boxes, tolerance=wanted, scale=flow.scale)
+    except ModalError:
+        return None
+    own = polynomial_error(model)
+    if (own / flow.scale).max() > 2 * float(found.facts["tolerance"]):
+        return None
+    bounds, _, left = search_levels(flow, model, 0, wanted, None)
+    apart = np.abs(bounds - np.stack([-found.lower, found.upper], -1))
+    distance: Array = (apart + left).max(-1) + own
+    return distance
+
+
+def _missed(found: Envelope, flow: UnitFlow, level: int) -> Array:
+    """By how much an independent sample of a level leaves the envelope, shape (m,)."""
+    lower, upper = flow.boxes.unit(level)
+    points = chebyshev_points(len(lower), SAMPLES, skip=100_003 * (level + 1))
+    worst = np.zeros(len(flow.outputs))
+    for chunk in np.array_split((lower + upper) / 2 + (upper - lower) / 2 * points, 2):
+        values = flow.values(chunk)
+        beyond = np.maximum(values.max(0) - found.upper[level], found.lower[level] - values.min(0))
+        worst = np.maximum(worst, beyond.max(0))
+    return worst
