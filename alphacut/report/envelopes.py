@@ -2,31 +2,32 @@
 
 from __future__ import annotations
 
-import html
 import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from markupsafe import Markup
+
 from alphacut.io.units import engineering, largest_by_unit
-from alphacut.report.tables import section, table
+from alphacut.report.tables import items, paragraphs, section, table
 from alphacut.stages import exceedance as outcomes
 
 
-def envelopes(summary: Mapping[str, Any], exceedance: str = "") -> str:
+def envelopes(summary: Mapping[str, Any], exceedance: Markup) -> Markup:
     """The interactive plot and the extremes; the picture of the exceedance where there is one."""
-    controls = (
+    controls = Markup(
         '<div class="controls"><label>study <select id="study"></select></label><label>output'
         ' <select id="output"></select></label><label>α <input type="range" id="alpha" min="0"'
         ' max="1" step="0.01" value="0.5"><output id="alpha-shown">0.50</output></label><button'
         ' type="button" id="reset">whole range</button></div>'
     )
-    hint = (
+    hint = Markup(
         '<p class="hint">The shaded bands are the computed α-cuts, the darker the higher α; the'
         " orange line is the cut at the slider's α, between computed levels by linear"
         " interpolation. Drag or turn the wheel to zoom, double click to see everything.</p>"
     )
     rows = extremes(summary["envelopes"])
-    svg = (
+    svg = Markup(
         '<svg id="plot" role="img" aria-label="Envelopes over time"></svg><div id="readout"></div>'
     )
     lowest = f"{min(study['alpha'][0] for study in summary['envelopes'].values()):g}"
@@ -76,16 +77,16 @@ def extremes(studies: Mapping[str, Any]) -> list[tuple[str, ...]]:
     )
 
 
-def natural(summary: Mapping[str, Any]) -> str:
+def natural(summary: Mapping[str, Any]) -> Markup:
     """The first natural periods, where the structure is linear."""
     omega = summary.get("structure", {}).get("omega_rad_per_s")
     if not omega:
-        return ""
+        return Markup("")
     periods = ", ".join(f"{2 * math.pi / w:.3g}" for w in omega[:4])
-    return f"<p>First natural periods at the modal values: {periods} s.</p>"
+    return paragraphs(f"First natural periods at the modal values: {periods} s.")
 
 
-def peaks(summary: Mapping[str, Any]) -> str:
+def peaks(summary: Mapping[str, Any]) -> Markup:
     """Fuzzy peaks of every study, and the fuzzy probability of exceeding the case's limit."""
     from alphacut.frame.outputs import output_unit
 
@@ -96,27 +97,26 @@ def peaks(summary: Mapping[str, Any]) -> str:
     ]
     largest = largest_by_unit((of["upper"][0], unit) for _, _, unit, of in each)
     rows = [(name, output, *peak_row(of, unit, largest[unit])) for name, output, unit, of in each]
-    words = (
-        "<p>Fuzzy peak of each output's magnitude at the nodes. On the lowest level no trajectory"
+    words = paragraphs(
+        "Fuzzy peak of each output's magnitude at the nodes. On the lowest level no trajectory"
         " peaks below the first value or above the last by more than the error, which covers what"
         " lies between nodes; the second is the least peak among some tried, so the least of all"
-        " lies between the first two.</p>"
+        " lies between the first two."
     )
-    limit = (
-        f"<p>P{html.escape(outcomes.sentence(summary['exceedance'])[1:].rstrip())}.</p>"
-        if "exceedance" in summary
-        else ""
-    )
+    limit = Markup("")
+    if "exceedance" in summary:
+        limit = paragraphs(f"P{outcomes.sentence(summary['exceedance'])[1:].rstrip()}.")
     head = ("study", "output", "not below", "least tried", "greatest", "error up to", "highest α")
     told = claims(summary["envelopes"])
-    return "<h3>Peaks</h3>" + words + table(head, rows, numbers=2) + told + limit if rows else limit
+    shown = Markup("<h3>Peaks</h3>") + words + table(head, rows, numbers=2) + told
+    return shown + limit if rows else limit
 
 
-def claims(studies: Mapping[str, Any]) -> str:
+def claims(studies: Mapping[str, Any]) -> Markup:
     """What the cuts claim of how often they hold, and which inputs are opinions, study by study."""
     each = {name: study["claim"] for name, study in studies.items() if "claim" in study}
-    rows = [f"<li>{html.escape(name)}: {html.escape(claim)}</li>" for name, claim in each.items()]
-    return f"<h3>How often the cuts hold</h3><ul>{''.join(rows)}</ul>" if rows else ""
+    rows = [f"{name}: {claim}" for name, claim in each.items()]
+    return Markup("<h3>How often the cuts hold</h3>") + items(rows) if rows else Markup("")
 
 
 def peak_row(of: Mapping[str, Any], unit: str, largest: float) -> Iterator[str]:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import base64
-import html
 import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from markupsafe import Markup
+
 from alphacut.figures.captions import caption
-from alphacut.report.tables import section
+from alphacut.report.tables import fragment, section
 
 # figures that stand in the section they belong to
 ELSEWHERE = (
@@ -25,17 +26,17 @@ WIDE = re.compile(r"envelope-|chain|record|shares-over-time|graph-follower")
 SVG_LIMIT = 200_000  # bytes; a heavier figure goes into the page as PNG
 
 
-def listed(summary: Mapping[str, Any], folder: Path, name: str) -> str:
+def listed(summary: Mapping[str, Any], folder: Path, name: str) -> Markup:
     """Figure by its name without the paper's number, if this run has drawn it."""
     for file in summary.get("figures", []):
         if re.fullmatch(rf"(fig\d+-)?{name}", Path(file).stem) and file.endswith(".svg"):
             return picture(
                 folder / file, caption(Path(file).stem, paper=bool(summary.get("paper")))
             )
-    return ""
+    return Markup("")
 
 
-def gallery(summary: Mapping[str, Any], folder: Path) -> str:
+def gallery(summary: Mapping[str, Any], folder: Path) -> Markup:
     """Every figure of the run that no other section shows."""
     names = [
         name
@@ -43,35 +44,35 @@ def gallery(summary: Mapping[str, Any], folder: Path) -> str:
         if name.endswith(".png") and Path(name).stem not in ELSEWHERE
     ]
     paper = bool(summary.get("paper"))
-    figures = []
-    for name in names:
-        drawn = picture((folder / name).with_suffix(".svg"), caption(Path(name).stem, paper=paper))
-        figures.append(
-            drawn.replace("<figure>", '<figure class="wide">', 1) if WIDE.search(name) else drawn
+    figures = [
+        picture(
+            (folder / name).with_suffix(".svg"),
+            caption(Path(name).stem, paper=paper),
+            wide=bool(WIDE.search(name)),
         )
-    return (
-        section("Figures", '<div class="gallery">' + "\n".join(figures) + "</div>")
-        if figures
-        else ""
-    )
+        for name in names
+    ]
+    shown = Markup('<div class="gallery">{}</div>').format(Markup("\n").join(figures))
+    return section("Figures", shown) if figures else Markup("")
 
 
-def picture(svg: Path, caption: str) -> str:
+def picture(svg: Path, caption: str, *, wide: bool = False) -> Markup:
     """A figure: as SVG where that is light, else as PNG; empty where there is none."""
     png = svg.with_suffix(".png")
     if svg.is_file() and svg.stat().st_size < SVG_LIMIT:
         text = re.sub(r"^.*?(?=<svg)", "", svg.read_text(encoding="utf-8"), flags=re.DOTALL)
-        content = unique_ids(
-            re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL), svg.stem + "-"
+        content = Markup(
+            unique_ids(
+                re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL), svg.stem + "-"
+            )
         )
     elif png.is_file():
-        content = (
-            f'<img alt="{html.escape(caption)}"'
-            f' src="data:image/png;base64,{base64.b64encode(png.read_bytes()).decode()}">'
+        content = Markup('<img alt="{}" src="data:image/png;base64,{}">').format(
+            caption, base64.b64encode(png.read_bytes()).decode()
         )
     else:
-        return ""
-    return f"<figure>{content}<figcaption>{html.escape(caption)}</figcaption></figure>"
+        return Markup("")
+    return fragment("figure", content, caption, wide)
 
 
 def unique_ids(svg: str, prefix: str) -> str:

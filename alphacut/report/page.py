@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import base64
-import html
 import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from string import Template
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from markupsafe import Markup, escape
 
 from alphacut.case.quick import banner
 from alphacut.io.netcdf import damaged, read_dataset, read_summary
 from alphacut.report.sections import sections
+from alphacut.report.tables import environment
 
 if TYPE_CHECKING:
     import xarray
@@ -38,33 +38,27 @@ def report(folder: Path) -> str:
 
 def page(summary: Mapping[str, Any], folder: Path) -> str:
     """The page for a summary."""
-    text = {
-        name: (HERE / f"report.{name}").read_text(encoding="utf-8")
-        for name in ("html", "css", "js")
-    }
-    return Template(text["html"]).substitute(
-        title=html.escape(summary["title"]),
-        name=html.escape(summary["case"]),
-        about=re.sub(
-            r"`([^`]+)`",
-            r"<code>\1</code>",
-            html.escape(" ".join(summary.get("about", "").split())),
-        ),
-        banner=(
-            f'<p class="banner">{html.escape(banner(summary["quick"]))}.</p>'
-            if "quick" in summary
-            else ""
-        ),
-        css=text["css"],
-        js=text["js"],
-        sections="\n".join(sections(summary, folder)),
-        envelopes=embedded(plots(summary, folder)),
+    text = {name: (HERE / f"report.{name}").read_text(encoding="utf-8") for name in ("css", "js")}
+    about = escape(" ".join(summary.get("about", "").split()))
+    return (
+        environment()
+        .get_template("report.html")
+        .render(
+            title=summary["title"],
+            name=summary["case"],
+            about=Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", about)),
+            banner=banner(summary["quick"]) if "quick" in summary else "",
+            css=Markup(text["css"]),
+            js=Markup(text["js"]),
+            sections=Markup("\n").join(sections(summary, folder)),
+            envelopes=embedded(plots(summary, folder)),
+        )
     )
 
 
-def embedded(document: object) -> str:
+def embedded(document: object) -> Markup:
     """JSON that may stand inside a script element."""
-    return json.dumps(document, ensure_ascii=False).replace("<", "\\u003c")
+    return Markup(json.dumps(document, ensure_ascii=False).replace("<", "\\u003c"))
 
 
 def plots(summary: Mapping[str, Any], folder: Path) -> list[dict[str, Any]]:

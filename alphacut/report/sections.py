@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+from markupsafe import Markup
 
 from alphacut.figures.captions import core, in_words
 from alphacut.fuzzy import Nature
@@ -14,11 +15,11 @@ from alphacut.report.citation import citation
 from alphacut.report.differences import differences
 from alphacut.report.envelopes import envelopes, natural
 from alphacut.report.figures import gallery, listed
-from alphacut.report.tables import section, table
+from alphacut.report.tables import code, details, items, paragraphs, section, table
 from alphacut.stages import response
 
 
-def sections(summary: Mapping[str, Any], folder: Path) -> Iterator[str]:
+def sections(summary: Mapping[str, Any], folder: Path) -> Iterator[Markup]:
     """All sections that the results allow, in reading order."""
     if "microstructure" in summary:
         yield microstructure(summary["microstructure"])
@@ -45,13 +46,13 @@ def sections(summary: Mapping[str, Any], folder: Path) -> Iterator[str]:
     yield versions(summary)
 
 
-def microstructure(found: Mapping[str, Any]) -> str:
+def microstructure(found: Mapping[str, Any]) -> Markup:
     """Particles, cells, and the fuzzy radius map."""
     low, high = found["limits"]
-    words = (
-        f"<p>{found['discs']} discs in {found['packings']} sections, area fraction"
+    words = paragraphs(
+        f"{found['discs']} discs in {found['packings']} sections, area fraction"
         f" {found['area_fraction']:.4f}{of_map(found)}. The limits {low:.4g} and {high:.4g} of r/a"
-        f" keep {found['share_kept']:.3%} of the area.</p>"
+        f" keep {found['share_kept']:.3%} of the area."
     )
     rows = [("a1", f"{found['a1']:.5g}")]
     rows += [
@@ -73,17 +74,20 @@ def of_map(found: Mapping[str, Any]) -> str:
     )
 
 
-def modulus(found: Mapping[str, Any], drawn: str) -> str:
+def modulus(found: Mapping[str, Any], drawn: Markup) -> Markup:
     """The fuzzy modulus with its α-cuts, error budget and certificate."""
     cuts = zip(found["alpha"], found["E_GPa"]["lower"], found["E_GPa"]["upper"], strict=True)
     rows = [(f"{alpha:g}", f"{low:.4f}", f"{high:.4f}") for alpha, low, high in cuts]
-    words = (
-        f"<p>{'Core' if '[' in core(found) else 'Modal value'} <strong>{core(found)}</strong>,"
-        f" support [{found['lower_GPa']:.4f}, {found['upper_GPa']:.4f}] GPa; Poisson's ratio"
-        f" {found['nu']:.4f}. E is the modulus of eq. 16, the paper's convention: a square array is"
-        f" not isotropic. {found['samples']} samples, {found['solves']} linear systems,"
-        f" {found['seconds']:.1f} s. {html.escape(sentence(found.get('reason', '')))}"
-        f" {html.escape(isotropy(found))}</p>"
+    words = Markup(
+        "<p>{} <strong>{}</strong>, support [{:.4f}, {:.4f}] GPa; Poisson's ratio {:.4f}. E is the"
+        " modulus of eq. 16, the paper's convention: a square array is not isotropic. {} samples,"
+        " {} linear systems, {:.1f} s. {} {}</p>"
+    ).format(
+        "Core" if "[" in core(found) else "Modal value",
+        core(found),
+        *(found[name] for name in ("lower_GPa", "upper_GPa", "nu", "samples", "solves", "seconds")),
+        sentence(found.get("reason", "")),
+        isotropy(found),
     )
     budget = [(in_words(name), f"{value:.2g}") for name, value in found.get("error", {}).items()]
     checks = [(in_words(name), f"{value:.2g}") for name, value in found.get("checks", {}).items()]
@@ -93,24 +97,25 @@ def modulus(found: Mapping[str, Any], drawn: str) -> str:
         drawn,
         table(("α", "lower E, GPa", "upper E, GPa"), rows),
         (
-            "<h3>Error budget</h3>" + table(("source", "estimated relative error of E"), budget)
+            Markup("<h3>Error budget</h3>")
+            + table(("source", "estimated relative error of E"), budget)
             if budget
-            else ""
+            else Markup("")
         ),
         (
-            "<h3>Certificate</h3>"
+            Markup("<h3>Certificate</h3>")
             + table(("property", "measured violation, largest of all samples"), checks)
             if checks
-            else ""
+            else Markup("")
         ),
     )
 
 
-def given(found: Mapping[str, Any]) -> str:
+def given(found: Mapping[str, Any]) -> Markup:
     """The modulus that the case gives instead of having it computed."""
     cuts = zip(found["alpha"], found["E_GPa"]["lower"], found["E_GPa"]["upper"], strict=True)
     rows = [(f"{alpha:g}", f"{low:.4f}", f"{high:.4f}") for alpha, low, high in cuts]
-    words = f"<p>Given by the case: <code>{html.escape(found['of'])}</code>.</p>"
+    words = paragraphs(Markup("Given by the case: {}.").format(code(found["of"])))
     return section("Fuzzy modulus", words, table(("α", "lower E, GPa", "upper E, GPa"), rows))
 
 
@@ -163,30 +168,30 @@ def isotropy(found: Mapping[str, Any]) -> str:
     )
 
 
-def stress(found: Mapping[str, Any], drawn: str) -> str:
+def stress(found: Mapping[str, Any], drawn: Markup) -> Markup:
     """The random and fuzzy stress of the cell."""
-    words = (
-        f"<p>Homogenised stress {found['quantity']}, random with θ at every fuzzy sample: intervals"
+    words = paragraphs(
+        f"Homogenised stress {found['quantity']}, random with θ at every fuzzy sample: intervals"
         " of its mean, its quantiles and of the probability of exceeding a limit. Bounds are"
-        f" {found['nature']}; {html.escape(found['note'])}.</p>"
+        f" {found['nature']}; {found['note']}."
     )
     head = ("quantity", f"cut at α = {found['alpha'][0]:g}", f"cut at α = {found['alpha'][-1]:g}")
     return section("Random and fuzzy stress", words, drawn, table(head, response.table(found)))
 
 
-def built(words: Mapping[str, Any], periods: str) -> str:
+def built(words: Mapping[str, Any], periods: Markup) -> Markup:
     """The structure: what it is, its floors or inputs, its first periods."""
-    sentences = "".join(f"<p>{html.escape(text)}</p>" for text in words["sentences"])
+    sentences = paragraphs(*words["sentences"])
     return section("Structure", sentences, table(words["head"], words["rows"]), periods)
 
 
-def shares(found: Mapping[str, Any]) -> str:
+def shares(found: Mapping[str, Any]) -> Markup:
     """Contributions of the inputs to the widths."""
     from alphacut.figures.envelope import WORDS
 
-    words = (
-        "<p>Share of the width at α = 0 that is lost when an input is fixed at its modal value and"
-        " all others are kept.</p>"
+    words = paragraphs(
+        "Share of the width at α = 0 that is lost when an input is fixed at its modal value and"
+        " all others are kept."
     )
     # quantities that depend on the same inputs share a table
     kinds = dict.fromkeys(tuple(entry) for entry in found.values())
@@ -204,7 +209,7 @@ def shares(found: Mapping[str, Any]) -> str:
     return section("What drives the width", words, *tables)
 
 
-def comparison(rows: Sequence[Mapping[str, Any]]) -> str:
+def comparison(rows: Sequence[Mapping[str, Any]]) -> Markup:
     """Paper, here, difference."""
     from alphacut.stages.summary import cells
 
@@ -218,7 +223,7 @@ def comparison(rows: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def methods(summary: Mapping[str, Any]) -> str:
+def methods(summary: Mapping[str, Any]) -> Markup:
     """Method and cost of each stage."""
     rows: list[tuple[object, ...]] = []
     if cell := summary.get("modulus"):
@@ -244,7 +249,7 @@ def methods(summary: Mapping[str, Any]) -> str:
                 f"{study['seconds']:.1f}",
             )
         )
-    words = "".join(f"<p>{html.escape(text)}</p>" for text in (*explained(rows), *proofs(summary)))
+    words = paragraphs(*explained(rows), *proofs(summary))
     return section(
         "Methods and cost",
         table(("stage", "method", "nature of the bounds", "cost", "seconds"), rows, numbers=3),
@@ -293,45 +298,31 @@ def sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:].rstrip('.')}." if text else ""
 
 
-def case_text(summary: Mapping[str, Any]) -> str:
+def case_text(summary: Mapping[str, Any]) -> Markup:
     """The case file as it was, and what the command line changed."""
-    changes = "".join(
-        f"<li><code>{html.escape(change)}</code></li>" for change in summary.get("changes", ())
-    )
+    changes = [code(change) for change in summary.get("changes", ())]
     return section(
         "The case",
-        f"<p>Changed on the command line:</p><ul>{changes}</ul>" if changes else "",
-        f"<details><summary>{html.escape(summary['case'])}.toml</summary><pre>{html.escape(summary['case_text'])}</pre></details>",
+        paragraphs("Changed on the command line:") + items(changes) if changes else Markup(),
+        details(f"{summary['case']}.toml", code(summary["case_text"], "pre")),
     )
 
 
-def differing(summary: Mapping[str, Any]) -> str:
+def differing(summary: Mapping[str, Any]) -> Markup:
     """Differences from the paper in the modules that the run used."""
     found = tuple(differences(summary))
-    rows = "".join(
-        f"<li><strong>{html.escape(subject)}</strong>: {html.escape(text)}</li>"
-        for subject, text in found
+    listed = items(
+        Markup("<strong>{}</strong>: {}").format(subject, text) for subject, text in found
     )
-    listed = f"<ul>{rows}</ul>"
     # for a case of one's own they are no news, but they are what the numbers rest on
     if not summary.get("paper"):
-        listed = (
-            f"<details><summary>{len(found)} places where the methods differ from the paper they"
-            f" follow</summary>{listed}</details>"
-        )
-    return section("Differences from the paper", listed) if found else ""
+        head = f"{len(found)} places where the methods differ from the paper they follow"
+        listed = details(head, listed)
+    return section("Differences from the paper", listed) if found else Markup("")
 
 
-def versions(summary: Mapping[str, Any]) -> str:
+def versions(summary: Mapping[str, Any]) -> Markup:
     """Versions, command, and how to cite."""
     found = ", ".join(f"{name} {version}" for name, version in summary["versions"].items())
-    command = (
-        f"<p>Made by <code>{html.escape(summary['command'])}</code> in {summary['seconds']:.0f}"
-        " s.</p>"
-    )
-    return section(
-        "Versions and citation",
-        command,
-        f"<p>{html.escape(found)}</p>",
-        f"<pre>{html.escape(citation())}</pre>",
-    )
+    command = Markup("Made by {} in {:.0f} s.").format(code(summary["command"]), summary["seconds"])
+    return section("Versions and citation", paragraphs(command, found), code(citation(), "pre"))

@@ -1,32 +1,60 @@
-"""Sections and tables of the report as HTML."""
+"""Pieces of the report as HTML, by Jinja2; text is escaped unless it is markup already."""
 
 from __future__ import annotations
 
-import html
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from markupsafe import Markup
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+HERE = Path(__file__).parent
 
 
-def section(title: str, *content: str) -> str:
-    """A section with its heading."""
-    return f"<section>\n<h2>{html.escape(title)}</h2>\n" + "\n".join(content) + "\n</section>"
+@cache
+def environment() -> Environment:
+    """The templates of this folder; everything in them is escaped."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    return Environment(autoescape=True, loader=FileSystemLoader(HERE), undefined=StrictUndefined)
+
+
+def fragment(name: str, *values: object) -> Markup:
+    """A macro of ``fragments.html`` with its values filled in."""
+    return Markup(getattr(environment().get_template("fragments.html").module, name)(*values))
+
+
+def section(title: str, *content: Markup) -> Markup:
+    """A section with its heading; empty pieces are left out."""
+    return fragment("section", title, [piece for piece in content if piece])
 
 
 def table(
     head: Sequence[str], rows: Sequence[Sequence[object]], *, numbers: int | None = None
-) -> str:
+) -> Markup:
     """A table; from column `numbers` on everything is a number, aligned to the right."""
-    first = 1 if numbers is None else numbers
+    return fragment("table", head, rows, 1 if numbers is None else numbers)
 
-    def cell(tag: str, column: int, content: object) -> str:
-        mark = ' class="number"' if column >= first else ""
-        return f"<{tag}{mark}>{html.escape(str(content))}</{tag}>"
 
-    top = "".join(cell("th", column, name) for column, name in enumerate(head))
-    body = "".join(
-        "<tr>" + "".join(cell("td", column, entry) for column, entry in enumerate(row)) + "</tr>\n"
-        for row in rows
-    )
-    return (
-        "<div"
-        f' class="scroll"><table><thead><tr>{top}</tr></thead><tbody>\n{body}</tbody></table></div>'
-    )
+def paragraphs(*texts: str) -> Markup:
+    """One paragraph for each text; words that are markup stay so."""
+    return fragment("paragraphs", texts)
+
+
+def items(entries: Iterable[str]) -> Markup:
+    """A list."""
+    return fragment("items", list(entries))
+
+
+def details(head: str, content: Markup) -> Markup:
+    """A part that unfolds."""
+    return fragment("details", head, content)
+
+
+def code(text: str, tag: str = "code") -> Markup:
+    """Text as it was typed, on its line or, with the tag pre, by itself."""
+    return Markup("<{0}>{1}</{0}>").format(tag, text)

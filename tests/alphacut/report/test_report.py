@@ -157,3 +157,19 @@ def test_the_error_of_a_certified_envelope_is_said_to_be_within_its_bounds():
     assert extremes({"E": {**study, "gap": 1e-4}}) == [
         ("E", "q1", "−200.0 mm", "300.0 mm", "100 µm (within the bounds)")
     ]
+
+
+def test_text_is_escaped_wherever_it_stands():
+    from alphacut.report.sections import case_text, given
+    from alphacut.report.tables import section, table
+
+    wicked = "<script>alert('&')</script>"
+    one = {"lower": [1.0], "upper": [2.0]}
+    pieces = [
+        section(wicked, table([wicked], [[wicked]])),
+        given({"alpha": [0.0], "E_GPa": one, "of": wicked}),
+        case_text({"case": wicked, "case_text": wicked, "changes": [wicked]}),
+    ]
+    for piece in pieces:
+        assert "<script>" not in piece
+        assert "&lt;script&gt;alert(&#39;&amp;&#39;)" in piece
