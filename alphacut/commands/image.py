@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TextIO
 
+from alphacut.case.idle import require_read
 from alphacut.case.load import load
-from alphacut.commands.options import add_common
-from alphacut.io.files import as_json, say, write_text
+from alphacut.commands.options import add_common, answer
+from alphacut.io.files import say
 from alphacut.io.progress import progress
 from alphacut.io.provenance import attributes, fingerprint
 from alphacut.stages import image
@@ -26,6 +27,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Compute and report."""
     case = load(options.case, options.set)
+    require_read(case, ("image",), "image")
     study = image.study_of(case)
     with progress("Image", quiet=options.quiet) as tick:
         found = image.compute(study, progress=tick)
@@ -33,15 +35,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         key = fingerprint(case.values, ("stochastic", "rve", "fuzzy"))
         image.write(found, Path(options.out), attributes(case.text_of_file, key))
     numbers = image.document(found)
-    document = as_json(numbers, indent=None if options.json == "-" else 2)
-    if options.json == "-":
-        out.write(document)
-    elif options.json:
-        write_text(options.json, document)
-    if options.json != "-" and not options.quiet:
-        out.write(summary(numbers))
-        if not options.out:
-            say("to hand this on: the same command with --out image.nc, then modulus.file")
+    if answer(options, numbers, out, summary(numbers)) and not options.out:
+        say("to hand this on: the same command with --out image.nc, then modulus.file")
     return 0
 
 

@@ -119,7 +119,7 @@ def given(found: Mapping[str, Any]) -> Markup:
     return section("Fuzzy modulus", words, table(("α", "lower E, GPa", "upper E, GPa"), rows))
 
 
-def image(found: Mapping[str, Any], drawn: str) -> str:
+def image(found: Mapping[str, Any], drawn: Markup) -> Markup:
     """The bounds of an image's modulus, what they are worth, and what widens them."""
     cuts = found["cuts"]
     ends = zip(
@@ -141,11 +141,11 @@ def image(found: Mapping[str, Any], drawn: str) -> str:
         if apparent
         else ""
     )
-    words = (
-        "<p>Plane strain: every section of the material is the image, as with fibres. If the"
+    words = paragraphs(
+        "Plane strain: every section of the material is the image, as with fibres. If the"
         f" particles are grains, the Hashin–Shtrikman interval of E is {grains}. The plane-strain"
         f" Young's modulus of the softest direction lies in {least}, of the stiffest in"
-        f" {greatest}.{own} {html.escape(sentence(found['advice']))}</p>"
+        f" {greatest}.{own} {sentence(found['advice'])}"
     )
     widths = [(name, f"{width:.4f}") for name, width in found["contributions_GPa"].items()]
     return section(
@@ -153,7 +153,7 @@ def image(found: Mapping[str, Any], drawn: str) -> str:
         words,
         drawn,
         table(("α", "lower E, GPa", "upper E, GPa", "nature"), rows),
-        "<h3>What widens E</h3>" + table(("source alone", "width of E, GPa"), widths),
+        Markup("<h3>What widens E</h3>") + table(("source alone", "width of E, GPa"), widths),
     )
 
 

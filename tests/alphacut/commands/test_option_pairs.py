@@ -11,6 +11,7 @@ import shutil
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
+import numpy as np
 import pytest
 
 from alphacut.entry import COMMANDS, main, parsers
@@ -76,6 +77,20 @@ area_fraction = 0.2
 smallest_radius = "1 mm"
 largest_radius = "2 mm"
 """
+IMAGED = """
+schema = 1
+title = "imaged"
+about = "A few pixels."
+stages = ["image"]
+
+[image]
+file = "a.npy"
+pixel = "2 µm"
+labels = [0, 1]
+modulus = ["20 GPa", "80 GPa"]
+poisson = [0.3]
+alpha = [0, 1]
+"""
 VALUES = {
     "--json": ("-", "out.json"),
     "--quiet": ((),),
@@ -133,6 +148,8 @@ OWN = {
     ("microstructure", "--set"): ("microstructure.seed=2",),
     ("microstructure", "--out"): ("particles",),
     ("report", "--out"): ("page.html",),
+    ("image", "--set"): ("image.poisson=[0.25]",),
+    ("image", "--out"): ("image.nc",),
 }
 EXPLAINED = {
     ("--quiet", "--json"): "as with --json -",
@@ -193,7 +210,8 @@ class Watched:
         text = CASE.format(stages=stages, modulus=own)
         if self.command == "report":
             text = CASE.format(stages='["envelope"]', modulus='modulus = "25.5 GPa"\n')
-        text = PACKED if self.command == "microstructure" else text
+        text = {"microstructure": PACKED, "image": IMAGED}.get(self.command, text)
+        np.save(place / "a.npy", np.pad(np.ones((4, 4), int), 4))
         (place / "case.toml").write_text(text, encoding="utf-8")
 
     def watch(self):
