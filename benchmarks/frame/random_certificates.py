@@ -7,47 +7,25 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from alphacut.frame import Accelerogram, Envelope, Exact, LinearFlow, StoreyFrame, envelope
+from alphacut.frame import Envelope, Exact, LinearFlow, StoreyFrame, envelope
 from alphacut.frame.calculus.jet import Array
 from alphacut.fuzzy import FuzzyNumber
-from benchmarks.frame.random_frames import random_frame
+from benchmarks.frame.random_frames import DURATION, drawn
 from benchmarks.rows import write
 
 RESULTS = Path(__file__).parents[1] / "results"
-DURATION = 12.0
 STEPS = (0.05, 0.1)
 """Distances of nodes, in s: two certificates of each frame."""
-RECORD_STEPS = (0.01, 0.017, 1 / 128, 1 / 256, 0.05, 0.3, 0.1 / 3)
 GAP = 1e-5
 """Gap asked for, as a share of each output's peak."""
 CHUNK = 2000
 OPTIMA = 100
 """Nodes and outputs whose best parameters are tried, and points next to them."""
-
-
-def random_record(rng: np.random.Generator) -> Accelerogram:
-    """Noise, a pulse or a sine of an odd step, mostly cut where it is not zero."""
-    step = float(rng.choice([*RECORD_STEPS, rng.uniform(0.004, 0.4)]))
-    time = np.arange(max(2, int(rng.uniform(0.5, 1.2 * DURATION) / step))) * step
-    kind = rng.integers(3)
-    if kind == 0:
-        return Accelerogram(step, 0.3 * rng.standard_normal(len(time)))
-    if kind == 1:
-        return Accelerogram(step, np.full(len(time), rng.uniform(-0.3, 0.3)))
-    return Accelerogram(step, 0.3 * np.sin(rng.uniform(1, 20) * time + rng.uniform(0, 6)))
-
-
-def drawn(seed: int) -> tuple[StoreyFrame, dict[str, FuzzyNumber]]:
-    """The random frame of a seed; those of odd seeds are shaken."""
-    frame, inputs = random_frame(seed)
-    rng = np.random.default_rng([seed, 1])
-    return (replace(frame, ground=random_record(rng)) if seed % 2 else frame), inputs
 
 
 def certified(

@@ -6,24 +6,27 @@ Run `python -m benchmarks.frame.random_frames --help`.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from alphacut.frame import Envelope, Exact, LinearFlow, StoreyFrame, envelope
+from alphacut.frame import Accelerogram, Envelope, Exact, LinearFlow, StoreyFrame, envelope
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.fuzzy import FuzzyNumber, Triangular
 from benchmarks.frame.reference import true_envelope
 from benchmarks.rows import write
 
 RESULTS = Path(__file__).parents[1] / "results"
-TIME: dict[str, Any] = {"duration": 12.0, "step": 0.05, "alpha": (0,)}
+DURATION = 12.0
+TIME: dict[str, Any] = {"duration": DURATION, "step": 0.05, "alpha": (0,)}
 ORDERS: list[tuple[tuple[str, ...], tuple[float, ...]]] = [
     ((), (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)),
     (("modal",), (1e-2, 1e-3, 1e-4)),
 ]
+RECORD_STEPS = (0.01, 0.017, 1 / 128, 1 / 256, 0.05, 0.3, 0.1 / 3)
 GAP = 1e-7
 """Of the certified envelope, in m, a tenth of the sharpest tolerance."""
 
@@ -54,6 +57,25 @@ def random_frame(seed: int) -> tuple[StoreyFrame, dict[str, FuzzyNumber]]:
     ]
     chosen = rng.choice(pool, int(rng.integers(1, 5)), replace=False)
     return frame, {str(name): _around(frame.parameters[name], rng) for name in chosen}
+
+
+def random_record(rng: np.random.Generator) -> Accelerogram:
+    """Noise, a pulse or a sine of an odd step, mostly cut where it is not zero."""
+    step = float(rng.choice([*RECORD_STEPS, rng.uniform(0.004, 0.4)]))
+    time = np.arange(max(2, int(rng.uniform(0.5, 1.2 * DURATION) / step))) * step
+    kind = rng.integers(3)
+    if kind == 0:
+        return Accelerogram(step, 0.3 * rng.standard_normal(len(time)))
+    if kind == 1:
+        return Accelerogram(step, np.full(len(time), rng.uniform(-0.3, 0.3)))
+    return Accelerogram(step, 0.3 * np.sin(rng.uniform(1, 20) * time + rng.uniform(0, 6)))
+
+
+def drawn(seed: int) -> tuple[StoreyFrame, dict[str, FuzzyNumber]]:
+    """The random frame of a seed; those of odd seeds are shaken."""
+    frame, inputs = random_frame(seed)
+    rng = np.random.default_rng([seed, 1])
+    return (replace(frame, ground=random_record(rng)) if seed % 2 else frame), inputs
 
 
 def _around(middle: float, rng: np.random.Generator) -> FuzzyNumber:
@@ -96,10 +118,13 @@ def true_errors(
     return errors
 
 
-def measured(seeds: Sequence[int]) -> Iterator[dict[str, Any]]:
+def measured(
+    seeds: Sequence[int],
+    draw: Callable[[int], tuple[StoreyFrame, dict[str, FuzzyNumber]]] = random_frame,
+) -> Iterator[dict[str, Any]]:
     """One row per frame, exclusion and tolerance."""
     for seed in seeds:
-        frame, inputs = random_frame(seed)
+        frame, inputs = draw(seed)
         orders = [
             (exclude, tolerance) for exclude, tolerances in ORDERS for tolerance in tolerances
         ]
@@ -131,10 +156,11 @@ def main() -> None:
     )
     parser.add_argument("--first", type=int, default=0, help="first seed (0)")
     parser.add_argument("--frames", type=int, default=20, help="number of frames (20)")
+    parser.add_argument("--records", action="store_true", help="shake the frames of odd seeds")
     options = parser.parse_args()
     RESULTS.mkdir(exist_ok=True)
-    rows = []
-    for row in measured(range(options.first, options.first + options.frames)):
+    rows, seeds = [], range(options.first, options.first + options.frames)
+    for row in measured(seeds, drawn if options.records else random_frame):
         rows.append(row)
         verdict = "" if row["error_m"] <= row["tolerance_m"] else "  ABOVE THE TOLERANCE"
         print(
@@ -146,7 +172,7 @@ def main() -> None:
         )
     kept = [row for row in rows if row["error_m"] <= row["tolerance_m"]]
     print(f"{len(kept)} of {len(rows)} within the tolerance")
-    write(rows, RESULTS / "frame_random.csv")
+    write(rows, RESULTS / f"frame_random{'_records' if options.records else ''}.csv")
 
 
 if __name__ == "__main__":
