@@ -208,12 +208,14 @@ class Table:
         """
         at_r, at_e = self.span.coordinates(radius, modulus)
         rows = chebyshev.chebvander(at_r, self.coefficients.shape[0] - 1)
-        columns = chebyshev.chebvander(at_e, self.coefficients.shape[1] - 1)
+        columns = np.ascontiguousarray(chebyshev.chebvander(at_e, self.coefficients.shape[1] - 1))
         # one by one: same bits in any company
-        logarithms = [
-            rows @ np.tensordot(column, self.coefficients, axes=(0, 1)) for column in columns
-        ]  # one by one: same bits in any company
-        return np.exp(np.stack(logarithms, axis=1)) * self.span.dilute(radius, modulus)
+        # one by one: same bits in any company
+        scales = [
+            np.exp(rows @ np.tensordot(column, self.coefficients, axes=(0, 1)))
+            for column in columns
+        ]
+        return np.asarray(np.stack(scales, axis=1) * self.span.dilute(radius, modulus))
 
     def stiffness(self, radius: Array, modulus: Array) -> Array:
         """Voigt matrices in Pa at n radii times m moduli, shape (n, m, 3, 3)."""
