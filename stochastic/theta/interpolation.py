@@ -19,11 +19,27 @@ def between_nodes(nodes: Array, values: Array, at: Array) -> Array:
     is small: its error falls with the number of nodes as that of the rule itself does. Pieces that
     keep the order of the values elsewhere.
     """
-    from scipy.interpolate import BarycentricInterpolator, PchipInterpolator
+    from scipy.interpolate import PchipInterpolator
 
     if len(nodes) >= FEWEST and lebesgue(nodes, at) <= LARGEST:
-        return np.asarray(BarycentricInterpolator(nodes, values)(at))
+        return barycentric(nodes, values, at)
     return np.asarray(PchipInterpolator(nodes, values)(at))
+
+
+def barycentric(nodes: Array, values: Array, at: Array) -> Array:
+    """Polynomial through values at nodes, shape (n,), at `at` (any shape).
+
+    The second form of the barycentric formula (Berrut and Trefethen, SIAM Review 46, 2004). SciPy's
+    takes the nodes in a random order, and its last digits change from run to run.
+    """
+    scaled = 4 / (nodes[-1] - nodes[0]) * (nodes[:, None] - nodes)
+    np.fill_diagonal(scaled, 1.0)
+    gaps = np.asarray(at, float)[..., None] - nodes
+    hit = gaps == 0
+    shares = 1 / np.prod(scaled, axis=1) / np.where(hit, 1.0, gaps)
+    shares = np.where(hit.any(axis=-1, keepdims=True), hit, shares)
+    total: Array = (shares * values).sum(axis=-1) / shares.sum(axis=-1)
+    return total
 
 
 def lebesgue(nodes: Array, at: Array) -> float:

@@ -72,3 +72,10 @@ def test_a_response_has_curves_good_to_four_digits_whatever_its_modulus_needs():
         own = model.solve(radius, matrix, [particle])[0].curve
         errors.append(np.abs(between_nodes(own.theta, own.s11, AT) / truth - 1).max())
     assert errors[1] < 1e-4 < 1e-2 < errors[0]
+
+
+def test_a_curve_between_nodes_is_the_same_to_the_last_bit_each_time():
+    nodes = gauss_rule(TruncatedNormal(), points=14).nodes
+    curves = {between_nodes(nodes, wave(nodes), AT).tobytes() for _ in range(20)}
+    assert len(curves) == 1
+    assert (between_nodes(nodes, wave(nodes), nodes) == wave(nodes)).all()
