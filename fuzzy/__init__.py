@@ -9,6 +9,7 @@ from alphacut.fuzzy.knowledge.joint import JointClaim, jointly
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.knowledge.order_statistics import least_alpha, values_needed
 from alphacut.fuzzy.plans.alpha_cut_optimisation import Optimisation
+from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.branch_and_bound import BranchAndBound
 from alphacut.fuzzy.plans.interval_quasi_monte_carlo import (
     IntervalQuasiMonteCarlo,
@@ -45,6 +46,7 @@ from alphacut.fuzzy.surrogates.response_surface import ResponseSurface
 from alphacut.fuzzy.width_contributions import Shares, width_shares
 
 __all__ = [
+    "Automatic",
     "BranchAndBound",
     "CampaignError",
     "Chebyshev",

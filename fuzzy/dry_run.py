@@ -15,6 +15,7 @@ from alphacut.fuzzy.campaign.memory_check import needed
 from alphacut.fuzzy.campaign.sample_store import Shelf, shelf
 from alphacut.fuzzy.campaign.store import Identity, Store, Stored
 from alphacut.fuzzy.knowledge.known import Known
+from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.plan import Plan
 from alphacut.fuzzy.plans.transformation import Extended, General, Reduced
 from alphacut.fuzzy.samples.model import Values
@@ -131,8 +132,8 @@ def explain(
     Args:
         function: Not called; may be left out, so that the inputs come first.
         inputs: Fuzzy number of each input; a plain number is crisp.
-        plan: How the boxes of the inputs are searched; the general transformation method if not
-            given.
+        plan: How the boxes of the inputs are searched; if not given, a search that sees extremes
+            inside and says what was verified.
         alpha: Rising levels; 0, ¼, ½, ¾, 1 if not given.
         interactions: Constraints between the inputs.
         shared: Inputs whose equality lets samples share one call.
@@ -150,7 +151,7 @@ def explain(
     """
     if isinstance(function, Mapping):
         inputs, plan = function, cast("Plan | None", inputs) or plan
-    plan = plan or General()
+    plan = plan or Automatic()
     require_plan(plan)
     domain = Domain(
         fuzzy_inputs(cast("Mapping[str, Any]", inputs)),

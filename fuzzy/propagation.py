@@ -24,8 +24,8 @@ from alphacut.fuzzy.campaign.spot_check import SpotCheck
 from alphacut.fuzzy.campaign.store import Identity, Store
 from alphacut.fuzzy.campaign.workers import pool, require_workers
 from alphacut.fuzzy.knowledge.known import Known
+from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.plan import Plan
-from alphacut.fuzzy.plans.transformation import General
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain, levels
 from alphacut.fuzzy.sets.interaction import Interaction
@@ -58,8 +58,8 @@ def propagate(
             (n,), and returns arrays whose first axis is n.
         inputs: Fuzzy number of each input; a plain number is crisp. Inputs are independent, also
             where one number object stands for two.
-        plan: How the boxes of the inputs are searched; the general transformation method if not
-            given.
+        plan: How the boxes of the inputs are searched; if not given, a search that sees extremes
+            inside and says what was verified.
         alpha: Rising levels; 0, ¼, ½, ¾, 1 if not given.
         interactions: Constraints between the inputs; plans that cannot respect them refuse.
         shared: Inputs whose equality lets samples share one call.
@@ -90,7 +90,7 @@ def propagate(
         fuzzy_inputs(inputs), levels(4) if alpha is None else alpha, interaction_list(interactions)
     )
     known = known_facts(known, domain.names)
-    plan = plan or General()
+    plan = plan or Automatic()
     require_plan(plan)
     require_workers(workers)
     require_callable(function, domain.names, by_name=not shared, sent=workers > 1)

@@ -75,7 +75,7 @@ class Optimisation:
         columns = memo(modal).columns
         names = self.outputs or primary(columns, model.known)
         for level in reversed(range(len(domain.alpha))):
-            cut = _Cut(memo, domain, level)
+            cut = LevelSearch(memo, domain, level)
             if not (cut.upper > cut.lower).any():
                 continue
             if self.method == "multistart":
@@ -88,7 +88,7 @@ class Optimisation:
             memo.values, plan=f"optimisation by {self.method}"
         )
 
-    def _search(self, cut: _Cut, output: str, sign: float) -> None:
+    def _search(self, cut: LevelSearch, output: str, sign: float) -> None:
         if self.method == "multistart":
             for start in cut.best(output, sign, self.starts):
                 cut.descend(start, output, sign)
@@ -122,7 +122,7 @@ class Optimisation:
             scipy.optimize.dual_annealing(objective, bounds, maxfun=self.budget, rng=self.seed)
 
 
-class _Cut:
+class LevelSearch:
     """One level under search, in unit coordinates of the inputs that have a width."""
 
     def __init__(self, memo: Memo, domain: Domain, level: int) -> None:
@@ -182,7 +182,7 @@ class _Cut:
                 chosen.append(unit[row])
         return np.array(chosen)
 
-    def descend(self, start: Array, output: str, sign: float) -> None:
+    def descend(self, start: Array, output: str, sign: float, rounds: int = 50) -> None:
         """A descent by gradients inside the cut; its samples stay in the memo."""
         from scipy.optimize import minimize
 
@@ -216,5 +216,5 @@ class _Cut:
                 jac=True,
                 bounds=bounds,
                 method="L-BFGS-B",
-                options={"maxiter": 50},
+                options={"maxiter": rounds},
             )

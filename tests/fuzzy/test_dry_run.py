@@ -19,8 +19,8 @@ from alphacut.fuzzy import (
     Triangular,
     explain,
     levels,
-    propagate,
 )
+from tests.fuzzy.general import propagate
 
 INPUTS = {"a": Triangular(0.0, 0.3, 1.0), "b": Triangular(-1.0, 0.0, 2.0)}
 IDENTITY = {"cell": {"mesh": 0.15, "layers": 12}, "version": "1"}

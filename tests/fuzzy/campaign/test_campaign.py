@@ -16,8 +16,8 @@ from alphacut.fuzzy import (
     QuasiMonteCarlo,
     Signed,
     Triangular,
-    propagate,
 )
+from tests.fuzzy.general import propagate
 
 INPUTS = {"a": Triangular(0.0, 0.5, 1.0), "b": Triangular(-1.0, 0.0, 2.0)}
 

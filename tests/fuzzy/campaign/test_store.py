@@ -22,11 +22,11 @@ from alphacut.fuzzy import (
     StoreError,
     Triangular,
     levels,
-    propagate,
 )
 from alphacut.fuzzy.campaign.call import Sample
 from alphacut.fuzzy.campaign.sample_store import Shelf
 from alphacut.fuzzy.campaign.store import canonical
+from tests.fuzzy.general import propagate
 
 INPUTS = {"a": Triangular(0.0, 0.3, 1.0), "b": Triangular(-1.0, 0.0, 2.0)}
 IDENTITY = {"model": "sum", "mesh": 0.15}

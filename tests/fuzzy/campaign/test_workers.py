@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from alphacut.fuzzy import Triangular, propagate
+from alphacut.fuzzy import Triangular
+from tests.fuzzy.general import propagate
 
 ROOT = Path(__file__).parents[3]
 SCRIPT = """

@@ -1,0 +1,154 @@
+"""The default plan: no answer far off in silence, whatever the function has inside."""
+
+import os
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+from scipy.stats import qmc
+
+from alphacut.fuzzy import (
+    Automatic,
+    General,
+    Interval,
+    Known,
+    Linear,
+    Nature,
+    Triangular,
+    propagate,
+)
+
+KINDS = ("monotone", "inside", "ridge", "kink", "wave")
+
+
+def random_problem(seed):
+    """A function of 1 to 5 inputs, of points (n, inputs), with its inputs."""
+    rng = np.random.default_rng(seed)
+    d, kind = int(rng.integers(1, 6)), KINDS[seed % len(KINDS)]
+    inputs = {}
+    for i in range(d):
+        low, modal, high = np.sort(rng.uniform(-1, 1, 3))
+        inputs[f"x{i}"] = (
+            Triangular(low, modal, high) if rng.random() < 0.7 else Interval(low, high)
+        )
+    w, centre, f, size = (
+        rng.normal(0, 1, d),
+        rng.uniform(-0.8, 0.8, d),
+        rng.normal(0, 2, d),
+        rng.normal(),
+    )
+    root = rng.normal(0, 1, (d, d))
+    matrix = root @ root.T + 0.3 * np.eye(d)
+    functions = {
+        "monotone": lambda x: np.exp(x @ np.abs(w)) + x.sum(axis=1),
+        "inside": lambda x: 0.3 * x @ w - np.einsum("ni,ij,nj->n", x - centre, matrix, x - centre),
+        "ridge": lambda x: np.exp(-6 * (x @ w / np.linalg.norm(w) - 0.1) ** 2) + 0.2 * x @ f,
+        "kink": lambda x: np.abs(x - centre) @ np.abs(w) + 0.3 * x @ f,
+        "wave": lambda x: x @ w + size * np.sin(1.5 * x @ f + 1),
+    }
+    return functions[kind], inputs, rng
+
+
+def truth(function, lower, upper, rng):
+    """Extremes over a box by many points, all corners and descents from the best."""
+    d = len(lower)
+    corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * d), axis=-1).reshape(-1, d)
+    points = lower + np.concatenate([qmc.Sobol(d, rng=rng).random_base2(13), corners]) * (
+        upper - lower
+    )
+    values, ends = function(points), []
+    for sign in (1, -1):
+        starts = points[np.argsort(sign * values)[:6]]
+        box = list(zip(lower, upper, strict=True))
+        found = [
+            minimize(lambda x, s=sign: s * function(x[None])[0], start, bounds=box).fun
+            for start in starts
+        ]
+        ends.append(sign * min(*found, (sign * values).min()))
+    return ends
+
+
+def misses(seed, plan, alpha=(0.0, 0.5)):
+    """What the plan's bounds miss, and what they say that they may, as shares of the width."""
+    function, inputs, rng = random_problem(seed)
+
+    def named(**x):
+        return function(np.stack(np.broadcast_arrays(*x.values()), axis=-1).reshape(-1, len(x)))
+
+    result = propagate(named, inputs, plan, alpha=alpha, vectorised=True)
+    missed = []
+    for level, (lower, upper) in enumerate(zip(*result.domain.boxes, strict=True)):
+        low, high = truth(function, lower, upper, rng)
+        miss = max(result.lower[level, 0] - low, high - result.upper[level, 0], 0.0)
+        missed.append([miss / (high - low), result.error[level, 0] / (high - low)])
+    return np.array(missed), result
+
+
+def check(seeds):
+    far, uncovered, cells = 0, 0, 0
+    for seed in seeds:
+        found, result = misses(seed, None)
+        assert result.notes[-1].startswith(
+            "searched for extremes inside: fresh points in every cut"
+        )
+        assert result.runs + result.verification_runs < 4000
+        far += int((found[:, 0] > 0.01).sum())
+        uncovered += int((found[:, 0] > found[:, 1] + 1e-6).sum())
+        cells += len(found)
+    return far / cells, uncovered / cells
+
+
+def test_extremes_inside_are_seen_by_default():
+    assert check(range(100, 115)) == (0.0, 0.0)
+
+
+@pytest.mark.slow
+def test_extremes_inside_are_seen_in_five_hundred_functions():
+    start = int(os.environ.get("SEED", "1000"))
+    far, uncovered = check(range(start, start + 500))
+    assert far <= 0.002
+    assert uncovered <= 0.01
+
+
+def test_the_general_method_misses_them():
+    found, _ = misses(103, General())
+    assert max(misses(seed, General())[0].max() for seed in (101, 102, 103, 104)) > 0.1
+
+
+def test_facts_that_prove_corners_are_used():
+    result = propagate(
+        lambda a, b: a * b,
+        {"a": Triangular(1, 2, 3), "b": Triangular(1, 2, 4)},
+        known=Known(signs={"a": 1, "b": 1}),
+    )
+    assert (result.nature, result.plan) == (Nature.GUARANTEED, "reduced")
+
+
+def test_interactions_are_respected():
+    result = propagate(
+        lambda a, b: a + b,
+        {"a": Interval(0, 1), "b": Interval(0, 1)},
+        alpha=(0.0,),
+        interactions=[Linear({"a": 1, "b": 1}, 1.5)],
+    )
+    assert abs(result.upper[0, 0] - 1.5) < 1e-6
+
+
+def test_many_outputs_get_the_bounds_of_a_surface():
+    at = np.linspace(0, 1, 30)
+    result = propagate(lambda a: np.sin(6 * a + at), {"a": Interval(0, 1)}, alpha=(0.0,))
+    assert result.nature is Nature.ESTIMATED
+    assert (np.abs(result.upper - 1) <= result.error + 1e-9).sum() >= 25
+    assert len(result.points) < 200
+
+
+def test_what_cannot_be_covered_is_said():
+    spike = 0.123456
+    result = propagate(lambda a: float(abs(a - spike) < 1e-5), {"a": Interval(0, 1)}, alpha=(0.0,))
+    assert result.upper[0, 0] == 0
+    assert result.notes[-1].endswith("a spike between samples would not be seen")
+
+
+def test_wrong_numbers_are_refused():
+    with pytest.raises(ValueError, match="tolerance, budget, look and looks are 0, 400, 6 and 4"):
+        Automatic(tolerance=0)
