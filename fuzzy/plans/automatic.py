@@ -27,9 +27,9 @@ class Automatic:
 
     Where the facts known of the model make corners suffice, these alone are run. Elsewhere every
     cut is looked at with fresh points, from the best of which the model itself is descended, until
-    such a look finds nothing new. Bounds are attained by samples (inner); their error is what the last
-    look found, doubled, or the surface's, whichever is larger. A spike narrower than the distance
-    of the samples is not seen, and nothing but a proof can see it.
+    such a look finds nothing new. Bounds are attained by samples (inner); their error is what the
+    last look found, doubled, or the surface's, whichever is larger. Only a proof sees a spike that
+    is narrower than the distance of the samples.
 
     Args:
         tolerance: Share of an output's range that a look must not find more than.
@@ -76,14 +76,8 @@ class Automatic:
         left = self._looked(memo, domain, names if few else ())
         result = Design.from_samples(domain, memo.points).bounds(memo.values, plan="automatic")
         chosen = [result.column(name) for name in names]
-        beyond = (found.lower < result.lower) | (found.upper > result.upper)
-        if not few:  # the surface sees further than the samples
-            result = replace(
-                result,
-                lower=np.minimum(found.lower, result.lower),
-                upper=np.maximum(found.upper, result.upper),
-                base=found.base if beyond.any() else result.base,
-            )
+        if not few:
+            result = _further(result, found)
         error = np.maximum(found.error, _SAFETY * left)
         return replace(
             result,
@@ -124,6 +118,19 @@ class Automatic:
             f"searched for extremes inside: fresh points in every cut {how}leave an error of"
             f" {share:.1g} of the width{grade}; a spike between samples would not be seen"
         )
+
+
+def _further(samples: FuzzyResult, surface: FuzzyResult) -> FuzzyResult:
+    """The wider of two bounds each; estimated where the surface sees further."""
+    low, high = surface.lower < samples.lower, surface.upper > samples.upper
+    return replace(
+        samples,
+        lower=np.where(low, surface.lower, samples.lower),
+        upper=np.where(high, surface.upper, samples.upper),
+        lower_at=np.where(low[..., None], surface.lower_at, samples.lower_at),
+        upper_at=np.where(high[..., None], surface.upper_at, samples.upper_at),
+        base=surface.base if (low | high).any() else samples.base,
+    )
 
 
 def _bounds(memo: Memo, domain: Domain) -> Array:

@@ -111,7 +111,6 @@ def test_extremes_inside_are_seen_in_five_hundred_functions():
 
 
 def test_the_general_method_misses_them():
-    found, _ = misses(103, General())
     assert max(misses(seed, General())[0].max() for seed in (101, 102, 103, 104)) > 0.1
 
 
