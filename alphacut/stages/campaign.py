@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alphacut.case.case import Case
-from alphacut.fuzzy import Extended, FuzzyNumber, General, Known, Plan, Reduced, Signed
+from alphacut.fuzzy import Extended, FuzzyNumber, General, Known, Reduced, Signed
+from alphacut.fuzzy.plans.plan import Plan
 from alphacut.io.provenance import source_digest, versions
 from alphacut.stages.cell import INPUTS, SHARED, CellChoice, cell_choice, key_of, parts
 from alphacut.stages.cell_models import cell_model

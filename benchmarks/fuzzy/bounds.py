@@ -35,7 +35,6 @@ from alphacut.fuzzy import (
     General,
     Known,
     Optimisation,
-    Plan,
     QuasiMonteCarlo,
     Reduced,
     Signed,
@@ -43,6 +42,7 @@ from alphacut.fuzzy import (
     levels,
     propagate,
 )
+from alphacut.fuzzy.plans.plan import Plan
 
 Array = NDArray[np.float64]
 Function = Callable[..., Array]

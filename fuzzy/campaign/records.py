@@ -90,7 +90,8 @@ def scan(read: Callable[[int, int], bytes], start: int, end: int) -> Iterator[Re
         end: Size of the file.
     """
     while start < end:
-        data = read(start, max(_BLOCK, _needed(read(start, HEAD))))
+        size = max(_BLOCK, _needed(read(start, HEAD)))
+        data = read(start, min(size, end - start))
         last, position = start + len(data) >= end, 0
         while position < len(data):
             content, size = _at(data, position)

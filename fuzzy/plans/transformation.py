@@ -133,11 +133,6 @@ class Reduced(_Transformation):
 
 
 @dataclass(frozen=True)
-class Vertex(Reduced):
-    """Vertex method (Dong & Shah 1987): the corners of the reduced method."""
-
-
-@dataclass(frozen=True)
 class Extended(_Transformation):
     """Extended transformation method: ends of monotone inputs, all points of the others.
 

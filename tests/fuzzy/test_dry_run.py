@@ -132,9 +132,9 @@ def test_a_process_that_dies_is_recorded_as_a_failed_sample(tmp_path):
 
 def test_an_explanation_takes_the_arguments_of_a_propagation(tmp_path):
     assert (
-        explain(model, INPUTS).samples
-        == explain(INPUTS).samples
-        == explain(inputs=INPUTS).samples
+        explain(model, INPUTS, General()).samples
+        == explain(INPUTS, General()).samples
+        == explain(inputs=INPUTS, plan=General()).samples
         == 55
     )
     options = {

@@ -7,7 +7,6 @@ from alphacut.frame import StoreyFrame, envelope
 from alphacut.fuzzy import (
     Claimed,
     Crisp,
-    DependencyError,
     Ellipsoidal,
     JointClaim,
     Known,
@@ -18,6 +17,7 @@ from alphacut.fuzzy import (
     jointly,
     propagate,
 )
+from alphacut.fuzzy.sets.arithmetic import DependencyError
 from benchmarks.fuzzy.joint_coverage import rows_of
 
 BOUNDS = (0, 100)

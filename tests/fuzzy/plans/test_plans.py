@@ -18,7 +18,6 @@ from alphacut.fuzzy import (
     Reduced,
     Signed,
     Triangular,
-    Vertex,
     levels,
     propagate,
 )
@@ -60,7 +59,6 @@ EXACT = {
 COARSE = {
     "general": General(),
     "reduced": Reduced(),
-    "vertex": Vertex(),
     "extended": Extended(),
     "signed": Signed(),
     "evolution": Optimisation("differential_evolution", budget=600),
@@ -323,7 +321,7 @@ def test_a_campaign_beyond_memory_is_refused_before_it_starts():
 
 
 def test_a_result_prints_a_line_for_each_level_and_what_they_are_worth():
-    found = propagate(lambda a: 2 * a, {"a": Triangular(1, 2, 4)}, alpha=[0.0, 0.5, 1.0])
+    found = propagate(lambda a: 2 * a, {"a": Triangular(1, 2, 4)}, General(), alpha=[0.0, 0.5, 1.0])
     assert str(found).splitlines() == [
         f"inner bounds by the plan general, {found.runs} runs",
         "y, α = 0: 2 … 8",

@@ -13,9 +13,9 @@ from alphacut.fuzzy import (
     Reduced,
     Signed,
     Triangular,
-    Verification,
     propagate,
 )
+from alphacut.fuzzy.plans.monotonicity import Verification
 
 PAPER = {
     "a2": Triangular(0.001, 0.1, 0.3145),

@@ -8,7 +8,6 @@ import pytest
 
 from alphacut.fuzzy import (
     Crisp,
-    Domain,
     Extended,
     General,
     Interval,
@@ -20,6 +19,7 @@ from alphacut.fuzzy import (
     propagate,
 )
 from alphacut.fuzzy.plans.transformation import hanss_points
+from alphacut.fuzzy.sets.boxes import Domain
 
 PAPER = {
     "a2": Triangular(0.001, 0.1, 0.3145),

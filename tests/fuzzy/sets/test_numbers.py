@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from alphacut.fuzzy import Crisp, Cut, Interval, PiecewiseLinear, Trapezoidal, Triangular
+from alphacut.fuzzy import Crisp, Interval, PiecewiseLinear, Trapezoidal, Triangular
+from alphacut.fuzzy.sets.numbers import Cut
 
 finite = st.floats(-1e6, 1e6, allow_nan=False)
 NUMBERS = [
