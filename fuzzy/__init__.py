@@ -21,7 +21,7 @@ from alphacut.fuzzy.propagation import propagate
 from alphacut.fuzzy.random_response import RandomResponse
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.fuzzy.samples.result import FuzzyResult
-from alphacut.fuzzy.sets.arithmetic import apply
+from alphacut.fuzzy.sets.arithmetic import DependencyError, apply
 from alphacut.fuzzy.sets.boxes import levels
 from alphacut.fuzzy.sets.claimed import Claim, Claimed
 from alphacut.fuzzy.sets.interaction import Ellipsoidal, Linear
@@ -44,6 +44,7 @@ __all__ = [
     "Claim",
     "Claimed",
     "Crisp",
+    "DependencyError",
     "Ellipsoidal",
     "Extended",
     "FuzzyNumber",
