@@ -211,7 +211,7 @@ class BranchAndBound:
             self._improve(model, optima, j[better], cells.centre[better], f[better], (lower, upper))
         r = cells.radius
         Tr = np.einsum("nijk,nk->nij", T, r)
-        rest = np.einsum("nij,ni,nj->n", Tr, r, r) / 6
+        rest = cubic(Tr, r)
         target = optima.value[j] + self.gap
         open_ = f + _separable(g, H, r) + rest > target
         rising = np.abs(g) > np.einsum("nij,nj->ni", np.abs(H), r) + 0.5 * np.einsum(
@@ -292,6 +292,12 @@ def _signed_taylor(
     return side * f, side[:, None] * g, side[:, None, None] * H
 
 
+def cubic(Tr: Array, r: Array) -> Array:
+    """Bound of what a quadratic Taylor model leaves out for |x| <= r, from T r, shape (N, d, d)."""
+    rest: Array = np.einsum("nij,ni,nj->n", Tr, r, r) / 6
+    return rest
+
+
 def _separable(g: Array, H: Array, r: Array) -> Array:
     """Upper bound of max g·x + x·H·x/2 over |x| <= r, mixed terms moved to the diagonal."""
     diagonal = np.einsum("nii->ni", H)
@@ -311,7 +317,5 @@ def _bound(model: ModalModel, optima: Optima, cells: Cells, remainder: Remainder
     j, r = cells.problem, cells.radius
     f, g, H = _signed_taylor(model, optima, cells.centre, j)
     T = remainder.at(optima.node[j], optima.output[j])
-    bound: Array = (
-        f + _separable(g, H, r) + np.einsum("nijk,ni,nj,nk->n", T, r, r, r, optimize=True) / 6
-    )
+    bound: Array = f + _separable(g, H, r) + cubic(np.einsum("nijk,nk->nij", T, r), r)
     return bound

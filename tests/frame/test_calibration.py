@@ -1,0 +1,109 @@
+"""Declared errors against true ones: each estimate and each proof has a case where it is tight."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from alphacut.frame import Exact, LinearFlow, StoreyFrame, envelope
+from alphacut.frame.boxes import UnitFlow, boxes
+from alphacut.frame.calculus.polynomial import Polynomial
+from alphacut.frame.certificate.branch_and_bound import cubic
+from alphacut.frame.certificate.model_error import proved_error
+from alphacut.frame.certificate.remainder import Remainder
+from alphacut.frame.methods.auto import Auto, ToleranceError
+from alphacut.frame.methods.modal import Modal, polynomial_error
+from alphacut.frame.modal.model import ModalModel, fit_modes
+from alphacut.fuzzy import Interval
+from benchmarks.frame.calibration import judged, random_case
+
+ONE = StoreyFrame((1e4,), (3.0,), 25e9, 1e-6, q0=(0.01,))
+TWO = StoreyFrame((2e4, 1e4), (3.0, 3.0), 25e9, 1e-6, q0=(0.0, 0.01))
+TIGHT = 1.8
+"""Declared over true error, at most, where an estimate is meant to be tight."""
+
+
+def undamped(share: float, duration: float, step: float) -> ModalModel:
+    cuts = boxes({"E": Interval((1 - share) * 25e9, (1 + share) * 25e9)}, (0,))
+    return fit_modes(LinearFlow(ONE, cuts.names, duration, step, Exact()), cuts, tolerance=1e-12)
+
+
+def test_remainder_of_a_box_is_needed_in_full() -> None:
+    model, r = undamped(0.01, 60, 0.1), 0.1
+    nodes = np.arange(1, len(model.time))
+    output, centre = np.zeros_like(nodes), np.zeros((len(nodes), 1))
+    tensor = Remainder.of(model, np.array([-r]), np.array([r])).at(nodes, output)
+    rest = cubic(r * tensor[..., 0], np.full((len(nodes), 1), r))
+    f, g, H = model.at(centre, nodes, output)
+    true = np.max(
+        [
+            np.abs(
+                model.value_at(centre + x, nodes, output) - f - g[:, 0] * x - H[:, 0, 0] * x**2 / 2
+            )
+            for x in np.linspace(-r, r, 41)
+        ],
+        0,
+    )
+    assert (rest >= true).all()
+    assert (rest[-100:] / true[-100:]).min() < TIGHT
+
+
+def test_proved_deviation_is_needed_in_full() -> None:
+    exact = undamped(1e-4, 20, 0.1)
+    off = exact.eigenvalue.coefficients.copy()
+    off[0] += 1e-5j  # a frequency that is wrong by 1e-5 rad/s
+    model = replace(exact, eigenvalue=Polynomial(exact.eigenvalue.index, off))
+    points = np.linspace(-1, 1, 21)[:, None]
+    wrong = np.abs(model.values(points) - exact.flow.values(exact.boxes.to_physical(points))).max(0)
+    proved = proved_error(model)
+    assert (proved >= wrong).all()
+    assert proved[-30:].max() < TIGHT * wrong[-30:].max()
+
+
+def test_error_of_the_polynomials_covers_dense_trajectories_and_is_near() -> None:
+    cuts = boxes({"E": Interval(20e9, 30e9)}, (0,))
+    flow = LinearFlow(TWO, cuts.names, 20, 0.05, Exact())
+    model = fit_modes(flow, cuts, tolerance=1e-5)
+    points = np.linspace(-1, 1, 401)[:, None]
+    wrong = np.abs(model.values(points) - flow.values(cuts.to_physical(points))).max(0)
+    declared = polynomial_error(model)
+    assert (declared >= wrong).all()
+    assert declared.max() < 2.5 * wrong.max()  # the factor of two on held-out trajectories
+
+
+def test_auto_returns_nothing_above_its_tolerance() -> None:
+    cuts = boxes({"E": Interval(5e9, 45e9)}, (0,))
+    flow = UnitFlow(LinearFlow(TWO, cuts.names, 5, 0.1, Exact()), cuts)
+    reached = Modal(tolerance=1e-14).run(flow).error
+    assert reached is not None
+    alone = ("improved-graph-follower",)
+    found = Auto(tolerance=2 * reached.max(), exclude=alone).run(flow)
+    assert found.error is not None
+    assert found.error.max() <= 2 * reached.max()
+    with pytest.raises(ToleranceError, match="modal estimates"):
+        Auto(tolerance=reached.max() / 3, exclude=alone).run(flow)
+
+
+def test_midpoint_rule_is_part_of_the_declared_error() -> None:
+    inputs = {"E": Interval(24e9, 26e9)}
+    common = {"duration": 5.0, "step": 0.05, "alpha": (0,)}
+    found = envelope(TWO, inputs, method="graph-follower", **common)  # type: ignore[arg-type]
+    exact = LinearFlow(TWO, ("E",), 5.0, 0.05, Exact()).values(
+        np.linspace(24e9, 26e9, 999)[:, None]
+    )
+    wrong = np.maximum(np.abs(exact.max(0) - found.upper[0]), np.abs(exact.min(0) - found.lower[0]))
+    assert found.error is not None
+    assert (found.error[0] >= wrong - 1e-8).all()
+    assert found.error.max() < TIGHT * wrong.max()
+    with pytest.raises(ToleranceError, match="time stepping"):
+        envelope(TWO, inputs, integrator="midpoint", tolerance=1e-6, **common)  # type: ignore[arg-type]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(2000, 2012))
+def test_declared_errors_cover_random_frames(seed: int) -> None:
+    row = judged(
+        random_case(seed), method="auto", tolerance=1e-3, samples=1000, starts=2, seed=seed
+    )
+    assert row["error"] <= 1e-3
+    assert row["above_declared"] == 0
