@@ -23,6 +23,7 @@ from alphacut.stochastic.theta.truncated_normal import Array
 _IRREGULAR_FADE = 0.15  # least share of a change that is taken to be left by orders below 4
 _ROUND_OFF = 1e-13
 _SAFETY = 3.3
+_POINTWISE = 2.0  # safety of a single θ, where errors do not average
 _SHARED = np.array([0.03, 0.5, 0.5])  # C11 + C12 is the easiest by far
 
 
@@ -112,7 +113,7 @@ class SlicesModel:
                 f" {self.mesh_size:g}"
             )
             result = Homogenised(
-                with_errors(curve, error_of_slice[nodes]),
+                with_errors(curve, _POINTWISE * error_of_slice[nodes]),
                 self.name,
                 slices[0].solver,
                 max(s.unknowns for s in slices),
