@@ -69,6 +69,11 @@ IMAGE_CELL = Section(
             default=1,
             allowed=DIVISIONS,
         ),
+        "width": Key(
+            "width of the stiffness's bounds, as a share, for which pixels are divided further",
+            "number",
+            allowed=Range("from 1e-6 to 1", 1e-6, 1.0, closed=True),
+        ),
         "accuracy": Key(
             "energy that the solver may leave, relative; more only widens the bounds",
             "number",

@@ -132,7 +132,7 @@ class FuzzyImage:
         if solution is None or solution.upper.energy.pixels is None:
             return None
         pixels = constitutive_gap(solution, np.array([1.0, 1.0, 1.0]))
-        return reduced_to_pixels(pixels, self.study.model.division)
+        return reduced_to_pixels(pixels, len(pixels) // len(self.study.ranges(1.0)[0]))
 
 
 def study_of(case: Case) -> ImageStudy:
@@ -212,6 +212,7 @@ def _model(case: Case, aspect: float) -> ImageModel:
         case.integer("image.tiles"),
         case.integer("image.division"),
         ConjugateGradient(case.number("image.accuracy")),
+        case.number("image.width") if case.has("image.width") else None,
     )
 
 

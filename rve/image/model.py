@@ -14,6 +14,7 @@ from alphacut.rve.image.cuts import ENCLOSED, TWO_CORNERS, nested
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.side import DISPLACEMENT, STRESS, solve_side
 from alphacut.rve.image.phase_images import ModuliImages
+from alphacut.rve.image.read import require_memory
 from alphacut.rve.image.solve import CrispBounds, solve_between
 from alphacut.rve.image.windows import Tiling, tiles_of
 from alphacut.rve.result import Homogenised, StressCurve
@@ -72,6 +73,8 @@ class ImageModel:
         tiles: Tiles along each side of a window.
         division: Parts along each side of a pixel.
         solver: Stopping rule.
+        width: Width of the stiffness's bounds that a crisp periodic image is to have; pixels are
+            divided further until it has. None: as many parts as `division` says.
 
     Raises:
         ValueError: A value lies outside its range.
@@ -82,6 +85,7 @@ class ImageModel:
     tiles: int = 2
     division: int = 1
     solver: ConjugateGradient = field(default_factory=ConjugateGradient)
+    width: float | None = None
 
     def __post_init__(self) -> None:
         if self.boundary not in BOUNDARIES:
@@ -95,17 +99,35 @@ class ImageModel:
         Args:
             images: Least and greatest moduli, for rising α; the last ones are solved first.
         """
-        cuts: list[ImageCut] = []
-        before: ModuliImages | None = None
-        for pair in reversed(images):
-            if before is None or not _same(pair, before):
-                cuts.append(self.cut(pair, cuts[-1].solution if cuts else None))
+        model, cuts = self.divided_enough(images[-1])
+        before = images[-1]
+        for pair in reversed(images[:-1]):
+            if not _same(pair, before):
+                cuts.append(model.cut(pair, cuts[-1].solution))
             else:
                 cuts.append(cuts[-1])
             before = pair
         intervals = nested([cut.modulus for cut in cuts])
         widened = [_with_modulus(c, m) for c, m in zip(cuts, intervals, strict=True)]
         return widened[::-1]
+
+    def divided_enough(self, images: ModuliImages) -> tuple[ImageModel, list[ImageCut]]:
+        """The model with the parts that its width needs, and the cut of this image by it.
+
+        Raises:
+            ValueError: The image is not crisp, or the width needs more memory than there is.
+        """
+        cut = self.cut(images)
+        if self.width is None or cut.solution is None or cut.bounds.width <= self.width:
+            return self, [cut]
+        if not all(np.array_equal(*pair) for pair in (images.bulk, images.shear)):
+            raise ValueError(
+                "a width can be asked for where the top level is crisp; "
+                f"here its inputs alone cause {cut.bounds.width:.2e}"
+            )
+        rows, columns = images.bulk[0].shape
+        require_memory(rows, columns, 2 * self.division)
+        return replace(self, division=2 * self.division).divided_enough(images)
 
     def cut(self, images: ModuliImages, start: CrispBounds | None = None) -> ImageCut:
         """Bounds between two images."""

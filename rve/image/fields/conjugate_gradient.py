@@ -6,7 +6,7 @@ field before them lacked (Hestenes and Stiefel 1952). The bounds hold for whatev
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -25,6 +25,23 @@ class Linear(Protocol):
 
     def apply(self, fields: Array, /) -> Array:
         """The image of the fields."""
+
+
+class Solver(Protocol):
+    """A way to fields of little energy."""
+
+    def coarser(self, factor: float) -> Solver:
+        """The same way with less accuracy, for a start."""
+
+    def solve(
+        self,
+        operator: Linear,
+        preconditioner: Linear,
+        load: Array,
+        scale: Array,
+        start: Array | None = None,
+    ) -> Solution:
+        """Fields with operator(fields) = load."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +79,10 @@ class ConjugateGradient:
             )
         if self.iterations is not None and self.iterations < 0:
             raise ValueError(f"{self.iterations} iterations are asked for; take 0 or more")
+
+    def coarser(self, factor: float) -> ConjugateGradient:
+        """The rule with less accuracy, for a start."""
+        return replace(self, accuracy=min(0.1, factor * self.accuracy))
 
     def solve(
         self,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
@@ -13,7 +13,7 @@ from alphacut.rve.image.fields.clamped import (
     ClampedPreconditioner,
     free_unknowns,
 )
-from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
+from alphacut.rve.image.fields.conjugate_gradient import Solver
 from alphacut.rve.image.fields.division import divided, prolonged
 from alphacut.rve.image.fields.element import Element, airy_element, displacement_element
 from alphacut.rve.image.fields.energy import Energy, energy
@@ -78,7 +78,7 @@ def solve_side(
     bulk: Array,
     shear: Array,
     *,
-    solver: ConjugateGradient,
+    solver: Solver,
     aspect: float = 1.0,
     division: int = 1,
     start: Array | None = None,
@@ -104,7 +104,7 @@ def solve_side(
     start = None if start is None else _of_solved_loads(start)
     trace, deviator = side.coefficients(bulk, shear)
     if division > 1 and start is None:
-        coarse = replace(solver, accuracy=min(0.1, COARSER * solver.accuracy))
+        coarse = solver.coarser(COARSER)
         fields, _ = _fields(element, trace, deviator, modes, coarse, None, clamped)
         start = prolonged(element, fields, division)
     trace, deviator = divided(trace, division), divided(deviator, division)
@@ -120,7 +120,7 @@ def _fields(
     trace: Array,
     deviator: Array,
     modes: Array,
-    solver: ConjugateGradient,
+    solver: Solver,
     start: Array | None,
     clamped: bool,
 ) -> tuple[Array, int]:

@@ -119,6 +119,16 @@ def test_a_window_gives_a_confidence_interval_and_says_so(folder, capfd):
     assert main(["image", written(folder, boundary='"window"', tiles="2"), "--quiet"]) == 0
 
 
+def test_a_width_asked_for_divides_the_pixels(folder, capfd):
+    whole = solved(folder, capfd, threshold="[130]")
+    narrow = solved(folder, capfd, threshold="[130]", width=repr(whole["width"] / 3))
+    assert narrow["width"] <= whole["width"] / 3
+    open_pixels = {"inequality": '"x <= 0.513"', "size": '["1 m", "1 m"]', "pixels": "16"}
+    outline = {"file": None, "pixel": None, "threshold": None, **open_pixels}
+    assert main(["image", written(folder, **outline, width="1e-3")]) == 1
+    assert "its inputs alone cause" in capfd.readouterr().err
+
+
 def test_the_words_name_the_plane_strain_bulk_modulus(folder, capfd):
     assert main(["image", written(folder)]) == 0
     told = capfd.readouterr().out
