@@ -13,9 +13,10 @@ from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.checks.step_error import step_error
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.envelope import Envelope, output_unit
+from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.batch_graph_follower import BatchFollower
 from alphacut.frame.methods.modal import Modal
+from alphacut.frame.outputs import output_unit
 from alphacut.frame.structures.modes import ModalError
 
 Progress = Callable[[float], None]

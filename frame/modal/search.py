@@ -118,7 +118,8 @@ class ModalSearch:
             (m,).
         """
         total, m, d = len(model.time), len(model.outputs), len(lower)
-        found, gained = problems(np.arange(total), m, d), np.zeros(m)
+        found = problems(np.arange(total), m, d)
+        gained: Array = np.zeros(m)
         if (upper > lower).any():
             pool = self._samples(lower, upper)
             values = trajectories(model, pool)
