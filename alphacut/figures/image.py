@@ -33,8 +33,8 @@ def image(found: xarray.Dataset) -> Figure:
         if name == "gap":
             plt.colorbar(shown, ax=axes, shrink=0.8)
     alpha, ends = found["alpha"].values, found["E"].values / GPA
-    for level, (low, high) in zip(alpha, ends, strict=True):
-        places[-1].plot([low, high], [level, level], color=BLUE, lw=2)
+    for level, pair in zip(alpha, ends, strict=True):
+        places[-1].plot(pair, [level, level], color=BLUE, lw=2)
     places[-1].plot(ends.ravel(order="F"), np.tile(alpha, 2), ".", color=INK, ms=3)
     places[-1].set_xlabel("E, GPa")
     places[-1].set_ylabel("α")

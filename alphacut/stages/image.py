@@ -67,8 +67,8 @@ class ImageStudy:
             if self.young:
                 found.append(ModuliInterval.of_young(*cuts))
             else:
-                ends = (PlaneModuli.of_bulk(cuts[0][end], cuts[1][end]) for end in (0, 1))
-                found.append(ModuliInterval(*ends))
+                low, high = (PlaneModuli.of_bulk(cuts[0][end], cuts[1][end]) for end in (0, 1))
+                found.append(ModuliInterval(low, high))
         return found
 
     def images(self, alpha: float, *, phases: float | None = None) -> ModuliImages:
@@ -378,7 +378,7 @@ def dataset(found: FuzzyImage) -> xarray.Dataset:
     )
 
 
-def write(found: FuzzyImage, path: Path, attributes: dict[str, str]) -> None:
+def write(found: FuzzyImage, path: Path, attributes: dict[str, str | int]) -> None:
     """Write ``image.nc``, whole or not at all."""
     from alphacut.io.files import as_json, whole_file
 

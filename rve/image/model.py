@@ -20,6 +20,7 @@ from alphacut.rve.image.windows import Tiling, tiles_of
 from alphacut.rve.result import Homogenised, StressCurve
 from alphacut.stochastic.theta.truncated_normal import Array
 
+MODULI = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 1.0]])  # strains of each modulus
 BOUNDARIES = ("periodic", "window")
 CONFIDENT = "95 % confidence interval of the material, no proof"
 
@@ -48,17 +49,18 @@ class ImageCut:
     def homogenised(self) -> Homogenised:
         """The middle of the bounds as a model of the cell gives it, half their distance as its error."""
         middle = (self.bounds.lower + self.bounds.upper) / 2
-        low, high = self.modulus
-        s11 = 0.01 * (middle[0, 0] + middle[1, 1] + 2 * middle[0, 1]) / 2  # eq. 15
+        values = np.einsum("mj,jk,mk->m", MODULI, middle, MODULI)
+        gaps = np.einsum("mj,jk,mk->m", MODULI, self.bounds.upper - middle, MODULI)
+        mean = 0.01 * values[0] / 2, 0.02 * values[2]  # eq. 15: ε11 = ε22 = 0.01, and ε12 = 0.01
         curve = StressCurve(
-            np.zeros(1), np.ones(1), np.array([s11]), np.array([0.02 * middle[2, 2]]), middle[None]
+            np.zeros(1), np.ones(1), np.array([mean[0]]), np.array([mean[1]]), middle[None]
         )
         return Homogenised(
             curve,
             "image",
             iterations=(self.iterations,),
             seconds={"total": self.seconds},
-            error={"bounds": (high - low) / (high + low)},
+            errors={"space": gaps / values},
             reason=self.nature,
         )
 

@@ -9,7 +9,9 @@ from alphacut.rve.image.directions import directions
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.gap import constitutive_gap
 from alphacut.rve.image.grains import grain_modulus
+from alphacut.rve.image.model import ImageModel
 from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
+from alphacut.rve.image.phase_images import ModuliImages
 from alphacut.rve.image.random_threshold import NormalThreshold, threshold_response
 from alphacut.rve.image.read import read_grey, require_memory, require_phases
 from alphacut.rve.image.solve import solve_image
@@ -91,6 +93,22 @@ def test_the_gap_needs_the_energies_of_the_pixels():
     found = solve_image(np.ones((4, 4)), np.ones((4, 4)))
     with pytest.raises(ValueError, match="pixels=True"):
         constitutive_gap(found, np.ones(3))
+
+
+def test_the_model_gives_the_result_type_of_the_other_models():
+    grey, exact = np.ones((4, 4)), PlaneModuli.of_young(20.0, 0.3)
+    images = ModuliImages((exact.bulk * grey,) * 2, (exact.shear * grey,) * 2, attained=True)
+    (cut,) = ImageModel().run([images])
+    found = cut.homogenised
+    assert np.isclose(found.modulus, 20.0, rtol=1e-12)
+    assert np.isclose(found.poisson, 0.3, rtol=1e-12)
+    assert found.method == "image"
+    mixed = np.where(ramp() > 0.5, 3.0, 1.0)
+    (cut,) = ImageModel().run([ModuliImages((mixed, mixed), (mixed, mixed), attained=True)])
+    low, high = cut.modulus
+    assert low < cut.homogenised.modulus < high
+    form = cut.bounds.shear
+    assert np.isclose(cut.homogenised.errors["space"][2], (form[1] - form[0]) / sum(form))
 
 
 def test_directions_hold_the_moduli_of_a_stiffness_between():
