@@ -19,7 +19,7 @@ from alphacut.frame.dynamics.integrators import INTEGRATORS, Integrator
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.judged import judged
-from alphacut.frame.methods.named import named
+from alphacut.frame.methods.named import named, options_of
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy import FuzzyNumber, JointClaim
@@ -74,7 +74,7 @@ def envelope(
     - graph-follower: `order` (of the Taylor models, 1 or 2), `tolerance` (1e-4), `budget` (none),
       `record` (False); see `GraphFollower`.
     - vertex: none. monte-carlo, quasi-monte-carlo: `samples` on each level (1000, 1024), `seed`.
-    - Where no method is named: those of auto.
+    - Where no method is named: those of auto, or those of modal with one of its own.
 
     Raises:
         ValueError: An unknown name or option, a value outside its range, a support that reaches
@@ -94,8 +94,7 @@ def envelope(
             " LagrangianSystem"
         )
     if method is None:
-        nonlinear = isinstance(model, LagrangianSystem)
-        method = "improved-graph-follower" if nonlinear else "auto"
+        method = _default(isinstance(model, LagrangianSystem), options)
     way = named(method, options)
     cuts = boxes(inputs, alpha)
     flow: LagrangianFlow | LinearFlow
@@ -118,6 +117,14 @@ def envelope(
     if method == "modal":
         warn_of_roughness(found)
     return found
+
+
+def _default(nonlinear: bool, options: Mapping[str, object]) -> str:
+    """Name of the method where none is named: `modal` where an option is its own."""
+    if nonlinear:
+        return "improved-graph-follower"
+    own = set(options) - set(options_of("auto"))
+    return "modal" if own and own <= set(options_of("modal")) else "auto"
 
 
 def _integrator(given: str | Integrator | None, method: str) -> Integrator:

@@ -16,6 +16,7 @@ ABOUT = "drop what is damaged in a store of samples; the next run computes only 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument("file", metavar="STORE", help="as results/NAME/samples.db")
+    parser.add_argument("--quiet", action="store_true", help="print nothing")
 
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
@@ -28,7 +29,9 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
             done = store.repair()
     except ValueError as error:
         raise BadInput(Problem("STORE", str(error), str(path), "a store of samples")) from None
-    out.write(
-        f"{done.kept} records are whole; {done.size} bytes at {done.places} places were dropped\n"
-    )
+    if not options.quiet:
+        out.write(
+            f"{done.kept} records are whole; {done.size} bytes at {done.places} places were"
+            " dropped\n"
+        )
     return 0

@@ -53,7 +53,7 @@ def truth(a: float, c: float) -> np.ndarray:
 
 def test_the_stated_error_covers_that_of_time_stepping() -> None:
     values = np.array([truth(a, c) for a in np.linspace(0.3, 0.8, 11) for c in (0.05, 0.1, 0.2)])
-    for options in ({}, {"method": "auto", "tolerance": 1e-3}):
+    for options in ({}, {"method": "auto", "tolerance": 2e-3}):
         found = envelope(DUFFING, INPUTS, **TIME, **options)
         missed = np.maximum(values.max(0) - found.upper[0], found.lower[0] - values.min(0))
         assert found.error is not None
@@ -154,7 +154,8 @@ def test_the_dominant_error_is_of_one_output_in_its_unit() -> None:
     # in metres, though the shear is hundreds of newtons
     assert float(found.facts["step_error"]) < 0.01
     assert found.error is not None
-    assert found.error[0, :, 0].max() > float(found.facts["step_error"])
+    # judged against the exact motion, the error holds that of time stepping without its margin
+    assert found.error[0, :, 0].max() > float(found.facts["step_error"]) / MARGIN
 
 
 def test_the_guard_says_what_it_found() -> None:
