@@ -18,7 +18,9 @@ DIRECT = {
     "dolfinx_mpc": "python3-dolfinx-mpc",
     "gmsh": "python3-gmsh",
     "hypothesis": "python3-hypothesis",
+    "jinja2": "python3-jinja2",
     "jsonschema": "python3-jsonschema",
+    "markupsafe": "python3-jinja2",  # which depends on it, by pip too
     "matplotlib": "python3-matplotlib",
     "meshio": "python3-meshio",
     "mpi4py": "python3-mpi4py",
@@ -39,7 +41,6 @@ INDIRECT = {  # imported by others on this project's behalf
     "cffi": "python3-cffi",  # DOLFINx, to compile forms
     "h5py": "python3-h5py",  # meshio, to write .xdmf
     "ipykernel": "python3-ipykernel",  # the notebook
-    "jinja2": "python3-jinja2",
     "joblib": "python3-joblib",
     "myst_parser": "python3-myst-parser",  # Sphinx, for the pages of docs
     "nbclient": "python3-nbclient",
