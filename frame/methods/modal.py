@@ -143,7 +143,7 @@ def _certified(
 ) -> Envelope:
     assert isinstance(flow.flow, LinearFlow)
     require_certifiable(len(flow.boxes.names))
-    model, error, unproved = _model_with_error(flow.flow, flow, method, gap)
+    model, error, unproved = model_with_error(flow.flow, flow, method, gap)
     searched = progress and (lambda share: progress(SEARCHED * share))
     proved = progress and (lambda share: progress(SEARCHED + (1 - SEARCHED) * share))
     bounds, at, _ = search_levels(flow, model, method.seed, gap, searched)
@@ -191,7 +191,7 @@ def _certified(
     return replace(envelope, inner_lower=-proof.bounds[..., 0], inner_upper=proof.bounds[..., 1])
 
 
-def _model_with_error(
+def model_with_error(
     linear: LinearFlow, flow: UnitFlow, method: Modal, gap: float
 ) -> tuple[ModalModel, Array, str]:
     """Modal model for a certificate, its error (T, m), and why that is only sampled.

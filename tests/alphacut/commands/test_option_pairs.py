@@ -60,6 +60,11 @@ method = "auto"
 duration = "2 s"
 step = "0.5 s"
 """
+LIMITED = """
+[exceedance]
+output = "v1"
+limit = "25 mm/s"
+"""
 PACKED = """
 schema = 1
 title = "packed"
@@ -109,6 +114,7 @@ VALUES = {
     "--duration": ("3",),
     "--step": ("0.25",),
     "--certify": ("1e-3",),
+    "--most": ("0.3",),
     "--modulus": ("25 GPa",),
     "--exclude": ("modal",),
     "--best-effort": ((),),
@@ -142,6 +148,8 @@ OWN = {
     ("envelope", "--method"): ("vertex",),
     ("envelope", "--tolerance"): ("1e-5",),
     ("envelope", "--out"): ("envelope.nc",),
+    ("tolerances", "--duration"): ("1",),
+    ("tolerances", "--set"): ("frame.dampers=60 N s/m",),
     ("run", "--set"): ("frame.dampers=60 N s/m",),
     ("run", "--out"): ("other",),
     ("check", "--set"): ("frame.masses=20 t",),
@@ -208,6 +216,8 @@ class Watched:
         stages = '["modulus"]' if self.command == "modulus" else stages
         own = 'modulus = "25.5 GPa"\n' if self.command == "envelope" else ""
         text = CASE.format(stages=stages, modulus=own)
+        if self.command == "tolerances":
+            text = CASE.format(stages=stages, modulus='modulus = "25.5 GPa"\n') + LIMITED
         if self.command == "report":
             text = CASE.format(stages='["envelope"]', modulus='modulus = "25.5 GPa"\n')
         text = {"microstructure": PACKED, "image": IMAGED}.get(self.command, text)
@@ -219,10 +229,18 @@ class Watched:
         from alphacut import frame
         from alphacut.commands import options
         from alphacut.figures import all as figures
+        from alphacut.frame.decisions import safe_scale as decisions
         from alphacut.fuzzy.campaign import workers
         from alphacut.io import progress
         from alphacut.stages import modulus
 
+        real_scale = decisions.safe_scale
+
+        def safe_scale(*given, workers=1, **named):
+            self.events.append(("safe scale", workers))
+            return real_scale(*given, **named)
+
+        self.monkeypatch.setattr(decisions, "safe_scale", safe_scale)
         real_answer, real_envelope, real_propagate = (
             options.answer,
             frame.envelope,

@@ -1,0 +1,85 @@
+"""Command ``alphacut tolerances``: the largest supports for which a limit provably holds."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from typing import TextIO
+
+from alphacut.case.idle import require_read
+from alphacut.case.load import load
+from alphacut.commands.envelope import given_modulus
+from alphacut.commands.options import (
+    KeyOption,
+    add_common,
+    add_keys,
+    add_workers,
+    answer,
+    changes,
+    check_workers,
+)
+from alphacut.io.problem import BadInput, Problem
+from alphacut.io.progress import progress
+from alphacut.io.units import engineering
+from alphacut.stages.modulus import stand_in
+from alphacut.stages.tolerances import Tolerances, tolerances
+
+ABOUT = "largest scaling of the fuzzy inputs' supports for which the limit provably holds"
+KEYS = {
+    "--fuzzy": KeyOption("envelope.fuzzy", "inputs whose supports are scaled, as E,m", "NAMES"),
+    "--duration": KeyOption("envelope.duration", "length of the simulation", bare="s"),
+    "--step": KeyOption("envelope.step", "time step", bare="s"),
+}
+READ = ("frame", "envelope", "exceedance", "radius", "cell", "mesh", "modulus")
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    add_common(parser)
+    add_keys(parser, KEYS)
+    parser.add_argument(
+        "--modulus",
+        metavar="QUANTITY|FILE.nc",
+        help="Young's modulus in place of the cell's: '[22, 24, 26] GPa', or α-cuts",
+    )
+    parser.add_argument(
+        "--most", type=float, default=2.0, metavar="X", help="largest scaling asked for (default 2)"
+    )
+    add_workers(parser, "the proof")
+
+
+def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
+    """Compute and report."""
+    check_workers(options.workers)
+    if not options.most > 0:
+        raise BadInput(Problem("--most", "out of range", f"{options.most:g}", "greater than 0"))
+    case = load(options.case, changes(options, KEYS))
+    require_read(case, READ, "tolerances")
+    for key in ("exceedance.output", "envelope.duration", "envelope.fuzzy"):
+        case.need(key)
+    handed = given_modulus(options.modulus) or stand_in(case)
+    with progress("Tolerances", quiet=options.quiet) as tick:
+        found = tolerances(case, handed, most=options.most, workers=options.workers, progress=tick)
+    answer(options, found.document(), out, text(found))
+    return 0
+
+
+def text(found: Tolerances) -> str:
+    """The safe scale, the safe intervals and the witness, in SI, a line each."""
+    from alphacut.frame.outputs import output_unit
+
+    scale, limit = found.found, engineering(found.limit, output_unit(found.output))
+    if scale.safe is None:
+        return f"|{found.output}| passes {limit} at the nominal values: no tolerance is safe\n"
+    lines = [
+        f"|{found.output}| <= {limit} at all nodes for supports scaled by up to {scale.safe:.4g}"
+        f" ({scale.nature}{f': {scale.reason}' if scale.reason else ''})"
+    ]
+    lines += [f"  {name}: {low:.6g} … {high:.6g}" for name, (low, high) in found.intervals.items()]
+    if scale.witness is None:
+        return "\n".join([*lines, f"nothing unsafe found up to {scale.safe:.4g}", ""])
+    point = ", ".join(
+        f"{name} = {x:.6g}" for name, x in zip(scale.names, scale.witness, strict=True)
+    )
+    lines.append(f"unsafe at {scale.unsafe:.4g} ({100 * scale.gap:.2g} % more): {point}")
+    return "\n".join([*lines, f"  there |{found.output}| is {scale.share:.6g} of the limit", ""])

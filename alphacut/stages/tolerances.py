@@ -1,0 +1,206 @@
+"""Safe tolerances of a case: the largest scaling of its supports that keeps the limit, proved.
+
+Where the modulus comes from the cell, the supports of the particle-size law and of the inclusions
+are scaled with the others, and the frame gets the range of E over them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from alphacut.case.case import Case
+from alphacut.case.limits import limit_of
+from alphacut.fuzzy import FuzzyNumber, Interval, Signed, propagate
+from alphacut.io.problem import BadInput, Problem
+from alphacut.io.progress import Tick
+from alphacut.stages.campaign import Campaign, campaign
+from alphacut.stages.structure import Structure, structure
+from alphacut.stochastic.theta.truncated_normal import Array
+
+if TYPE_CHECKING:
+    from alphacut.frame.decisions.safe_scale import SafeScale
+
+Range = Callable[[float], tuple[float, float]]
+SCALES = 13
+"""Scales at which the range of the cell's modulus is computed; between them it is interpolated."""
+
+
+@dataclass(frozen=True)
+class Supports:
+    """Nominal values and supports of inputs.
+
+    Args:
+        numbers: Fuzzy numbers by name, in SI.
+    """
+
+    numbers: dict[str, FuzzyNumber]
+
+    def at(self, scale: float) -> dict[str, tuple[float, float]]:
+        """Intervals of the inputs at a scale of their supports about the nominal values."""
+        return {name: _scaled(number, scale) for name, number in self.numbers.items()}
+
+
+def _scaled(number: FuzzyNumber, scale: float) -> tuple[float, float]:
+    low, high = number.support
+    return number.modal - scale * (number.modal - low), number.modal + scale * (high - number.modal)
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """Safe tolerances of a case.
+
+    Args:
+        found: Scale, box and witness of the frame's parameters.
+        output: The output that is limited.
+        limit: Its largest magnitude, in SI.
+        frame: Supports of the frame's parameters; without E where the cell gives it.
+        cell: Supports of the cell's inputs; empty where the modulus is given.
+    """
+
+    found: SafeScale
+    output: str
+    limit: float
+    frame: Supports
+    cell: Supports
+
+    @property
+    def intervals(self) -> dict[str, tuple[float, float]]:
+        """Safe interval of every input, the cell's first, in SI; of scale 0 where nothing is."""
+        scale = self.found.safe or 0.0
+        return {**self.cell.at(scale), **self.frame.at(scale)}
+
+    def document(self) -> dict[str, Any]:
+        """The result as it is printed with ``--json``, in SI."""
+        from alphacut.frame.outputs import output_unit
+
+        found = self.found
+        witness = (
+            None if found.witness is None else dict(zip(found.names, found.witness, strict=True))
+        )
+        return {
+            "output": self.output,
+            "limit": self.limit,
+            "unit": output_unit(self.output),
+            "safe_scale": found.safe,
+            "unsafe_scale": None if np.isinf(found.unsafe) else found.unsafe,
+            "gap": None if np.isinf(found.gap) else found.gap,
+            "safe": {name: list(ends) for name, ends in self.intervals.items()},
+            "witness": witness,
+            "witness_share": found.share,
+            "nominal_share": found.nominal_share,
+            "nature": found.nature,
+            "reason": found.reason,
+            "boxes": found.boxes,
+            "seconds": found.seconds,
+        }
+
+
+def tolerances(
+    case: Case,
+    handed: FuzzyNumber | None,
+    *,
+    most: float = 2.0,
+    workers: int = 1,
+    progress: Tick | None = None,
+) -> Tolerances:
+    """Largest scaling of the supports of [envelope] fuzzy for which the limit provably holds.
+
+    Args:
+        case: With the sections exceedance and envelope and a storey frame.
+        handed: Modulus in Pa that stands in for the cell, if any.
+        most: Largest scale that is asked for.
+        workers: Processes of the proof.
+        progress: Told the share done.
+
+    Raises:
+        BadInput: The structure is no storey frame, or has no such output.
+    """
+    from alphacut.frame.decisions.safe_scale import safe_scale
+
+    cell = None if handed is not None or case.has("frame.modulus") else campaign(case)
+    modulus_range = None if cell is None else _cell_range(cell, most)
+    given = handed if cell is None or modulus_range is None else _triangle(modulus_range)
+    wanted = structure(case, given)
+    if wanted.frame is None:
+        raise BadInput(Problem("frame", "missing: safe tolerances are those of a storey frame"))
+    output, limit = case.text("exceedance.output"), limit_of(case)
+    inputs = wanted.inputs(case.names("envelope.fuzzy"))
+    own = {name: x for name, x in inputs.items() if modulus_range is None or name != "E"}
+    frame = Supports(own)
+
+    def reach(scale: float) -> tuple[Array, Array]:
+        ends = frame.at(scale)
+        if modulus_range is not None and "E" in inputs:
+            ends["E"] = modulus_range(scale)
+        both = np.array([ends[name] for name in inputs], float)
+        return both[:, 0], both[:, 1]
+
+    found = safe_scale(
+        _limited(wanted, output, case),
+        {name: number.modal for name, number in inputs.items()},
+        reach,
+        {output: limit},
+        duration=case.number("envelope.duration"),
+        step=case.number("envelope.step"),
+        most=most,
+        workers=workers,
+        progress=progress,
+    )
+    if cell is not None and found.safe and "E" in inputs:
+        found = _within_cell(found, cell, list(inputs).index("E"))
+    return Tolerances(found, output, limit, frame, Supports(dict(cell.inputs) if cell else {}))
+
+
+def _limited(wanted: Structure, output: str, case: Case) -> Any:
+    """The frame with the limited output alone."""
+    assert wanted.frame is not None
+    try:
+        return replace(wanted.frame, outputs=(output,))
+    except ValueError as error:
+        raise case.refuse("exceedance.output", str(error)) from None
+
+
+def _moduli(cell: Campaign, scale: float) -> tuple[float, float]:
+    """Range of E over the cell's supports at a scale, by the corners that the proved signs give."""
+    inputs = {}
+    for name, number in cell.inputs.items():
+        low, high = _scaled(number, scale)
+        inputs[name] = Interval(low, high)
+    found = propagate(
+        cell.task, inputs, Signed(outputs=("E",)), alpha=[1.0], shared=cell.shared, known=cell.known
+    )
+    lower, upper = found.bounds("E")
+    return float(lower[0]), float(upper[0])
+
+
+def _cell_range(cell: Campaign, most: float) -> Range:
+    """Range of E by scale, monotone between computed ones."""
+    from scipy.interpolate import PchipInterpolator
+
+    scales = np.linspace(0, most, SCALES)
+    ends = np.array([_moduli(cell, float(scale)) for scale in scales])
+    low, high = (PchipInterpolator(scales, ends[:, side]) for side in (0, 1))
+    return lambda scale: (float(low(scale)), float(high(scale)))
+
+
+def _triangle(modulus: Range) -> FuzzyNumber:
+    """The modulus at scale 0 and 1 as a triangle, for the structure."""
+    from alphacut.fuzzy import Triangular
+
+    (low, high), (modal, _) = modulus(1.0), modulus(0.0)
+    return Triangular(low, modal, high)
+
+
+def _within_cell(found: SafeScale, cell: Campaign, column: int) -> SafeScale:
+    """The safe scale, lowered until the range of E computed at it lies in the box proved safe."""
+    assert found.safe is not None
+    safe, low, high = found.safe, found.lower[column], found.upper[column]
+    for lowered in (1.0, 1 - 1e-5, 1 - 1e-4, 1 - 1e-3, 1 - 1e-2):
+        ends = _moduli(cell, lowered * safe)
+        if low <= ends[0] and ends[1] <= high:
+            return replace(found, safe=lowered * safe)
+    raise RuntimeError("tolerances: the range of E over the safe box is not smooth in its scale")

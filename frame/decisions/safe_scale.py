@@ -1,0 +1,160 @@
+"""Largest scaling of tolerances for which a storey frame provably keeps its limits over time.
+
+A search finds the least scaled box that holds a motion beyond a limit, confirmed by the exact
+propagator. A branch and bound on the polynomials of the modes then proves a box a little smaller,
+node by node, with the error of the polynomials on the safe side. Nodes that resist are proved at a
+smaller scale alone, since a box holds the smaller ones.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from alphacut.frame.calculus.jet import Array
+from alphacut.frame.decisions.limit_search import LimitSearch, Reach, unproved
+from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.integrators import Exact
+from alphacut.frame.structures.storey import StoreyFrame
+
+GAP = 1e-3
+"""Share of the limits that the model of the motion and the proof may take, at most."""
+FINE = 0.01
+"""The same as a share of what the nominal motion leaves of the limits."""
+SHRINK = (0.004, 0.008, 0.015, 0.03, 0.06, 0.12, 0.25, 0.5, 0.75)
+"""By how much the box to be proved is smaller than the refuted one, until all is proved."""
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class SafeScale:
+    """Scaling of tolerances that keeps all limits.
+
+    Args:
+        names: Parameters, d of them.
+        nominal: Their nominal values, shape (d,), in SI units.
+        safe: Largest scale proved safe; None where the nominal motion reaches a limit.
+        lower: Lower ends of the safe box, shape (d,).
+        upper: Upper ends.
+        unsafe: Scale of the least box that holds the witness; infinite without one.
+        witness: Parameters whose motion breaks a limit, shape (d,), or None.
+        share: Largest |output| / limit of the witness.
+        nominal_share: The same at the nominal values.
+        nature: "guaranteed", or "verified by sampling" where the model's error is only sampled.
+        reason: Why the error is not proved; empty where it is.
+        boxes: Boxes of parameters that the proof looked at.
+        seconds: Wall time.
+    """
+
+    names: tuple[str, ...]
+    nominal: Array
+    safe: float | None
+    lower: Array
+    upper: Array
+    unsafe: float
+    witness: Array | None
+    share: float
+    nominal_share: float
+    nature: str
+    reason: str
+    boxes: int
+    seconds: float
+
+    @property
+    def gap(self) -> float:
+        """Distance of the witness beyond the safe scale, as a share of it; infinite without one."""
+        return self.unsafe / self.safe - 1 if self.safe else float("inf")
+
+
+def safe_scale(
+    frame: StoreyFrame,
+    nominal: Mapping[str, float],
+    reach: Reach,
+    limits: Mapping[str, float],
+    *,
+    duration: float,
+    step: float,
+    most: float = 2.0,
+    precision: float = 1e-3,
+    budget: float = 100,
+    workers: int = 1,
+    progress: Progress | None = None,
+) -> SafeScale:
+    """Largest scale of a family of boxes in which every |output| stays at most at its limit.
+
+    Args:
+        frame: The structure with its ground motion and initial state.
+        nominal: Nominal values of the uncertain parameters by name, in SI units.
+        reach: Lower and upper ends (d,) of the box of a scale, in SI units: nested, growing from
+            the nominal values at scale 0. `scaled` gives the usual one.
+        limits: Largest magnitude allowed by output, in SI units, at the nodes of the step.
+        duration: Length of the motion, in s.
+        step: Distance of nodes, in s.
+        most: Largest scale that is asked for.
+        precision: Relative precision of the refuted scale.
+        budget: Most boxes per node on average at each scale that is tried.
+        workers: Processes of the proof.
+        progress: Called with the fraction done.
+
+    Raises:
+        ValueError: A limit is not positive, or the largest box reaches values without a meaning.
+        ModalError: The structure has no smooth oscillating modes over the box.
+    """
+    if not limits or not all(np.isfinite(x) and x > 0 for x in limits.values()):
+        raise ValueError(f"limits: {dict(limits)}; each must be positive and finite, one at least")
+    if not most > 0:
+        raise ValueError(f"most: {most:g} is not allowed; the largest scale must be positive")
+    begun, names = time.perf_counter(), tuple(nominal)
+    flow = LinearFlow(replace(frame, outputs=tuple(limits)), names, duration, step, Exact())
+    centre = np.array([*nominal.values()], float)
+    search = LimitSearch(flow, reach, np.array([*limits.values()], float), centre, GAP)
+    if (nominal_share := search.share(centre)) >= 1:
+        seconds = time.perf_counter() - begun
+        box, shares = (centre, centre), (nominal_share, nominal_share)
+        worth = ("guaranteed", "")
+        return SafeScale(names, centre, None, *box, 0.0, centre, *shares, *worth, 0, seconds)
+    search.gap = min(GAP, FINE * (1 - nominal_share))
+    search.fit(most)
+    unsafe, witness = search.refuted(precision)
+    if witness is not None and unsafe < 0.9 * most:
+        search.fit(unsafe)
+    pending: Array = np.arange(2 * len(flow.time) * len(limits))
+    boxes, safe = 0, 0.0
+    for done, shrink in enumerate((0.0, *SHRINK) if witness is None else SHRINK):
+        size = (1 - shrink) * min(unsafe, most)
+        pending, beyond, looked = unproved(search, size, pending, budget, workers)
+        boxes += looked
+        if progress:
+            progress((1 + done) / (1 + len(SHRINK)))
+        if beyond is not None and (found := search.size_of(beyond)) < unsafe:
+            unsafe, witness = found, beyond
+        if not len(pending):
+            safe = size
+            break
+    share = 0.0 if witness is None else search.share(witness)
+    nature = "verified by sampling" if search.reason else "guaranteed"
+    seconds = time.perf_counter() - begun
+    lower, upper = reach(safe)
+    return SafeScale(
+        names,
+        centre,
+        safe,
+        lower,
+        upper,
+        unsafe,
+        witness,
+        share,
+        nominal_share,
+        nature,
+        search.reason,
+        boxes,
+        seconds,
+    )
+
+
+def scaled(nominal: Array, below: Array, above: Array) -> Reach:
+    """Boxes nominal − scale · below … nominal + scale · above, all of shape (d,)."""
+    return lambda size: (nominal - size * below, nominal + size * above)

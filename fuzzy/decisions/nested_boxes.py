@@ -1,0 +1,157 @@
+"""Families of growing boxes, and the size at which one ceases to be safe."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.fuzzy.sets.numbers import Array
+
+
+class Growing(Protocol):
+    """A family of nested boxes."""
+
+    def at(self, size: float) -> tuple[Array, Array]:
+        """Lower and upper corner of the box of a size, two arrays of shape (inputs,)."""
+
+    def size_of(self, point: Array) -> float:
+        """Least size whose box holds a point, shape (inputs,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scaled:
+    """Boxes centre − size · below … centre + size · above.
+
+    Args:
+        centre: Box of size 0, shape (inputs,).
+        below: Reach to the left at size 1, not negative, shape (inputs,).
+        above: Reach to the right at size 1.
+    """
+
+    centre: Array
+    below: Array
+    above: Array
+
+    def at(self, size: float) -> tuple[Array, Array]:
+        """Corners of the box of a size."""
+        return self.centre - size * self.below, self.centre + size * self.above
+
+    def size_of(self, point: Array) -> float:
+        """Least size whose box holds a point; infinite where none does."""
+        step = point - self.centre
+        reach = np.where(step > 0, self.above, self.below)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            sizes = np.where(step == 0, 0.0, np.abs(step) / reach)
+        return float(sizes.max())
+
+
+@dataclass(frozen=True, eq=False)
+class ByLevel:
+    """The cuts of fuzzy inputs, of size 1 − α.
+
+    Args:
+        domain: The inputs.
+    """
+
+    domain: Domain
+
+    def at(self, size: float) -> tuple[Array, Array]:
+        """Corners of the cut at α = 1 − size."""
+        cuts = np.array([number.cut(1 - size) for number in self.domain.inputs.values()])
+        return cuts[:, 0], cuts[:, 1]
+
+    def size_of(self, point: Array) -> float:
+        """1 − the least membership of the point's values."""
+        numbers = self.domain.inputs.values()
+        least = min(float(x.membership(p)) for x, p in zip(numbers, point, strict=True))
+        return 1 - least
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What is known of a box: proved safe, or a point of it is not, or neither.
+
+    Args:
+        safe: Whether the limits are proved to hold in all of the box.
+        witness: A point where one does not hold, shape (inputs,); None where none is known.
+    """
+
+    safe: bool
+    witness: Array | None = None
+
+
+Judge = Callable[[Array, Array], Verdict]
+
+
+@dataclass(frozen=True, eq=False)
+class Threshold:
+    """Size at which boxes cease to be safe.
+
+    Args:
+        safe: Largest size proved safe; None where not even the least box is.
+        unsafe: Size of the least box that holds the witness; infinite without one.
+        witness: The point that breaks a limit, shape (inputs,), or None.
+        judged: Boxes that were judged.
+    """
+
+    safe: float | None
+    unsafe: float
+    witness: Array | None
+    judged: int
+
+    @property
+    def gap(self) -> float:
+        """Distance of the witness beyond what is proved, as a share of it; infinite without one."""
+        return self.unsafe / self.safe - 1 if self.safe else float("inf")
+
+
+def threshold(
+    family: Growing, judge: Judge, *, most: float = 1.0, tolerance: float = 1e-3, limit: int = 100
+) -> Threshold:
+    """Halves the interval between the largest box proved safe and the least one that is not.
+
+    Args:
+        family: The boxes.
+        judge: Tells what is known of a box.
+        most: Largest size that is asked for.
+        tolerance: Wanted distance of both sizes, as a share of `most`.
+        limit: Most boxes that are judged.
+
+    Raises:
+        ValueError: A number is not positive.
+    """
+    if not (most > 0 and tolerance > 0 and limit >= 2):
+        raise ValueError(
+            f"most, tolerance and limit are {most:g}, {tolerance:g}, {limit}; they must be positive"
+        )
+    last, first = judge(*family.at(most)), judge(*family.at(0.0))
+    if last.safe or not first.safe:
+        witness = None if last.safe else first.witness
+        return Threshold(
+            most if last.safe else None, np.inf if witness is None else 0.0, witness, 2
+        )
+    safe, unsafe, witness, judged = 0.0, np.inf, last.witness, 2
+    if witness is not None:
+        unsafe = min(family.size_of(witness), most)
+    undecided = [] if witness is not None else [most]
+    while judged < limit:
+        top, bottom = min(undecided, default=unsafe), max(undecided, default=safe)
+        if top - safe > tolerance * most:
+            middle = (safe + top) / 2
+        elif witness is not None and unsafe - bottom > tolerance * most:
+            middle = (bottom + unsafe) / 2
+        else:
+            break
+        found, judged = judge(*family.at(middle)), judged + 1
+        if found.safe:
+            safe = middle
+        elif found.witness is not None:
+            unsafe, witness = min(family.size_of(found.witness), middle), found.witness
+        else:
+            undecided.append(middle)
+        undecided = [size for size in undecided if safe < size < unsafe]
+    return Threshold(safe, unsafe, witness, judged)

@@ -1,0 +1,74 @@
+"""Command tolerances: the largest scaling of supports that keeps a limit."""
+
+import json
+
+import pytest
+
+from alphacut.entry import main
+
+CASE = """
+schema = 1
+title = "Two floors"
+about = "A frame of two floors, for tests."
+source = "made up"
+stages = ["envelope"]
+
+[frame]
+modulus = "[22, 25, 27] GPa"
+second_moment = "1e-6 m^4"
+masses = ["[900, 1000, 1100] kg", "1000 kg"]
+lengths = ["3 m", "3 m"]
+dampers = ["50 N s/m"]
+damper_placement = "storey"
+displacements = ["0 mm"]
+velocities = ["0.1 m/s", "0.2 m/s"]
+
+[envelope]
+fuzzy = ["E", "m1"]
+duration = "4 s"
+step = "0.01 s"
+
+[exceedance]
+output = "drift1"
+limit = "LIMIT"
+"""
+
+
+def told(tmp_path, limit, *more, text=CASE):
+    path = tmp_path / "two.toml"
+    path.write_text(text.replace("LIMIT", limit), encoding="utf-8")
+    return main(["tolerances", str(path), "--quiet", *more])
+
+
+def test_the_safe_supports_are_told_and_a_witness(tmp_path, capfd):
+    assert told(tmp_path, "44 mm", "--json", "-") == 0
+    found = json.loads(capfd.readouterr().out)
+    assert found["nature"] == "guaranteed"
+    assert 0 < found["safe_scale"] < found["unsafe_scale"] < 2
+    assert found["gap"] <= 0.01
+    low, high = found["safe"]["E"]
+    assert low == pytest.approx(25e9 - found["safe_scale"] * 3e9)
+    assert high == pytest.approx(25e9 + found["safe_scale"] * 2e9)
+    assert found["witness_share"] > 1
+
+
+def test_a_limit_below_the_nominal_motion_leaves_no_tolerance(tmp_path, capfd):
+    assert told(tmp_path, "1 mm", "--json", "-") == 0
+    assert json.loads(capfd.readouterr().out)["safe_scale"] is None
+
+
+@pytest.mark.parametrize(
+    ("more", "text", "message"),
+    [
+        (("--most", "0"), CASE, "--most.*greater than 0"),
+        ((), CASE[: CASE.index("[exceedance]")], "exceedance.output.*missing"),
+        ((), CASE.replace("drift1", "drift7"), "exceedance"),
+    ],
+)
+def test_bad_input_is_told_in_one_line(more, text, message, tmp_path, capfd):
+    import re
+
+    assert told(tmp_path, "44 mm", *more, text=text) == 2
+    error = capfd.readouterr().err
+    assert re.search(message, error), error
+    assert "Traceback" not in error

@@ -1,0 +1,90 @@
+"""The safe scaling of tolerances: proved inside, refuted just outside."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from alphacut.frame import StoreyFrame
+from alphacut.frame.decisions.safe_scale import safe_scale, scaled
+from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.integrators import Exact
+
+TIME = {"duration": 5, "step": 0.01}
+
+
+def one_floor(shape):
+    return StoreyFrame([1e3], [3.0], 2.5e10, 1e-6, **shape)
+
+
+def test_a_monotone_peak_is_cut_off_where_it_is_known():
+    # without damping |q| = v0 / omega, omega² = 24 E I / (l³ m): the peak rises with the mass
+    frame, rigidity = one_floor({"v0": [0.5]}), 24 * 2.5e10 * 1e-6 / 27
+    limit = 0.5 * np.sqrt(1.15e3 / rigidity)
+    centre = np.array([1e3])
+    reach = scaled(centre, 0.1 * centre, 0.1 * centre)
+    found = safe_scale(frame, {"m1": 1e3}, reach, {"q1": limit}, duration=5, step=0.001)
+    assert found.safe < 1.5 + 1e-3
+    assert found.safe == pytest.approx(1.5, rel=0.01)
+    assert found.unsafe == pytest.approx(1.5, rel=0.01)
+    assert found.nature == "guaranteed"
+
+
+def safe_and_truth(seed):
+    rng = np.random.default_rng(seed)
+    frame = StoreyFrame(
+        rng.uniform(800, 2000, 2),
+        [3.0, 3.0],
+        2.5e10,
+        1e-6,
+        v0=rng.uniform(-0.2, 0.2, 2),
+        dampers=rng.uniform(20, 200, 2),
+    )
+    nominal = {"E": 2.5e10, "m1": float(frame.masses[0])}
+    centre = np.array([*nominal.values()])
+    flow = LinearFlow(replace(frame, outputs=("drift2",)), tuple(nominal), 5, 0.01, Exact())
+    least = np.abs(flow.values(centre[None])).max()
+    most = np.abs(flow.values(centre * (1 + 0.1 * rng.uniform(-1, 1, (500, 2))))).max()
+    limit = least + 0.6 * (most - least)
+    reach = scaled(centre, 0.1 * centre, 0.1 * centre)
+    return safe_scale(frame, nominal, reach, {"drift2": limit}, **TIME), flow, limit, rng
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_safe_box_is_safe_and_the_witness_is_not(seed):
+    found, flow, limit, rng = safe_and_truth(seed)
+    points = rng.uniform(-1, 1, (4000, 2))
+    points[::2] = np.sign(points[::2])
+    middle, half = (found.lower + found.upper) / 2, (found.upper - found.lower) / 2
+    assert np.abs(flow.values(middle + half * points)).max() <= limit
+    assert np.abs(flow.values(found.witness[None])).max() > limit
+    assert 0 <= found.gap <= 0.01
+    assert found.nature == "guaranteed"
+
+
+def test_a_limit_that_is_never_reached_or_always_broken_is_said_to_be():
+    frame = one_floor({"q0": [0.01]})
+    reach = scaled(np.array([2.5e10]), np.array([1e9]), np.array([1e9]))
+    free = safe_scale(frame, {"E": 2.5e10}, reach, {"q1": 0.011}, **TIME)
+    assert (free.safe, free.witness, free.gap) == (2.0, None, np.inf)
+    broken = safe_scale(frame, {"E": 2.5e10}, reach, {"q1": 0.009}, **TIME)
+    assert broken.safe is None
+    assert broken.share == pytest.approx(0.01 / 0.009)
+
+
+@pytest.mark.parametrize(("limits", "most"), [({"q1": -1.0}, 1), ({}, 1), ({"q1": 1.0}, 0)])
+def test_limits_without_a_meaning_are_refused(limits, most):
+    reach = scaled(np.array([2.5e10]), np.array([1e9]), np.array([1e9]))
+    with pytest.raises(ValueError, match="must be positive"):
+        safe_scale(one_floor({"q0": [0.01]}), {"E": 2.5e10}, reach, limits, most=most, **TIME)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(10, 40))
+def test_random_frames_have_a_tight_safe_scale(seed):
+    found, flow, limit, rng = safe_and_truth(seed)
+    points = rng.choice([-1.0, 1.0], (100_000, 2)) * rng.choice([1, 1, 0.5], (100_000, 2))
+    middle, half = (found.lower + found.upper) / 2, (found.upper - found.lower) / 2
+    for part in np.array_split(middle + half * points, 50):
+        assert np.abs(flow.values(part)).max() <= limit
+    assert found.gap <= 0.01

@@ -1,0 +1,102 @@
+"""Possibility, necessity, margins and safe tolerances, against cases that are known exactly."""
+
+import numpy as np
+import pytest
+
+from alphacut.fuzzy import Triangular, from_data
+from alphacut.fuzzy.decisions.limits import decide, safe_scale
+from alphacut.fuzzy.decisions.nested_boxes import Scaled, Verdict, threshold
+
+X = Triangular(0, 1, 2)
+
+
+def test_a_linear_limit_is_exceeded_as_possibly_as_its_cut_says():
+    found = decide(lambda x, y: 2 * x + y, {"x": X, "y": X}, {"y": 4.5})
+    assert found.possibility == pytest.approx((0.5, 0.5), abs=1e-6)  # 3 (2 − α) = 4.5
+    assert found.possibility[0] <= 0.5 <= found.possibility[1]
+    assert found.necessity == (0, 0)
+    assert found.margin["y"][0] == pytest.approx([-1.5, -0.75, 0, 0.75, 1.5], abs=1e-3)
+    assert found.margin["y"][1] == pytest.approx([4.5, 3.75, 3, 2.25, 1.5], abs=1e-3)
+    assert 2 * found.witness["x"] + found.witness["y"] > 4.5
+    assert found.verdict == "undecided"
+
+
+def test_what_must_be_exceeded_is_necessary():
+    found = decide(lambda x: 2 * x, {"x": Triangular(2, 3, 4)}, {"y": 5})
+    assert found.possibility == (1, 1)
+    assert found.necessity == pytest.approx((0.5, 0.5), abs=1e-6)  # 2 (2 + α) = 5
+    assert decide(lambda x: 2 * x, {"x": Triangular(2, 3, 4)}, {"y": 3.5}).verdict == "unsafe"
+    assert decide(lambda x: 2 * x, {"x": Triangular(2, 3, 4)}, {"y": 8.5}).verdict == "safe"
+
+
+def test_an_extreme_inside_decides():
+    found = decide(lambda x: 1 - (x - 1.5) ** 2, {"x": X}, {"y": 0.91})
+    assert found.possibility == pytest.approx((0.8, 0.8), abs=1e-6)  # x = 1.2 is in the cut at 0.8
+
+
+def test_any_of_several_limits_decides():
+    both = decide(lambda x: {"a": x, "b": -x}, {"x": X}, {"a": 1.8, "b": -0.3})
+    assert both.possibility == pytest.approx((0.3, 0.3), abs=1e-6)  # b: x < 0.3
+    with pytest.raises(ValueError, match="there is no output 'c'; there are a, b"):
+        decide(lambda x: {"a": x, "b": -x}, {"x": X}, {"c": 1})
+
+
+def test_claims_make_the_possibility_a_bound_of_the_probability():
+    data = from_data(np.arange(1.0, 20.0), "next value", bounds=(0, 100))
+    found = decide(lambda x: 2 * x, {"x": data}, {"y": 38.5})
+    assert found.possibility == pytest.approx((0.1, 0.1), abs=1e-6)
+    assert "lies in its α-cut with P >= 1 - α" in str(found)
+
+
+@pytest.mark.parametrize(
+    ("function", "nominal", "reach", "limit", "exact"),
+    [
+        (lambda x, y: 2 * x + y, {"x": 1, "y": 1}, {"x": 0.1, "y": 0.2}, 3.5, 1.25),
+        (lambda x, y: x * y, {"x": 1, "y": 1}, {"x": 0.1, "y": 0.2}, 1.5, (np.sqrt(13) - 3) * 2.5),
+        (lambda x, y: x - y**2, {"x": 0, "y": 0.5}, {"x": 1, "y": 1}, 0.3, 1 - np.sqrt(0.45)),
+        (lambda x: 1 - (x - 1) ** 2, {"x": 0}, {"x": (3.0, 0.5)}, 0.75, 1.0),
+    ],
+)
+def test_the_safe_scale_is_exact_and_its_witness_is_unsafe(function, nominal, reach, limit, exact):
+    found = safe_scale(function, nominal, reach, {"y": limit}, most=2, tolerance=2e-7)
+    assert found.safe <= exact + 1e-12 <= found.unsafe + 2e-12
+    assert found.unsafe - found.safe < 1e-6
+    assert function(**dict(zip(nominal, found.witness, strict=True))) > limit
+
+
+def test_all_of_the_safe_box_is_safe():
+    found = safe_scale(
+        lambda x, y: x * y**2 - x,
+        {"x": 1, "y": 1},
+        {"x": 0.3, "y": 0.2},
+        {"y": 0.5},
+        tolerance=1e-4,
+    )
+    rng = np.random.default_rng()
+    points = rng.uniform(-1, 1, (100_000, 2))
+    points[::2] = np.sign(points[::2])
+    x, y = (1 + found.safe * np.array([0.3, 0.2]) * points).T
+    assert (x * y**2 - x).max() <= 0.5
+
+
+def test_a_family_without_a_decision_stays_open():
+    family = Scaled(np.zeros(1), np.ones(1), np.ones(1))
+    found = threshold(family, lambda low, high: Verdict(high[0] <= 0.25), tolerance=1e-3)
+    assert found.safe == pytest.approx(0.25, abs=1e-3)
+    assert found.unsafe == found.gap == np.inf
+    unsafe = threshold(family, lambda low, high: Verdict(False, np.zeros(1)))
+    assert (unsafe.safe, unsafe.unsafe) == (None, 0)
+    assert family.size_of(np.array([-0.5])) == 0.5
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: safe_scale(lambda x: x, {"x": 1}, {"z": 1}, {"y": 2}), "the tolerances name z"),
+        (lambda: safe_scale(lambda x: x, {"x": 1}, {"x": -1}, {"y": 2}), "must be 0 or greater"),
+        (lambda: safe_scale(lambda x: x, {"x": 1}, {"x": 1}, {"y": 2}, most=0), "must be positive"),
+    ],
+)
+def test_bad_tolerances_are_refused(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
