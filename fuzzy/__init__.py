@@ -2,6 +2,8 @@
 
 from alphacut.fuzzy.campaign.campaign import CampaignError
 from alphacut.fuzzy.campaign.store import Store, StoreError
+from alphacut.fuzzy.decisions.limits import Decision, decide, safe_scale
+from alphacut.fuzzy.decisions.nested_boxes import Threshold
 from alphacut.fuzzy.dry_run import explain
 from alphacut.fuzzy.knowledge.enclosure import gradient_range
 from alphacut.fuzzy.knowledge.from_data import from_data
@@ -44,6 +46,7 @@ __all__ = [
     "Claim",
     "Claimed",
     "Crisp",
+    "Decision",
     "DependencyError",
     "Ellipsoidal",
     "Extended",
@@ -68,9 +71,11 @@ __all__ = [
     "Stepwise",
     "Store",
     "StoreError",
+    "Threshold",
     "Trapezoidal",
     "Triangular",
     "apply",
+    "decide",
     "explain",
     "from_data",
     "gradient_range",
@@ -78,6 +83,7 @@ __all__ = [
     "least_alpha",
     "levels",
     "propagate",
+    "safe_scale",
     "values_needed",
     "width_shares",
 ]
