@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from alphacut.fuzzy import BranchAndBound, Interval, Known, Signed, gradient_range, propagate
+from alphacut.fuzzy.knowledge import interval_arithmetic
 from alphacut.fuzzy.knowledge.enclosure import Enclosed
 
 LOW, HIGH = np.array([[-1.0]]), np.array([[1.0]])
@@ -255,3 +256,11 @@ def test_branch_and_bound_proves_kinks():
     values = function(x, y)
     assert result.lower[0, 0] <= values.min() <= result.lower[0, 0] + 2e-3
     assert result.upper[0, 0] - 2e-3 <= values.max() <= result.upper[0, 0]
+
+
+def test_a_reciprocal_across_zero_has_no_bounds():
+    ends = np.array([-1.0, 1.0, -2.0, 0.0]), np.array([2.0, 2.0, -1.0, 1.0])
+    lower, upper = interval_arithmetic.reciprocal(ends)
+    assert (lower[[0, 3]] == -np.inf).all()
+    assert (upper[[0, 3]] == np.inf).all()
+    np.testing.assert_allclose([lower[1:3], upper[1:3]], [[0.5, -1.0], [1.0, -0.5]])

@@ -184,3 +184,17 @@ def test_round_off_contradicts_no_sign(plan, seed):
         lambda x, y: x * y, inputs, plan, known=Known({"x": 1, "y": 1}), alpha=np.linspace(0, 1, 8)
     )
     assert (result.nature, result.notes) == (Nature.GUARANTEED, ())
+
+
+def test_a_slope_that_nearly_vanishes_is_no_sign():
+    inputs = {"x": Interval(0.0, 1.0)}
+
+    def model(x):
+        return (x + 0.01) ** 2  # slopes from 0.02 to 2.02: the least is 1 % of their range
+
+    told = [
+        propagate(model, inputs, Signed(verification=Verification(margin=margin)), alpha=[0]).notes
+        for margin in (0.05, 0.0)
+    ]
+    assert "not monotone in input x, or not surely" in told[0][0]
+    assert not told[1]
