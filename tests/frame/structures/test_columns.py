@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from alphacut.frame import StoreyFrame, envelope
+from alphacut.frame import Exact, LinearFlow, StoreyFrame, envelope
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import Interval, Triangular
 
@@ -56,3 +56,17 @@ def test_shears_and_certificates_know_of_the_columns() -> None:
 def test_columns_that_make_no_sense_are_refused(columns: tuple[float, ...], pattern: str) -> None:
     with pytest.raises(ValueError, match=pattern):
         StoreyFrame(MASSES, LENGTHS, 25e9, 1e-5, columns=columns)
+
+
+def test_the_shear_of_a_storey_is_its_stiffness_times_its_drift():
+    frame = StoreyFrame(
+        masses=[2e4, 1e4],
+        lengths=[3.0, 2.5],
+        modulus=25e9,
+        second_moment=1e-6,
+        q0=[0.01, 0.03],
+        outputs=("shear1", "shear2", "drift2"),
+    )
+    start = LinearFlow(frame, (), 1, 0.01, Exact()).values(np.zeros((1, 0)))[0, 0]
+    stiffness = 24 * 25e9 * 1e-6 / np.array([3.0, 2.5]) ** 3
+    np.testing.assert_allclose(start, [stiffness[0] * 0.01, stiffness[1] * 0.02, 0.02], rtol=1e-12)
