@@ -30,7 +30,7 @@ class StiffnessBounds:
 
     @property
     def bulk(self) -> tuple[float, float]:
-        """Bounds of B = (C11 + C22)/2 + C12, in Pa: its energy is that of equal strains, ε11 = ε22."""
+        """Bounds of B = (C11 + C22)/2 + C12, in Pa, the energy of equal strains."""
         return _form(self.lower, EQUAL), _form(self.upper, EQUAL)
 
     @property
@@ -48,7 +48,8 @@ class StiffnessBounds:
         steepest = self.shear[1] / self.bulk[0]
         if not steepest < 1.5:
             raise ValueError(
-                f"E of eq. 16 has no bounds here: A/B reaches {steepest:.3g}, and E rises with A only below 1.5"
+                f"E of eq. 16 has no bounds here: A/B reaches {steepest:.3g}, and E rises with A"
+                " only below 1.5"
             )
         low, high = (
             (1.5 * a - a * a / (2 * b)) for a, b in zip(self.shear, self.bulk, strict=True)
@@ -56,7 +57,7 @@ class StiffnessBounds:
         return low * (1 - 16 * UNIT), high * (1 + 16 * UNIT)
 
     def contains(self, stiffness: Array) -> bool:
-        """Whether a symmetric stiffness, shape (3, 3), lies between the bounds."""
+        """True if a symmetric stiffness, shape (3, 3), lies between the bounds."""
         return bool(
             np.linalg.eigvalsh(stiffness - self.lower)[0] >= 0
             and np.linalg.eigvalsh(self.upper - stiffness)[0] >= 0
@@ -71,9 +72,10 @@ def _form(stiffness: Array, strain: Array) -> float:
 
 
 def inverse_below(matrix: Array) -> Array:
-    """A matrix below the inverse of every symmetric matrix up to the given positive definite one, shape (…, 3, 3).
+    """Matrix below the inverse of every symmetric matrix up to the given one, shape (…, 3, 3).
 
-    With X the computed inverse and R = I − X·matrix, the true one differs from X by at most ‖R‖‖X‖/(1 − ‖R‖), rounding of R included.
+    With X the computed inverse and R = I − X·matrix, the true one differs from X by at most
+    ‖R‖‖X‖/(1 − ‖R‖), rounding of R included.
     """
     inverse = np.linalg.inv(matrix)
     inverse = (inverse + np.swapaxes(inverse, -1, -2)) / 2

@@ -24,7 +24,8 @@ class ImageBox:
 
     Args:
         thresholds: Least and greatest grey value of each threshold, rising.
-        phases: Moduli of each phase, one more than thresholds; phase k has k thresholds at or below its grey values.
+        phases: Moduli of each phase, one more than thresholds; phase k has k thresholds at or below
+            its grey values.
 
     Raises:
         ValueError: The numbers do not fit, or thresholds run backwards.
@@ -72,12 +73,14 @@ def solve_cuts(
 ) -> list[Cut]:
     """One guaranteed cut for each box: one solve with stresses and one with displacements.
 
-    The order of the phases is needed at the two corners only. Where a pixel that the threshold leaves open may be of phases without
-    order, it takes the least of their K + G/3 and the least of their G: still a proof, but of an enclosure.
+    The order of the phases is needed at the two corners only. Where a pixel that the threshold
+    leaves open may be of phases without order, it takes the least of their K + G/3 and the least of
+    their G: still a proof, but of an enclosure.
 
     Args:
         grey: Grey values, shape (rows, columns).
-        boxes: Cuts of the input, each inside the one before or the other way round; neighbours give the first guess.
+        boxes: Cuts of the input, each inside the one before or the other way round; neighbours give
+            the first guess.
         aspect: Height of a pixel over its width.
         solver: Stopping rule.
         division: Parts along each side of a pixel.
@@ -94,7 +97,7 @@ def solve_cuts(
 
 
 def nested(intervals: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Intervals in the order of falling α, each widened to hold those before it, which what it holds guarantees."""
+    """Intervals in the order of falling α, each widened to hold those before it."""
     lows = np.minimum.accumulate([low for low, _ in intervals])
     highs = np.maximum.accumulate([high for _, high in intervals])
     return [(float(low), float(high)) for low, high in zip(lows, highs, strict=True)]

@@ -43,7 +43,7 @@ class Directions:
 
 
 def directions(bounds: StiffnessBounds) -> Directions:
-    """Anisotropy of a stiffness between bounds; C ≤ upper gives compliances above, so moduli below."""
+    """Anisotropy of a stiffness between bounds."""
     middle = (bounds.lower + bounds.upper) / 2
     weights = np.array([[1, 1, 2], [1, 1, 2], [2, 2, 4]])  # of Voigt entries in the tensor's norm
     bulk = (middle[0, 0] + middle[1, 1] + 2 * middle[0, 1]) / 4

@@ -1,7 +1,8 @@
-"""Where the two bounds part company: the constitutive error of the two fields, pixel by pixel.
+"""Constitutive error of the two fields, pixel by pixel.
 
-For a load the energy of the strains plus the complementary energy of the stresses minus their work is nowhere negative, zero where
-one is the other's by Hooke's law, and its mean is the distance of the bounds (Prager and Synge 1947; Ladevèze and Leguillon 1983).
+For a load the energy of the strains plus the complementary energy of the stresses minus their work
+is nowhere negative, zero where one is the other's by Hooke's law, and its mean is the distance of
+the bounds (Prager and Synge 1947; Ladevèze and Leguillon 1983).
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 
 def constitutive_gap(found: CrispBounds, strain: Array) -> Array:
-    """Error of each pixel under a mean strain, shape (rows, columns), in Pa; its mean bounds the distance of the energies.
+    """Error of each pixel under a mean strain, shape (rows, columns), in Pa.
 
     Args:
         found: Bounds of one crisp image, solved with ``pixels=True``.

@@ -1,7 +1,8 @@
 """Hashin–Shtrikman interval of the three-dimensional isotropic composite of the same phases.
 
-An image read as plane strain is the section of a prismatic material: fibres. If its particles are grains, this interval bounds what
-the solid can be (Hashin and Shtrikman 1963; Walpole 1966 where the phases have no order).
+An image read as plane strain is the section of a prismatic material: fibres. If its particles are
+grains, this interval bounds what the solid can be (Hashin and Shtrikman 1963; Walpole 1966 where
+the phases have no order).
 """
 
 from __future__ import annotations

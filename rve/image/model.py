@@ -30,7 +30,8 @@ class ImageCut:
     """Bounds at one α-level.
 
     Args:
-        bounds: Of the stiffness: the material's of a periodic image, the tiles' bracket of a window.
+        bounds: Of the stiffness: the material's of a periodic image, the tiles' bracket of a
+            window.
         modulus: Interval of E of eq. 16, in Pa; of a window widened by the scatter of its tiles.
         nature: What the interval is worth.
         solution: Fields of a periodic image.
@@ -47,7 +48,7 @@ class ImageCut:
 
     @property
     def homogenised(self) -> Homogenised:
-        """The middle of the bounds as a model of the cell gives it, half their distance as its error."""
+        """Middle of the bounds as a model of the cell gives it, with its error."""
         middle = (self.bounds.lower + self.bounds.upper) / 2
         values = np.einsum("mj,jk,mk->m", MODULI, middle, MODULI)
         gaps = np.einsum("mj,jk,mk->m", MODULI, self.bounds.upper - middle, MODULI)
@@ -67,7 +68,7 @@ class ImageCut:
 
 @dataclass(frozen=True)
 class ImageModel:
-    """How an image is solved.
+    """Settings of the solution of an image.
 
     Args:
         aspect: Height of a pixel over its width.

@@ -55,7 +55,8 @@ class ModuliInterval:
     Args:
         lower: Least moduli.
         upper: Greatest moduli.
-        attained: Both ends are materials that can occur; else the interval only encloses them (a fuzzy Poisson's ratio).
+        attained: Both ends are materials that can occur; else the interval only encloses them (a
+            fuzzy Poisson's ratio).
 
     Raises:
         ValueError: The ends are the wrong way round.

@@ -1,6 +1,7 @@
-"""PETSc's Krylov methods on the matrix-free operators: a shell matrix, a shell preconditioner, PETSc's options.
+"""PETSc's Krylov methods on the matrix-free operators, by shell matrices.
 
-Give it to `solve_side` in the place of `ConjugateGradient`; PETSc is not for several threads, so the sides are solved one after another.
+Give it to `solve_side` in the place of `ConjugateGradient`; PETSc is not for several threads, so
+the sides are solved one after another.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Images of moduli, least and greatest, from phases that are not certain.
 
-The stiffness of a composite grows in the Loewner order with the tensor of every point. So the image of the least K + G/3 and the
-least G of each pixel, over all phases it may be and all moduli that these may have, has a stiffness below every possible one.
+The stiffness of a composite grows in the Loewner order with the tensor of every point. So the image
+of the least K + G/3 and the least G of each pixel, over all phases it may be and all moduli that
+these may have, has a stiffness below every possible one.
 """
 
 from __future__ import annotations
@@ -35,7 +36,8 @@ def threshold_ranges(grey: Array, thresholds: Sequence[tuple[float, float]]) -> 
 
     Args:
         grey: Grey values, shape (rows, columns).
-        thresholds: Least and greatest value of each threshold, rising; a pixel is of phase k if k thresholds are ≤ its grey value.
+        thresholds: Least and greatest value of each threshold, rising; a pixel is of phase k if k
+            thresholds are ≤ its grey value.
     """
     first, last = (
         np.searchsorted(np.array([t[end] for t in thresholds]), grey, side="right")
@@ -45,7 +47,7 @@ def threshold_ranges(grey: Array, thresholds: Sequence[tuple[float, float]]) -> 
 
 
 def moduli_images(first: Array, last: Array, phases: Sequence[ModuliInterval]) -> ModuliImages:
-    """Least and greatest moduli of pixels of the phases `first` … `last`, numbers of shape (rows, columns)."""
+    """Least and greatest moduli of pixels of the phases `first` … `last`."""
     pairs = np.unique(first * len(phases) + last)
     tables = np.zeros((4, len(phases), len(phases)))
     attained = all(phase.attained for phase in phases)

@@ -1,8 +1,8 @@
 """A random threshold: E over τ between proved bounds, its mean and its quantiles.
 
-The stiffness falls as τ rises where the brighter phase is the stiffer one. Between two values of τ it lies between
-the lower bound at the greater and the upper bound at the smaller; beyond the ends, between those
-and the pure phases.
+The stiffness falls as τ rises where the brighter phase is the stiffer one. Between two values of τ
+it lies between the lower bound at the greater and the upper bound at the smaller; beyond the ends,
+between those and the pure phases.
 """
 
 from __future__ import annotations
@@ -45,7 +45,8 @@ class NormalThreshold:
     def probability(self, threshold: Array) -> tuple[Array, Array]:
         """Least and greatest probability of a threshold up to the given values.
 
-        The distribution function is monotone in the mean and, at each value, in the deviation: its extremes are at corners.
+        The distribution function is monotone in the mean and, at each value, in the deviation: its
+        extremes are at corners.
         """
         values = [ndtr((threshold - m) / s) for m in self.mean for s in self.deviation]
         return np.minimum.reduce(values), np.maximum.reduce(values)

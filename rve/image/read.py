@@ -110,7 +110,8 @@ def require_phases(grey: Array, thresholds: tuple[tuple[float, float], ...]) -> 
         thresholds: Least and greatest value of each.
 
     Raises:
-        ValueError: A threshold lies outside the grey values, a phase is empty, or the threshold is one of 8 bits for 16.
+        ValueError: A threshold lies outside the grey values, a phase is empty, or the threshold is
+            one of 8 bits for 16.
     """
     low, high = float(grey.min()), float(grey.max())
     told = f"the grey values lie from {low:g} to {high:g}"

@@ -39,7 +39,8 @@ def solve_image(
     """Proved bounds of the effective stiffness of the periodic image.
 
     Args:
-        bulk: Plane-strain bulk modulus K + G/3 of each pixel, shape (rows, columns), in Pa; row 0 is at the bottom, y rises with rows.
+        bulk: Plane-strain bulk modulus K + G/3 of each pixel, shape (rows, columns), in Pa; row 0
+            is at the bottom, y rises with rows.
         shear: Shear modulus of each pixel, same shape, in Pa.
         aspect: Height of a pixel over its width.
         solver: Stopping rule.
@@ -59,14 +60,15 @@ def solve_between(
     start: CrispBounds | None = None,
     pixels: bool = False,
 ) -> CrispBounds:
-    """Proved bounds of the stiffness of every image between two: stresses in the lower, displacements in the upper.
+    """Proved bounds of the stiffness of every image between two.
 
     Args:
         images: Least and greatest moduli.
         aspect: Height of a pixel over its width.
         solver: Stopping rule.
         division: Parts along each side of a pixel.
-        start: Result of a similar image of as many pixels and parts; its fields are the first guess.
+        start: Result of a similar image of as many pixels and parts; its fields are the first
+            guess.
         pixels: Keep the energy of each pixel.
     """
     rule = solver or ConjugateGradient()

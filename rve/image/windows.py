@@ -1,8 +1,9 @@
-"""Windows of a material: the bracket of a tiling, and the interval of the material that the scatter of its tiles allows.
+"""Windows of a material: a tiling's bracket, and the interval of the material.
 
-For a tiling of a periodic cell the harmonic mean of the tiles' stiffnesses under uniform traction (SUBC) and the arithmetic mean of
-those under uniform displacement (KUBC) bracket the cell's stiffness (Huet 1990). A window of a larger material is another sample:
-its bracket bounds its own apparent stiffness only, and the material's takes the scatter between tiles besides.
+For a tiling of a periodic cell the harmonic mean of the tiles' stiffnesses under uniform traction
+(SUBC) and the arithmetic mean of those under uniform displacement (KUBC) bracket the cell's
+stiffness (Huet 1990). A window of a larger material is another sample: its bracket bounds its own
+apparent stiffness only, and the material's takes the scatter between tiles besides.
 """
 
 from __future__ import annotations
@@ -26,8 +27,10 @@ class Tiling:
     """Bounds of the tiles.
 
     Args:
-        stiffness: Above each tile's stiffness under uniform displacement, shape (tiles, 3, 3), in Pa.
-        compliance: Above each tile's compliance under uniform traction, shape (tiles, 3, 3), in 1/Pa.
+        stiffness: Above each tile's stiffness under uniform displacement, shape (tiles, 3, 3), in
+            Pa.
+        compliance: Above each tile's compliance under uniform traction, shape (tiles, 3, 3), in
+            1/Pa.
     """
 
     stiffness: Array
@@ -35,13 +38,14 @@ class Tiling:
 
     @property
     def bracket(self) -> StiffnessBounds:
-        """Bounds of the stiffness of the periodic cell that the tiles fill; of one tile, of its apparent stiffness."""
+        """Bounds of the stiffness of the periodic cell that the tiles fill."""
         return StiffnessBounds(inverse_below(_mean(self.compliance)), _mean(self.stiffness))
 
     def material_modulus(self, confidence: float = CONFIDENCE) -> tuple[float, float]:
-        """Interval of E of eq. 16 of the material, from independent tiles: no proof, a confidence interval.
+        """Confidence interval of E of eq. 16 of the material, from independent tiles.
 
-        The bracket's ends, each moved out by t·s/√m, with s the scatter of E between m tiles to first order.
+        The bracket's ends, each moved out by t·s/√m, with s the scatter of E between m tiles to
+        first order.
 
         Raises:
             ValueError: There is one tile only, or E has no bounds.
@@ -62,7 +66,7 @@ class Tiling:
 
 
 def tiles_of(image: Array, along: int) -> Array:
-    """An image of shape (rows, columns) as along × along tiles, shape (tiles, rows/along, columns/along).
+    """An image of shape (rows, columns) as tiles, (tiles, rows/along, columns/along).
 
     Raises:
         ValueError: The image cannot be divided so.

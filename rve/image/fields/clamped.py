@@ -1,7 +1,8 @@
-"""Fields that vanish on the edge of every tile: uniform displacement (KUBC) or uniform traction (SUBC) of a window.
+"""Fields that vanish on the edge of every tile: KUBC or SUBC of a window.
 
-The periodic preconditioner becomes exact for the clamped tile of one material by the forces that hold its edge (capacitance matrix):
-z − M E (Eᵀ M E)⁻¹ Eᵀ z with z = M r and E the unknowns of the edge.
+The periodic preconditioner becomes exact for the clamped tile of one material by the forces that
+hold its edge (capacitance matrix): z − M E (Eᵀ M E)⁻¹ Eᵀ z with z = M r and E the unknowns of the
+edge.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from alphacut.rve.image.fields.operator import Operator
 from alphacut.rve.image.fields.preconditioner import FourierPreconditioner
 from alphacut.stochastic.theta.truncated_normal import Array
 
-HOLD = 1e4  # what a uniform field yields, over what the longest wave yields, so that the edge can hold it
+# what a uniform field yields, over what the longest wave yields, so that the edge can hold it
+HOLD = 1e4
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,7 @@ class ClampedPreconditioner:
 
 
 def free_unknowns(element: Element, shape: tuple[int, int]) -> Array:
-    """0 for unknowns on the lower and the left edge of the tile, which are its upper and right edge too; 1 elsewhere."""
+    """0 for unknowns on the lower and the left edge of the tile, 1 elsewhere."""
     free = np.ones((element.types, *shape))
     for kind, (_, y, x, _, _) in enumerate(element.functionals):
         if y == 0:

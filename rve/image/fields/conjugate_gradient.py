@@ -1,7 +1,8 @@
-"""Preconditioned conjugate gradients on many systems in step, stopped by the energy that is still to be gained.
+"""Preconditioned conjugate gradients on many systems, stopped by the energy to gain.
 
-A step lowers the energy by (step length) × (residual · preconditioned residual), so the sum over the last steps estimates what the
-field before them lacked (Hestenes and Stiefel 1952). The bounds hold for whatever field comes out; stopping early only widens them.
+A step lowers the energy by (step length) × (residual · preconditioned residual), so the sum over
+the last steps estimates what the field before them lacked (Hestenes and Stiefel 1952). The bounds
+hold for whatever field comes out; stopping early only widens them.
 """
 
 from __future__ import annotations
@@ -63,7 +64,8 @@ class ConjugateGradient:
 
     Args:
         accuracy: Energy still to be gained, relative to the scale given with the load, in (0, 0.1].
-        iterations: Exact number of iterations instead, or None; fields are then not converged and not meant to be.
+        iterations: Exact number of iterations instead, or None; fields are then not converged and
+            not meant to be.
 
     Raises:
         ValueError: A value lies outside its range.
@@ -127,13 +129,14 @@ class ConjugateGradient:
         if self.iterations is None:
             lacking = float((gains[-1] / scale).max())
             raise ConvergenceError(
-                f"the image's fields have not converged in {LIMIT} iterations (last gain of energy {lacking:.1e}, {self.accuracy:.1e} asked for); "
-                f"lower the contrast of the phases or ask for less accuracy"
+                f"the image's fields have not converged in {LIMIT} iterations (last gain of energy"
+                f" {lacking:.1e}, {self.accuracy:.1e} asked for); lower the contrast of the phases"
+                " or ask for less accuracy"
             )
         return Solution(fields, limit)
 
     def _enough(self, product: Array, gains: list[Array], scale: Array) -> bool:
-        """Whether every system's remaining gain, extrapolated from the last steps, is within the accuracy."""
+        """True if every system's remaining gain is within the accuracy."""
         if not np.any(product > 1e-26 * scale):
             return True
         if len(gains) < 2:

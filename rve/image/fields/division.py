@@ -1,4 +1,4 @@
-"""Division of every pixel into equal parts: the same image, a larger space of fields that contains the old one."""
+"""Division of every pixel into equal parts: the same image, a larger space of fields."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def divided(image: Array, parts: int) -> Array:
 
 
 def prolonged(element: Element, fields: Array, parts: int) -> Array:
-    """The same fields, shape (tiles, loads, types, rows, columns), as unknowns of the divided pixels."""
+    """The same fields, (tiles, loads, types, rows, columns), as unknowns of the parts."""
     tiles, loads, types, rows, columns = fields.shape
     result = np.empty((tiles, loads, types, rows * parts, columns * parts))
     matrices = {
@@ -36,7 +36,7 @@ def prolonged(element: Element, fields: Array, parts: int) -> Array:
 
 
 def evaluation(element: Element, row: int, column: int, parts: int) -> Array:
-    """From a pixel's local unknowns to those that the part (row, column) of it owns, shape (types, n)."""
+    """From a pixel's unknowns to those of the part (row, column) of it, shape (types, n)."""
     components = len(element.local_types) // len(element.line) ** 2
     size = len(element.line) ** 2
     matrix = np.zeros((element.types, components * size))

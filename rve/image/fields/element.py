@@ -1,11 +1,13 @@
-"""The two finite elements on a pixel, each as the matrix from its unknowns to its orthonormal strain or stress modes.
+"""Two finite elements on a pixel, from unknowns to orthonormal strain or stress modes.
 
-Displacement: biquadratic, two components (Q2). Stress: from an Airy function φ in the bicubic rectangle with continuous slopes
-(Bogner, Fox, Schmit 1965), σ11 = φ,22, σ22 = φ,11, σ12 = −φ,12, which is in equilibrium exactly.
+Displacement: biquadratic, two components (Q2). Stress: from an Airy function φ in the bicubic
+rectangle with continuous slopes (Bogner, Fox, Schmit 1965), σ11 = φ,22, σ22 = φ,11, σ12 = −φ,12,
+which is in equilibrium exactly.
 
-Either field f is expanded in products of Legendre polynomials that are orthonormal on the pixel, so the mean energy of a pixel is a
-sum of squares without quadrature error: k Σ (modes of the trace)² + G Σ (modes of 11 − 22 and of twice 12)², with k = K + G/3, and
-with 1/(4 k), 1/(4 G) in the place of k, G for stresses.
+Either field f is expanded in products of Legendre polynomials that are orthonormal on the pixel, so
+the mean energy of a pixel is a
+sum of squares without quadrature error: k Σ (modes of the trace)² + G Σ (modes of 11 − 22 and of
+twice 12)², with k = K + G/3, and with 1/(4 k), 1/(4 G) in the place of k, G for stresses.
 """
 
 from __future__ import annotations
@@ -29,18 +31,23 @@ class Element:
     Args:
         types: Unknowns per pixel of the periodic grid.
         local_types: Type of each of the pixel's local unknowns, shape (n,).
-        shifts: Pixel, from this one in (rows, columns), that owns each local unknown, shape (n, 2), 0 or 1.
+        shifts: Pixel, from this one in (rows, columns), that owns each local unknown, shape (n, 2),
+            0 or 1.
         positions: Place (y, x) of each local unknown in pixels, shape (n, 2), multiples of 1/2.
         odd: Types whose unknown changes sign under inversion of the plane, shape (types,).
         modes: Matrix from local unknowns to modes, shape (rows, n); lengths in pixel widths.
         bulk_rows: The first so many modes belong to the trace.
-        constants: Rows of the constant modes of trace, difference of normal components and twice the shear component.
+        constants: Rows of the constant modes of trace, difference of normal components and twice
+            the shear component.
         twice_shear: Factor from the Voigt component 12 to twice the tensor component.
-        anchors: For each local unknown the ones to subtract from it, which takes a field without strain or stress away.
+        anchors: For each local unknown the ones to subtract from it, which takes a field without
+            strain or stress away.
         line: Coefficients of the basis functions along one side, of which the pixel's are products.
         order: Derivatives between the field and its modes.
-        orders: For each mode its part (0 trace, 1 difference, 2 shear) and Legendre orders along y, x.
-        functionals: For each type its component, place (y, x) in its pixel and orders of its derivatives along y and x.
+        orders: For each mode its part (0 trace, 1 difference, 2 shear) and Legendre orders along y,
+            x.
+        functionals: For each type its component, place (y, x) in its pixel and orders of its
+            derivatives along y and x.
     """
 
     types: int
@@ -59,7 +66,7 @@ class Element:
     functionals: tuple[tuple[int, float, float, int, int], ...]
 
     def mean_modes(self, loads: Array) -> Array:
-        """Modes of uniform fields given in Voigt order (11, 22, 12 with 2 ε12 or σ12), shape (loads, 3) → (rows, loads)."""
+        """Modes of uniform fields in Voigt order, shape (loads, 3) → (rows, loads)."""
         modes = np.zeros((len(self.modes), len(loads)))
         first, second, shear = np.asarray(loads).T
         for row, value in zip(
@@ -104,7 +111,7 @@ def displacement_element(aspect: float = 1.0) -> Element:
 
 @cache
 def airy_element(aspect: float = 1.0) -> Element:
-    """Bicubic Airy function on a pixel `aspect` times as high as wide; slopes are per pixel, not per length."""
+    """Bicubic Airy function on a pixel `aspect` times as high as wide; slopes are per pixel."""
     # value and slope at 0, value and slope at 1
     basis = (
         (1, 0, -3, 2),
@@ -146,7 +153,7 @@ def airy_element(aspect: float = 1.0) -> Element:
 
 
 def _tables(basis: tuple[tuple[int, ...], ...], *, degree: int) -> list[Array]:
-    """Orthonormal modes 0 … degree of the basis functions' derivatives 0, 1, 2: each of shape (degree + 1, functions).
+    """Orthonormal modes 0 … degree of derivatives 0, 1, 2, each (degree + 1, functions).
 
     The integrals are rational and exact; each entry is rounded twice, and what is zero is zero.
     """
@@ -187,7 +194,7 @@ def _integral(polynomial: Polynomial) -> Fraction:
 def _stacked(
     parts: tuple[Array, Array, Array],
 ) -> tuple[Array, int, tuple[int, int, int], tuple[tuple[int, int, int], ...]]:
-    """Modes of trace, difference and shear without the rows that vanish; end of the trace; constant rows; orders."""
+    """Modes of trace, difference and shear without rows that vanish."""
     kept = [np.flatnonzero(np.abs(part).max(axis=1) > 0) for part in parts]
     starts = np.cumsum([0] + [len(rows) for rows in kept])
     modes = np.vstack([part[rows] for part, rows in zip(parts, kept, strict=True)])

@@ -1,7 +1,8 @@
 """Mean energies of given fields, with a bound of every rounding error made on the way.
 
-The floating-point numbers of a field are taken as exact: whatever the solver left in them, they are a field of the space. Rounded are
-the differences from the pixel's anchor, the modes, and the energy of each pixel; the sum over pixels is exact (`math.fsum`).
+The floating-point numbers of a field are taken as exact: whatever the solver left in them, they are
+a field of the space. Rounded are the differences from the pixel's anchor, the modes, and the energy
+of each pixel; the sum over pixels is exact (`math.fsum`).
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ class Energy:
     Args:
         value: Symmetric, shape (tiles, fields, fields).
         rounding: Bound of the absolute error of each entry, same shape.
-        pixels: Energies of all pairs in each pixel, shape (tiles, fields, fields, rows, columns), or
-            None.
+        pixels: Energies of all pairs in each pixel, shape (tiles, fields, fields, rows, columns),
+            or None.
     """
 
     value: Array
@@ -95,7 +96,8 @@ def modes_of(
     """Modes and bounds of their rounding errors, block by block.
 
     Yields:
-        Tiles, rows, modes of shape (mode rows, tiles, fields, rows, columns) and the bound of each, same shape.
+        Tiles, rows, modes of shape (mode rows, tiles, fields, rows, columns) and the bound of each,
+        same shape.
     """
     absolute = np.abs(element.modes)
     count = len(element.local_types)
@@ -113,7 +115,7 @@ def modes_of(
 
 
 def _anchored(element: Element, fields: Array, tiles: slice, lines: slice) -> tuple[Array, Array]:
-    """Local unknowns minus their anchors, shape (n, tiles, fields, rows, columns), and the bound of the rounding."""
+    """Local unknowns minus their anchors, and the bound of the rounding."""
     raw = np.empty((len(element.local_types), *fields[tiles, :, 0, lines].shape))
     for k, (kind, shift) in enumerate(zip(element.local_types, element.shifts, strict=True)):
         for here, there in shifted(lines, shift, fields.shape):

@@ -1,6 +1,7 @@
 """The elastic operator on a pixel grid, applied pixel by pixel without a matrix.
 
-Fields have the shape (tiles, loads, types, rows, columns): one periodic grid a tile, one field a load, one unknown per pixel and type.
+Fields have the shape (tiles, loads, types, rows, columns): one periodic grid a tile, one field a
+load, one unknown per pixel and type.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ class Operator:
 
     @cached_property
     def matrix(self) -> Array:
-        """Element matrices for unit bulk and unit shear coefficient side by side, shape (n, 2 n)."""
+        """Element matrices for unit bulk and unit shear coefficient, shape (n, 2 n)."""
         modes, rows = self.element.modes, self.element.bulk_rows
         return np.hstack([modes[:rows].T @ modes[:rows], modes[rows:].T @ modes[rows:]])
 
@@ -60,7 +61,7 @@ class Operator:
         return result
 
     def load(self, mean_modes: Array) -> Array:
-        """Minus the operator on uniform fields of the given modes, shape (rows, loads): the right-hand sides."""
+        """Minus the operator on uniform fields of the given modes, shape (rows, loads)."""
         tiles, rows, columns = self.bulk.shape
         result = np.zeros((tiles, mean_modes.shape[1], self.element.types, rows, columns))
         split = self.element.bulk_rows
@@ -77,7 +78,7 @@ class Operator:
         return result
 
     def _scatter(self, forces: Array, result: Array, tiles: slice, rows: slice) -> None:
-        """Add the local forces, shape (n, tiles, loads, rows, columns), to the fields they belong to."""
+        """Add local forces, (n, tiles, loads, rows, columns), to the fields they belong to."""
         for k, (kind, shift) in enumerate(
             zip(self.element.local_types, self.element.shifts, strict=True)
         ):
@@ -86,7 +87,7 @@ class Operator:
 
 
 def blocks(shape: tuple[int, ...]) -> Iterator[tuple[slice, slice]]:
-    """Slices of tiles and of rows that together cover fields of this shape, each of about `COLUMNS` pixels times loads."""
+    """Slices of tiles and rows, each of about `COLUMNS` pixels times loads."""
     tiles, loads, _, rows, columns = shape
     lines = max(1, min(rows, COLUMNS // (loads * columns)))
     together = max(1, COLUMNS // (loads * columns * rows)) if lines == rows else 1
@@ -98,7 +99,7 @@ def blocks(shape: tuple[int, ...]) -> Iterator[tuple[slice, slice]]:
 def shifted(
     rows: slice, shift: tuple[int, int], shape: tuple[int, ...]
 ) -> Iterator[tuple[tuple[slice, slice], tuple[slice, slice]]]:
-    """Pairs of places, in a block of whole `rows` and in the periodic grid moved by `shift`, which together cover the block."""
+    """Pairs of places, in a block of `rows` and in the grid moved by `shift`."""
     height, width = shape[-2:]
     for lines in _moved(rows.start, rows.stop, shift[0], height):
         for columns in _moved(0, width, shift[1], width):
@@ -106,7 +107,7 @@ def shifted(
 
 
 def _moved(start: int, stop: int, by: int, period: int) -> list[tuple[slice, slice]]:
-    """Places from `start` to `stop` counted from `start`, and the same moved by 0 or 1 with the given period."""
+    """Places from `start` to `stop`, and the same moved by 0 or 1 with the period."""
     length = stop - start
     if stop + by <= period:
         return [(slice(0, length), slice(start + by, stop + by))]

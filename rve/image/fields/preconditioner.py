@@ -1,8 +1,9 @@
-"""The inverse of the operator of one constant material, diagonal in blocks under the Fourier transform.
+"""Inverse of the operator of one constant material, by Fourier transform.
 
-A constant isotropic material looks the same after an inversion of the plane. So, with the place of each unknown in its phase and a
-factor i for unknowns that change sign, the blocks are real and symmetric. It also looks the same after a reflection: half of the
-blocks give the others by changes of sign.
+A constant isotropic material looks the same after an inversion of the plane. So, with the place of
+each unknown in its phase and a factor i for unknowns that change sign, the blocks are real and
+symmetric. It also looks the same after a reflection: half of the blocks give the others by changes
+of sign.
 """
 
 from __future__ import annotations
@@ -23,8 +24,10 @@ class FourierPreconditioner:
     """Inverse of the constant-coefficient operator on a periodic grid.
 
     Args:
-        inverse: Real blocks at wave numbers 0 … half of those along y, shape (half, types, types, waves along x).
-        phases: Unit factors of the types, along y with shape (types, rows), along x with shape (types, waves along x).
+        inverse: Real blocks at wave numbers 0 … half of those along y, shape (half, types, types,
+            waves along x).
+        phases: Unit factors of the types, along y with shape (types, rows), along x with shape
+            (types, waves along x).
         shape: Rows and columns of the grid.
     """
 
@@ -61,7 +64,7 @@ class FourierPreconditioner:
 
 
 def _inverted(blocks: Array, first: bool) -> Array:
-    """Symmetric inverses of blocks, shape (waves, types, types); uniform fields, in the very first block, cause nothing."""
+    """Symmetric inverses of blocks, shape (waves, types, types); uniform fields cause nothing."""
     inverse = np.empty_like(blocks)
     inverse[0] = (
         np.linalg.pinv(blocks[0], rcond=1e-10, hermitian=True)
@@ -91,9 +94,10 @@ def symbol(element: Element, bulk: float, shear: float, ky: Array, kx: Array) ->
 
 
 def phase_factors(element: Element, ky: Array, kx: Array) -> tuple[Complex, Complex]:
-    """Factors of the types along y and along x: the wave at the place in the pixel, i if the type is odd, −1 where a reflection tells.
+    """Factors of the types along y and along x: the wave at the place in the pixel.
 
-    The block at −ky is the one at ky with the signs of those types changed that change sign under a reflection of y.
+    The block at −ky is the one at ky with the signs of those types changed that change sign under a
+    reflection of y.
     """
     along_y = np.empty((element.types, len(ky)), complex)
     along_x = np.empty((element.types, len(kx)), complex)

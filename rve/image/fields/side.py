@@ -89,11 +89,13 @@ def solve_side(
 
     Args:
         side: Space of the fields.
-        bulk: Plane-strain bulk modulus K + G/3 of each pixel, shape (tiles, rows, columns), any unit.
+        bulk: Plane-strain bulk modulus K + G/3 of each pixel, shape (tiles, rows, columns), any
+            unit.
         shear: Shear modulus, same shape and unit.
         solver: Stopping rule.
         aspect: Height of a pixel over its width.
-        division: Parts along each side into which every pixel is divided; the fields of whole pixels are the start.
+        division: Parts along each side into which every pixel is divided; the fields of whole
+            pixels are the start.
         start: Fields to start from, on the divided pixels.
         clamped: Fluctuations vanish on the edge of each tile; else they are periodic.
         pixels: Keep the energy of each pixel.
@@ -124,7 +126,7 @@ def _fields(
     start: Array | None,
     clamped: bool,
 ) -> tuple[Array, int]:
-    """Fields of the unit loads and the most iterations; on large images one load at a time, which keeps the work space small."""
+    """Fields of the unit loads and the most iterations; large images load by load."""
     periodic = Operator(element, trace, deviator)
     bulk, shear = (float(np.sqrt(c.min() * c.max())) for c in (trace, deviator))
     kind = ClampedPreconditioner if clamped else FourierPreconditioner
@@ -154,7 +156,7 @@ def _of_solved_loads(fields: Array) -> Array:
 
 
 def _of_unit_loads(fields: Array) -> Array:
-    """Fields under `UNIT_LOADS` from those under `SOLVED_LOADS`, in place; rounded, they are fields all the same."""
+    """Fields under `UNIT_LOADS` from those under `SOLVED_LOADS`, in place."""
     fields[:, 0] += fields[:, 1]
     fields[:, 0] *= 0.5
     np.subtract(fields[:, 0], fields[:, 1], out=fields[:, 1])
@@ -162,7 +164,7 @@ def _of_unit_loads(fields: Array) -> Array:
 
 
 def least_energy(element: Element, trace: Array, deviator: Array, modes: Array) -> Array:
-    """Total energy that no field with the given means can be below, shape (tiles, loads): harmonic means of the coefficients."""
+    """Total energy that no field with the given means is below, shape (tiles, loads)."""
     split = element.bulk_rows
     parts = ((trace, modes[:split]), (deviator, modes[split:]))
     pixels = trace.shape[1] * trace.shape[2]

@@ -1,4 +1,4 @@
-"""A particle given by an inequality in x and y, evaluated on whole pixels by interval arithmetic."""
+"""Particle given by an inequality in x and y, by interval arithmetic on pixels."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Equation:
         return np.array(np.broadcast_to(classes, (grid.rows, grid.columns)))
 
     def _excess(self, x: Interval, y: Interval) -> Interval:
-        """What must not be positive."""
+        """Expression that must not be positive."""
         try:
             tree = ast.parse(self.inequality.strip(), mode="eval").body
         except SyntaxError as error:

@@ -9,7 +9,8 @@ import numpy as np
 
 from alphacut.stochastic.theta.truncated_normal import Array
 
-OUTWARDS = 4e-16  # relative step out after each operation: above its rounding error, of NumPy's functions too
+# relative step out after each operation: above its rounding error, of NumPy's functions too
+OUTWARDS = 4e-16
 TINY = 1e-300  # where a result underflows
 
 

@@ -1,4 +1,4 @@
-"""Which pixels a particle's outline certainly fills, certainly misses, or cuts."""
+"""Pixels that a particle's outline certainly fills, certainly misses, or cuts."""
 
 from __future__ import annotations
 

@@ -23,7 +23,8 @@ class Polygons:
         polygons: Corners (x, y) of each, shape (n, 2), three or more; the last joins the first.
 
     Raises:
-        ValueError: There is no polygon, or one has fewer than three corners or a corner that is no number.
+        ValueError: There is no polygon, or one has fewer than three corners or a corner that is no
+            number.
     """
 
     polygons: Sequence[Array]
@@ -57,7 +58,7 @@ class Polygons:
 
 
 def _classified(corners: Array, size: Array) -> Array:
-    """Classes of unit pixels, shape (rows, columns) = size[::-1], for corners (x, y) well inside them."""
+    """Classes of unit pixels, shape (rows, columns), for corners (x, y) inside them."""
     columns, rows = size
     after = np.roll(corners, -1, axis=0)
     cut = np.zeros((rows, columns), bool)

@@ -1,4 +1,4 @@
-"""Polygons from a CSV file: columns x and y with their unit, a row ``nan, nan`` between polygons."""
+"""Polygons from a CSV file: columns x and y, a row ``nan, nan`` between polygons."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A few fields whose best combination gives a proved bound for any moduli of the phases, in microseconds."""
+"""Few fields whose best combination gives a proved bound for any moduli."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 @dataclass(frozen=True)
 class ReducedSide:
-    """Trial fields of one side with their energies phase by phase; the first three are the uniform fields.
+    """Trial fields of one side with their energies by phase; the first three uniform.
 
     Args:
         side: The space.
@@ -50,7 +50,7 @@ class ReducedSide:
         return pairs.reshape(len(bulk), -1)
 
     def combination(self, coefficients: Array) -> Array:
-        """Shares of the fields under the three loads, shape (m, 3 + n, 3): of least energy but for single precision."""
+        """Shares of the fields under the three loads, shape (m, 3 + n, 3)."""
         count = len(self.fields)
         shares = np.zeros((len(coefficients), 3 + count, 3))
         shares[:, :3] = np.eye(3)
@@ -63,7 +63,7 @@ class ReducedSide:
         return shares
 
     def energy_above(self, coefficients: Array) -> Array:
-        """Matrices above the least mean energies of the three loads, shape (m, 3, 3), all rounding included."""
+        """Matrices above the least mean energies, shape (m, 3, 3), rounding included."""
         shares = self.combination(coefficients)
         size, error = self.energies.size, self.energies.error
         flat = self.energies.value.reshape(len(size), -1)

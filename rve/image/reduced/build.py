@@ -1,4 +1,4 @@
-"""Reduced bases of an image, one for each side, from a few solves at moduli far from one another."""
+"""Reduced bases of an image, one a side, from solves at distant moduli."""
 
 from __future__ import annotations
 
@@ -39,7 +39,8 @@ class ReducedBounds:
         """Lower and upper stiffness, each of shape (m, 3, 3), in the unit of the moduli.
 
         Args:
-            bulk: K + G/3 of the phases, shape (m, phases), positive; near the moduli of the solves the bounds are close.
+            bulk: K + G/3 of the phases, shape (m, phases), positive; near the moduli of the solves
+                the bounds are close.
             shear: G of the phases, same shape.
         """
         lower, upper = np.empty((2, len(bulk), 3, 3))
@@ -68,7 +69,8 @@ def reduced_bounds(
 ) -> ReducedBounds:
     """Reduced bases of both sides, each solve at the candidate farthest from those before.
 
-    A common factor of all moduli changes nothing, so distances are between logarithms less their mean.
+    A common factor of all moduli changes nothing, so distances are between logarithms less their
+    mean.
 
     Args:
         labels: Phase of each pixel, shape (rows, columns).
@@ -89,7 +91,7 @@ def reduced_bounds(
 
 
 def _far_apart(logarithms: Array, number: int) -> list[int]:
-    """Rows one after another, each the farthest from those before it, the first the farthest from the middle."""
+    """Rows one after another, each the farthest from those before it."""
     places = logarithms - logarithms.mean(axis=1, keepdims=True)
     distance = np.linalg.norm(places - places.mean(axis=0), axis=1)
     chosen = [int(np.argmax(distance))]
@@ -108,7 +110,7 @@ def _empty(side: Side, aspect: float, labels: Array, phases: int) -> ReducedSide
 def _extended(
     reduced: ReducedSide, bulk: Array, shear: Array, solver: ConjugateGradient
 ) -> ReducedSide:
-    """The side with what its best fields lack at these moduli, scaled to unit energy and made orthogonal."""
+    """The side with what its best fields lack at these moduli, made orthogonal."""
     coefficients = reduced.coefficients(bulk[None], shear[None])
     shares = reduced.combination(coefficients)[0, 3:]
     start = np.tensordot(shares.T, reduced.fields, axes=1)

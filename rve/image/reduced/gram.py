@@ -17,7 +17,8 @@ class Gram:
     """Mean products of the modes of fields over each phase, of the trace and of the deviator.
 
     Args:
-        value: Shape (2 phases, fields, fields): trace of phase 0, deviator of phase 0, trace of phase 1, …
+        value: Shape (2 phases, fields, fields): trace of phase 0, deviator of phase 0, trace of
+            phase 1, …
         error: Norm of the rounding error of each field's modes, shape (2 phases, fields).
         summed: Relative rounding of the sums.
     """
