@@ -19,7 +19,7 @@ run:
 	$(IN) python -m alphacut run $(CASE) --out $(OUT) --workers $(WORKERS) $(if $(FRESH),--fresh)
 
 test:
-	$(IN) python -m pytest -m "not slow" $(PYTEST)
+	$(IN) python -m pytest -m "not slow" -n $(WORKERS) --dist loadfile $(PYTEST)
 
 test-slow:
 	$(IN) python -m pytest -m slow $(PYTEST)

@@ -47,6 +47,7 @@ INDIRECT = {  # imported by others on this project's behalf
     "notebook": "python3-notebook",
     "pip": "python3-pip",  # enter, to install ruff
     "pytest_cov": "python3-pytest-cov",  # pytest, for make coverage
+    "xdist": "python3-pytest-xdist",  # pytest, for make test
     "sphinx": "python3-sphinx",
 }
 FROM_PYPI = {"pyuncertainnumber": "benchmarks/fuzzy/requirements.txt"}  # one comparison needs it
