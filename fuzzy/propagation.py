@@ -22,7 +22,7 @@ from alphacut.fuzzy.campaign.campaign import Campaign, Progress
 from alphacut.fuzzy.campaign.sample_store import shelf
 from alphacut.fuzzy.campaign.spot_check import SpotCheck
 from alphacut.fuzzy.campaign.store import Identity, Store
-from alphacut.fuzzy.campaign.workers import pool, require_workers
+from alphacut.fuzzy.campaign.workers import pool, require_executor, require_workers
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.plan import Plan
@@ -93,6 +93,7 @@ def propagate(
     plan = plan or Automatic()
     require_plan(plan)
     require_workers(workers)
+    require_executor(executor, workers)
     require_callable(function, domain.names, by_name=not shared, sent=workers > 1)
     call = Call(function, domain.names, tuple(shared), vectorised)
     start = perf_counter()

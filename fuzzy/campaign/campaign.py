@@ -10,10 +10,10 @@ from time import sleep
 import numpy as np
 
 from alphacut.fuzzy.campaign.call import Call, Failure, Outcome, Sample, named_point
+from alphacut.fuzzy.campaign.dispatch import Task, completed
 from alphacut.fuzzy.campaign.memory_check import require
 from alphacut.fuzzy.campaign.sample_store import Shelf
 from alphacut.fuzzy.campaign.spot_check import SpotCheck
-from alphacut.fuzzy.campaign.workers import Task, completed
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.samples.model import Layout, Values
 from alphacut.fuzzy.sets.numbers import Array

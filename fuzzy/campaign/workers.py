@@ -5,18 +5,11 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import contextmanager, suppress
-from itertools import islice
 from numbers import Integral
 from typing import Any
-
-from alphacut.fuzzy.campaign.call import Call, Failure, Outcome
-from alphacut.fuzzy.sets.numbers import Array
-
-Task = tuple[list[int], Array]  # rows of the design, and their points
-Done = tuple[list[int], list[Outcome]]
 
 
 class ProcessPool(Executor):
@@ -61,20 +54,14 @@ class ProcessPool(Executor):
             raise RuntimeError(f"{reason}; {GUARD}") from None
         self._started = True
 
-    def alone(self, call: Call, points: Array) -> list[Outcome]:
-        """Run one call in a process of its own, which may die."""
+    def alone(self, fn: Callable[..., Any], /, *args: Any) -> Any:
+        """Run one call in a process of its own, which may die.
+
+        Raises:
+            BrokenExecutor: It died.
+        """
         with _processes(1) as executor:
-            try:
-                return executor.submit(call, points).result()
-            except BrokenExecutor:
-                if len(points) == 1:
-                    return [
-                        Failure(
-                            "the process that ran it died: out of memory, or a crash in compiled"
-                            " code"
-                        )
-                    ]
-        return [self.alone(call, point[None])[0] for point in points]
+            return executor.submit(fn, *args).result()
 
     def stop(self) -> None:
         """End the processes in the middle of what they do: nobody waits for it any more."""
@@ -141,6 +128,21 @@ def require_workers(workers: object) -> None:
         )
 
 
+def require_executor(executor: object, workers: int) -> None:
+    """An executor is one of `concurrent.futures`, and stands instead of workers.
+
+    Raises:
+        ValueError: It is something else, or both are given.
+    """
+    if executor is not None and not isinstance(executor, Executor):
+        raise ValueError(
+            f"the executor is a {type(executor).__name__}; it must be one of concurrent.futures"
+            " (of a client of dask: client.get_executor())"
+        )
+    if executor is not None and workers != 1:
+        raise ValueError("workers and an executor are both given; give one")
+
+
 def _end_with_parent() -> None:
     """Leave when the process that started this one is gone: a killed campaign leaves no orphans."""
     from multiprocessing import parent_process
@@ -157,60 +159,3 @@ def _end_with_parent() -> None:
             os._exit(1)
 
     Thread(target=watch, daemon=True).start()
-
-
-def completed(call: Call, tasks: Iterable[Task], executor: Executor | None) -> Iterator[Done]:
-    """Run the tasks and yield each as it ends, with no more than a few waiting in the executor.
-
-    Args:
-        call: The function with the way it is called.
-        tasks: Rows and points of each call; taken from the iterable only when there is room.
-        executor: Any `concurrent.futures` executor; None runs here, one after the other.
-    """
-    if executor is None:
-        for rows, points in tasks:
-            yield rows, call(points)
-        return
-    queue = iter(tasks)
-    waiting: dict[Future[list[Outcome]], Task] = {}
-    room = 2 * _width(executor)
-    try:
-        while True:
-            for rows, points in islice(queue, room - len(waiting)):
-                waiting[executor.submit(call, points)] = rows, points
-            if not waiting:
-                return
-            for future in wait(waiting, return_when=FIRST_COMPLETED).done:
-                rows, points = waiting.pop(future)
-                yield rows, _outcomes(future, executor, call, points)
-    finally:
-        for future in waiting:
-            future.cancel()
-
-
-def _outcomes(
-    future: Future[list[Outcome]], executor: Executor, call: Call, points: Array
-) -> list[Outcome]:
-    """Outcomes of a call, run again by itself if its process died."""
-    try:
-        return future.result()
-    except BrokenExecutor:
-        if isinstance(executor, ProcessPool):
-            return executor.alone(call, points)
-        raise
-    except Exception as error:  # a call raises nothing itself
-        failure = (
-            f"the function or its outputs cannot be sent between processes ({type(error).__name__}:"
-            f" {error})"
-        )
-        return [Failure(failure)] * len(points)
-
-
-def _width(executor: Executor) -> int:
-    """Number of calls that the executor runs at once, as far as it says."""
-    return int(
-        getattr(executor, "_max_workers", 0)
-        or getattr(executor, "num_workers", 0)
-        or os.cpu_count()
-        or 1
-    )

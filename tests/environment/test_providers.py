@@ -14,6 +14,7 @@ DIRECT = {
     "PIL": "python3-matplotlib",  # which depends on Pillow, by pip too
     "basix": "python3-dolfinx",
     "cvxopt": "python3-cvxopt",
+    "distributed": "python3-distributed",
     "dolfinx": "python3-dolfinx",
     "dolfinx_mpc": "python3-dolfinx-mpc",
     "gmsh": "python3-gmsh",
