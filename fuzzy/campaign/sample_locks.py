@@ -31,6 +31,8 @@ class _File:
     held: set[int] = field(default_factory=set)
 
 
+_ALONE = 1 << 62  # offset beyond those of samples
+
 _FILES: dict[Path, _File] = {}
 _GUARD = Lock()
 
@@ -52,6 +54,15 @@ class Claims:
                 _FILES[self._path] = _File(os.open(self._path, os.O_CREAT | os.O_RDWR, 0o666))
             self._file = _FILES[self._path]
             self._file.users += 1
+
+    def alone(self) -> bool:
+        """Hold the file for this process as long as it is open, unless another process does."""
+        try:
+            if fcntl is not None:
+                fcntl.lockf(self._file.handle, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, _ALONE)
+        except OSError:
+            return False
+        return True
 
     def take(self, keys: Iterable[str]) -> set[str]:
         """Claim what nobody else has claimed; the keys that are this campaign's now."""

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from alphacut.fuzzy.campaign.call import Failure, Outcome, Sample
+from alphacut.fuzzy.campaign.network_folder import network_kind
 from alphacut.fuzzy.campaign.sample_locks import Claims
 from alphacut.fuzzy.campaign.store import (
     Identity,
@@ -132,13 +133,28 @@ class Shelf:
             The keys that are now this campaign's to run, and the samples that turned out to be
             stored. What is in neither, another campaign is running.
         """
-        if self._claims is None:
-            with self._store.reported():
-                self._claims = Claims(self._store.path, canonical(self._identity))
-        mine = self._claims.take(keys)
+        claims = self._claims or self._begin()
+        mine = claims.take(keys)
         stored = self.stored(keys)
-        self._claims.release(mine & stored.keys())
+        claims.release(mine & stored.keys())
         return mine - stored.keys(), stored
+
+    def _begin(self) -> Claims:
+        """Make the claims; alone on a network file system.
+
+        Raises:
+            StoreError: Another process works on a store there.
+        """
+        path = self._store.path
+        with self._store.reported():
+            self._claims = Claims(path, canonical(self._identity))
+        if (kind := network_kind(path)) and not self._claims.alone():
+            raise StoreError(
+                f"the store {path} is on a network file system ({kind}) and in use by another"
+                " campaign, or it keeps no locks; one campaign at a time works on such a store:"
+                " give each its own, or a folder of this machine"
+            )
+        return self._claims
 
     def gather(self, key: str, outcome: Outcome) -> None:
         """Keep an outcome for the next write."""

@@ -2,6 +2,7 @@
 pages are up to date.
 """
 
+import os
 import re
 import shlex
 import subprocess
@@ -154,6 +155,16 @@ def test_console_blocks_run(path, tmp_path):
             check=False,
         )
         assert done.returncode == 0, f"{lines}\n{done.stderr[-2000:]}"
+
+
+def test_the_job_array_runs(tmp_path):
+    (tmp_path / "cases").symlink_to(ROOT / "cases")
+    script = blocks(ROOT / "docs" / "howto" / "clusters.md", "sh")[0]
+    for number in ("0", "3"):
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "SLURM_ARRAY_TASK_ID": number}
+        subprocess.run(["bash", "-euc", script], check=True, cwd=tmp_path, env=environment)
+    files = sorted(path.name for path in (tmp_path / "results" / "array").glob("*.nc"))
+    assert files == ["0.2.nc", "0.35.nc"]
 
 
 def test_generated_pages_are_up_to_date():
