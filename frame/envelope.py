@@ -10,9 +10,12 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.outputs import output_unit
+from alphacut.fuzzy.drawing import draw_bands, new_axes
+from alphacut.fuzzy.html import html_table
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.axes import Axes
 
     from alphacut.frame.boxes import Boxes
 
@@ -133,6 +136,41 @@ class Envelope:
         cost = f"  {self.method}: {count}, {self.seconds:.2g} s, bounds {self.nature}"
         claim = [f"  {self.facts['claim']}"] if "claim" in self.facts else []
         return "\n".join([*lines, cost, *claim])
+
+    def _repr_html_(self) -> str:
+        """Extremes over time of every output and level as a table, for notebooks."""
+        rows = [
+            (name, _unit(name).strip(), f"{alpha:g}", f"{low:.6g}", f"{high:.6g}")
+            for k, name in enumerate(self.outputs)
+            for alpha, low, high in zip(
+                self.alpha, self.minimum[:, k], self.maximum[:, k], strict=True
+            )
+        ]
+        return html_table(("output", "unit", "α", "least", "greatest"), rows, below=repr(self))
+
+    def plot(self, output: str | None = None, axes: Axes | None = None) -> Axes:
+        """Draw one output's band over time for every level (Fig. 33).
+
+        Args:
+            output: Name of the output; the last one if not given.
+            axes: Where to draw; a new figure if not given.
+
+        Returns:
+            The axes drawn on.
+
+        Raises:
+            ValueError: There is no such output.
+        """
+        output = self.outputs[-1] if output is None else output
+        if output not in self.outputs:
+            raise ValueError(f"there is no output {output!r}; there are {', '.join(self.outputs)}")
+        k = self.outputs.index(output)
+        axes = new_axes(axes)
+        draw_bands(axes, self.time, self.alpha, self.lower[..., k], self.upper[..., k])
+        unit = _unit(output)
+        axes.set(xlabel="time in s", ylabel=f"{output} in{unit}" if unit else output)
+        axes.set_title(f"bounds {self.nature}", fontsize="medium")
+        return axes
 
     @property
     def minimum(self) -> Array:

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from html import escape
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from alphacut.rve.cell import STRAIN, Cell
 from alphacut.stochastic.theta.truncated_normal import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 def effective_modulus(s11: float, s12: float) -> tuple[float, float]:
@@ -54,7 +59,7 @@ class StressCurve:
         return float(self.weights @ self.s11), float(self.weights @ self.s12)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Homogenised:
     """Effective behaviour of one cell with what it cost.
 
@@ -83,6 +88,45 @@ class Homogenised:
     reason: str = ""
     checks: Mapping[str, float] = field(default_factory=dict)
     cell: Cell | None = None
+
+    def __repr__(self) -> str:
+        """E and ν of eq. 16 with the declared error, the model and its cost."""
+        cost = self.seconds.get("total", 0.0)
+        return (
+            f"Homogenised(E = {self.modulus:.7g} Pa, ν = {self.poisson:.5g}, relative error of E"
+            f" {self.estimated_error:.2g}, by {self.method}, {cost:.2g} s)"
+        )
+
+    def _repr_html_(self) -> str:
+        """The same as a table, for notebooks."""
+        rows = {
+            "E of eq. 16": f"{self.modulus:.7g} Pa",
+            "ν of eq. 16": f"{self.poisson:.5g}",
+            "declared relative error of E": f"{self.estimated_error:.2g}",
+            "model": self.method,
+            "why": self.reason,
+        }
+        cells = "".join(f"<tr><th>{k}</th><td>{escape(v)}</td></tr>" for k, v in rows.items() if v)
+        return f"<table>{cells}</table>"
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the homogenised stress over θ (Fig. 16).
+
+        Args:
+            axes: Where to draw; a new figure if not given.
+
+        Returns:
+            The axes drawn on.
+        """
+        if axes is None:
+            from matplotlib import pyplot
+
+            axes = pyplot.subplots(figsize=(5.0, 3.0), layout="constrained")[1]
+        axes.plot(self.curve.theta, self.curve.s11, label="σ11 under ε11 = ε22")
+        axes.plot(self.curve.theta, self.curve.s12, label="σ12 under ε12")
+        axes.set(xlabel="θ", ylabel="homogenised stress in Pa")
+        axes.legend(frameon=False)
+        return axes
 
     @property
     def modulus(self) -> float:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from alphacut.fuzzy.drawing import draw_membership, new_axes
+from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.knowledge.contradiction import contradictions
 from alphacut.fuzzy.knowledge.joint import JointClaim
 from alphacut.fuzzy.knowledge.known import Signs
@@ -22,6 +24,7 @@ from alphacut.fuzzy.surrogates.response_surface import ResponseSurface
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.axes import Axes
 
 
 _PRINTED = 50  # outputs that are printed
@@ -32,7 +35,7 @@ def _shown(value: float) -> str:
     return f"{0.0 if abs(value) < np.finfo(float).tiny else value:.6g}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FuzzyResult:
     """Fuzzy outputs by their α-cuts.
 
@@ -165,6 +168,41 @@ class FuzzyResult:
         more = [f"… and {hidden:,} outputs more: bounds(NAME) has them"] if hidden > 0 else []
         said = [str(self.claim)] if str(self.claim) else []
         return "\n".join([*lines, *more, *self.notes, *said])
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        """The text of the result with its cuts as a table, for notebooks."""
+        head, *said = str(self).split("\n")
+        notes = [line for line in said if ", α = " not in line]
+        shown = range(min(len(self.outputs), _PRINTED))
+        rows = [
+            (self.outputs[k], f"{alpha:g}", _shown(self.lower[a, k]), _shown(self.upper[a, k]))
+            for k in shown
+            for a, alpha in enumerate(self.domain.alpha)
+        ]
+        return html_table(("output", "α", "lower", "upper"), rows, below="\n".join([head, *notes]))
+
+    def plot(self, output: str = "y", axes: Axes | None = None) -> Axes:
+        """Draw one output's cuts as a membership function, with the levels that were computed.
+
+        Args:
+            output: Name of the output.
+            axes: Where to draw; a new figure if not given.
+
+        Returns:
+            The axes drawn on.
+
+        Raises:
+            ValueError: There is no such output.
+        """
+        lower, upper = self.bounds(output)
+        axes = new_axes(axes)
+        draw_membership(axes, self.alpha, lower, upper)
+        for level, *ends in zip(self.alpha, lower, upper, strict=True):
+            axes.plot(ends, (level, level), color="grey", marker="|", linewidth=0.8)
+        axes.set(xlabel=output, title=f"{self.nature} bounds")
+        return axes
 
     @property
     def claim(self) -> JointClaim:

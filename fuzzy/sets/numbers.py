@@ -9,10 +9,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from numbers import Real
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from alphacut.fuzzy.drawing import draw_membership, new_axes
+from alphacut.fuzzy.html import membership_svg
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -70,6 +76,26 @@ class FuzzyNumber(ABC):
         return Cut(
             float(_interpolate(alpha, levels, lower)), float(_interpolate(alpha, levels, upper))
         )
+
+    def plot(self, axes: Axes | None = None, *, quantity: str = "p", name: str = "") -> Axes:
+        """Draw the membership function (Fig. 36).
+
+        Args:
+            axes: Where to draw; a new figure if not given.
+            quantity: Label of the abscissa, with its unit.
+            name: Name in the legend of the axes; none if empty.
+
+        Returns:
+            The axes drawn on.
+        """
+        axes = new_axes(axes)
+        draw_membership(axes, *self.cuts, name=name)
+        axes.set_xlabel(quantity)
+        return axes
+
+    def _repr_html_(self) -> str:
+        """The membership function as a small drawing, for notebooks."""
+        return membership_svg(*self.cuts)
 
     def membership(self, x: ArrayLike) -> Array:
         """Grade of membership μ in [0, 1] at `x`, any shape; not a number where `x` is none."""

@@ -26,6 +26,8 @@ DIRECT = {
     "meshio": "python3-meshio",
     "mpi4py": "python3-mpi4py",
     "netCDF4": "python3-netcdf4",
+    "nbclient": "python3-nbclient",
+    "nbformat": "python3-nbclient",  # which depends on it
     "numpy": "python3-numpy",
     "petsc4py": "python3-petsc4py-real",
     "pint": "python3-pint",
@@ -44,7 +46,6 @@ INDIRECT = {  # imported by others on this project's behalf
     "ipykernel": "python3-ipykernel",  # the notebook
     "joblib": "python3-joblib",
     "myst_parser": "python3-myst-parser",  # Sphinx, for the pages of docs
-    "nbclient": "python3-nbclient",
     "notebook": "python3-notebook",
     "pip": "python3-pip",  # enter, to install ruff
     "pytest_cov": "python3-pytest-cov",  # pytest, for make coverage
