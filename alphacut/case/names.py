@@ -10,7 +10,7 @@ from alphacut.case.checks_structure import RAYLEIGH
 from alphacut.case.values import nearest
 from alphacut.io.problem import Problem
 
-GROUPS = ("E", "I", "m", "l", "d", "q0", "v0", "zeta", *RAYLEIGH)
+GROUPS = ("E", "I", "m", "l", "c", "d", "q0", "v0", "zeta", *RAYLEIGH)
 OTHERS = {  # structures beside the storey frame, and their inputs
     "pendulum": ("m", "l", "d", "g", "phi_0", "omega_0"),
     "tower": ("E_columns", "E_columns_top", "E_beams", "mass", "zeta", *RAYLEIGH),
@@ -26,9 +26,7 @@ def floors(case: Case) -> Iterator[Problem]:
     """One entry for each floor in every array of the frame, or one for all floors."""
     count = len(case.fuzzies("frame.masses"))
     for name in ("lengths", "dampers", "displacements", "velocities", "second_moment", "columns"):
-        found = len(
-            case.numbers("frame.columns") if name == "columns" else case.fuzzies(f"frame.{name}")
-        )
+        found = len(case.fuzzies(f"frame.{name}"))
         if found not in (1, count):
             few = f"{count} value{'s' if count > 1 else ''}"
             words = (
@@ -138,12 +136,12 @@ def known_output(case: Case, floors: int) -> Iterator[Problem]:
 
 def known_input(key: str, name: str, count: int) -> Iterator[Problem]:
     """A fuzzy input of the frame: a group or one floor's member of it."""
-    members = [f"{group}{floor + 1}" for group in ("m", "l", "d") for floor in range(count)]
+    members = [f"{group}{floor + 1}" for group in ("m", "l", "c", "d") for floor in range(count)]
     members += [f"{group}{floor + 1}_0" for group in ("q", "v") for floor in range(count)]
     members += [f"zeta{mode + 1}" for mode in range(count)]
     if name not in GROUPS and name not in members:
         each = f"m1 to m{count}" if count > 1 else "m1"
-        allowed = f"{', '.join(GROUPS)}, or one floor: {each}, l1, d1, q1_0, v1_0 …"
+        allowed = f"{', '.join(GROUPS)}, or one floor: {each}, l1, c1, d1, q1_0, v1_0 …"
         yield Problem(
             key,
             f"the frame has no input {name}",

@@ -50,9 +50,9 @@ FRAME = Section(
             alone=True,
         ),
         "columns": Key(
-            "columns in each storey, clamped at both ends",
-            "numbers",
-            default=(2.0,),
+            "columns in each storey, clamped at both ends; fuzzy where a storey's stiffness is",
+            "fuzzy list",
+            default=(Crisp(2.0),),
             allowed=POSITIVE,
             alone=True,
         ),
@@ -216,8 +216,8 @@ ENVELOPE = Section(
     "Fuzzy forward dynamics.",
     {
         "fuzzy": Key(
-            "inputs that are fuzzy, of a frame: E, I, m or m1 …, l, d, q0, v0, zeta (damping"
-            " ratio) …",
+            "inputs that are fuzzy, of a frame: E, I, m or m1 …, l, c (columns), d, q0, v0, zeta"
+            " (damping ratio) …",
             "choices",
             required=True,
         ),

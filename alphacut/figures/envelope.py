@@ -18,6 +18,7 @@ WORDS = {
     "E": "modulus",
     "m": "masses",
     "l": "lengths",
+    "c": "columns",
     "d": "dampers",
     "q0": "initial displacements",
     "v0": "initial velocities",

@@ -217,7 +217,7 @@ def storey_frame(case: Case, modulus: FuzzyNumber) -> Structure:
             else None
         ),
         damping_ratio=tuple(ratio.modal for ratio in ratios(case)),
-        columns=columns(case),
+        columns=tuple(number.modal for number in columns(case)),
     )
     return Structure(model, numbers)
 
@@ -235,6 +235,7 @@ def parameters(case: Case, modulus: FuzzyNumber) -> dict[str, FuzzyNumber]:
             f"{letter}{floor}": value
             for floor, value in enumerate(per_floor(case, f"frame.{key}"), start=1)
         }
+    found |= {f"c{floor}": value for floor, value in enumerate(columns(case), start=1)}
     for letter, key in STARTS.items():
         found |= {
             f"{letter}{floor}_0": value
@@ -243,17 +244,13 @@ def parameters(case: Case, modulus: FuzzyNumber) -> dict[str, FuzzyNumber]:
     return found
 
 
-def columns(case: Case) -> tuple[float, ...]:
+def columns(case: Case) -> tuple[FuzzyNumber, ...]:
     """Columns of each storey; differing second moments become numbers of columns."""
-    floors = len(case.fuzzies("frame.masses"))
-    number, moments = (
-        case.numbers("frame.columns"),
-        [moment.modal for moment in case.fuzzies("frame.second_moment")],
+    moments = [moment.modal for moment in per_floor(case, "frame.second_moment")]
+    return tuple(
+        c if moment == moments[0] else c * (moment / moments[0])
+        for c, moment in zip(per_floor(case, "frame.columns"), moments, strict=True)
     )
-    count, moment = (
-        values * floors if len(values) == 1 else values for values in (list(number), moments)
-    )
-    return tuple(c * i / moments[0] for c, i in zip(count, moment, strict=True))
 
 
 def ratios(case: Case) -> tuple[FuzzyNumber, ...]:

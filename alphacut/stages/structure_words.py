@@ -86,9 +86,11 @@ def frame_sentences(case: Case, wanted: Structure) -> Iterator[str]:
     """Stiffness, damping, and what moves the frame."""
     assert wanted.frame is not None
     modulus, moment = wanted.numbers["E"], wanted.numbers["I"]
-    counts = set(case.numbers("frame.columns"))
-    number = f"{min(counts):g} in each storey" if len(counts) == 1 else "c in a storey"
-    formula = f"{12 * min(counts):g} E I / l³" if len(counts) == 1 else "12 c E I / l³"
+    counts = set(case.fuzzies("frame.columns"))
+    alone = next(iter(counts)) if len(counts) == 1 else None
+    crisp = alone is not None and alone.support.width == 0
+    number = f"{in_unit(alone, '', '')} in each storey" if alone else "c in a storey"
+    formula = f"{12 * alone.modal:g} E I / l³" if alone and crisp else "12 c E I / l³"
     alike = len(case.fuzzies("frame.second_moment")) == 1
     section = f"I = {in_unit(moment, 'm^4', 'm^4')} of one column; " if alike else ""
     rigidity = f"E I = {modulus.modal * moment.modal / 1e6:.4g} MN m² at the modal values" + (
@@ -160,14 +162,12 @@ def floors(case: Case, wanted: Structure) -> dict[str, Any]:
     ]
     head = ["floor", *(COLUMNS[kind] for kind in kinds)]
     for name, entries in (
-        ("columns c", case.numbers("frame.columns")),
+        ("columns c", case.fuzzies("frame.columns")),
         ("second moment", case.fuzzies("frame.second_moment")),
     ):
         if len(entries) > 1:
-            told = [
-                in_unit(x, "m^4", "m^4") if isinstance(x, FuzzyNumber) else f"{x:g}"
-                for x in entries
-            ]
+            unit = "m^4" if name == "second moment" else ""
+            told = [in_unit(x, unit, unit) for x in entries]
             head, columns = [*head, name], [*columns, told]
     head, columns = [*head, "stiffness"], [*columns, stiffnesses(case, wanted)]
     return {
@@ -183,6 +183,6 @@ def stiffnesses(case: Case, wanted: Structure) -> list[str]:
     rigidity = wanted.numbers["E"].modal * wanted.numbers["I"].modal
     lengths = [length.modal for length in per_floor(case, "frame.lengths")]
     return [
-        f"{12e-6 * c * rigidity / length**3:.4g} MN/m"
+        f"{12e-6 * c.modal * rigidity / length**3:.4g} MN/m"
         for c, length in zip(count_columns(case), lengths, strict=True)
     ]

@@ -20,7 +20,7 @@ POSITIVE, NOT_NEGATIVE, RATIO = (
     "0 or greater and below 1, the critical damping",
 )
 OF_FRAME = {
-    r"E|I|[ml]\d+": POSITIVE,
+    r"E|I|[mlc]\d+": POSITIVE,
     r"d\d+|rayleigh_(mass|stiffness)": NOT_NEGATIVE,
     r"zeta\d*": RATIO,
 }

@@ -35,9 +35,9 @@ UNITS |= {
 class StoreyFrame:
     """Chain of n floors with k_z = 12 c_z E I / l_z³ for c_z clamped columns (2 by default).
 
-    Parameters that can be uncertain: "E", "I", "m1" … "mn", "l1" …, "d1" …, "q1_0" … (initial
-    displacements), "v1_0" … (initial velocities), "rayleigh_mass", "rayleigh_stiffness", and
-    "zeta", or "zeta1" … where each mode has its own ratio.
+    Parameters that can be uncertain: "E", "I", "m1" … "mn", "l1" …, "c1" … (columns of a storey),
+    "d1" …, "q1_0" … (initial displacements), "v1_0" … (initial velocities), "rayleigh_mass",
+    "rayleigh_stiffness", and "zeta", or "zeta1" … where each mode has its own ratio.
     Outputs: "q1" … (displacement, m), "v1" … (velocity, m/s), "drift1" … (q_z − q_(z−1), m),
     "shear1" … (k_z drift_z, N); "base_shear" is "shear1".
 
@@ -168,6 +168,7 @@ class StoreyFrame:
         lists = {
             "m{}": self.masses,
             "l{}": self.lengths,
+            "c{}": self.columns,
             "d{}": self.dampers,
             "q{}_0": self.q0,
             "v{}_0": self.v0,
@@ -186,7 +187,7 @@ class StoreyFrame:
         Raises:
             ValueError: The name is neither a group nor a parameter.
         """
-        patterns = {"m": "m{}", "l": "l{}", "d": "d{}", "q0": "q{}_0", "v0": "v{}_0"}
+        patterns = {"m": "m{}", "l": "l{}", "c": "c{}", "d": "d{}", "q0": "q{}_0", "v0": "v{}_0"}
         if name in patterns:
             return tuple(patterns[name].format(z + 1) for z in range(self.floors))
         if name == "zeta" and self.ratios:
@@ -240,7 +241,8 @@ class StoreyFrame:
 
     def _columns(self, p: Mapping[str, Jet]) -> list[Entry]:
         # k_z; 24 E I / l³ in section 6.1
-        return [12 * c * p["E"] * p["I"] * p[f"l{z + 1}"] ** -3 for z, c in enumerate(self.columns)]
+        rigidity = 12 * p["E"] * p["I"]
+        return [rigidity * p[f"c{z + 1}"] * p[f"l{z + 1}"] ** -3 for z in range(self.floors)]
 
     def _output(self, name: str) -> tuple[str, int]:
         found = re.fullmatch(

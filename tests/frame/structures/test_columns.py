@@ -70,3 +70,19 @@ def test_the_shear_of_a_storey_is_its_stiffness_times_its_drift():
     start = LinearFlow(frame, (), 1, 0.01, Exact()).values(np.zeros((1, 0)))[0, 0]
     stiffness = 24 * 25e9 * 1e-6 / np.array([3.0, 2.5]) ** 3
     np.testing.assert_allclose(start, [stiffness[0] * 0.01, stiffness[1] * 0.02, 0.02], rtol=1e-12)
+
+
+def test_each_storey_can_be_uncertain_by_its_columns() -> None:
+    inputs = {"c1": Interval(1.9, 2.1), "c3": Interval(1.9, 2.1)}
+    frame = StoreyFrame(MASSES, LENGTHS, 25e9, 1e-5, q0=(0.01, 0.02, 0.03), outputs=("q3",))
+    found = envelope(frame, inputs, duration=2, step=0.05, alpha=(0,), method="modal", certify=1e-4)
+    assert found.nature == "guaranteed"
+    for c in ((1.9, 2, 2.1), (2.05, 2, 1.95)):
+        other = StoreyFrame(
+            MASSES, LENGTHS, 25e9, 1e-5, q0=(0.01, 0.02, 0.03), outputs=("q3",), columns=c
+        )
+        motion = LinearFlow(other, ("E",), 2, 0.05, Exact()).values(np.array([[25e9]]))[0]
+        assert (motion >= found.lower[0] - 1e-12).all()
+        assert (motion <= found.upper[0] + 1e-12).all()
+    with pytest.raises(ValueError, match=r"c1: its support .* must be positive"):
+        envelope(frame, {"c1": Interval(-0.1, 2)}, duration=2, step=0.05)
