@@ -16,6 +16,7 @@ import numpy as np
 
 from alphacut.fuzzy.knowledge.observations import Observations
 from alphacut.fuzzy.knowledge.order_statistics import Side
+from alphacut.fuzzy.sets.claimed import Claim, Claimed
 from alphacut.fuzzy.sets.numbers import Array
 from alphacut.fuzzy.sets.stepwise import Stepwise
 
@@ -159,3 +160,34 @@ def _within(
     return Stepwise((0.0, *LEVELS), (ends[0], *lower), (ends[1], *upper)), 0.0 if whole else float(
         LEVELS[first]
     )
+
+
+def from_scatter(mean: float, deviation: float, count: int, *, known: bool = False) -> Claimed:
+    """Fuzzy number of the mean of a normal law, from the mean and the scatter of measured values.
+
+    Args:
+        mean: Mean of the values.
+        deviation: Standard deviation of one value, from the values, or known from elsewhere.
+        count: Number of values: 2 at least, or 1 where the deviation is known.
+        known: Whether the deviation is known: a normal pivot in place of Student's t.
+
+    Raises:
+        ValueError: The deviation is not positive, or there are too few values.
+    """
+    from scipy.stats import norm, t
+
+    if not (deviation > 0 and np.isfinite([mean, deviation]).all()):
+        raise ValueError(f"mean and deviation are {mean:g}, {deviation:g}; it must be positive")
+    if count < (1 if known else 2):
+        raise ValueError(f"there is {count} value; its scatter needs 2 or more, or must be known")
+    factors = norm.isf(LEVELS / 2) if known else t.isf(LEVELS / 2, count - 1)
+    reach = deviation / np.sqrt(count) * np.maximum(factors, 0.0)
+    law = (
+        f"{count} values drawn alike and independently from a normal law"
+        if not known
+        else f"{count} value{'s' * (count > 1)} of a normal law of known deviation {deviation:.3g}"
+    )
+    number = Stepwise(
+        (0.0, *LEVELS), (mean - reach[0], *(mean - reach)), (mean + reach[0], *(mean + reach))
+    )
+    return Claimed(number, Claim("mean", (law,)), float(LEVELS[0]))

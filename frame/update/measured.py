@@ -1,0 +1,159 @@
+"""Measured natural modes: frequencies and shapes as fuzzy numbers, claimed or opinions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from alphacut.frame.calculus.jet import Array
+from alphacut.fuzzy import Claimed, Crisp, FuzzyNumber, from_data
+from alphacut.fuzzy.knowledge.named_law import from_scatter
+
+
+@dataclass(frozen=True)
+class MeasuredMode:
+    """One mode of a frame as measured.
+
+    Args:
+        mode: Its number by rising frequency, from 1.
+        frequency: Natural frequency, in Hz.
+        shape: Amplitude by floor, from 1, as a share of that of the reference floor, which is
+            left out.
+        reference: The floor whose amplitude is 1; 0 where no shape was measured.
+
+    Raises:
+        ValueError: The mode or a floor is below 1, the frequency may be 0 or less, or the reference
+            floor has an amplitude.
+    """
+
+    mode: int
+    frequency: FuzzyNumber
+    shape: Mapping[int, FuzzyNumber] = field(default_factory=dict)
+    reference: int = 0
+
+    def __post_init__(self) -> None:
+        if self.mode < 1 or any(floor < 1 for floor in self.shape):
+            raise ValueError(f"mode {self.mode}: modes and floors are numbered from 1")
+        if not self.frequency.modal > 0:
+            raise ValueError(
+                f"mode {self.mode}: its frequency is {self.frequency.modal:g} Hz; it must be"
+                " positive"
+            )
+        if self.shape and (self.reference < 1 or self.reference in self.shape):
+            raise ValueError(
+                f"mode {self.mode}: its reference floor is {self.reference}; it must be a floor"
+                " that is not among the measured amplitudes, since its own is 1"
+            )
+
+    @property
+    def quantities(self) -> dict[str, FuzzyNumber]:
+        """What was measured, by name: "f1", and "shape1_3" for the third floor."""
+        return {
+            f"f{self.mode}": self.frequency,
+            **{f"shape{self.mode}_{floor}": number for floor, number in self.shape.items()},
+        }
+
+
+def measured_mode(
+    mode: int,
+    frequencies: Sequence[float] | Array,
+    shapes: Mapping[int, Sequence[float]] | None = None,
+    *,
+    frequency_deviation: float | None = None,
+    shape_deviation: float | None = None,
+) -> MeasuredMode:
+    """A mode from repeated values: what is claimed is the mean of the normal law of each.
+
+    Args:
+        mode: Its number by rising frequency, from 1.
+        frequencies: Measured values, in Hz.
+        shapes: Measured amplitudes by floor, as many of each as frequencies. Each set is divided by
+            that of the reference floor: the one whose mean amplitude is largest.
+        frequency_deviation: Standard deviation of one value as a share of it, where it is known
+            from elsewhere; from the values' own scatter if not given, which takes two at least.
+        shape_deviation: The same of an amplitude, as a share of that of the reference floor.
+
+    Raises:
+        ValueError: There are too few values, counts differ, or a reference amplitude is 0.
+    """
+    values = np.asarray(frequencies, float)
+    rows = {floor: np.asarray(row, float) for floor, row in (shapes or {}).items()}
+    if any(row.shape != values.shape for row in rows.values()) or values.ndim != 1:
+        raise ValueError(f"mode {mode}: each floor needs {values.size} amplitudes, as frequencies")
+    spread = None if frequency_deviation is None else frequency_deviation * float(values.mean())
+    number = _mean(values, spread)
+    if not rows:
+        return MeasuredMode(mode, number)
+    reference = max(rows, key=lambda floor: abs(float(rows[floor].mean())))
+    if not rows[reference].all():
+        raise ValueError(f"mode {mode}: an amplitude of floor {reference}, the reference, is 0")
+    shape = {
+        floor: _mean(row / rows[reference], shape_deviation)
+        for floor, row in rows.items()
+        if floor != reference
+    }
+    return MeasuredMode(mode, number, shape, reference)
+
+
+def _mean(values: Array, deviation: float | None) -> Claimed:
+    if deviation is None:
+        return from_data(values, "mean", law="normal")
+    return from_scatter(float(values.mean()), deviation, len(values), known=True)
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """All measured modes.
+
+    Args:
+        modes: The modes, by rising number.
+        independent: Whether the sources of all claimed quantities are independent; of unknown
+            dependence if not.
+
+    Raises:
+        ValueError: There is no mode, or one twice.
+    """
+
+    modes: tuple[MeasuredMode, ...]
+    independent: bool = False
+
+    def __post_init__(self) -> None:
+        numbers = [mode.mode for mode in self.modes]
+        if not numbers or sorted(set(numbers)) != numbers:
+            raise ValueError(f"the measured modes are {numbers}; they must rise, one at least")
+
+    @property
+    def quantities(self) -> dict[str, FuzzyNumber]:
+        """All that was measured, by name."""
+        return {name: x for mode in self.modes for name, x in mode.quantities.items()}
+
+    def cuts(self, alpha: float, beta: float) -> Iterator[tuple[MeasuredMode, ModeCut]]:
+        """Cuts of each mode: opinions at α, claimed quantities at β, which makes them joint."""
+        for mode in self.modes:
+            taken = {
+                name: x.cut(beta if isinstance(x, Claimed) else alpha)
+                for name, x in mode.quantities.items()
+            }
+            shape = {floor: taken[f"shape{mode.mode}_{floor}"] for floor in mode.shape}
+            if mode.reference:
+                shape[mode.reference] = Crisp(1.0).cut(0.0)
+            low, high = taken[f"f{mode.mode}"]
+            square = (2 * np.pi) ** 2
+            yield mode, ModeCut(square * max(low, 0.0) ** 2, square * high**2, shape)
+
+
+@dataclass(frozen=True)
+class ModeCut:
+    """What a mode may be at a level.
+
+    Args:
+        low: Least squared angular frequency, in 1/s².
+        high: Greatest.
+        shape: Interval of the amplitude by floor, the reference included.
+    """
+
+    low: float
+    high: float
+    shape: Mapping[int, tuple[float, float]]

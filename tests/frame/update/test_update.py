@@ -1,0 +1,268 @@
+"""Learning a frame's parameters from measured modes: coverage, enclosures, identifiability."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from alphacut.frame import StoreyFrame, envelope
+from alphacut.frame.update.chain import Chain, eigenvalue_ranges
+from alphacut.frame.update.linear_bounds import LinearProgram
+from alphacut.frame.update.measured import MeasuredMode, Measurement, measured_mode
+from alphacut.frame.update.posterior import RefutedError, update
+from alphacut.frame.update.relaxation import CONSTANT, Rows, relaxation
+from alphacut.fuzzy import Claimed, FuzzyNumber, Interval, Triangular, from_data
+
+FRAME = StoreyFrame([20e3, 15e3, 10e3], [3.0, 2.8, 2.8], 30e9, 3e-4, q0=(0.01, 0.02, 0.03))
+NAMES = ("c1", "c2", "c3")
+PRIOR: dict[str, FuzzyNumber] = {name: Interval(1.6, 2.4) for name in NAMES}
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(20)
+
+
+def measured(
+    truth: np.ndarray,
+    rng: np.random.Generator,
+    *,
+    records: int = 20,
+    names: tuple[str, ...] = NAMES,
+    modes: tuple[int, ...] = (1, 2),
+    floors: tuple[int, ...] = (1, 2, 3),
+    noise: float = 0.01,
+) -> Measurement:
+    values, vectors = Chain.of(FRAME, names).modes(truth[None])
+    found = []
+    for mode in modes:
+        shape = vectors[0, :, mode - 1]
+        largest = int(np.abs(shape).argmax())
+        frequency = np.sqrt(values[0, mode - 1]) / (2 * np.pi)
+        rows = {
+            z: shape[z - 1] / shape[largest]
+            + noise * (z - 1 != largest) * rng.standard_normal(records)
+            for z in floors
+        }
+        frequencies = frequency * (1 + noise * rng.standard_normal(records))
+        found.append(measured_mode(mode, frequencies, rows))
+    return Measurement(tuple(found), independent=True)
+
+
+def test_frequencies_over_a_box_lie_in_their_ranges_and_reach_them(
+    rng: np.random.Generator,
+) -> None:
+    names = ("E", "c2", "l1", "m3")
+    chain = Chain.of(FRAME, names)
+    lower, upper = np.log([0.9, 0.8, 0.95, 0.7]), np.log([1.1, 1.3, 1.02, 1.4])
+    points = chain.nominal * np.exp(rng.uniform(lower, upper, (200, 4)))
+    low, high = eigenvalue_ranges(chain, lower, upper)
+    found = chain.modes(points)[0]
+    assert (found >= low).all()
+    assert (found <= high).all()
+    ends = np.exp(np.where(np.array([1, 1, -1, -1]) > 0, [lower, upper], [upper, lower]))
+    reached = chain.modes(chain.nominal * ends)[0]
+    assert reached[0] == pytest.approx(low, rel=1e-9)
+    assert reached[1] == pytest.approx(high, rel=1e-9)
+
+
+def test_modes_of_the_chain_are_those_of_the_frame() -> None:
+    from alphacut.frame.structures.linear import frequencies
+
+    chain = Chain.of(FRAME, ("E", "l2", "m1", "c3"))
+    point = np.array([31e9, 2.7, 21e3, 2.2])
+    other = replace(
+        FRAME, modulus=31e9, lengths=(3.0, 2.7, 2.8), masses=(21e3, 15e3, 10e3), columns=(2, 2, 2.2)
+    )
+    assert np.sqrt(chain.modes(point[None])[0][0]) == pytest.approx(frequencies(other), rel=1e-10)
+
+
+def test_linear_bounds_hold_for_any_multipliers_and_tell_empty_sets() -> None:
+    rows = Rows()
+    x, y = rows.variable(0.0, 2.0), rows.variable(-1.0, 3.0)
+    z = rows.product(x, y)
+    rows.at_most({**x, **y}, 1.0)
+    program: LinearProgram = rows.program()
+    cost = np.zeros(3)
+    cost[next(iter(z))] = 1.0
+    bound, point = program.least(cost)
+    assert point is not None
+    assert bound == pytest.approx(-2.0, abs=1e-9)  # x = 2, y = −1
+    assert bound <= -2.0
+    assert not program.empty()
+    rows.at_most({next(iter(x)): -1.0, next(iter(y)): -1.0}, -1.5)  # x + y >= 1.5
+    assert rows.program().empty()
+    assert rows.program().least(cost)[0] == np.inf
+
+
+@pytest.mark.parametrize("shown", [(1, 2, 3), (1, 3), ()])
+def test_every_frame_of_the_box_with_such_modes_fulfils_the_relaxation(
+    rng: np.random.Generator, shown: tuple[int, ...]
+) -> None:
+    """The true parameters and amplitudes are a point of the linear program."""
+    names = ("c1", "c2", "c3", "m2")
+    chain = Chain.of(FRAME, names)
+    for _ in range(8):
+        lower, upper = np.log([0.8, 0.8, 0.8, 0.8]), np.log([1.2, 1.2, 1.2, 1.2])
+        truth = chain.nominal * np.exp(rng.uniform(lower, upper))
+        values, vectors = chain.modes(truth[None])
+        modes = []
+        for k in (0, 1):
+            f = float(np.sqrt(values[0, k]) / (2 * np.pi))
+            shape = vectors[0, :, k] / vectors[0, 2, k]
+            near = {z: Interval(shape[z - 1] - 0.02, shape[z - 1] + 0.01) for z in shown if z != 3}
+            reference = 3 if shown else 0
+            modes.append(MeasuredMode(k + 1, Interval(0.99 * f, 1.02 * f), near, reference))
+        cuts = list(Measurement(tuple(modes)).cuts(0.0, 0.0))
+        held = relaxation(chain, lower, upper, cuts, {})
+        assert held is not None
+        for at, expression in enumerate(held.parameters):
+            log = np.log(truth[at] / chain.nominal[at])
+            constant = expression.get(CONSTANT, 0.0)
+            assert held.least(expression)[0] + constant <= log + 1e-12
+            assert -held.least(expression, -1.0)[0] + constant >= log - 1e-12
+        amplitudes = {key: held.least(x)[0] for key, x in held.shapes.items()}
+        for (mode, floor), low in amplitudes.items():
+            shape = vectors[0, :, mode - 1] / vectors[0, 2, mode - 1]
+            assert low <= shape[floor - 1] + 1e-12
+
+
+def test_truth_is_covered_and_the_box_is_sharp(rng: np.random.Generator) -> None:
+    degrees, inside = [], []
+    for _ in range(20):
+        truth = rng.uniform(1.6, 2.4, 3)
+        found = update(FRAME, PRIOR, measured(truth, rng), alpha=(0.1,))
+        degrees.append(float(found.agreement.possibility(truth[None])[0]))
+        inside.append(bool(((found.lower[0] <= truth) & (truth <= found.upper[0])).all()))
+        if degrees[-1] >= 0.1:
+            assert inside[-1]  # the box holds the set
+        tried = found.tried_upper - found.tried_lower
+        assert (tried <= (found.upper - found.lower) * (1 + 1e-9)).all()
+        assert np.nanmean(tried / (found.upper - found.lower)) > 0.7
+    assert np.mean(inside) >= 0.9 - 4 * np.sqrt(0.09 / 20)
+    assert np.mean(np.array(degrees) >= 0.5) <= 0.5 + 4 * np.sqrt(0.25 / 20)
+
+
+def test_points_of_the_set_lie_in_the_box_whatever_was_measured(rng: np.random.Generator) -> None:
+    truth = np.array([1.9, 2.1, 2.2])
+    for kind in ({"floors": (1, 3)}, {"floors": ()}, {"modes": (2,)}, {"modes": (1, 2, 3)}):
+        found = update(FRAME, PRIOR, measured(truth, rng, **kind), alpha=(0.05, 0.3))  # type: ignore[arg-type]
+        points = rng.uniform(1.6, 2.4, (20000, 3))
+        degree = found.agreement.possibility(points)
+        for row, level in enumerate(found.alpha):
+            of = points[degree >= level]
+            assert (of >= found.lower[row]).all()
+            assert (of <= found.upper[row]).all()
+
+
+def test_cuts_are_nested_inside_the_priors_and_feed_an_envelope(rng: np.random.Generator) -> None:
+    truth = np.array([1.9, 2.1, 2.2])
+    prior = {**PRIOR, "c1": Triangular(1.6, 1.9, 2.4)}
+    found = update(FRAME, prior, measured(truth, rng), alpha=(0.05, 0.25, 0.5, 1.0))
+    assert (np.diff(found.lower, axis=0) >= 0).all()
+    assert (np.diff(found.upper, axis=0) <= 0).all()
+    for column, name in enumerate(NAMES):
+        for row, level in enumerate(found.alpha):
+            low, high = prior[name].cut(min(float(level), found.height[0]))
+            assert low - 1e-12 <= found.lower[row, column]
+            assert found.upper[row, column] <= high + 1e-12
+    assert max(found.narrowed.values()) < 0.5
+    after = envelope(FRAME, found.numbers, duration=1.0, step=0.05, alpha=(0.05,))
+    before = envelope(FRAME, prior, duration=1.0, step=0.05, alpha=(0.05,))
+    assert (after.upper - after.lower).mean() < 0.5 * (before.upper - before.lower).mean()
+    assert "given" in str(found.claim)
+    assert "c1, c2, c3 in their cuts at α (opinions)" in str(found.claim)
+
+
+def test_a_common_factor_of_stiffnesses_and_masses_is_not_learned(
+    rng: np.random.Generator,
+) -> None:
+    names = (*NAMES, "m1", "m2", "m3")
+    nominal = Chain.of(FRAME, names).nominal
+    prior = {name: Interval(0.8 * x, 1.2 * x) for name, x in zip(names, nominal, strict=True)}
+    found = update(FRAME, prior, measured(nominal, rng, names=names), alpha=(0.05,))
+    assert "not learned: the common factor of c1, c2, c3, m1, m2, m3" in found.words
+    assert min(found.narrowed.values()) > 0.7
+    known = update(FRAME, PRIOR, measured(np.full(3, 2.0), rng), alpha=(0.05,))
+    assert "not learned" not in known.words
+
+
+def test_modulus_and_columns_cannot_be_told_apart(rng: np.random.Generator) -> None:
+    prior = {**PRIOR, "E": Interval(24e9, 36e9)}
+    found = update(FRAME, prior, measured(np.full(3, 2.0), rng), alpha=(0.05,))
+    (lost,) = [one for one in found.directions if not one.learned]
+    assert set(lost.parts) == {"c1", "c2", "c3", "E"}
+    assert lost.words in (
+        "larger c1, c2, c3 with smaller E",
+        "larger E with smaller c1, c2, c3",
+    )
+
+
+def test_a_measurement_that_no_such_frame_has_is_refuted(rng: np.random.Generator) -> None:
+    with pytest.raises(RefutedError, match=r"storey frame with such parameters is refuted"):
+        update(FRAME, PRIOR, measured(np.full(3, 4.0), rng))
+    modes = measured(np.full(3, 2.0), rng).modes
+    first = MeasuredMode(1, modes[0].frequency, {**modes[0].shape, 1: Interval(0.8, 0.9)}, 3)
+    with pytest.raises(RefutedError):
+        update(FRAME, PRIOR, Measurement((first, modes[1])))
+
+
+def test_claimed_priors_are_joined_with_the_measured_claims(rng: np.random.Generator) -> None:
+    weighed = from_data(10e3 * (1 + 0.01 * rng.standard_normal(8)), "mean", law="normal")
+    prior: dict[str, FuzzyNumber] = {**PRIOR, "m3": weighed}
+    names = (*NAMES, "m3")
+    found = update(
+        FRAME, prior, measured(np.array([2, 2, 2, 10e3]), rng, names=names), alpha=(0.05,)
+    )
+    rule = found.agreement.joint
+    assert rule is not None
+    assert "m3" in rule.names
+    assert len(rule.names) == 1 + 2 * 3
+    number = found.numbers["m3"]
+    assert isinstance(number, Claimed)
+    assert number.cut(0.05).width <= weighed.cut(found.agreement.own_level(0.05)).width + 1e-9
+    with pytest.raises(ValueError, match=r"decide the cuts"):
+        number.cut(0.01)
+
+
+def test_known_deviations_take_one_value(rng: np.random.Generator) -> None:
+    one = measured_mode(
+        1, [2.0], {1: [0.5], 2: [1.0]}, frequency_deviation=0.01, shape_deviation=0.02
+    )
+    assert one.reference == 2
+    low, high = one.frequency.cut(0.05)
+    assert (low, high) == pytest.approx((2 - 1.959964 * 0.02, 2 + 1.959964 * 0.02), abs=1e-6)
+    low, high = one.shape[1].cut(0.05)
+    assert high - low == pytest.approx(2 * 1.959964 * 0.02, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("make", "pattern"),
+    [
+        (lambda: measured_mode(1, [2.0]), r"needs 2 or more"),
+        (lambda: measured_mode(1, [2.0, 2.1], {1: [1.0]}), r"each floor needs 2 amplitudes"),
+        (lambda: MeasuredMode(0, Interval(1, 2)), r"numbered from 1"),
+        (lambda: MeasuredMode(1, Interval(-2, -1)), r"must be positive"),
+        (lambda: MeasuredMode(1, Interval(1, 2), {1: Interval(0, 1)}, 1), r"reference floor is 1"),
+        (lambda: Measurement(()), r"must rise, one at least"),
+        (lambda: Chain.of(FRAME, ("d1",)), r"'d1' cannot be learned"),
+        (lambda: Chain.of(FRAME, ("c4",)), r"'c4' cannot be learned"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(make: object, pattern: str) -> None:
+    with pytest.raises(ValueError, match=pattern):
+        make()  # type: ignore[operator]
+
+
+def test_modes_and_priors_beyond_the_frame_are_refused() -> None:
+    mode = MeasuredMode(4, Interval(1, 2))
+    with pytest.raises(ValueError, match=r"3 floors, and as many modes"):
+        update(FRAME, PRIOR, Measurement((mode,)))
+    one = Measurement((MeasuredMode(1, Interval(1, 2)),))
+    with pytest.raises(ValueError, match=r"prior of c1 reaches"):
+        update(FRAME, {"c1": Interval(-1, 2)}, one)
+    for alpha in ((0.0, 0.5), (0.5, 0.2), (0.5, 1.2), ()):
+        with pytest.raises(ValueError, match=r"must rise within"):
+            update(FRAME, PRIOR, one, alpha=alpha)
