@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import cast
 
+from alphacut.case.schema_image import PICTURES
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.problem import BadInput, Problem
 
@@ -68,6 +69,8 @@ class Case:
         if not self.has(key):
             section = key.rpartition(".")[0]
             what = f"missing; this command needs section [{section}]"
+            if section in ("cell", "radius") and any(self.has(f"cell.{k}") for k in PICTURES):
+                what = "missing; the cell is a picture, whose modulus command image computes"
             if section == "radius" and "microstructure" in self.stages:
                 what += (
                     f": alphacut microstructure {self.path.name} --out FOLDER makes it from the"

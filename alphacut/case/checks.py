@@ -27,8 +27,8 @@ FILES = (
     "microstructure.packing.file",
     "microstructure.circles.file",
     "microstructure.image.file",
-    "image.file",
-    "image.polygons",
+    "cell.image",
+    "cell.polygons",
     "modulus.file",
     "modulus.measured",
     "frame.accelerogram",
@@ -46,8 +46,8 @@ def checks(*, modal: bool = False) -> Iterator[Check]:
     yield where("radius.a1", partial(radius, alpha=1.0 if modal else 0.0))
     yield where("response.quantity", stress_curves)
     yield one_modulus
-    yield where("image.alpha", image)
-    for section in ("modulus", "image", "envelope"):
+    yield where("cell.boundary", image)
+    for section in ("modulus", "envelope"):
         yield where(f"{section}.alpha", partial(levels, key=f"{section}.alpha"))
     yield where("frame.masses", floors)
     yield other_structures

@@ -67,8 +67,16 @@ class Key:
 
 @dataclass(frozen=True)
 class Section:
-    """One table of a case file; `repeated` if it is written ``[[name]]``."""
+    """One table of a case file.
+
+    Args:
+        about: What it is, for help texts and docs.
+        keys: Its keys by name.
+        repeated: Whether it is written ``[[name]]``.
+        unless: Keys of which one lifts what others require.
+    """
 
     about: str
     keys: Mapping[str, Key] = field(default_factory=dict)
     repeated: bool = False
+    unless: tuple[str, ...] = ()

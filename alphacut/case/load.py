@@ -203,12 +203,15 @@ def checked_section(
     written: dict[str, object],
 ) -> Iterator[Problem]:
     """Check the keys of one table, and that none is missing."""
+    needed = not any(key in table for key in section.unless)
     strangers = [
         unknown(key, name, value) for key, value in table.items() if key not in section.keys
     ]
     if len(strangers) == 1 and not strangers[0].nearest:
         missing = [
-            key for key, entry in section.keys.items() if entry.required and key not in table
+            key
+            for key, entry in section.keys.items()
+            if entry.required and needed and key not in table
         ]
         strangers = [replace(strangers[0], nearest=missing[0])] if len(missing) == 1 else strangers
     yield from strangers
@@ -217,7 +220,7 @@ def checked_section(
     for key, entry in section.keys.items():
         full = dotted(name, key)
         if key not in table:
-            if entry.required and key not in meant:
+            if entry.required and needed and key not in meant:
                 yield Problem(full, f"missing: {entry.about}", allowed=allowed(entry))
             values[full] = entry.default
             continue

@@ -27,11 +27,12 @@ COARSE = {
 
 
 PARTS = {
-    "mesh": "modulus",
-    "modulus": "modulus",
-    "exceedance": "envelope",
-    "study": "envelope",
-    "envelope": "envelope",
+    "modulus.alpha": ("modulus", "image"),
+    "mesh": ("modulus",),
+    "modulus": ("modulus",),
+    "exceedance": ("envelope",),
+    "study": ("envelope",),
+    "envelope": ("envelope",),
 }
 
 
@@ -40,11 +41,12 @@ def settings(case: Case) -> dict[str, object]:
     keys = [
         key for key in case.values if (key in COARSE or key.endswith(".duration")) and case.has(key)
     ]
-    return {
-        key: case.values[key]
-        for key in keys
-        if PARTS.get(re.split(r"[.\[]", key)[0], "microstructure") in case.stages
-    }
+    return {key: case.values[key] for key in keys if set(_readers(key)) & set(case.stages)}
+
+
+def _readers(key: str) -> tuple[str, ...]:
+    """Stages that read a key."""
+    return PARTS.get(key) or PARTS.get(re.split(r"[.\[]", key)[0], ("microstructure",))
 
 
 def banner(found: Mapping[str, Any]) -> str:

@@ -14,7 +14,7 @@ from alphacut.case.key import (
     Range,
     Section,
 )
-from alphacut.case.schema_image import IMAGE_CELL
+from alphacut.case.schema_image import PICTURE_KEYS
 from alphacut.case.schema_structure import (
     ALPHA,
     ENVELOPE,
@@ -203,7 +203,8 @@ RADIUS = Section(
 )
 
 CELL = Section(
-    "The two elastic phases of the periodic cell, in plane strain.",
+    "The periodic cell, in plane strain: two elastic phases and a round particle, or a picture of"
+    " its phases (one of image, polygons, inequality), of which stage image gives proved bounds.",
     {
         "matrix_modulus": Key(
             "Young's modulus of the matrix", unit="Pa", required=True, allowed=POSITIVE
@@ -213,7 +214,9 @@ CELL = Section(
             "Young's modulus of the particle", unit="Pa", required=True, allowed=POSITIVE
         ),
         "inclusion_poisson": Key("Poisson's ratio of the particle", required=True, allowed=POISSON),
+        **PICTURE_KEYS,
     },
+    unless=tuple(PICTURE_KEYS),
 )
 
 MESH = Section(
@@ -294,7 +297,6 @@ SECTIONS: dict[str, Section] = {
     "microstructure.image": IMAGE,
     "radius": RADIUS,
     "cell": CELL,
-    "image": IMAGE_CELL,
     "mesh": MESH,
     "modulus": MODULUS,
     "response": RESPONSE,
@@ -309,7 +311,7 @@ SECTIONS: dict[str, Section] = {
 NEEDED = {
     "microstructure": ("microstructure",),
     "modulus": ("radius", "cell"),
-    "image": ("image",),
+    "image": ("cell",),
     "envelope": ("envelope",),
 }
 # sections that hold their defaults where they are left out and the other one is there

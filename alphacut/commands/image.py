@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -13,7 +13,9 @@ from alphacut.commands.options import add_common, answer
 from alphacut.io.files import say
 from alphacut.io.progress import progress
 from alphacut.io.provenance import attributes, fingerprint
-from alphacut.stages import image
+from alphacut.stages.image.bounds import compute
+from alphacut.stages.image.document import document, write
+from alphacut.stages.image.reading import study_of
 
 ABOUT = "proved bounds of the stiffness of the material whose every section is an image"
 
@@ -27,14 +29,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Compute and report."""
     case = load(options.case, options.set)
-    require_read(case, ("image",), "image")
-    study = image.study_of(case)
+    require_read(case, ("cell", "modulus.alpha"), "image")
+    study = study_of(case, petsc=petsc)
     with progress("Image", quiet=options.quiet) as tick:
-        found = image.compute(study, progress=tick)
+        found = compute(study, progress=tick)
     if options.out:
-        key = fingerprint(case.values, ("stochastic", "rve", "fuzzy"))
-        image.write(found, Path(options.out), attributes(case.text_of_file, key))
-    numbers = image.document(found)
+        inputs = {"case": dict(case.values), "petsc": dict(petsc)}
+        key = fingerprint(inputs, ("stochastic", "rve", "fuzzy"))
+        write(found, Path(options.out), attributes(case.text_of_file, key))
+    numbers = document(found)
     if answer(options, numbers, out, summary(numbers)) and not options.out:
         say("to hand this on: the same command with --out image.nc, then modulus.file")
     return 0
@@ -66,9 +69,18 @@ def summary(found: Mapping[str, Any]) -> str:
         f"width of the stiffness's bounds at the top level: {found['width']:.2e}\n"
         f"plane-strain bulk modulus: {_interval(bulk)}\n"
         f"{apparent}if the particles are grains, E (Hashin-Shtrikman): {_interval(grains)}\n"
-        f"{found['advice']}\n"
+        f"{table_of(found['error_table'])}"
         f"{found['iterations']} iterations, {found['seconds']:.1f} s\n"
     )
+
+
+def table_of(rows: Sequence[Mapping[str, Any]]) -> str:
+    """The error table in lines, the source to improve first on top."""
+    lines = "".join(
+        f"{row['source']:<15} {row['width_GPa']:9.2e} GPa {row['share']:6.1%}  {row['cure']}\n"
+        for row in rows
+    )
+    return f"what widens E, the source to improve first on top:\n{lines}"
 
 
 def _interval(pair: Mapping[str, float]) -> str:

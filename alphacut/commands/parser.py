@@ -72,8 +72,8 @@ class Parser(argparse.ArgumentParser):
 
 def refuse_petsc(command: str, petsc: Mapping[str, str]) -> None:
     """Refuse PETSc's options with a command that solves nothing with PETSc."""
-    if petsc and command not in ("cell", "modulus", "run"):
-        allowed = "with the commands cell, modulus and run"
+    if petsc and command not in ("cell", "image", "modulus", "run"):
+        allowed = "with the commands cell, image, modulus and run"
         raise BadInput(
             [
                 Problem(

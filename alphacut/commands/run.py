@@ -128,7 +128,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
 PARTS = {
     "microstructure": ("microstructure",),
     "modulus": ("radius", "cell", "mesh", "modulus", "response"),
-    "image": ("image",),
+    "image": ("cell", "modulus.alpha"),
     "envelope": ("frame", "pendulum", "tower", "envelope", "exceedance", "modulus"),
 }
 """Sections that a stage reads."""

@@ -38,11 +38,17 @@ def json_schema() -> dict[str, Any]:
 
 def section_schema(section: Section) -> dict[str, Any]:
     """One table."""
+    required = [name for name, key in section.keys.items() if key.required]
+    ways = [required, *([name] for name in section.unless)]
     return {
         "type": "object",
         "description": section.about,
         "properties": {name: key_schema(key) for name, key in section.keys.items()},
-        "required": [name for name, key in section.keys.items() if key.required],
+        **(
+            {"anyOf": [{"required": way} for way in ways]}
+            if section.unless
+            else {"required": required}
+        ),
         "additionalProperties": False,
     }
 

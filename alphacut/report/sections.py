@@ -145,15 +145,19 @@ def image(found: Mapping[str, Any], drawn: Markup) -> Markup:
         "Plane strain: every section of the material is the image, as with fibres. If the"
         f" particles are grains, the Hashin–Shtrikman interval of E is {grains}. The plane-strain"
         f" Young's modulus of the softest direction lies in {least}, of the stiffest in"
-        f" {greatest}.{own} {sentence(found['advice'])}"
+        f" {greatest}.{own}"
     )
-    widths = [(name, f"{width:.4f}") for name, width in found["contributions_GPa"].items()]
+    widths = [
+        (row["source"], f"{row['width_GPa']:.2e}", f"{row['share']:.1%}", row["cure"])
+        for row in found["error_table"]
+    ]
     return section(
         "Stiffness of the image",
         words,
         drawn,
         table(("α", "lower E, GPa", "upper E, GPa", "nature"), rows),
-        Markup("<h3>What widens E</h3>") + table(("source alone", "width of E, GPa"), widths),
+        Markup("<h3>What widens E, the source to improve first on top</h3>")
+        + table(("source", "width of E, GPa", "share", "to narrow it"), widths),
     )
 
 

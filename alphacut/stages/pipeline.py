@@ -15,11 +15,13 @@ from alphacut.io.files import say, whole_file
 from alphacut.io.netcdf import require_known
 from alphacut.io.progress import progress
 from alphacut.io.provenance import attributes, fingerprint
-from alphacut.stages import envelope, image, microstructure, modulus, response
+from alphacut.stages import envelope, microstructure, modulus, response
 from alphacut.stages import exceedance as outcomes
 from alphacut.stages.campaign import campaign
 from alphacut.stages.contract import keep_modulus
 from alphacut.stages.envelope_task import EnvelopeTask, task_of
+from alphacut.stages.image import bounds, document
+from alphacut.stages.image.reading import study_of
 from alphacut.stages.microstructure import write as write_microstructure
 from alphacut.stages.structure import Structure, structure
 
@@ -159,18 +161,24 @@ class Chain:
 
     def image(self) -> xarray.Dataset:
         """The proved bounds of the image's modulus, in image.nc."""
-        inputs = {key: value for key, value in self.case.values.items() if key.startswith("image.")}
+        inputs = {
+            key: value
+            for key, value in self.case.values.items()
+            if key.startswith("cell.") or key == "modulus.alpha"
+        }
         files = [
-            self.case.digest(key)
-            for key in FILES
-            if key.startswith("image.") and self.case.has(key)
+            self.case.digest(key) for key in FILES if key.startswith("cell.") and self.case.has(key)
         ]
-        key = fingerprint({"case": inputs, "files": files}, ("stochastic", "rve", "fuzzy"))
+        key = fingerprint(
+            {"case": inputs, "files": files, "petsc": dict(self.petsc)},
+            ("stochastic", "rve", "fuzzy"),
+        )
 
         def compute(path: Path) -> None:
             with progress("Image", quiet=self.quiet) as tick:
-                found = image.compute(image.study_of(self.case), progress=tick)
-            image.write(found, path, attributes(self.case.text_of_file, key))
+                study = study_of(self.case, petsc=self.petsc)
+                found = bounds.compute(study, progress=tick)
+            document.write(found, path, attributes(self.case.text_of_file, key))
 
         return self.stored("image.nc", key, compute)
 

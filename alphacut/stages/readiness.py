@@ -13,7 +13,7 @@ from alphacut.case.names import fuzzy_keys
 from alphacut.fuzzy import FuzzyNumber, Triangular
 from alphacut.io.problem import BadInput, Problem
 from alphacut.stages import modulus
-from alphacut.stages.image import expected_modulus, study_of
+from alphacut.stages.image.reading import expected_modulus, study_of
 from alphacut.stages.pipeline import studies
 from alphacut.stages.resolution_checks import rough
 from alphacut.stages.structure import Structure, structure

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from alphacut.rve.image.bounds import StiffnessBounds
-from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
+from alphacut.rve.image.fields.conjugate_gradient import Solver
 from alphacut.rve.image.moduli import ModuliInterval
-from alphacut.rve.image.phase_images import moduli_images, threshold_ranges
+from alphacut.rve.image.phase_images import ModuliImages, moduli_images, threshold_ranges
 from alphacut.rve.image.solve import CrispBounds, solve_between
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -68,7 +68,7 @@ def solve_cuts(
     boxes: Sequence[ImageBox],
     *,
     aspect: float = 1.0,
-    solver: ConjugateGradient | None = None,
+    solver: Solver | None = None,
     division: int = 1,
 ) -> list[Cut]:
     """One guaranteed cut for each box: one solve with stresses and one with displacements.
@@ -85,15 +85,30 @@ def solve_cuts(
         solver: Stopping rule.
         division: Parts along each side of a pixel.
     """
-    cuts: list[Cut] = []
+    return list(each_cut(grey, boxes, aspect=aspect, solver=solver, division=division))
+
+
+def each_cut(
+    grey: Array,
+    boxes: Iterable[ImageBox],
+    *,
+    aspect: float = 1.0,
+    solver: Solver | None = None,
+    division: int = 1,
+) -> Iterator[Cut]:
+    """The cuts of `solve_cuts` one after another; equal neighbours are solved once."""
+    last: Cut | None = None
+    before: ModuliImages | None = None
     for box in boxes:
         images = moduli_images(*threshold_ranges(grey, box.thresholds), box.phases)
-        before = cuts[-1].solution if cuts else None
-        solution = solve_between(
-            images, aspect=aspect, solver=solver, division=division, start=before
-        )
-        cuts.append(Cut(solution.bounds, TWO_CORNERS if images.attained else ENCLOSED, solution))
-    return cuts
+        if last is None or before is None or not images.same(before):
+            start = None if last is None else last.solution
+            solution = solve_between(
+                images, aspect=aspect, solver=solver, division=division, start=start
+            )
+            nature = TWO_CORNERS if images.attained else ENCLOSED
+            last, before = Cut(solution.bounds, nature, solution), images
+        yield last
 
 
 def nested(intervals: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 
@@ -11,17 +10,18 @@ import numpy as np
 
 from alphacut.rve.image.bounds import StiffnessBounds
 from alphacut.rve.image.cuts import ENCLOSED, TWO_CORNERS, nested
-from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
-from alphacut.rve.image.fields.side import DISPLACEMENT, STRESS, solve_side
+from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, Solver
 from alphacut.rve.image.phase_images import ModuliImages
 from alphacut.rve.image.read import require_memory
-from alphacut.rve.image.solve import CrispBounds, solve_between
+from alphacut.rve.image.solve import CrispBounds, both_sides, solve_between
 from alphacut.rve.image.windows import Tiling, tiles_of
 from alphacut.rve.result import Homogenised, StressCurve
 from alphacut.stochastic.theta.truncated_normal import Array
 
 MODULI = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 1.0]])  # strains of each modulus
 BOUNDARIES = ("periodic", "window")
+MILD = 10.0
+LARGE = 1 << 19
 CONFIDENT = "95 % confidence interval of the material, no proof"
 
 
@@ -74,8 +74,8 @@ class ImageModel:
         aspect: Height of a pixel over its width.
         boundary: "periodic": the image repeats itself; "window": it is cut from a larger material.
         tiles: Tiles along each side of a window.
-        division: Parts along each side of a pixel.
-        solver: Stopping rule.
+        division: Parts along each side of a pixel; None: `usual_division`.
+        solver: Way to the fields.
         width: Width of the stiffness's bounds that a crisp periodic image is to have; pixels are
             divided further until it has. None: as many parts as `division` says.
 
@@ -86,8 +86,8 @@ class ImageModel:
     aspect: float = 1.0
     boundary: str = "periodic"
     tiles: int = 2
-    division: int = 1
-    solver: ConjugateGradient = field(default_factory=ConjugateGradient)
+    division: int | None = None
+    solver: Solver = field(default_factory=ConjugateGradient)
     width: float | None = None
 
     def __post_init__(self) -> None:
@@ -96,56 +96,71 @@ class ImageModel:
         if self.boundary == "window" and self.tiles < 2:
             raise ValueError("one tile has no scatter; divide the window into 2 × 2 tiles or more")
 
-    def run(self, images: Sequence[ModuliImages]) -> list[ImageCut]:
+    def refined(self, images: ModuliImages) -> tuple[ImageModel, ImageCut]:
+        """The model with the parts that its width needs, and periodic bounds of the image by it.
+
+        Args:
+            images: Least and greatest moduli for crisp inputs, equal but where an outline cuts.
+
+        Raises:
+            ValueError: An outline alone causes a larger width, or it needs more memory than there
+                is.
+        """
+        model = replace(self, division=self.division or usual_division(images))
+        crisp = model.periodic(images, pixels=True)
+        if self.width is None or crisp.bounds.width <= self.width:
+            return model, crisp
+        if not all(np.array_equal(*pair) for pair in (images.bulk, images.shear)):
+            raise ValueError(
+                f"pixels that the outline cuts cause a width of {crisp.bounds.width:.2e} by"
+                f" themselves, {self.width:.2e} is asked for; take more pixels"
+            )
+        rows, columns = images.bulk[0].shape
+        require_memory(rows, columns, 2 * model.parts)
+        return replace(model, division=2 * model.parts).refined(images)
+
+    def cuts(
+        self, images: Sequence[ModuliImages], crisp: tuple[ModuliImages, ImageCut]
+    ) -> list[ImageCut]:
         """One cut for each pair of images, in their order; equal neighbours are solved once.
 
         Args:
             images: Least and greatest moduli, for rising α; the last ones are solved first.
+            crisp: A pair and its periodic bounds by the same model, the start.
         """
-        model, cuts = self.divided_enough(images[-1])
-        before = images[-1]
-        for pair in reversed(images[:-1]):
-            if not _same(pair, before):
-                cuts.append(model.cut(pair, cuts[-1].solution))
-            else:
-                cuts.append(cuts[-1])
-            before = pair
-        intervals = nested([cut.modulus for cut in cuts])
-        widened = [_with_modulus(c, m) for c, m in zip(cuts, intervals, strict=True)]
+        before, last = crisp
+        solved = self.boundary == "periodic"
+        found: list[ImageCut] = []
+        for pair in reversed(images):
+            if not (solved and pair.same(before)):
+                last = self.cut(pair, last.solution)
+            found.append(last)
+            before, solved = pair, True
+        intervals = nested([cut.modulus for cut in found])
+        widened = [replace(cut, modulus=m) for cut, m in zip(found, intervals, strict=True)]
         return widened[::-1]
 
-    def divided_enough(self, images: ModuliImages) -> tuple[ImageModel, list[ImageCut]]:
-        """The model with the parts that its width needs, and the cut of this image by it.
-
-        Raises:
-            ValueError: The image is not crisp, or the width needs more memory than there is.
-        """
-        cut = self.cut(images)
-        if self.width is None or cut.solution is None or cut.bounds.width <= self.width:
-            return self, [cut]
-        if not all(np.array_equal(*pair) for pair in (images.bulk, images.shear)):
-            raise ValueError(
-                "a width can be asked for where the top level is crisp; "
-                f"here its inputs alone cause {cut.bounds.width:.2e}"
-            )
-        rows, columns = images.bulk[0].shape
-        require_memory(rows, columns, 2 * self.division)
-        return replace(self, division=2 * self.division).divided_enough(images)
-
     def cut(self, images: ModuliImages, start: CrispBounds | None = None) -> ImageCut:
-        """Bounds between two images."""
+        """Bounds between two images, of the boundary that the model has."""
+        if self.boundary == "periodic":
+            return self.periodic(images, start)
         began = perf_counter()
-        if self.boundary == "window":
-            tiling, iterations = self.tiling(images, self.tiles)
-            bounds, modulus, nature = tiling.bracket, tiling.material_modulus(), CONFIDENT
-            return ImageCut(bounds, modulus, nature, None, iterations, perf_counter() - began)
+        tiling, iterations = self.tiling(images, self.tiles)
+        bounds, modulus = tiling.bracket, tiling.material_modulus()
+        return ImageCut(bounds, modulus, CONFIDENT, None, iterations, perf_counter() - began)
+
+    def periodic(
+        self, images: ModuliImages, start: CrispBounds | None = None, *, pixels: bool = False
+    ) -> ImageCut:
+        """Bounds between two images that repeat themselves."""
+        began = perf_counter()
         solution = solve_between(
             images,
             aspect=self.aspect,
             solver=self.solver,
-            division=self.division,
+            division=self.parts,
             start=start,
-            pixels=start is None,
+            pixels=pixels,
         )
         nature = TWO_CORNERS if images.attained else ENCLOSED
         iterations = max(solution.upper.iterations, solution.lower.iterations)
@@ -155,32 +170,31 @@ class ImageModel:
 
     def tiling(self, images: ModuliImages, along: int) -> tuple[Tiling, int]:
         """Tiles of a window under uniform displacement and uniform traction, and the iterations."""
-        with ThreadPoolExecutor(2) as pool:
-            upper, lower = (
-                pool.submit(
-                    solve_side,
-                    side,
-                    tiles_of(images.bulk[end], along),
-                    tiles_of(images.shear[end], along),
-                    solver=self.solver,
-                    aspect=self.aspect,
-                    division=self.division,
-                    clamped=True,
-                )
-                for side, end in ((DISPLACEMENT, 1), (STRESS, 0))
-            )
-        sides = upper.result(), lower.result()
-        tiling = Tiling(*(side.energy.upper for side in sides))
-        return tiling, max(side.iterations for side in sides)
+        tiles = [[tiles_of(m, along) for m in pair] for pair in (images.bulk, images.shear)]
+        upper, lower = both_sides(
+            ((tiles[0][1], tiles[1][1]), (tiles[0][0], tiles[1][0])),
+            solver=self.solver,
+            aspect=self.aspect,
+            division=self.parts,
+            clamped=True,
+        )
+        tiling = Tiling(upper.energy.upper, lower.energy.upper)
+        return tiling, max(upper.iterations, lower.iterations)
+
+    @property
+    def parts(self) -> int:
+        """Parts along each side of a pixel."""
+        return self.division or 1
 
 
-def _same(first: ModuliImages, second: ModuliImages) -> bool:
-    pairs = zip((*first.bulk, *first.shear), (*second.bulk, *second.shear), strict=True)
-    return all(np.array_equal(a, b) for a, b in pairs)
+def usual_division(images: ModuliImages) -> int:
+    """Parts of a pixel where nobody names them.
 
-
-def _with_modulus(cut: ImageCut, modulus: tuple[float, float]) -> ImageCut:
-    return replace(cut, modulus=modulus)
+    Two where both moduli of an image stay within a factor `MILD`, so that few iterations are
+    needed, and the image has up to `LARGE` pixels; else one.
+    """
+    ratio = max(float(pair[1].max() / pair[0].min()) for pair in (images.bulk, images.shear))
+    return 2 if ratio <= MILD and images.bulk[0].size <= LARGE else 1
 
 
 def reduced_to_pixels(values: Array, division: int) -> Array:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alphacut.stochastic.theta.truncated_normal import Array
+
 SOFTEST = -0.25  # Poisson's ratio of the least plane-strain bulk modulus at a given E
 
 
@@ -46,6 +48,12 @@ class PlaneModuli:
         if not bulk > 0:
             raise ValueError(f"the bulk modulus of a phase is {bulk:g} Pa; it must be positive")
         return cls(bulk + shear / 3, shear)
+
+    @property
+    def stiffness(self) -> Array:
+        """Plane-strain stiffness in Voigt order (11, 22, 12 with 2 ε12), shape (3, 3), in Pa."""
+        k, g = self.bulk, self.shear
+        return np.array([[k + g, k - g, 0], [k - g, k + g, 0], [0, 0, g]])
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 from petsc4py import PETSc
@@ -46,6 +47,7 @@ class PetscSolver:
 
     accuracy: float = 3e-6
     options: Mapping[str, str] = field(default_factory=dict)
+    threads: ClassVar[int] = 1
 
     def coarser(self, factor: float) -> PetscSolver:
         """The method with less accuracy, for a start."""

@@ -30,6 +30,11 @@ class ModuliImages:
     shear: tuple[Array, Array]
     attained: bool
 
+    def same(self, other: ModuliImages) -> bool:
+        """True if both are the same moduli everywhere."""
+        pairs = zip((*self.bulk, *self.shear), (*other.bulk, *other.shear), strict=True)
+        return all(np.array_equal(a, b) for a, b in pairs)
+
 
 def threshold_ranges(grey: Array, thresholds: Sequence[tuple[float, float]]) -> tuple[Array, Array]:
     """Least and greatest number of each pixel's phase.

@@ -1,8 +1,7 @@
-"""A random threshold: E over τ between proved bounds, its mean and its quantiles.
+"""A random threshold: stiffness over τ between proved bounds, its mean and the quantiles of E.
 
-The stiffness falls as τ rises where the brighter phase is the stiffer one. Between two values of τ
-it lies between the lower bound at the greater and the upper bound at the smaller; beyond the ends,
-between those and the pure phases.
+The stiffness falls as τ rises where the brighter phase is the stiffer one, and rises with τ where
+the darker one is.
 """
 
 from __future__ import annotations
@@ -14,10 +13,14 @@ import numpy as np
 from scipy.special import ndtr
 
 from alphacut.rve.image.bounds import StiffnessBounds
-from alphacut.rve.image.cuts import ImageBox, solve_cuts
-from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
-from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
+from alphacut.rve.image.cuts import ImageBox, each_cut
+from alphacut.rve.image.fields.conjugate_gradient import Solver
+from alphacut.rve.image.fields.energy import UNIT
+from alphacut.rve.image.moduli import ModuliInterval
 from alphacut.stochastic.theta.truncated_normal import Array
+
+NODES = 33  # most thresholds at which an image is solved
+REACH = 4.0  # deviations from the mean to the outermost nodes
 
 
 @dataclass(frozen=True)
@@ -51,80 +54,161 @@ class NormalThreshold:
         values = [ndtr((threshold - m) / s) for m in self.mean for s in self.deviation]
         return np.minimum.reduce(values), np.maximum.reduce(values)
 
+    @property
+    def mirrored(self) -> NormalThreshold:
+        """The law of minus the threshold."""
+        return NormalThreshold((-self.mean[1], -self.mean[0]), self.deviation)
+
+
+def threshold_nodes(grey: Array, law: NormalThreshold) -> Array:
+    """Thresholds at which the response over a law is wanted, rising.
+
+    All images that a threshold within `REACH` deviations makes, where these are few: then each pair
+    of nodes holds one image, and the mean is as close as that image's bounds. Else even steps.
+
+    Args:
+        grey: Grey values, shape (rows, columns).
+        law: Law of the threshold; the widest, where it is fuzzy.
+    """
+    ends = [m + s * law.deviation[1] for m, s in zip(law.mean, (-REACH, REACH), strict=True)]
+    values = np.unique(grey)
+    values = values[(values >= ends[0]) & (values <= ends[1])].astype(float)
+    if len(values) > NODES:
+        return np.linspace(*ends, NODES)
+    nodes = np.sort(np.concatenate([values, np.nextafter(values, np.inf)]))
+    return nodes if len(nodes) else np.array([sum(law.mean) / 2])
+
 
 @dataclass(frozen=True)
 class ThresholdResponse:
-    """E of eq. 16 over the threshold, falling.
+    """Stiffness over the threshold of two phases, falling in the Loewner order with its argument.
 
     Args:
-        threshold: Nodes, rising, shape (n,).
-        lower: Lower bound at each node, in Pa.
-        upper: Upper bound at each node, in Pa.
-        pure: Lower bound for the dark phase alone and upper bound for the bright one, in Pa.
+        argument: Nodes, rising, shape (n,): the threshold, or minus it where the dark phase is the
+            stiffer one.
+        lower: Below the stiffness at each node, shape (n, 3, 3), in Pa.
+        upper: Above it, same shape.
+        pure: Stiffness of the softer and of the stiffer phase alone, each (3, 3), in Pa: below and
+            above what lies beyond the nodes.
+        sign: 1, or −1 where the argument is minus the threshold.
     """
 
-    threshold: Array
+    argument: Array
     lower: Array
     upper: Array
-    pure: tuple[float, float]
+    pure: tuple[Array, Array]
+    sign: int = 1
+
+    @property
+    def threshold(self) -> Array:
+        """Nodes as thresholds, in the order of the other arrays, shape (n,)."""
+        return self.sign * self.argument
+
+    @property
+    def modulus(self) -> tuple[Array, Array]:
+        """Bounds of E of eq. 16 at the nodes, each of shape (n,), in Pa, falling."""
+        ends = np.array([_modulus(a, b) for a, b in zip(self.lower, self.upper, strict=True)])
+        lower = np.maximum.accumulate(ends[::-1, 0])[::-1]  # E exceeds before what it falls to
+        return lower, np.minimum.accumulate(ends[:, 1])
+
+    def stiffness(self, law: NormalThreshold) -> StiffnessBounds:
+        """Proved bounds of the mean stiffness over all laws of the interval.
+
+        Between two nodes the stiffness lies between the lower bound at the greater and the upper
+        bound at the smaller one; the law's least and greatest distribution functions are the
+        extremes of the mean of what falls.
+        """
+        below, above = self._weights(law)
+        lower = np.tensordot(below, np.concatenate([self.lower, self.pure[:1]]), axes=1)
+        upper = np.tensordot(above, np.concatenate([self.pure[1:], self.upper]), axes=1)
+        slack = (len(below) + 8) * UNIT * np.abs(self.pure[1]).sum() * np.eye(3)
+        return StiffnessBounds(lower - slack, upper + slack)
 
     def mean(self, law: NormalThreshold) -> tuple[float, float]:
         """Proved bounds of the mean of E over all laws of the interval, in Pa."""
-        least, greatest = law.probability(self.threshold)
-        below = np.diff(least, prepend=0.0, append=1.0) @ np.append(self.lower, self.pure[0])
-        above = np.diff(greatest, prepend=0.0, append=1.0) @ np.append(self.pure[1], self.upper)
-        return float(below), float(above)
+        below, above = self._weights(law)
+        lower, upper = self.modulus
+        low, high = below @ [*lower, self._pure[0]], above @ [self._pure[1], *upper]
+        slack = (len(below) + 8) * UNIT * self._pure[1]
+        return float(low - slack), float(high + slack)
 
     def quantile(self, law: NormalThreshold, share: float) -> tuple[float, float]:
         """Proved bounds of the E that is not exceeded with probability `share`, in Pa.
 
-        It is E at the threshold that is not exceeded with probability 1 − share.
+        It is E at the argument that is not exceeded with probability 1 − share.
         """
-        least, greatest = law.probability(self.threshold)
+        lower, upper = self.modulus
+        least, greatest = self._law(law).probability(self.argument)
         after = int(np.searchsorted(least, 1 - share, side="left"))  # nodes certainly not before it
         before = int(np.searchsorted(greatest, 1 - share, side="right"))  # nodes certainly before
-        low = self.lower[after] if after < len(self.lower) else self.pure[0]
-        high = self.upper[before - 1] if before else self.pure[1]
+        low = lower[after] if after < len(lower) else self._pure[0]
+        high = upper[before - 1] if before else self._pure[1]
         return float(low), float(high)
+
+    def _weights(self, law: NormalThreshold) -> tuple[Array, Array]:
+        """Probabilities between the nodes, for the lower and for the upper mean, (n + 1,)."""
+        least, greatest = self._law(law).probability(self.argument)
+        return (
+            np.diff(least, prepend=0.0, append=1.0),
+            np.diff(greatest, prepend=0.0, append=1.0),
+        )
+
+    def _law(self, law: NormalThreshold) -> NormalThreshold:
+        return law if self.sign > 0 else law.mirrored
+
+    @property
+    def _pure(self) -> tuple[float, float]:
+        """E of the softer and of the stiffer phase alone, in Pa."""
+        low, high = self.pure
+        return _modulus(low, low)[0], _modulus(high, high)[1]
 
 
 def threshold_response(
     grey: Array,
-    thresholds: Sequence[float],
+    thresholds: Sequence[float] | Array,
     phases: Sequence[ModuliInterval],
     *,
     aspect: float = 1.0,
-    solver: ConjugateGradient | None = None,
+    solver: Solver | None = None,
+    division: int = 1,
 ) -> ThresholdResponse:
-    """E over the threshold of two phases.
+    """Stiffness over the threshold of two phases.
 
     Args:
         grey: Grey values, shape (rows, columns).
         thresholds: Nodes, rising.
-        phases: Moduli of the darker and of the brighter phase, the stiffer in K + G/3 and in G.
+        phases: Moduli of the darker and of the brighter phase, one stiffer in K + G/3 and in G.
         aspect: Height of a pixel over its width.
         solver: Stopping rule.
+        division: Parts along each side of a pixel.
 
     Raises:
-        ValueError: The phases have no such order, so E need not fall with the threshold.
+        ValueError: The phases have no such order, so nothing need fall with the threshold.
     """
+    soft, stiff, sign = ordered(phases)
+    values = sign * grey.astype(float)
+    argument = np.sort(sign * np.asarray(thresholds, float))
+    # a pixel at the threshold is bright, so in the mirrored image not yet of the stiffer phase
+    at = argument if sign > 0 else np.nextafter(argument, np.inf)
+    boxes = [ImageBox([(value, value)], [soft, stiff]) for value in at.tolist()]
+    cuts = each_cut(values, boxes, aspect=aspect, solver=solver, division=division)
+    bounds = np.array([(cut.bounds.lower, cut.bounds.upper) for cut in cuts])
+    pure = soft.lower.stiffness, stiff.upper.stiffness
+    return ThresholdResponse(argument, bounds[:, 0], bounds[:, 1], pure, sign)
+
+
+def ordered(phases: Sequence[ModuliInterval]) -> tuple[ModuliInterval, ModuliInterval, int]:
+    """The softer and the stiffer phase, and −1 where the darker one is the stiffer."""
     dark, bright = phases
-    if not (bright.lower.bulk >= dark.upper.bulk and bright.lower.shear >= dark.upper.shear):
-        raise ValueError(
-            "a random threshold needs a brighter phase that is stiffer in K + G/3 and in G; "
-            "a fuzzy threshold, whose cuts need no order, does not"
-        )
-    boxes = [ImageBox([(value, value)], phases) for value in thresholds]
-    cuts = solve_cuts(grey, boxes, aspect=aspect, solver=solver)
-    ends = np.array([cut.bounds.modulus for cut in cuts])
-    lower = np.maximum.accumulate(ends[::-1, 0])[::-1]  # E exceeds before what it falls to later
-    upper = np.minimum.accumulate(ends[:, 1])
-    pure = _modulus(dark.lower)[0], _modulus(bright.upper)[1]
-    return ThresholdResponse(np.array(thresholds, float), lower, upper, pure)
+    for soft, stiff, sign in ((dark, bright, 1), (bright, dark, -1)):
+        if stiff.lower.bulk >= soft.upper.bulk and stiff.lower.shear >= soft.upper.shear:
+            return soft, stiff, sign
+    raise ValueError(
+        "a random threshold needs one phase that is stiffer in K + G/3 and in G; "
+        "a fuzzy threshold, whose cuts need no order, does not"
+    )
 
 
-def _modulus(moduli: PlaneModuli) -> tuple[float, float]:
-    """E of eq. 16 of one material, in Pa."""
-    k, g = moduli.bulk, moduli.shear
-    stiffness = np.array([[k + g, k - g, 0], [k - g, k + g, 0], [0, 0, g]])
-    return StiffnessBounds(stiffness, stiffness).modulus
+def _modulus(lower: Array, upper: Array) -> tuple[float, float]:
+    """Bounds of E of eq. 16 from those of the stiffness, in Pa."""
+    return StiffnessBounds(lower, upper).modulus

@@ -82,7 +82,7 @@ def _require_square(path: Path, resolution: tuple[float, float] | None) -> None:
     if resolution and abs(float(resolution[0]) / float(resolution[1]) - 1) > 0.01:
         raise ValueError(
             f"{path.name} says that its pixels are not square, {float(resolution[0]):g} by "
-            f"{float(resolution[1]):g} per inch; give their height as image.pixel_height"
+            f"{float(resolution[1]):g} per inch; give cell.pixel = [width, height]"
         )
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 from alphacut.rve.image.bounds import StiffnessBounds, inverse_below
-from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
+from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, Solver
 from alphacut.rve.image.fields.side import DISPLACEMENT, STRESS, SideSolution, solve_side
 from alphacut.rve.image.phase_images import ModuliImages
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -32,7 +33,7 @@ def solve_image(
     shear: Array,
     *,
     aspect: float = 1.0,
-    solver: ConjugateGradient | None = None,
+    solver: Solver | None = None,
     division: int = 1,
     pixels: bool = False,
 ) -> CrispBounds:
@@ -55,7 +56,7 @@ def solve_between(
     images: ModuliImages,
     *,
     aspect: float = 1.0,
-    solver: ConjugateGradient | None = None,
+    solver: Solver | None = None,
     division: int = 1,
     start: CrispBounds | None = None,
     pixels: bool = False,
@@ -71,23 +72,56 @@ def solve_between(
             guess.
         pixels: Keep the energy of each pixel.
     """
-    rule = solver or ConjugateGradient()
-    with ThreadPoolExecutor(2) as pool:
+    fields = None if start is None else (start.upper.fields, start.lower.fields)
+    upper, lower = both_sides(
+        tuple((images.bulk[end][None], images.shear[end][None]) for end in (1, 0)),
+        solver=solver or ConjugateGradient(),
+        aspect=aspect,
+        division=division,
+        start=fields,
+        pixels=pixels,
+    )
+    return CrispBounds(_bounds(lower, upper), upper, lower)
+
+
+def both_sides(
+    moduli: Sequence[tuple[Array, Array]],
+    *,
+    solver: Solver,
+    aspect: float,
+    division: int,
+    start: tuple[Array, Array] | None = None,
+    clamped: bool = False,
+    pixels: bool = False,
+) -> tuple[SideSolution, SideSolution]:
+    """Displacements and stresses, on as many threads as the solver allows.
+
+    Args:
+        moduli: K + G/3 and G of the tiles for the displacements, then those for the stresses, as
+            `solve_side` takes them, like all that follows.
+        solver: Stopping rule.
+        aspect: Height of a pixel over its width.
+        division: Parts along each side of a pixel.
+        start: Fields to start from, of each side.
+        clamped: Fluctuations vanish on the edge of each tile.
+        pixels: Keep the energy of each pixel.
+    """
+    with ThreadPoolExecutor(solver.threads) as pool:
         upper, lower = (
             pool.submit(
                 solve_side,
                 side,
-                images.bulk[end][None],
-                images.shear[end][None],
-                solver=rule,
+                *moduli[k],
+                solver=solver,
                 aspect=aspect,
                 division=division,
-                start=None if start is None else (start.lower, start.upper)[end].fields,
+                start=None if start is None else start[k],
+                clamped=clamped,
                 pixels=pixels,
             )
-            for side, end in ((DISPLACEMENT, 1), (STRESS, 0))
+            for k, side in enumerate((DISPLACEMENT, STRESS))
         )
-    return CrispBounds(_bounds(lower.result(), upper.result()), upper.result(), lower.result())
+        return upper.result(), lower.result()
 
 
 def _bounds(lower: SideSolution, upper: SideSolution) -> StiffnessBounds:

@@ -8,7 +8,7 @@ hold for whatever field comes out; stopping early only widens them.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -30,6 +30,9 @@ class Linear(Protocol):
 
 class Solver(Protocol):
     """A way to fields of little energy."""
+
+    threads: ClassVar[int]
+    """Systems that may be solved at once."""
 
     def coarser(self, factor: float) -> Solver:
         """The same way with less accuracy, for a start."""
@@ -73,6 +76,7 @@ class ConjugateGradient:
 
     accuracy: float = 3e-6
     iterations: int | None = None
+    threads: ClassVar[int] = 2
 
     def __post_init__(self) -> None:
         if not 0 < self.accuracy <= 0.1:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.special import ndtr
 
 from alphacut.rve.anisotropy import directional_young
 from alphacut.rve.image.bounds import StiffnessBounds
@@ -12,7 +13,11 @@ from alphacut.rve.image.grains import grain_modulus
 from alphacut.rve.image.model import ImageModel
 from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
 from alphacut.rve.image.phase_images import ModuliImages
-from alphacut.rve.image.random_threshold import NormalThreshold, threshold_response
+from alphacut.rve.image.random_threshold import (
+    NormalThreshold,
+    threshold_nodes,
+    threshold_response,
+)
 from alphacut.rve.image.read import read_grey, require_memory, require_phases
 from alphacut.rve.image.solve import solve_image
 
@@ -69,8 +74,48 @@ def test_laws_within_an_interval_stay_within_its_bounds(response, seed):
 
 
 def test_a_random_threshold_needs_ordered_phases():
-    with pytest.raises(ValueError, match="brighter phase that is stiffer"):
-        threshold_response(ramp(8), [0.4, 0.6], PHASES[::-1])
+    crossed = [ModuliInterval.crisp(PlaneModuli(*pair)) for pair in ((1.0, 3.0), (3.0, 1.0))]
+    with pytest.raises(ValueError, match="one phase that is stiffer"):
+        threshold_response(ramp(8), [0.4, 0.6], crossed)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_few_grey_values_give_the_mean_as_close_as_their_images(order):
+    grey = np.round(8 * ramp(12)).astype(int)
+    law, phases = NormalThreshold((4.2, 4.2), (0.9, 0.9)), PHASES[::order]
+    nodes = threshold_nodes(grey, law)
+    found = threshold_response(grey, nodes, phases)
+    low, high = found.mean(law)
+    exact, ends = np.zeros(2), np.array([*np.unique(grey), np.inf])
+    below = 0.0
+    for value in ends:  # thresholds up to a grey value, above the one before, make one image
+        share = ndtr((value - 4.2) / 0.9) - below
+        below += share
+        moduli = [
+            np.where(grey >= value, b, a)
+            for a, b in zip(*((p.lower.bulk, p.lower.shear) for p in phases), strict=True)
+        ]
+        exact += share * np.array(solve_image(*moduli).bounds.modulus)
+    assert low <= exact[1]
+    assert exact[0] <= high
+    assert high - low < 1.5 * (exact[1] - exact[0]) + 0.002 * exact[0]
+    whole = found.stiffness(law)
+    assert whole.width < 0.05
+    assert whole.modulus[0] < high
+    assert low < whole.modulus[1]
+    for share in (0.2, 0.8):
+        ends = found.quantile(law, share)
+        assert ends[0] <= ends[1] <= 80.0 + 1e-9
+
+
+def test_a_response_over_falling_stiffness_is_that_of_the_mirrored_image():
+    law = NormalThreshold((0.45, 0.55), (0.05, 0.1))
+    nodes = np.linspace(0.2, 0.8, 5)
+    first = threshold_response(ramp(12), nodes, PHASES)
+    second = threshold_response(-ramp(12), -nodes[::-1], PHASES[::-1])
+    assert second.sign == -1
+    assert np.allclose(first.mean(law), second.mean(law.mirrored), rtol=1e-6)
+    assert np.allclose(first.quantile(law, 0.1), second.quantile(law.mirrored, 0.1), rtol=1e-6)
 
 
 def test_the_constitutive_gap_is_nowhere_negative_and_sums_to_the_distance_of_the_bounds():
@@ -98,13 +143,13 @@ def test_the_gap_needs_the_energies_of_the_pixels():
 def test_the_model_gives_the_result_type_of_the_other_models():
     grey, exact = np.ones((4, 4)), PlaneModuli.of_young(20.0, 0.3)
     images = ModuliImages((exact.bulk * grey,) * 2, (exact.shear * grey,) * 2, attained=True)
-    (cut,) = ImageModel().run([images])
+    _, cut = ImageModel().refined(images)
     found = cut.homogenised
     assert np.isclose(found.modulus, 20.0, rtol=1e-12)
     assert np.isclose(found.poisson, 0.3, rtol=1e-12)
     assert found.method == "image"
     mixed = np.where(ramp() > 0.5, 3.0, 1.0)
-    (cut,) = ImageModel().run([ModuliImages((mixed, mixed), (mixed, mixed), attained=True)])
+    _, cut = ImageModel().refined(ModuliImages((mixed, mixed), (mixed, mixed), attained=True))
     low, high = cut.modulus
     assert low < cut.homogenised.modulus < high
     form = cut.bounds.shear

@@ -1,0 +1,114 @@
+"""Proved bounds of the stiffness of an image, level by level."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from alphacut.io.progress import Tick
+from alphacut.rve.image.gap import constitutive_gap
+from alphacut.rve.image.grains import grain_modulus
+from alphacut.rve.image.model import ImageCut, ImageModel, reduced_to_pixels
+from alphacut.stages.image.error_table import Contribution, contributions
+from alphacut.stages.image.random_response import RandomResponse, responses
+from alphacut.stages.image.study import ImageStudy, Level
+from alphacut.stochastic.theta.truncated_normal import Array
+
+
+@dataclass(frozen=True)
+class FuzzyImage:
+    """Bounds of an image at every level.
+
+    Args:
+        study: What was solved.
+        model: Its model, with the division taken.
+        crisp: Periodic bounds at the modal values.
+        cuts: One for each level of the study, rising.
+        contributions: Widths of E by source, the widest first.
+        apparent: Proved bounds of E of a window as it is, in Pa; None for a periodic image.
+        random: Responses over a random threshold; None for a certain or fuzzy one.
+        seconds: Wall time.
+    """
+
+    study: ImageStudy
+    model: ImageModel
+    crisp: ImageCut
+    cuts: tuple[ImageCut, ...]
+    contributions: tuple[Contribution, ...]
+    apparent: tuple[float, float] | None
+    random: RandomResponse | None
+    seconds: float
+
+    @property
+    def top(self) -> ImageCut:
+        """The cut at the highest level."""
+        return self.cuts[-1]
+
+    @property
+    def phase(self) -> Array:
+        """Number of each pixel's phase at the modal values, shape (rows, columns).
+
+        A pixel that an outline cuts has the mean of its ends.
+        """
+        return np.asarray(np.add(*self.study.ranges(None)) / 2)
+
+    @property
+    def fractions(self) -> Array:
+        """Area share of each phase at the modal values; a cut pixel counts half for its ends."""
+        count = len(self.study.pairs)
+        ends = self.study.ranges(None)
+        sums = [np.bincount(which.ravel(), minlength=count) for which in ends]
+        return np.asarray((sums[0] + sums[1]) / 2 / ends[0].size)
+
+    @property
+    def grains(self) -> tuple[float, float]:
+        """Hashin–Shtrikman interval of E of grains, at the highest level, in Pa."""
+        phases = self.study.phases(self.study.alpha[-1])
+        return grain_modulus(
+            list(self.fractions), [p.lower for p in phases], [p.upper for p in phases]
+        )
+
+    @property
+    def gap(self) -> Array:
+        """Constitutive error of each pixel under strain (1, 1, 1), shape (rows, columns), Pa."""
+        assert self.crisp.solution is not None
+        pixels = constitutive_gap(self.crisp.solution, np.array([1.0, 1.0, 1.0]))
+        return reduced_to_pixels(pixels, self.model.parts)
+
+
+def compute(study: ImageStudy, *, progress: Tick | None = None) -> FuzzyImage:
+    """Bounds at every level, and what widens them.
+
+    Args:
+        study: What is solved.
+        progress: Told the share done.
+    """
+    began = perf_counter()
+    tick = progress or (lambda share: None)
+    modal = study.images(None, None)
+    model, crisp = study.model.refined(modal)
+    tick(0.3)
+    random = None if study.random is None else responses(study, study.random)
+    if random is not None:
+        cuts = random.cuts
+        rows = contributions(study, random.width(None, None), random.width)
+    else:
+        levels = [study.images(level, level) for level in study.alpha]
+        cuts = tuple(model.cuts(levels, (modal, crisp)))
+        tick(0.7)
+
+        def width(threshold: Level, phases: Level) -> float:
+            images = study.images(threshold, phases)
+            (alone,) = model.cuts([images], (modal, crisp))
+            return alone.modulus[1] - alone.modulus[0]
+
+        rows = contributions(study, crisp.modulus[1] - crisp.modulus[0], width)
+    apparent = None
+    if model.boundary == "window":
+        tiling, _ = model.tiling(modal, 1)
+        apparent = tiling.bracket.modulus
+    tick(1.0)
+    seconds = perf_counter() - began
+    return FuzzyImage(study, model, crisp, cuts, rows, apparent, random, seconds)

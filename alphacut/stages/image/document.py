@@ -1,0 +1,159 @@
+"""The result of an image as JSON and as NetCDF."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from alphacut.io.provenance import versions
+from alphacut.rve.image.directions import directions
+from alphacut.rve.image.model import ImageCut
+from alphacut.stages.cell import GPA
+from alphacut.stages.image.bounds import FuzzyImage
+from alphacut.stages.image.random_response import RandomResponse
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def document(found: FuzzyImage) -> dict[str, Any]:
+    """The result as it is printed with ``--json``; moduli in GPa."""
+    cut, alpha = found.top, found.study.alpha
+    bounds = cut.bounds
+    low, high = bounds.bulk
+    turned = directions(bounds)
+    return {
+        "lower_GPa": bounds.lower / GPA,
+        "upper_GPa": bounds.upper / GPA,
+        "width": bounds.width,
+        "E_GPa": pair(cut.modulus),
+        "nature": cut.nature,
+        "iterations": max(c.iterations for c in (found.crisp, *found.cuts)),
+        "seconds": found.seconds,
+        "nu": poisson(cut),
+        "plane_strain_bulk_GPa": pair((low / 2, high / 2)),
+        "cuts": {
+            "alpha": alpha,
+            "E_GPa": {
+                "lower": [c.modulus[0] / GPA for c in found.cuts],
+                "upper": [c.modulus[1] / GPA for c in found.cuts],
+            },
+            "nature": [c.nature for c in found.cuts],
+        },
+        "error_table": error_table(found),
+        "random_threshold": None if found.random is None else random_threshold(found.random),
+        "fractions": found.fractions,
+        "grains_E_GPa": pair(found.grains),
+        "apparent_E_GPa": None if found.apparent is None else pair(found.apparent),
+        "directions_E_GPa": {"least": pair(turned.least), "greatest": pair(turned.greatest)},
+        "isotropic": {
+            "plane_strain_bulk_GPa": turned.isotropic[0] / GPA,
+            "shear_GPa": turned.isotropic[1] / GPA,
+            "distance": turned.distance,
+        },
+        "division": found.model.parts,
+        "versions": versions(),
+    }
+
+
+def error_table(found: FuzzyImage) -> list[dict[str, Any]]:
+    """Source, width of E from it, its share of all of them, and what narrows it."""
+    total = sum(row.width for row in found.contributions) or 1.0
+    return [
+        {
+            "source": row.source,
+            "width_GPa": row.width / GPA,
+            "share": row.width / total,
+            "cure": row.cure,
+        }
+        for row in found.contributions
+    ]
+
+
+def random_threshold(found: RandomResponse) -> dict[str, Any]:
+    """Bounds of E over the threshold, of its mean and of its quantiles; moduli in GPa."""
+    lower, upper = found.modal.modulus
+    order = np.argsort(found.modal.threshold)
+    means = [found.by_level[a].mean(found.random.law(a)) for a in found.alpha]
+    return {
+        "threshold": found.modal.threshold[order],
+        "E_GPa": {"lower": lower[order] / GPA, "upper": upper[order] / GPA},
+        "mean_of_E_GPa": [pair(ends) for ends in means],
+        "quantiles": [
+            {"share": share, "E_GPa": [pair((low, high)) for low, high in ends]}
+            for share, ends in zip(found.random.shares, found.quantiles.swapaxes(0, 1), strict=True)
+        ],
+    }
+
+
+def poisson(cut: ImageCut) -> dict[str, float]:
+    """Bounds of ν of eq. 16, (1 − A/B)/2, by those of A and B."""
+    shear, bulk = cut.bounds.shear, cut.bounds.bulk
+    return {"lower": (1 - shear[1] / bulk[0]) / 2, "upper": (1 - shear[0] / bulk[1]) / 2}
+
+
+def pair(ends: tuple[float, float]) -> dict[str, float]:
+    """An interval of moduli in GPa."""
+    return {"lower": ends[0] / GPA, "upper": ends[1] / GPA}
+
+
+def dataset(found: FuzzyImage) -> xarray.Dataset:
+    """α-cuts of E and of the stiffness, the picture of the phases and of the error."""
+    import xarray
+
+    plane = ("y", "x")
+    variables: dict[str, Any] = {
+        "E": (
+            ("alpha", "bound"),
+            np.array([cut.modulus for cut in found.cuts]),
+            {"units": "Pa", "long_name": "effective Young's modulus, eq. 16"},
+        ),
+        "stiffness": (
+            ("alpha", "bound", "row", "column"),
+            np.array([[c.bounds.lower, c.bounds.upper] for c in found.cuts]),
+            {"units": "Pa", "long_name": "bounds of the plane-strain stiffness, 11, 22, 12"},
+        ),
+        "phase": (plane, found.phase.astype(np.float32), {"long_name": "number of the phase"}),
+        "gap": (
+            plane,
+            found.gap.astype(np.float32),
+            {"units": "Pa", "long_name": "constitutive error of the two fields"},
+        ),
+    }
+    if found.random is not None:
+        variables |= random_variables(found.random)
+    coordinates = {
+        "alpha": list(found.study.alpha),
+        "bound": ["lower", "upper"],
+        "row": ["11", "22", "12"],
+        "column": ["11", "22", "12"],
+    }
+    return xarray.Dataset(
+        variables, coordinates, {"nature": found.top.nature, "seconds": found.seconds}
+    )
+
+
+def random_variables(found: RandomResponse) -> dict[str, Any]:
+    """E over the random threshold, and its quantiles at each level."""
+    about = {"units": "Pa", "long_name": "Young's modulus, eq. 16, over the threshold"}
+    return {
+        "E_of_threshold": (("node", "bound"), np.stack(found.modal.modulus, axis=-1), about),
+        "threshold": (("node",), found.modal.threshold, {"long_name": "grey value"}),
+        "quantile": (
+            ("alpha", "share", "bound"),
+            found.quantiles,
+            {"units": "Pa", "long_name": "quantiles of E"},
+        ),
+        "share": (("share",), list(found.random.shares), {"long_name": "probability"}),
+    }
+
+
+def write(found: FuzzyImage, path: Path, attributes: dict[str, str | int]) -> None:
+    """Write ``image.nc``, whole or not at all."""
+    from alphacut.io.files import as_json, whole_file
+
+    numbers = as_json(document(found))
+    with whole_file(path) as partial:
+        dataset(found).assign_attrs(attributes | {"document": numbers}).to_netcdf(partial)

@@ -1,0 +1,198 @@
+"""From the section [cell] of a case to a picture with its phases."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.case.case import Case
+from alphacut.case.checks import beside
+from alphacut.case.checks_image import picture
+from alphacut.fuzzy import Crisp
+from alphacut.io.problem import BadInput, Problem
+from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, Solver
+from alphacut.rve.image.model import ImageModel
+from alphacut.rve.image.phase_images import threshold_ranges
+from alphacut.rve.image.random_threshold import ordered
+from alphacut.rve.image.windows import tiles_of
+from alphacut.stages.image.study import ImageStudy, RandomThreshold, Ranges, cut_at
+from alphacut.stochastic.theta.truncated_normal import Array
+
+ACCURACY = 1e-5  # relative energy that the solver may leave; a width asked for takes less
+
+
+def study_of(case: Case, *, petsc: Mapping[str, str] | None = None) -> ImageStudy:
+    """The study that a case describes.
+
+    Args:
+        case: The case.
+        petsc: PETSc options for its solver, without their prefix; none: the own one.
+
+    Raises:
+        BadInput: Its picture cannot be used.
+    """
+    source = picture(case)
+    if not source:
+        case.need("cell.image")
+    young = case.has("cell.modulus")
+    keys = ("cell.modulus", "cell.poisson") if young else ("cell.bulk", "cell.shear")
+    first, second = (case.fuzzies(key) for key in keys)
+    second = second * len(first) if len(second) == 1 else second
+    try:
+        parted = _image(case) if source == "cell.image" else _outline(case, source)
+        study = ImageStudy(
+            parted.ranges,
+            tuple(zip(first, second, strict=True)),
+            young,
+            case.numbers("modulus.alpha"),
+            _model(case, parted.aspect, petsc or {}),
+            parted.fuzzy,
+            parted.random,
+        )
+        if study.model.boundary == "window":
+            source = "cell.tiles"
+            tiles_of(study.ranges(None)[0], study.model.tiles)
+        if study.random is not None:
+            source = "cell.threshold_deviation"
+            ordered(study.phases(study.alpha[0]))
+    except ValueError as error:
+        line = case.lines.get(source, 0)
+        raise BadInput(Problem(source, str(error), file=str(case.path), line=line)) from None
+    return study
+
+
+@dataclass(frozen=True)
+class Parted:
+    """Pixels parted into phases.
+
+    Args:
+        ranges: Phases that each pixel may be of, at a level.
+        aspect: Height of a pixel over its width.
+        fuzzy: Whether they, or the law of a random threshold, depend on the level.
+        random: Threshold that is random.
+    """
+
+    ranges: Ranges
+    aspect: float
+    fuzzy: bool = False
+    random: RandomThreshold | None = None
+
+
+def _model(case: Case, aspect: float, petsc: Mapping[str, str]) -> ImageModel:
+    width = case.number("cell.width") if case.has("cell.width") else None
+    accuracy = ACCURACY if width is None else min(ACCURACY, width / 100)
+    return ImageModel(
+        aspect,
+        case.text("cell.boundary"),
+        case.integer("cell.tiles"),
+        case.integer("cell.division") if case.has("cell.division") else None,
+        _solver(accuracy, petsc),
+        width,
+    )
+
+
+def _solver(accuracy: float, petsc: Mapping[str, str]) -> Solver:
+    """The own conjugate gradients, or PETSc where options of it are given.
+
+    Raises:
+        BadInput: PETSc is not installed.
+    """
+    if not petsc:
+        return ConjugateGradient(accuracy)
+    try:
+        from alphacut.rve.image.petsc_solver import PetscSolver
+    except ImportError:
+        what = "PETSc is not installed"
+        allowed = "no option of PETSc, or python3-petsc4py-real"
+        raise BadInput(Problem(f"-rve_{min(petsc)}", what, allowed=allowed)) from None
+    return PetscSolver(accuracy, petsc)
+
+
+def _image(case: Case) -> Parted:
+    """Phases of an image file."""
+    from alphacut.rve.image.read import read_grey, require_phases
+
+    pixel = case.numbers("cell.pixel")
+    parts = case.integer("cell.division") if case.has("cell.division") else 1
+    path = beside(case, case.text("cell.image"))
+    grey = read_grey(path, division=parts, square=len(pixel) == 1)
+    aspect = pixel[-1] / pixel[0]
+    if case.has("cell.size"):
+        _require_size(grey, (pixel[0], pixel[-1]), case.numbers("cell.size"))
+    if case.has("cell.labels"):
+        phase = _labelled(grey, case.numbers("cell.labels"))
+        return Parted(lambda level: (phase, phase), aspect)
+    thresholds, random = case.fuzzies("cell.threshold"), None
+    uncertain = [number for number in thresholds if not isinstance(number, Crisp)]
+    if case.has("cell.threshold_deviation"):
+        deviation = case.fuzzy("cell.threshold_deviation")
+        random = RandomThreshold(grey, thresholds[0], deviation, case.numbers("cell.quantiles"))
+        uncertain += [] if isinstance(deviation, Crisp) else [deviation]
+        thresholds = (Crisp(thresholds[0].modal),)
+    require_phases(grey, tuple(number.cut(0.0) for number in thresholds))
+    return Parted(
+        lambda level: threshold_ranges(grey, [cut_at(number, level) for number in thresholds]),
+        aspect,
+        bool(uncertain),
+        random,
+    )
+
+
+def _labelled(grey: Array, labels: tuple[float, ...]) -> Array:
+    """Number of each pixel's phase."""
+    phase = np.full(grey.shape, -1)
+    for number, label in enumerate(labels):
+        phase[grey == label] = number
+    if (phase < 0).any():
+        stranger = grey[phase < 0].flat[0]
+        raise ValueError(f"a pixel holds {stranger:g}, which is none of cell.labels")
+    if missing := set(range(len(labels))) - set(np.unique(phase)):
+        raise ValueError(f"no pixel holds the label {labels[min(missing)]:g}")
+    return phase
+
+
+def _require_size(grey: Array, pixel: tuple[float, float], size: tuple[float, ...]) -> None:
+    """The stated size of the image is that of its pixels, to half a pixel."""
+    for count, side, length, name in zip(
+        grey.shape[::-1], pixel, size, ("wide", "high"), strict=True
+    ):
+        if abs(count * side - length) > side / 2:
+            raise ValueError(
+                f"{count} pixels of {side:g} m are {count * side:g} m {name}, "
+                f"cell.size says {length:g} m"
+            )
+
+
+def _outline(case: Case, source: str) -> Parted:
+    """Phases of an outline's pixels."""
+    from alphacut.rve.image.outlines.equation import Equation
+    from alphacut.rve.image.outlines.outline import Grid, Outline, phase_ranges
+    from alphacut.rve.image.outlines.polygon_file import read_polygons
+
+    width, height = case.numbers("cell.size")
+    columns = case.integer("cell.pixels")
+    grid = Grid(max(2, round(columns * height / width)), columns, width, height)
+    outline: Outline = (
+        Equation(case.text(source))
+        if source == "cell.inequality"
+        else read_polygons(beside(case, case.text(source)))
+    )
+    ends = phase_ranges(outline.classify(grid))
+    if not ends[1].any() or ends[0].all():
+        raise ValueError("the outline leaves one phase only; are its lengths those of cell.size?")
+    return Parted(lambda level: ends, grid.aspect)
+
+
+def expected_modulus(case: Case) -> tuple[float, float, float]:
+    """Least, some middle and greatest E of the phases, in Pa, before the image is solved."""
+    if case.has("cell.modulus"):
+        ends = [end for number in case.fuzzies("cell.modulus") for end in number.support]
+        return min(ends), case.fuzzies("cell.modulus")[0].modal, max(ends)
+    pairs = [
+        (k.modal, g.modal)
+        for k, g in zip(case.fuzzies("cell.bulk"), case.fuzzies("cell.shear"), strict=True)
+    ]
+    moduli = [9 * k * g / (3 * k + g) for k, g in pairs]
+    return min(moduli), moduli[0], max(moduli)

@@ -1,0 +1,88 @@
+"""A picture with its phases, ready to be solved."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from alphacut.fuzzy import Crisp, FuzzyNumber
+from alphacut.rve.image.model import ImageModel
+from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
+from alphacut.rve.image.phase_images import ModuliImages, moduli_images
+from alphacut.rve.image.random_threshold import NormalThreshold
+from alphacut.stochastic.theta.truncated_normal import Array
+
+RANDOM = "guaranteed, of the mean over the random threshold"
+Level = float | None  # None: the modal values alone
+Ranges = Callable[[Level], tuple[Array, Array]]  # → least and greatest phase of each pixel
+
+
+def cut_at(number: FuzzyNumber, level: Level) -> tuple[float, float]:
+    """The cut of a number at a level, or its modal value twice."""
+    return (number.modal, number.modal) if level is None else number.cut(level)
+
+
+@dataclass(frozen=True)
+class RandomThreshold:
+    """A normal threshold whose parameters may be fuzzy.
+
+    Args:
+        grey: Grey values, shape (rows, columns).
+        mean: Mean, in grey levels.
+        deviation: Standard deviation, in grey levels, positive.
+        shares: Probabilities whose quantiles of E are wanted.
+    """
+
+    grey: Array
+    mean: FuzzyNumber
+    deviation: FuzzyNumber
+    shares: tuple[float, ...]
+
+    def law(self, level: Level) -> NormalThreshold:
+        """The laws at a level."""
+        return NormalThreshold(cut_at(self.mean, level), cut_at(self.deviation, level))
+
+
+@dataclass(frozen=True)
+class ImageStudy:
+    """An image case ready to be solved.
+
+    Args:
+        ranges: Phases that each pixel may be of, at a level.
+        pairs: E and ν, or K and G, of each phase.
+        young: Whether the pairs are E and ν.
+        alpha: Levels, rising.
+        model: How it is solved.
+        fuzzy_threshold: Whether the phases of the pixels, or the law of a random threshold,
+            depend on the level.
+        random: Threshold that is random; its mean parts the phases of `ranges`.
+    """
+
+    ranges: Ranges
+    pairs: tuple[tuple[FuzzyNumber, FuzzyNumber], ...]
+    young: bool
+    alpha: tuple[float, ...]
+    model: ImageModel
+    fuzzy_threshold: bool
+    random: RandomThreshold | None = None
+
+    def phases(self, level: Level) -> list[ModuliInterval]:
+        """Moduli of each phase at a level."""
+        moduli = []
+        for pair in self.pairs:
+            first, second = (cut_at(number, level) for number in pair)
+            if self.young:
+                moduli.append(ModuliInterval.of_young(first, second))
+            else:
+                ends = (PlaneModuli.of_bulk(first[end], second[end]) for end in (0, 1))
+                moduli.append(ModuliInterval(*ends))
+        return moduli
+
+    def images(self, threshold: Level, phases: Level) -> ModuliImages:
+        """Least and greatest moduli of each pixel, at levels of threshold and phases."""
+        return moduli_images(*self.ranges(threshold), self.phases(phases))
+
+    @property
+    def fuzzy_phases(self) -> bool:
+        """Whether the moduli depend on the level."""
+        return any(not isinstance(number, Crisp) for pair in self.pairs for number in pair)
