@@ -1,4 +1,4 @@
-"""The periodic cell: four models of its homogenised stiffness behind one result type."""
+"""The periodic cell: its models of the homogenised stiffness behind one result type."""
 
 from alphacut.rve.cell import LOADS, STRAIN, Cell, Phase
 from alphacut.rve.model import Model, cross_check, named

@@ -15,6 +15,7 @@ MODELS = {  # name → module and class; imported when asked for, so that none i
     "slices": ("alphacut.rve.slices.model", "SlicesModel"),
     "table": ("alphacut.rve.table.model", "TableModel"),
     "series": ("alphacut.rve.series.model", "SeriesModel"),
+    "image": ("alphacut.rve.image.round_particle", "RasterModel"),
     "auto": ("alphacut.rve.auto.model", "AutoModel"),
 }
 

@@ -65,7 +65,7 @@ class Homogenised:
 
     Args:
         curve: Homogenised stress over θ.
-        method: Name of the model: prism, slices, table or series.
+        method: Name of the model: prism, slices, table, series or image.
         solver: Name of the linear solver and its options, or "none".
         unknowns: Unknowns of one linear system after elimination of constraints.
         iterations: Iterations of the linear solver, one number per load.

@@ -31,7 +31,7 @@ from alphacut.case.schema_structure import NONLINEAR as NONLINEAR
 VERSION = 1
 STAGES = ("microstructure", "modulus", "image", "envelope")
 PLANS = ("general", "reduced", "extended", "signed")
-CELL_METHODS = ("prism", "slices", "table", "series", "auto")
+CELL_METHODS = ("prism", "slices", "table", "series", "image", "auto")
 
 KNOWN_VERSION = Range(f"equal to {VERSION}", lower=VERSION, upper=VERSION, closed=True)
 

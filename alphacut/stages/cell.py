@@ -56,7 +56,7 @@ class CellChoice:
     """Choice of a cell model and its resolution, small enough for workers.
 
     Args:
-        method: prism, slices, table, series or auto.
+        method: prism, slices, table, series, image or auto.
         layers: Element layers in θ.
         size: Element size over half the cell's side.
         interface: conforming, or sign.

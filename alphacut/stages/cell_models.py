@@ -10,6 +10,7 @@ from alphacut.io.missing import missing
 from alphacut.io.problem import BadInput, Problem
 from alphacut.rve.auto.model import AutoModel
 from alphacut.rve.auto.refined import RefinedModel
+from alphacut.rve.image.round_particle import RasterModel
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.table.model import TableModel
 from alphacut.stages.cell import CellChoice, CellModel
@@ -83,6 +84,8 @@ def made(choice: CellChoice) -> CellModel:
     if choice.method == "table":
         accuracy = TableModel.accuracy if tolerance is None else tolerance
         return TableModel(accuracy, table_folder(), moduli=choice.moduli)
+    if choice.method == "image":
+        return RasterModel()
     if tolerance is not None and not choice.named:
         return RefinedModel(choice.method, tolerance)
     return meshed(choice)

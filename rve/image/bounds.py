@@ -8,6 +8,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from alphacut.rve.image.fields.energy import SAFETY, UNIT
+from alphacut.rve.square import square_moduli
 from alphacut.stochastic.theta.truncated_normal import Array
 
 
@@ -55,6 +56,15 @@ class StiffnessBounds:
             (1.5 * a - a * a / (2 * b)) for a, b in zip(self.shear, self.bulk, strict=True)
         )
         return low * (1 - 16 * UNIT), high * (1 + 16 * UNIT)
+
+    @property
+    def relative_error(self) -> Array:
+        """Errors of C11 + C12, C11 − C12 and C33 of the middle of the bounds, shape (3,).
+
+        Each is a quadratic form: the true one lies from middle/(1 + error) to middle·(1 + error).
+        """
+        lower, upper = square_moduli(self.lower), square_moduli(self.upper)
+        return np.asarray((lower + upper) / 2 / lower - 1)
 
     def contains(self, stiffness: Array) -> bool:
         """True if a symmetric stiffness, shape (3, 3), lies between the bounds."""

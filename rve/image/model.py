@@ -8,6 +8,7 @@ from time import perf_counter
 
 import numpy as np
 
+from alphacut.rve.cell import STRAIN
 from alphacut.rve.image.bounds import StiffnessBounds
 from alphacut.rve.image.cuts import ENCLOSED, TWO_CORNERS, nested
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, Solver
@@ -16,9 +17,9 @@ from alphacut.rve.image.read import require_memory
 from alphacut.rve.image.solve import CrispBounds, both_sides, solve_between
 from alphacut.rve.image.windows import Tiling, tiles_of
 from alphacut.rve.result import Homogenised, StressCurve
+from alphacut.rve.square import square_moduli
 from alphacut.stochastic.theta.truncated_normal import Array
 
-MODULI = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 1.0]])  # strains of each modulus
 BOUNDARIES = ("periodic", "window")
 MILD = 10.0
 LARGE = 1 << 19
@@ -50,18 +51,20 @@ class ImageCut:
     def homogenised(self) -> Homogenised:
         """Middle of the bounds as a model of the cell gives it, with its error."""
         middle = (self.bounds.lower + self.bounds.upper) / 2
-        values = np.einsum("mj,jk,mk->m", MODULI, middle, MODULI)
-        gaps = np.einsum("mj,jk,mk->m", MODULI, self.bounds.upper - middle, MODULI)
-        mean = 0.01 * values[0] / 2, 0.02 * values[2]  # eq. 15: ε11 = ε22 = 0.01, and ε12 = 0.01
+        bulk, _, shear = square_moduli(middle)
         curve = StressCurve(
-            np.zeros(1), np.ones(1), np.array([mean[0]]), np.array([mean[1]]), middle[None]
+            np.zeros(1),
+            np.ones(1),
+            np.array([STRAIN * bulk]),  # eq. 15: ε11 = ε22 = 0.01
+            np.array([2 * STRAIN * shear]),  # and ε12 = 0.01
+            middle[None],
         )
         return Homogenised(
             curve,
             "image",
             iterations=(self.iterations,),
             seconds={"total": self.seconds},
-            errors={"space": gaps / values},
+            errors={"space": self.bounds.relative_error},
             reason=self.nature,
         )
 

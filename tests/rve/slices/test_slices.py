@@ -233,7 +233,7 @@ def test_estimate_of_the_rule_falls_with_its_error():
 
 def test_models_by_name():
     assert named("slices", order=2) == SlicesModel(order=2)
-    with pytest.raises(ValueError, match="known models are prism, slices, table, series, auto"):
+    with pytest.raises(ValueError, match="known models are prism, slices, table, series, image"):
         named("slice")
     with pytest.raises(ValueError, match="has no option 'h'; its options are order"):
         named("slices", h=1)
