@@ -1,40 +1,119 @@
-"""A case: every value checked and in SI, by its full name."""
+"""A case: its sections as typed values in SI, and where they stand in the file."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import cast
+from typing import Generic, TypeVar
 
-from alphacut.case.schema_image import PICTURES
-from alphacut.fuzzy import FuzzyNumber
+from alphacut.case.key import Key, Section, UnknownValueError, keys_of
+from alphacut.case.sections.material import Cell, Mesh, Modulus, Radius, Response
+from alphacut.case.sections.particles import Microstructure
+from alphacut.case.sections.picture import Picture
+from alphacut.case.sections.structures import Frame, Pendulum, Tower
+from alphacut.case.sections.top import Top
+from alphacut.case.sections.vibration import Envelope, Exceedance, Study
 from alphacut.io.problem import BadInput, Problem
+
+S = TypeVar("S", bound=Section)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sections:
+    """The sections of a case; None where the file has none.
+
+    The file's section [cell] is a round particle, `cell`, or a `picture`.
+    """
+
+    top: Top
+    microstructure: Microstructure | None = None
+    radius: Radius | None = None
+    cell: Cell | None = None
+    picture: Picture | None = None
+    mesh: Mesh | None = None
+    modulus: Modulus | None = None
+    response: Response | None = None
+    frame: Frame | None = None
+    pendulum: Pendulum | None = None
+    tower: Tower | None = None
+    study: tuple[Study, ...] = ()
+    envelope: Envelope | None = None
+    exceedance: Exceedance | None = None
+
+    @property
+    def files(self) -> tuple[Section | None, ...]:
+        """The sections that may name files."""
+        return (self.microstructure, self.picture, self.modulus, self.frame, self.tower)
+
+
+class Needed(Generic[S]):
+    """A section of a case that its reader cannot do without.
+
+    Raises:
+        BadInput: The file has no such section.
+    """
+
+    def __set_name__(self, owner: type[Case], name: str) -> None:
+        """Keep the section's name."""
+        self.name = name
+
+    def __get__(self, case: Case, owner: type[Case]) -> S:
+        """The section of a case."""
+        found: S | None = getattr(case.sections, self.name)
+        if found is None:
+            raise case.without(self.name)
+        return found
 
 
 @dataclass(frozen=True)
 class Case:
-    """A checked case.
+    """A checked case; a section by its name, such as `case.radius.theta`.
 
     Args:
         path: File it came from.
-        values: Full key name to value, in SI; keys that were left out hold their default.
-        written: Full key name to what the user wrote, for reports.
+        sections: The sections that the file has; keys that were left out hold their default.
+        written: Full key name to what the user wrote, for messages and reports.
         lines: Full key name to its line in the file.
         changed: Full names of the keys that the command line changed.
+        broken: Full names of keys whose values are wrong, while the case is being checked.
     """
 
     path: Path
-    values: Mapping[str, object]
+    sections: Sections
     written: Mapping[str, object]
     lines: Mapping[str, int]
     changed: frozenset[str] = frozenset()
+    broken: frozenset[str] = frozenset()
+
+    microstructure = Needed[Microstructure]()
+    radius = Needed[Radius]()
+    cell = Needed[Cell]()
+    picture = Needed[Picture]()
+    mesh = Needed[Mesh]()
+    modulus = Needed[Modulus]()
+    response = Needed[Response]()
+    frame = Needed[Frame]()
+    pendulum = Needed[Pendulum]()
+    tower = Needed[Tower]()
+    envelope = Needed[Envelope]()
+    exceedance = Needed[Exceedance]()
 
     @property
     def name(self) -> str:
         """The file's name without its ending: results go to results/NAME."""
         return self.path.stem
+
+    @property
+    def top(self) -> Top:
+        """What stands above the first section: title, stages."""
+        return self.sections.top
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """The stages that a run computes, in order."""
+        return self.sections.top.stages
 
     @property
     def quoted(self) -> Path | None:
@@ -47,85 +126,91 @@ class Case:
         """The file as it stands."""
         return self.path.read_text(encoding="utf-8-sig")
 
-    def digest(self, key: str) -> str:
-        """Digest of a file that the case names: results depend on its content."""
-        return hashlib.sha256((self.path.parent / self.text(key)).read_bytes()).hexdigest()
+    def beside(self, name: str) -> Path:
+        """A file that the case names, looked for from the case's folder."""
+        return self.path.parent / name
 
-    @property
-    def stages(self) -> tuple[str, ...]:
-        """The stages that a run computes, in order."""
-        return cast(tuple[str, ...], self.values["stages"])
-
-    def has(self, key: str) -> bool:
-        """True if the key holds a value."""
-        return self.values.get(key) is not None
+    def digests(self, *sections: Section | None) -> list[str]:
+        """Digests of the files that sections name: results depend on their content."""
+        return [
+            hashlib.sha256(self.beside(name).read_bytes()).hexdigest()
+            for section in sections
+            if section is not None
+            for _, name in files_of(section)
+        ]
 
     def asked(self, key: str) -> bool:
         """Whether the file or the command line gives the key, so that no default stands in."""
+        if key in self.broken:
+            raise UnknownValueError(key)
         return key in self.written
 
-    def need(self, key: str) -> object:
-        """The value of a key that this command cannot do without."""
-        if not self.has(key):
-            section = key.rpartition(".")[0]
-            what = f"missing; this command needs section [{section}]"
-            if section in ("cell", "radius") and any(self.has(f"cell.{k}") for k in PICTURES):
-                what = "missing; the cell is a picture, whose modulus command image computes"
-            if section == "radius" and "microstructure" in self.stages:
-                what += (
-                    f": alphacut microstructure {self.path.name} --out FOLDER makes it from the"
-                    " particles, in FOLDER/radius.toml"
-                )
-            raise BadInput(Problem(key, what, file=str(self.path)))
-        return self.values[key]
+    @property
+    def names_mesh(self) -> bool:
+        """Whether the case names the mesh that its model of the cell is to have."""
+        return any(self.asked(f"mesh.{name}") for name in keys_of(Mesh))
 
-    def fuzzy(self, key: str) -> FuzzyNumber:
-        """A crisp or fuzzy quantity."""
-        return cast(FuzzyNumber, self.need(key))
+    @property
+    def modulus_tolerance(self) -> float | None:
+        """Relative tolerance on E that is asked for; None where the case names none."""
+        return self.modulus.tolerance if self.asked("modulus.tolerance") else None
 
-    def fuzzies(self, key: str) -> tuple[FuzzyNumber, ...]:
-        """An array of crisp or fuzzy quantities."""
-        return cast(tuple[FuzzyNumber, ...], self.need(key))
+    @property
+    def stand_ins(self) -> dict[str, object]:
+        """What stands in for the computed modulus, by its full key."""
+        given = self.sections.modulus
+        if given is None:
+            return {}
+        found = {
+            "modulus.value": given.value,
+            "modulus.file": given.file,
+            "modulus.measured": given.measured,
+        }
+        return {key: value for key, value in found.items() if value is not None}
 
-    def number(self, key: str) -> float:
-        """A crisp number."""
-        return cast(float, self.need(key))
-
-    def numbers(self, key: str) -> tuple[float, ...]:
-        """An array of crisp numbers."""
-        return cast(tuple[float, ...], self.need(key))
-
-    def integer(self, key: str) -> int:
-        """A whole number."""
-        return cast(int, self.need(key))
-
-    def text(self, key: str) -> str:
-        """Text or a choice."""
-        return cast(str, self.need(key))
-
-    def names(self, key: str) -> tuple[str, ...]:
-        """An array of names."""
-        return cast(tuple[str, ...], self.need(key))
+    def without(self, section: str) -> BadInput:
+        """The error of a command that cannot do without a section."""
+        what = f"missing; this command needs section [{section}]"
+        if section == "picture":
+            section, what = "cell", "missing: this command needs a picture of the cell"
+        if section in ("cell", "radius") and self.sections.picture:
+            what = "missing; the cell is a picture, whose modulus command image computes"
+        if section == "radius" and "microstructure" in self.stages:
+            what += (
+                f": alphacut microstructure {self.path.name} --out FOLDER makes it from the"
+                " particles, in FOLDER/radius.toml"
+            )
+        return BadInput(Problem(section, what, file=str(self.path)))
 
     def refuse(self, key: str, what: str, allowed: str = "") -> BadInput:
         """The error for a key whose value cannot be used after all."""
         value = self.written.get(key)
         return BadInput(
-            Problem(
-                key,
-                what,
-                "" if value is None else str(value),
-                allowed,
-                file=str(self.path),
-                line=self.lines.get(key, 0),
-            )
+            self.located(Problem(key, what, "" if value is None else str(value), allowed))
         )
 
-    def with_values(self, **sections: Mapping[str, object]) -> Case:
-        """A copy with other values, already checked: ``with_values(radius={"a2": …})``."""
-        changed = {
-            f"{name}.{key}": value
-            for name, section in sections.items()
-            for key, value in section.items()
-        }
-        return replace(self, values={**self.values, **changed})
+    def located(self, problem: Problem) -> Problem:
+        """The problem with its file and line; a missing key points at its section."""
+        key = problem.key
+        if key in self.changed:
+            return replace(problem, file="command line", line=0)
+        line = self.lines.get(key) or self.lines.get(key.rpartition(".")[0]) or 0
+        return replace(problem, file=str(self.path), line=line)
+
+    def told(self, section: str) -> Iterator[tuple[str, Key, object]]:
+        """Name, key and text of what the file gives in a section."""
+        found = getattr(self.sections, section)
+        for name, key in keys_of(type(found)).items() if found is not None else ():
+            if (text := self.written.get(f"{section}.{name}")) is not None:
+                yield name, key, text
+
+
+def files_of(section: Section) -> Iterator[tuple[str, str]]:
+    """Key and name of each file that a section, or a section inside it, names."""
+    keys = keys_of(type(section))
+    for field in fields(section):
+        value = getattr(section, field.name)
+        if isinstance(value, Section):
+            yield from ((f"{field.name}.{key}", name) for key, name in files_of(value))
+        elif field.name in keys and keys[field.name].file and value is not None:
+            yield field.name, str(value)

@@ -6,16 +6,17 @@ import itertools
 import re
 from collections.abc import Callable, Iterator
 from functools import partial
-from pathlib import Path
 
-from alphacut.case.case import Case
+from alphacut.case.case import Case, files_of
 from alphacut.case.checks_image import image
 from alphacut.case.checks_material import particles, radius
 from alphacut.case.checks_structure import incomplete
 from alphacut.case.idle import idle_envelope
 from alphacut.case.limits import limit_of, storey_height
-from alphacut.case.names import OTHERS, OUTPUTS, floors, named_inputs, study_count
-from alphacut.case.schema import ENVELOPE_METHODS, INTEGRATORS, NEEDED, NONLINEAR, STAGES
+from alphacut.case.names import OUTPUTS, floors, others, structures
+from alphacut.case.schema import NEEDED
+from alphacut.case.sections.top import STAGES
+from alphacut.case.sections.vibration import ENVELOPE_METHODS, INTEGRATORS, NONLINEAR
 from alphacut.case.values import nearest
 from alphacut.io.output_paths import hint
 from alphacut.io.problem import BadInput, Problem
@@ -23,78 +24,59 @@ from alphacut.io.problem import BadInput, Problem
 Check = Callable[[Case], Iterator[Problem]]
 
 MOST_STEPS = 1_000_000  # more would not fit into memory, and no figure could show them
-FILES = (
-    "microstructure.packing.file",
-    "microstructure.circles.file",
-    "microstructure.image.file",
-    "cell.image",
-    "cell.polygons",
-    "modulus.file",
-    "modulus.measured",
-    "frame.accelerogram",
-    "tower.accelerogram",
-)
 
 
 def checks(*, modal: bool = False) -> Iterator[Check]:
     """Every check of a case whose single values are all right; each finds problems of its own."""
     yield order_of_stages
+    yield names_of_studies
     yield missing_sections
     yield files
     yield incomplete
-    yield where("microstructure.seed", particles)
-    yield where("radius.a1", partial(radius, alpha=1.0 if modal else 0.0))
-    yield where("response.quantity", stress_curves)
+    yield where("microstructure", particles)
+    yield where("radius", partial(radius, alpha=1.0 if modal else 0.0))
+    yield where("response", stress_curves)
     yield one_modulus
-    yield where("cell.boundary", image)
-    for section in ("modulus", "envelope"):
-        yield where(f"{section}.alpha", partial(levels, key=f"{section}.alpha"))
-    yield where("frame.masses", floors)
-    yield other_structures
+    yield image
+    yield where("modulus", lambda case: levels("modulus.alpha", case.modulus.alpha))
+    yield where("envelope", lambda case: levels("envelope.alpha", case.envelope.alpha))
+    yield where("frame", floors)
+    yield others
     yield one_structure
-    yield where("envelope.step", times)
-    yield tolerances
-    yield where("envelope.method", methods)
-    yield idle_envelope
-    yield where("exceedance.output", exceedance)
+    yield where("envelope", times)
+    yield where("envelope", tolerances)
+    yield where("envelope", methods)
+    yield where("envelope", certificate)
+    yield where("envelope", integrators)
+    yield where("envelope", idle_envelope)
+    yield where("exceedance", exceedance)
 
 
-def where(key: str, check: Check) -> Check:
-    """The check, of cases that hold the key."""
-    return lambda case: check(case) if case.has(key) else iter(())
+def where(section: str, check: Check) -> Check:
+    """The check, of cases that have the section."""
+    return lambda case: check(case) if getattr(case.sections, section) else iter(())
 
 
 def one_modulus(case: Case) -> Iterator[Problem]:
     """At most one thing stands in for the computed modulus, and an image is one."""
-    if "image" in case.stages and ("modulus" in case.stages or replaced(case)):
+    if "image" in case.stages and ("modulus" in case.stages or case.stand_ins):
         yield Problem(
             "stages",
             "stage image gives the modulus, and so does another",
-            ", ".join(["image", *stand_ins(case)]),
+            ", ".join(["image", *case.stand_ins]),
             "one of stage image, stage modulus, modulus.value, modulus.file, modulus.measured",
         )
-    if len(stand_ins(case)) > 1:
+    if len(case.stand_ins) > 1:
         yield Problem(
-            stand_ins(case)[1],
-            f"more than one modulus is given: {', '.join(stand_ins(case))}",
+            list(case.stand_ins)[1],
+            f"more than one modulus is given: {', '.join(case.stand_ins)}",
             allowed="one of them",
         )
 
 
-def other_structures(case: Case) -> Iterator[Problem]:
-    """The inputs of structures beside the storey frame."""
-    for section, names in OTHERS.items():
-        if any(key.startswith(f"{section}.") for key in case.values):
-            yield from named_inputs(case, section, names)
-
-
 def one_structure(case: Case) -> Iterator[Problem]:
     """Exactly one structure vibrates."""
-    found = [
-        name
-        for name in ("frame", *OTHERS)
-        if any(key.startswith(f"{name}.") for key in case.values)
-    ]
+    found = structures(case)
     if "envelope" in case.stages and len(found) != 1:
         yield Problem(
             "frame",
@@ -106,25 +88,24 @@ def one_structure(case: Case) -> Iterator[Problem]:
 
 def tolerances(case: Case) -> Iterator[Problem]:
     """One tolerance, in the unit of the output."""
-    if case.has("envelope.relative_tolerance") and any(
-        f"{name}.tolerance" in case.written for name in ("envelope", "pendulum")
+    if case.envelope.relative_tolerance is not None and any(
+        case.asked(f"{name}.tolerance") for name in ("envelope", "pendulum")
     ):
         yield Problem(
             "envelope.relative_tolerance",
             "there is a tolerance besides",
             allowed="one of tolerance and relative_tolerance",
         )
-    if case.has("frame.masses") and case.names("frame.outputs") and not displacements(case):
-        for name in ("tolerance", "certify"):
-            if f"envelope.{name}" in case.written:
-                allowed = "envelope.relative_tolerance, or an output such as q1 or drift1 besides"
+    if forces_only(case):
+        for key in ("envelope.tolerance", "envelope.certify"):
+            if case.asked(key):
                 yield Problem(
-                    f"envelope.{name}",
+                    key,
                     "this is a length, and no output is a displacement",
-                    as_text(case, name),
-                    allowed,
+                    str(case.written[key]),
+                    "envelope.relative_tolerance, or an output such as q1 or drift1 besides",
                 )
-    if case.has("pendulum.mass") and "envelope.tolerance" in case.written:
+    if case.sections.pendulum and case.asked("envelope.tolerance"):
         yield Problem(
             "envelope.tolerance",
             "a pendulum's output is a force",
@@ -132,14 +113,10 @@ def tolerances(case: Case) -> Iterator[Problem]:
         )
 
 
-def displacements(case: Case) -> list[str]:
-    """The outputs of a frame that are displacements."""
-    return [name for name in case.names("frame.outputs") if name.startswith(("q", "drift"))]
-
-
-def as_text(case: Case, name: str) -> str:
-    """A key of [envelope] as it is written."""
-    return str(case.written[f"envelope.{name}"])
+def forces_only(case: Case) -> bool:
+    """Whether a frame is observed, and no output of it is a displacement."""
+    outputs = case.sections.frame.outputs if case.sections.frame else ()
+    return bool(outputs) and not any(name.startswith(("q", "drift")) for name in outputs)
 
 
 def order_of_stages(case: Case) -> Iterator[Problem]:
@@ -148,7 +125,11 @@ def order_of_stages(case: Case) -> Iterator[Problem]:
         yield Problem(
             "stages", "the stages are not in their order", str(list(case.stages)), ", ".join(STAGES)
         )
-    names = [case.text(f"study[{i}].name") for i in range(study_count(case))]
+
+
+def names_of_studies(case: Case) -> Iterator[Problem]:
+    """Every study has its own name, which a file can bear."""
+    names = [study.name for study in case.sections.study]
     for index, name in enumerate(names):
         if not re.fullmatch(r"[\w.+-]+", name):
             yield Problem(
@@ -163,13 +144,13 @@ def order_of_stages(case: Case) -> Iterator[Problem]:
 
 def stress_curves(case: Case) -> Iterator[Problem]:
     """The response needs the stress curves of a computed modulus, and each probability once."""
-    if replaced(case):
+    if case.stand_ins:
         yield Problem(
             "response",
             "its stresses come from the samples of stage modulus",
             allowed="this section where the modulus is computed",
         )
-    probabilities = case.numbers("response.quantiles")
+    probabilities = case.response.quantiles
     if list(probabilities) != sorted(set(probabilities)):
         yield Problem(
             "response.quantiles",
@@ -179,28 +160,17 @@ def stress_curves(case: Case) -> Iterator[Problem]:
         )
 
 
-def replaced(case: Case) -> bool:
-    """True if something stands in for the computed modulus."""
-    return bool(stand_ins(case))
-
-
-def stand_ins(case: Case) -> list[str]:
-    """Keys of what stands in for the computed modulus."""
-    return [key for name in ("value", "file", "measured") if case.has(key := f"modulus.{name}")]
-
-
 def missing_sections(case: Case) -> Iterator[Problem]:
     """Sections that the wanted stages need."""
     for stage in case.stages:
         for section in NEEDED.get(stage, ()):
             if section == "radius" and "microstructure" in case.stages:
                 continue
-            if not any(key.startswith(f"{section}.") for key in case.values) and not (
-                stage == "modulus" and replaced(case)
-            ):
-                made = section == "radius" and any(
-                    key.startswith("microstructure.") for key in case.values
-                )
+            absent = getattr(case.sections, section) is None
+            if section == "cell":
+                absent = absent and case.sections.picture is None
+            if absent and not (stage == "modulus" and case.stand_ins):
+                made = section == "radius" and case.sections.microstructure
                 cure = (
                     'or "microstructure" among the stages, which makes it from the particles'
                     if made
@@ -221,25 +191,18 @@ def missing_sections(case: Case) -> Iterator[Problem]:
 
 def files(case: Case) -> Iterator[Problem]:
     """Files that the case names must be there."""
-    for key in FILES:
-        if case.has(key) and not (path := beside(case, case.text(key))).is_file():
-            what = "this is a folder" if path.is_dir() else "there is no such file"
-            yield Problem(
-                key,
-                what,
-                case.text(key),
-                hint(path) or f"a path from the case's folder, {case.path.parent}",
-            )
+    for section in ("microstructure", "picture", "modulus", "frame", "tower"):
+        found = getattr(case.sections, section)
+        section = "cell" if section == "picture" else section
+        for key, name in files_of(found) if found else ():
+            if not (path := case.beside(name)).is_file():
+                what = "this is a folder" if path.is_dir() else "there is no such file"
+                cure = hint(path) or f"a path from the case's folder, {case.path.parent}"
+                yield Problem(f"{section}.{key}", what, name, cure)
 
 
-def beside(case: Case, name: str) -> Path:
-    """A file that the case names, looked for from the case's folder."""
-    return case.path.parent / name
-
-
-def levels(case: Case, key: str) -> Iterator[Problem]:
+def levels(key: str, alpha: tuple[float, ...]) -> Iterator[Problem]:
     """α-levels must rise."""
-    alpha = case.numbers(key)
     if any(low >= high for low, high in itertools.pairwise(alpha)):
         yield Problem(
             key,
@@ -250,59 +213,56 @@ def levels(case: Case, key: str) -> Iterator[Problem]:
 
 
 def methods(case: Case) -> Iterator[Problem]:
-    """A method and a time stepping that the structure's kind has."""
-    if case.has("pendulum.mass") and case.text("envelope.method") == "modal":
+    """A method that the structure's kind has."""
+    if case.sections.pendulum and case.envelope.method == "modal":
         yield Problem(
             "envelope.method",
             "a pendulum has no modes",
             "modal",
             ", ".join(x for x in ENVELOPE_METHODS if x != "modal"),
         )
-    if case.has("envelope.certify") and (
-        case.has("pendulum.mass") or case.text("envelope.method") not in ("auto", "modal")
-    ):
+
+
+def certificate(case: Case) -> Iterator[Problem]:
+    """A certificate needs a linear structure, a method that proves, and the exact motion."""
+    wanted, pendulum = case.envelope, case.sections.pendulum
+    if wanted.certify is None:
+        return
+    if pendulum or wanted.method not in ("auto", "modal"):
         found = (
             "a pendulum cannot be certified"
-            if case.has("pendulum.mass")
-            else f"method {case.text('envelope.method')} cannot certify"
+            if pendulum
+            else f"method {wanted.method} cannot certify"
         )
         yield Problem(
             "envelope.certify", found, allowed="a linear structure with method modal or auto"
         )
-    if (
-        case.has("envelope.certify")
-        and case.has("envelope.integrator")
-        and case.text("envelope.integrator") != "exact"
-    ):
-        scheme = case.text("envelope.integrator")
+    if wanted.integrator not in (None, "exact"):
         yield Problem(
             "envelope.integrator",
             "a certificate is of the exact motion",
-            scheme,
+            str(wanted.integrator),
             "exact, or no integrator, beside certify",
         )
-    if case.has("envelope.integrator"):
-        known = (
-            NONLINEAR
-            if case.has("pendulum.mass")
-            else tuple(x for x in INTEGRATORS if x != "composition4")
-        )
-        if (scheme := case.text("envelope.integrator")) not in known:
-            what = (
-                "this is for linear structures"
-                if case.has("pendulum.mass")
-                else "this is for a pendulum"
-            )
-            yield Problem("envelope.integrator", what, scheme, ", ".join(known))
+
+
+def integrators(case: Case) -> Iterator[Problem]:
+    """A time stepping that the structure's kind has."""
+    scheme, pendulum = case.envelope.integrator, case.sections.pendulum
+    linear = tuple(x for x in INTEGRATORS if x != "composition4")
+    known = NONLINEAR if pendulum else linear
+    if scheme is not None and scheme not in known:
+        what = f"this is for {'linear structures' if pendulum else 'a pendulum'}"
+        yield Problem("envelope.integrator", what, scheme, ", ".join(known))
 
 
 def exceedance(case: Case) -> Iterator[Problem]:
     """A limit is for an output of the structure in vibration, and in its unit."""
-    if not case.has("envelope.step"):
+    if case.sections.envelope is None:
         yield Problem("exceedance", "a probability needs the section [envelope]")
-    for section, outputs in OUTPUTS.items():
-        name = case.text("exceedance.output")
-        if any(key.startswith(f"{section}.") for key in case.values) and name not in outputs:
+    name = case.exceedance.output
+    for structure in structures(case):
+        if name not in (outputs := OUTPUTS.get(structure, (name,))):
             yield Problem(
                 "exceedance.output",
                 f"there is no output {name}",
@@ -311,10 +271,7 @@ def exceedance(case: Case) -> Iterator[Problem]:
                 nearest(name, outputs),
             )
     try:
-        if not (
-            case.text("exceedance.output").startswith("drift")
-            and storey_height(case, case.text("exceedance.output")) is None
-        ):
+        if not (name.startswith("drift") and storey_height(case, name) is None):
             limit_of(case)  # of a storey that is not there nothing can be said
     except BadInput as error:
         yield from error.problems
@@ -322,23 +279,20 @@ def exceedance(case: Case) -> Iterator[Problem]:
 
 def times(case: Case) -> Iterator[Problem]:
     """Every duration is a whole number of steps."""
-    step = case.number("envelope.step")
-    for key in ("envelope.duration", *(f"study[{i}].duration" for i in range(study_count(case)))):
-        if not case.has(key):
-            continue
-        duration = case.number(key)
-        if duration / step > MOST_STEPS:
-            what = f"{duration:g} s are {duration / step:.3g} steps of {step:g} s"
-            yield Problem(
-                key,
-                what,
-                str(case.written.get(key, "")),
-                f"at most {MOST_STEPS:,} steps; lengthen envelope.step",
-            )
-            continue
-        if (
-            round(duration / step) < 1
-            or abs(round(duration / step) * step - duration) > 1e-9 * duration
-        ):
-            what = f"{duration:g} s is not a whole number of steps of {step:g} s"
-            yield Problem(key, what, str(case.written.get(key, "")), "a multiple of envelope.step")
+    yield from whole_steps(case, "envelope.duration", case.envelope.duration)
+    for index, study in enumerate(case.sections.study):
+        yield from whole_steps(case, f"study[{index}].duration", study.duration)
+
+
+def whole_steps(case: Case, key: str, duration: float) -> Iterator[Problem]:
+    """A duration is a whole number of steps, and of not too many."""
+    step, written = case.envelope.step, str(case.written.get(key, ""))
+    if duration / step > MOST_STEPS:
+        what = f"{duration:g} s are {duration / step:.3g} steps of {step:g} s"
+        yield Problem(key, what, written, f"at most {MOST_STEPS:,} steps; lengthen envelope.step")
+    elif (
+        round(duration / step) < 1
+        or abs(round(duration / step) * step - duration) > 1e-9 * duration
+    ):
+        what = f"{duration:g} s is not a whole number of steps of {step:g} s"
+        yield Problem(key, what, written, "a multiple of envelope.step")

@@ -6,19 +6,16 @@ import itertools
 from collections.abc import Iterator
 
 from alphacut.case.case import Case
+from alphacut.case.sections.particles import Packing
 from alphacut.io.problem import Problem
 from alphacut.stochastic import HermiteMap, TruncatedNormal
-
-SLOPES = ("a1", "a2", "a3", "a4")
 
 
 def particles(case: Case) -> Iterator[Problem]:
     """Exactly one source of particles, and numbers in it that fit together."""
-    sources = [
-        name
-        for name in ("packing", "circles", "image")
-        if any(key.startswith(f"microstructure.{name}.") for key in case.values)
-    ]
+    study = case.microstructure
+    every = {"packing": study.packing, "circles": study.circles, "image": study.image}
+    sources = [name for name, source in every.items() if source]
     if len(sources) != 1:
         allowed = (
             "one of [microstructure.packing], [microstructure.circles], [microstructure.image]"
@@ -29,37 +26,36 @@ def particles(case: Case) -> Iterator[Problem]:
             ", ".join(sources),
             allowed,
         )
-    if case.has("microstructure.limits"):
-        limits = case.numbers("microstructure.limits")
-        if len(limits) != 2 or not limits[0] < limits[1]:
-            yield Problem(
-                "microstructure.limits",
-                "the limits need two values in rising order",
-                str(list(limits)),
-                "for example [0.13, 0.87]",
-            )
-    yield from sizes(case)
-    for name in ("size", "origin"):
-        key = f"microstructure.circles.{name}"
-        if case.has(key) and len(case.numbers(key)) != 2:
-            yield Problem(key, f"got {len(case.numbers(key))} values", allowed="two: across and up")
+    limits = study.limits
+    if limits is not None and (len(limits) != 2 or not limits[0] < limits[1]):
+        yield Problem(
+            "microstructure.limits",
+            "the limits need two values in rising order",
+            str(list(limits)),
+            "for example [0.13, 0.87]",
+        )
+    if study.packing:
+        yield from sizes(case, study.packing)
+    if study.circles:
+        for name, pair in (("size", study.circles.size), ("origin", study.circles.origin)):
+            if len(pair) != 2:
+                key = f"microstructure.circles.{name}"
+                yield Problem(key, f"got {len(pair)} values", allowed="two: across and up")
 
 
-def sizes(case: Case) -> Iterator[Problem]:
+def sizes(case: Case, packing: Packing) -> Iterator[Problem]:
     """The radii of packed discs: a file of them, or both ends of their law in order."""
     key = "microstructure.packing"
     low, high = (f"{key}.{end}_radius" for end in ("smallest", "largest"))
-    ends = [name for name in (low, high) if name in case.written]
-    if not case.has(f"{key}.discs"):
-        return
-    if case.has(f"{key}.file") and ends:
+    ends = [name for name in (low, high) if case.asked(name)]
+    if packing.file and ends:
         yield Problem(
             ends[0],
             "the radii come from a file besides",
             str(case.written[ends[0]]),
             f"one of {key}.file and the two ends",
         )
-    elif not case.has(f"{key}.file"):
+    elif not packing.file:
         for name in (low, high):
             if name not in ends:
                 yield Problem(
@@ -67,7 +63,8 @@ def sizes(case: Case) -> Iterator[Problem]:
                     "missing: the law of the radii needs it",
                     allowed=f'a length such as "1.6 mm", or {key}.file',
                 )
-    if len(ends) == 2 and case.number(low) > case.number(high):
+    smallest, largest = packing.smallest_radius, packing.largest_radius
+    if smallest is not None and largest is not None and smallest > largest:
         yield Problem(
             low, "the smallest radius is greater than the largest", str(case.written[low])
         )
@@ -75,7 +72,7 @@ def sizes(case: Case) -> Iterator[Problem]:
 
 def radius(case: Case, alpha: float) -> Iterator[Problem]:
     """r(θ) stays inside (0, 1) in every corner of the α-cuts; r is linear in a1 … a4."""
-    theta = case.numbers("radius.theta")
+    theta = case.radius.theta
     if len(theta) != 2 or not theta[0] < theta[1]:
         yield Problem(
             "radius.theta",
@@ -86,7 +83,7 @@ def radius(case: Case, alpha: float) -> Iterator[Problem]:
         return
     law = TruncatedNormal(*theta)
     for corner in itertools.product(
-        *(sorted(set(case.fuzzy(f"radius.{name}").cut(alpha))) for name in SLOPES)
+        *(sorted(set(number.cut(alpha))) for number in case.radius.slopes)
     ):
         a1, a2, a3, a4 = corner
         try:

@@ -13,16 +13,16 @@ DAMPING = 'damping_ratio = "5 %", rayleigh_mass and rayleigh_stiffness'
 
 def incomplete(case: Case) -> Iterator[Problem]:
     """Every key that a frame or tower lacks."""
-    if case.has("frame.masses"):
+    if case.sections.frame:
         yield from frame_damping(case)
         yield from frame_motion(case)
-    if case.has("tower.storeys"):
+    if case.sections.tower:
         yield from tower_damping(case)
 
 
 def given(case: Case, section: str, *names: str) -> bool:
     """True if the file holds any of the keys."""
-    return any(f"{section}.{name}" in case.written for name in names)
+    return any(case.asked(f"{section}.{name}") for name in names)
 
 
 def frame_damping(case: Case) -> Iterator[Problem]:
@@ -61,7 +61,7 @@ def tower_damping(case: Case) -> Iterator[Problem]:
 
 def frame_motion(case: Case) -> Iterator[Problem]:
     """A start is given, unless the ground moves; and something moves at all."""
-    if case.has("frame.accelerogram"):
+    if case.frame.accelerogram:
         return
     missing = [name for name in ("displacements", "velocities") if not given(case, "frame", name)]
     for name in missing:
@@ -70,11 +70,7 @@ def frame_motion(case: Case) -> Iterator[Problem]:
             "missing: without an accelerogram the start moves the frame",
             allowed="one for each floor, or for all",
         )
-    starts = [
-        number
-        for name in ("displacements", "velocities")
-        for number in case.fuzzies(f"frame.{name}")
-    ]
+    starts = (*case.frame.displacements, *case.frame.velocities)
     if not missing and not any(number.support.lower or number.support.upper for number in starts):
         what = (
             "nothing moves the frame: displacements and velocities are zero, and there is no"

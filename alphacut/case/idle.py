@@ -40,9 +40,7 @@ def idle_mesh(case: Case, models: Collection[str]) -> Iterator[Problem]:
 
 def idle_envelope(case: Case) -> Iterator[Problem]:
     """Keys that the method does not have; a changed method passes over those of the file."""
-    if not case.has("envelope.method"):
-        return
-    method = case.text("envelope.method")
+    method = case.envelope.method
     for key, known in OF_ENVELOPES.items():
         if not case.asked(key) or method in known:
             continue
@@ -84,3 +82,9 @@ def require_read(case: Case, sections: Collection[str], command: str) -> None:
                 for key in unread
             ]
         )
+
+
+def changed_moduli(case: Case) -> list[str]:
+    """Keys of a modulus that the command line gives."""
+    keys = ("modulus.value", "modulus.file", "modulus.measured", "frame.modulus")
+    return [key for key in keys if key in case.changed]

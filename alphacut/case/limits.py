@@ -1,6 +1,8 @@
-"""The limit of an exceedance, in the unit of its output."""
+"""Limit of an exceedance and tolerance of envelopes, each in the unit of its output."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 from alphacut.case.case import Case
 from alphacut.io import quantity
@@ -14,7 +16,7 @@ def limit_of(case: Case) -> float:
     """
     from alphacut.frame.outputs import output_unit
 
-    name, text = case.text("exceedance.output"), case.text("exceedance.limit")
+    name, text = case.exceedance.output, case.exceedance.limit
     unit, height = output_unit(name), storey_height(case, name)
     try:
         share = height is not None and text.rstrip().endswith("%")
@@ -36,8 +38,37 @@ def storey_height(case: Case, output: str) -> float | None:
     kind, floor = output.rstrip("0123456789"), output.lstrip("abcdefghijklmnopqrstuvwxyz_")
     if kind != "drift":
         return None
-    if case.has("tower.height"):
-        return case.number("tower.height")
-    lengths = case.fuzzies("frame.lengths") if case.has("frame.lengths") else ()
+    if case.sections.tower:
+        return case.tower.height
+    lengths = case.sections.frame.lengths if case.sections.frame else ()
     index = 0 if len(lengths) == 1 else int(floor or 1) - 1
     return lengths[index].modal if 0 <= index < len(lengths) else None
+
+
+@dataclass(frozen=True)
+class AskedTolerance:
+    """Tolerance of envelopes that a case names.
+
+    Args:
+        value: In SI, or a share of a peak.
+        unit: Its unit in words, such as `` m`` or `` of a peak``.
+        changed: Whether the command line names it.
+    """
+
+    value: float
+    unit: str
+    changed: bool
+
+
+def asked_tolerance(case: Case) -> AskedTolerance | None:
+    """Tolerance of envelopes that a case names; None where a default stands in."""
+    named: list[tuple[str, float | None, str]] = [
+        ("envelope.relative_tolerance", case.envelope.relative_tolerance, " of a peak"),
+        ("envelope.tolerance", case.envelope.tolerance, " m"),
+    ]
+    if case.sections.pendulum:
+        named.append(("pendulum.tolerance", case.pendulum.tolerance, " N"))
+    for key, value, unit in named:
+        if value is not None and case.asked(key):
+            return AskedTolerance(value, unit, key in case.changed)
+    return None

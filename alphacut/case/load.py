@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-import re
-import tomllib
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
+from typing import TypeVar
 
-from alphacut.case.case import Case
+from alphacut.case.case import Case, Sections
 from alphacut.case.checks import checks
-from alphacut.case.dependent_checks import undoubted
-from alphacut.case.key import Key, Section
-from alphacut.case.line_numbers import key_at, lines_of_keys
+from alphacut.case.key import Section, UnknownValueError, keys_of
 from alphacut.case.overrides import Raw, apply_changes, table_of
 from alphacut.case.schema import IMPLIED, SECTIONS, dotted, every_key
+from alphacut.case.sections.material import Cell, Mesh, Modulus, Radius, Response
+from alphacut.case.sections.particles import Microstructure
+from alphacut.case.sections.picture import PICTURES, Picture
+from alphacut.case.sections.structures import Frame, Pendulum, Tower
+from alphacut.case.sections.top import Top
+from alphacut.case.sections.vibration import Envelope, Exceedance, Study
+from alphacut.case.toml_file import contents, lines_of_keys, parsed
 from alphacut.case.values import Unfit, allowed, nearest, read
-from alphacut.io.output_paths import hint
 from alphacut.io.problem import BadInput, Problem
+
+S = TypeVar("S", bound=Section)
+Tables = dict[str, dict[str, object]]
+"""Values of the keys of each section, by the section's full name: ``study[0]``."""
 
 
 def load(
@@ -47,19 +54,69 @@ def load(
     for section, _, key in (name.rpartition(".") for name in without):
         (table_of(raw, section) or {}).pop(key, None)
     changed = apply_changes(raw, changes)
-    values: dict[str, object] = {}
+    tables: Tables = {}
     written: dict[str, object] = {}
-    single = list(checked(raw, values, written))
-    case = Case(path, values, written, lines, frozenset(changed))
+    single = list(checked(raw, tables, written))
+    broken = unsound(single)
+    case = Case(
+        path, built(tables, written, broken), written, lines, frozenset(changed), frozenset(broken)
+    )
     problems = [*single, *together(case, single, modal=modal)]
     if problems:
-        raise BadInput(
-            sorted(
-                (located(problem, path, lines, changed) for problem in problems),
-                key=lambda problem: problem.line,
-            )
-        )
-    return case
+        raise BadInput(sorted(map(case.located, problems), key=lambda problem: problem.line))
+    return replace(case, broken=frozenset())
+
+
+def unsound(problems: Sequence[Problem]) -> set[str]:
+    """Keys whose values are wrong, or may stand under a misspelt name."""
+    meant = (
+        dotted(problem.key.rpartition(".")[0], problem.nearest)
+        for problem in problems
+        if problem.nearest
+    )
+    return {*(problem.key for problem in problems), *meant}
+
+
+def built(tables: Tables, written: Collection[str], broken: Collection[str]) -> Sections:
+    """The sections of a case; what is broken is left out of them."""
+    sound = {
+        name: {key: value for key, value in table.items() if dotted(name, key) not in broken}
+        for name, table in tables.items()
+    }
+    pictured = any(f"cell.{name}" in written for name in PICTURES)
+
+    def given(section: type[S], name: str) -> S | None:
+        return section_of(section, name, sound) if name in sound else None
+
+    return Sections(
+        top=section_of(Top, "", sound),
+        microstructure=given(Microstructure, "microstructure"),
+        radius=given(Radius, "radius"),
+        cell=None if pictured else given(Cell, "cell"),
+        picture=given(Picture, "cell") if pictured else None,
+        mesh=given(Mesh, "mesh"),
+        modulus=given(Modulus, "modulus"),
+        response=given(Response, "response"),
+        frame=given(Frame, "frame"),
+        pendulum=given(Pendulum, "pendulum"),
+        tower=given(Tower, "tower"),
+        envelope=given(Envelope, "envelope"),
+        exceedance=given(Exceedance, "exceedance"),
+        study=tuple(section_of(Study, name, sound) for name in sound if name.startswith("study[")),
+    )
+
+
+def section_of(section: type[S], name: str, tables: Tables) -> S:
+    """A section and those inside it; a field whose value is missing stays unset."""
+    made = object.__new__(section)
+    for field in fields(section):
+        inner = dotted(name, field.name)
+        if inner in SECTIONS:
+            value = section_of(SECTIONS[inner], inner, tables) if inner in tables else None
+            object.__setattr__(made, field.name, value)
+        elif field.name in tables[name]:
+            object.__setattr__(made, field.name, tables[name][field.name])
+    return made
 
 
 def together(case: Case, single: Sequence[Problem], *, modal: bool) -> Iterator[Problem]:
@@ -67,96 +124,26 @@ def together(case: Case, single: Sequence[Problem], *, modal: bool) -> Iterator[
     # a section or the stages: there is no telling what was meant
     if any("." not in problem.key for problem in single):
         return
-    broken = {problem.key for problem in single}
-    broken |= {
-        dotted(problem.key.rpartition(".")[0], problem.nearest)
-        for problem in single
-        if problem.nearest
-    }
     for check in checks(modal=modal):
-        yield from undoubted(check, case, broken)
+        try:
+            yield from check(case)
+        except UnknownValueError:  # what the check goes on to rests on a wrong value
+            continue
 
 
-def contents(path: Path) -> str:
-    """Text of a file, or what is wrong with it: missing, a folder, not UTF-8."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        reason = {
-            FileNotFoundError: "there is no such file",
-            IsADirectoryError: "this is a folder",
-        }.get(type(error), error.strerror)
-        raise BadInput(
-            Problem(
-                str(path), f"{reason}", allowed=hint(path) or "a case file such as cases/paper.toml"
-            )
-        ) from None
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        before = data[: error.start].decode("utf-8")
-        line = before.count("\n") + 1
-        key, _ = key_at(data.decode("utf-8", "replace"), line)
-        raise BadInput(
-            Problem(
-                key,
-                f"byte {data[error.start]:#04x} is not UTF-8",
-                allowed="text in UTF-8",
-                file=str(path),
-                line=line,
-            )
-        ) from None
-
-
-def parsed(path: Path, text: str) -> Raw:
-    """The TOML tree, or the line and key where it is broken."""
-    try:
-        return tomllib.loads(text.replace("\r\n", "\n"))
-    except tomllib.TOMLDecodeError as error:
-        where = re.search(r"\(at line (\d+), column \d+\)", str(error))
-        line = int(where[1]) if where else max(1, len(text.splitlines()))
-        reason = re.sub(r"\s*\(at .*\)$", "", str(error)).rstrip(".")
-        shown = text.splitlines()[line - 1].strip() if text.splitlines() else ""
-        key = broken_key(text, line)
-        what = f"this is not TOML: {reason[:1].lower()}{reason[1:]}, at '{shown}'"
-        problem = Problem(key, what, allowed=cure(shown), file=str(path), line=line)
-        raise BadInput(problem) from None
-
-
-def cure(line: str) -> str:
-    """Cure of a broken line where that is plain; else empty."""
-    name, _, value = (part.strip() for part in line.partition("#")[0].partition("="))
-    if re.fullmatch(r"[\w\-]+", name) and not name.isascii():
-        return "keys of plain letters, digits and _"
-    if match := re.fullmatch(r"([-+]?\d+),(\d+)(.*)", value):
-        return f"{match[1]}.{match[2]}{match[3]}, with a point"
-    unquoted = re.fullmatch(r"(\[[^\]\"']*\]|[-+]?[\d.,]+)\s*[A-Za-z%µ][^\"']*", value)
-    return f'put it in quotes: "{value}"' if unquoted else ""
-
-
-def broken_key(text: str, line: int) -> str:
-    """Key on a broken line: before the =, or the first word, or the key it belongs to."""
-    key, at = key_at(text, line)
-    broken = text.splitlines()[line - 1] if text else ""
-    if section := re.match(r"\s*\[+\s*([\w.\-]+)\s*\]+", broken):
-        return section[1]
-    word = re.match(r"\s*([A-Za-z_][\w\-]*)\s*$", broken)
-    return word[1] if word and at != line else key
-
-
-def checked(raw: Raw, values: dict[str, object], written: dict[str, object]) -> Iterator[Problem]:
-    """Check the tree against the schema; fills `values` and `written` on the way."""
+def checked(raw: Raw, tables: Tables, written: dict[str, object]) -> Iterator[Problem]:
+    """Check the tree against the schema; fills `tables` and `written` on the way."""
     for name in raw:
-        if name not in SECTIONS and name not in SECTIONS[""].keys:
+        if name not in SECTIONS and name not in keys_of(Top):
             yield unknown(name, "", raw[name])
     raw = flattened(raw)
-    top = {key: value for key, value in raw.items() if key in SECTIONS[""].keys}
-    yield from checked_section("", SECTIONS[""], top, values, written)
+    top = {key: value for key, value in raw.items() if key in keys_of(Top)}
+    yield from checked_section("", Top, top, tables, written)
     for name, section in SECTIONS.items():
         if name and name in raw:
-            yield from checked_table(name, section, raw[name], values, written)
+            yield from checked_table(name, section, raw[name], tables, written)
         elif IMPLIED.get(name) in raw:
-            yield from checked_section(name, section, {}, values, written)
+            yield from checked_section(name, section, {}, tables, written)
 
 
 def flattened(raw: Raw) -> Raw:
@@ -173,19 +160,17 @@ def flattened(raw: Raw) -> Raw:
 
 def checked_table(
     name: str,
-    section: Section,
+    section: type[Section],
     table: object,
-    values: dict[str, object],
+    tables: Tables,
     written: dict[str, object],
 ) -> Iterator[Problem]:
     """Check ``[name]``, or every ``[[name]]``."""
-    tables = table if section.repeated and isinstance(table, list) else [table]
-    if section.repeated:
-        values[name] = len(tables)
-    for index, entry in enumerate(tables):
+    entries = table if section.repeated and isinstance(table, list) else [table]
+    for index, entry in enumerate(entries):
         full = f"{name}[{index}]" if section.repeated else name
         if isinstance(entry, dict) and isinstance(table, list) == section.repeated:
-            yield from checked_section(full, section, entry, values, written)
+            yield from checked_section(full, section, entry, tables, written)
         else:
             yield Problem(
                 full,
@@ -197,36 +182,38 @@ def checked_table(
 
 def checked_section(
     name: str,
-    section: Section,
+    section: type[Section],
     table: Mapping[str, object],
-    values: dict[str, object],
+    tables: Tables,
     written: dict[str, object],
 ) -> Iterator[Problem]:
     """Check the keys of one table, and that none is missing."""
     needed = not any(key in table for key in section.unless)
     strangers = [
-        unknown(key, name, value) for key, value in table.items() if key not in section.keys
+        unknown(key, name, value) for key, value in table.items() if key not in keys_of(section)
     ]
     if len(strangers) == 1 and not strangers[0].nearest:
         missing = [
             key
-            for key, entry in section.keys.items()
+            for key, entry in keys_of(section).items()
             if entry.required and needed and key not in table
         ]
         strangers = [replace(strangers[0], nearest=missing[0])] if len(missing) == 1 else strangers
     yield from strangers
     # a misspelt key is one problem, not a missing one besides
     meant = {problem.nearest for problem in strangers}
-    for key, entry in section.keys.items():
+    values = tables.setdefault(name, {})
+    for key, entry in keys_of(section).items():
         full = dotted(name, key)
         if key not in table:
             if entry.required and needed and key not in meant:
                 yield Problem(full, f"missing: {entry.about}", allowed=allowed(entry))
-            values[full] = entry.default
+            if not entry.required:
+                values[key] = entry.default
             continue
         written[full] = table[key]
         try:
-            values[full] = read(table[key], entry)
+            values[key] = read(table[key], entry)
         except Unfit as unfit:
             yield Problem(
                 full,
@@ -240,7 +227,7 @@ def checked_section(
 def unknown(key: str, section: str, value: object) -> Problem:
     """The problem of a key or section that does not exist, with the nearest that does."""
     plain = section.partition("[")[0]
-    here = SECTIONS[plain].keys
+    here = keys_of(SECTIONS[plain])
     close = nearest(key, [*here, *(() if section else filter(None, SECTIONS))])
     if not close:
         elsewhere = {name.rpartition(".")[2]: name for name in every_key()}
@@ -261,26 +248,10 @@ def as_written(value: object) -> str:
     return f'"{value}"' if isinstance(value, str) else str(value).replace("'", '"')
 
 
-def located(
-    problem: Problem, path: Path, lines: Mapping[str, int], changed: Collection[str]
-) -> Problem:
-    """The problem with its file and line; a missing key points at its section."""
-    if problem.key in changed:
-        return Problem(
-            problem.key,
-            problem.what,
-            problem.value,
-            problem.allowed,
-            problem.nearest,
-            "command line",
-        )
-    section = problem.key.rpartition(".")[0]
-    line = lines.get(problem.key) or lines.get(section) or 0
-    return Problem(
-        problem.key, problem.what, problem.value, problem.allowed, problem.nearest, str(path), line
-    )
-
-
-def describe(key: Key) -> str:
-    """One line of help for a key: what it is and what it may hold."""
-    return f"{key.about}; {allowed(key)}"
+def section_from(section: type[S], table: Mapping[str, object]) -> S:
+    """A section from a table that this program wrote; what it leaves out holds its default."""
+    keys = keys_of(section)
+    values = {
+        name: read(table[name], key) if name in table else key.default for name, key in keys.items()
+    }
+    return section_of(section, "", {"": values})

@@ -24,9 +24,9 @@ OUTPUTS = {
 
 def floors(case: Case) -> Iterator[Problem]:
     """One entry for each floor in every array of the frame, or one for all floors."""
-    count = len(case.fuzzies("frame.masses"))
+    frame, count = case.frame, len(case.frame.masses)
     for name in ("lengths", "dampers", "displacements", "velocities", "second_moment", "columns"):
-        found = len(case.fuzzies(f"frame.{name}"))
+        found = len(getattr(frame, name))
         if found not in (1, count):
             few = f"{count} value{'s' if count > 1 else ''}"
             words = (
@@ -38,17 +38,14 @@ def floors(case: Case) -> Iterator[Problem]:
                 f"got {found} values for {count} floor{'s' if count > 1 else ''}",
                 allowed=words,
             )
-    if case.has("frame.damping_ratio") and len(case.fuzzies("frame.damping_ratio")) not in (
-        1,
-        count,
-    ):
-        what = f"got {len(case.fuzzies('frame.damping_ratio'))} values for {count} modes"
+    if frame.damping_ratio is not None and len(frame.damping_ratio) not in (1, count):
+        what = f"got {len(frame.damping_ratio)} values for {count} modes"
         yield Problem(
             "frame.damping_ratio",
             what,
             allowed=f"one for all modes, or {count}: one for each, by rising frequency",
         )
-    moments = case.fuzzies("frame.second_moment")
+    moments = frame.second_moment
     if len(moments) > 1 and any(moment.support.width > 0 for moment in moments):
         allowed = (
             "one fuzzy value for all storeys, or crisp ones; what makes a storey uncertain by"
@@ -61,16 +58,28 @@ def floors(case: Case) -> Iterator[Problem]:
             allowed,
         )
     yield from known_output(case, count)
-    for key in fuzzy_keys(case):
-        for name in case.names(key):
+    for key, names in named_inputs(case):
+        for name in names:
             yield from known_input(key, name, count)
 
 
-def named_inputs(case: Case, section: str, known: tuple[str, ...]) -> Iterator[Problem]:
+def structures(case: Case) -> list[str]:
+    """Names of the sections on structures that the case has."""
+    return [name for name in ("frame", *OTHERS) if getattr(case.sections, name) is not None]
+
+
+def others(case: Case) -> Iterator[Problem]:
     """Fuzzy inputs of a structure that has no groups of them."""
-    for key in fuzzy_keys(case):
-        for name in case.names(key):
-            if name == "zeta" and section == "tower" and not case.has("tower.damping_ratio"):
+    for section in structures(case):
+        if section in OTHERS:
+            yield from other_inputs(case, section, OTHERS[section])
+
+
+def other_inputs(case: Case, section: str, known: tuple[str, ...]) -> Iterator[Problem]:
+    """Names of inputs that a pendulum or a tower does not have."""
+    for key, names in named_inputs(case):
+        for name in names:
+            if name == "zeta" and section == "tower" and case.tower.damping_ratio is None:
                 yield Problem(
                     key,
                     "the tower has no damping ratio",
@@ -87,26 +96,22 @@ def named_inputs(case: Case, section: str, known: tuple[str, ...]) -> Iterator[P
                 )
 
 
-def fuzzy_keys(case: Case) -> list[str]:
-    """Keys that name fuzzy inputs of the structure."""
-    keys = [
-        "envelope.fuzzy",
-        "exceedance.random",
-        *(f"study[{i}].fuzzy" for i in range(study_count(case))),
-    ]
-    return [key for key in keys if case.has(key)]
-
-
-def study_count(case: Case) -> int:
-    """Number of [[study]] tables."""
-    return int(str(case.values.get("study", 0)))
+def named_inputs(case: Case) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Keys that name inputs of the structure, each with the names."""
+    given = case.sections
+    if given.envelope:
+        yield "envelope.fuzzy", given.envelope.fuzzy
+    if given.exceedance:
+        yield "exceedance.random", given.exceedance.random
+    for index, study in enumerate(given.study):
+        yield f"study[{index}].fuzzy", study.fuzzy
 
 
 def known_output(case: Case, floors: int) -> Iterator[Problem]:
     """The observed quantities, and the one that a study draws."""
     kinds = ("q", "v", "drift", "shear")
     possible = [f"{kind}{floor + 1}" for kind in kinds for floor in range(floors)] + ["base_shear"]
-    for name in case.names("frame.outputs"):
+    for name in case.frame.outputs:
         if name not in possible:
             yield Problem(
                 "frame.outputs",
@@ -115,14 +120,14 @@ def known_output(case: Case, floors: int) -> Iterator[Problem]:
                 f"q, v, drift or shear with a floor, base_shear: {', '.join(possible[:floors])} …",
                 nearest(name, possible),
             )
-    outputs = case.names("frame.outputs") or tuple(possible[:floors])
-    for index in range(study_count(case)):
-        drawn = str(case.values.get(f"study[{index}].output", ""))
+    outputs = case.frame.outputs or tuple(possible[:floors])
+    for index, study in enumerate(case.sections.study):
+        drawn = study.output
         if drawn and drawn not in outputs:
             yield Problem(
                 f"study[{index}].output", f"there is no output {drawn}", drawn, ", ".join(outputs)
             )
-    limited = case.text("exceedance.output") if case.has("exceedance.output") else possible[0]
+    limited = case.exceedance.output if case.sections.exceedance else possible[0]
     if limited not in possible:
         allowed = f"q, v, drift or shear with a floor, base_shear: {', '.join(possible[:floors])} …"
         yield Problem(

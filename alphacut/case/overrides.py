@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Sequence
 from typing import Any
 
-from alphacut.case.key import Key
+from alphacut.case.key import Key, keys_of
 from alphacut.case.schema import SECTIONS, every_key
 from alphacut.case.values import nearest
 from alphacut.io.problem import BadInput, Problem
@@ -90,7 +90,7 @@ def no_key(name: str, change: str, raw: Raw) -> Problem:
             "--set",
             f"{name} is a section",
             change,
-            ", ".join(f"{name}.{key}" for key in SECTIONS[name].keys),
+            ", ".join(f"{name}.{key}" for key in keys_of(SECTIONS[name])),
         )
     # keys of the case's own sections come first
     here = [key for key in every_key() if table_of(raw, key.rpartition(".")[0]) is not None]

@@ -2,51 +2,56 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from alphacut.case.case import Case
+from alphacut.case.sections.particles import Microstructure
 
 NODES = 120  # time steps of an envelope
 LEVELS = (0.0, 1.0)
 COARSE = {
-    "mesh.layers": 3,
-    "mesh.size": 0.4,
-    "modulus.plan": "reduced",
-    "modulus.alpha": LEVELS,
-    "modulus.tolerance": 1e-2,
-    "envelope.alpha": LEVELS,
-    "envelope.relative_tolerance": 1e-2,
-    "exceedance.samples": 10,
-    "microstructure.bootstrap": 100,
-    "microstructure.packing.packings": 5,
-    "microstructure.packing.discs": 500,
+    "microstructure": (
+        "microstructure.bootstrap",
+        "microstructure.packing.packings",
+        "microstructure.packing.discs",
+    ),
+    "modulus": (
+        "mesh.layers",
+        "mesh.size",
+        "modulus.plan",
+        "modulus.alpha",
+        "modulus.tolerance",
+    ),
+    "image": ("modulus.alpha",),
+    "envelope": (
+        "envelope.alpha",
+        "envelope.relative_tolerance",
+        "envelope.duration",
+        "exceedance.samples",
+    ),
 }
-
-
-PARTS = {
-    "modulus.alpha": ("modulus", "image"),
-    "mesh": ("modulus",),
-    "modulus": ("modulus",),
-    "exceedance": ("envelope",),
-    "study": ("envelope",),
-    "envelope": ("envelope",),
-}
+"""Keys that the quick form changes, by the stage that reads them."""
 
 
 def settings(case: Case) -> dict[str, object]:
     """Values of the quick form in place of the case's own."""
-    keys = [
-        key for key in case.values if (key in COARSE or key.endswith(".duration")) and case.has(key)
-    ]
-    return {key: case.values[key] for key in keys if set(_readers(key)) & set(case.stages)}
+    found: dict[str, object] = {}
+    for stage, keys in COARSE.items():
+        found |= {key: value_of(case, key) for key in keys if stage in case.stages}
+    if "envelope" in case.stages:
+        for index, study in enumerate(case.sections.study):
+            found[f"study[{index}].duration"] = study.duration
+    return {key: value for key, value in found.items() if value is not None}
 
 
-def _readers(key: str) -> tuple[str, ...]:
-    """Stages that read a key."""
-    return PARTS.get(key) or PARTS.get(re.split(r"[.\[]", key)[0], ("microstructure",))
+def value_of(case: Case, key: str) -> object:
+    """The value of a key; None where the case has no such section."""
+    found: object = case.sections
+    for name in key.split("."):
+        found = None if found is None else getattr(found, name)
+    return found
 
 
 def banner(found: Mapping[str, Any]) -> str:
@@ -64,9 +69,30 @@ def banner(found: Mapping[str, Any]) -> str:
 
 def quick(case: Case) -> Case:
     """The case with few levels, samples and time steps on a coarse mesh."""
-    values = dict(case.values)
-    values |= {key: value for key, value in COARSE.items() if key in case.values}
-    for key in case.values:
-        if key.endswith(".duration") and case.has(key):
-            values[key] = min(case.number(key), NODES * case.number("envelope.step"))
-    return replace(case, values=values)
+    old = case.sections
+    longest = NODES * old.envelope.step if old.envelope else 0.0
+    return replace(
+        case,
+        sections=replace(
+            old,
+            microstructure=old.microstructure and few_particles(old.microstructure),
+            mesh=old.mesh and replace(old.mesh, layers=3, size=0.4),
+            modulus=old.modulus
+            and replace(old.modulus, plan="reduced", alpha=LEVELS, tolerance=1e-2),
+            study=tuple(replace(x, duration=min(x.duration, longest)) for x in old.study),
+            envelope=old.envelope
+            and replace(
+                old.envelope,
+                alpha=LEVELS,
+                relative_tolerance=1e-2,
+                duration=min(old.envelope.duration, longest),
+            ),
+            exceedance=old.exceedance and replace(old.exceedance, samples=10),
+        ),
+    )
+
+
+def few_particles(wanted: Microstructure) -> Microstructure:
+    """The microstructure from few particles and resamples."""
+    packing = wanted.packing and replace(wanted.packing, packings=5, discs=500)
+    return replace(wanted, bootstrap=100, packing=packing)

@@ -10,7 +10,7 @@ from typing import TextIO
 from alphacut.case.case import Case
 from alphacut.case.idle import idle_mesh, require_read
 from alphacut.case.load import load
-from alphacut.case.schema import CELL_METHODS
+from alphacut.case.sections.material import CELL_METHODS
 from alphacut.commands.options import (
     MESH,
     MODEL,
@@ -98,7 +98,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     if options.export:
         check_format(options.export)
     pair = named_pair(options.cross_check)
-    models = pair or (case.text("modulus.method"),)
+    models = pair or (case.modulus.method,)
     require_effect(options, case, models)
     excluded = named_models("--exclude", options.exclude)
     choice = cell.cell_choice(case, exclude=excluded, petsc=petsc)
@@ -122,7 +122,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     found["tolerance"] = contract(case, sum(result.error.values()) if result.error else None)
     if answer(options, found, out, summary(result)):
         out.write(agreement(pair, difference, allowed_difference(case)))
-        modal = cell.parts(cell.modal_values(case), case.numbers("radius.theta"))
+        modal = cell.parts(cell.modal_values(case), case.radius.theta)
         out.write(remark(cell.anisotropy(*modal)))
     return 0
 
@@ -136,7 +136,7 @@ def require_effect(options: argparse.Namespace, case: Case, models: Sequence[str
     problems = list(idle_mesh(case, models))
     if options.cross_check and "modulus.method" in case.changed:
         what = "this has no effect beside --cross-check, which names both models"
-        problems.append(Problem("modulus.method", what, case.text("modulus.method")))
+        problems.append(Problem("modulus.method", what, case.modulus.method))
     if options.exclude and "auto" not in models:
         what = f"the method is {' and '.join(models)}, and only method auto leaves a choice"
         problems.append(Problem("--exclude", what, options.exclude, "beside --method auto"))
@@ -153,7 +153,7 @@ def require_effect(options: argparse.Namespace, case: Case, models: Sequence[str
 
 def allowed_difference(case: Case) -> float:
     """The relative difference of E that ``--cross-check`` allows."""
-    return case.number("modulus.tolerance")
+    return case.modulus.tolerance
 
 
 def compared(case: Case, choice: cell.CellChoice, pair: Sequence[str]) -> tuple[Homogenised, float]:

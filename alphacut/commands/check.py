@@ -59,10 +59,14 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         # the modulus is yet to be computed
         about = "about " if {"modulus", "image"} & set(case.stages) else ""
         period = f"; first natural period {about}{found.period:.3g} s" if found.period else ""
-        passed = {"modulus", "image"} & set(case.stages) and "frame.modulus" in case.written
+        passed = (
+            {"modulus", "image"} & set(case.stages)
+            and case.sections.frame
+            and case.frame.modulus is not None
+        )
         over = "; frame.modulus is passed over, stage modulus hands its own on" if passed else ""
         out.write(
             f"{options.case}: no problems; stages {', '.join(case.stages)};"
-            f" {case.text('title')}{period}{over}\n"
+            f" {case.top.title}{period}{over}\n"
         )
     return 0

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, TextIO
 import numpy as np
 
 from alphacut.case.case import Case
-from alphacut.case.idle import require_read
+from alphacut.case.idle import changed_moduli, require_read
 from alphacut.case.load import load
-from alphacut.case.schema import ENVELOPE_METHODS
+from alphacut.case.sections.vibration import ENVELOPE_METHODS
 from alphacut.case.values import nearest
 from alphacut.commands.options import (
     KeyOption,
@@ -87,7 +87,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     task = replace(task_of(case), exclude=excluded(options.exclude))
     contradictions(options, case, task)
     wanted = structure(case, handed)
-    if case.has("exceedance.output"):
+    if case.sections.exceedance:
         outcomes.require_random(case, wanted)  # before anything is computed
     with progress("Envelopes", quiet=options.quiet) as tick:
         found = envelope.compute(
@@ -101,7 +101,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     envelope.keep_tolerance(case, dataset, best_effort=options.best_effort)
     if options.out:
         key = fingerprint(
-            {"case": case.values, "task": task, "modulus": handed}, ("fuzzy", "frame")
+            {"case": case.sections, "task": task, "modulus": handed}, ("fuzzy", "frame")
         )
         envelope.write(dataset, options.out, case_text=case.text_of_file, key=key)
     limit = exceeded(options, case, wanted)
@@ -121,7 +121,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
 
 def exceeded(options: argparse.Namespace, case: Case, wanted: Structure) -> dict[str, Any] | None:
     """The fuzzy probability of exceeding the case's limit; None where it names none."""
-    if not case.has("exceedance.output"):
+    if case.sections.exceedance is None:
         return None
     with progress("Exceedance", quiet=options.quiet) as tick:
         return outcomes.exceedance_document(outcomes.exceedance(case, wanted, tick))
@@ -147,8 +147,8 @@ def contradictions(options: argparse.Namespace, case: Case, task: EnvelopeTask) 
             miss.
     """
     problems = []
-    given = [key for key in (*GIVEN, "frame.modulus") if key in case.changed]
-    if options.modulus is not None and (given or not case.has("frame.masses")):
+    given = changed_moduli(case)
+    if options.modulus is not None and (given or case.sections.frame is None):
         what = f"{given[0]} is given besides" if given else "this structure takes no modulus"
         allowed = "one of them" if given else "with a storey frame"
         problems.append(Problem("--modulus", what, options.modulus, allowed))

@@ -34,7 +34,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     with progress("Image", quiet=options.quiet) as tick:
         found = compute(study, progress=tick)
     if options.out:
-        inputs = {"case": dict(case.values), "petsc": dict(petsc)}
+        inputs = {"case": case.sections, "petsc": dict(petsc)}
         key = fingerprint(inputs, ("stochastic", "rve", "fuzzy"))
         write(found, Path(options.out), attributes(case.text_of_file, key))
     numbers = document(found)

@@ -37,7 +37,6 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
 
     check_workers(options.workers)
     case = load(options.case, options.set)
-    case.need("microstructure.seed")
     require_read(case, ("microstructure",), "microstructure")
     if options.no_figures and not options.out:
         raise BadInput(
@@ -47,7 +46,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         found = microstructure.compute(case, workers=options.workers, progress=tick, quiet=True)
     written: list[str] = []
     if options.out:
-        key = fingerprint(case.values, ("stochastic",))
+        key = fingerprint({"case": case.sections}, ("stochastic",))
         written = microstructure.write(
             found,
             Path(options.out),

@@ -10,7 +10,7 @@ from typing import TextIO
 from alphacut.case.case import Case
 from alphacut.case.idle import idle_mesh, require_read
 from alphacut.case.load import load
-from alphacut.case.schema import PLANS
+from alphacut.case.sections.material import PLANS
 from alphacut.commands.cell import named_models, remark
 from alphacut.commands.options import (
     MODEL,
@@ -74,7 +74,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     check_workers(options.workers)
     case = load(options.case, changes(options, KEYS))
     require_read(case, READ, "modulus")
-    if problems := list(idle_mesh(case, (case.text("modulus.method"),))):
+    if problems := list(idle_mesh(case, (case.modulus.method,))):
         raise BadInput(problems)
     if options.explain:
         refuse_beside(options, "--explain", UNEXPLAINED)
@@ -91,11 +91,11 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         found = modulus.compute(wanted, workers=options.workers, progress=tick)
     keep_modulus(case, found.choice.method, found.error, best_effort=options.best_effort)
     if options.out:
-        key = fingerprint(case.values, ("stochastic", "rve", "fuzzy"))
+        key = fingerprint({"case": case.sections}, ("stochastic", "rve", "fuzzy"))
         modulus.write(found, options.out, case_text=case.text_of_file, key=key)
     stress = (
         response.document(response.dataset(case, found.dataset()))
-        if case.has("response.quantity")
+        if case.sections.response
         else None
     )
     reached = sum(found.error.values()) if found.error else None

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TextIO
 
-from alphacut.case.schema import CELL_METHODS
+from alphacut.case.sections.material import CELL_METHODS
 from alphacut.io.files import as_json, write_text
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.quantity import NUMBER

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from alphacut.case.case import Case
-from alphacut.case.checks import FILES, replaced
 from alphacut.case.idle import idle_mesh, require_read
 from alphacut.case.load import load
 from alphacut.case.quick import banner, quick, settings
@@ -146,8 +145,8 @@ def require_effect(options: argparse.Namespace, case: Case) -> None:
     Raises:
         BadInput: One is given.
     """
-    computed = "modulus" in case.stages and not replaced(case)
-    models = (case.text("modulus.method"),) if computed else ()
+    computed = "modulus" in case.stages and not case.stand_ins
+    models = (case.modulus.method,) if computed else ()
     if computed and (problems := list(idle_mesh(case, models))):
         raise BadInput(problems)
     if options.quick:
@@ -186,8 +185,9 @@ def main_numbers(found: Mapping[str, Any]) -> str:
 
 def driven(chain: Chain, results: Results) -> tuple[str, Callable[[Path], None]]:
     """Fingerprint and making of shares.nc, which says what drives the widths."""
-    files = [results.case.digest(key) for key in FILES if results.case.has(key)]
-    content = {"case": results.case.values, "files": files, "modulus": results.handed}
+    given = results.case.sections
+    files = results.case.digests(*given.files)
+    content = {"case": given, "files": files, "modulus": results.handed}
     key = fingerprint(content, ("stochastic", "rve", "fuzzy", "frame", "alphacut"))
 
     def compute(path: Path) -> None:

@@ -55,8 +55,6 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         raise BadInput(Problem("--most", "out of range", f"{options.most:g}", "greater than 0"))
     case = load(options.case, changes(options, KEYS))
     require_read(case, READ, "tolerances")
-    for key in ("exceedance.output", "envelope.duration", "envelope.fuzzy"):
-        case.need(key)
     handed = given_modulus(options.modulus) or stand_in(case)
     with progress("Tolerances", quiet=options.quiet) as tick:
         found = tolerances(case, handed, most=options.most, workers=options.workers, progress=tick)

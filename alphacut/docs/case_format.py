@@ -10,8 +10,9 @@ import os
 import sys
 from collections.abc import Iterator
 
-from alphacut.case.key import Key
-from alphacut.case.schema import SECTIONS, VERSION
+from alphacut.case.key import Key, about_of, keys_of
+from alphacut.case.schema import SECTIONS
+from alphacut.case.sections.top import VERSION
 from alphacut.case.values import allowed
 from alphacut.io.units import ACCEPTED, QUANTITIES
 
@@ -58,9 +59,9 @@ def sections() -> Iterator[str]:
         title = (
             f"`[[{name}]]`" if section.repeated else f"`[{name}]`" if name else "Top of the file"
         )
-        rows = "\n".join(row(key, entry) for key, entry in section.keys.items())
+        rows = "\n".join(row(key, entry) for key, entry in keys_of(section).items())
         yield (
-            f"## {title}\n\n{section.about}\n\n| key | meaning | allowed | if left out"
+            f"## {title}\n\n{about_of(section)}\n\n| key | meaning | allowed | if left out"
             f" |\n|---|---|---|---|\n{rows}\n"
         )
 

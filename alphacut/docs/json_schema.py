@@ -9,7 +9,7 @@ import json
 import math
 from typing import Any
 
-from alphacut.case.key import Key, Section
+from alphacut.case.key import Key, Section, about_of, keys_of
 from alphacut.case.schema import SECTIONS
 from alphacut.case.values import allowed
 from alphacut.io.units import QUANTITIES
@@ -36,14 +36,14 @@ def json_schema() -> dict[str, Any]:
     }
 
 
-def section_schema(section: Section) -> dict[str, Any]:
+def section_schema(section: type[Section]) -> dict[str, Any]:
     """One table."""
-    required = [name for name, key in section.keys.items() if key.required]
+    required = [name for name, key in keys_of(section).items() if key.required]
     ways = [required, *([name] for name in section.unless)]
     return {
         "type": "object",
-        "description": section.about,
-        "properties": {name: key_schema(key) for name, key in section.keys.items()},
+        "description": about_of(section),
+        "properties": {name: key_schema(key) for name, key in keys_of(section).items()},
         **(
             {"anyOf": [{"required": way} for way in ways]}
             if section.unless

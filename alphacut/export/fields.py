@@ -54,18 +54,18 @@ def cell_fields(case: Case) -> meshio.Mesh:
     from alphacut.rve.solver.options import SolverOptions
     from alphacut.rve.solver.stopwatch import Stopwatch
 
-    if case.text("mesh.interface") != "conforming":
+    if case.mesh.interface != "conforming":
         raise BadInput(
             Problem(
                 "mesh.interface",
                 "fields need a mesh that follows the interface",
-                case.text("mesh.interface"),
+                case.mesh.interface,
                 "conforming",
             )
         )
-    radius, matrix, inclusion = parts(modal_values(case), case.numbers("radius.theta"))
-    plane = triangulate(size=case.number("mesh.size"), radius=reference_radius(radius))
-    system = PrismSystem(PrismGrid(plane, case.integer("mesh.layers")), MPI.COMM_SELF)
+    radius, matrix, inclusion = parts(modal_values(case), case.radius.theta)
+    plane = triangulate(size=case.mesh.size, radius=reference_radius(radius))
+    system = PrismSystem(PrismGrid(plane, case.mesh.layers), MPI.COMM_SELF)
     system.move(radius)
     solved = PrismTask(system, SolverOptions("theta"), LOADS, Stopwatch()).solve(
         (matrix, inclusion)

@@ -62,11 +62,9 @@ def prism_mesh(case: Case) -> meshio.Mesh:
     from alphacut.rve.mesh.triangulation import triangulate
     from alphacut.rve.prism.model import reference_radius
 
-    radius, _, _ = parts(modal_values(case), case.numbers("radius.theta"))
-    plane = triangulate(size=case.number("mesh.size"), radius=reference_radius(radius))
-    grid = PrismGrid(
-        plane, case.integer("mesh.layers"), case.text("mesh.interface") == "conforming"
-    )
+    radius, _, _ = parts(modal_values(case), case.radius.theta)
+    plane = triangulate(size=case.mesh.size, radius=reference_radius(radius))
+    grid = PrismGrid(plane, case.mesh.layers, case.mesh.interface == "conforming")
     phase = np.tile(plane.inside.astype(np.int64), grid.layers)
     # meshio 5.3 reads and writes this cell but has forgotten its dimension
     topological_dimension.setdefault("wedge15", 3)

@@ -31,7 +31,7 @@ Drawing = tuple[str, Callable[[], "Figure"]]
 
 def drawings(results: Results) -> Iterator[Drawing]:
     """Name and function of each figure that the results allow."""
-    if results.case.has("radius.a1"):
+    if results.case.sections.radius:
         if "microstructure" not in results.case.stages:  # that stage draws both from its particles
             if results.case.quoted:
                 yield "fig11-radii", lambda: figure_radius.radii(results.case)
@@ -49,17 +49,17 @@ def drawings(results: Results) -> Iterator[Drawing]:
         yield "response", lambda: figure_response.response(stress)
     if results.envelopes:
         yield "fig20-mapping", lambda: figure_fuzzy.mapping(results)
-    if results.envelopes and results.case.has("frame.masses"):
+    if results.envelopes and results.case.sections.frame:
         yield "fig26-frame", lambda: figure_frame.frame(results.case)
         yield "fig27-chain", lambda: figure_frame.chain(results.case)
-    if results.envelopes and results.case.has("tower.storeys"):
+    if results.envelopes and results.case.sections.tower:
         yield "tower", lambda: figure_frame.tower(results.case)
     model = None if results.structure is None else results.structure.linear
     if model is not None and (shaken := model.ground) is not None:
         yield "record", lambda: figure_record.record(shaken)
     if (
-        results.case.has("envelope.method")
-        and results.case.text("envelope.method") == "graph-follower"
+        results.case.sections.envelope
+        and results.case.envelope.method == "graph-follower"
         and results.envelopes
     ):
         richest = max(results.studies, key=lambda study: len(study.task.fuzzy))
@@ -109,12 +109,12 @@ def particle_pictures(folder: Path, results: Results) -> list[str]:
 
 def mesh_picture(results: Results) -> list[str]:
     """Fig. 15 and the stress on slices, where the modulus was computed on prisms."""
-    if results.modulus is None or results.case.text("modulus.method") != "prism":
+    if results.modulus is None or results.case.modulus.method != "prism":
         return []
     from alphacut.figures.mesh import draw_mesh
 
     pictures = {f"figures/{file_stem('fig15-prism-mesh', results)}.png": "mesh"}
-    if results.case.text("mesh.interface") == "conforming":
+    if results.case.mesh.interface == "conforming":
         pictures["figures/stress-on-slices.png"] = "stress"
     return [
         name

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 def frame(case: Case) -> Figure:
     """Fig. 26: floors, columns with their lengths, displacements."""
-    lengths = [length.modal for length in per_floor(case, "frame.lengths")]
-    masses = [mass.modal for mass in per_floor(case, "frame.masses")]
+    lengths = [length.modal for length in per_floor(case.frame, case.frame.lengths)]
+    masses = [mass.modal for mass in per_floor(case.frame, case.frame.masses)]
     height = sum(lengths)
     span, level = 0.45 * max(height, 6.0) if len(lengths) < 5 else 0.3 * height, 0.0
     high = min(9.0, 1.4 + 0.5 * height, 4.4 * 1.13 * height / (2.15 * span))
@@ -65,8 +65,8 @@ def frame(case: Case) -> Figure:
 
 def tower(case: Case) -> Figure:
     """The beam frame to scale, its parts of one modulus in one colour."""
-    storeys, bays = case.integer("tower.storeys"), case.integer("tower.bays")
-    height, width = case.number("tower.height"), case.number("tower.width")
+    storeys, bays = case.tower.storeys, case.tower.bays
+    height, width = case.tower.height, case.tower.width
     high = float(np.clip(storeys * height / (bays * width) * 2.6, 2.4, 6.5))
     drawn, axes = figure(5.4, high)
     levels, lines = height * np.arange(storeys + 1), width * np.arange(bays + 1)
@@ -103,11 +103,9 @@ def ground(axes: Axes, left: float, right: float) -> None:
 
 def chain(case: Case) -> Figure:
     """Fig. 27: the frame as masses on springs, with its dampers if it has any."""
-    floors = len(case.fuzzies("frame.masses"))
-    damped = case.has("frame.damper_placement") and any(
-        d.support.upper > 0 for d in case.fuzzies("frame.dampers")
-    )
-    placement = case.text("frame.damper_placement") if damped else "none"
+    floors = len(case.frame.masses)
+    damped = case.frame.damper_placement is not None and case.frame.damped
+    placement = case.frame.damper_placement if damped else "none"
     wide = min(10.0, 2.2 + 1.5 * floors)
     drawn, axes = figure(wide, 2.15 * wide / (1.6 * floors + 0.5) + 0.1)
     foot = -0.9 if placement == "ground" else -0.5
@@ -154,7 +152,7 @@ def chain(case: Case) -> Figure:
             edgecolor=GREY,
             lw=0,
         )
-    if words := "; ".join(spread_damping(case)):
+    if words := "; ".join(spread_damping(case.frame)):
         axes.annotate(
             f"damping besides: {words}" if damped else f"damping: {words}",
             (0.1, foot),

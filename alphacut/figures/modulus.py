@@ -89,8 +89,8 @@ def fuzzy_modulus(dataset: xarray.Dataset, case: Case) -> Figure:
     alpha, ends = dataset["alpha"].values, dataset["E"].values / GPA
     shaded_cuts(axes, alpha, ends[:, 0], ends[:, 1])
     axes.plot([], [], color=INK, marker="o", ms=3.5, lw=1.2, label="computed here")
-    if case.has("frame.modulus"):
-        quoted = case.fuzzy("frame.modulus")
+    quoted = case.sections.frame and case.frame.modulus
+    if quoted is not None:
         left, right = zip(*(quoted.cut(level) for level in (0.0, 1.0)), strict=True)
         x = np.array([*left, *right[::-1]]) / GPA
         axes.plot(x, [0, 1, 1, 0], color=BLUE, lw=1.2, ls="--", label="quoted in the case")

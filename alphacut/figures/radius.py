@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alphacut.case.case import Case
-from alphacut.case.checks_material import SLOPES
 from alphacut.figures.style import BLUE, GREY, INK, PURPLE, figure
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -21,21 +20,18 @@ SIGMA = np.log(10) / 6  # eq. 11: the radius varies by a factor of ten over θ i
 
 def law(case: Case) -> TruncatedNormal:
     """Law of θ."""
-    lower, upper = case.numbers("radius.theta")
-    return TruncatedNormal(lower, upper)
+    return case.radius.law
 
 
 def maps(case: Case, alpha: float) -> list[HermiteMap]:
     """The radius maps at the corners of an α-cut."""
-    corners = itertools.product(
-        *(sorted(set(case.fuzzy(f"radius.{name}").cut(alpha))) for name in SLOPES)
-    )
+    corners = itertools.product(*(sorted(set(number.cut(alpha))) for number in case.radius.slopes))
     return [HermiteMap(a1, a2, a3, a4, law(case)) for a1, a2, a3, a4 in corners]
 
 
 def modal_map(case: Case) -> HermiteMap:
     """The radius map at the modal values."""
-    a1, a2, a3, a4 = (case.fuzzy(f"radius.{name}").modal for name in SLOPES)
+    a1, a2, a3, a4 = (number.modal for number in case.radius.slopes)
     return HermiteMap(a1, a2, a3, a4, law(case))
 
 

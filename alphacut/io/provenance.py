@@ -9,7 +9,7 @@ import platform
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, is_dataclass
+from dataclasses import fields, is_dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -89,7 +89,8 @@ def fingerprint(inputs: Mapping[str, Any], packages: Sequence[str]) -> str:
 
 def _canonical(value: object) -> object:
     if is_dataclass(value) and not isinstance(value, type):
-        return [type(value).__name__, asdict(value)]
+        values = {field.name: getattr(value, field.name) for field in fields(value)}
+        return [type(value).__name__, values]
     return str(value)
 
 

@@ -14,7 +14,14 @@ from alphacut.case.case import Case
 from alphacut.fuzzy import Extended, FuzzyNumber, General, Known, Reduced, Signed
 from alphacut.fuzzy.plans.plan import Plan
 from alphacut.io.provenance import source_digest, versions
-from alphacut.stages.cell import INPUTS, SHARED, CellChoice, cell_choice, key_of, parts
+from alphacut.stages.cell import (
+    SHARED,
+    CellChoice,
+    cell_choice,
+    cell_inputs,
+    modal_values,
+    parts,
+)
 from alphacut.stages.cell_models import cell_model
 from alphacut.stochastic.theta.interpolation import between_nodes
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -102,12 +109,12 @@ def plan_of(case: Case) -> Plan:
         "extended": Extended(outputs=("E",)),
         "signed": Signed(outputs=("E",)),
     }
-    return plans[case.text("modulus.plan")]
+    return plans[case.modulus.plan]
 
 
 def fuzzy_inputs(case: Case) -> dict[str, FuzzyNumber]:
     """The inputs of the cell that are fuzzy, by name, in SI."""
-    numbers = {name: case.fuzzy(key_of(name)) for name in INPUTS}
+    numbers = cell_inputs(case)
     found = {name: number for name, number in numbers.items() if number.support.width > 0}
     return found or {"inclusion_modulus": numbers["inclusion_modulus"]}
 
@@ -156,24 +163,24 @@ def campaign(
         store: File that keeps every sample.
     """
     inputs = fuzzy_inputs(case)
-    crisp = {name: case.fuzzy(key_of(name)).modal for name in INPUTS if name not in inputs}
-    support = case.fuzzy(key_of("inclusion_modulus")).cut(0.0)
+    crisp = {name: value for name, value in modal_values(case).items() if name not in inputs}
+    support = case.cell.inclusion_modulus.cut(0.0)
     choice = cell_choice(case, exclude=exclude, petsc=petsc)
     # no other method's samples depend on the range, and a wider one may take them as they are
     if choice.method in TABULATED:
         choice = replace(choice, moduli=(support.lower, support.upper))
     if choice.tolerance is not None and choice.named:
         choice = replace(choice, estimate=True)  # so that every sample can be held to it
-    if case.has("response.quantity") and choice.method == "auto" and "series" not in choice.exclude:
+    if case.sections.response and choice.method == "auto" and "series" not in choice.exclude:
         # a curve needs more nodes than its mean, and they cost little
         choice = replace(choice, tolerance=min(choice.tolerance or 1.0, OF_CURVES))
-    task = CellTask(choice, crisp, case.numbers("radius.theta"))
+    task = CellTask(choice, crisp, case.radius.theta)
     shared = tuple(name for name in inputs if name in SHARED) or ("inclusion_modulus",)
     return Campaign(
         task,
         inputs,
         plan_of(case),
-        case.numbers("modulus.alpha"),
+        case.modulus.alpha,
         shared,
         known(case, inputs),
         store,
@@ -188,15 +195,13 @@ def known(case: Case, inputs: Mapping[str, FuzzyNumber]) -> Known:
     falls with a4, since h1, h2, h3 >= 0 >= h4 (eq. 12). Nothing is stated for finite elements on
     the product space, whose error depends on the mesh that moves with the radius.
     """
-    matrix, inclusion = (
-        case.fuzzy("cell.matrix_modulus").support,
-        case.fuzzy("cell.inclusion_modulus").support,
-    )
-    poisson = {case.fuzzy(f"cell.{phase}_poisson").support for phase in ("matrix", "inclusion")}
+    cell = case.cell
+    matrix, inclusion = cell.matrix_modulus.support, cell.inclusion_modulus.support
+    poisson = {cell.matrix_poisson.support, cell.inclusion_poisson.support}
     stiffer, softer = inclusion.lower >= matrix.upper, inclusion.upper <= matrix.lower
     one = next(iter(poisson))
     if (
-        case.text("modulus.method") == "prism"
+        case.modulus.method == "prism"
         or len(poisson) > 1
         or one.width
         or one.lower < 0

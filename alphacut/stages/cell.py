@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from alphacut.case.case import Case
+from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.provenance import versions
 from alphacut.rve.anisotropy import directional_shear, directional_young, shear_ratio
 from alphacut.rve.cell import Phase
 from alphacut.rve.declared import error_of_means, error_of_stiffness
-from alphacut.stages.contract import resolution_named
 from alphacut.stochastic import HermiteMap, RadiusMap, TruncatedNormal
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -37,9 +37,16 @@ INPUTS = (
 SHARED = tuple(name for name in INPUTS if name != "inclusion_modulus")
 
 
-def key_of(name: str) -> str:
-    """Full case key of a cell input: ``radius.a2``, ``cell.matrix_modulus``."""
-    return f"radius.{name}" if name in ("a1", "a2", "a3", "a4") else f"cell.{name}"
+def cell_inputs(case: Case) -> dict[str, FuzzyNumber]:
+    """The values of `INPUTS`, crisp or fuzzy, in SI."""
+    slopes = dict(zip(INPUTS, case.radius.slopes, strict=False))
+    cell = case.cell
+    return slopes | {
+        "matrix_modulus": cell.matrix_modulus,
+        "matrix_poisson": cell.matrix_poisson,
+        "inclusion_modulus": cell.inclusion_modulus,
+        "inclusion_poisson": cell.inclusion_poisson,
+    }
 
 
 class CellModel(Protocol):
@@ -105,18 +112,17 @@ def cell_choice(
     Raises:
         BadInput: The case names its model, so that none can be excluded.
     """
-    method = case.text("modulus.method")
-    tolerance = case.number("modulus.tolerance") if case.asked("modulus.tolerance") else None
+    method, mesh = case.modulus.method, case.mesh
     if exclude and method != "auto":
         what = f"the method is {method}, and only method auto leaves a choice"
         raise BadInput(Problem("--exclude", what, ", ".join(exclude), "beside --method auto"))
     return CellChoice(
         method,
-        case.integer("mesh.layers"),
-        case.number("mesh.size"),
-        case.text("mesh.interface"),
-        tolerance,
-        resolution_named(case) or bool(petsc),
+        mesh.layers,
+        mesh.size,
+        mesh.interface,
+        case.modulus_tolerance,
+        case.names_mesh or bool(petsc),
         exclude,
         petsc or {},
     )
@@ -132,7 +138,7 @@ def parts(values: Mapping[str, float], theta: tuple[float, ...]) -> tuple[Hermit
 
 def modal_values(case: Case) -> dict[str, float]:
     """The modal value of every input of the cell."""
-    return {name: case.fuzzy(key_of(name)).modal for name in INPUTS}
+    return {name: number.modal for name, number in cell_inputs(case).items()}
 
 
 def solve(case: Case, model: CellModel) -> Homogenised:
@@ -142,7 +148,7 @@ def solve(case: Case, model: CellModel) -> Homogenised:
         BadInput: r(θ) leaves (0, 1).
     """
     try:
-        radius, matrix, inclusion = parts(modal_values(case), case.numbers("radius.theta"))
+        radius, matrix, inclusion = parts(modal_values(case), case.radius.theta)
     except ValueError as error:
         raise BadInput(Problem("radius", str(error), file=str(case.path))) from None
     return model.solve(radius, matrix, [inclusion])[0]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from alphacut.case.case import Case
+from alphacut.case.limits import asked_tolerance
 from alphacut.io.files import say
 from alphacut.io.problem import BadInput, Problem
 
@@ -43,14 +44,14 @@ def keep_modulus(case: Case, method: str, error: Mapping[str, float], *, best_ef
     Raises:
         ToleranceMissedError: It is larger.
     """
-    if not case.asked("modulus.tolerance"):
+    if (asked := case.modulus_tolerance) is None:
         return
     cure = "--method auto reaches it"
     if method in ("prism", "slices"):
         cure = f"without mesh.size and mesh.layers method {method} is refined; {cure}"
     keep(
         sum(error.values()),
-        case.number("modulus.tolerance"),
+        asked,
         of=f"the relative error of E by method {method}",
         cure=cure,
         best_effort=best_effort,
@@ -59,13 +60,7 @@ def keep_modulus(case: Case, method: str, error: Mapping[str, float], *, best_ef
 
 def contract(case: Case, reached: float | None) -> dict[str, float | None]:
     """The tolerance of E that is asked for and the error that is declared, for JSON."""
-    asked = case.number("modulus.tolerance") if case.asked("modulus.tolerance") else None
-    return {"asked": asked, "reached": reached}
-
-
-def resolution_named(case: Case) -> bool:
-    """Whether the case names the mesh that its model of the cell is to have."""
-    return any(case.asked(f"mesh.{name}") for name in ("layers", "size", "interface"))
+    return {"asked": case.modulus_tolerance, "reached": reached}
 
 
 def require_choice(case: Case, *, modulus: bool, envelope: bool) -> None:
@@ -79,11 +74,10 @@ def require_choice(case: Case, *, modulus: bool, envelope: bool) -> None:
     Raises:
         BadInput: No tolerance is asked for, or every method is steered by it.
     """
-    fixed = modulus and case.asked("modulus.tolerance") and resolution_named(case)
-    fixed = fixed and case.text("modulus.method") not in STEERED
-    keys = ("envelope.tolerance", "envelope.relative_tolerance", "pendulum.tolerance")
-    own = envelope and any(case.asked(key) for key in keys)
-    if not fixed and not (own and case.text("envelope.method") != "auto"):
+    fixed = modulus and case.modulus_tolerance is not None and case.names_mesh
+    fixed = fixed and case.modulus.method not in STEERED
+    own = envelope and asked_tolerance(case) is not None
+    if not fixed and not (own and case.envelope.method != "auto"):
         raise BadInput(
             Problem(
                 "--best-effort",

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from alphacut.case.case import Case
+from alphacut.case.limits import asked_tolerance
 from alphacut.io.files import say, whole_file
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
 from alphacut.io.provenance import attributes, versions
 from alphacut.stages.contract import keep
-from alphacut.stages.envelope_task import TOLERANCES, EnvelopeTask
+from alphacut.stages.envelope_task import EnvelopeTask
 from alphacut.stages.resolution_checks import guard_against
 from alphacut.stages.structure import Structure
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -126,16 +127,15 @@ def keep_tolerance(case: Case, dataset: xarray.Dataset, *, best_effort: bool) ->
     Raises:
         ToleranceMissedError: The error is larger.
     """
-    asked = [key for key in TOLERANCES if case.asked(key)]
-    if not asked or "reached" not in dataset.attrs:
+    asked = asked_tolerance(case)
+    if asked is None or "reached" not in dataset.attrs:
         return
     # there the file's tolerance is the gain worth a trajectory; an error over it is only told
-    gain = dataset.attrs["method"] == "graph-follower" and asked[0] not in case.changed
-    unit = {"envelope.tolerance": " m", "pendulum.tolerance": " N"}.get(asked[0], " of a peak")
+    gain = dataset.attrs["method"] == "graph-follower" and not asked.changed
     keep(
         float(dataset.attrs["reached"]),
-        case.number(asked[0]),
-        of=f"the error of the envelope by method {dataset.attrs['method']}, in{unit},",
+        asked.value,
+        of=f"the error of the envelope by method {dataset.attrs['method']}, in{asked.unit},",
         cure="--method auto reaches it",
         best_effort=best_effort or gain,
     )

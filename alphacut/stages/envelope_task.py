@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from alphacut.case.case import Case
-from alphacut.case.checks import displacements
+from alphacut.case.checks import forces_only
 
-TOLERANCES = ("envelope.relative_tolerance", "envelope.tolerance", "pendulum.tolerance")
 SHARE = 1e-3  # the tolerance where no output is a displacement: of their peaks
 
 
@@ -54,27 +53,18 @@ def task_of(
     case: Case, *, fuzzy: Sequence[str] | None = None, duration: float | None = None
 ) -> EnvelopeTask:
     """Envelope that [envelope] asks for, with other inputs or duration if given."""
-    tolerance = "pendulum.tolerance" if case.has("pendulum.mass") else "envelope.tolerance"
-    relative, method = case.has("envelope.relative_tolerance"), case.text("envelope.method")
-    forces = (
-        case.has("frame.masses") and bool(case.names("frame.outputs")) and not displacements(case)
-    )
-    certify = case.number("envelope.certify") if case.has("envelope.certify") else None
+    given, forces = case.envelope, forces_only(case)
+    share = SHARE if forces and given.relative_tolerance is None else given.relative_tolerance
+    length = case.pendulum.tolerance if case.sections.pendulum else given.tolerance
     return EnvelopeTask(
-        tuple(fuzzy) if fuzzy else case.names("envelope.fuzzy"),
-        duration or case.number("envelope.duration"),
-        case.number("envelope.step"),
-        case.numbers("envelope.alpha"),
-        "modal" if certify is not None and method == "auto" else method,
-        case.text("envelope.integrator") if case.has("envelope.integrator") else None,
-        case.integer("envelope.order"),
-        (
-            case.number("envelope.relative_tolerance")
-            if relative
-            else SHARE
-            if forces
-            else case.number(tolerance)
-        ),
-        certify=certify,
-        relative=relative or forces,
+        tuple(fuzzy) if fuzzy else given.fuzzy,
+        duration or given.duration,
+        given.step,
+        given.alpha,
+        "modal" if given.certify is not None and given.method == "auto" else given.method,
+        given.integrator,
+        given.order,
+        length if share is None else share,
+        certify=given.certify,
+        relative=share is not None,
     )

@@ -134,7 +134,7 @@ def require_random(case: Case, wanted: Structure) -> None:
     Raises:
         BadInput: One is crisp, or unknown.
     """
-    for name in case.names("exceedance.random"):
+    for name in case.exceedance.random:
         try:
             wanted.members(name)
         except BadInput as error:
@@ -153,10 +153,10 @@ def split_inputs(
     case: Case, wanted: Structure
 ) -> tuple[dict[str, FuzzyNumber], dict[str, Sampler]]:
     """Inputs that stay fuzzy and those that are random; a crisp one stands in for none."""
-    random = wanted.inputs(case.names("exceedance.random"))
+    random = wanted.inputs(case.exceedance.random)
     fuzzy = {
         name: number
-        for name, number in wanted.inputs(case.names("envelope.fuzzy")).items()
+        for name, number in wanted.inputs(case.envelope.fuzzy).items()
         if name not in random
     }
     crisp = {name: number for name, number in wanted.numbers.items() if number.support.width == 0}
@@ -181,7 +181,8 @@ def exceedance(case: Case, wanted: Structure, progress: Tick | None = None) -> x
     from alphacut.frame import exceedance as probabilities
     from alphacut.frame.outputs import output_unit
 
-    output = case.text("exceedance.output")
+    limited, over = case.exceedance, case.envelope
+    output = limited.output
     model = wanted.model if wanted.frame is None else replace(wanted.frame, outputs=(output,))
     if output not in model.outputs:
         raise case.refuse(
@@ -193,19 +194,19 @@ def exceedance(case: Case, wanted: Structure, progress: Tick | None = None) -> x
         fuzzy,
         random,
         limit=limit_of(case),
-        duration=case.number("envelope.duration"),
-        step=case.number("envelope.step"),
+        duration=over.duration,
+        step=over.step,
         output=model.outputs.index(output),
-        alpha=case.numbers("envelope.alpha"),
-        samples=case.integer("exceedance.samples"),
-        rng=np.random.default_rng(case.integer("exceedance.seed")),
+        alpha=over.alpha,
+        samples=limited.samples,
+        rng=np.random.default_rng(limited.seed),
         progress=progress,
     )
     about = {"long_name": f"probability that |{output}| exceeds the limit", "units": "1"}
     ends = (("alpha", "bound"), np.column_stack([found.lower, found.upper]), about)
     drawn = {
-        "samples": case.integer("exceedance.samples"),
-        "step": case.number("envelope.step"),
+        "samples": limited.samples,
+        "step": over.step,
         "trajectories": found.trajectories,
     }
     facts = {

@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
-from typing import cast
 
 from alphacut.case.case import Case
 from alphacut.fuzzy import FuzzyNumber, from_data
-from alphacut.fuzzy.knowledge.named_law import Law
 from alphacut.io.output_paths import hint
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.units import factor
@@ -18,18 +16,22 @@ HEADER = "E [GPa]"
 NAMES = r"E|E_?c?m?|E_?mod(ul(us)?)?|(young'?s?[\s_-]*)?modul(us|i)|elastic[\s_-]modulus"
 
 
-def measured_modulus(case: Case, key: str = "modulus.measured") -> FuzzyNumber:
+def measured_modulus(case: Case, file: str) -> FuzzyNumber:
     """The fuzzy modulus in Pa of measured values, with the claim that the case names.
+
+    Args:
+        case: With the section modulus.
+        file: CSV file, from the case's folder.
 
     Raises:
         BadInput: The file is missing, its header has no unit, a row is no positive number, or the
             values do not decide what is claimed.
     """
-    values = measured_values(case.path.parent / case.text(key), key)
-    bounds = case.fuzzy("modulus.bounds").support if case.has("modulus.bounds") else None
-    law = cast(Law, case.text("modulus.law")) if case.has("modulus.law") else None
+    key, wanted = "modulus.measured", case.modulus
+    values = measured_values(case.beside(file), key)
+    bounds = None if wanted.bounds is None else wanted.bounds.support
     try:
-        number = from_data(values, case.text("modulus.claim"), bounds=bounds, law=law)
+        number = from_data(values, wanted.claim, bounds=bounds, law=wanted.law)
         number.cut(0.0)
     except ValueError as error:
         raise case.refuse(key, str(error), 'bounds such as bounds = "[10, 60] GPa"') from None

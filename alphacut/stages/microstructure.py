@@ -6,13 +6,14 @@ import re
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from alphacut.case.case import Case
-from alphacut.case.checks import beside
-from alphacut.case.schema import RADIUS
-from alphacut.case.values import read
+from alphacut.case.load import section_from
+from alphacut.case.sections.material import Radius
+from alphacut.case.sections.particles import Packing as PackingSection
 from alphacut.io.files import as_json, say, whole_file, write_text
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
     from alphacut.stochastic.particles.radius_law import RadiusLaw
     from alphacut.stochastic.sections import Measured, Simulated
 
-SOURCES = ("packing", "circles", "image")
-
 
 def source(case: Case) -> Simulated | Measured:
     """Source of the discs."""
@@ -32,60 +31,51 @@ def source(case: Case) -> Simulated | Measured:
     from alphacut.stochastic.particles.packing import Packing
     from alphacut.stochastic.sections import Measured, Simulated
 
-    key = "microstructure"
-    if case.has(f"{key}.packing.discs"):
-        key += ".packing"
-        fraction, gap, method = (
-            case.number(f"{key}.area_fraction"),
-            case.number(f"{key}.gap"),
-            case.text(f"{key}.method"),
-        )
+    given = case.microstructure
+    if wanted := given.packing:
         packing = Packing(
-            case.integer(f"{key}.discs"), fraction, radii_of(case, key), gap=gap, method=method
+            wanted.discs,
+            wanted.area_fraction,
+            radii_of(case, wanted),
+            gap=wanted.gap,
+            method=wanted.method,
         )
-        return Simulated(packing, case.integer(f"{key}.packings"))
-    if case.has(f"{key}.circles.file"):
-        key += ".circles"
-        width, height = case.numbers(f"{key}.size")
-        x, y = case.numbers(f"{key}.origin")
-        words = {
-            "periodic": case.values[f"{key}.periodic"] is True,
-            "drop": case.values[f"{key}.drop"] is True,
-        }
-        path = beside(case, case.text(f"{key}.file"))
+        return Simulated(packing, wanted.packings)
+    if circles := given.circles:
+        width, height = circles.size
+        x, y = circles.origin
         return Measured(
             CircleFile(
-                path,
+                case.beside(circles.file),
                 (width, height),
                 (x, y),
-                unit=case.text(f"{key}.unit"),
-                overlap=case.number(f"{key}.overlap"),
-                **words,
+                unit=circles.unit,
+                overlap=circles.overlap,
+                periodic=circles.periodic,
+                drop=circles.drop,
             )
         )
-    key += ".image"
+    photograph = given.image
+    assert photograph is not None  # one of the three is there, or the case is refused
     return Measured(
-        SectionImage(
-            beside(case, case.text(f"{key}.file")),
-            case.number(f"{key}.pixel"),
-            case.text(f"{key}.particles"),
-        )
+        SectionImage(case.beside(photograph.file), photograph.pixel, photograph.particles)
     )
 
 
-def radii_of(case: Case, key: str) -> RadiusLaw:
+def radii_of(case: Case, packing: PackingSection) -> RadiusLaw:
     """The law of the radii of a packing: log-normal between two ends, or that of a list."""
     from alphacut.stochastic.particles.log_normal import LogNormalRadii
     from alphacut.stochastic.particles.measured import MeasuredRadii
 
-    if not case.has(f"{key}.file"):
-        return LogNormalRadii(
-            case.number(f"{key}.smallest_radius"), case.number(f"{key}.largest_radius")
-        )
+    if packing.file is None:
+        ends = packing.smallest_radius, packing.largest_radius
+        assert ends[0] is not None  # without a file both are there, or the case is refused
+        assert ends[1] is not None
+        return LogNormalRadii(*ends)
     try:
-        return MeasuredRadii.read(beside(case, case.text(f"{key}.file")))
+        return MeasuredRadii.read(case.beside(packing.file))
     except ValueError as error:
-        raise case.refuse(f"{key}.file", str(error)) from None
+        raise case.refuse("microstructure.packing.file", str(error)) from None
 
 
 def study_of(case: Case) -> Study:
@@ -96,17 +86,18 @@ def study_of(case: Case) -> Study:
     """
     from alphacut.stochastic.microstructure import Study
 
-    limits = case.numbers("microstructure.limits") if case.has("microstructure.limits") else None
+    given = case.microstructure
+    limits = given.limits
     try:
         return Study(
             source(case),
             (limits[0], limits[1]) if limits else None,
-            case.number("microstructure.share"),
-            case.integer("microstructure.seed"),
-            case.number("microstructure.confidence"),
-            case.integer("microstructure.bootstrap"),
-            band=case.number("microstructure.band") if case.has("microstructure.band") else None,
-            sampling=case.values["microstructure.sampling"] is True,
+            given.share,
+            given.seed,
+            given.confidence,
+            given.bootstrap,
+            band=given.band,
+            sampling=given.sampling,
         )
     except ValueError as error:
         raise BadInput(Problem("microstructure", str(error), file=str(case.path))) from None
@@ -121,7 +112,7 @@ def require_readable(case: Case) -> None:
     from alphacut.stochastic.sections import Measured
 
     given = source(case)
-    if not (isinstance(given, Measured) and case.has("microstructure.circles.file")):
+    if not (isinstance(given, Measured) and case.microstructure.circles):
         return
     try:
         given.file.read()
@@ -196,10 +187,8 @@ def crisp_slopes(fragment: str) -> Iterator[str]:
 
 def with_radius(case: Case, fragment: str) -> Case:
     """The case with the section [radius] of a fragment."""
-    table = tomllib.loads(fragment)["radius"]
-    return case.with_values(
-        radius={name: read(value, RADIUS.keys[name]) for name, value in table.items()}
-    )
+    radius = section_from(Radius, tomllib.loads(fragment)["radius"])
+    return replace(case, sections=replace(case.sections, radius=radius))
 
 
 def read_fragment(path: Path) -> str:

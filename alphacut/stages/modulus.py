@@ -302,10 +302,9 @@ def read_number(path: Path | str, option: str = "--modulus") -> FuzzyNumber:
 
 def stand_in(case: Case) -> FuzzyNumber | None:
     """Modulus in Pa that the case gives; None if it gives none."""
-    if case.has("modulus.value"):
-        return case.fuzzy("modulus.value")
-    if case.has("modulus.file"):
-        return read_number(case.path.parent / case.text("modulus.file"), "modulus.file")
-    if case.has("modulus.measured"):
-        return measured_modulus(case)
-    return None
+    given = case.sections.modulus
+    if given is None or given.value is not None:
+        return given and given.value
+    if given.file is not None:
+        return read_number(case.beside(given.file), "modulus.file")
+    return None if given.measured is None else measured_modulus(case, given.measured)

@@ -8,8 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from alphacut.case.case import Case
-from alphacut.case.checks import FILES
-from alphacut.case.names import OTHERS
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import say, whole_file
 from alphacut.io.netcdf import require_known
@@ -27,9 +25,6 @@ from alphacut.stages.structure import Structure, structure
 
 if TYPE_CHECKING:
     import xarray
-
-
-MODULUS_SECTIONS = ("radius", "cell", "mesh", "modulus")
 
 
 @dataclass(frozen=True)
@@ -99,11 +94,9 @@ class Chain:
             envelopes = {
                 study.name: self.envelope(study, handed, wanted) for study in studies(self.case)
             }
-        stress = (
-            self.response(cell) if cell is not None and self.case.has("response.quantity") else None
-        )
+        stress = self.response(cell) if cell is not None and self.case.sections.response else None
         limit = None
-        if wanted is not None and self.case.has("exceedance.output"):
+        if wanted is not None and self.case.sections.exceedance:
             limit = self.exceedance(handed, wanted)
         return Results(
             self.case, self.folder, cell, envelopes, handed, stress, limit, wanted, picture
@@ -111,17 +104,9 @@ class Chain:
 
     def with_particles(self) -> Case:
         """Case with the radius map of its particles; the stage's files are stored."""
-        inputs = {
-            key: value
-            for key, value in self.case.values.items()
-            if key.startswith("microstructure")
-        }
-        files = [
-            self.case.digest(key)
-            for key in FILES
-            if key.startswith("microstructure") and self.case.has(key)
-        ]
-        key = fingerprint({"case": inputs, "files": files}, ("stochastic",))
+        particles = self.case.microstructure
+        inputs = {"case": particles, "files": self.case.digests(particles)}
+        key = fingerprint(inputs, ("stochastic",))
 
         def compute(path: Path) -> None:
             with progress("Microstructure", quiet=self.quiet) as tick:
@@ -135,11 +120,8 @@ class Chain:
 
     def modulus(self) -> xarray.Dataset:
         """The fuzzy modulus, in modulus.nc."""
-        inputs = {
-            key: value
-            for key, value in self.case.values.items()
-            if key.partition(".")[0] in MODULUS_SECTIONS
-        }
+        case = self.case
+        inputs = [case.radius, case.cell, case.mesh, case.modulus]
         key = fingerprint(
             {"case": inputs, "petsc": dict(self.petsc)}, ("stochastic", "rve", "fuzzy")
         )
@@ -161,18 +143,10 @@ class Chain:
 
     def image(self) -> xarray.Dataset:
         """The proved bounds of the image's modulus, in image.nc."""
-        inputs = {
-            key: value
-            for key, value in self.case.values.items()
-            if key.startswith("cell.") or key == "modulus.alpha"
-        }
-        files = [
-            self.case.digest(key) for key in FILES if key.startswith("cell.") and self.case.has(key)
-        ]
-        key = fingerprint(
-            {"case": inputs, "files": files, "petsc": dict(self.petsc)},
-            ("stochastic", "rve", "fuzzy"),
-        )
+        picture = self.case.picture
+        inputs = {"case": picture, "alpha": self.case.modulus.alpha, "petsc": dict(self.petsc)}
+        files = self.case.digests(picture)
+        key = fingerprint({**inputs, "files": files}, ("stochastic", "rve", "fuzzy"))
 
         def compute(path: Path) -> None:
             with progress("Image", quiet=self.quiet) as tick:
@@ -184,11 +158,8 @@ class Chain:
 
     def response(self, cell: xarray.Dataset) -> xarray.Dataset:
         """The random and fuzzy stress of the cell, in response.nc."""
-        wanted = {
-            key: value for key, value in self.case.values.items() if key.startswith("response.")
-        }
         key = fingerprint(
-            {"modulus": cell.attrs["fingerprint"], "wanted": wanted},
+            {"modulus": cell.attrs["fingerprint"], "wanted": self.case.response},
             ("stochastic", "fuzzy", "alphacut"),
         )
 
@@ -224,12 +195,7 @@ class Chain:
 
     def exceedance(self, handed: FuzzyNumber | None, wanted: Structure) -> xarray.Dataset:
         """The fuzzy probability of exceeding the case's limit, in exceedance.nc."""
-        asked = {
-            key: value
-            for key, value in self.case.values.items()
-            if key.partition(".")[0] in ("exceedance", "envelope")
-        }
-        key = self.vibration({"wanted": asked}, handed)
+        key = self.vibration({"wanted": [self.case.exceedance, self.case.envelope]}, handed)
 
         def compute(path: Path) -> None:
             with progress("Exceedance", quiet=self.quiet) as tick:
@@ -240,16 +206,9 @@ class Chain:
 
     def vibration(self, wanted: Mapping[str, Any], handed: FuzzyNumber | None) -> str:
         """Fingerprint of a result for the structure, its record and the modulus."""
-        inputs = {
-            key: value
-            for key, value in self.case.values.items()
-            if key.partition(".")[0] in ("frame", *OTHERS)
-        }
-        record = [
-            self.case.digest(key)
-            for key in FILES
-            if key.endswith("accelerogram") and self.case.has(key)
-        ]
+        given = self.case.sections
+        inputs = [given.frame, given.pendulum, given.tower]
+        record = self.case.digests(*inputs)
         return fingerprint(
             {"case": inputs, "record": record, "modulus": handed, **wanted}, ("fuzzy", "frame")
         )
@@ -322,21 +281,13 @@ def fingerprint_of(path: Path) -> str:
 
 def studies(case: Case) -> tuple[Study, ...]:
     """The studies of a case: its [[study]] tables, or one made of [envelope]."""
-    count: Any = case.values.get("study", 0)
-    if not count:
-        return (Study("all", task_of(case)),)
-    found = []
-    for index in range(count):
-        key = f"study[{index}]"
-        task = task_of(
-            case, fuzzy=case.names(f"{key}.fuzzy"), duration=case.number(f"{key}.duration")
+    given = case.sections.study
+    return tuple(
+        Study(
+            study.name,
+            task_of(case, fuzzy=study.fuzzy, duration=study.duration),
+            study.figures,
+            study.output,
         )
-        found.append(
-            Study(
-                case.text(f"{key}.name"),
-                task,
-                case.names(f"{key}.figures"),
-                case.text(f"{key}.output"),
-            )
-        )
-    return tuple(found)
+        for study in given
+    ) or (Study("all", task_of(case)),)

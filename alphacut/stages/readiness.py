@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from alphacut.case.case import Case
-from alphacut.case.checks import replaced, stand_ins
-from alphacut.case.names import fuzzy_keys
+from alphacut.case.names import named_inputs
 from alphacut.fuzzy import FuzzyNumber, Triangular
 from alphacut.io.problem import BadInput, Problem
 from alphacut.stages import modulus
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
 
 PERIODS = (0.02, 30.0)  # s, from a stiff machine frame to the slenderest towers
 STRONGEST = 50.0  # m/s², more than any ground acceleration recorded
-RECORDS = ("frame.accelerogram", "tower.accelerogram")
 
 
 @dataclass(frozen=True)
@@ -60,13 +58,11 @@ def ready(case: Case) -> Readiness:
         require_readable(case)
     if "image" in case.stages:
         study_of(case)
-    stand_in = modulus.stand_in(case) if "modulus" in case.stages or replaced(case) else None
+    stand_in = modulus.stand_in(case) if "modulus" in case.stages or case.stand_ins else None
     if "envelope" not in case.stages:
-        if "modulus" in case.stages and replaced(case):
-            what = (
-                f"there is nothing to compute: {', '.join(stand_ins(case))} stands in for stage"
-                " modulus"
-            )
+        if "modulus" in case.stages and case.stand_ins:
+            given = ", ".join(case.stand_ins)
+            what = f"there is nothing to compute: {given} stands in for stage modulus"
             raise BadInput(
                 Problem(
                     "stages",
@@ -99,8 +95,8 @@ def first_period(wanted: Structure) -> float | None:
 
 def unproved(case: Case) -> Iterator[str]:
     """A remark where a certificate is wanted that cannot become a guarantee."""
-    ratio = any(case.has(f"{section}.damping_ratio") for section in ("frame", "tower"))
-    if case.has("envelope.certify") and ratio:
+    given = case.sections.frame or case.sections.tower
+    if case.envelope.certify is not None and given and given.damping_ratio is not None:
         yield (
             "envelope.certify: with a damping ratio the error of the modal model is verified by"
             " sampling, not proved; dampers and Rayleigh's factors allow a guarantee"
@@ -114,70 +110,63 @@ def unlikely(case: Case, ground: Accelerogram | None, period: float | None) -> I
             f"a first natural period of {period:.3g} s is unusual for a structure; check the units"
             " of masses, lengths and moduli"
         )
-    for key in RECORDS:
-        if case.has(key) and ground is not None:
-            peak = float(abs(ground.acceleration).max())
-            if peak > STRONGEST:
-                yield (
-                    f"{key}: a peak of {peak:.3g} m/s² is above any earthquake recorded; check the"
-                    " unit in its header"
-                )
+    peak = 0.0 if ground is None else float(abs(ground.acceleration).max())
+    if peak > STRONGEST:
+        yield (
+            f"{record_key(case)}: a peak of {peak:.3g} m/s² is above any earthquake recorded; check"
+            " the unit in its header"
+        )
+
+
+def record_key(case: Case) -> str:
+    """Key of the record of the ground's motion."""
+    return f"{'tower' if case.sections.tower else 'frame'}.accelerogram"
 
 
 def lacking(case: Case) -> Iterator[Problem]:
     """A frame needs a modulus from somewhere."""
-    if (
-        case.has("frame.masses")
-        and not case.has("frame.modulus")
-        and not {"modulus", "image"} & set(case.stages)
-        and not replaced(case)
-    ):
+    given = case.sections.frame
+    computed = {"modulus", "image"} & set(case.stages)
+    if given and given.modulus is None and not computed and not case.stand_ins:
         what = (
             "missing; stage envelope needs a modulus: give frame.modulus, modulus.value or"
             ' modulus.measured, or compute one with stages = ["modulus", "envelope"]'
         )
-        yield Problem("frame.modulus", what, file=str(case.path), line=case.lines.get("frame", 0))
+        yield case.located(Problem("frame.modulus", what))
 
 
 def expected(case: Case) -> FuzzyNumber | None:
     """Modulus in place of one yet to be computed, between both phases; or None."""
-    computed = {"modulus", "image"} & set(case.stages)
-    if not computed or case.has("frame.modulus") or not case.has("frame.masses"):
+    computed, given = {"modulus", "image"} & set(case.stages), case.sections.frame
+    if not computed or given is None or given.modulus is not None:
         return None
     if "image" in computed:
         low, middle, high = expected_modulus(case)
         return Triangular(low, middle, max(high, low * (1 + 1e-9)))
-    matrix, inclusion = case.fuzzy("cell.matrix_modulus"), case.fuzzy("cell.inclusion_modulus")
+    matrix, inclusion = case.cell.matrix_modulus, case.cell.inclusion_modulus
     ends = sorted([*matrix.support, *inclusion.support])
     return Triangular(ends[0], matrix.modal, max(ends[-1], ends[0] * (1 + 1e-9)))
 
 
 def crisp_names(case: Case, wanted: Structure) -> Iterator[Problem]:
     """Names of fuzzy inputs that are crisp in the case, by the key that names them."""
-    for key in fuzzy_keys(case):
-        for name in case.names(key):
+    for key, names in named_inputs(case):
+        for name in names:
             try:
                 wanted.members(name)
             except BadInput as error:
                 (problem,) = error.problems
-                yield Problem(
-                    key,
-                    problem.what,
-                    name,
-                    problem.allowed,
-                    file=str(case.path),
-                    line=case.lines.get(key, 0),
-                )
+                yield case.located(Problem(key, problem.what, name, problem.allowed))
 
 
 def outlasted(case: Case, record: Accelerogram | None) -> Iterator[str]:
     """A remark on durations that are longer than the record."""
-    for key in RECORDS:
-        if case.has(key) and record is not None:
-            end = (len(record.acceleration) - 1) * record.step
-            longest = max(study.task.duration for study in studies(case))
-            if longest > end + 0.5 * record.step:
-                yield (
-                    f"{key}: the record ends at {end:g} s and the simulation at {longest:g} s;"
-                    " afterwards the ground is at rest"
-                )
+    if record is None:
+        return
+    end = (len(record.acceleration) - 1) * record.step
+    longest = max(study.task.duration for study in studies(case))
+    if longest > end + 0.5 * record.step:
+        yield (
+            f"{record_key(case)}: the record ends at {end:g} s and the simulation at {longest:g} s;"
+            " afterwards the ground is at rest"
+        )

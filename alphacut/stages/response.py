@@ -16,7 +16,6 @@ from alphacut.fuzzy import FuzzyResult, RandomResponse
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.stages.campaign import fuzzy_inputs
 from alphacut.stages.cell import GPA
-from alphacut.stochastic import TruncatedNormal
 
 if TYPE_CHECKING:
     import xarray
@@ -38,10 +37,7 @@ def random_response(case: Case, modulus: xarray.Dataset) -> RandomResponse:
     from alphacut.fuzzy.samples.design import Design
     from alphacut.fuzzy.samples.model import Values
 
-    curves, theta = (
-        modulus[CURVES[case.text("response.quantity")][0]].values,
-        modulus["theta"].values,
-    )
+    curves, theta = modulus[CURVES[case.response.quantity][0]].values, modulus["theta"].values
     inputs = fuzzy_inputs(case)
     domain = Domain(
         {str(name): inputs[str(name)] for name in modulus["parameter"].values},
@@ -52,8 +48,9 @@ def random_response(case: Case, modulus: xarray.Dataset) -> RandomResponse:
     samples = Design.from_samples(domain, modulus["point"].values).bounds(
         values, plan="stored samples"
     )
-    law = TruncatedNormal(*case.numbers("radius.theta"))
-    return RandomResponse.from_curves(samples, "curve", theta="theta", quantile=law.quantile)
+    return RandomResponse.from_curves(
+        samples, "curve", theta="theta", quantile=case.radius.law.quantile
+    )
 
 
 def ends(result: FuzzyResult) -> np.ndarray[Any, Any]:
@@ -65,9 +62,10 @@ def dataset(case: Case, modulus: xarray.Dataset) -> xarray.Dataset:
     """p-box, fuzzy mean and quantiles, and exceedance of a limit, by level, in SI."""
     import xarray
 
-    response, about = random_response(case, modulus), CURVES[case.text("response.quantity")][1]
+    wanted = case.response
+    response, about = random_response(case, modulus), CURVES[wanted.quantity][1]
     stress = np.linspace(response.ordered.min(), response.ordered.max(), GRID)
-    probabilities = case.numbers("response.quantiles")
+    probabilities = wanted.quantiles
     quantiles, pascal = response.quantile(probabilities), {"units": "Pa"}
     places = np.stack([quantiles.lower_at, quantiles.upper_at], axis=1)
     cut = ("alpha", "bound")
@@ -89,15 +87,15 @@ def dataset(case: Case, modulus: xarray.Dataset) -> xarray.Dataset:
             {"long_name": "inputs that reach it, in SI"},
         ),
     }
-    if case.has("response.limit"):
+    if wanted.limit is not None:
         words = {
             "units": "1",
             "long_name": f"probability that {about} exceeds the limit",
-            "limit": case.number("response.limit"),
+            "limit": wanted.limit,
         }
         found["exceedance"] = (
             cut,
-            ends(response.exceedance(case.number("response.limit")))[..., 0],
+            ends(response.exceedance(wanted.limit))[..., 0],
             words,
         )
     axes = {
@@ -108,7 +106,7 @@ def dataset(case: Case, modulus: xarray.Dataset) -> xarray.Dataset:
     }
     coordinates: dict[str, Any] = {**axes, "parameter": list(quantiles.inputs)}
     facts = {
-        "quantity": case.text("response.quantity"),
+        "quantity": wanted.quantity,
         "nature": str(quantiles.nature),
         "note": quantiles.notes[0],
     }
@@ -121,7 +119,7 @@ def dataset(case: Case, modulus: xarray.Dataset) -> xarray.Dataset:
 
 def deviation(case: Case, modulus: xarray.Dataset, response: RandomResponse) -> float:
     """Largest relative difference of the stored curve's mean and the model's own."""
-    own = modulus[f"{case.text('response.quantity')}_sample"].values
+    own = modulus[f"{case.response.quantity}_sample"].values
     return float(np.abs(response.ordered.mean(axis=1) / own - 1).max())
 
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING
 
 from alphacut.case.case import Case
-from alphacut.case.checks import beside
-from alphacut.case.names import OTHERS
+from alphacut.case.sections.structures import Frame, Pendulum, Tower
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.problem import BadInput, Problem
 from alphacut.stages.accelerogram import accelerogram
@@ -19,18 +18,6 @@ if TYPE_CHECKING:
     from alphacut.frame.reduced.reduction import ReducedStructure
     from alphacut.frame.structures.lagrangian import LagrangianSystem
     from alphacut.frame.structures.linear import LinearSystem
-
-LISTS = {"m": "masses", "l": "lengths", "d": "dampers"}
-RAYLEIGH = ("rayleigh_mass", "rayleigh_stiffness")
-STARTS = {"q": "displacements", "v": "velocities"}
-PENDULUM = {
-    "m": "mass",
-    "l": "length",
-    "d": "damping",
-    "g": "gravity",
-    "phi_0": "angle",
-    "omega_0": "angular_velocity",
-}
 
 
 @dataclass(frozen=True)
@@ -109,13 +96,12 @@ class Structure:
         """Trajectories as a function of parameters, by the midpoint rule by default."""
         from alphacut.frame import INTEGRATORS, LinearFlow
         from alphacut.frame.dynamics.nonlinear import LagrangianFlow
+        from alphacut.frame.structures.lagrangian import LagrangianSystem
 
-        if self.linear is not None:
-            return LinearFlow(
-                self.linear, tuple(names), duration, step, INTEGRATORS[integrator or "midpoint"]
-            )
-        system = cast("LagrangianSystem", self.model)
-        return LagrangianFlow(system, tuple(names), duration, step, integrator or "midpoint")
+        scheme, model = integrator or "midpoint", self.model
+        if isinstance(model, LagrangianSystem):
+            return LagrangianFlow(model, tuple(names), duration, step, scheme)
+        return LinearFlow(model, tuple(names), duration, step, INTEGRATORS[scheme])
 
 
 def structure(case: Case, handed: FuzzyNumber | None) -> Structure:
@@ -125,32 +111,33 @@ def structure(case: Case, handed: FuzzyNumber | None) -> Structure:
         BadInput: Its values do not make a structure.
     """
     try:
-        if case.has("pendulum.mass"):
-            return pendulum(case)
-        return (
-            tower(case)
-            if case.has("tower.storeys")
-            else storey_frame(case, modulus_of(case, handed))
-        )
+        if case.sections.pendulum:
+            return pendulum(case.pendulum)
+        return tower(case) if case.sections.tower else storey_frame(case, modulus_of(case, handed))
     except ValueError as error:
         raise BadInput(Problem("frame", str(error), file=str(case.path))) from None
 
 
-def pendulum(case: Case) -> Structure:
+def pendulum(given: Pendulum) -> Structure:
     """A damped pendulum."""
     from alphacut.frame.structures.lagrangian import pendulum as make
 
-    numbers = {name: case.fuzzy(f"pendulum.{key}") for name, key in PENDULUM.items()}
-    names = {
-        "m": "mass",
-        "l": "length",
-        "d": "damping",
-        "g": "gravity",
-        "phi_0": "phi0",
-        "omega_0": "omega0",
+    model = make(
+        mass=given.mass.modal,
+        length=given.length.modal,
+        damping=given.damping.modal,
+        gravity=given.gravity.modal,
+        phi0=given.angle.modal,
+        omega0=given.angular_velocity.modal,
+    )
+    numbers = {
+        "m": given.mass,
+        "l": given.length,
+        "d": given.damping,
+        "g": given.gravity,
+        "phi_0": given.angle,
+        "omega_0": given.angular_velocity,
     }
-    modal: dict[str, Any] = {names[name]: number.modal for name, number in numbers.items()}
-    model = make(**modal)
     return Structure(replace(model, observed={"force": model.observed["force"]}), numbers)
 
 
@@ -158,21 +145,17 @@ def tower(case: Case) -> Structure:
     """Plane beam frame, reduced for the whole supports of its fuzzy inputs."""
     from alphacut.frame.reduced.beam import BeamFrame
 
-    numbers = {name: case.fuzzy(f"tower.{name}") for name in OTHERS["tower"] if name != "zeta"}
-    if case.has("tower.damping_ratio"):
-        numbers["zeta"] = case.fuzzy("tower.damping_ratio")
-    sizes: dict[str, Any] = {
-        name: case.number(f"tower.{name}") for name in ("height", "width", "density")
-    }
-    column, beam = (
-        (case.number(f"tower.{part}_area"), case.number(f"tower.{part}_moment"))
-        for part in ("column", "beam")
-    )
-    ground = accelerogram(beside(case, case.text("tower.accelerogram")), "tower.accelerogram")
-    ratio = numbers["zeta"].modal if "zeta" in numbers else None
-    counts = (case.integer("tower.storeys"), case.integer("tower.bays"))
+    given, numbers = case.tower, tower_parameters(case.tower)
     frame = BeamFrame(
-        *counts, column=column, beam=beam, ground=ground, damping_ratio=ratio, **sizes
+        given.storeys,
+        given.bays,
+        column=(given.column_area, given.column_moment),
+        beam=(given.beam_area, given.beam_moment),
+        ground=accelerogram(case.beside(given.accelerogram), "tower.accelerogram"),
+        damping_ratio=None if given.damping_ratio is None else given.damping_ratio.modal,
+        height=given.height,
+        width=given.width,
+        density=given.density,
     )
     full = replace(
         frame.structure(), parameters={name: number.modal for name, number in numbers.items()}
@@ -185,83 +168,86 @@ def tower(case: Case) -> Structure:
     return Structure(full.reduced(bounds), numbers)
 
 
+def tower_parameters(given: Tower) -> dict[str, FuzzyNumber]:
+    """Every parameter of the tower, in SI."""
+    found = {
+        "E_columns": given.E_columns,
+        "E_columns_top": given.E_columns_top,
+        "E_beams": given.E_beams,
+        "mass": given.mass,
+        "rayleigh_mass": given.rayleigh_mass,
+        "rayleigh_stiffness": given.rayleigh_stiffness,
+    }
+    return found if given.damping_ratio is None else found | {"zeta": given.damping_ratio}
+
+
 def storey_frame(case: Case, modulus: FuzzyNumber) -> Structure:
     """A storey frame."""
     from alphacut.frame import StoreyFrame
 
-    numbers = parameters(case, modulus)
-    modal = {
-        name: tuple(x.modal for x in per_floor(case, f"frame.{name}"))
-        for name in (*LISTS.values(), *STARTS.values())
-    }
+    given = case.frame
+
+    def modal(values: tuple[FuzzyNumber, ...]) -> tuple[float, ...]:
+        return tuple(x.modal for x in per_floor(given, values))
+
     model = StoreyFrame(
-        modal["masses"],
-        modal["lengths"],
+        modal(given.masses),
+        modal(given.lengths),
         modulus.modal,
-        case.fuzzies("frame.second_moment")[0].modal,
-        dampers=modal["dampers"],
-        damper_placement=cast(
-            Literal["ground", "storey"],
-            case.text("frame.damper_placement") if case.has("frame.damper_placement") else "ground",
-        ),
-        q0=modal["displacements"],
-        v0=modal["velocities"],
-        outputs=case.names("frame.outputs"),
-        rayleigh=(
-            case.fuzzy("frame.rayleigh_mass").modal,
-            case.fuzzy("frame.rayleigh_stiffness").modal,
-        ),
+        given.second_moment[0].modal,
+        dampers=modal(given.dampers),
+        damper_placement=given.damper_placement or "ground",
+        q0=modal(given.displacements),
+        v0=modal(given.velocities),
+        outputs=given.outputs,
+        rayleigh=(given.rayleigh_mass.modal, given.rayleigh_stiffness.modal),
         ground=(
-            accelerogram(beside(case, case.text("frame.accelerogram")))
-            if case.has("frame.accelerogram")
-            else None
+            None if given.accelerogram is None else accelerogram(case.beside(given.accelerogram))
         ),
-        damping_ratio=tuple(ratio.modal for ratio in ratios(case)),
-        columns=tuple(number.modal for number in columns(case)),
+        damping_ratio=tuple(ratio.modal for ratio in given.damping_ratio or ()),
+        columns=tuple(number.modal for number in columns(given)),
     )
-    return Structure(model, numbers)
+    return Structure(model, parameters(given, modulus))
 
 
-def parameters(case: Case, modulus: FuzzyNumber) -> dict[str, FuzzyNumber]:
+def parameters(given: Frame, modulus: FuzzyNumber) -> dict[str, FuzzyNumber]:
     """Every parameter of the frame by the name that `frame` gives it, in SI."""
-    found = {"E": modulus, "I": case.fuzzies("frame.second_moment")[0]}
-    found |= {name: case.fuzzy(f"frame.{name}") for name in RAYLEIGH}
-    found |= {
-        "zeta" if len(ratios(case)) == 1 else f"zeta{mode}": ratio
-        for mode, ratio in enumerate(ratios(case), start=1)
+    found = {
+        "E": modulus,
+        "I": given.second_moment[0],
+        "rayleigh_mass": given.rayleigh_mass,
+        "rayleigh_stiffness": given.rayleigh_stiffness,
     }
-    for letter, key in LISTS.items():
-        found |= {
-            f"{letter}{floor}": value
-            for floor, value in enumerate(per_floor(case, f"frame.{key}"), start=1)
-        }
-    found |= {f"c{floor}": value for floor, value in enumerate(columns(case), start=1)}
-    for letter, key in STARTS.items():
-        found |= {
-            f"{letter}{floor}_0": value
-            for floor, value in enumerate(per_floor(case, f"frame.{key}"), start=1)
-        }
+    ratios = given.damping_ratio or ()
+    found |= {
+        "zeta" if len(ratios) == 1 else f"zeta{mode}": ratio
+        for mode, ratio in enumerate(ratios, start=1)
+    }
+    for name, values in (
+        ("m{}", given.masses),
+        ("l{}", given.lengths),
+        ("d{}", given.dampers),
+        ("c{}", columns(given)),
+        ("q{}_0", given.displacements),
+        ("v{}_0", given.velocities),
+    ):
+        every = enumerate(per_floor(given, values), start=1)
+        found |= {name.format(floor): value for floor, value in every}
     return found
 
 
-def columns(case: Case) -> tuple[FuzzyNumber, ...]:
+def columns(given: Frame) -> tuple[FuzzyNumber, ...]:
     """Columns of each storey; differing second moments become numbers of columns."""
-    moments = [moment.modal for moment in per_floor(case, "frame.second_moment")]
+    moments = [moment.modal for moment in per_floor(given, given.second_moment)]
     return tuple(
         c if moment == moments[0] else c * (moment / moments[0])
-        for c, moment in zip(per_floor(case, "frame.columns"), moments, strict=True)
+        for c, moment in zip(per_floor(given, given.columns), moments, strict=True)
     )
 
 
-def ratios(case: Case) -> tuple[FuzzyNumber, ...]:
-    """Damping ratios: none, one for all modes, or one for each."""
-    return case.fuzzies("frame.damping_ratio") if case.has("frame.damping_ratio") else ()
-
-
-def per_floor(case: Case, key: str) -> tuple[FuzzyNumber, ...]:
+def per_floor(given: Frame, values: tuple[FuzzyNumber, ...]) -> tuple[FuzzyNumber, ...]:
     """One value for each floor; a single one holds for all of them."""
-    values, floors = case.fuzzies(key), len(case.fuzzies("frame.masses"))
-    return values * floors if len(values) == 1 else values
+    return values * len(given.masses) if len(values) == 1 else values
 
 
 def modulus_of(case: Case, given: FuzzyNumber | None) -> FuzzyNumber:
@@ -272,7 +258,7 @@ def modulus_of(case: Case, given: FuzzyNumber | None) -> FuzzyNumber:
     """
     if given is not None:
         return given
-    if not case.has("frame.modulus"):
+    if case.frame.modulus is None:
         raise BadInput(
             Problem(
                 "frame.modulus",
@@ -281,4 +267,4 @@ def modulus_of(case: Case, given: FuzzyNumber | None) -> FuzzyNumber:
                 file=str(case.path),
             )
         )
-    return case.fuzzy("frame.modulus")
+    return case.frame.modulus

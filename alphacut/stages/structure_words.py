@@ -9,10 +9,10 @@ import numpy as np
 
 from alphacut.case.case import Case
 from alphacut.case.names import OTHERS
-from alphacut.case.schema import SECTIONS
+from alphacut.case.sections.structures import Frame
 from alphacut.fuzzy import FuzzyNumber, PiecewiseLinear
 from alphacut.io.units import MINUS, shown
-from alphacut.stages.structure import Structure, per_floor, ratios
+from alphacut.stages.structure import Structure, per_floor
 from alphacut.stages.structure import columns as count_columns
 
 if TYPE_CHECKING:
@@ -60,9 +60,12 @@ def in_unit(number: FuzzyNumber, unit: str, si: str) -> str:
 def structure_words(case: Case, wanted: Structure) -> dict[str, Any]:
     """Sentences on the structure, and head and rows of a table of its floors."""
     if wanted.frame is not None:
-        return {"sentences": list(frame_sentences(case, wanted)), **floors(case, wanted)}
+        return {
+            "sentences": list(frame_sentences(case.frame, wanted)),
+            **floors(case.frame, wanted),
+        }
     ground = None if wanted.linear is None else wanted.linear.ground
-    sentences = [motion(case.text("tower.accelerogram"), ground)] if ground is not None else []
+    sentences = [motion(case.tower.accelerogram, ground)] if ground is not None else []
     return {
         "sentences": sentences,
         "head": ["input", "what it is", "value"],
@@ -73,25 +76,21 @@ def structure_words(case: Case, wanted: Structure) -> dict[str, Any]:
 def inputs(case: Case) -> Iterator[list[str]]:
     """A row for each number of a pendulum or a tower, as the case writes it."""
     for section in OTHERS:
-        for name, key in SECTIONS[section].keys.items():
-            if (
-                key.kind != "text"
-                and name != "tolerance"
-                and (written := case.written.get(f"{section}.{name}")) is not None
-            ):
+        for name, key, written in case.told(section):
+            if key.kind != "text" and name != "tolerance":
                 yield [name, key.about.partition(";")[0], str(written).replace("'", "")]
 
 
-def frame_sentences(case: Case, wanted: Structure) -> Iterator[str]:
+def frame_sentences(given: Frame, wanted: Structure) -> Iterator[str]:
     """Stiffness, damping, and what moves the frame."""
     assert wanted.frame is not None
     modulus, moment = wanted.numbers["E"], wanted.numbers["I"]
-    counts = set(case.fuzzies("frame.columns"))
+    counts = set(given.columns)
     alone = next(iter(counts)) if len(counts) == 1 else None
     crisp = alone is not None and alone.support.width == 0
     number = f"{in_unit(alone, '', '')} in each storey" if alone else "c in a storey"
     formula = f"{12 * alone.modal:g} E I / l³" if alone and crisp else "12 c E I / l³"
-    alike = len(case.fuzzies("frame.second_moment")) == 1
+    alike = len(given.second_moment) == 1
     section = f"I = {in_unit(moment, 'm^4', 'm^4')} of one column; " if alike else ""
     rigidity = f"E I = {modulus.modal * moment.modal / 1e6:.4g} MN m² at the modal values" + (
         "" if alike else ", in the ground storey"
@@ -100,29 +99,30 @@ def frame_sentences(case: Case, wanted: Structure) -> Iterator[str]:
         f"{len(wanted.frame.masses)} rigid floors on columns clamped at both ends, {number}:"
         f" stiffness {formula}. E = {in_unit(modulus, 'GPa', 'Pa')}, {section}{rigidity}."
     )
-    yield f"Damping: {'; '.join(damping(case)) or 'none'}."
+    yield f"Damping: {'; '.join(damping(given)) or 'none'}."
     if wanted.frame.ground is not None:
-        yield motion(case.text("frame.accelerogram"), wanted.frame.ground)
-    elif moves(case):
+        yield motion(str(given.accelerogram), wanted.frame.ground)
+    elif moves(given):
         yield "The frame starts from the displacements and velocities of the table."
 
 
-def damping(case: Case) -> Iterator[str]:
+def damping(given: Frame) -> Iterator[str]:
     """Everything that damps a frame."""
-    yield from spread_damping(case)
-    if any(number.support.upper > 0 for number in case.fuzzies("frame.dampers")):
-        yield f"dashpots {PLACEMENT[case.text('frame.damper_placement')]}"
+    yield from spread_damping(given)
+    if given.damped:
+        yield f"dashpots {PLACEMENT[str(given.damper_placement)]}"
 
 
-def spread_damping(case: Case) -> Iterator[str]:
+def spread_damping(given: Frame) -> Iterator[str]:
     """The damping that no dashpot stands for."""
-    if any(number.support.upper > 0 for number in ratios(case)):
-        each = "of every mode" if len(ratios(case)) == 1 else "of the modes, by rising frequency"
+    ratios = given.damping_ratio or ()
+    if any(number.support.upper > 0 for number in ratios):
+        each = "of every mode" if len(ratios) == 1 else "of the modes, by rising frequency"
         yield (
-            f"{', '.join(in_unit(ratio, '%', '') for ratio in ratios(case))} of the critical"
+            f"{', '.join(in_unit(ratio, '%', '') for ratio in ratios)} of the critical"
             f" damping {each}"
         )
-    a, b = (case.fuzzy(f"frame.rayleigh_{name}") for name in ("mass", "stiffness"))
+    a, b = given.rayleigh_mass, given.rayleigh_stiffness
     if a.support.upper or b.support.upper:
         yield f"a M + b K with a = {in_unit(a, '1/s', '1/s')} and b = {in_unit(b, 'ms', 's')}"
 
@@ -140,36 +140,37 @@ def motion(file: str, ground: Accelerogram) -> str:
     )
 
 
-def moves(case: Case) -> list[str]:
+def moves(given: Frame) -> list[str]:
     """Names of displacements and velocities that are not zero at the start."""
-    kinds = ("displacements", "velocities")
+    starts = {"displacements": given.displacements, "velocities": given.velocities}
     return [
         kind
-        for kind in kinds
-        if any(
-            number.support.upper or number.support.lower for number in case.fuzzies(f"frame.{kind}")
-        )
+        for kind, numbers in starts.items()
+        if any(number.support.upper or number.support.lower for number in numbers)
     ]
 
 
-def floors(case: Case, wanted: Structure) -> dict[str, Any]:
+def floors(given: Frame, wanted: Structure) -> dict[str, Any]:
     """Row for each floor, from the ground up: mass, height and what is not zero."""
-    damped = any(number.support.upper > 0 for number in case.fuzzies("frame.dampers"))
-    kinds: Sequence[str] = ["masses", "lengths", *(["dampers"] if damped else []), *moves(case)]
+    kinds: Sequence[str] = [
+        "masses",
+        "lengths",
+        *(["dampers"] if given.damped else []),
+        *moves(given),
+    ]
     columns = [
-        [in_unit(number, *UNITS[kind]) for number in per_floor(case, f"frame.{kind}")]
+        [in_unit(number, *UNITS[kind]) for number in per_floor(given, getattr(given, kind))]
         for kind in kinds
     ]
     head = ["floor", *(COLUMNS[kind] for kind in kinds)]
-    for name, entries in (
-        ("columns c", case.fuzzies("frame.columns")),
-        ("second moment", case.fuzzies("frame.second_moment")),
+    for name, unit, entries in (
+        ("columns c", "", given.columns),
+        ("second moment", "m^4", given.second_moment),
     ):
         if len(entries) > 1:
-            unit = "m^4" if name == "second moment" else ""
             told = [in_unit(x, unit, unit) for x in entries]
             head, columns = [*head, name], [*columns, told]
-    head, columns = [*head, "stiffness"], [*columns, stiffnesses(case, wanted)]
+    head, columns = [*head, "stiffness"], [*columns, stiffnesses(given, wanted)]
     return {
         "head": head,
         "rows": [
@@ -178,11 +179,11 @@ def floors(case: Case, wanted: Structure) -> dict[str, Any]:
     }
 
 
-def stiffnesses(case: Case, wanted: Structure) -> list[str]:
+def stiffnesses(given: Frame, wanted: Structure) -> list[str]:
     """Stiffness of each storey at the modal values, 12 c E I / l³, in MN/m."""
     rigidity = wanted.numbers["E"].modal * wanted.numbers["I"].modal
-    lengths = [length.modal for length in per_floor(case, "frame.lengths")]
+    lengths = [length.modal for length in per_floor(given, given.lengths)]
     return [
         f"{12e-6 * c.modal * rigidity / length**3:.4g} MN/m"
-        for c, length in zip(count_columns(case), lengths, strict=True)
+        for c, length in zip(count_columns(given), lengths, strict=True)
     ]

@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from alphacut.case.checks import stand_ins
 from alphacut.io.provenance import FORMAT, command, versions
 from alphacut.stages import exceedance as outcomes
 from alphacut.stages import modulus, response
-from alphacut.stages.cell import GPA, SHARED, key_of, parts
+from alphacut.stages.cell import GPA, modal_values, parts
 from alphacut.stages.pipeline import Results
 from alphacut.stages.structure_words import structure_words
 
@@ -31,8 +30,8 @@ def summary(results: Results) -> dict[str, Any]:
     case = results.case
     words = {
         "case": case.name,
-        "title": case.text("title"),
-        "about": case.text("about"),
+        "title": case.top.title,
+        "about": case.top.about,
         "case_text": case.text_of_file,
     }
     found: dict[str, Any] = {
@@ -44,7 +43,7 @@ def summary(results: Results) -> dict[str, Any]:
     particles = results.folder / "microstructure.json"
     if "microstructure" in case.stages and particles.is_file():
         found["microstructure"] = json.loads(particles.read_text(encoding="utf-8"))
-    if case.has("radius.a1"):
+    if case.sections.radius:
         found["area_fraction"] = area_fraction(results)
     if results.modulus is not None:
         found["modulus"] = modulus_numbers(results.modulus)
@@ -72,8 +71,7 @@ def area_fraction(results: Results) -> float:
     from alphacut.stochastic import gauss_rule
 
     case = results.case
-    modal = {name: case.fuzzy(key_of(name)).modal for name in (*SHARED, "inclusion_modulus")}
-    radius, _, _ = parts(modal, case.numbers("radius.theta"))
+    radius, _, _ = parts(modal_values(case), case.radius.theta)
     rule = gauss_rule(radius.distribution, points=20)
     return float(rule.mean(np.pi / 4 * radius(rule.nodes) ** 2))
 
@@ -101,8 +99,8 @@ def modulus_numbers(dataset: xarray.Dataset) -> dict[str, Any]:
 def given(results: Results) -> Row:
     """The modulus that stands in for a computed one: where it comes from, and its α-cuts."""
     assert results.handed is not None
-    key = next(iter(stand_ins(results.case)), "frame.modulus")
-    alpha = results.case.numbers("envelope.alpha") if results.envelopes else (0.0, 1.0)
+    key = next(iter(results.case.stand_ins), "frame.modulus")
+    alpha = results.case.envelope.alpha if results.envelopes else (0.0, 1.0)
     cuts = np.array([results.handed.cut(level) for level in alpha]) / GPA
     return {
         "of": f"{key} = {results.case.written.get(key, '')}",

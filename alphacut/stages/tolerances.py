@@ -22,6 +22,7 @@ from alphacut.stages.structure import Structure, structure
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
+    from alphacut.frame import StoreyFrame
     from alphacut.frame.decisions.safe_scale import SafeScale
 
 Range = Callable[[float], tuple[float, float]]
@@ -121,14 +122,14 @@ def tolerances(
     """
     from alphacut.frame.decisions.safe_scale import safe_scale
 
-    cell = None if handed is not None or case.has("frame.modulus") else campaign(case)
+    output, limit, over = case.exceedance.output, limit_of(case), case.envelope
+    cell = None if handed is not None or case.frame.modulus is not None else campaign(case)
     modulus_range = None if cell is None else _cell_range(cell, most)
     given = handed if cell is None or modulus_range is None else _triangle(modulus_range)
     wanted = structure(case, given)
     if wanted.frame is None:
         raise BadInput(Problem("frame", "missing: safe tolerances are those of a storey frame"))
-    output, limit = case.text("exceedance.output"), limit_of(case)
-    inputs = wanted.inputs(case.names("envelope.fuzzy"))
+    inputs = wanted.inputs(over.fuzzy)
     own = {name: x for name, x in inputs.items() if modulus_range is None or name != "E"}
     frame = Supports(own)
 
@@ -144,8 +145,8 @@ def tolerances(
         {name: number.modal for name, number in inputs.items()},
         reach,
         {output: limit},
-        duration=case.number("envelope.duration"),
-        step=case.number("envelope.step"),
+        duration=over.duration,
+        step=over.step,
         most=most,
         workers=workers,
         progress=progress,
@@ -155,7 +156,7 @@ def tolerances(
     return Tolerances(found, output, limit, frame, Supports(dict(cell.inputs) if cell else {}))
 
 
-def _limited(wanted: Structure, output: str, case: Case) -> Any:
+def _limited(wanted: Structure, output: str, case: Case) -> StoreyFrame:
     """The frame with the limited output alone."""
     assert wanted.frame is not None
     try:

@@ -94,10 +94,10 @@ def dataset(results: Results) -> xarray.Dataset:
         variables["modulus_share"] = (("cell_input", "alpha"), cell.share, {"units": "1"})
         coordinates |= {
             "cell_input": list(cell.names),
-            "alpha": list(results.case.numbers("modulus.alpha")),
+            "alpha": list(results.case.modulus.alpha),
         }
     study = richest(results)
-    if study is not None and len(study.task.fuzzy) > 1 and not results.case.has("pendulum.mass"):
+    if study is not None and len(study.task.fuzzy) > 1 and not results.case.sections.pendulum:
         try:
             structure, time = envelope_shares(results, study)
         except ModalError as error:

@@ -48,8 +48,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     flow = LinearFlow(
         replace(frame, outputs=(result.output,)),
         found.names,
-        case.number("envelope.duration"),
-        case.number("envelope.step"),
+        case.envelope.duration,
+        case.envelope.step,
         Exact(),
     )
     worst, left = 0.0, options.points

@@ -66,7 +66,7 @@ def test_a_response_has_curves_good_to_four_digits_whatever_its_modulus_needs():
             *(["response.quantity=s11"] if limited else []),
         ]
         case = load(CASES / "porous.toml", changes)
-        assert case.has("response.quantity") == limited
+        assert (case.sections.response is not None) == limited
         choice = campaign(case).task.choice
         model = cell_model(CellChoice("auto", tolerance=choice.tolerance))
         own = model.solve(radius, matrix, [particle])[0].curve

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.case.case import Case
-from alphacut.case.checks import beside
-from alphacut.case.checks_image import picture
+from alphacut.case.sections.picture import Picture
 from alphacut.fuzzy import Crisp
 from alphacut.io.problem import BadInput, Problem
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, Solver
@@ -33,21 +32,17 @@ def study_of(case: Case, *, petsc: Mapping[str, str] | None = None) -> ImageStud
     Raises:
         BadInput: Its picture cannot be used.
     """
-    source = picture(case)
-    if not source:
-        case.need("cell.image")
-    young = case.has("cell.modulus")
-    keys = ("cell.modulus", "cell.poisson") if young else ("cell.bulk", "cell.shear")
-    first, second = (case.fuzzies(key) for key in keys)
-    second = second * len(first) if len(second) == 1 else second
+    given = case.picture
+    source = f"cell.{given.sources[0]}"
+    first, second = given.pairs
     try:
-        parted = _image(case) if source == "cell.image" else _outline(case, source)
+        parted = _outline(case) if given.image is None else _image(case, given.image)
         study = ImageStudy(
             parted.ranges,
             tuple(zip(first, second, strict=True)),
-            young,
-            case.numbers("modulus.alpha"),
-            _model(case, parted.aspect, petsc or {}),
+            given.modulus is not None,
+            case.modulus.alpha,
+            _model(given, parted.aspect, petsc or {}),
             parted.fuzzy,
             parted.random,
         )
@@ -58,8 +53,7 @@ def study_of(case: Case, *, petsc: Mapping[str, str] | None = None) -> ImageStud
             source = "cell.threshold_deviation"
             ordered(study.phases(study.alpha[0]))
     except ValueError as error:
-        line = case.lines.get(source, 0)
-        raise BadInput(Problem(source, str(error), file=str(case.path), line=line)) from None
+        raise BadInput(case.located(Problem(source, str(error)))) from None
     return study
 
 
@@ -80,16 +74,15 @@ class Parted:
     random: RandomThreshold | None = None
 
 
-def _model(case: Case, aspect: float, petsc: Mapping[str, str]) -> ImageModel:
-    width = case.number("cell.width") if case.has("cell.width") else None
-    accuracy = ACCURACY if width is None else min(ACCURACY, width / 100)
+def _model(given: Picture, aspect: float, petsc: Mapping[str, str]) -> ImageModel:
+    accuracy = ACCURACY if given.width is None else min(ACCURACY, given.width / 100)
     return ImageModel(
         aspect,
-        case.text("cell.boundary"),
-        case.integer("cell.tiles"),
-        case.integer("cell.division") if case.has("cell.division") else None,
+        given.boundary,
+        given.tiles,
+        given.division,
         _solver(accuracy, petsc),
-        width,
+        given.width,
     )
 
 
@@ -110,25 +103,24 @@ def _solver(accuracy: float, petsc: Mapping[str, str]) -> Solver:
     return PetscSolver(accuracy, petsc)
 
 
-def _image(case: Case) -> Parted:
+def _image(case: Case, file: str) -> Parted:
     """Phases of an image file."""
     from alphacut.rve.image.read import read_grey, require_phases
 
-    pixel = case.numbers("cell.pixel")
-    parts = case.integer("cell.division") if case.has("cell.division") else 1
-    path = beside(case, case.text("cell.image"))
-    grey = read_grey(path, division=parts, square=len(pixel) == 1)
+    given, pixel = case.picture, case.picture.pixel
+    assert pixel is not None  # an image has pixels, or the case is refused
+    grey = read_grey(case.beside(file), division=given.division or 1, square=len(pixel) == 1)
     aspect = pixel[-1] / pixel[0]
-    if case.has("cell.size"):
-        _require_size(grey, (pixel[0], pixel[-1]), case.numbers("cell.size"))
-    if case.has("cell.labels"):
-        phase = _labelled(grey, case.numbers("cell.labels"))
+    if given.size is not None:
+        _require_size(grey, (pixel[0], pixel[-1]), given.size)
+    if given.labels is not None:
+        phase = _labelled(grey, given.labels)
         return Parted(lambda level: (phase, phase), aspect)
-    thresholds, random = case.fuzzies("cell.threshold"), None
+    thresholds, random = given.threshold or (), None
     uncertain = [number for number in thresholds if not isinstance(number, Crisp)]
-    if case.has("cell.threshold_deviation"):
-        deviation = case.fuzzy("cell.threshold_deviation")
-        random = RandomThreshold(grey, thresholds[0], deviation, case.numbers("cell.quantiles"))
+    deviation = given.threshold_deviation
+    if deviation is not None:
+        random = RandomThreshold(grey, thresholds[0], deviation, given.quantiles)
         uncertain += [] if isinstance(deviation, Crisp) else [deviation]
         thresholds = (Crisp(thresholds[0].modal),)
     require_phases(grey, tuple(number.cut(0.0) for number in thresholds))
@@ -165,19 +157,20 @@ def _require_size(grey: Array, pixel: tuple[float, float], size: tuple[float, ..
             )
 
 
-def _outline(case: Case, source: str) -> Parted:
+def _outline(case: Case) -> Parted:
     """Phases of an outline's pixels."""
     from alphacut.rve.image.outlines.equation import Equation
     from alphacut.rve.image.outlines.outline import Grid, Outline, phase_ranges
     from alphacut.rve.image.outlines.polygon_file import read_polygons
 
-    width, height = case.numbers("cell.size")
-    columns = case.integer("cell.pixels")
+    given = case.picture
+    width, height = given.size or ()
+    columns = given.pixels
     grid = Grid(max(2, round(columns * height / width)), columns, width, height)
     outline: Outline = (
-        Equation(case.text(source))
-        if source == "cell.inequality"
-        else read_polygons(beside(case, case.text(source)))
+        Equation(given.inequality or "")
+        if given.polygons is None
+        else read_polygons(case.beside(given.polygons))
     )
     ends = phase_ranges(outline.classify(grid))
     if not ends[1].any() or ends[0].all():
@@ -187,12 +180,10 @@ def _outline(case: Case, source: str) -> Parted:
 
 def expected_modulus(case: Case) -> tuple[float, float, float]:
     """Least, some middle and greatest E of the phases, in Pa, before the image is solved."""
-    if case.has("cell.modulus"):
-        ends = [end for number in case.fuzzies("cell.modulus") for end in number.support]
-        return min(ends), case.fuzzies("cell.modulus")[0].modal, max(ends)
-    pairs = [
-        (k.modal, g.modal)
-        for k, g in zip(case.fuzzies("cell.bulk"), case.fuzzies("cell.shear"), strict=True)
-    ]
+    first, second = case.picture.pairs
+    if case.picture.modulus is not None:
+        ends = [end for number in first for end in number.support]
+        return min(ends), first[0].modal, max(ends)
+    pairs = [(k.modal, g.modal) for k, g in zip(first, second, strict=True)]
     moduli = [9 * k * g / (3 * k + g) for k, g in pairs]
     return min(moduli), moduli[0], max(moduli)

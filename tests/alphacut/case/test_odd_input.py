@@ -116,9 +116,7 @@ def test_one_value_for_all_floors_may_be_changed_from_the_command_line():
         "displacements=1 mm,2 mm,3 mm",
         "velocities=[0, 1] mm/s",
     ]
-    values = load(CASES / "paper.toml", [f"frame.{change}" for change in changes]).values
-    assert [
-        len(values[f"frame.{name}"])
-        for name in ("damping_ratio", "lengths", "displacements", "velocities")
-    ] == [1, 1, 3, 1]
-    assert values["frame.damping_ratio"][0].modal == 0.04
+    frame = load(CASES / "paper.toml", [f"frame.{change}" for change in changes]).frame
+    given = (frame.damping_ratio, frame.lengths, frame.displacements, frame.velocities)
+    assert [len(values) for values in given] == [1, 1, 3, 1]
+    assert frame.damping_ratio[0].modal == 0.04

@@ -61,7 +61,7 @@ def test_a_limit_below_the_nominal_motion_leaves_no_tolerance(tmp_path, capfd):
     ("more", "text", "message"),
     [
         (("--most", "0"), CASE, "--most.*greater than 0"),
-        ((), CASE[: CASE.index("[exceedance]")], "exceedance.output.*missing"),
+        ((), CASE[: CASE.index("[exceedance]")], "exceedance.*missing"),
         ((), CASE.replace("drift1", "drift7"), "exceedance"),
     ],
 )

@@ -1,0 +1,155 @@
+"""Sections on the material: random radius, phases, mesh, modulus and stress of the cell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal, get_args
+
+from alphacut.case.key import (
+    ALPHA,
+    COUNT,
+    DEVIATIONS,
+    MEMBERSHIP,
+    POISSON,
+    POSITIVE,
+    UNIT,
+    Key,
+    Range,
+    Section,
+    keys_of,
+)
+from alphacut.case.sections.picture import Picture
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.stochastic import TruncatedNormal
+
+CellMethod = Literal["prism", "slices", "table", "series", "image", "auto"]
+PlanName = Literal["general", "reduced", "extended", "signed"]
+CELL_METHODS: tuple[str, ...] = get_args(CellMethod)
+PLANS: tuple[str, ...] = get_args(PlanName)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Radius(Section):
+    """Random radius of the particle over half the cell's side.
+
+    Cubic Hermite map of the truncated normal θ (eq. 12).
+    """
+
+    theta: Annotated[
+        tuple[float, ...], Key("support of θ in standard deviations", allowed=DEVIATIONS)
+    ] = (-3.0, 3.0)
+    a1: Annotated[FuzzyNumber, Key("radius at the lower end of θ", allowed=UNIT)]
+    a2: Annotated[FuzzyNumber, Key("slope dr/dξ at the lower end")]
+    a3: Annotated[FuzzyNumber, Key("radius at the upper end of θ", allowed=UNIT)]
+    a4: Annotated[FuzzyNumber, Key("slope dr/dξ at the upper end")]
+
+    @property
+    def slopes(self) -> tuple[FuzzyNumber, FuzzyNumber, FuzzyNumber, FuzzyNumber]:
+        """The factors a1 … a4 of the Hermite functions, eq. 12."""
+        return self.a1, self.a2, self.a3, self.a4
+
+    @property
+    def law(self) -> TruncatedNormal:
+        """The truncated normal law of θ."""
+        return TruncatedNormal(self.theta[0], self.theta[1])
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Cell(Section):
+    """The two elastic phases of the periodic cell, in plane strain."""
+
+    matrix_modulus: Annotated[
+        FuzzyNumber, Key("Young's modulus of the matrix", "Pa", allowed=POSITIVE)
+    ]
+    matrix_poisson: Annotated[FuzzyNumber, Key("Poisson's ratio of the matrix", allowed=POISSON)]
+    inclusion_modulus: Annotated[
+        FuzzyNumber, Key("Young's modulus of the particle", "Pa", allowed=POSITIVE)
+    ]
+    inclusion_poisson: Annotated[
+        FuzzyNumber, Key("Poisson's ratio of the particle", allowed=POISSON)
+    ]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class CellTable(Section):
+    """The periodic cell, in plane strain: two elastic phases and a round particle, or a picture.
+
+    Of a picture of its phases (one of image, polygons, inequality) stage image gives proved bounds.
+    """
+
+    parts: ClassVar[tuple[type[Section], ...]] = (Cell, Picture)
+    unless: ClassVar[tuple[str, ...]] = tuple(keys_of(Picture))
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Mesh(Section):
+    """Discretisation of the product domain."""
+
+    layers: Annotated[int, Key("element layers in θ", allowed=COUNT)] = 12
+    size: Annotated[float, Key("element size over half the cell's side", allowed=UNIT)] = 0.15
+    interface: Annotated[
+        Literal["conforming", "sign"], Key("conforming, or sign(z) at quadrature points (eq. 13)")
+    ] = "conforming"
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Modulus(Section):
+    """The fuzzy modulus: how it is computed, or what stands in for it."""
+
+    method: Annotated[CellMethod, Key("model of the cell")] = "prism"
+    plan: Annotated[PlanName, Key("samples of the transformation method")] = "general"
+    alpha: Annotated[tuple[float, ...], Key("α-levels", allowed=MEMBERSHIP)] = ALPHA
+    tolerance: Annotated[
+        float,
+        Key(
+            "relative tolerance on E, for method auto",
+            allowed=Range("from 1e-10 to 0.1", 1e-10, 0.1, closed=True),
+        ),
+    ] = 0.0001
+    value: Annotated[
+        FuzzyNumber | None, Key("a known modulus instead of a computed one", "Pa", allowed=POSITIVE)
+    ] = None
+    file: Annotated[
+        str | None, Key("α-cuts from a NetCDF file instead of computed ones", file=True)
+    ] = None
+    measured: Annotated[
+        str | None, Key("CSV file of measured moduli instead of computed ones", file=True)
+    ] = None
+    claim: Annotated[
+        str,
+        Key(
+            "what the cuts of measured moduli hold with probability 1 - α: next value,"
+            " mean, median or quantile Q"
+        ),
+    ] = "next value"
+    bounds: Annotated[
+        FuzzyNumber | None,
+        Key(
+            "physically possible moduli, two numbers; needed with measured ones",
+            "Pa",
+            allowed=POSITIVE,
+        ),
+    ] = None
+    law: Annotated[
+        Literal["normal", "log-normal"] | None, Key("law of measured moduli, where it is known")
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Response(Section):
+    """Random stress of the cell beside its mean.
+
+    Its p-box, fuzzy quantiles, and the fuzzy probability of exceeding a limit.
+    """
+
+    quantity: Annotated[
+        Literal["s11", "s12"],
+        Key("homogenised stress 11 under ε11 = ε22 = 0.01, or 12 under ε12 = 0.01"),
+    ] = "s11"
+    quantiles: Annotated[
+        tuple[float, ...], Key("probabilities whose quantiles are wanted", allowed=UNIT)
+    ] = (0.05, 0.5, 0.95)
+    limit: Annotated[
+        float | None,
+        Key("stress whose probability of being exceeded is wanted", "Pa", allowed=POSITIVE),
+    ] = None

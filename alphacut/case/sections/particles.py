@@ -1,0 +1,122 @@
+"""Sections on particles: packed at random, measured, or seen on a photograph."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from alphacut.case.key import MEMBERSHIP, NATURAL, NOT_NEGATIVE, POSITIVE, UNIT, Key, Range, Section
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Microstructure(Section):
+    """From particles to the random radius.
+
+    Exactly one of the sections packing, circles, image stands below it.
+    """
+
+    seed: Annotated[int, Key("seed of everything left to chance", allowed=NATURAL)]
+    limits: Annotated[
+        tuple[float, ...] | None,
+        Key("lower and upper limit of r_n = r/a; share decides if left out", allowed=UNIT),
+    ] = None
+    share: Annotated[float, Key("share of area that the limits keep", allowed=UNIT)] = 0.9927
+    confidence: Annotated[
+        float, Key("level of the empirical distribution's bootstrap band", allowed=UNIT)
+    ] = 0.99
+    bootstrap: Annotated[
+        int, Key("resamples", allowed=Range("100 or more", 100.0, closed=True))
+    ] = 500
+    band: Annotated[
+        float | None,
+        Key(
+            "half width, in probability, by which the distribution may leave the p-box;"
+            " that bootstrap band if left out",
+            allowed=Range("0 or greater and below 1", 0.0, 1.0, closed=True, below=True),
+        ),
+    ] = None
+    sampling: Annotated[
+        bool,
+        Key(
+            "whether a2 and a4 also hold the slopes' own bootstrap band: fewer data, a fuzzier map"
+        ),
+    ] = False
+    packing: Packing | None = None
+    circles: Circles | None = None
+    image: Photograph | None = None
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Packing(Section):
+    """Discs packed at random in a periodic box.
+
+    Equal, truncated log-normal (eq. 11), or of the radii in a file.
+    """
+
+    packings: Annotated[
+        int, Key("independent packings", allowed=Range("5 or more", 5.0, closed=True))
+    ] = 20
+    discs: Annotated[
+        int, Key("discs in each packing", allowed=Range("10 or more", 10.0, closed=True))
+    ]
+    area_fraction: Annotated[
+        float,
+        Key("share of the area that discs cover", allowed=Range("inside (0, 0.85)", 0.0, 0.85)),
+    ]
+    smallest_radius: Annotated[
+        float | None,
+        Key("smallest radius of the log-normal law; needed without a file", "m", allowed=POSITIVE),
+    ] = None
+    largest_radius: Annotated[
+        float | None,
+        Key("largest radius of the log-normal law; needed without a file", "m", allowed=POSITIVE),
+    ] = None
+    file: Annotated[
+        str | None,
+        Key(
+            "CSV file of measured radii or diameters, a column r [mm] or d [mm], in place of both",
+            file=True,
+        ),
+    ] = None
+    gap: Annotated[float, Key("least gap between surfaces", "m", allowed=NOT_NEGATIVE)] = 0.0
+    method: Annotated[Literal["auto", "sequential", "relaxed"], Key("how they are packed")] = "auto"
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Circles(Section):
+    """Measured circles from a CSV file with the columns x, y, r."""
+
+    file: Annotated[
+        str, Key("CSV file, its units in the header: x [mm], y [mm], r [mm]", file=True)
+    ]
+    size: Annotated[
+        tuple[float, ...], Key("width and height of the section", "m", allowed=POSITIVE)
+    ]
+    origin: Annotated[
+        tuple[float, ...], Key("lower left corner of the section in the file's coordinates", "m")
+    ] = (0.0, 0.0)
+    periodic: Annotated[
+        bool, Key("whether the section repeats itself; otherwise it is an open window")
+    ] = False
+    unit: Annotated[str, Key("unit of columns whose header names none")] = ""
+    drop: Annotated[bool, Key("leave out rows that make no sense instead of refusing the file")] = (
+        False
+    )
+    overlap: Annotated[
+        float,
+        Key(
+            "overlap that counts as error of measurement, over the smaller radius",
+            allowed=MEMBERSHIP,
+        ),
+    ] = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Photograph(Section):
+    """Circles segmented from the image of a section."""
+
+    file: Annotated[str, Key("image file", file=True)]
+    pixel: Annotated[float, Key("side of a pixel", "m", allowed=POSITIVE)]
+    particles: Annotated[
+        Literal["auto", "bright", "dark"], Key("bright or dark against the matrix")
+    ] = "auto"

@@ -1,0 +1,176 @@
+"""Sections on structures: storey frame, tower of beams, pendulum."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from alphacut.case.key import COUNT, NOT_NEGATIVE, POSITIVE, RATIO, Key, Section
+from alphacut.fuzzy import Crisp, FuzzyNumber
+
+ZERO, TWO = Crisp(0.0), Crisp(2.0)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Frame(Section):
+    """Storey frame: rigid floors on elastic columns, numbered from the ground."""
+
+    masses: Annotated[tuple[FuzzyNumber, ...], Key("mass of each floor", "kg", allowed=POSITIVE)]
+    lengths: Annotated[
+        tuple[FuzzyNumber, ...],
+        Key("length of the columns below each floor", "m", allowed=POSITIVE, alone=True),
+    ]
+    modulus: Annotated[
+        FuzzyNumber | None, Key("Young's modulus where none is handed on", "Pa", allowed=POSITIVE)
+    ] = None
+    second_moment: Annotated[
+        tuple[FuzzyNumber, ...],
+        Key(
+            "second moment of area of one column; where storeys differ a crisp one for each",
+            "m^4",
+            allowed=POSITIVE,
+            alone=True,
+        ),
+    ]
+    columns: Annotated[
+        tuple[FuzzyNumber, ...],
+        Key(
+            "columns in each storey, clamped at both ends; fuzzy where a storey's stiffness is",
+            allowed=POSITIVE,
+            alone=True,
+        ),
+    ] = (TWO,)
+    damping_ratio: Annotated[
+        tuple[FuzzyNumber, ...] | None,
+        Key(
+            "viscous damping over the critical one: of all modes, or of each by rising"
+            " frequency; beside the other damping",
+            allowed=RATIO,
+            alone=True,
+        ),
+    ] = None
+    dampers: Annotated[
+        tuple[FuzzyNumber, ...],
+        Key(
+            "viscous damper of each floor; needed where no other damping is given",
+            "N*s/m",
+            allowed=NOT_NEGATIVE,
+            alone=True,
+        ),
+    ] = (ZERO,)
+    damper_placement: Annotated[
+        Literal["ground", "storey"] | None,
+        Key("to the ground, or between storeys; needed with dampers"),
+    ] = None
+    displacements: Annotated[
+        tuple[FuzzyNumber, ...],
+        Key(
+            "displacement of each floor at the start; needed without an accelerogram",
+            "m",
+            alone=True,
+        ),
+    ] = (ZERO,)
+    velocities: Annotated[
+        tuple[FuzzyNumber, ...],
+        Key(
+            "velocity of each floor at the start; needed without an accelerogram", "m/s", alone=True
+        ),
+    ] = (ZERO,)
+    rayleigh_mass: Annotated[
+        FuzzyNumber, Key("factor a of Rayleigh damping a M + b K", "1/s", allowed=NOT_NEGATIVE)
+    ] = ZERO
+    rayleigh_stiffness: Annotated[
+        FuzzyNumber, Key("factor b of Rayleigh damping a M + b K", "s", allowed=NOT_NEGATIVE)
+    ] = ZERO
+    accelerogram: Annotated[
+        str | None,
+        Key(
+            "CSV file of the ground's acceleration; displacements are then relative to the ground",
+            file=True,
+        ),
+    ] = None
+    outputs: Annotated[
+        tuple[str, ...],
+        Key(
+            "observed quantities: q1, v1 (m/s), drift1, shear1 … (in the columns of a"
+            " storey; dampers excluded), base_shear (that of the lowest storey); all"
+            " displacements if left out"
+        ),
+    ] = ()
+
+    @property
+    def damped(self) -> bool:
+        """Whether any damper is there."""
+        return any(number.support.upper > 0 for number in self.dampers)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Tower(Section):
+    """Plane beam frame of many storeys and bays, clamped at its foot.
+
+    It is reduced to a few shapes that hold for all its fuzzy inputs.
+    """
+
+    storeys: Annotated[int, Key("number of storeys", allowed=COUNT)]
+    bays: Annotated[int, Key("number of bays", allowed=COUNT)]
+    height: Annotated[float, Key("height of a storey", "m", allowed=POSITIVE)]
+    width: Annotated[float, Key("width of a bay", "m", allowed=POSITIVE)]
+    column_area: Annotated[float, Key("area of a column", "m^2", allowed=POSITIVE)]
+    column_moment: Annotated[
+        float, Key("second moment of area of a column", "m^4", allowed=POSITIVE)
+    ]
+    beam_area: Annotated[float, Key("area of a beam", "m^2", allowed=POSITIVE)]
+    beam_moment: Annotated[float, Key("second moment of area of a beam", "m^4", allowed=POSITIVE)]
+    E_columns: Annotated[
+        FuzzyNumber, Key("Young's modulus of the lower half's columns", "Pa", allowed=POSITIVE)
+    ]
+    E_columns_top: Annotated[
+        FuzzyNumber, Key("Young's modulus of the upper half's columns", "Pa", allowed=POSITIVE)
+    ]
+    E_beams: Annotated[FuzzyNumber, Key("Young's modulus of the beams", "Pa", allowed=POSITIVE)]
+    mass: Annotated[
+        FuzzyNumber,
+        Key("mass of the floors over the length of the beams", "kg/m", allowed=POSITIVE),
+    ]
+    density: Annotated[float, Key("density of the columns", "kg/m^3", allowed=NOT_NEGATIVE)]
+    damping_ratio: Annotated[
+        FuzzyNumber | None,
+        Key(
+            "viscous damping over the critical one, of all modes; beside Rayleigh's", allowed=RATIO
+        ),
+    ] = None
+    rayleigh_mass: Annotated[
+        FuzzyNumber,
+        Key(
+            "factor a of Rayleigh damping a M + b K; needed without damping_ratio",
+            "1/s",
+            allowed=NOT_NEGATIVE,
+        ),
+    ] = ZERO
+    rayleigh_stiffness: Annotated[
+        FuzzyNumber,
+        Key(
+            "factor b of Rayleigh damping a M + b K; needed without damping_ratio",
+            "s",
+            allowed=NOT_NEGATIVE,
+        ),
+    ] = ZERO
+    accelerogram: Annotated[str, Key("CSV file of the ground's acceleration", file=True)]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Pendulum(Section):
+    """Damped pendulum: a mass on a bar under gravity; the output is the force in the bar."""
+
+    mass: Annotated[FuzzyNumber, Key("mass", "kg", allowed=POSITIVE)]
+    length: Annotated[FuzzyNumber, Key("length of the bar", "m", allowed=POSITIVE)]
+    damping: Annotated[
+        FuzzyNumber, Key("moment over angular velocity", "N*m*s", allowed=NOT_NEGATIVE)
+    ]
+    gravity: Annotated[FuzzyNumber, Key("acceleration of gravity", "m/s^2", allowed=POSITIVE)]
+    angle: Annotated[FuzzyNumber, Key("angle at the start, 0 hanging down", "rad")]
+    angular_velocity: Annotated[FuzzyNumber, Key("angular velocity at the start", "rad/s")]
+    tolerance: Annotated[
+        float,
+        Key("wanted error of the force, or gain worth a new trajectory", "N", allowed=POSITIVE),
+    ] = 0.001

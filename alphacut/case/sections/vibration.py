@@ -1,0 +1,118 @@
+"""Sections on the vibration of a structure: envelopes, studies, exceedance of a limit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal, get_args
+
+from alphacut.case.key import ALPHA, COUNT, MEMBERSHIP, NATURAL, POSITIVE, UNIT, Key, Range, Section
+
+EnvelopeMethod = Literal[
+    "auto",
+    "modal",
+    "graph-follower",
+    "improved-graph-follower",
+    "vertex",
+    "monte-carlo",
+    "quasi-monte-carlo",
+]
+IntegratorName = Literal["midpoint", "newmark", "rk4", "gauss4", "exact", "composition4"]
+ENVELOPE_METHODS: tuple[str, ...] = get_args(EnvelopeMethod)
+INTEGRATORS: tuple[str, ...] = get_args(IntegratorName)
+NONLINEAR = ("midpoint", "composition4", "rk4")  # those that integrate a pendulum
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Study(Section):
+    """One envelope that `alphacut run` computes.
+
+    Keys that it leaves out are taken from [envelope].
+    """
+
+    repeated: ClassVar[bool] = True
+
+    name: Annotated[
+        str, Key("name of the study and of its file envelope_NAME.nc: letters, digits and . _ + -")
+    ]
+    fuzzy: Annotated[
+        tuple[str, ...], Key("inputs that are fuzzy; all others take their modal value")
+    ]
+    duration: Annotated[float, Key("length of the simulation", "s", allowed=POSITIVE)]
+    figures: Annotated[tuple[str, ...], Key("figure of the paper for each output, or for one")] = ()
+    output: Annotated[str, Key("the one output that is drawn; all if left out")] = ""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Envelope(Section):
+    """Fuzzy forward dynamics."""
+
+    fuzzy: Annotated[
+        tuple[str, ...],
+        Key(
+            "inputs that are fuzzy, of a frame: E, I, m or m1 …, l, c (columns), d, q0, v0, zeta"
+            " (damping ratio) …"
+        ),
+    ]
+    alpha: Annotated[tuple[float, ...], Key("α-levels", allowed=MEMBERSHIP)] = ALPHA
+    method: Annotated[EnvelopeMethod, Key("how the envelope is found")] = "auto"
+    integrator: Annotated[
+        IntegratorName | None,
+        Key("time stepping; by the method if left out: exact for modal, else midpoint"),
+    ] = None
+    order: Annotated[
+        int, Key("order κ of the Taylor models", allowed=Range("1 or 2", 1, 2, closed=True))
+    ] = 2
+    tolerance: Annotated[
+        float,
+        Key(
+            "wanted error of displacements; of other outputs the same share of their"
+            " peaks as of the first displacement's; for graph-follower the gain that is"
+            " worth a new trajectory",
+            "m",
+            allowed=POSITIVE,
+        ),
+    ] = 0.0001
+    relative_tolerance: Annotated[
+        float | None,
+        Key("the same as a share of each output's peak, in place of tolerance", allowed=UNIT),
+    ] = None
+    certify: Annotated[
+        float | None,
+        Key(
+            "gap within which the bounds of displacements of a linear structure, up to"
+            " six inputs fuzzy, are enclosed and proved; for outputs of other units the"
+            " same share of their peaks as of the first displacement's; minutes of"
+            " computing; no proof if left out; with a damping ratio the error of the model"
+            " can only be sampled",
+            "m",
+            allowed=POSITIVE,
+        ),
+    ] = None
+    duration: Annotated[float, Key("length of the simulation", "s", allowed=POSITIVE)]
+    step: Annotated[float, Key("time step", "s", allowed=POSITIVE)]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Exceedance(Section):
+    """Fuzzy probability that an output exceeds a limit within [envelope]'s duration.
+
+    Inputs that are not random stay fuzzy.
+    """
+
+    output: Annotated[
+        str,
+        Key("the output: q3, drift1, base_shear …; of a tower roof or drift, of a pendulum force"),
+    ]
+    limit: Annotated[
+        str,
+        Key(
+            "magnitude it must not exceed, with the output's unit; of a drift also a"
+            " share of the storey's modal height: 0.5 %"
+        ),
+    ]
+    random: Annotated[
+        tuple[str, ...],
+        Key("inputs that are random, with a density of the shape of their membership"),
+    ] = ()
+    samples: Annotated[int, Key("random draws at each fuzzy point", allowed=COUNT)] = 200
+    seed: Annotated[int, Key("seed of the draws", allowed=NATURAL)] = 0
