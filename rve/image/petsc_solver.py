@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
-from petsc4py import PETSc
 
 from alphacut.rve.image.fields.conjugate_gradient import ConvergenceError, Linear, Solution
+from alphacut.rve.petsc import PETSc
 from alphacut.rve.solver.options import PREFIX
 from alphacut.rve.solver.petsc_options import in_database
 from alphacut.stochastic.theta.truncated_normal import Array

@@ -8,6 +8,9 @@ from functools import cached_property
 from time import perf_counter
 from typing import Any
 
+import alphacut.rve.petsc  # noqa: F401
+
+# isort: split
 import basix.ufl
 import dolfinx
 import numpy as np

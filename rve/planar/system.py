@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy.sparse as sp
-from petsc4py import PETSc
 
 from alphacut.rve.mesh.triangulation import Integers
+from alphacut.rve.petsc import PETSc
 from alphacut.stochastic.theta.truncated_normal import Array
 
 SOLVER = "MUMPS Cholesky"

@@ -10,6 +10,9 @@ from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
 
+from alphacut.rve.petsc import PETSc
+
+# isort: split
 import basix.ufl
 import dolfinx
 import numpy as np
@@ -17,7 +20,6 @@ import ufl
 from dolfinx import fem
 from dolfinx.fem import petsc
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from alphacut.rve.cell import Phase
 from alphacut.rve.mesh.prism_grid import PrismGrid

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from alphacut.rve.cell import Phase
 from alphacut.rve.mesh.periodicity import identify
 from alphacut.rve.mesh.prism_grid import PrismGrid
+from alphacut.rve.petsc import PETSc
 from alphacut.rve.prism.form import PrismForm
 from alphacut.rve.prism.slice_stress import CELL_AREA, SliceStress
 from alphacut.rve.solver.constraints import LevelNumbering

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from petsc4py import PETSc
 
 from alphacut.rve.cell import Phase
+from alphacut.rve.petsc import PETSc
 from alphacut.rve.prism.system import PrismSystem
 from alphacut.rve.solver.krylov import LinearSolver
 from alphacut.rve.solver.options import SolverOptions

@@ -104,7 +104,7 @@ def _injection(nodes: Array) -> sp.csr_matrix:
 
 def _solve(matrix: sp.csr_matrix, loads: Array) -> Array:
     """Solve for all loads by one Cholesky factorisation."""
-    from petsc4py import PETSc
+    from alphacut.rve.petsc import PETSc
 
     operator = PETSc.Mat().createAIJ(
         matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=PETSc.COMM_SELF

@@ -35,6 +35,8 @@ def many_mesh(discs: Discs, *, size: float, around: int = 12) -> tuple[Any, Arra
     """
     from mpi4py import MPI
 
+    import alphacut.rve.petsc  # noqa: F401
+
     try:
         from dolfinx.io import gmsh as reader
     except ImportError:  # its name before DOLFINx 0.10

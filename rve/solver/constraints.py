@@ -16,11 +16,11 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from alphacut.rve.mesh.periodicity import Periodicity
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import Integers
+from alphacut.rve.petsc import PETSc
 from alphacut.stochastic.theta.truncated_normal import Array
 
 

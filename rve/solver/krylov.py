@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from petsc4py import PETSc
 
+from alphacut.rve.petsc import PETSc
 from alphacut.rve.solver.options import PREFIX, SolverOptions
 from alphacut.rve.solver.petsc_options import in_database
 from alphacut.stochastic.theta.truncated_normal import Array

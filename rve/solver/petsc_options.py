@@ -6,8 +6,7 @@ import ctypes
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 
-from petsc4py import PETSc
-
+from alphacut.rve.petsc import PETSc
 from alphacut.rve.solver.options import PREFIX, OptionError
 
 _LIBRARY = ctypes.CDLL(PETSc.__file__)  # petsc4py does not wrap PetscOptionsUsed

@@ -25,9 +25,9 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from alphacut.rve.mesh.triangulation import Integers
+from alphacut.rve.petsc import PETSc
 from alphacut.rve.solver.constraints import LevelNumbering
 from alphacut.rve.solver.level_cholesky import LevelCholesky
 from alphacut.rve.solver.level_stiffness import LevelPattern, element_stiffness

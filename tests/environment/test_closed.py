@@ -96,3 +96,15 @@ def test_a_command_answers_the_same(unplanted, tmp_path):
         plant(tmp_path, name)
     assert unplanted(*command)[0] == 0
     assert answer(command, environment(tmp_path, {"PYTHONPATH": "lib"})) == unplanted(*command)
+
+
+def test_options_of_petsc_stay_outside(tmp_path):
+    (tmp_path / ".petscrc").write_text("-planted 1\n", encoding="utf-8")
+    planted = {**environment(tmp_path, {}), "PETSC_OPTIONS": "-planted 1"}
+    program, bare = (
+        f"{start}; from petsc4py import PETSc; print(PETSc.Options().hasName('planted'))"
+        for start in ("import alphacut.rve.planar.problem, alphacut.rve.solver.krylov", "pass")
+    )
+    enter = str(ROOT / "enter")
+    assert answer((enter, "python", "-c", program), planted) == (0, "False\n")
+    assert answer((enter, "python", "-c", bare), planted) == (0, "True\n")  # read without it
