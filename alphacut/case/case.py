@@ -172,7 +172,7 @@ class Case:
         """The error of a command that cannot do without a section."""
         what = f"missing; this command needs section [{section}]"
         if section == "picture":
-            section, what = "cell", "missing: this command needs a picture of the cell"
+            section, what = "cell", "missing; this command needs section [cell] with a picture"
         if section in ("cell", "radius") and self.sections.picture:
             what = "missing; the cell is a picture, whose modulus command image computes"
         if section == "radius" and "microstructure" in self.stages:
