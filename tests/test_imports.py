@@ -194,7 +194,7 @@ def test_a_package_imports_fast_and_without_dolfinx(package):
 def test_what_a_model_may_need_is_loaded_before_its_clock_starts(method, exclude, loaded):
     choice = f"CellChoice({method!r}, exclude={exclude!r})"
     program = (
-        "import sys; from alphacut.stages.cell import CellChoice; from alphacut.stages.cell_models import cell_model;"
+        "import sys; from alphacut.stages.material.cell import CellChoice; from alphacut.stages.material.cell_models import cell_model;"
         f" cell_model({choice})"
     )
     told = subprocess.run(

@@ -31,9 +31,9 @@ from alphacut.rve.cell import STRAIN
 from alphacut.rve.declared import error_of_means
 from alphacut.rve.model import cross_check
 from alphacut.rve.result import Homogenised
-from alphacut.stages import cell
-from alphacut.stages.cell_models import cell_model
 from alphacut.stages.contract import contract, keep_modulus, require_choice
+from alphacut.stages.material import cell
+from alphacut.stages.material.cell_models import cell_model
 
 ABOUT = "homogenise the cell at crisp values; a fuzzy input takes its modal value"
 

@@ -31,12 +31,12 @@ from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import progress
 from alphacut.io.provenance import fingerprint
 from alphacut.io.units import engineering, largest_by_unit
-from alphacut.stages import envelope
-from alphacut.stages import exceedance as outcomes
 from alphacut.stages.contract import require_choice
-from alphacut.stages.envelope_task import EnvelopeTask, task_of
-from alphacut.stages.modulus import read_number, stand_in
-from alphacut.stages.structure import Structure, structure
+from alphacut.stages.material.modulus import read_number, stand_in
+from alphacut.stages.vibration import envelope
+from alphacut.stages.vibration import exceedance as outcomes
+from alphacut.stages.vibration.envelope_task import EnvelopeTask, task_of
+from alphacut.stages.vibration.structure import Structure, structure
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:

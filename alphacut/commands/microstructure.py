@@ -14,7 +14,7 @@ from alphacut.io.files import say
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import progress
 from alphacut.io.provenance import attributes, door, fingerprint, versions
-from alphacut.stages import microstructure
+from alphacut.stages.material import microstructure
 
 ABOUT = "from particles, packed or measured, to the random radius and its fuzzy map"
 

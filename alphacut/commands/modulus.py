@@ -30,10 +30,10 @@ from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import progress
 from alphacut.io.provenance import fingerprint
 from alphacut.rve.auto.model import ORDER
-from alphacut.stages import modulus, response
-from alphacut.stages.campaign import campaign
-from alphacut.stages.cell import GPA
 from alphacut.stages.contract import contract, keep_modulus, require_choice
+from alphacut.stages.material import modulus, response
+from alphacut.stages.material.campaign import campaign
+from alphacut.stages.material.cell import GPA
 
 ABOUT = "fuzzy effective modulus by the transformation method over all fuzzy inputs of the cell"
 KEYS = {

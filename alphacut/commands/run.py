@@ -28,12 +28,12 @@ from alphacut.io.output_paths import unwritable
 from alphacut.io.problem import BadInput
 from alphacut.io.provenance import attributes, door, fingerprint
 from alphacut.io.units import engineering, largest_by_unit
-from alphacut.stages import exceedance as outcomes
 from alphacut.stages import summary
 from alphacut.stages import width_shares as shares
 from alphacut.stages.contract import require_choice
 from alphacut.stages.pipeline import Chain, Results
 from alphacut.stages.readiness import ready
+from alphacut.stages.vibration import exceedance as outcomes
 
 ABOUT = (
     "run every stage of a case: files, figures, summary, and the comparison with the paper where"

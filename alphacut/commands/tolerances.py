@@ -21,8 +21,8 @@ from alphacut.commands.options import (
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import progress
 from alphacut.io.units import engineering
-from alphacut.stages.modulus import stand_in
-from alphacut.stages.tolerances import Tolerances, tolerances
+from alphacut.stages.material.modulus import stand_in
+from alphacut.stages.vibration.tolerances import Tolerances, tolerances
 
 ABOUT = "largest scaling of the fuzzy inputs' supports for which the limit provably holds"
 KEYS = {

@@ -10,7 +10,7 @@ from alphacut.case.case import Case
 from alphacut.export.prism_mesh import ORDER
 from alphacut.io.problem import BadInput, Problem
 from alphacut.rve.cell import LOADS, Phase
-from alphacut.stages.cell import modal_values, parts
+from alphacut.stages.material.cell import modal_values, parts
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:

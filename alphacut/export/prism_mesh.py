@@ -10,7 +10,7 @@ import numpy as np
 from alphacut.case.case import Case
 from alphacut.io.files import whole_file
 from alphacut.io.problem import BadInput, Problem
-from alphacut.stages.cell import modal_values, parts
+from alphacut.stages.material.cell import modal_values, parts
 
 if TYPE_CHECKING:
     import meshio

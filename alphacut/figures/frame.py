@@ -8,8 +8,8 @@ import numpy as np
 
 from alphacut.case.case import Case
 from alphacut.figures.style import BLUE, GREY, INK, ORANGE, PURPLE, figure
-from alphacut.stages.structure import per_floor
-from alphacut.stages.structure_words import spread_damping
+from alphacut.stages.vibration.structure import per_floor
+from alphacut.stages.vibration.structure_words import spread_damping
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

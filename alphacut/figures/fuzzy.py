@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.figures.style import BLUE, INK, ORANGE, figure, membership_axes, prefix_axis
-from alphacut.stages.cell import GPA
+from alphacut.stages.material.cell import GPA
 from alphacut.stages.pipeline import Results
 
 if TYPE_CHECKING:

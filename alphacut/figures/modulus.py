@@ -17,7 +17,7 @@ from alphacut.figures.style import (
     membership_axes,
     shaded_cuts,
 )
-from alphacut.stages.cell import GPA
+from alphacut.stages.material.cell import GPA
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from alphacut.figures.style import (
     colours,
     membership_axes,
 )
-from alphacut.stages.cell import GPA
+from alphacut.stages.material.cell import GPA
 
 if TYPE_CHECKING:
     import xarray

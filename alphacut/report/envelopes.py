@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from alphacut.io.units import engineering, largest_by_unit
 from alphacut.report.tables import items, paragraphs, section, table
-from alphacut.stages import exceedance as outcomes
+from alphacut.stages.vibration import exceedance as outcomes
 
 
 def envelopes(summary: Mapping[str, Any], exceedance: Markup) -> Markup:

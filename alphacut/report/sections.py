@@ -16,7 +16,7 @@ from alphacut.report.differences import differences
 from alphacut.report.envelopes import envelopes, natural
 from alphacut.report.figures import gallery, listed
 from alphacut.report.tables import code, details, items, paragraphs, section, table
-from alphacut.stages import response
+from alphacut.stages.material import response
 
 
 def sections(summary: Mapping[str, Any], folder: Path) -> Iterator[Markup]:

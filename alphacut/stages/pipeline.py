@@ -13,15 +13,16 @@ from alphacut.io.files import say, whole_file
 from alphacut.io.netcdf import require_known
 from alphacut.io.progress import progress
 from alphacut.io.provenance import attributes, fingerprint
-from alphacut.stages import envelope, microstructure, modulus, response
-from alphacut.stages import exceedance as outcomes
-from alphacut.stages.campaign import campaign
 from alphacut.stages.contract import keep_modulus
-from alphacut.stages.envelope_task import EnvelopeTask, task_of
 from alphacut.stages.image import bounds, document
 from alphacut.stages.image.reading import study_of
-from alphacut.stages.microstructure import write as write_microstructure
-from alphacut.stages.structure import Structure, structure
+from alphacut.stages.material import microstructure, modulus, response
+from alphacut.stages.material.campaign import campaign
+from alphacut.stages.material.microstructure import write as write_microstructure
+from alphacut.stages.vibration import envelope
+from alphacut.stages.vibration import exceedance as outcomes
+from alphacut.stages.vibration.envelope_task import EnvelopeTask, task_of
+from alphacut.stages.vibration.structure import Structure, structure
 
 if TYPE_CHECKING:
     import xarray

@@ -11,11 +11,11 @@ from alphacut.case.case import Case
 from alphacut.case.names import named_inputs
 from alphacut.fuzzy import FuzzyNumber, Triangular
 from alphacut.io.problem import BadInput, Problem
-from alphacut.stages import modulus
 from alphacut.stages.image.reading import expected_modulus, study_of
+from alphacut.stages.material import modulus
 from alphacut.stages.pipeline import studies
-from alphacut.stages.resolution_checks import rough
-from alphacut.stages.structure import Structure, structure
+from alphacut.stages.vibration.resolution_checks import rough
+from alphacut.stages.vibration.structure import Structure, structure
 
 if TYPE_CHECKING:
     from alphacut.frame import Accelerogram
@@ -51,8 +51,8 @@ def ready(case: Case) -> Readiness:
             is crisp.
     """
     if "microstructure" in case.stages:
-        from alphacut.stages.microstructure import require_readable
-        from alphacut.stages.microstructure import study_of as particles_of
+        from alphacut.stages.material.microstructure import require_readable
+        from alphacut.stages.material.microstructure import study_of as particles_of
 
         particles_of(case)
         require_readable(case)

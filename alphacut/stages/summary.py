@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alphacut.io.provenance import FORMAT, command, versions
-from alphacut.stages import exceedance as outcomes
-from alphacut.stages import modulus, response
-from alphacut.stages.cell import GPA, modal_values, parts
+from alphacut.stages.material import modulus, response
+from alphacut.stages.material.cell import GPA, modal_values, parts
 from alphacut.stages.pipeline import Results
-from alphacut.stages.structure_words import structure_words
+from alphacut.stages.vibration import exceedance as outcomes
+from alphacut.stages.vibration.structure_words import structure_words
 
 if TYPE_CHECKING:
     import xarray

@@ -16,7 +16,7 @@ import numpy as np
 from alphacut.case.case import Case
 from alphacut.fuzzy import Crisp, FuzzyNumber, Reduced, propagate
 from alphacut.io.files import say
-from alphacut.stages.campaign import campaign
+from alphacut.stages.material.campaign import campaign
 from alphacut.stages.pipeline import Results, Study
 from alphacut.stochastic.theta.truncated_normal import Array
 

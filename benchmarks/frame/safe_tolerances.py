@@ -18,9 +18,9 @@ from alphacut.case.load import load
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.fuzzy import Crisp
-from alphacut.stages.modulus import stand_in
-from alphacut.stages.structure import structure
-from alphacut.stages.tolerances import tolerances
+from alphacut.stages.material.modulus import stand_in
+from alphacut.stages.vibration.structure import structure
+from alphacut.stages.vibration.tolerances import tolerances
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

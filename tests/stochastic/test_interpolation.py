@@ -9,9 +9,9 @@ import pytest
 
 from alphacut.case.load import load
 from alphacut.rve import Phase
-from alphacut.stages.campaign import campaign
-from alphacut.stages.cell import CellChoice
-from alphacut.stages.cell_models import cell_model
+from alphacut.stages.material.campaign import campaign
+from alphacut.stages.material.cell import CellChoice
+from alphacut.stages.material.cell_models import cell_model
 from alphacut.stochastic import HermiteMap, TruncatedNormal, gauss_rule, layered_rule
 from alphacut.stochastic.theta.interpolation import between_nodes, lebesgue
 

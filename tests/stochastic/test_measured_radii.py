@@ -11,7 +11,7 @@ from scipy.stats import kstest
 from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.io.problem import BadInput
-from alphacut.stages.microstructure import source
+from alphacut.stages.material.microstructure import source
 from alphacut.stochastic.particles.measured import MeasuredRadii
 from alphacut.stochastic.particles.packing import Packing, _law_test
 

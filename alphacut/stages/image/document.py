@@ -10,9 +10,9 @@ import numpy as np
 from alphacut.io.provenance import versions
 from alphacut.rve.image.directions import directions
 from alphacut.rve.image.model import ImageCut
-from alphacut.stages.cell import GPA
 from alphacut.stages.image.bounds import FuzzyImage
 from alphacut.stages.image.random_response import RandomResponse
+from alphacut.stages.material.cell import GPA
 
 if TYPE_CHECKING:
     import xarray

@@ -10,7 +10,7 @@ import pytest
 
 from alphacut.case.load import load
 from alphacut.entry import main
-from alphacut.stages.envelope_task import task_of
+from alphacut.stages.vibration.envelope_task import task_of
 
 PAPER = Path(__file__).parents[3] / "cases" / "paper.toml"
 

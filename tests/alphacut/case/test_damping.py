@@ -12,7 +12,7 @@ import pytest
 from alphacut.case.checks_structure import incomplete
 from alphacut.case.load import load
 from alphacut.entry import main
-from alphacut.stages.structure import structure
+from alphacut.stages.vibration.structure import structure
 
 CASES = Path(__file__).parents[3] / "cases"
 PAPER = (CASES / "paper.toml").read_text(encoding="utf-8")

@@ -9,7 +9,7 @@ import pytest
 from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.io.problem import BadInput
-from alphacut.stages.microstructure import study_of
+from alphacut.stages.material.microstructure import study_of
 from alphacut.stochastic.particles.log_normal import LogNormalRadii
 from alphacut.stochastic.particles.packing import Packing
 

@@ -10,9 +10,9 @@ import pytest
 from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.io.problem import BadInput
-from alphacut.stages.accelerogram import accelerogram
-from alphacut.stages.measured_modulus import measured_values
-from alphacut.stages.modulus import stand_in
+from alphacut.stages.material.measured_modulus import measured_values
+from alphacut.stages.material.modulus import stand_in
+from alphacut.stages.vibration.accelerogram import accelerogram
 from benchmarks.frame.synthetic_record import SyntheticRecord, text
 
 CASES = Path(__file__).parents[3] / "cases"

@@ -15,8 +15,8 @@ from alphacut.commands.parser import split_petsc
 from alphacut.entry import COMMANDS, main, parsers
 from alphacut.io.files import as_json, rank, standard_output, whole_file
 from alphacut.io.problem import BadInput
-from alphacut.stages.envelope import method_options
-from alphacut.stages.envelope_task import task_of
+from alphacut.stages.vibration.envelope import method_options
+from alphacut.stages.vibration.envelope_task import task_of
 
 CASES = Path(__file__).parents[3] / "cases"
 PAPER = str(CASES / "paper.toml")
@@ -286,7 +286,8 @@ def test_petsc_options_are_taken_out_of_the_command_line(words, ours, petsc):
 
 
 def test_a_second_run_takes_what_is_up_to_date(tmp_path, monkeypatch, capfd):
-    from alphacut.stages import envelope, modulus
+    from alphacut.stages.material import modulus
+    from alphacut.stages.vibration import envelope
 
     arguments = [
         "run",
@@ -312,7 +313,7 @@ def test_a_second_run_takes_what_is_up_to_date(tmp_path, monkeypatch, capfd):
     assert (second["modulus"], second["envelopes"]) == (first["modulus"], first["envelopes"])
     assert calls == []
     assert main([*arguments, "--set", "inclusion_modulus=[74, 80, 85] GPa"]) == 1
-    assert calls == ["alphacut.stages.modulus"]
+    assert calls == ["alphacut.stages.material.modulus"]
     assert main([*arguments, "--fresh"]) == 1
     capfd.readouterr()
 

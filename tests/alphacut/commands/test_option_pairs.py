@@ -232,7 +232,7 @@ class Watched:
         from alphacut.frame.decisions import safe_scale as decisions
         from alphacut.fuzzy.campaign import workers
         from alphacut.io import progress
-        from alphacut.stages import modulus
+        from alphacut.stages.material import modulus
 
         real_scale = decisions.safe_scale
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from alphacut.stages.accelerogram import accelerogram
+from alphacut.stages.vibration.accelerogram import accelerogram
 
 
 def test_rounded_times_do_not_shift_the_end_of_a_record(tmp_path: Path) -> None:

@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from alphacut.entry import main
-from alphacut.stages import pipeline, readiness, structure
+from alphacut.stages import pipeline, readiness
+from alphacut.stages.vibration import structure
 
 CASES = Path(__file__).parents[3] / "cases"
 

@@ -14,9 +14,9 @@ from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.fuzzy import Interval, Trapezoidal, Triangular
 from alphacut.io.problem import BadInput
-from alphacut.stages import exceedance as outcomes
-from alphacut.stages.exceedance import shaped_like
-from alphacut.stages.structure import structure
+from alphacut.stages.vibration import exceedance as outcomes
+from alphacut.stages.vibration.exceedance import shaped_like
+from alphacut.stages.vibration.structure import structure
 
 CASES = Path(__file__).parents[3] / "cases"
 PAPER = CASES / "paper.toml"

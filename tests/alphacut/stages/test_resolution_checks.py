@@ -15,8 +15,8 @@ from alphacut.frame import LinearFlow, StoreyFrame
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.checks.tolerance import tolerance_guard
 from alphacut.fuzzy import Triangular
-from alphacut.stages.envelope_task import task_of
 from alphacut.stages.readiness import ready
+from alphacut.stages.vibration.envelope_task import task_of
 
 CASES = Path(__file__).parents[3] / "cases"
 PAPER = str(CASES / "paper.toml")

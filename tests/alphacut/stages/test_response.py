@@ -12,7 +12,7 @@ import xarray
 from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.io.problem import BadInput
-from alphacut.stages import response
+from alphacut.stages.material import response
 from alphacut.stochastic import TruncatedNormal
 
 PAPER = Path(__file__).parents[3] / "cases" / "paper.toml"

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from alphacut.case.load import load
-from alphacut.stages.campaign import campaign
+from alphacut.stages.material.campaign import campaign
 
 CASES = Path(__file__).parents[3] / "cases"
 

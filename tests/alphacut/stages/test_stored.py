@@ -16,7 +16,7 @@ from alphacut.entry import main
 from alphacut.io.netcdf import read_dataset, read_summary
 from alphacut.io.problem import BadInput
 from alphacut.io.provenance import FORMAT
-from alphacut.stages.modulus import read_number
+from alphacut.stages.material.modulus import read_number
 
 OLD = Path(__file__).parent / "stored-v1"
 PAPER = Path(__file__).parents[3] / "cases" / "paper.toml"

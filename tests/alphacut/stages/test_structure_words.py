@@ -14,8 +14,8 @@ from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import PiecewiseLinear, Triangular
 from alphacut.io.problem import BadInput
 from alphacut.io.quantity import fuzzy
-from alphacut.stages.structure import structure
-from alphacut.stages.structure_words import in_unit, structure_words
+from alphacut.stages.vibration.structure import structure
+from alphacut.stages.vibration.structure_words import in_unit, structure_words
 
 CASES = Path(__file__).parents[3] / "cases"
 MODULUS = Triangular(22e9, 25e9, 26e9)

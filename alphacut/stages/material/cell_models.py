@@ -13,7 +13,7 @@ from alphacut.rve.auto.refined import RefinedModel
 from alphacut.rve.image.round_particle import RasterModel
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.table.model import TableModel
-from alphacut.stages.cell import CellChoice, CellModel
+from alphacut.stages.material.cell import CellChoice, CellModel
 
 SHARE = 0.4
 """Of the tolerance, for the series at each θ and again for its rule in θ."""

@@ -12,8 +12,8 @@ from alphacut.case.names import OTHERS
 from alphacut.case.sections.structures import Frame
 from alphacut.fuzzy import FuzzyNumber, PiecewiseLinear
 from alphacut.io.units import MINUS, shown
-from alphacut.stages.structure import Structure, per_floor
-from alphacut.stages.structure import columns as count_columns
+from alphacut.stages.vibration.structure import Structure, per_floor
+from alphacut.stages.vibration.structure import columns as count_columns
 
 if TYPE_CHECKING:
     from alphacut.frame.structures.linear import Accelerogram

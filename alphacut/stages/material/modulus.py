@@ -17,10 +17,10 @@ from alphacut.io.netcdf import read_dataset
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
 from alphacut.io.provenance import attributes, versions
-from alphacut.stages.campaign import Campaign, theta_shown
-from alphacut.stages.cell import GPA, CellChoice, anisotropy, parts
-from alphacut.stages.cell_models import cell_model
-from alphacut.stages.measured_modulus import measured_modulus
+from alphacut.stages.material.campaign import Campaign, theta_shown
+from alphacut.stages.material.cell import GPA, CellChoice, anisotropy, parts
+from alphacut.stages.material.cell_models import cell_model
+from alphacut.stages.material.measured_modulus import measured_modulus
 
 if TYPE_CHECKING:
     import xarray

@@ -14,7 +14,7 @@ from alphacut.case.case import Case
 from alphacut.fuzzy import Extended, FuzzyNumber, General, Known, Reduced, Signed
 from alphacut.fuzzy.plans.plan import Plan
 from alphacut.io.provenance import source_digest, versions
-from alphacut.stages.cell import (
+from alphacut.stages.material.cell import (
     SHARED,
     CellChoice,
     cell_choice,
@@ -22,7 +22,7 @@ from alphacut.stages.cell import (
     modal_values,
     parts,
 )
-from alphacut.stages.cell_models import cell_model
+from alphacut.stages.material.cell_models import cell_model
 from alphacut.stochastic.theta.interpolation import between_nodes
 from alphacut.stochastic.theta.truncated_normal import Array
 

@@ -15,9 +15,9 @@ from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
 from alphacut.io.provenance import attributes, versions
 from alphacut.stages.contract import keep
-from alphacut.stages.envelope_task import EnvelopeTask
-from alphacut.stages.resolution_checks import guard_against
-from alphacut.stages.structure import Structure
+from alphacut.stages.vibration.envelope_task import EnvelopeTask
+from alphacut.stages.vibration.resolution_checks import guard_against
+from alphacut.stages.vibration.structure import Structure
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 from alphacut.io.files import say
 from alphacut.io.problem import BadInput, Problem
-from alphacut.stages.structure import Structure
+from alphacut.stages.vibration.structure import Structure
 
 if TYPE_CHECKING:
-    from alphacut.stages.envelope_task import EnvelopeTask
+    from alphacut.stages.vibration.envelope_task import EnvelopeTask
 
 MISSED = 0.01  # of a peak, between two nodes
 WITH_TOLERANCE = ("auto", "modal", "graph-follower", "improved-graph-follower")

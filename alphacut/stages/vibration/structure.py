@@ -10,7 +10,7 @@ from alphacut.case.case import Case
 from alphacut.case.sections.structures import Frame, Pendulum, Tower
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.problem import BadInput, Problem
-from alphacut.stages.accelerogram import accelerogram
+from alphacut.stages.vibration.accelerogram import accelerogram
 
 if TYPE_CHECKING:
     from alphacut.frame import StoreyFrame

@@ -17,8 +17,8 @@ from alphacut.case.limits import limit_of
 from alphacut.fuzzy import FuzzyNumber, Interval, Signed, propagate
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
-from alphacut.stages.campaign import Campaign, campaign
-from alphacut.stages.structure import Structure, structure
+from alphacut.stages.material.campaign import Campaign, campaign
+from alphacut.stages.vibration.structure import Structure, structure
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ import numpy as np
 from alphacut.case.case import Case
 from alphacut.fuzzy import FuzzyResult, RandomResponse
 from alphacut.fuzzy.sets.boxes import Domain
-from alphacut.stages.campaign import fuzzy_inputs
-from alphacut.stages.cell import GPA
+from alphacut.stages.material.campaign import fuzzy_inputs
+from alphacut.stages.material.cell import GPA
 
 if TYPE_CHECKING:
     import xarray

@@ -14,14 +14,14 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
 from alphacut.io.units import engineering
-from alphacut.stages.structure import Structure
+from alphacut.stages.vibration.structure import Structure
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     import xarray
 
     from alphacut.frame import Envelope
-    from alphacut.stages.envelope_task import EnvelopeTask
+    from alphacut.stages.vibration.envelope_task import EnvelopeTask
 
 Sampler = Callable[[np.random.Generator, int], Array]
 FACTS = (
