@@ -56,6 +56,11 @@ class Damage(NamedTuple):
         return self.start + self.size
 
 
+def marked(start: bytes) -> bool:
+    """Whether a file begins with the mark of a record of any format."""
+    return start[: len(NAME)] == NAME and start[len(NAME) + 1 :] == MARK[len(NAME) + 1 :]
+
+
 def packed(content: bytes) -> bytes:
     """A content as a record."""
     length = _LENGTH.pack(len(content))

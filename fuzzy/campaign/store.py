@@ -104,12 +104,12 @@ class Store:
     def _require_store(self) -> None:
         """Refuse a file that holds neither a record nor the mark of one."""
         start = self._read(0, len(records.MARK))
-        if not start or start == records.MARK or start[:1] == records.VOID:
-            return
+        if records.MARK.startswith(start) or start[:1] == records.VOID:
+            return  # a record, or the torn beginning of the first one
         if any(isinstance(one, Record) for one in self._scan(0)):
             return
         self.close()
-        if start.startswith(records.NAME) and len(start) > len(records.NAME):
+        if records.marked(start):
             raise ValueError(
                 f"{self.path} has format {start[len(records.NAME)]}, this program writes"
                 f" {records.FORMAT}; update the program or give another path"

@@ -168,6 +168,10 @@ def test_the_torn_end_of_a_killed_write_is_dropped_in_silence(tmp_path):
         assert run(path).reused == 54
         assert path.read_bytes().count(MARK) == 56
         assert run(path).reused == 55
+    for left in (0, 1, 4, 5, 7, 8, 9, 40):
+        path.write_bytes(data[:left])
+        assert run(path).reused == 0
+        assert run(path).reused == 55
 
 
 def test_only_a_store_is_repaired(tmp_path, capfd):
