@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from alphacut.entry import COMMANDS, main, parsers
+from alphacut.fuzzy import Store
 
 CASE = """
 schema = 1
@@ -106,7 +107,7 @@ VALUES = {
     "--matrix-modulus": ("21 GPa",),
     "--inclusion-modulus": ("81 GPa",),
     "--layers": ("3",),
-    "--mesh-size": ("0.5",),
+    "--mesh-size": ("0.3",),
     "--interface": ("sign",),
     "--plan": ("general",),
     "--alpha": ("0.4",),
@@ -152,7 +153,7 @@ OWN = {
     ("tolerances", "--set"): ("frame.dampers=60 N s/m",),
     ("run", "--set"): ("frame.dampers=60 N s/m",),
     ("run", "--out"): ("other",),
-    ("check", "--set"): ("frame.masses=20 t",),
+    ("check", "--set"): ("frame.lengths=[2.8, 3, 3.2] m",),
     ("microstructure", "--set"): ("microstructure.seed=2",),
     ("microstructure", "--out"): ("particles",),
     ("report", "--out"): ("page.html",),
@@ -166,6 +167,22 @@ EXPLAINED = {
 }
 """An option, beside which other one (or any) it may be idle, and where its help says so."""
 BASE = {"mesh": ["--out", "mesh.vtu"]}
+PRISM = ("--method", "prism")
+MISSED = ("--tolerance", "1e-9")
+NEEDED = {
+    ("cell", "--layers"): PRISM,
+    ("cell", "--mesh-size"): PRISM,
+    ("cell", "--interface"): PRISM,
+    ("cell", "--stiffness"): PRISM,
+    ("cell", "--best-effort"): (*PRISM, *MISSED),
+    ("cell", "--exclude"): ("--method", "auto"),
+    ("modulus", "--exclude"): ("--method", "auto"),
+    ("modulus", "--best-effort"): (*PRISM, *MISSED, "--alpha", "1"),
+    ("envelope", "--best-effort"): ("--method", "graph-follower", *MISSED),
+    ("envelope", "--workers"): ("--certify", "1e-3"),
+    ("microstructure", "--no-figures"): ("--out", "particles"),
+}
+"""Options that are refused alone, with those that they need; --strict is to refuse, no more."""
 NEEDS_RESULTS = {"run": ("--fresh",), "modulus": ("--store", "--resume")}
 
 
@@ -182,6 +199,12 @@ def choices(command, parser):
     return found
 
 
+def pairs(command, parser):
+    """Every two different options of a command."""
+    every = itertools.combinations(choices(command, parser), 2)
+    return [(first, second) for first, second in every if first[0] != second[0]]
+
+
 class Watched:
     """Runs of one command, each in a folder of its own, with all that they do and compute."""
 
@@ -192,7 +215,7 @@ class Watched:
             monkeypatch,
             capfd,
         )
-        self.events, self.known = [], {}
+        self.events, self.known, self.base = [], {}, list(BASE.get(command, []))
         self.watch()
         self.results = folder / "results"
         self.results.mkdir()
@@ -221,6 +244,7 @@ class Watched:
         if self.command == "report":
             text = CASE.format(stages='["envelope"]', modulus='modulus = "25.5 GPa"\n')
         text = {"microstructure": PACKED, "image": IMAGED}.get(self.command, text)
+        Store(place / "a.db").close()
         np.save(place / "a.npy", np.pad(np.ones((4, 4), int), 4))
         (place / "case.toml").write_text(text, encoding="utf-8")
 
@@ -291,7 +315,7 @@ class Watched:
 
     def run(self, *words, results=False):
         """Exit status, output, files and computations of one run."""
-        key = (*words, results)
+        key = (*self.base, *words, results)
         if key not in self.known:
             place = self.folder / str(len(self.known))
             if results or self.command == "report":
@@ -301,9 +325,9 @@ class Watched:
                 self.write_case(place)
             self.monkeypatch.chdir(place)
             self.events.clear()
-            subject = "results/case" if self.command == "report" else "case.toml"
+            subject = {"report": "results/case", "repair": "a.db"}.get(self.command, "case.toml")
             before = {path: stamp(path) for path in place.rglob("*")}
-            status = main([self.command, subject, *BASE.get(self.command, []), *words])
+            status = main([self.command, subject, *self.base, *words])
             out, err = self.capfd.readouterr()
             files = sorted(
                 f"{path.relative_to(place)} {content(path)}"
@@ -349,7 +373,7 @@ def ignored(watched, parser, first, second):
     needed = any(option[0] in needs for option in (first, second))
     for one, other in ((first, second), (second, first)):
         both = watched.run(*first, *second, results=needed)
-        if both[0] == 2:
+        if both[0] == 2 or (both[0] == 1 and "is asked for" in both[2]):
             assert both[2].startswith("alphacut: ")
             return
         if both == watched.run(*other, results=needed) and not explained(parser, one[0], other[0]):
@@ -362,21 +386,39 @@ def test_no_option_is_ignored_beside_another(command, tmp_path, monkeypatch, cap
         pytest.importorskip("dolfinx")
     parser = parsers("alphacut", COMMANDS)[1][command]
     watched = Watched(command, tmp_path, monkeypatch, capfd)
-    wrong = []
-    for first, second in itertools.combinations(choices(command, parser), 2):
-        if first[0] != second[0]:
-            wrong += ignored(watched, parser, first, second)
+    wrong = [line for pair in pairs(command, parser) for line in ignored(watched, parser, *pair)]
     assert "\n".join(wrong) == ""
+    assert "\n".join(idle_beside_what_they_need(watched, parser)) == ""
 
 
-def test_an_ignored_option_would_be_seen(tmp_path, monkeypatch, capfd):
+def idle_beside_what_they_need(watched, parser):
+    """Those ignored among pairs of an option that is refused alone, beside what it needs."""
+    every = choices(watched.command, parser)
+    needy = [one for one in every if one[0] != "--strict" and watched.run(*one)[0] == 2]
+    plain = list(watched.base)
+    for first in needy:
+        watched.base = [*plain, *NEEDED.get((watched.command, first[0]), ())]
+        assert watched.run(*first)[0] != 2, watched.run(*first)[2]
+        for second in every:
+            if second[0] not in (first[0], *watched.base):
+                yield from ignored(watched, parser, first, second)
+    watched.base = plain
+
+
+def test_an_option_that_nobody_reads_is_seen(tmp_path, monkeypatch, capfd):
+    real = COMMANDS["check"].arguments
+
+    def arguments(parser):
+        real(parser)
+        parser.add_argument("--idle", action="store_true")
+
+    monkeypatch.setattr(COMMANDS["check"], "arguments", arguments)
+    monkeypatch.setitem(VALUES, "--idle", ((),))
     parser = parsers("alphacut", COMMANDS)[1]["check"]
     watched = Watched("check", tmp_path, monkeypatch, capfd)
-    first, second = ["--json", "-"], ["--set", "frame.masses=20 t"]
-    watched.known[(*first, *second, False)] = watched.run(*first)
-    assert list(ignored(watched, parser, first, second)) == [
-        "--set frame.masses=20 t beside --json -"
-    ]
+    wrong = [line for pair in pairs("check", parser) for line in ignored(watched, parser, *pair)]
+    assert {line.partition(" beside ")[0] for line in wrong} == {"--idle"}
+    assert len(wrong) == 4
 
 
 @pytest.mark.parametrize("command", COMMANDS)
