@@ -22,8 +22,9 @@ from alphacut.frame.methods.judged import judged
 from alphacut.frame.methods.named import named, options_of
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
-from alphacut.fuzzy import FuzzyNumber, JointClaim
+from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arguments import fuzzy_inputs
+from alphacut.fuzzy.knowledge.joint import JointClaim
 
 Progress = Callable[[float], None]
 

@@ -1,15 +1,12 @@
 """Fuzzy inputs through any model: α-cuts, plans of samples, fuzzy results."""
 
 from alphacut.fuzzy.campaign.campaign import CampaignError
-from alphacut.fuzzy.campaign.store import Store, StoreError
-from alphacut.fuzzy.decisions.limits import Decision, decide, safe_scale
-from alphacut.fuzzy.decisions.nested_boxes import Threshold
+from alphacut.fuzzy.campaign.store import Store
+from alphacut.fuzzy.decisions.limits import decide, safe_scale
 from alphacut.fuzzy.dry_run import explain
-from alphacut.fuzzy.knowledge.enclosure import gradient_range
 from alphacut.fuzzy.knowledge.from_data import from_data
-from alphacut.fuzzy.knowledge.joint import JointClaim, jointly
+from alphacut.fuzzy.knowledge.joint import jointly
 from alphacut.fuzzy.knowledge.known import Known
-from alphacut.fuzzy.knowledge.order_statistics import least_alpha, values_needed
 from alphacut.fuzzy.plans.alpha_cut_optimisation import Optimisation
 from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.branch_and_bound import BranchAndBound
@@ -21,11 +18,8 @@ from alphacut.fuzzy.plans.sparse_chebyshev import Chebyshev
 from alphacut.fuzzy.plans.transformation import Extended, General, Reduced
 from alphacut.fuzzy.propagation import propagate
 from alphacut.fuzzy.random_response import RandomResponse
-from alphacut.fuzzy.samples.nature import Nature
-from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.arithmetic import DependencyError, apply
 from alphacut.fuzzy.sets.boxes import levels
-from alphacut.fuzzy.sets.claimed import Claim, Claimed
 from alphacut.fuzzy.sets.interaction import Ellipsoidal, Linear
 from alphacut.fuzzy.sets.numbers import (
     Crisp,
@@ -35,7 +29,6 @@ from alphacut.fuzzy.sets.numbers import (
     Trapezoidal,
     Triangular,
 )
-from alphacut.fuzzy.sets.stepwise import Stepwise
 from alphacut.fuzzy.width_contributions import width_shares
 
 __all__ = [
@@ -43,24 +36,18 @@ __all__ = [
     "BranchAndBound",
     "CampaignError",
     "Chebyshev",
-    "Claim",
-    "Claimed",
     "Crisp",
-    "Decision",
     "DependencyError",
     "Ellipsoidal",
     "Extended",
     "FuzzyNumber",
-    "FuzzyResult",
     "General",
     "Interval",
     "IntervalQuasiMonteCarlo",
-    "JointClaim",
     "Known",
     "Linear",
     "Metamodel",
     "MonteCarlo",
-    "Nature",
     "Optimisation",
     "PiecewiseLinear",
     "QuasiMonteCarlo",
@@ -68,22 +55,16 @@ __all__ = [
     "RandomResponse",
     "Reduced",
     "Signed",
-    "Stepwise",
     "Store",
-    "StoreError",
-    "Threshold",
     "Trapezoidal",
     "Triangular",
     "apply",
     "decide",
     "explain",
     "from_data",
-    "gradient_range",
     "jointly",
-    "least_alpha",
     "levels",
     "propagate",
     "safe_scale",
-    "values_needed",
     "width_shares",
 ]

@@ -9,7 +9,7 @@ from typing import Any
 from markupsafe import Markup
 
 from alphacut.figures.captions import core, in_words
-from alphacut.fuzzy import Nature
+from alphacut.fuzzy.samples.nature import Nature
 from alphacut.io.units import engineering
 from alphacut.report.citation import citation
 from alphacut.report.differences import differences

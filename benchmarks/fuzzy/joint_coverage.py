@@ -19,7 +19,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from alphacut.fuzzy import Claimed, FuzzyNumber, Known, Signed, from_data, jointly, propagate
+from alphacut.fuzzy import FuzzyNumber, Known, Signed, from_data, jointly, propagate
+from alphacut.fuzzy.sets.claimed import Claimed
 from benchmarks.rows import write
 
 Array = NDArray[np.float64]

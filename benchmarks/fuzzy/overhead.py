@@ -18,9 +18,10 @@ from time import perf_counter
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-from alphacut.fuzzy import FuzzyResult, Interval, propagate
+from alphacut.fuzzy import Interval, propagate
 from alphacut.fuzzy.samples.design import Design
 from alphacut.fuzzy.samples.model import Model
+from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
 
 

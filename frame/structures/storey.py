@@ -157,7 +157,7 @@ class StoreyFrame:
     @property
     def ratios(self) -> dict[str, float]:
         """Damping ratios by the names of their parameters; empty where there are none."""
-        values = cast(Sequence[float], self.damping_ratio)
+        values = np.atleast_1d(self.damping_ratio)
         return {
             "zeta" if len(values) == 1 else f"zeta{k + 1}": float(x) for k, x in enumerate(values)
         }

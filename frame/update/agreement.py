@@ -13,8 +13,8 @@ from scipy.optimize import least_squares, linprog
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.update.chain import Chain
 from alphacut.frame.update.measured import Measurement
-from alphacut.fuzzy import Claimed, FuzzyNumber
-from alphacut.fuzzy.sets.claimed import Joint
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy.sets.claimed import Claimed, Joint
 from alphacut.fuzzy.sets.numbers import Cut
 
 MIDDLE = 0.3

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
-from alphacut.fuzzy import Claimed, Crisp, FuzzyNumber, from_data
+from alphacut.fuzzy import Crisp, FuzzyNumber, from_data
 from alphacut.fuzzy.knowledge.named_law import from_scatter
+from alphacut.fuzzy.sets.claimed import Claimed
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,9 @@ from alphacut.frame.update.chain import Chain
 from alphacut.frame.update.enclosure import PASSES, Enclosure, enclosure
 from alphacut.frame.update.identified import Direction, directions
 from alphacut.frame.update.measured import Measurement
-from alphacut.fuzzy import Claim, Claimed, Crisp, FuzzyNumber
+from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.knowledge.joint import JointClaim
+from alphacut.fuzzy.sets.claimed import Claim, Claimed
 from alphacut.fuzzy.sets.numbers import Cut
 from alphacut.fuzzy.sets.stepwise import outer_steps
 

@@ -80,7 +80,7 @@ class Tracer:
             self._trace.refuse("a remainder has no enclosure")
         if type(exponent) is Tracer or not _whole(self._number(exponent)):
             return self._positive_power(self._operand(exponent))
-        whole = int(cast("float", exponent))
+        whole = int(self._number(exponent))
         if whole < 0:
             return 1.0 / self**-whole
         return self._chain(

@@ -15,7 +15,6 @@ from alphacut.fuzzy import (
     Known,
     Linear,
     MonteCarlo,
-    Nature,
     Optimisation,
     QuasiMonteCarlo,
     RandomInput,
@@ -27,6 +26,7 @@ from alphacut.fuzzy import (
     width_shares,
 )
 from alphacut.fuzzy.random_response import RandomResponse
+from alphacut.fuzzy.samples.nature import Nature
 
 MEAN, SPREAD = Triangular(9.0, 10.0, 12.0), Triangular(1.0, 2.0, 2.5)
 NODES = np.linspace(-4, 4, 41)

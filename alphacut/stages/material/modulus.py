@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alphacut.case.case import Case
-from alphacut.fuzzy import Crisp, FuzzyNumber, FuzzyResult, Nature, PiecewiseLinear, propagate
+from alphacut.fuzzy import Crisp, FuzzyNumber, PiecewiseLinear, propagate
 from alphacut.fuzzy import explain as fuzzy_explain
 from alphacut.fuzzy.dry_run import Explanation
+from alphacut.fuzzy.samples.nature import Nature
+from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.io.files import whole_file
 from alphacut.io.netcdf import read_dataset
 from alphacut.io.problem import BadInput, Problem

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alphacut.case.case import Case
-from alphacut.fuzzy import FuzzyResult, RandomResponse
+from alphacut.fuzzy import RandomResponse
+from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.stages.material.campaign import fuzzy_inputs
 from alphacut.stages.material.cell import GPA

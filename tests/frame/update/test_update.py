@@ -13,7 +13,8 @@ from alphacut.frame.update.linear_bounds import LinearProgram
 from alphacut.frame.update.measured import MeasuredMode, Measurement, measured_mode
 from alphacut.frame.update.posterior import RefutedError, update
 from alphacut.frame.update.relaxation import CONSTANT, Rows, relaxation
-from alphacut.fuzzy import Claimed, FuzzyNumber, Interval, Triangular, from_data
+from alphacut.fuzzy import FuzzyNumber, Interval, Triangular, from_data
+from alphacut.fuzzy.sets.claimed import Claimed
 
 FRAME = StoreyFrame([20e3, 15e3, 10e3], [3.0, 2.8, 2.8], 30e9, 3e-4, q0=(0.01, 0.02, 0.03))
 NAMES = ("c1", "c2", "c3")

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from alphacut.fuzzy import General, Reduced, StoreError, Triangular
+from alphacut.fuzzy import General, Reduced, Triangular
 from alphacut.fuzzy.campaign import network_folder, sample_locks, sample_store
+from alphacut.fuzzy.campaign.store import StoreError
 from tests.fuzzy.general import propagate
 
 INPUTS = {"a": Triangular(0.0, 0.3, 1.0), "b": Triangular(-1.0, 0.0, 2.0)}

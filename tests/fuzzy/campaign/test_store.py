@@ -14,18 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from alphacut.fuzzy import (
-    CampaignError,
-    Interval,
-    MonteCarlo,
-    Store,
-    StoreError,
-    Triangular,
-    levels,
-)
+from alphacut.fuzzy import CampaignError, Interval, MonteCarlo, Store, Triangular, levels
 from alphacut.fuzzy.campaign.call import Sample
 from alphacut.fuzzy.campaign.sample_store import Shelf
-from alphacut.fuzzy.campaign.store import canonical
+from alphacut.fuzzy.campaign.store import StoreError, canonical
 from tests.fuzzy.general import propagate
 
 INPUTS = {"a": Triangular(0.0, 0.3, 1.0), "b": Triangular(-1.0, 0.0, 2.0)}

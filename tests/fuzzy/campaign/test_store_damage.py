@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from alphacut.entry import main
-from alphacut.fuzzy import Store, StoreError, Triangular
+from alphacut.fuzzy import Store, Triangular
 from alphacut.fuzzy.campaign.records import HEAD, MARK
 from alphacut.fuzzy.campaign.sample_store import Shelf
+from alphacut.fuzzy.campaign.store import StoreError
 from tests.fuzzy.general import propagate
 
 INPUTS = {"a": Triangular(0.0, 0.3, 1.0), "b": Triangular(-1.0, 0.0, 2.0)}

@@ -13,9 +13,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from alphacut.fuzzy import BranchAndBound, Interval, Known, Signed, gradient_range, propagate
+from alphacut.fuzzy import BranchAndBound, Interval, Known, Signed, propagate
 from alphacut.fuzzy.knowledge import interval_arithmetic
-from alphacut.fuzzy.knowledge.enclosure import Enclosed
+from alphacut.fuzzy.knowledge.enclosure import Enclosed, gradient_range
 
 LOW, HIGH = np.array([[-1.0]]), np.array([[1.0]])
 

@@ -5,10 +5,8 @@ import pytest
 
 from alphacut.frame import StoreyFrame, envelope
 from alphacut.fuzzy import (
-    Claimed,
     Crisp,
     Ellipsoidal,
-    JointClaim,
     Known,
     Optimisation,
     Signed,
@@ -17,7 +15,9 @@ from alphacut.fuzzy import (
     jointly,
     propagate,
 )
+from alphacut.fuzzy.knowledge.joint import JointClaim
 from alphacut.fuzzy.sets.arithmetic import DependencyError
+from alphacut.fuzzy.sets.claimed import Claimed
 from benchmarks.fuzzy.joint_coverage import rows_of
 
 BOUNDS = (0, 100)

@@ -7,16 +7,8 @@ import pytest
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
-from alphacut.fuzzy import (
-    Automatic,
-    General,
-    Interval,
-    Known,
-    Linear,
-    Nature,
-    Triangular,
-    propagate,
-)
+from alphacut.fuzzy import Automatic, General, Interval, Known, Linear, Triangular, propagate
+from alphacut.fuzzy.samples.nature import Nature
 
 KINDS = ("monotone", "inside", "ridge", "kink", "wave")
 

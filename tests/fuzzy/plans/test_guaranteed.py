@@ -12,14 +12,13 @@ from alphacut.fuzzy import (
     Interval,
     Known,
     Linear,
-    Nature,
     Signed,
     Triangular,
-    gradient_range,
     levels,
     propagate,
 )
-from alphacut.fuzzy.knowledge.enclosure import Enclosed
+from alphacut.fuzzy.knowledge.enclosure import Enclosed, gradient_range
+from alphacut.fuzzy.samples.nature import Nature
 from tests.fuzzy.plans.test_plans import PROBLEMS, brute_force, random_problem
 
 FUNCTIONS = {

@@ -8,7 +8,6 @@ from alphacut.fuzzy import (
     General,
     IntervalQuasiMonteCarlo,
     Metamodel,
-    Nature,
     Optimisation,
     RandomInput,
     Reduced,
@@ -19,6 +18,7 @@ from alphacut.fuzzy import (
 )
 from alphacut.fuzzy.campaign.call import Call
 from alphacut.fuzzy.campaign.campaign import Campaign
+from alphacut.fuzzy.samples.nature import Nature
 from alphacut.fuzzy.sets.boxes import Domain
 
 INPUTS = {"a": Triangular(0.0, 0.4, 1.0), "b": Triangular(1.0, 1.5, 3.0)}

@@ -12,7 +12,6 @@ from alphacut.fuzzy import (
     Interval,
     Known,
     MonteCarlo,
-    Nature,
     Optimisation,
     QuasiMonteCarlo,
     Reduced,
@@ -21,6 +20,7 @@ from alphacut.fuzzy import (
     levels,
     propagate,
 )
+from alphacut.fuzzy.samples.nature import Nature
 
 
 def ishigami(x1, x2, x3):

@@ -9,13 +9,13 @@ from alphacut.fuzzy import (
     General,
     Interval,
     Known,
-    Nature,
     Reduced,
     Signed,
     Triangular,
     propagate,
 )
 from alphacut.fuzzy.plans.monotonicity import Verification
+from alphacut.fuzzy.samples.nature import Nature
 
 PAPER = {
     "a2": Triangular(0.001, 0.1, 0.3145),

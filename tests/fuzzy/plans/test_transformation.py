@@ -11,7 +11,6 @@ from alphacut.fuzzy import (
     Extended,
     General,
     Interval,
-    Nature,
     Reduced,
     Trapezoidal,
     Triangular,
@@ -19,6 +18,7 @@ from alphacut.fuzzy import (
     propagate,
 )
 from alphacut.fuzzy.plans.transformation import hanss_points
+from alphacut.fuzzy.samples.nature import Nature
 from alphacut.fuzzy.sets.boxes import Domain
 
 PAPER = {
