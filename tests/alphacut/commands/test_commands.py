@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from alphacut.case.load import load
-from alphacut.case.schema import ENVELOPE_METHODS
+from alphacut.case.sections.vibration import ENVELOPE_METHODS
 from alphacut.commands.parser import split_petsc
 from alphacut.entry import COMMANDS, main, parsers
 from alphacut.io.files import as_json, rank, standard_output, whole_file
