@@ -42,10 +42,10 @@ def basis(u: Array, index: Index) -> Array:
     out = np.ones((len(u), len(index)))
     for start in range(0, len(u), 2048):  # pieces that stay in the cache
         piece = powers[..., start : start + 2048]
-        product: Array = piece[0, index[:, 0]]
+        monomials: Array = piece[0, index[:, 0]]
         for i in range(1, u.shape[1]):
-            product *= piece[i, index[:, i]]
-        out[start : start + 2048] = product.T
+            monomials *= piece[i, index[:, i]]
+        out[start : start + 2048] = monomials.T
     return out
 
 
@@ -67,7 +67,7 @@ def lowered(index: bytes, shape: tuple[int, int], axis: int) -> Index:
     return np.array([lookup.get(tuple(row), 0) for row in (rows - step).tolist()], np.int64)
 
 
-def _product(real: Array, coefficients: Array) -> Array:
+def product(real: Array, coefficients: Array) -> Array:
     """Real @ coefficients for complex coefficients without making `real` complex."""
     if not np.iscomplexobj(coefficients):
         plain: Array = real @ coefficients
@@ -108,7 +108,7 @@ class Polynomial:
 
     def __call__(self, u: Array) -> Array:
         """Values at (S, d), shape (S, K)."""
-        return _product(basis(u, self.index), self.coefficients)
+        return product(basis(u, self.index), self.coefficients)
 
     def jet(self, u: Array) -> Jet:
         """Values with first and second derivatives, V = (S, K)."""
@@ -119,9 +119,9 @@ class Polynomial:
         lower, lowest = (terms(d, max(degree - k, 0)) for k in (1, 2))
         for i in range(d):
             for j in range(i, d):
-                second[i, j] = second[j, i] = _product(B[:, :lowest], self.curve[i, j, :lowest])
-        first = np.stack([_product(B[:, :lower], self.slope[i, :lower]) for i in range(d)])
-        return Jet(_product(B, self.coefficients), first, second)
+                second[i, j] = second[j, i] = product(B[:, :lowest], self.curve[i, j, :lowest])
+        first = np.stack([product(B[:, :lower], self.slope[i, :lower]) for i in range(d)])
+        return Jet(product(B, self.coefficients), first, second)
 
 
 def fit(u: Array, data: Jet, degree: int) -> Polynomial:

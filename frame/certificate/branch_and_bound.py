@@ -1,94 +1,37 @@
 """Branch and bound for the modal model: every bound between attained and proved.
 
-A box of parameters is closed by one of four tests, each on the quadratic Taylor model with the
-remainder of `frame.remainder`:
-1. its bound lies below the best known value; 2. the output is monotone along an axis and the
-neighbouring box, or the face, covers it; 3. near the best point the quadratic model, made less
-concave by the remainder, has no higher point; else it is halved.
+All nodes, outputs and sides share one tree of boxes, and each box its polynomials. A box is closed
+for a problem by one of four tests, each on the quadratic Taylor model with the remainder of
+`remainder`: 1. its bound lies below the best known value; 2. the output is monotone along an axis,
+and the neighbouring box, or the face, covers it; 3. a concave function above the quadratic model
+has no higher point; 4. near the best point the same holds for the Taylor model there, made less
+concave by the remainder. Else it is halved.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
-from alphacut.frame.calculus.box_quadratic import gain, global_maximum
 from alphacut.frame.calculus.jet import Array
+from alphacut.frame.certificate.box_models import BoxModels
+from alphacut.frame.certificate.frontier import Frontier
+from alphacut.frame.certificate.kernel import examination
+from alphacut.frame.certificate.numpy_kernel import bounds
+from alphacut.frame.certificate.piece import Piece, Problems
 from alphacut.frame.certificate.remainder import Remainder
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.search import Optima, refine
 
-PIECE = 4000
-"""Boxes examined together."""
-PROBLEMS = 500
-"""Problems of one task."""
+PIECE = 30_000
+"""Items examined together."""
+HIGHER = 1e-10
+"""Least gain for which a better point is taken over."""
 
 Progress = Callable[[float], None]
-
-
-@dataclass(eq=False)
-class Cells:
-    """Boxes still open, each for one problem.
-
-    Args:
-        problem: Index of the problem, shape (N,).
-        centre: Unit coordinates, shape (N, d).
-        radius: Half widths, shape (N, d); 0 along axes reduced to a face.
-    """
-
-    problem: Array
-    centre: Array
-    radius: Array
-
-    def __len__(self) -> int:
-        return len(self.problem)
-
-    def take(self, which: Array) -> Cells:
-        """The boxes `which`."""
-        return Cells(self.problem[which], self.centre[which], self.radius[which])
-
-    def pieces(self) -> list[Cells]:
-        """The boxes in parts that stay in the cache."""
-        return (
-            [
-                self.take(rows)
-                for rows in np.array_split(np.arange(len(self)), -(-len(self) // PIECE))
-            ]
-            if len(self)
-            else []
-        )
-
-    def halved(self, axis: Array) -> Cells:
-        """Both halves along `axis` (N,)."""
-        rows = np.arange(len(self))
-        radius = self.radius.copy()
-        radius[rows, axis] /= 2
-        shift = np.zeros_like(radius)
-        shift[rows, axis] = radius[rows, axis]
-        both = np.concatenate([self.centre - shift, self.centre + shift])
-        return Cells(np.tile(self.problem, 2), both, np.tile(radius, (2, 1)))
-
-
-def _counted(results: Iterable[Enclosed], total: int, progress: Progress | None) -> list[Enclosed]:
-    done = []
-    for result in results:
-        done.append(result)
-        if progress:
-            progress(len(done) / total)
-    return done
-
-
-def joined(parts: list[Cells]) -> Cells:
-    """All boxes of `parts`."""
-    return Cells(
-        *(
-            np.concatenate([getattr(p, name) for p in parts])
-            for name in ("problem", "centre", "radius")
-        )
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +42,7 @@ class Enclosed:
         point: Best points, shape (N, d).
         value: side × output there, shape (N,).
         proved: Proved bounds above `value`, shape (N,).
-        boxes: Boxes looked at.
+        boxes: Boxes looked at, each as often as there are problems that need it.
     """
 
     point: Array
@@ -146,176 +89,131 @@ class BranchAndBound:
             lower: Lower ends of the box, shape (d,).
             upper: Upper ends.
             optima: The problems with their best points.
-            workers: Processes; the result does not depend on their number.
+            workers: Threads; the result does not depend on their number.
             progress: Called with the fraction done.
         """
-        remainder = Remainder.of(model, lower, upper)
-        pieces = [
-            optima.take(rows)
-            for rows in np.array_split(
-                np.arange(len(optima.value)), -(-len(optima.value) // PROBLEMS)
-            )
-        ]
-        work = partial(self._piece, model, lower, upper, remainder)
-        if workers == 1:
-            done = _counted(map(work, pieces), len(pieces), progress)
-        else:
-            from concurrent.futures import ProcessPoolExecutor
-
-            with ProcessPoolExecutor(workers) as pool:
-                done = _counted(pool.map(work, pieces), len(pieces), progress)
-        point, value, proved = (
-            np.concatenate([getattr(part, name) for part in done])
-            for name in ("point", "value", "proved")
-        )
-        return Enclosed(point, value, proved, sum(part.boxes for part in done))
-
-    def _piece(
-        self, model: ModalModel, lower: Array, upper: Array, remainder: Remainder, optima: Optima
-    ) -> Enclosed:
-        size = len(optima.value)
-        cells = Cells(
-            np.arange(size),
-            np.tile((lower + upper) / 2, (size, 1)),
-            np.tile((upper - lower) / 2, (size, 1)),
-        )
-        used = 0
-        while len(cells) and used + len(cells) <= self.budget * size:
-            used += len(cells)
-            cells = joined(
-                [
-                    self._examined(model, lower, upper, optima, part, remainder)
-                    for part in cells.pieces()
-                ]
-            )
-        proved = optima.value + self.gap
-        for part in cells.pieces():  # what the budget left open keeps its own bound
-            np.maximum.at(proved, part.problem, _bound(model, optima, part, remainder))
+        tree = Tree.of(model, lower, upper, optima, self.gap)
+        frontier, size, used = Frontier.whole(len(lower), tree.numbers), len(tree.numbers), 0
+        while len(frontier) and used + len(frontier) <= self.budget * size:
+            used += len(frontier)
+            frontier = tree.examined(frontier, workers)
+            if progress:
+                progress(1 - len(np.unique(frontier.problem)) / size)
+        proved = tree.proved(frontier)  # what the budget left open keeps its own bound
         return Enclosed(optima.point, optima.value, proved, used)
 
-    def _examined(
-        self,
-        model: ModalModel,
-        lower: Array,
-        upper: Array,
-        optima: Optima,
-        cells: Cells,
-        remainder: Remainder,
-    ) -> Cells:
-        """The boxes that no test closes, reduced to a face or halved."""
-        j = cells.problem
-        T = remainder.at(optima.node[j], optima.output[j])
-        f, g, H = _signed_taylor(model, optima, cells.centre, j)
-        better = f > optima.value[j] + 1e-10
-        if better.any():
-            self._improve(model, optima, j[better], cells.centre[better], f[better], (lower, upper))
-        r = cells.radius
-        Tr = np.einsum("nijk,nk->nij", T, r)
-        rest = cubic(Tr, r)
-        target = optima.value[j] + self.gap
-        open_ = f + _separable(g, H, r) + rest > target
-        rising = np.abs(g) > np.einsum("nij,nj->ni", np.abs(H), r) + 0.5 * np.einsum(
-            "nij,nj->ni", Tr, r
+
+@dataclass(frozen=True, eq=False)
+class Tree:
+    """Boxes of one domain and the problems that share them.
+
+    Args:
+        models: The model over boxes.
+        lower: Lower ends of the domain, shape (d,).
+        upper: Upper ends.
+        optima: N problems with their best points, which improve.
+        numbers: Their numbers, see `Problems`, shape (N,).
+        problems: All problems of the model by number; those without a place in `optima` are idle.
+    """
+
+    models: BoxModels
+    lower: Array
+    upper: Array
+    optima: Optima
+    numbers: Array
+    problems: Problems
+
+    @classmethod
+    def of(cls, model: ModalModel, lower: Array, upper: Array, optima: Optima, gap: float) -> Tree:
+        """The tree with nothing but its root."""
+        m, d = len(model.outputs), len(lower)
+        numbers = (optima.node * m + optima.output) * 2 + (optima.side > 0)
+        remainder, total = Remainder.of(model, lower, upper), 2 * m * len(model.time)
+        tree = cls(
+            BoxModels(model),
+            lower,
+            upper,
+            optima,
+            numbers,
+            Problems(
+                remainder.tensor,
+                remainder.margin,
+                np.zeros(total),
+                np.zeros((total, d)),
+                np.zeros((total, 1 + d + d * (d + 1) // 2)),
+                gap,
+            ),
         )
-        rising &= r > 0
-        face = cells.centre + np.sign(g) * r
-        edge = np.where(g > 0, upper, lower)
-        inner = rising & (np.abs(face - edge) > 1e-12)
-        open_ &= ~inner.any(1)  # the neighbour holds higher points
-        collapse = rising & ~inner
-        cells.centre[collapse], cells.radius[collapse] = face[collapse], 0.0
-        open_ = self._close_by_quadratic(f, g, H, r, rest, target, open_ & ~collapse.any(1)) | (
-            open_ & collapse.any(1)
+        tree._renew(np.arange(len(numbers)))
+        return tree
+
+    def examined(self, frontier: Frontier, workers: int) -> Frontier:
+        """What is still open after one examination of all boxes of a frontier."""
+        examine = examination()[1]
+
+        def found(part: tuple[slice, slice]) -> tuple[Array, Array]:
+            return examine(self._piece(frontier, *part), self.problems)
+
+        if workers == 1:
+            results = list(map(found, frontier.pieces(PIECE)))
+        else:
+            with ThreadPoolExecutor(workers) as pool:
+                results = list(pool.map(found, frontier.pieces(PIECE)))
+        code, value = (np.concatenate(part) for part in zip(*results, strict=True))
+        higher = np.flatnonzero(value > self.problems.best[frontier.problem] + HIGHER)
+        if len(higher):
+            self._improve(frontier, higher[np.argsort(value[higher])], value)
+        return frontier.children(code)
+
+    def proved(self, frontier: Frontier) -> Array:
+        """Upper bounds of all problems, where the boxes of a frontier are left open, (N,)."""
+        whole = self.problems.best + self.problems.gap
+        for part in frontier.pieces(PIECE):
+            bound, problem = bounds(self._piece(frontier, *part), self.problems)
+            np.maximum.at(whole, problem, bound)
+        return whole[self.numbers]
+
+    def _improve(self, frontier: Frontier, items: Array, value: Array) -> None:
+        """Take over the centres of items, the best last, and refine them."""
+        place = np.zeros(len(self.problems.best), np.int64)
+        place[self.numbers] = np.arange(len(self.numbers))
+        which = place[frontier.problem[items]]
+        centre = frontier.geometry(self.lower, self.upper)[0]
+        self.optima.point[which] = centre[frontier.box[items]]
+        self.optima.value[which] = value[items]
+        which = np.unique(which)
+        small = self.problems.gap / 100
+        refine(self.models.model, self.optima, which, self.lower, self.upper, small)
+        self._renew(which)
+
+    def _renew(self, which: Array) -> None:
+        """Values, points and jets of the problems at places `which` of the optima."""
+        optima, own = self.optima, self.numbers[which]
+        point = optima.point[which]
+        f, g, H = self.models.model.at(point, optima.node[which], optima.output[which])
+        row, column = np.triu_indices(g.shape[1])
+        self.problems.best[own], self.problems.point[own] = optima.value[which], point
+        self.problems.jets[own] = np.column_stack([f, g, H[:, row, column]])
+
+    def _piece(self, frontier: Frontier, boxes: slice, items: slice) -> Piece:
+        """Boxes and items of a frontier with their derivatives and waves."""
+        outputs = len(self.models.model.outputs)
+        centre, radius, edges = frontier.take(boxes).geometry(self.lower, self.upper)
+        box, problem = frontier.box[items] - boxes.start, frontier.problem[items]
+        node, column = np.divmod(problem, 2 * outputs)
+        fresh = np.append(True, (np.diff(box) != 0) | (np.diff(node) != 0))
+        begin = np.flatnonzero(fresh)
+        row_box, row_node = box[begin], node[begin]
+        rate, share = self.models.jets(centre)
+        return Piece(
+            centre,
+            radius,
+            edges,
+            np.searchsorted(row_box, np.arange(len(centre) + 1)),
+            np.append(begin, len(box)),
+            row_node,
+            column,
+            rate,
+            share,
+            self.models.waves(rate[0], row_box, row_node),
         )
-        undecided = np.flatnonzero(open_ & ~collapse.any(1))
-        if len(undecided):
-            still = self._not_closed_near_best(model, optima, cells.take(undecided), T[undecided])
-            open_[undecided[~still]] = False
-        split = np.flatnonzero(open_ & ~collapse.any(1))
-        weight = r * (np.einsum("nij,nj->ni", Tr, r) + 0.5 * np.einsum("nij,nj->ni", np.abs(H), r))
-        halves = cells.take(split).halved(weight[split].argmax(1))
-        return joined([cells.take(np.flatnonzero(open_ & collapse.any(1))), halves])
-
-    def _improve(
-        self,
-        model: ModalModel,
-        optima: Optima,
-        problem: Array,
-        points: Array,
-        values: Array,
-        box: tuple[Array, Array],
-    ) -> None:
-        """Takes over the best of the points found higher, then refines them."""
-        order = np.argsort(values)
-        optima.point[problem[order]], optima.value[problem[order]] = points[order], values[order]
-        refine(model, optima, np.unique(problem), *box, self.gap / 100)
-
-    def _close_by_quadratic(
-        self, f: Array, g: Array, H: Array, r: Array, rest: Array, target: Array, open_: Array
-    ) -> Array:
-        """Test 1 with the exact maximum of the quadratic model, where it can succeed."""
-        which = np.flatnonzero(open_ & (f + rest <= target))
-        if len(which):
-            x = global_maximum(g[which], H[which], -r[which], r[which])
-            closed = f[which] + gain(g[which], H[which], x) + rest[which] <= target[which]
-            open_[which[closed]] = False
-        return open_
-
-    def _not_closed_near_best(
-        self, model: ModalModel, optima: Optima, cells: Cells, T: Array
-    ) -> Array:
-        """Test 3: boxes in which the best point's Taylor model allows more than the gap."""
-        j = cells.problem
-        best = optima.point[j]
-        low, high = cells.centre - cells.radius - best, cells.centre + cells.radius - best
-        reach = np.maximum(np.abs(low), np.abs(high))
-        near = (np.maximum(low, 0) + np.maximum(-high, 0) <= 2 * cells.radius).all(1)
-        still = np.ones(len(cells), bool)
-        which = np.flatnonzero(near)
-        if not len(which):
-            return still
-        _, g, H = _signed_taylor(model, optima, best[which], j[which])
-        span = np.maximum(reach[which], 1e-9)
-        pair = np.einsum("nijk,nk->nij", T[which], span)
-        bend = np.einsum("nij,nj->ni", pair, span) / span  # cubic remainder <= Σ bend_i x_i² / 6
-        softer = H + np.einsum("ni,ij->nij", bend / 3, np.eye(H.shape[1]))
-        x = global_maximum(g, softer, low[which], high[which])
-        still[which] = gain(g, softer, x) > self.gap
-        return still
-
-
-def _signed_taylor(
-    model: ModalModel, optima: Optima, points: Array, problem: Array
-) -> tuple[Array, Array, Array]:
-    side = optima.side[problem]
-    f, g, H = model.at(points, optima.node[problem], optima.output[problem])
-    return side * f, side[:, None] * g, side[:, None, None] * H
-
-
-def cubic(Tr: Array, r: Array) -> Array:
-    """Bound of what a quadratic Taylor model leaves out for |x| <= r, from T r, shape (N, d, d)."""
-    rest: Array = np.einsum("nij,ni,nj->n", Tr, r, r) / 6
-    return rest
-
-
-def _separable(g: Array, H: Array, r: Array) -> Array:
-    """Upper bound of max g·x + x·H·x/2 over |x| <= r, mixed terms moved to the diagonal."""
-    diagonal = np.einsum("nii->ni", H)
-    mixed = np.abs(H) * r[:, None, :]
-    spread = np.where(r > 0, (mixed.sum(-1) - np.abs(diagonal) * r) / np.where(r > 0, r, 1.0), 0.0)
-    bend, slope = diagonal + spread, np.abs(g)
-    inside = (bend < 0) & (slope < -bend * r)
-    top = np.where(
-        inside, -(slope**2) / np.where(inside, 2 * bend, 1.0), slope * r + 0.5 * bend * r**2
-    )
-    total: Array = top.sum(1)
-    return total
-
-
-def _bound(model: ModalModel, optima: Optima, cells: Cells, remainder: Remainder) -> Array:
-    """Upper bounds of boxes."""
-    j, r = cells.problem, cells.radius
-    f, g, H = _signed_taylor(model, optima, cells.centre, j)
-    T = remainder.at(optima.node[j], optima.output[j])
-    bound: Array = f + _separable(g, H, r) + cubic(np.einsum("nijk,nk->nij", T, r), r)
-    return bound

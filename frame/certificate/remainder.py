@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import permutations
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial, derivative
 from alphacut.frame.certificate.wave_bounds import parts
+from alphacut.frame.modal.ground_response import REACH
 from alphacut.frame.modal.model import ModalModel
 
 MOST_PARAMETERS = 6
 """Tensors of third derivatives grow with the cube of the number of parameters."""
+
+
+MOST_TERMS = 100
+"""Terms of the series of a wave under a load, at most, as rounding counts them."""
 
 
 def require_certifiable(parameters: int) -> None:
@@ -59,13 +63,16 @@ def largest_growth(eigenvalue: Polynomial, reach: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Remainder:
-    """|∂³ output / ∂u_i ∂u_j ∂u_k| <= tensor[node, output, i, j, k] in the box.
+    """Bounds of what quadratic Taylor models of the outputs leave out in a box, and of rounding.
 
     Args:
-        tensor: Shape (T, m, d, d, d), symmetric in the last three.
+        tensor: |∂³ output / ∂u_i ∂u_j ∂u_k| at most, shape (T, m, d, d, d), symmetric in the last
+            three.
+        margin: Rounding of values, and of slopes, at most, shape (T, m, 1 + d).
     """
 
     tensor: Array
+    margin: Array
 
     @classmethod
     def of(cls, model: ModalModel, lower: Array, upper: Array) -> Remainder:
@@ -76,39 +83,87 @@ class Remainder:
         """
         d, n, m = len(lower), model.count, len(model.outputs)
         require_certifiable(d)
-        reach = np.maximum(np.abs(lower), np.abs(upper))
+        reach, width = np.maximum(np.abs(lower), np.abs(upper)), upper - lower
         rate, growth = suprema(model.eigenvalue, reach), largest_growth(model.eigenvalue, reach)
-        out = np.zeros((len(model.time), m, d, d, d))
+        third = np.zeros((len(model.time), m, d, d, d))
+        margin = np.zeros((len(model.time), m, 1 + d))
         for part in parts(model, growth):
             share = [x.reshape((*x.shape[:-1], n, m)) for x in suprema(part.share, reach)]
+            noise = _noise(model, rate[0], forced=part.forced)
             for k in range(n):
-                # (4, d, d, d, m)
-                bounds = np.stack(
-                    _leibniz([x[..., k, :] for x in share], [x[..., k] for x in rate])
-                )
-                out += np.einsum("rt,rxyzm->tmxyz", 2 * part.waves[..., k], bounds)
-        return cls(out)
+                own = [x[..., k, :] for x in share], [x[..., k] for x in rate]
+                sizes = []
+                for order in range(4):
+                    bounds = np.stack(leibniz(*own, order))
+                    waves = 2 * part.waves[: order + 1, :, k]
+                    sizes.append(np.tensordot(waves, bounds, (0, 0)))  # (T, d, …, m)
+                third += np.moveaxis(sizes[3], -1, 1)
+                bent = np.einsum("tijm,j->tim", sizes[2], width)
+                slopes, middle = sizes[1] + bent, sizes[1] + bent / 2
+                values = sizes[0] + np.einsum("tim,i->tm", middle, width)
+                margin[..., 0] += noise[:, k, None] * values
+                margin[..., 1:] += noise[:, k, None, None] * np.moveaxis(slopes, -1, 1)
+        third[model.time == 0] = _at_rest(model, reach)
+        return cls((1 + 1e-9) * third, margin)
 
-    def at(self, node: Array, output: Array) -> Array:
-        """Tensors of N problems, shape (N, d, d, d)."""
-        chosen: Array = self.tensor[node, output]
-        return chosen
+
+def _noise(model: ModalModel, rate: Array, *, forced: bool) -> Array:
+    """Bound of rounding in a mode's motion, as a share of its size, shape (T, n).
+
+    Polynomials are sums of their terms, waves turn by λ t, and outputs are sums over modes; a
+    wave under a load is a series whose terms may pass its sum exp(REACH) times.
+    """
+    count, d = model.eigenvalue.index.shape
+    polynomial = count + model.degree + 2
+    turned = rate * model.time[:, None]
+    steps = polynomial * (2 + turned) + 12 * model.count + 4 * d**3 + 50
+    if forced:
+        steps = steps + (len(model.time) + MOST_TERMS) * np.exp(REACH)
+    noise: Array = np.finfo(float).eps * steps
+    return noise
 
 
-def _leibniz(c: list[Array], r: list[Array]) -> list[Array]:
-    """Bounds of D³(C exp(λ t)) / exp(λ t) by powers of t, each of shape (d, d, d, m)."""
-    d, m = r[1].shape[0], c[0].shape[-1]
-    out: list[Array] = [np.zeros((d, d, d, m)) for _ in range(4)]
-    out[0] += c[3]
-    out[1] += c[0] * r[3][..., None]
-    out[3] += c[0] * np.einsum("i,j,k->ijk", r[1], r[1], r[1])[..., None]
-    # each unordered choice of one index of three appears twice
-    for i, j, k in permutations(range(3)):
-        axes = (i, j, k)
-        single = np.einsum("ijm,k->ijkm", c[2], r[1]) + np.einsum("im,jk->ijkm", c[1], r[2])
-        double = np.einsum("im,j,k->ijkm", c[1], r[1], r[1]) + np.einsum(
-            "ij,k,m->ijkm", r[2], r[1], c[0]
-        )
-        out[1] += 0.5 * single.transpose((*axes, 3))
-        out[2] += 0.5 * double.transpose((*axes, 3))
+def _at_rest(model: ModalModel, reach: Array) -> Array:
+    """Bounds of third derivatives of the initial outputs, shape (m, d, d, d).
+
+    They are sums over the modes, and most of these cancel.
+    """
+    share = model.coefficient.coefficients
+    together = 2 * share.reshape(len(share), model.count, -1).sum(1).real
+    third = suprema(Polynomial(model.coefficient.index, together), reach)[3]
+    return np.moveaxis(third, -1, 0)
+
+
+def leibniz(c: list[Array], r: list[Array], order: int) -> list[Array]:
+    """Bounds of derivatives of C exp(λ t), divided by exp(λ t), by powers of t.
+
+    Args:
+        c: Bounds of the derivatives of C, shapes (d,) * its order + (m,).
+        r: The same of λ, shapes (d,) * its order.
+        order: Of the derivative.
+
+    Returns:
+        For each power of t from 0 to `order`, shape (d,) * order + (m,).
+    """
+    d, m = len(r[1]), c[0].shape[-1]
+    out: list[Array] = [np.zeros((d,) * order + (m,)) for _ in range(order + 1)]
+    axes = "ijk"[:order]
+    for chosen in range(2**order):
+        own = "".join(a for bit, a in enumerate(axes) if chosen >> bit & 1)
+        others = [a for a in axes if a not in own]
+        for blocks in _partitions(others):
+            factors = [c[len(own)], *(r[len(block)] for block in blocks)]
+            names = ",".join([own + "z", *blocks])
+            out[len(blocks)] += np.einsum(f"{names}->{axes}z", *factors)
     return out
+
+
+def _partitions(items: list[str]) -> list[list[str]]:
+    """All ways to divide letters into blocks."""
+    if not items:
+        return [[]]
+    first, found = items[0], []
+    for rest in _partitions(items[1:]):
+        found.append([first, *rest])
+        found += [[*rest[:k], first + rest[k], *rest[k + 1 :]] for k in range(len(rest))]
+    return found

@@ -8,8 +8,8 @@ import pytest
 from alphacut.frame import Exact, LinearFlow, StoreyFrame, envelope
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.polynomial import Polynomial
-from alphacut.frame.certificate.branch_and_bound import cubic
 from alphacut.frame.certificate.model_error import proved_error
+from alphacut.frame.certificate.numpy_kernel import Items
 from alphacut.frame.certificate.remainder import Remainder
 from alphacut.frame.methods.auto import Auto, ToleranceError
 from alphacut.frame.methods.modal import Modal, polynomial_error
@@ -32,9 +32,10 @@ def test_remainder_of_a_box_is_needed_in_full() -> None:
     model, r = undamped(0.01, 60, 0.1), 0.1
     nodes = np.arange(1, len(model.time))
     output, centre = np.zeros_like(nodes), np.zeros((len(nodes), 1))
-    tensor = Remainder.of(model, np.array([-r]), np.array([r])).at(nodes, output)
-    rest = cubic(r * tensor[..., 0], np.full((len(nodes), 1), r))
+    bounds = Remainder.of(model, np.array([-r]), np.array([r]))
     f, g, H = model.at(centre, nodes, output)
+    own = np.full((len(nodes), 1), r), bounds.tensor[nodes, 0], bounds.margin[nodes, 0]
+    rest = Items(f, g, H, *own, nodes).rest
     true = np.max(
         [
             np.abs(

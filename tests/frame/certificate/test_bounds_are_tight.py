@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from alphacut.frame import Accelerogram, Exact, LinearFlow, StoreyFrame
 from alphacut.frame.boxes import boxes
+from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.certificate.branch_and_bound import BranchAndBound
 from alphacut.frame.certificate.certificate import certify
+from alphacut.frame.certificate.numpy_kernel import Items, stays_below
 from alphacut.frame.certificate.remainder import Remainder, largest_growth
 from alphacut.frame.certificate.wave_bounds import parts
 from alphacut.frame.dynamics.spectral import responses
 from alphacut.frame.modal.model import ModalModel, fit_modes
 from alphacut.frame.modal.search import Optima
 from alphacut.fuzzy import Interval
+from tests.frame.certificate.test_kernels import take
 
 PULSE = Accelerogram(0.37, np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0]))
 
@@ -71,21 +76,74 @@ def test_what_outputs_do_between_nodes_is_bounded_where_the_record_jumps() -> No
     assert 1 <= proof.between[1, 0] / np.abs(fine - line).max() <= 1.8
 
 
-class Cube:
-    """The function x³, whose third derivative is 6."""
+def cube(square: float = 0.0) -> ModalModel:
+    """A model of the motion x³ − square x² for all times; its third derivative is 6."""
+    model = spring(1.0, None, 1.0, 1.0)
+    index = np.arange(4)[:, None]
+    half = np.array([0, 0, -square / 2, 0.5])[:, None] + 0j
+    return replace(
+        model, eigenvalue=Polynomial(index, 0 * half), coefficient=Polynomial(index, half)
+    )
 
-    def at(self, unit: np.ndarray, *_: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return unit[:, 0] ** 3, 3 * unit**2, 6 * unit[:, :, None]
 
-
+@pytest.mark.parametrize("kernel", ["c", "numpy"])
 @pytest.mark.parametrize(("start", "budget"), [(0.5, 4000), (0.0, 1)])
 def test_branch_and_bound_needs_all_of_the_remainder(
-    start: float, budget: float, monkeypatch: pytest.MonkeyPatch
+    start: float, budget: float, kernel: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """About 0 nothing but the third derivative tells that x³ reaches 1."""
-    tensor = np.full((1, 1, 1, 1, 1), 6.0)
-    monkeypatch.setattr(Remainder, "of", lambda *_: Remainder(tensor))
-    none, best = np.zeros(1, int), np.full((1, 1), start)
-    optima = Optima(none, none, np.ones(1), best, best[0] ** 3, np.zeros(1))
-    found = BranchAndBound(1e-3, budget).run(Cube(), -np.ones(1), np.ones(1), optima)  # type: ignore[arg-type]
+    take(kernel, monkeypatch)
+    one, best = np.ones(1, int), np.full((1, 1), start)
+    optima = Optima(one, 0 * one, np.ones(1), best, best[0] ** 3, np.zeros(1))
+    found = BranchAndBound(1e-3, budget).run(cube(), -np.ones(1), np.ones(1), optima)
     assert 1 <= found.proved[0] <= 1.01
+
+
+@pytest.mark.parametrize("kernel", ["c", "numpy"])
+def test_the_best_point_is_not_trusted_beyond_its_remainder(
+    kernel: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """About 0, a local maximum, half of the remainder would leave x³ − 3 x²/4 concave up to 1."""
+    take(kernel, monkeypatch)
+    one, best = np.ones(1, int), np.zeros((1, 1))
+    optima = Optima(one, 0 * one, np.ones(1), best, np.zeros(1), np.zeros(1))
+    found = BranchAndBound(1e-3).run(cube(0.75), -np.ones(1), np.ones(1), optima)
+    assert 0.25 <= found.proved[0] <= 0.252
+
+
+def test_rounding_of_late_phases_is_in_the_margin() -> None:
+    model, narrow = spring(1.0, None, 1e8, 1e6), np.full(1, 1e-8)
+    margin = Remainder.of(model, -narrow, narrow).margin[:, 0, 0]
+    unit = np.random.default_rng(2).uniform(-narrow, narrow, (200, 1))
+    powers = np.longdouble(unit) ** model.eigenvalue.index[:, 0]
+    phase = powers @ model.eigenvalue.coefficients[:, 0].imag
+    growth = powers @ model.eigenvalue.coefficients[:, 0].real
+    share = [
+        powers @ part[:, 0]
+        for part in (model.coefficient.coefficients.real, model.coefficient.coefficients.imag)
+    ]
+    nodes = np.array([1, 10, 100])
+    for node in nodes:
+        t = np.longdouble(model.time[node])
+        exact = (
+            2 * np.exp(growth * t) * (share[0] * np.cos(phase * t) - share[1] * np.sin(phase * t))
+        )
+        off = np.abs(model.value_at(unit, np.full(200, node), np.zeros(200, int)) - exact)
+        assert 0 < off.max() <= margin[node]
+        assert off.max() > 1e-3 * margin[node]
+
+
+def test_slopes_wander_by_as_much_as_the_remainder_says() -> None:
+    model, r = cube(), 0.5
+    bounds = Remainder.of(model, -np.ones(1), np.ones(1))
+    f, g, H = np.zeros(1), np.zeros((1, 1)), np.zeros((1, 1, 1))
+    items = Items(f, g, H, np.full((1, 1), r), bounds.tensor[:1, 0], bounds.margin[:1, 0], f)
+    assert items.wander[0, 0] == pytest.approx(3 * r**2)  # of x³ within r about 0
+    assert items.rest[0] == pytest.approx(r**3)
+
+
+def test_concave_bound_is_that_of_the_curvature_it_adds() -> None:
+    """x²/2 − y² on [−1, 1]² is at most 1/2, and no shift below 1 makes it concave."""
+    g, H = np.zeros((2, 2)), np.tile(np.diag([1.0, -2.0]), (2, 1, 1))
+    low, high = -np.ones((2, 2)), np.ones((2, 2))
+    assert stays_below(g, H, low, high, np.array([8.01, 0.49])).tolist() == [True, False]
