@@ -76,6 +76,8 @@ class PetscSolver:
         ksp.setOptionsPrefix(PREFIX)
         tolerance = {"ksp_rtol": repr(float(np.sqrt(self.accuracy) / 10))}
         options = {**DEFAULTS, **tolerance, **self.options}
+        if "ksp_type" in self.options and "ksp_norm_type" not in self.options:
+            del options["ksp_norm_type"]  # the natural norm is for conjugate gradients
         with in_database(options, wanted=tuple(self.options)):
             ksp.setFromOptions()
             if ksp.getPC().getType() == "python":

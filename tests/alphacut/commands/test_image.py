@@ -262,6 +262,77 @@ def test_pixels_that_the_file_says_are_not_square_need_their_height(folder, capf
     )
 
 
+def one_phase(folder):
+    return np.full((8, 8), 130, np.uint8)
+
+
+def channels(folder):
+    return np.zeros((8, 8, 3), np.uint8)
+
+
+def palette(folder):
+    return pytest.importorskip("PIL.Image").fromarray(channels(folder)).quantize(4)
+
+
+def sixteen_bits(folder):
+    return np.linspace(0, 60000, 64).astype(np.uint16).reshape(8, 8)
+
+
+def not_finite(folder):
+    return np.where(np.eye(8) > 0, np.nan, 200.0)
+
+
+@pytest.mark.parametrize(
+    ("picture", "told"),
+    [
+        (one_phase, "the image has one grey value, 130, so one phase"),
+        (channels, "has several channels (RGB); save the one that tells the phases as grey"),
+        (palette, "has a palette: its numbers are colours, not grey values"),
+        (sixteen_bits, "the threshold 140 is one of 8 bits, the image has 16"),
+        (not_finite, "holds 8 values that are not finite"),
+    ],
+)
+def test_pictures_that_no_threshold_parts_are_one_line_and_status_2(folder, capfd, picture, told):
+    image, values = pytest.importorskip("PIL.Image"), picture(folder)
+    if picture is not_finite:
+        np.save(folder / "b.npy", values)
+    else:
+        (values if picture is palette else image.fromarray(values)).save(folder / "b.png")
+    bad_picture(folder, capfd, '"b.npy"' if picture is not_finite else '"b.png"', told)
+
+
+def test_an_image_too_large_for_memory_is_refused_with_a_window_that_fits(folder, capfd):
+    image = pytest.importorskip("PIL.Image")
+    image.new("L", (1200, 1200)).save(folder / "b.png")
+    bad_picture(folder, capfd, '"b.png"', "crop a window of ", division="16")
+
+
+def bad_picture(folder, capfd, name, told, **changes):
+    out = folder / "out.nc"
+    case = written(folder, image=name, **changes)
+    assert main(["image", case, "--out", str(out), "--json", str(folder / "o.json")]) == 2
+    (line,) = [line for line in capfd.readouterr().err.splitlines() if line]
+    assert line.startswith("alphacut: ")
+    assert "cell.image" in line
+    assert told in line
+    assert not out.exists()
+    assert not (folder / "o.json").exists()
+
+
+def test_options_of_petsc_count_and_strangers_are_refused(folder, capfd):
+    pytest.importorskip("petsc4py")
+    own = solved(folder, capfd, threshold="[130]")
+    case = written(folder, threshold="[130]")
+    command = ["image", case, "--json", "-", "--quiet"]
+    assert main([*command, "-rve_ksp_type", "minres"]) == 0
+    other = json.loads(capfd.readouterr().out)
+    assert np.allclose(own["lower_GPa"], other["lower_GPa"], rtol=1e-3, atol=1e-3)
+    assert main([*command, "-rve_ksp_max_it", "1"]) == 1
+    assert "PETSc stopped after 1 iterations" in capfd.readouterr().err
+    assert main([*command, "-rve_ksp_nonsense", "1"]) == 2
+    assert "no use for -rve_ksp_nonsense" in capfd.readouterr().err
+
+
 def test_an_image_and_another_modulus_are_refused(folder, capfd):
     case = written(folder, HEAD, 'value = "20 GPa"\n')
     assert main(["run", case, "--out", str(folder / "out")]) == 2
