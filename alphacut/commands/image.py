@@ -68,9 +68,19 @@ def summary(found: Mapping[str, Any]) -> str:
         f"alpha  lower GPa   upper GPa   (E of eq. 16, plane strain)\n{rows}"
         f"width of the stiffness's bounds at the top level: {found['width']:.2e}\n"
         f"plane-strain bulk modulus: {_interval(bulk)}\n"
-        f"{apparent}if the particles are grains, E (Hashin-Shtrikman): {_interval(grains)}\n"
+        f"{apparent}{quantiles(found)}"
+        f"if the particles are grains, E (Hashin-Shtrikman): {_interval(grains)}\n"
         f"{table_of(found['error_table'])}"
         f"{found['iterations']} iterations, {found['seconds']:.1f} s\n"
+    )
+
+
+def quantiles(found: Mapping[str, Any]) -> str:
+    """Quantiles of E over a random threshold at the top level, in lines; empty without one."""
+    random = found["random_threshold"]
+    rows = random["quantiles"] if random else []
+    return "".join(
+        f"quantile {row['share']:g} of E: {_interval(row['E_GPa'][-1])}\n" for row in rows
     )
 
 

@@ -11,31 +11,74 @@ from alphacut.stages.material.cell import GPA
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+SMALLEST = 1e-6  # error drawn, over the largest
 
 
 def image(found: xarray.Dataset) -> Figure:
-    """Phases, constitutive error where there is one, and α-cuts of E."""
+    """Phases, constitutive error, E over a random threshold where there is one, α-cuts of E."""
+    random = "E_of_threshold" in found
+    rows, columns = (2, 2) if random else (1, 3)
+    drawn, first = figure(width=3.2 * columns, height=3.0 * rows)
+    first.remove()
+    places = iter(drawn.add_subplot(rows, columns, k + 1) for k in range(rows * columns))
+    phases(next(places), found)
+    errors(next(places), found)
+    if random:
+        over_threshold(next(places), found)
+    cuts(next(places), found)
+    return drawn
+
+
+def phases(axes: Axes, found: xarray.Dataset) -> None:
+    """The number of each pixel's phase as grey."""
+    plane(axes, "phases").imshow(found["phase"].values, origin="lower", cmap="Greys_r")
+
+
+def errors(axes: Axes, found: xarray.Dataset) -> None:
+    """The logarithm of the constitutive error over its largest value."""
     import matplotlib.pyplot as plt
 
-    pictures = ["phase"] + ["gap"] * ("gap" in found)
-    drawn, first = figure(width=3.2 * (len(pictures) + 1), height=3.0)
-    first.remove()
-    places = [drawn.add_subplot(1, len(pictures) + 1, k + 1) for k in range(len(pictures) + 1)]
-    for axes, name in zip(places, pictures, strict=False):
-        values = found[name].values
-        if name == "gap":
-            values = np.log10(np.maximum(values / values.max(), 1e-6))
-        shown = axes.imshow(values, origin="lower", cmap="Greys_r" if name == "phase" else "magma")
-        axes.set_xticks([])
-        axes.set_yticks([])
-        axes.set_title("phases" if name == "phase" else "error of the fields, log10", fontsize=9)
-        if name == "gap":
-            plt.colorbar(shown, ax=axes, shrink=0.8)
+    values = found["gap"].values
+    values = np.log10(np.maximum(values / values.max(), SMALLEST))
+    shown = plane(axes, "error of the fields, log10").imshow(values, origin="lower", cmap="magma")
+    plt.colorbar(shown, ax=axes, shrink=0.8)
+
+
+def plane(axes: Axes, title: str) -> Axes:
+    """Axes of a picture, without ticks."""
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.set_title(title, fontsize=9)
+    return axes
+
+
+def over_threshold(axes: Axes, found: xarray.Dataset) -> None:
+    """Bounds of E over the random threshold, and the band of its outer quantiles."""
+    order = np.argsort(found["threshold"].values)
+    ends = found["E_of_threshold"].values[order] / GPA
+    grey = found["threshold"].values[order]
+    axes.fill_between(grey, *ends.T, color=BLUE, alpha=0.35, lw=0)
+    axes.plot(grey, ends, color=BLUE, lw=1)
+    quantiles, shares = found["quantile"].values[-1] / GPA, found["share"].values
+    for pair, share in zip(quantiles, shares, strict=True):
+        axes.axhspan(*pair, color=INK, alpha=0.25, lw=0)
+        axes.axhline(pair.mean(), color=INK, lw=0.5)
+        axes.annotate(
+            f"{share:g}", (grey[-1], pair.mean()), fontsize=7, va="bottom", ha="right", color=INK
+        )
+    axes.set_xlabel("threshold, grey value")
+    axes.set_ylabel("E, GPa")
+    axes.set_title("E over the threshold, its quantiles", fontsize=9)
+
+
+def cuts(axes: Axes, found: xarray.Dataset) -> None:
+    """The α-cuts of E."""
     alpha, ends = found["alpha"].values, found["E"].values / GPA
     for level, pair in zip(alpha, ends, strict=True):
-        places[-1].plot(pair, [level, level], color=BLUE, lw=2)
-    places[-1].plot(ends.ravel(order="F"), np.tile(alpha, 2), ".", color=INK, ms=3)
-    places[-1].set_xlabel("E, GPa")
-    places[-1].set_ylabel("α")
-    return drawn
+        axes.plot(pair, [level, level], color=BLUE, lw=2)
+    axes.plot(ends.ravel(order="F"), np.tile(alpha, 2), ".", color=INK, ms=3)
+    axes.set_xlabel("E, GPa")
+    axes.set_ylabel("α")

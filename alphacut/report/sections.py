@@ -156,9 +156,25 @@ def image(found: Mapping[str, Any], drawn: Markup) -> Markup:
         words,
         drawn,
         table(("α", "lower E, GPa", "upper E, GPa", "nature"), rows),
+        random_threshold(found),
         Markup("<h3>What widens E, the source to improve first on top</h3>")
         + table(("source", "width of E, GPa", "share", "to narrow it"), widths),
     )
+
+
+def random_threshold(found: Mapping[str, Any]) -> Markup:
+    """Quantiles of E over a random threshold at the lowest and the highest level, or nothing."""
+    random = found.get("random_threshold")
+    if not random:
+        return Markup("")
+    levels = found["cuts"]["alpha"]
+    rows = [
+        (f"{row['share']:g}", *(f"[{e['lower']:.4f}, {e['upper']:.4f}]" for e in ends))
+        for row in random["quantiles"]
+        for ends in [(row["E_GPa"][-1], row["E_GPa"][0])]
+    ]
+    head = ("probability", f"E, GPa, at α = {levels[-1]:g}", f"E, GPa, at α = {levels[0]:g}")
+    return Markup("<h3>Quantiles of E over the random threshold, proved</h3>") + table(head, rows)
 
 
 def isotropy(found: Mapping[str, Any]) -> str:

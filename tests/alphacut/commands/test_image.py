@@ -257,6 +257,7 @@ def test_pixels_that_the_file_says_are_not_square_need_their_height(folder, capf
     assert main(["image", written(folder, image='"b.png"')]) == 2
     assert "give cell.pixel = [width, height]" in capfd.readouterr().err
     found = solved(folder, capfd, image='"b.png"', pixel='["2 µm", "4 µm"]')
+    assert found["upper_GPa"][1][1] > found["upper_GPa"][0][0]  # the particle is twice as high
     assert (
         found["directions_E_GPa"]["greatest"]["upper"] > found["directions_E_GPa"]["least"]["upper"]
     )

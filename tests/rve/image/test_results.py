@@ -10,7 +10,7 @@ from alphacut.rve.image.directions import directions
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.gap import constitutive_gap
 from alphacut.rve.image.grains import grain_modulus
-from alphacut.rve.image.model import ImageModel
+from alphacut.rve.image.model import ImageModel, usual_division
 from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
 from alphacut.rve.image.phase_images import ModuliImages
 from alphacut.rve.image.random_threshold import (
@@ -153,7 +153,23 @@ def test_the_model_gives_the_result_type_of_the_other_models():
     low, high = cut.modulus
     assert low < cut.homogenised.modulus < high
     form = cut.bounds.shear
-    assert np.isclose(cut.homogenised.errors["space"][2], (form[1] - form[0]) / sum(form))
+    assert np.isclose(cut.homogenised.errors["space"][2], sum(form) / 2 / form[0] - 1)
+
+
+@pytest.mark.parametrize(("contrast", "rows", "parts"), [(9, 4, 2), (11, 4, 1), (9, 1 << 19, 1)])
+def test_pixels_are_divided_where_that_is_cheap(contrast, rows, parts):
+    image = np.ones((rows, 4))
+    image[0] = contrast
+    assert usual_division(ModuliImages((image, image), (image, image), attained=True)) == parts
+
+
+def test_a_width_asked_for_is_reached_by_more_parts():
+    mixed = np.where(ramp() > 0.5, 3.0, 1.0)
+    images = ModuliImages((mixed, mixed), (mixed, mixed), attained=True)
+    _, usual = ImageModel().refined(images)
+    model, found = ImageModel(width=usual.bounds.width / 2).refined(images)
+    assert model.parts == 4
+    assert found.bounds.width <= usual.bounds.width / 2
 
 
 def test_directions_hold_the_moduli_of_a_stiffness_between():

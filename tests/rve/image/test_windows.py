@@ -2,14 +2,16 @@
 
 import numpy as np
 import pytest
+from scipy.stats import t as student
 
 from alphacut.rve.image.fields.clamped import ClampedPreconditioner
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.element import airy_element, displacement_element
 from alphacut.rve.image.fields.operator import Operator
 from alphacut.rve.image.fields.side import DISPLACEMENT, STRESS, solve_side
+from alphacut.rve.image.moduli import PlaneModuli
 from alphacut.rve.image.solve import solve_image
-from alphacut.rve.image.windows import solve_tiles, tiles_of
+from alphacut.rve.image.windows import Tiling, solve_tiles, tiles_of
 
 
 def random_image(rng, size):
@@ -58,6 +60,19 @@ def test_the_interval_of_the_material_holds_the_bracket_and_shrinks_with_more_ti
         inner = tiling.bracket.modulus
         assert low < inner[0]
         assert inner[1] < high
+
+
+def test_the_interval_is_that_of_student_for_tiles_of_known_scatter():
+    scales = np.random.default_rng(3).uniform(0.8, 1.3, 9)
+    stiffness = PlaneModuli.of_young(20.0, 0.3).stiffness
+    tiling = Tiling(
+        scales[:, None, None] * stiffness, np.linalg.inv(stiffness) / scales[:, None, None]
+    )
+    quantile = student.ppf(0.975, 8) / 3
+    softness = 1 / scales
+    low = 20 / softness.mean() - quantile * 20 * softness.std(ddof=1) / softness.mean() ** 2
+    high = 20 * scales.mean() + quantile * 20 * scales.std(ddof=1)
+    assert np.allclose(tiling.material_modulus(), (low, high), rtol=1e-9)
 
 
 def test_one_tile_gives_no_interval():
