@@ -19,6 +19,7 @@ from alphacut.commands import repair as command_repair
 from alphacut.commands import report as command_report
 from alphacut.commands import run as command_run
 from alphacut.commands import tolerances as command_tolerances
+from alphacut.commands import update as command_update
 from alphacut.commands.parser import Parser, refuse_petsc, split_petsc
 from alphacut.fuzzy import CampaignError
 from alphacut.io.files import rank, ranks, say, standard_output
@@ -38,6 +39,7 @@ COMMANDS: dict[str, ModuleType] = {
     "modulus": command_modulus,
     "envelope": command_envelope,
     "tolerances": command_tolerances,
+    "update": command_update,
     "report": command_report,
     "repair": command_repair,
 }

@@ -14,6 +14,7 @@ from alphacut.case.sections.particles import Microstructure
 from alphacut.case.sections.picture import Picture
 from alphacut.case.sections.structures import Frame, Pendulum, Tower
 from alphacut.case.sections.top import Top
+from alphacut.case.sections.update import Update
 from alphacut.case.sections.vibration import Envelope, Exceedance, Study
 from alphacut.io.problem import BadInput, Problem
 
@@ -41,11 +42,12 @@ class Sections:
     study: tuple[Study, ...] = ()
     envelope: Envelope | None = None
     exceedance: Exceedance | None = None
+    update: Update | None = None
 
     @property
     def files(self) -> tuple[Section | None, ...]:
         """The sections that may name files."""
-        return (self.microstructure, self.picture, self.modulus, self.frame, self.tower)
+        return (self.microstructure, self.picture, self.modulus, self.frame, self.tower, self.update)
 
 
 class Needed(Generic[S]):
@@ -99,6 +101,7 @@ class Case:
     tower = Needed[Tower]()
     envelope = Needed[Envelope]()
     exceedance = Needed[Exceedance]()
+    update = Needed[Update]()
 
     @property
     def name(self) -> str:

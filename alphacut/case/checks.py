@@ -50,6 +50,7 @@ def checks(*, modal: bool = False) -> Iterator[Check]:
     yield where("envelope", integrators)
     yield where("envelope", idle_envelope)
     yield where("exceedance", exceedance)
+    yield where("update", update)
 
 
 def where(section: str, check: Check) -> Check:
@@ -275,6 +276,21 @@ def exceedance(case: Case) -> Iterator[Problem]:
             limit_of(case)  # of a storey that is not there nothing can be said
     except BadInput as error:
         yield from error.problems
+
+
+def update(case: Case) -> Iterator[Problem]:
+    """Modes are those of a storey frame, and levels rise from above 0."""
+    alpha = case.update.alpha
+    yield from levels("update.alpha", alpha)
+    if case.sections.frame is None:
+        yield Problem("update", "natural modes are learned from for a storey frame", "", "[frame]")
+    if alpha[0] <= 0:
+        yield Problem(
+            "update.alpha",
+            "measured values decide no cut at α = 0",
+            str(list(alpha)),
+            "levels above 0, as [0.05, 0.5, 1]",
+        )
 
 
 def times(case: Case) -> Iterator[Problem]:

@@ -9,6 +9,7 @@ from alphacut.case.sections.material import CellTable, Mesh, Modulus, Radius, Re
 from alphacut.case.sections.particles import Circles, Microstructure, Packing, Photograph
 from alphacut.case.sections.structures import Frame, Pendulum, Tower
 from alphacut.case.sections.top import Top
+from alphacut.case.sections.update import Update
 from alphacut.case.sections.vibration import Envelope, Exceedance, Study
 
 SECTIONS: dict[str, type[Section]] = {
@@ -28,6 +29,7 @@ SECTIONS: dict[str, type[Section]] = {
     "study": Study,
     "envelope": Envelope,
     "exceedance": Exceedance,
+    "update": Update,
 }
 # sections that a stage cannot do without
 NEEDED = {

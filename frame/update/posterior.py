@@ -17,7 +17,7 @@ import numpy as np
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.frame.update.agreement import Agreement, widest
-from alphacut.frame.update.chain import Chain
+from alphacut.frame.update.chain import Chain, eigenvalue_ranges
 from alphacut.frame.update.enclosure import PASSES, Enclosure, enclosure
 from alphacut.frame.update.identified import Direction, directions
 from alphacut.frame.update.measured import Measurement
@@ -101,6 +101,15 @@ class Posterior:
         widths = [prior_cut(priors[name], level, self.agreement).width for name in self.names]
         found = (self.upper[0] - self.lower[0]) / np.array(widths)
         return dict(zip(self.names, map(float, found), strict=True))
+
+    @property
+    def frequencies(self) -> tuple[Array, Array]:
+        """Ends of all natural frequencies over the boxes, each (A, n), proved, in Hz."""
+        chain = self.agreement.chain
+        logs = [np.log(ends / chain.nominal) for ends in (self.lower, self.upper)]
+        found = [eigenvalue_ranges(chain, low, high) for low, high in zip(*logs, strict=True)]
+        low, high = np.array(found).swapaxes(0, 1)
+        return np.sqrt(np.maximum(low, 0.0)) / (2 * np.pi), np.sqrt(high) / (2 * np.pi)
 
     @property
     def words(self) -> str:

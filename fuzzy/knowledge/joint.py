@@ -117,11 +117,11 @@ class JointClaim:
             for name, number in inputs.items()
             if name not in claimed and number.support.width > 0
         )
-        given = [
-            f"{name}: {', '.join(number.claim.given)}"
-            for name, number in claimed.items()
-            if number.claim.given
-        ]
+        alike: dict[str, list[str]] = {}
+        for name, number in claimed.items():
+            if number.claim.given:
+                alike.setdefault(", ".join(number.claim.given), []).append(name)
+        given = [f"{', '.join(names)}: {words}" for words, names in alike.items()]
         rule = next(
             (
                 number.joint or Joint((name,), False, number.claim.about)

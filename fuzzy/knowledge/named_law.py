@@ -185,7 +185,7 @@ def from_scatter(mean: float, deviation: float, count: int, *, known: bool = Fal
     law = (
         f"{count} values drawn alike and independently from a normal law"
         if not known
-        else f"{count} value{'s' * (count > 1)} of a normal law of known deviation {deviation:.3g}"
+        else f"{count} value{'s' * (count > 1)} of a normal law of known deviation"
     )
     number = Stepwise(
         (0.0, *LEVELS), (mean - reach[0], *(mean - reach)), (mean + reach[0], *(mean + reach))

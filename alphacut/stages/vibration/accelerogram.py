@@ -52,7 +52,7 @@ def accelerogram(path: Path, key: str = "frame.accelerogram") -> Accelerogram:
     return Accelerogram(even_step(times, lines, path, key), np.array(values))
 
 
-def table(path: Path, key: str) -> list[tuple[int, list[str]]]:
+def table(path: Path, key: str, least: int = 2) -> list[tuple[int, list[str]]]:
     """Line and entries of every row that is neither empty nor a comment."""
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
@@ -74,9 +74,10 @@ def table(path: Path, key: str) -> list[tuple[int, list[str]]]:
         for number, line in enumerate(lines, start=1)
         if line.strip() and not line.startswith("#")
     ]
-    if len(kept) < 3:
+    if len(kept) <= least:
+        rows = "two rows" if least == 2 else "a row"
         raise BadInput(
-            Problem(key, "the record needs a header and two rows or more", str(path), ALLOWED)
+            Problem(key, f"the record needs a header and {rows} or more", str(path), ALLOWED)
         )
     return [(number, next(csv.reader([line]))) for number, line in kept]
 

@@ -1,0 +1,99 @@
+"""Command ``alphacut update``: what measured natural modes say about a frame's inputs."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TextIO
+
+from alphacut.case.idle import require_read
+from alphacut.case.load import load
+from alphacut.commands.envelope import given_modulus
+from alphacut.commands.options import add_common, answer, changes
+from alphacut.io.files import as_json, write_text
+from alphacut.io.output_paths import unwritable
+from alphacut.io.problem import BadInput
+from alphacut.io.progress import progress
+from alphacut.stages.material.modulus import stand_in
+from alphacut.stages.vibration.structure import structure
+from alphacut.stages.vibration.update import Learned, envelopes, learned, narrower
+
+ABOUT = "learn a frame's fuzzy inputs from its measured natural modes, and its envelope with them"
+READ = ("frame", "envelope", "update", "modulus")
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    add_common(parser)
+    parser.add_argument(
+        "--modulus",
+        metavar="QUANTITY|FILE.nc",
+        help="Young's modulus in place of the case's: '[22, 24, 26] GPa', or α-cuts",
+    )
+    parser.add_argument(
+        "--out",
+        metavar="FOLDER",
+        help="write update.json, and figures of the inputs and of the envelope before and after",
+    )
+
+
+def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
+    """Learn and report; status 0 also where the measurement refutes the frame."""
+    case = load(options.case, changes(options, {}))
+    require_read(case, READ, "update")
+    if case.sections.update is None:
+        raise case.without("update")
+    folder = Path(options.out) if options.out else None
+    if folder is not None and (problems := list(unwritable("--out", folder, folder=True))):
+        raise BadInput(problems)
+    wanted = structure(case, given_modulus(options.modulus) or stand_in(case))
+    found = learned(case, wanted)
+    document: dict[str, Any] = found.document()
+    bands = None
+    if folder is not None and found.posterior is not None and case.sections.envelope is not None:
+        with progress("Envelopes", quiet=options.quiet) as tick:
+            bands = envelopes(case, wanted, found, tick)
+        document["envelope_width"] = narrower(bands)
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+        document["figures"] = draw(folder, found, bands)
+        write_text(folder / "update.json", as_json(document, indent=2))
+    answer(options, document, out, text(found, document))
+    return 0
+
+
+def draw(folder: Path, found: Learned, bands: Any) -> list[str]:
+    """Figures of the inputs and of each output's envelope; names of the files."""
+    from alphacut.figures import update as figures
+    from alphacut.figures.style import save, style
+
+    if found.posterior is None:
+        return []
+    with style():
+        drawn = save(figures.boxes(found.posterior), folder / "update-inputs")
+        for output in [] if bands is None else bands["output"].values:
+            drawn += save(figures.bands(bands, str(output)), folder / f"update-{output}")
+    return [path.name for path in drawn]
+
+
+def text(found: Learned, document: Mapping[str, Any]) -> str:
+    """Inputs, predictions and what was not learned, a line each, in SI."""
+    posterior = found.posterior
+    if posterior is None:
+        return f"{found.refuted}\n"
+    lines = [f"inputs at α = {posterior.alpha[0]:g}, proved to hold all that agree:"]
+    for column, name in enumerate(posterior.names):
+        low, high = posterior.lower[0, column], posterior.upper[0, column]
+        share = posterior.narrowed[name]
+        lines.append(f"  {name}: {low:.6g} … {high:.6g}, {100 * share:.3g} % of its prior's width")
+    for held in found.held_out:
+        low, high = held.predicted
+        where = "inside" if held.inside else "OUTSIDE"
+        lines.append(
+            f"mode {held.mode} was held out: {low:.4g} … {high:.4g} Hz predicted,"
+            f" {held.measured:.4g} Hz measured: {where}"
+        )
+    for output, share in document.get("envelope_width", {}).items():
+        lines.append(f"envelope of {output}: {100 * share:.3g} % of its width before")
+    return "\n".join([*lines, posterior.words, ""])

@@ -1,0 +1,109 @@
+"""Measured natural modes from a CSV file: ``mode,frequency,q1,q2``, a row for each measurement."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from alphacut.io.problem import BadInput, Problem
+from alphacut.stages.vibration.accelerogram import table
+from alphacut.stochastic.theta.truncated_normal import Array
+
+KEY = "update.measured"
+ALLOWED = "mode,frequency [Hz],q1,q2 … with the floors that were measured"
+
+
+@dataclass(frozen=True, eq=False)
+class ModeRows:
+    """All measurements of one mode.
+
+    Args:
+        mode: Its number.
+        frequencies: In Hz, shape (rows,).
+        amplitudes: By floor, each of shape (rows,), to any scale.
+    """
+
+    mode: int
+    frequencies: Array
+    amplitudes: dict[int, Array]
+
+
+def mode_rows(path: Path) -> tuple[ModeRows, ...]:
+    """The measurements of each mode, by rising number.
+
+    Raises:
+        BadInput: The file is missing, its header or a row is wrong, or a mode has some amplitudes
+            in one row and not in another.
+    """
+    (line, head), *rows = table(path, KEY, least=1)
+    floors = _floors(head, path, line)
+    numbers = [(line, _numbers(row, len(head), path, line)) for line, row in rows]
+    modes = sorted({row[0] for _, row in numbers})
+    return tuple(
+        _mode(int(mode), [(line, row) for line, row in numbers if row[0] == mode], floors, path)
+        for mode in modes
+    )
+
+
+def _floors(head: list[str], path: Path, line: int) -> tuple[int, ...]:
+    words = [word.strip() for word in head]
+    floors = [re.fullmatch(r"q([1-9]\d*)", word) for word in words[2:]]
+    known = tuple(int(match[1]) for match in floors if match)
+    first = len(words) > 1 and re.fullmatch(r"frequency(\s*\[Hz\])?", words[1])
+    if words[0] != "mode" or not first or len(set(known)) != len(floors):
+        raise BadInput(
+            Problem(KEY, "the header is wrong", ",".join(head), ALLOWED, file=str(path), line=line)
+        )
+    return known
+
+
+def _numbers(row: list[str], count: int, path: Path, line: int) -> list[float]:
+    """Entries of a row; an empty amplitude was not measured."""
+    try:
+        values = [float(text) if text.strip() else float("nan") for text in row]
+    except ValueError:
+        values = []
+    if (
+        len(values) != count
+        or not (values[0] >= 1 and values[0] == int(values[0]))
+        or not 0 < values[1] < float("inf")
+        or np.isinf(values).any()
+    ):
+        raise BadInput(
+            Problem(
+                KEY,
+                "this row is no measured mode",
+                ",".join(row),
+                "a mode from 1, a positive frequency and amplitudes, points in the numbers",
+                file=str(path),
+                line=line,
+            )
+        )
+    return values
+
+
+def _mode(
+    mode: int, rows: list[tuple[int, list[float]]], floors: tuple[int, ...], path: Path
+) -> ModeRows:
+    values = np.array([row for _, row in rows])
+    amplitudes = {}
+    for column, floor in enumerate(floors, start=2):
+        missing = np.isnan(values[:, column])
+        if missing.any() and not missing.all():
+            line = rows[int(missing.argmax())][0]
+            raise BadInput(
+                Problem(
+                    KEY,
+                    f"mode {mode} has an amplitude of floor {floor} in some rows only",
+                    "",
+                    "one in each row of the mode, or none",
+                    file=str(path),
+                    line=line,
+                )
+            )
+        if not missing.any():
+            amplitudes[floor] = values[:, column]
+    return ModeRows(mode, values[:, 1], amplitudes if len(amplitudes) > 1 else {})

@@ -1,0 +1,212 @@
+"""Inputs of a case after natural modes of its frame were measured, and its envelope with them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from alphacut.case.case import Case
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.io.problem import BadInput, Problem
+from alphacut.io.progress import Tick
+from alphacut.stages.vibration import envelope
+from alphacut.stages.vibration.envelope_task import task_of
+from alphacut.stages.vibration.modes_csv import ModeRows, mode_rows
+from alphacut.stages.vibration.structure import Structure
+
+if TYPE_CHECKING:
+    import xarray
+
+    from alphacut.frame.update.measured import MeasuredMode
+    from alphacut.frame.update.posterior import Posterior
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """A measured mode that was predicted.
+
+    Args:
+        mode: Its number.
+        measured: Mean of its measured frequencies, in Hz.
+        predicted: Proved range of the frequency at the lowest level, in Hz.
+    """
+
+    mode: int
+    measured: float
+    predicted: tuple[float, float]
+
+    @property
+    def inside(self) -> bool:
+        """Whether the measured frequency lies in the range predicted."""
+        return self.predicted[0] <= self.measured <= self.predicted[1]
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """What measured modes leave of a case's inputs.
+
+    Args:
+        posterior: The inputs' boxes; None where the measurement refutes the frame.
+        refuted: Why it does; empty where it does not.
+        prior: The inputs before.
+        held_out: Modes that were predicted.
+        structure: The structure with the inputs learned.
+    """
+
+    posterior: Posterior | None
+    refuted: str
+    prior: Mapping[str, FuzzyNumber]
+    held_out: tuple[HeldOut, ...]
+    structure: Structure
+
+    def document(self) -> dict[str, Any]:
+        """The result as it is printed with ``--json``, in SI."""
+        found = self.posterior
+        if found is None:
+            return {"refuted": self.refuted}
+        return {
+            "alpha": found.alpha,
+            "inputs": {
+                name: {"lower": found.lower[:, k], "upper": found.upper[:, k]}
+                for k, name in enumerate(found.names)
+            },
+            "narrowed": found.narrowed,
+            "agreement": found.height,
+            "not_learned": [x.words for x in found.directions if not x.learned],
+            "held_out": [
+                {
+                    "mode": x.mode,
+                    "measured": x.measured,
+                    "predicted": x.predicted,
+                    "inside": x.inside,
+                }
+                for x in self.held_out
+            ],
+            "claim": str(found.claim),
+            "seconds": found.seconds,
+        }
+
+
+def learned(case: Case, wanted: Structure) -> Learned:
+    """The inputs of [update] learn after its measured modes.
+
+    Args:
+        case: With the sections update and frame.
+        wanted: The structure with its priors.
+
+    Raises:
+        BadInput: The file of modes is wrong, or an input cannot be learned.
+    """
+    from alphacut.frame.update.measured import Measurement
+    from alphacut.frame.update.posterior import RefutedError, update
+
+    if wanted.frame is None:
+        raise BadInput(Problem("update", "natural modes are learned from for a storey frame"))
+    given = case.update
+    rows = mode_rows(case.beside(given.measured))
+    held = {round(number) for number in given.held_out}
+    used = [row for row in rows if row.mode not in held]
+    prior = inputs(case, wanted)
+    try:
+        measurement = Measurement(
+            tuple(_measured(case, row) for row in used), given.independent
+        )
+        found = update(wanted.frame, prior, measurement, alpha=given.alpha)
+    except RefutedError as error:
+        return Learned(None, str(error), prior, (), wanted)
+    except ValueError as error:
+        raise BadInput(Problem("update", str(error), file=str(case.path))) from None
+    low, high = found.frequencies
+    predicted = tuple(
+        HeldOut(
+            row.mode,
+            float(row.frequencies.mean()),
+            (float(low[0, row.mode - 1]), float(high[0, row.mode - 1])),
+        )
+        for row in rows
+        if row.mode in held and row.mode <= low.shape[1]
+    )
+    after = replace(wanted, numbers={**wanted.numbers, **found.numbers})
+    return Learned(found, "", prior, predicted, after)
+
+
+def inputs(case: Case, wanted: Structure) -> dict[str, FuzzyNumber]:
+    """The fuzzy inputs that [update] learn names.
+
+    Raises:
+        BadInput: One is unknown, or crisp.
+    """
+    try:
+        return wanted.inputs(case.update.learn)
+    except BadInput as error:
+        (problem,) = error.problems
+        raise BadInput(replace(problem, key="update.learn", file=str(case.path))) from None
+
+
+def _measured(case: Case, row: ModeRows) -> MeasuredMode:
+    from alphacut.frame.update.measured import measured_mode
+
+    shapes = {floor: [*map(float, values)] for floor, values in row.amplitudes.items()}
+    return measured_mode(
+        row.mode,
+        row.frequencies,
+        shapes,
+        frequency_deviation=case.update.frequency_deviation,
+        shape_deviation=case.update.shape_deviation,
+    )
+
+
+def envelopes(
+    case: Case, wanted: Structure, found: Learned, progress: Tick | None = None
+) -> xarray.Dataset:
+    """The envelope with the priors and with what was learned, over `knowledge`.
+
+    Args:
+        case: With the section envelope.
+        wanted: The structure with its priors.
+        found: What was learned.
+        progress: Told the share done.
+
+    Raises:
+        BadInput: An input that was learned is not among the envelope's.
+    """
+    import xarray
+
+    task = replace(task_of(case), alpha=case.update.alpha)
+    missing = sorted(set(found.prior) - set(wanted.inputs(task.fuzzy)))
+    if missing:
+        raise BadInput(
+            Problem(
+                "envelope.fuzzy",
+                f"{', '.join(missing)} of [update] learn are missing",
+                ", ".join(task.fuzzy),
+                "all inputs that are learned, among others",
+                file=str(case.path),
+            )
+        )
+    sides = []
+    for share, structure in enumerate((wanted, found.structure)):
+
+        def tick(done: float, before: int = share) -> None:
+            if progress is not None:
+                progress((before + done) / 2)
+
+        sides.append(envelope.compute(structure, task, progress=tick).to_dataset())
+    shared = ["lower", "upper"]
+    return xarray.concat(
+        [side[shared] for side in sides],
+        xarray.DataArray(["prior", "posterior"], dims="knowledge", name="knowledge"),
+    )
+
+
+def narrower(bands: xarray.Dataset) -> dict[str, float]:
+    """Mean width of each output's envelope after the update over that before, lowest level."""
+    width = (bands["upper"] - bands["lower"]).isel(alpha=0).mean("time")
+    share = width.sel(knowledge="posterior") / width.sel(knowledge="prior")
+    return {
+        str(name): float(x)
+        for name, x in zip(share["output"].values, np.asarray(share), strict=True)
+    }
