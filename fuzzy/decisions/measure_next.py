@@ -1,0 +1,172 @@
+"""Which input to measure next: how much narrower the answer is if one is known better.
+
+For each input the answer is computed again at one level with its cut halved, about the modal value
+and at both ends, and with the input exact: where a better measurement will find it, nobody knows
+beforehand, so the least gain over those places stands beside the gain at the modal value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.fuzzy.arguments import fuzzy_inputs
+from alphacut.fuzzy.knowledge.joint import joined_once
+from alphacut.fuzzy.knowledge.known import Known
+from alphacut.fuzzy.plans.plan import Plan
+from alphacut.fuzzy.propagation import propagate
+from alphacut.fuzzy.samples.result import FuzzyResult
+from alphacut.fuzzy.sets.numbers import Crisp, Cut, FuzzyNumber, Interval
+
+Answer = Callable[[Mapping[str, FuzzyNumber]], tuple[float, float]]
+"""From inputs to the width of the answer and its error."""
+INNER = 0.02
+"""Share of a width that counts as its error where the bounds are attained ones without estimate."""
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What better knowledge of one input takes off the answer's width.
+
+    Args:
+        name: The input.
+        half: Width lost where its cut is half as wide about the modal value.
+        half_least: The least of that over cuts at the modal value and at both ends.
+        exact: Width lost where it is the modal value.
+        exact_least: The least of that over the modal value and both ends.
+    """
+
+    name: str
+    half: float
+    half_least: float
+    exact: float
+    exact_least: float
+
+
+@dataclass(frozen=True)
+class Advice:
+    """Gains of all inputs, the largest first.
+
+    Args:
+        gains: One for each fuzzy input.
+        width: Width of the answer now.
+        error: Error of a difference of widths.
+        alpha: The level.
+        note: Why no input can be named; empty where one can.
+    """
+
+    gains: tuple[Gain, ...]
+    width: float
+    error: float
+    alpha: float
+    note: str
+
+    def __str__(self) -> str:
+        """A line for each input, then what cannot be said."""
+        unit = 100 / self.width if self.width > 0 else 0.0
+        lines = [
+            f"width {self.width:.6g} at α = {self.alpha:g}, less by, known twice as well (at"
+            " least) and exactly (at least):"
+        ]
+        lines += [
+            f"  {x.name}: {unit * x.half:.3g} % ({unit * x.half_least:.3g} %),"
+            f" {unit * x.exact:.3g} % ({unit * x.exact_least:.3g} %)"
+            for x in self.gains
+        ]
+        return "\n".join([*lines, *([self.note] if self.note else [])])
+
+
+def advice(answer: Answer, inputs: Mapping[str, FuzzyNumber], *, alpha: float = 0.0) -> Advice:
+    """Gains by computing the answer again, six times for each input.
+
+    Args:
+        answer: The width of the answer and its error, for inputs of which some are intervals or
+            crisp.
+        inputs: The fuzzy inputs; claims must be joined already.
+        alpha: The level.
+    """
+    cuts = {name: number.cut(alpha) for name, number in inputs.items()}
+    whole: dict[str, FuzzyNumber] = {name: _between(*cut) for name, cut in cuts.items()}
+    width, error = answer(whole)
+    worst, gains = error, []
+    for name, number in inputs.items():
+        low, high = cuts[name]
+        if low == high:
+            continue
+        lost = []
+        for at in (min(max(number.modal, low), high), low, high):
+            for share in (0.5, 0.0):
+                narrow = _between(at + share * (low - at), at + share * (high - at))
+                less, error = answer({**whole, name: narrow})
+                worst = max(worst, error)
+                lost.append(width - less)
+        gains.append(Gain(name, lost[0], min(lost[0::2]), lost[1], min(lost[1::2])))
+    gains.sort(key=lambda x: -x.half)
+    return Advice(tuple(gains), width, 2 * worst, alpha, _note(gains, width, 2 * worst))
+
+
+def measure_next(
+    function: Callable[..., object],
+    inputs: Mapping[str, FuzzyNumber | float],
+    plan: Plan | None = None,
+    *,
+    output: str | None = None,
+    alpha: float = 0.0,
+    known: Known | None = None,
+    vectorised: bool = False,
+) -> Advice:
+    """How much narrower an output is if each input were known twice as well, and exactly.
+
+    Args:
+        function: As for `propagate`.
+        inputs: Fuzzy inputs; claims are joined as `propagate` does.
+        plan: As for `propagate`.
+        output: The output; the only one if not given.
+        alpha: The level at which widths are compared.
+        known: Facts about the function, as for `propagate`.
+        vectorised: Whether the function takes arrays.
+
+    Raises:
+        ValueError: An argument is wrong, or there are several outputs and none is named.
+    """
+    numbers = joined_once(fuzzy_inputs(inputs))
+
+    def answer(changed: Mapping[str, FuzzyNumber]) -> tuple[float, float]:
+        found = propagate(function, changed, plan, alpha=[1.0], known=known, vectorised=vectorised)
+        return _width(found, output)
+
+    return advice(answer, numbers, alpha=alpha)
+
+
+def _width(found: FuzzyResult, output: str | None) -> tuple[float, float]:
+    if output is None and len(found.outputs) > 1:
+        raise ValueError(f"there are the outputs {', '.join(found.outputs)}; name one: output=")
+    column = 0 if output is None else found.column(output)
+    width = float(found.upper[0, column] - found.lower[0, column])
+    error = float(found.error[0, column]) if found.error.size else 0.0
+    proved = bool(found.proved[0, column]) if found.proved.size else False
+    return width, 2 * error if error or proved else INNER * width
+
+
+def _between(low: float, high: float) -> FuzzyNumber:
+    return Interval(*Cut(low, high)) if high > low else Crisp(low)
+
+
+def _note(gains: list[Gain], width: float, error: float) -> str:
+    """Why no input can be named as the one to measure next."""
+    if not gains:
+        return "no input is fuzzy at this level: there is nothing to measure"
+    if not np.isfinite([width, error]).all():
+        return "the width is not finite: nothing can be said"
+    if gains[0].half <= error:
+        least = f"the error of a difference, {error:.3g}"
+        return f"no input can be named: no gain is above {least}; try measuring two of them"
+    tied = [x.name for x in gains[1:] if gains[0].half - x.half <= error]
+    return (
+        f"{gains[0].name} cannot be told from {', '.join(tied)}: their gains differ by less than"
+        f" {error:.3g}, the error"
+        if tied
+        else ""
+    )
