@@ -3,7 +3,6 @@
 from alphacut.fuzzy.campaign.campaign import CampaignError
 from alphacut.fuzzy.campaign.store import Store
 from alphacut.fuzzy.decisions.limits import decide, safe_scale
-from alphacut.fuzzy.decisions.measure_next import measure_next
 from alphacut.fuzzy.dry_run import explain
 from alphacut.fuzzy.knowledge.from_data import from_data
 from alphacut.fuzzy.knowledge.joint import jointly
@@ -65,7 +64,6 @@ __all__ = [
     "from_data",
     "jointly",
     "levels",
-    "measure_next",
     "propagate",
     "safe_scale",
     "width_shares",

@@ -47,7 +47,14 @@ class Sections:
     @property
     def files(self) -> tuple[Section | None, ...]:
         """The sections that may name files."""
-        return (self.microstructure, self.picture, self.modulus, self.frame, self.tower, self.update)
+        return (
+            self.microstructure,
+            self.picture,
+            self.modulus,
+            self.frame,
+            self.tower,
+            self.update,
+        )
 
 
 class Needed(Generic[S]):

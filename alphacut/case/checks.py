@@ -192,7 +192,7 @@ def missing_sections(case: Case) -> Iterator[Problem]:
 
 def files(case: Case) -> Iterator[Problem]:
     """Files that the case names must be there."""
-    for section in ("microstructure", "picture", "modulus", "frame", "tower"):
+    for section in ("microstructure", "picture", "modulus", "frame", "tower", "update"):
         found = getattr(case.sections, section)
         section = "cell" if section == "picture" else section
         for key, name in files_of(found) if found else ():

@@ -17,6 +17,7 @@ from alphacut.case.sections.particles import Microstructure
 from alphacut.case.sections.picture import PICTURES, Picture
 from alphacut.case.sections.structures import Frame, Pendulum, Tower
 from alphacut.case.sections.top import Top
+from alphacut.case.sections.update import Update
 from alphacut.case.sections.vibration import Envelope, Exceedance, Study
 from alphacut.case.toml_file import contents, lines_of_keys, parsed
 from alphacut.case.values import Unfit, allowed, nearest, read
@@ -102,6 +103,7 @@ def built(tables: Tables, written: Collection[str], broken: Collection[str]) -> 
         tower=given(Tower, "tower"),
         envelope=given(Envelope, "envelope"),
         exceedance=given(Exceedance, "exceedance"),
+        update=given(Update, "update"),
         study=tuple(section_of(Study, name, sound) for name in sound if name.startswith("study[")),
     )
 

@@ -24,7 +24,7 @@ from alphacut.io.units import engineering
 from alphacut.stages.material.modulus import stand_in
 from alphacut.stages.vibration.tolerances import Tolerances, tolerances
 
-ABOUT = "largest scaling of the fuzzy inputs' supports for which the limit provably holds"
+ABOUT = "largest supports for which the limit provably holds"
 KEYS = {
     "--fuzzy": KeyOption("envelope.fuzzy", "inputs whose supports are scaled, as E,m", "NAMES"),
     "--duration": KeyOption("envelope.duration", "length of the simulation", bare="s"),

@@ -19,7 +19,7 @@ from alphacut.stages.material.modulus import stand_in
 from alphacut.stages.vibration.structure import structure
 from alphacut.stages.vibration.update import Learned, envelopes, learned, narrower
 
-ABOUT = "learn a frame's fuzzy inputs from its measured natural modes, and its envelope with them"
+ABOUT = "learn inputs of a frame from its measured modes"
 READ = ("frame", "envelope", "update", "modulus")
 
 

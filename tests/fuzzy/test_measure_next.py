@@ -17,9 +17,8 @@ from alphacut.fuzzy import (
     Reduced,
     Triangular,
     from_data,
-    measure_next,
 )
-from alphacut.fuzzy.decisions.measure_next import advice
+from alphacut.fuzzy.decisions.measure_next import advice, measure_next
 
 Array = np.ndarray
 NAMES = ("a", "b", "c", "d")

@@ -111,9 +111,7 @@ def learned(case: Case, wanted: Structure) -> Learned:
     used = [row for row in rows if row.mode not in held]
     prior = inputs(case, wanted)
     try:
-        measurement = Measurement(
-            tuple(_measured(case, row) for row in used), given.independent
-        )
+        measurement = Measurement(tuple(_measured(case, row) for row in used), given.independent)
         found = update(wanted.frame, prior, measurement, alpha=given.alpha)
     except RefutedError as error:
         return Learned(None, str(error), prior, (), wanted)
