@@ -16,14 +16,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from alphacut.stochastic.particles.circles_csv import MeasuredCircles
 from alphacut.stochastic.particles.discs import Discs
+from alphacut.stochastic.particles.touching import Labels, roundness, split
 from alphacut.stochastic.theta.truncated_normal import Array
 
 # pixels by which a particle at the image's edge may be narrower than its area tells before it
 # counts as cut
 CUT = 1.2
+FLATTENED = 0.45  # roundness of a disc that several neighbours overlap
 PARTICLES = ("auto", "bright", "dark")
 
 
@@ -92,7 +95,7 @@ class SectionImage:
 
         share, labels = self._segmented(picture)
         height, width = picture.shape
-        found, rejected = [], {}
+        found, rejected, touching = [], {}, _touching(labels)
         for region in measure.regionprops(labels):  # type: ignore[no-untyped-call]
             top, left, bottom, right = region.bbox
             circle = _circle(share, labels, region.label, region.bbox)
@@ -101,7 +104,9 @@ class SectionImage:
                 rejected[region.label] = f"is smaller than {self.smallest:g} pixels in radius"
             elif at_edge and 2 * circle[2] - min(bottom - top, right - left) > CUT:
                 rejected[region.label] = "is cut by the image's edge"
-            elif region.area < self.roundness * np.pi / 4 * region.feret_diameter_max**2:
+            elif roundness(*region.coords.T) < (
+                FLATTENED if touching[region.label] else self.roundness
+            ):
                 rejected[region.label] = "is not round"
             else:
                 found.append(circle)
@@ -119,7 +124,15 @@ class SectionImage:
             rejected,
         )
 
-    def _segmented(self, picture: Array) -> tuple[Array, Array]:
+    def _plateau(self, smooth: Array, mask: NDArray[np.bool_]) -> float:
+        """Grey of one phase away from the smoothed edge, or as far from it as pixels lie."""
+        from scipy import ndimage
+
+        depth = ndimage.distance_transform_edt(mask)
+        enough = min(3 * self.smoothing + 1, float(np.quantile(depth[mask], 0.8)))
+        return float(np.median(smooth[depth >= enough]))
+
+    def _segmented(self, picture: Array) -> tuple[Array, Labels]:
         """Particle's share of each pixel, in [0, 1], and labels of the particles."""
         from scipy import ndimage
         from skimage import feature, filters, segmentation
@@ -132,18 +145,44 @@ class SectionImage:
         edge = np.concatenate([mask[0], mask[-1], mask[:, 0], mask[:, -1]])
         if self.particles == "dark" or (self.particles == "auto" and edge.mean() > 0.5):
             mask = ~mask
-        within, without = np.median(smooth[mask]), np.median(smooth[~mask])
-        share = np.clip((smooth - without) / (within - without), 0, 1)
+        within, without = self._plateau(smooth, mask), self._plateau(smooth, ~mask)
+        share = (smooth - without) / (within - without)  # noise beyond 0 and 1 cancels in sums
         depth = ndimage.gaussian_filter(ndimage.distance_transform_edt(mask), 1.0)
         parts, apart = ndimage.label(mask)[0], max(2, round(self.smallest))
         peaks = feature.peak_local_max(depth, apart, labels=parts, exclude_border=False)  # type: ignore[no-untyped-call]
         seeds = np.zeros(mask.shape, int)
         seeds[tuple(peaks.T)] = np.arange(1, len(peaks) + 1)
-        return share, segmentation.watershed(-depth, seeds, mask=mask)  # type: ignore[no-untyped-call]
+        labels = segmentation.watershed(-depth, seeds, mask=mask)  # type: ignore[no-untyped-call]
+        return share, _rounder(labels, self.roundness, np.pi * self.smallest**2)
+
+
+def _rounder(labels: Labels, least: float, smallest: float) -> Labels:
+    """Labels where pieces that are not round are split into parts that are, if they can be."""
+    from scipy import ndimage
+
+    new = labels.max() + 1
+    for label, window in enumerate(ndimage.find_objects(labels), start=1):
+        if window is None:
+            continue
+        rows, columns = np.nonzero(labels[window] == label)
+        parts = split(rows, columns, least, smallest)
+        for part in range(1, parts.max() + 1):
+            labels[window][rows[parts == part], columns[parts == part]] = new
+            new += 1
+    return labels
+
+
+def _touching(labels: Labels) -> NDArray[np.bool_]:
+    """Labels whose pixels have a pixel of another particle beside them, shape (labels + 1,)."""
+    touching = np.zeros(labels.max() + 1, bool)
+    for one, other in ((labels[1:], labels[:-1]), (labels[:, 1:], labels[:, :-1])):
+        meet = (one != other) & (one > 0) & (other > 0)
+        touching[one[meet]] = touching[other[meet]] = True
+    return touching
 
 
 def _circle(
-    share: Array, labels: Array, label: int, box: tuple[int, int, int, int]
+    share: Array, labels: Labels, label: int, box: tuple[int, int, int, int]
 ) -> tuple[float, float, float]:
     """Centroid (row, column) and radius of a particle, in pixels.
 
