@@ -35,6 +35,7 @@ def summary(found: Microstructure) -> dict[str, Any]:
         },
         "area_fraction": float(np.mean([one.area_fraction for one in discs])),
         "area_fraction_of_cells": sample.area_fraction,
+        "area_fraction_of_image": found.sections[0].phase_fraction,
         "smallest_radius": float(radii.min()),
         "largest_radius": float(radii.max()),
         "cell_areas_sum_error": max(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Executor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -30,11 +30,13 @@ class Section:
         diagram: Apollonius cells.
         whole: Cells that count, and their weights.
         rejected: What was left out of measured data: row or label to reason.
+        phase_fraction: Area fraction of the particles in the image that was read, if one was.
     """
 
     diagram: Apollonius
     whole: WholeCells
     rejected: dict[int, str] = field(default_factory=dict)
+    phase_fraction: float | None = None
 
     @property
     def discs(self) -> Discs:
@@ -103,7 +105,9 @@ class Measured:
     ) -> list[Section]:
         """The section with its cells; `seed` and `executor` do nothing here."""
         circles = self.file.read()
-        section = _section(circles.discs, circles.rejected)
+        section = replace(
+            _section(circles.discs, circles.rejected), phase_fraction=circles.phase_fraction
+        )
         if progress:
             progress(1.0)
         return [section]

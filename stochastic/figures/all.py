@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.stochastic.figures.cells import draw_cells, draw_neighbours, draw_two_point
+from alphacut.stochastic.figures.overlay import draw_overlay
 from alphacut.stochastic.figures.statistics import (
     draw_areas,
     draw_correlation,
@@ -19,9 +20,10 @@ from alphacut.stochastic.figures.statistics import (
 )
 from alphacut.stochastic.figures.style import save, style
 from alphacut.stochastic.particles.discs import Discs
+from alphacut.stochastic.particles.image import SectionImage
 from alphacut.stochastic.particles.log_normal import LogNormalRadii
 from alphacut.stochastic.particles.packing import Packing
-from alphacut.stochastic.sections import Simulated
+from alphacut.stochastic.sections import Measured, Simulated
 from alphacut.stochastic.tessellation.apollonius import apollonius
 from alphacut.stochastic.tessellation.delaunay import neighbours
 
@@ -55,6 +57,9 @@ def draw(found: Microstructure, folder: Path) -> dict[str, list[Path]]:
         "13_pbox": lambda: draw_pbox(found),
         "radius_map": lambda: draw_map(found),
     }
+    if isinstance(source, Measured) and isinstance(source.file, SectionImage):
+        picture, discs = source.file.picture(), found.sections[0].discs
+        figures["image_circles"] = lambda: draw_overlay(picture, discs)
     with style():
         return {name: save(figure(), folder / name) for name, figure in figures.items()}
 

@@ -136,7 +136,11 @@ class MeasuredCircles:
     Args:
         discs: The circles, origin at the corner of the section.
         rejected: What was left out: row (or label) to reason.
+        phase_fraction: Area fraction of the particles in the whole image; None without an image.
+        lost: Share of that area which lies in particles left out inside the image.
     """
 
     discs: Discs
     rejected: dict[int, str] = field(default_factory=dict)
+    phase_fraction: float | None = None
+    lost: float = 0.0

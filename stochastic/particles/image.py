@@ -6,26 +6,42 @@ area counts every pixel by the share that the smoothed grey value gives it, whic
 a fraction of a pixel.
 
 Tested limits: radii of 8 pixels or more, gaps of 3 or more, contrast at least 5 times the standard
-deviation of the noise: the count is exact and half of the radii are within half a pixel. Particles
-that the image's edge cuts are listed as rejected: their circle is not known.
+deviation of the noise: the count is exact and half of the radii are within half a pixel. A piece
+that is not round is split into parts that are rounder, if there are any. Particles that the image's
+edge cuts are listed as rejected: their circle is not known.
 """
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from alphacut.stochastic.particles.circles_csv import MeasuredCircles
 from alphacut.stochastic.particles.discs import Discs
-from alphacut.stochastic.particles.touching import Labels, roundness, split
+from alphacut.stochastic.particles.touching import (
+    CONVEX,
+    Labels,
+    convexity,
+    pushed_apart,
+    roundness,
+    split,
+)
 from alphacut.stochastic.theta.truncated_normal import Array
+
+if TYPE_CHECKING:
+    from skimage.measure._regionprops import RegionProperties
 
 # pixels by which a particle at the image's edge may be narrower than its area tells before it
 # counts as cut
 CUT = 1.2
+CUT_OFF = "is cut by the image's edge"
+LOST = 0.02  # share of the particles' area that may be left out
 FLATTENED = 0.45  # roundness of a disc that several neighbours overlap
 PARTICLES = ("auto", "bright", "dark")
 
@@ -37,12 +53,13 @@ class SectionImage:
     Args:
         path: Image file.
         pixel: Side of a pixel, in m.
-        particles: "bright" or "dark" against the matrix; "auto" takes the sort that the image's
-            edge shows less of.
+        particles: "bright" or "dark" against the matrix; "auto" takes the phase whose pieces fill
+            more of their convex hulls.
         smallest: Least radius that counts as a particle, in pixels.
         smoothing: Standard deviation of the smoothing, in pixels.
         roundness: Least share of its own smallest round hull (diameter = longest chord) that a
             particle must fill.
+        drop: Go on where particles left out hold more than `LOST` of the particles' area.
 
     Raises:
         ValueError: A value lies outside its range.
@@ -54,6 +71,7 @@ class SectionImage:
     smallest: float = 4.0
     smoothing: float = 1.5
     roundness: float = 0.7
+    drop: bool = False
 
     def __post_init__(self) -> None:
         if not 0 < self.pixel < np.inf:
@@ -74,6 +92,14 @@ class SectionImage:
         Raises:
             ValueError: The file is no image, has no contrast, or shows no particle.
         """
+        return self.circles(self.picture())
+
+    def picture(self) -> Array:
+        """Grey values of the file, shape (rows, columns).
+
+        Raises:
+            ValueError: The file is no plane image of 16 × 16 pixels or more.
+        """
         from skimage import color, io
 
         try:
@@ -87,42 +113,68 @@ class SectionImage:
                 f"{self.path} has the shape {picture.shape}; it takes a plane image of 16 × 16"
                 " pixels or more"
             )
-        return self.circles(picture.astype(float))
+        return picture.astype(float)
 
     def circles(self, picture: Array) -> MeasuredCircles:
-        """Circles of a grey image, shape (rows, columns); y points up from the lower edge, in m."""
-        from skimage import measure
+        """Circles of a grey image, shape (rows, columns); y points up from the lower edge, in m.
 
+        Raises:
+            ValueError: The image has no contrast or no particle, or more than `LOST` of the
+                particles' area lies in pieces that are no round particles, unless `drop` is set.
+        """
         share, labels = self._segmented(picture)
-        height, width = picture.shape
-        found, rejected, touching = [], {}, _touching(labels)
-        for region in measure.regionprops(labels):  # type: ignore[no-untyped-call]
-            top, left, bottom, right = region.bbox
-            circle = _circle(share, labels, region.label, region.bbox)
-            at_edge = top == 0 or left == 0 or bottom == height or right == width
-            if circle[2] < self.smallest:
-                rejected[region.label] = f"is smaller than {self.smallest:g} pixels in radius"
-            elif at_edge and 2 * circle[2] - min(bottom - top, right - left) > CUT:
-                rejected[region.label] = "is cut by the image's edge"
-            elif roundness(*region.coords.T) < (
-                FLATTENED if touching[region.label] else self.roundness
-            ):
-                rejected[region.label] = "is not round"
-            else:
-                found.append(circle)
+        found, rejected, lost = self._sorted(share, labels)
         if not found:
             raise ValueError(
-                f"{self.path} shows no round particle of {self.smallest:g} pixels or more in"
-                " radius; is the contrast right?"
+                f"{self.path} shows no round particle of {self.smallest:g} pixels or more in radius"
+                f" ({_counted(rejected)}); particles that are not round need the image itself as"
+                " the cell: [cell] image"
             )
-        row, column, radius = np.array(found).T
-        centres = np.stack([column + 0.5, height - row - 0.5], axis=1) * self.pixel
-        return MeasuredCircles(
-            Discs(
-                centres, radius * self.pixel, np.array([width, height]) * self.pixel, periodic=False
-            ),
-            rejected,
-        )
+        fraction = float(share.mean())
+        missing = lost / share.sum()
+        if missing > LOST and not self.drop:
+            raise ValueError(
+                f"{self.path} shows particles on {fraction:.4f} of its area, and {missing:.1%} of"
+                f" that lies in pieces that were left out ({_counted(rejected)}): take the image"
+                " itself as the cell ([cell] image), or drop them (drop = true)"
+            )
+        (row, column, radius), (height, width) = np.array(found).T, picture.shape
+        centres = np.stack([column + 0.5, height - row - 0.5], axis=1)
+        centres = pushed_apart(centres, radius) * self.pixel
+        size = np.array([width, height]) * self.pixel
+        discs = Discs(centres, radius * self.pixel, size, periodic=False)
+        return MeasuredCircles(discs, rejected, fraction, missing)
+
+    def _sorted(
+        self, share: Array, labels: Labels
+    ) -> tuple[list[tuple[float, float, float]], dict[int, str], float]:
+        """Circles in pixels, reasons of what was left out, and pixels left out inside the image."""
+        from skimage import measure
+
+        found, rejected, lost = [], {}, 0.0
+        touching = _touching(labels)
+        for region in measure.regionprops(labels):  # type: ignore[no-untyped-call]
+            circle = _circle(share, labels, region.label, region.bbox)
+            reason = self._reason(region, circle[2], labels.shape, touching[region.label])
+            if not reason:
+                found.append(circle)
+                continue
+            rejected[region.label] = reason
+            lost += 0.0 if reason == CUT_OFF else np.pi * circle[2] ** 2
+        return found, rejected, lost
+
+    def _reason(
+        self, region: RegionProperties, radius: float, shape: tuple[int, ...], touches: bool
+    ) -> str:
+        """Reason to leave a piece out; empty for a round particle."""
+        top, left, bottom, right = region.bbox
+        at_edge = top == 0 or left == 0 or bottom == shape[0] or right == shape[1]
+        if at_edge and 2 * radius - min(bottom - top, right - left) > CUT:
+            return CUT_OFF
+        if radius < self.smallest:
+            return f"is smaller than {self.smallest:g} pixels in radius"
+        least = FLATTENED if touches else self.roundness
+        return "is not round" if roundness(*region.coords.T) < least else ""
 
     def _plateau(self, smooth: Array, mask: NDArray[np.bool_]) -> float:
         """Grey of one phase away from the smoothed edge, or as far from it as pixels lie."""
@@ -135,25 +187,62 @@ class SectionImage:
     def _segmented(self, picture: Array) -> tuple[Array, Labels]:
         """Particle's share of each pixel, in [0, 1], and labels of the particles."""
         from scipy import ndimage
-        from skimage import feature, filters, segmentation
+        from skimage import filters
 
         smooth = ndimage.gaussian_filter(picture, self.smoothing)
         if not np.ptp(smooth) > 0:
             raise ValueError(f"{self.path} is of one grey throughout; nothing can be told apart")
         threshold = filters.threshold_otsu(smooth)  # type: ignore[no-untyped-call]
         mask = smooth > threshold
-        edge = np.concatenate([mask[0], mask[-1], mask[:, 0], mask[:, -1]])
-        if self.particles == "dark" or (self.particles == "auto" and edge.mean() > 0.5):
+        if self.particles == "dark" or (self.particles == "auto" and not self._are_bright(mask)):
             mask = ~mask
         within, without = self._plateau(smooth, mask), self._plateau(smooth, ~mask)
         share = (smooth - without) / (within - without)  # noise beyond 0 and 1 cancels in sums
+        return share, _rounder(self._pieces(mask), self.roundness, np.pi * self.smallest**2)
+
+    def _pieces(self, mask: NDArray[np.bool_]) -> Labels:
+        """Watershed of the distance to the background."""
+        from scipy import ndimage
+        from skimage import feature, segmentation
+
         depth = ndimage.gaussian_filter(ndimage.distance_transform_edt(mask), 1.0)
         parts, apart = ndimage.label(mask)[0], max(2, round(self.smallest))
         peaks = feature.peak_local_max(depth, apart, labels=parts, exclude_border=False)  # type: ignore[no-untyped-call]
         seeds = np.zeros(mask.shape, int)
         seeds[tuple(peaks.T)] = np.arange(1, len(peaks) + 1)
-        labels = segmentation.watershed(-depth, seeds, mask=mask)  # type: ignore[no-untyped-call]
-        return share, _rounder(labels, self.roundness, np.pi * self.smallest**2)
+        labels: Labels = segmentation.watershed(-depth, seeds, mask=mask)  # type: ignore[no-untyped-call]
+        return _convex_whole(labels, parts)
+
+    def _are_bright(self, mask: NDArray[np.bool_]) -> bool:
+        """The bright phase is the particles: its pieces fill more of their convex hulls."""
+        return self._convexity(mask) > self._convexity(~mask)
+
+    def _convexity(self, mask: NDArray[np.bool_]) -> float:
+        """Area of all pieces over that of their convex hulls."""
+        from skimage import measure
+
+        pieces = measure.regionprops(self._pieces(mask))  # type: ignore[no-untyped-call]
+        large = [piece for piece in pieces if piece.area >= np.pi * self.smallest**2]
+        hulls = sum(piece.area_convex for piece in large)
+        return sum(piece.area for piece in large) / hulls if hulls else 0.0
+
+
+def _counted(rejected: Mapping[int, str]) -> str:
+    """Pieces that were left out, by reason."""
+    told = Counter(rejected.values()).most_common()
+    return ", ".join(f"{count} {reason.replace('is ', '', 1)}" for reason, count in told) or "none"
+
+
+def _convex_whole(labels: Labels, parts: Labels) -> Labels:
+    """Labels where a connected part without a neck is one piece, whatever its distances say."""
+    from scipy import ndimage
+
+    for part, window in enumerate(ndimage.find_objects(parts), start=1):
+        here = parts[window] == part
+        pieces = np.unique(labels[window][here])
+        if len(pieces) > 1 and convexity(*np.nonzero(here)) >= CONVEX:
+            labels[window][here] = pieces.max()
+    return labels
 
 
 def _rounder(labels: Labels, least: float, smallest: float) -> Labels:

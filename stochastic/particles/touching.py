@@ -10,7 +10,9 @@ from alphacut.stochastic.theta.truncated_normal import Array
 Labels = NDArray[np.intp]
 
 MOST = 8  # particles that one connected piece is split into at most
+CONVEX = 0.95  # convexity above which a piece has no neck to split it at
 GAIN = 0.1  # of roundness that a split must bring
+PUSHES = 60  # rounds of moving circles apart
 ROUNDS = 25  # of the assignment of pixels to circles
 
 
@@ -21,19 +23,28 @@ def roundness(rows: Array, columns: Array) -> float:
         rows: Rows of the pixels, shape (n,).
         columns: Their columns, shape (n,).
     """
-    from scipy.spatial import ConvexHull, QhullError
+    corners = _hull(rows, columns)
+    chord = np.hypot(*(corners[:, None] - corners[None]).T).max()
+    return float(len(rows) / (np.pi / 4 * chord**2))
 
-    points = np.stack([rows, columns], axis=1).astype(float)
-    try:
-        corners = points[ConvexHull(points).vertices]
-    except QhullError:  # pixels of one line
-        corners = points
-    chord = np.hypot(*(corners[:, None] - corners[None]).T).max() + 1  # pixels have a width
-    return float(len(points) / (np.pi / 4 * chord**2))
+
+def convexity(rows: Array, columns: Array) -> float:
+    """Share of their convex hull that pixels fill, in (0, 1]."""
+    x, y = _hull(rows, columns).T
+    return float(len(rows) / (abs(x @ np.roll(y, 1) - y @ np.roll(x, 1)) / 2))
+
+
+def _hull(rows: Array, columns: Array) -> Array:
+    """Corners of the convex hull of pixels, each half a pixel wide to every side, in order."""
+    from scipy.spatial import ConvexHull
+
+    sides = np.array([[-0.5, 0], [0.5, 0], [0, -0.5], [0, 0.5]])
+    points = (np.stack([rows, columns], axis=1)[:, None] + sides).reshape(-1, 2)
+    return np.asarray(points[ConvexHull(points).vertices])
 
 
 def split(rows: Array, columns: Array, least: float, smallest: float) -> Labels:
-    """Parts of a piece that is not round, if they are rounder than the piece.
+    """Parts of a piece that is neither round nor convex, if they are rounder than the piece.
 
     Every pixel goes to the circle whose edge it lies deepest inside; each circle takes the centroid
     and the area of its pixels, until nothing moves. Of two to eight parts the number is taken whose
@@ -50,7 +61,7 @@ def split(rows: Array, columns: Array, least: float, smallest: float) -> Labels:
     """
     points = np.stack([rows, columns], axis=1).astype(float)
     best, parts_of = roundness(rows, columns), np.zeros(len(points), np.intp)
-    if best >= least:
+    if best >= least or convexity(rows, columns) >= CONVEX:
         return parts_of
     best += GAIN
     for parts in range(2, MOST + 1):
@@ -90,3 +101,34 @@ def _far_apart(points: Array, parts: int) -> Array:
         nearest = np.min([np.hypot(*(points - one).T) for one in chosen], axis=0)
         chosen.append(points[np.argmax(nearest)])
     return np.array(chosen)
+
+
+def pushed_apart(centres: Array, radii: Array) -> Array:
+    """Centres of circles moved apart until none overlap, or as far as `PUSHES` rounds take them.
+
+    Circles of the area of touching parts overlap a little where their parts are flat. Each round
+    moves both circles of a pair by half of their overlap.
+
+    Args:
+        centres: shape (n, 2), in m.
+        radii: shape (n,), in m.
+
+    Returns:
+        New centres, shape (n, 2), in m.
+    """
+    from scipy.spatial import cKDTree
+
+    moved = centres.copy()
+    for _ in range(PUSHES):
+        pairs = cKDTree(moved).query_pairs(2 * radii.max(), output_type="ndarray")
+        first, second = pairs.T
+        line = moved[second] - moved[first]
+        distance = np.hypot(*line.T)
+        overlap = radii[first] + radii[second] - distance
+        meet = overlap > 0
+        if not meet.any():
+            break
+        push = (overlap[meet] / 2 / distance[meet])[:, None] * line[meet]
+        np.add.at(moved, first[meet], -push)
+        np.add.at(moved, second[meet], push)
+    return moved

@@ -120,3 +120,4 @@ class Photograph(Section):
     particles: Annotated[
         Literal["auto", "bright", "dark"], Key("bright or dark against the matrix")
     ] = "auto"
+    drop: Annotated[bool, Key("go on without the pieces that are no round particles")] = False

@@ -58,7 +58,12 @@ def source(case: Case) -> Simulated | Measured:
     photograph = given.image
     assert photograph is not None  # one of the three is there, or the case is refused
     return Measured(
-        SectionImage(case.beside(photograph.file), photograph.pixel, photograph.particles)
+        SectionImage(
+            case.beside(photograph.file),
+            photograph.pixel,
+            photograph.particles,
+            drop=photograph.drop,
+        )
     )
 
 
@@ -152,7 +157,7 @@ def compute(
 
 
 def left_out(found: Microstructure) -> Iterator[str]:
-    """One line on the measured particles that were not taken, by reason, if there are any."""
+    """Lines on the measured particles that were not taken, and on the image's area fraction."""
     reasons = [reason for section in found.sections for reason in section.rejected.values()]
     if reasons:
         told = ", ".join(
@@ -161,6 +166,9 @@ def left_out(found: Microstructure) -> Iterator[str]:
         )
         taken = sum(len(section.discs) for section in found.sections)
         yield f"warning: {len(reasons)} of {taken + len(reasons)} particles were left out: {told}"
+    if (fraction := found.sections[0].phase_fraction) is not None:
+        cells = found.sample.area_fraction
+        yield f"area fraction: {fraction:.4f} in the image, {cells:.4f} in the circles' whole cells"
 
 
 def without_numbers(reason: str) -> str:
