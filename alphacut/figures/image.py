@@ -20,15 +20,14 @@ SMALLEST = 1e-6  # error drawn, over the largest
 def image(found: xarray.Dataset) -> Figure:
     """Phases, constitutive error, E over a random threshold where there is one, α-cuts of E."""
     random = "E_of_threshold" in found
-    rows, columns = (2, 2) if random else (1, 3)
-    drawn, first = figure(width=3.2 * columns, height=3.0 * rows)
+    drawn, first = figure(height=6.0 if random else 5.0)
     first.remove()
-    places = iter(drawn.add_subplot(rows, columns, k + 1) for k in range(rows * columns))
-    phases(next(places), found)
-    errors(next(places), found)
+    grid = drawn.add_gridspec(2, 2, height_ratios=(1, 1 if random else 0.7), hspace=0.25)
+    phases(drawn.add_subplot(grid[0, 0]), found)
+    errors(drawn.add_subplot(grid[0, 1]), found)
     if random:
-        over_threshold(next(places), found)
-    cuts(next(places), found)
+        over_threshold(drawn.add_subplot(grid[1, 0]), found)
+    cuts(drawn.add_subplot(grid[1, 1] if random else grid[1, :]), found)
     return drawn
 
 
@@ -66,9 +65,9 @@ def over_threshold(axes: Axes, found: xarray.Dataset) -> None:
     for pair, share in zip(quantiles, shares, strict=True):
         axes.axhspan(*pair, color=INK, alpha=0.25, lw=0)
         axes.axhline(pair.mean(), color=INK, lw=0.5)
-        axes.annotate(
-            f"{share:g}", (grey[-1], pair.mean()), fontsize=7, va="bottom", ha="right", color=INK
-        )
+        at = (grey[-1], pair.max())
+        above = {"xytext": (0, 1), "textcoords": "offset points", "va": "bottom", "ha": "right"}
+        axes.annotate(f"{share:g}", at, fontsize=8, color=INK, **above)
     axes.set_xlabel("threshold, grey value")
     axes.set_ylabel("E, GPa")
     axes.set_title("E over the threshold, its quantiles", fontsize=9)
