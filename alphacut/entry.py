@@ -23,9 +23,8 @@ from alphacut.commands import update as command_update
 from alphacut.commands.parser import Parser, refuse_petsc, split_petsc
 from alphacut.fuzzy import CampaignError
 from alphacut.io.files import rank, ranks, say, standard_output
-from alphacut.io.missing import missing
 from alphacut.io.output_paths import check_destinations
-from alphacut.io.problem import BadInput
+from alphacut.io.problem import BadInput, missing
 from alphacut.io.provenance import own_version
 from alphacut.rve.solver.options import OptionError
 

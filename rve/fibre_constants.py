@@ -18,11 +18,10 @@ from itertools import product
 
 import numpy as np
 
-from alphacut.rve.cell import Cell, Phase
+from alphacut.rve.cell import Cell, Phase, square_moduli
 from alphacut.rve.result import Homogenised
-from alphacut.rve.series.antiplane import longitudinal_shear
+from alphacut.rve.series.stiffness import longitudinal_shear
 from alphacut.rve.slices.theta_rule import theta_rule
-from alphacut.rve.square import square_moduli
 from alphacut.stochastic import ThetaRule
 from alphacut.stochastic.theta.truncated_normal import Array
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields, replace
-from functools import cache
 from types import MappingProxyType, NoneType
 from typing import TYPE_CHECKING, ClassVar, Literal, get_args, get_origin, get_type_hints
 
@@ -116,9 +115,17 @@ def about_of(section: type[Section]) -> str:
     return " ".join((section.__doc__ or "").split())
 
 
-@cache
 def keys_of(section: type[Section]) -> Mapping[str, Key]:
     """Keys of a section by name; fields without a `Key` are sections of their own."""
+    if section not in _KEYS:
+        _KEYS[section] = MappingProxyType(_keys_of(section))
+    return _KEYS[section]
+
+
+_KEYS: dict[type[Section], Mapping[str, Key]] = {}
+
+
+def _keys_of(section: type[Section]) -> dict[str, Key]:
     hints = get_type_hints(section, include_extras=True)
     found: dict[str, Key] = {}
     for entry in fields(section):
@@ -135,7 +142,7 @@ def keys_of(section: type[Section]) -> Mapping[str, Key]:
             )
     for part in section.parts:
         found |= keys_of(part)
-    return MappingProxyType(found)
+    return found
 
 
 def kind_of(of_type: object) -> tuple[str, tuple[str, ...]]:

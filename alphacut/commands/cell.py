@@ -28,9 +28,8 @@ from alphacut.io.problem import BadInput, Problem
 from alphacut.rve.anisotropy import ISOTROPIC_ENOUGH, shear_ratio_in_words
 from alphacut.rve.auto.model import ORDER
 from alphacut.rve.cell import STRAIN
-from alphacut.rve.declared import error_of_means
 from alphacut.rve.model import cross_check
-from alphacut.rve.result import Homogenised
+from alphacut.rve.result import Homogenised, error_of_means
 from alphacut.stages.contract import contract, keep_modulus, require_choice
 from alphacut.stages.material import cell
 from alphacut.stages.material.cell_models import cell_model

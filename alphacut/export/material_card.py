@@ -11,8 +11,8 @@ import numpy as np
 from alphacut.io.files import as_json, write_text
 from alphacut.io.problem import BadInput, Problem
 from alphacut.rve.anisotropy import shear_ratio, shear_ratio_in_words
-from alphacut.rve.declared import error_of_means, error_of_stiffness
 from alphacut.rve.fibre_constants import FibreConstants, fibre_constants
+from alphacut.rve.result import error_of_means, error_of_stiffness
 
 if TYPE_CHECKING:
     from alphacut.rve.result import Homogenised

@@ -8,14 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from alphacut.figures import envelope as figure_envelope
-from alphacut.figures import exceedance as figure_exceedance
 from alphacut.figures import follower as figure_follower
 from alphacut.figures import frame as figure_frame
 from alphacut.figures import fuzzy as figure_fuzzy
 from alphacut.figures import image as figure_image
 from alphacut.figures import modulus as figure_modulus
 from alphacut.figures import radius as figure_radius
-from alphacut.figures import record as figure_record
 from alphacut.figures import response as figure_response
 from alphacut.figures import shares as figure_shares
 from alphacut.figures.style import save, style
@@ -56,7 +54,7 @@ def drawings(results: Results) -> Iterator[Drawing]:
         yield "tower", lambda: figure_frame.tower(results.case)
     model = None if results.structure is None else results.structure.linear
     if model is not None and (shaken := model.ground) is not None:
-        yield "record", lambda: figure_record.record(shaken)
+        yield "record", lambda: figure_envelope.record(shaken)
     if (
         results.case.sections.envelope
         and results.case.envelope.method == "graph-follower"
@@ -65,7 +63,7 @@ def drawings(results: Results) -> Iterator[Drawing]:
         richest = max(results.studies, key=lambda study: len(study.task.fuzzy))
         yield "fig21-25-graph-follower", lambda: figure_follower.follower(results, richest)
     if (limited := results.exceedance) is not None:
-        yield "exceedance", lambda: figure_exceedance.exceedance(limited)
+        yield "exceedance", lambda: figure_envelope.exceedance(limited)
     for study in results.studies:
         yield from figure_envelope.drawings(study, results.envelopes[study.name])
 

@@ -1,4 +1,4 @@
-"""Envelopes over time on every α-cut (Figs. 28 to 35)."""
+"""Envelopes over time on every α-cut (Figs. 28 to 35), exceedance of a limit, the record."""
 
 from __future__ import annotations
 
@@ -7,12 +7,18 @@ from functools import partial
 from textwrap import fill
 from typing import TYPE_CHECKING
 
-from alphacut.figures.style import INK, alpha_legend, colours, figure, prefix_axis
+import numpy as np
+
+from alphacut.figures.style import INK, ORANGE, alpha_legend, colours, figure, prefix_axis
+from alphacut.io.units import MINUS, axis_prefix, engineering
 from alphacut.stages.pipeline import Study
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
+
+    from alphacut.frame.structures.linear import Accelerogram
+
 
 WORDS = {
     "E": "modulus",
@@ -66,4 +72,50 @@ def envelope(dataset: xarray.Dataset, output: str, study: Study) -> Figure:
     words = ", ".join(known.get(name, name) for name in study.task.fuzzy)
     axes.set_title(fill(f"{output}, fuzzy {words}", 84), loc="left", fontsize=10)
     alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return drawn
+
+
+def exceedance(found: xarray.Dataset) -> Figure:
+    """The probability between its bounds on each level, and the case's limit."""
+    from alphacut.frame.outputs import output_unit
+
+    drawn, axes = figure(7.2, 3.6)
+    alpha, limits = found["alpha"].values, found["limit"].values
+    curves = found["curve"].transpose("alpha", "bound", "limit").values
+    for (lower, upper), shade in zip(curves[:-1], colours(alpha), strict=False):
+        axes.fill_between(limits, lower, upper, color=shade, lw=0)
+    axes.plot(limits, curves[-1].T, color=INK, lw=1)
+    limit, unit = float(found.attrs["limit"]), output_unit(found.attrs["output"])
+    if limit <= 2 * limits[-1]:
+        axes.axvline(limit, color=ORANGE, lw=1.2, ls="--")
+    axes.set_title(
+        (
+            f"limit {engineering(limit, unit)} (dashed)"
+            if limit <= 2 * limits[-1]
+            else f"limit {engineering(limit, unit)}, far off"
+        ),
+        loc="left",
+        fontsize=10,
+    )
+    factor, prefixed = axis_prefix(max(limits[-1], limit if limit <= 2 * limits[-1] else 0.0), unit)
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value * factor:.10g}".replace("-", MINUS))
+    axes.set_xlabel(f"limit of |{found.attrs['output']}|, {prefixed}")
+    axes.set_ylabel("probability of exceeding it")
+    axes.set_ylim(0, 1.02)
+    alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return drawn
+
+
+def record(ground: Accelerogram) -> Figure:
+    """The record as it is read, its peak marked."""
+    drawn, axes = figure(7.2, 2.4)
+    acceleration = np.asarray(ground.acceleration)
+    time, peak = np.arange(len(acceleration)) * ground.step, int(np.abs(acceleration).argmax())
+    axes.plot(time, acceleration, color=INK, lw=0.7)
+    axes.plot(time[peak], acceleration[peak], "o", color=ORANGE, ms=4)
+    strongest = engineering(float(acceleration[peak]), "m/s^2", digits=3).replace("^2", "²")
+    axes.set_title(f"peak {strongest} at {time[peak]:.4g} s", loc="left", fontsize=10)
+    axes.set_xlabel("time t, s")
+    axes.set_ylabel("ground acceleration, m/s²")
+    axes.set_xlim(time[0], time[-1])
     return drawn

@@ -89,7 +89,7 @@ def fuzzy_modulus(dataset: xarray.Dataset, case: Case) -> Figure:
     alpha, ends = dataset["alpha"].values, dataset["E"].values / GPA
     shaded_cuts(axes, alpha, ends[:, 0], ends[:, 1])
     axes.plot([], [], color=INK, marker="o", ms=3.5, lw=1.2, label="computed here")
-    quoted = case.sections.frame and case.frame.modulus
+    quoted = case.frame.modulus if case.sections.frame else None
     if quoted is not None:
         left, right = zip(*(quoted.cut(level) for level in (0.0, 1.0)), strict=True)
         x = np.array([*left, *right[::-1]]) / GPA

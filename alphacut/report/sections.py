@@ -11,11 +11,10 @@ from markupsafe import Markup
 from alphacut.figures.captions import core, in_words
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.io.units import engineering
-from alphacut.report.citation import citation
 from alphacut.report.differences import differences
 from alphacut.report.envelopes import envelopes, natural
 from alphacut.report.figures import gallery, listed
-from alphacut.report.tables import code, details, items, paragraphs, section, table
+from alphacut.report.tables import citation, code, details, items, paragraphs, section, table
 from alphacut.stages.material import response
 
 

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
+from alphacut.io.provenance import own_version
+
 if TYPE_CHECKING:
     from jinja2 import Environment
+
 
 HERE = Path(__file__).parent
 
@@ -58,3 +62,38 @@ def details(head: str, content: Markup) -> Markup:
 def code(text: str, tag: str = "code") -> Markup:
     """Text as it was typed, on its line or, with the tag pre, by itself."""
     return Markup("<{0}>{1}</{0}>").format(tag, text)
+
+
+def citation() -> str:
+    """The citations in BibTeX, from CITATION.cff where that is at hand."""
+    file = Path(__file__).resolve().parents[2] / "CITATION.cff"
+    own, _, paper = (
+        file.read_text(encoding="utf-8").partition("references:")
+        if file.is_file()
+        else ("", "", "")
+    )
+    program = told(own, "title", "date-released", "name")
+    entry = {
+        "author": f"{{{program.get('name', 'The alphacut developers')}}}",
+        "title": program.get(
+            "title",
+            "alphacut: from an uncertain microstructure to the fuzzy vibration of a structure",
+        ),
+        "version": own_version(),
+        "year": program.get("date-released", "")[:4],
+    }
+    return bibtex("software", "alphacut", entry) + bibtex(
+        "article", "alphacut-paper", told(paper, "title", "journal", "year", "doi")
+    )
+
+
+def told(text: str, *names: str) -> dict[str, str]:
+    """The values of some keys of a piece of CITATION.cff."""
+    found = dict(re.findall(r'^[\s-]*([\w-]+): *"?([^"\n]+)"?', text, flags=re.MULTILINE))
+    return {name: found[name] for name in names if name in found}
+
+
+def bibtex(kind: str, name: str, entry: Mapping[str, str]) -> str:
+    """An entry; empty where nothing is known."""
+    lines = "".join(f"  {key} = {{{value}}},\n" for key, value in entry.items() if value)
+    return f"@{kind}{{{name},\n{lines}}}\n" if lines else ""

@@ -23,8 +23,8 @@ import numpy as np
 from alphacut.rve.cell import Phase
 from alphacut.rve.representative.averages import Averages, Isotropic, averages, mori_tanaka
 from alphacut.stochastic.particles.discs import Discs
-from alphacut.stochastic.particles.log_normal import LogNormalRadii
 from alphacut.stochastic.particles.packing import Packing, packings
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 from alphacut.stochastic.radius_map import HermiteMap
 from alphacut.stochastic.sections import Simulated, reduced_radii
 

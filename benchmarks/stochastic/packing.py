@@ -18,8 +18,8 @@ from time import perf_counter
 
 import numpy as np
 
-from alphacut.stochastic.particles.log_normal import LogNormalRadii
 from alphacut.stochastic.particles.packing import Packing
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 from alphacut.stochastic.tessellation.apollonius import apollonius
 
 RESULTS = Path(__file__).parents[1] / "results"

@@ -21,8 +21,8 @@ import numpy as np
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.fit.hermite_fit import HermiteFit
 from alphacut.stochastic.particles.discs import Discs
-from alphacut.stochastic.particles.log_normal import LogNormalRadii
 from alphacut.stochastic.particles.packing import Packing, packings
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 from alphacut.stochastic.tessellation.apollonius import apollonius
 from alphacut.stochastic.theta.truncated_normal import TruncatedNormal
 

@@ -15,9 +15,8 @@ from functools import partial
 
 import numpy as np
 
-from alphacut.frame.calculus.chebyshev_bounds import ChebyshevGrid
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.calculus.polynomial import Polynomial
+from alphacut.frame.calculus.polynomial import ChebyshevGrid, Polynomial
 from alphacut.frame.certificate.remainder import largest_growth, suprema
 from alphacut.frame.certificate.wave_bounds import Part, parts
 from alphacut.frame.dynamics.integrators import Exact

@@ -18,7 +18,7 @@ from alphacut.frame.dynamics.nonlinear import SCHEMES, LagrangianFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.outputs import output_unit
 from alphacut.frame.structures.linear import evaluate
-from alphacut.frame.structures.state_space import state_matrix
+from alphacut.frame.structures.modes import state_matrix
 
 CORNERS = 16
 """Corners of the widest box that are looked at, at most."""

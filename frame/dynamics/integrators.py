@@ -16,7 +16,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, concatenate, inverse
 from alphacut.frame.structures.linear import Matrices
-from alphacut.frame.structures.state_space import state_matrix
+from alphacut.frame.structures.modes import state_matrix
 
 
 @dataclass(frozen=True, eq=False)

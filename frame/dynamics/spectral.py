@@ -14,10 +14,13 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet, concatenate
 from alphacut.frame.dynamics.record_load import SAME, Segments
-from alphacut.frame.structures.classical import ClassicalModes, classical_modes
 from alphacut.frame.structures.linear import Accelerogram, Matrices
-from alphacut.frame.structures.modes import eigenvectors
-from alphacut.frame.structures.state_space import state_matrix
+from alphacut.frame.structures.modes import (
+    ClassicalModes,
+    classical_modes,
+    eigenvectors,
+    state_matrix,
+)
 
 LARGE = 40
 """States from which on eigenvalues are cheaper than powers of the transfer matrix."""

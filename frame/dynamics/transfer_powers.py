@@ -10,7 +10,7 @@ from alphacut.frame.calculus.jet import Array, Jet, concatenate
 from alphacut.frame.dynamics.integrators import StepMap, exponential
 from alphacut.frame.dynamics.record_load import load_rule, parts_of
 from alphacut.frame.structures.linear import Accelerogram, Matrices
-from alphacut.frame.structures.state_space import state_matrix
+from alphacut.frame.structures.modes import state_matrix
 
 TERMS = 28
 """Terms of exp(A τ) where |λ| τ ≤ 2: the next is 2^28 / 28! = 1e-21."""

@@ -20,8 +20,14 @@ from alphacut.frame.calculus.polynomial import Polynomial, fit, terms
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.modal.ground_response import LoadTables
 from alphacut.frame.structures.linear import evaluate
-from alphacut.frame.structures.modes import ModalError, Modes, eigenvectors, modes, require_single
-from alphacut.frame.structures.state_space import state_matrix
+from alphacut.frame.structures.modes import (
+    ModalError,
+    Modes,
+    eigenvectors,
+    modes,
+    require_single,
+    state_matrix,
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,7 @@ import numpy as np
 
 from alphacut.fuzzy.plans.monotonicity import primary
 from alphacut.fuzzy.samples.design import Design
-from alphacut.fuzzy.samples.evaluation_cache import Memo
-from alphacut.fuzzy.samples.model import Model
+from alphacut.fuzzy.samples.model import Memo, Model
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.interaction import pulled

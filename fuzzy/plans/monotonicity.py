@@ -16,8 +16,7 @@ import numpy as np
 from alphacut.fuzzy.knowledge.contradiction import contradictions, negligible
 from alphacut.fuzzy.knowledge.known import Known, Signs
 from alphacut.fuzzy.samples.design import Design
-from alphacut.fuzzy.samples.evaluation_cache import Memo
-from alphacut.fuzzy.samples.model import Values
+from alphacut.fuzzy.samples.model import Memo, Values
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.numbers import Array, Mask, Rows

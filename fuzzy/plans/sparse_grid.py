@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 from scipy.stats import qmc
 
-from alphacut.fuzzy.samples.evaluation_cache import Memo
+from alphacut.fuzzy.samples.model import Memo
 from alphacut.fuzzy.sets.numbers import Array
 from alphacut.fuzzy.surrogates.chebyshev_polynomial import Polynomial
 

@@ -20,8 +20,7 @@ from alphacut.fuzzy.campaign.memory_check import require
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.monotonicity import Verification, require_few, verified, verify
 from alphacut.fuzzy.samples.design import Design
-from alphacut.fuzzy.samples.evaluation_cache import Memo
-from alphacut.fuzzy.samples.model import Model
+from alphacut.fuzzy.samples.model import Memo, Model
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.numbers import FuzzyNumber, Mask

@@ -108,13 +108,13 @@ class AutoModel:
             )
             results = model.solve(radius_map, matrix, inclusions)
         elif name == "slices":
-            from alphacut.rve.auto.refine_slices import refined_slices
+            from alphacut.rve.auto.refinement import refined_slices
 
             results = refined_slices(
                 radius_map, matrix, inclusions, tolerance=self.tolerance, progress=self.progress
             )
         else:
-            from alphacut.rve.auto.refine_prism import refined_prism
+            from alphacut.rve.auto.refinement import refined_prism
 
             results = refined_prism(radius_map, matrix, inclusions, tolerance=self.tolerance)
         worst = max(r.largest_error for r in results)

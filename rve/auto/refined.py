@@ -44,8 +44,7 @@ class RefinedModel:
         Raises:
             ChoiceError: The finest resolution leaves more.
         """
-        from alphacut.rve.auto.refine_prism import refined_prism
-        from alphacut.rve.auto.refine_slices import refined_slices
+        from alphacut.rve.auto.refinement import refined_prism, refined_slices
 
         refined = refined_prism if self.name == "prism" else refined_slices
         results = refined(radius_map, matrix, inclusions, tolerance=self.tolerance)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eigh
 
+from alphacut.rve.cell import square_moduli
 from alphacut.rve.image.fields.energy import SAFETY, UNIT
-from alphacut.rve.square import square_moduli
 from alphacut.stochastic.theta.truncated_normal import Array
 
 

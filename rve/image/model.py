@@ -8,7 +8,7 @@ from time import perf_counter
 
 import numpy as np
 
-from alphacut.rve.cell import STRAIN
+from alphacut.rve.cell import STRAIN, square_moduli
 from alphacut.rve.image.bounds import StiffnessBounds
 from alphacut.rve.image.cuts import ENCLOSED, TWO_CORNERS, nested
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, Solver
@@ -17,7 +17,6 @@ from alphacut.rve.image.read import require_memory
 from alphacut.rve.image.solve import CrispBounds, both_sides, solve_between
 from alphacut.rve.image.windows import Tiling, tiles_of
 from alphacut.rve.result import Homogenised, StressCurve
-from alphacut.rve.square import square_moduli
 from alphacut.stochastic.theta.truncated_normal import Array
 
 BOUNDARIES = ("periodic", "window")

@@ -12,7 +12,7 @@ from time import perf_counter
 
 import numpy as np
 
-from alphacut.rve.cell import Phase
+from alphacut.rve.cell import Phase, square_moduli
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
 from alphacut.rve.image.outlines.equation import Equation
@@ -22,7 +22,6 @@ from alphacut.rve.image.solve import CrispBounds, solve_between
 from alphacut.rve.result import Homogenised
 from alphacut.rve.slices.curve import certified, curve_of, mean_errors, with_errors
 from alphacut.rve.slices.theta_rule import DIGITS, extreme_radii, theta_error, theta_rule
-from alphacut.rve.square import square_moduli
 from alphacut.stochastic import RadiusMap
 
 

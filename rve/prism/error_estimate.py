@@ -14,10 +14,9 @@ from dataclasses import replace
 import numpy as np
 
 from alphacut.rve.bounds import hashin_shtrikman_bulk, reuss, voigt
-from alphacut.rve.cell import STRAIN, Phase
+from alphacut.rve.cell import STRAIN, Phase, square_moduli
 from alphacut.rve.result import Homogenised, StressCurve
 from alphacut.rve.slices.theta_rule import extreme_radii, theta_rule
-from alphacut.rve.square import square_moduli
 from alphacut.rve.table.cache import stored_table
 from alphacut.rve.table.interpolant import TableRange
 from alphacut.stochastic import RadiusMap

@@ -8,8 +8,8 @@ import gmsh
 import numpy as np
 
 from alphacut.rve.mesh.geometry import PeriodicSquare
-from alphacut.stochastic.particles.contacts import smallest_gap
 from alphacut.stochastic.particles.discs import Discs
+from alphacut.stochastic.particles.relaxation import smallest_gap
 
 if TYPE_CHECKING:
     from alphacut.stochastic.theta.truncated_normal import Array

@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from alphacut.rve.cell import STRAIN, Cell, Phase
+from alphacut.rve.cell import STRAIN, Cell, Phase, square_moduli
 from alphacut.rve.certificate import ROUND_OFF, Limits, require, stiffness_checks
 from alphacut.rve.result import Homogenised, StressCurve
-from alphacut.rve.square import square_moduli
 from alphacut.stochastic import RadiusMap, ThetaRule
 from alphacut.stochastic.theta.truncated_normal import Array
 

@@ -8,10 +8,9 @@ from functools import lru_cache
 import numpy as np
 
 from alphacut.rve.bounds import mori_tanaka
-from alphacut.rve.cell import Phase
+from alphacut.rve.cell import Phase, square_moduli
 from alphacut.rve.result import StressCurve
 from alphacut.rve.slices.curve import curve_of
-from alphacut.rve.square import square_moduli
 from alphacut.stochastic import HermiteMap, RadiusMap, ThetaRule, gauss_rule
 from alphacut.stochastic.theta.truncated_normal import Array, TruncatedNormal
 

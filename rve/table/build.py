@@ -9,10 +9,9 @@ from typing import Protocol
 
 import numpy as np
 
-from alphacut.rve.cell import Phase
+from alphacut.rve.cell import Phase, square_moduli
 from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.rve.slices.model import solve_slice
-from alphacut.rve.square import square_moduli
 from alphacut.rve.table.interpolant import Table, TableRange, coefficients, tail
 from alphacut.stochastic.theta.truncated_normal import Array
 

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from alphacut.rve.bounds import mori_tanaka
-from alphacut.rve.cell import Phase
-from alphacut.rve.square import square_voigt
+from alphacut.rve.cell import Phase, square_voigt
 from alphacut.stochastic.theta.truncated_normal import Array
 
 _SLACK = 1e-9

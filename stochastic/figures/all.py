@@ -21,8 +21,8 @@ from alphacut.stochastic.figures.statistics import (
 from alphacut.stochastic.figures.style import save, style
 from alphacut.stochastic.particles.discs import Discs
 from alphacut.stochastic.particles.image import SectionImage
-from alphacut.stochastic.particles.log_normal import LogNormalRadii
 from alphacut.stochastic.particles.packing import Packing
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 from alphacut.stochastic.sections import Measured, Simulated
 from alphacut.stochastic.tessellation.apollonius import apollonius
 from alphacut.stochastic.tessellation.delaunay import neighbours

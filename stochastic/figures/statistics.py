@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from alphacut.stochastic.microstructure import Microstructure
-    from alphacut.stochastic.particles.radius_law import RadiusLaw
+    from alphacut.stochastic.particles.radius_laws import RadiusLaw
     from alphacut.stochastic.tessellation.apollonius import Apollonius
     from alphacut.stochastic.tessellation.delaunay import Neighbours
 

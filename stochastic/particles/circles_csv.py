@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.stochastic.particles.contacts import close_pairs, surface_distance
 from alphacut.stochastic.particles.csv_columns import length_columns
 from alphacut.stochastic.particles.discs import Discs
+from alphacut.stochastic.particles.relaxation import close_pairs, surface_distance
 from alphacut.stochastic.theta.truncated_normal import Array
 
 COLUMNS = ("x", "y", "r")

@@ -9,11 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.stochastic.errors import RefusedError
-from alphacut.stochastic.particles.contacts import smallest_gap
 from alphacut.stochastic.particles.discs import Discs
-from alphacut.stochastic.particles.radius_law import RadiusLaw
+from alphacut.stochastic.particles.radius_laws import RadiusLaw
 from alphacut.stochastic.particles.random_sequential import random_sequential
-from alphacut.stochastic.particles.relaxation import relaxed
+from alphacut.stochastic.particles.relaxation import relaxed, smallest_gap
 from alphacut.stochastic.theta.truncated_normal import Array
 
 METHODS = ("auto", "sequential", "relaxed")

@@ -25,8 +25,12 @@ from alphacut.stochastic.particles.neighbour_search import (
     nearest_in_each_class,
     size_classes,
 )
-from alphacut.stochastic.tessellation.circle_envelope import Arcs, upper_envelopes
-from alphacut.stochastic.tessellation.hyperbola import anomaly, sector_area
+from alphacut.stochastic.tessellation.circle_envelope import (
+    Arcs,
+    anomaly,
+    sector_area,
+    upper_envelopes,
+)
 from alphacut.stochastic.theta.truncated_normal import Array
 
 

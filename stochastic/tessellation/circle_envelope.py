@@ -14,6 +14,39 @@ import numpy as np
 
 from alphacut.stochastic.theta.truncated_normal import Array
 
+
+def anomaly(psi: Array, near: Array, far: Array) -> Array:
+    """Hyperbolic anomaly s of the angle ψ.
+
+    Args:
+        psi: Angle from the direction of the neighbour, shape (m,), brought to [−π, π] here.
+        near: d + Δ, twice the least distance of the wall from the centre, shape (m,).
+        far: d − Δ, shape (m,).
+    """
+    psi = psi - 2 * np.pi * np.round(psi / (2 * np.pi))
+    return np.asarray(
+        2 * np.arctanh(np.clip(np.sqrt(near / far) * np.tan(psi / 2), -1 + 2**-53, 1 - 2**-53))
+    )
+
+
+def sector_area(start: Array, end: Array, near: Array, far: Array) -> Array:
+    """Area between the centre and the wall from anomaly `start` to `end`, shape (m,)."""
+    middle, half = (start + end) / 2, (end - start) / 2
+    sum_, difference = 2 / near, 2 / far  # M + C, M − C
+    bulge = 2 * np.sinh(middle / 2) ** 2 * np.sinh(half) + _sinh_less_argument(half)
+    return np.asarray(
+        ((sum_ + difference) / 2 * bulge + difference * half) / (sum_ * difference) ** 1.5
+    )
+
+
+def _sinh_less_argument(x: Array) -> Array:
+    """Sinh x − x to full relative precision."""
+    square, series = x * x, np.ones_like(x)
+    for k in range(9, 0, -1):
+        series = 1 + series * square / ((2 * k + 2) * (2 * k + 3))
+    return np.where(np.abs(x) < 1, x * square / 6 * series, np.sinh(x) - x)
+
+
 # the sweep goes this far past a crossing before it looks which function is uppermost: shorter arcs
 # are left out
 STRIDE = 1e-13

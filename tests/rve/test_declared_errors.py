@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from alphacut.rve import Phase
+from alphacut.rve.cell import square_moduli
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
-from alphacut.rve.square import square_moduli
 from alphacut.stochastic import HermiteMap
 from benchmarks.rve.calibration import calibrate, main
 

@@ -5,8 +5,8 @@ import pytest
 
 from alphacut.rve import Phase
 from alphacut.rve.fibre_constants import fibre_constants
-from alphacut.rve.series.antiplane import longitudinal_shear
 from alphacut.rve.series.model import SeriesModel
+from alphacut.rve.series.stiffness import longitudinal_shear
 from alphacut.stochastic import HermiteMap
 
 PAPER = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)

@@ -12,8 +12,8 @@ from alphacut.stochastic.figures.cells import (
 )
 from alphacut.stochastic.figures.statistics import draw_neighbour_statistics
 from alphacut.stochastic.particles.discs import Discs
-from alphacut.stochastic.particles.log_normal import LogNormalRadii
 from alphacut.stochastic.particles.packing import Packing
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 from alphacut.stochastic.tessellation.apollonius import apollonius
 from alphacut.stochastic.tessellation.delaunay import neighbours
 

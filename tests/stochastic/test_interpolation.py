@@ -13,7 +13,7 @@ from alphacut.stages.material.campaign import campaign
 from alphacut.stages.material.cell import CellChoice
 from alphacut.stages.material.cell_models import cell_model
 from alphacut.stochastic import HermiteMap, TruncatedNormal, gauss_rule, layered_rule
-from alphacut.stochastic.theta.interpolation import between_nodes, lebesgue
+from alphacut.stochastic.theta.quadrature import between_nodes, lebesgue
 
 CASES = Path(__file__).parents[2] / "cases"
 AT = np.linspace(-3, 3, 61)

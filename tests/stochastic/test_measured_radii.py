@@ -12,8 +12,8 @@ from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.io.problem import BadInput
 from alphacut.stages.material.microstructure import source
-from alphacut.stochastic.particles.measured import MeasuredRadii
 from alphacut.stochastic.particles.packing import Packing, _law_test
+from alphacut.stochastic.particles.radius_laws import MeasuredRadii
 
 CONCRETE = Path(__file__).parents[2] / "cases" / "concrete.toml"
 LIST = "\n".join(

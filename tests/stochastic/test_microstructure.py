@@ -17,8 +17,8 @@ from alphacut.stochastic.microstructure_summary import fragment, summary
 from alphacut.stochastic.particles.circles_csv import CircleFile
 from alphacut.stochastic.particles.discs import Discs
 from alphacut.stochastic.particles.image import SectionImage
-from alphacut.stochastic.particles.log_normal import LogNormalRadii
 from alphacut.stochastic.particles.packing import Packing
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 from alphacut.stochastic.sections import Measured, Simulated
 from alphacut.stochastic.tessellation.apollonius import apollonius
 from alphacut.stochastic.tessellation.delaunay import cell_correlation, neighbours

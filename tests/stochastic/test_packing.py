@@ -10,11 +10,10 @@ from scipy import stats
 from scipy.spatial.distance import pdist
 
 from alphacut.stochastic.errors import RefusedError
-from alphacut.stochastic.particles.contacts import close_pairs, smallest_gap
 from alphacut.stochastic.particles.discs import Discs
-from alphacut.stochastic.particles.log_normal import LogNormalRadii
 from alphacut.stochastic.particles.packing import Packing, packings
-from alphacut.stochastic.particles.relaxation import Relaxation, relaxed
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii
+from alphacut.stochastic.particles.relaxation import Relaxation, close_pairs, relaxed, smallest_gap
 
 EQUAL, TENFOLD, HUNDREDFOLD = (
     LogNormalRadii(1e-3, 1e-3),

@@ -23,7 +23,7 @@ from alphacut.stages.material.cell import (
     parts,
 )
 from alphacut.stages.material.cell_models import cell_model
-from alphacut.stochastic.theta.interpolation import between_nodes
+from alphacut.stochastic.theta.quadrature import between_nodes
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from alphacut.io.problem import BadInput, Problem
 from alphacut.io.provenance import versions
 from alphacut.rve.anisotropy import directional_shear, directional_young, shear_ratio
 from alphacut.rve.cell import Phase
-from alphacut.rve.declared import error_of_means, error_of_stiffness
+from alphacut.rve.result import error_of_means, error_of_stiffness
 from alphacut.stochastic import HermiteMap, RadiusMap, TruncatedNormal
 from alphacut.stochastic.theta.truncated_normal import Array
 

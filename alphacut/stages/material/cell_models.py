@@ -6,8 +6,7 @@ import os
 from importlib import import_module
 from pathlib import Path
 
-from alphacut.io.missing import missing
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput, Problem, missing
 from alphacut.rve.auto.model import AutoModel
 from alphacut.rve.auto.refined import RefinedModel
 from alphacut.rve.image.round_particle import RasterModel

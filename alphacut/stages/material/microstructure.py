@@ -20,7 +20,7 @@ from alphacut.io.progress import Tick
 
 if TYPE_CHECKING:
     from alphacut.stochastic.microstructure import Microstructure, Study
-    from alphacut.stochastic.particles.radius_law import RadiusLaw
+    from alphacut.stochastic.particles.radius_laws import RadiusLaw
     from alphacut.stochastic.sections import Measured, Simulated
 
 
@@ -69,14 +69,13 @@ def source(case: Case) -> Simulated | Measured:
 
 def radii_of(case: Case, packing: PackingSection) -> RadiusLaw:
     """The law of the radii of a packing: log-normal between two ends, or that of a list."""
-    from alphacut.stochastic.particles.log_normal import LogNormalRadii
-    from alphacut.stochastic.particles.measured import MeasuredRadii
+    from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
 
     if packing.file is None:
-        ends = packing.smallest_radius, packing.largest_radius
-        assert ends[0] is not None  # without a file both are there, or the case is refused
-        assert ends[1] is not None
-        return LogNormalRadii(*ends)
+        smallest, largest = packing.smallest_radius, packing.largest_radius
+        assert smallest is not None  # without a file both are there, or the case is refused
+        assert largest is not None
+        return LogNormalRadii(smallest, largest)
     try:
         return MeasuredRadii.read(case.beside(packing.file))
     except ValueError as error:

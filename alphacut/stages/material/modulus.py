@@ -305,8 +305,10 @@ def read_number(path: Path | str, option: str = "--modulus") -> FuzzyNumber:
 def stand_in(case: Case) -> FuzzyNumber | None:
     """Modulus in Pa that the case gives; None if it gives none."""
     given = case.sections.modulus
-    if given is None or given.value is not None:
-        return given and given.value
+    if given is None:
+        return None
+    if given.value is not None:
+        return given.value
     if given.file is not None:
         return read_number(case.beside(given.file), "modulus.file")
     return None if given.measured is None else measured_modulus(case, given.measured)

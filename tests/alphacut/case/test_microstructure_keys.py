@@ -10,8 +10,8 @@ from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.io.problem import BadInput
 from alphacut.stages.material.microstructure import study_of
-from alphacut.stochastic.particles.log_normal import LogNormalRadii
 from alphacut.stochastic.particles.packing import Packing
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 
 CONCRETE = Path(__file__).parents[3] / "cases" / "concrete.toml"
 

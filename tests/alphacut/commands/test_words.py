@@ -15,8 +15,8 @@ from alphacut.entry import main
 from alphacut.figures.captions import FIGURES, caption, core, figure_words
 from alphacut.frame import Envelope
 from alphacut.io.units import engineering, largest_by_unit
-from alphacut.report.citation import citation
 from alphacut.report.differences import differences
+from alphacut.report.tables import citation
 
 CASES = Path(__file__).parents[3] / "cases"
 

@@ -20,8 +20,7 @@ from alphacut.frame import (
     envelope,
 )
 from alphacut.frame.boxes import UnitFlow, boxes
-from alphacut.frame.calculus.chebyshev_bounds import ChebyshevGrid
-from alphacut.frame.calculus.polynomial import Polynomial
+from alphacut.frame.calculus.polynomial import ChebyshevGrid, Polynomial
 from alphacut.frame.certificate import model_error
 from alphacut.frame.certificate.model_error import Comparison, proved_error
 from alphacut.frame.certificate.remainder import largest_growth

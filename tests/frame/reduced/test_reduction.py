@@ -10,8 +10,8 @@ from scipy.sparse.linalg import eigsh
 
 from alphacut.frame import Accelerogram, Exact, LinearFlow, StoreyFrame, envelope
 from alphacut.frame.reduced.beam import BeamFrame
-from alphacut.frame.structures.classical import classical_modes
 from alphacut.frame.structures.linear import evaluate, frequencies
+from alphacut.frame.structures.modes import classical_modes
 from alphacut.fuzzy import Triangular
 
 TIME = np.arange(201) * 0.02

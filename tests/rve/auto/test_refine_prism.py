@@ -5,7 +5,7 @@ estimate covers the true error.
 import pytest
 
 from alphacut.rve import Phase
-from alphacut.rve.auto.refine_prism import refined_prism
+from alphacut.rve.auto.refinement import refined_prism
 from alphacut.rve.series.model import SeriesModel
 from alphacut.stochastic import HermiteMap
 
@@ -25,7 +25,7 @@ def test_the_estimate_is_below_the_tolerance_and_above_the_error(tolerance):
 
 
 def test_a_tolerance_out_of_reach_is_said_to_be(monkeypatch):
-    monkeypatch.setattr("alphacut.rve.auto.refine_prism._FINEST", 0.25)
+    monkeypatch.setattr("alphacut.rve.auto.refinement._FINEST", 0.25)
     with pytest.raises(
         RuntimeError, match=r"mesh size 0\.25 with 6 layers leaves a relative error of"
     ):

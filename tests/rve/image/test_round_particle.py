@@ -5,10 +5,10 @@ import pytest
 
 from alphacut.entry import main
 from alphacut.rve import Phase, named
+from alphacut.rve.cell import square_moduli
 from alphacut.rve.image.bounds import StiffnessBounds
 from alphacut.rve.image.round_particle import RasterModel
 from alphacut.rve.series.stiffness import square_stiffness
-from alphacut.rve.square import square_moduli
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 
 

@@ -15,8 +15,8 @@ from alphacut.rve.representative.many_particles import many_particles
 from alphacut.rve.result import effective_modulus
 from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.stochastic.particles.discs import Discs
-from alphacut.stochastic.particles.log_normal import LogNormalRadii
 from alphacut.stochastic.particles.packing import Packing
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 
 MATRIX, INCLUSION = Phase(20e9), Phase(80e9, 0.2)
 PACKING = Packing(20, 0.3, LogNormalRadii(1e-3, 4e-3), gap=2e-4).make(np.random.default_rng(1))

@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 
 from alphacut.rve import Phase
+from alphacut.rve.cell import square_moduli
 from alphacut.rve.model import CrossCheckError, cross_check, named
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.rve.slices.model import SlicesModel, solve_slice
 from alphacut.rve.slices.theta_rule import theta_error, theta_rule
-from alphacut.rve.square import square_moduli
 from alphacut.stochastic import HermiteMap
 
 planar = pytest.importorskip("alphacut.rve.planar.problem")
