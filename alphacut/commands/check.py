@@ -8,6 +8,7 @@ from dataclasses import asdict
 from typing import TextIO
 
 from alphacut.case.load import load
+from alphacut.case.readings import readings
 from alphacut.commands.options import add_common, answer
 from alphacut.io.files import say
 from alphacut.io.problem import BadInput
@@ -40,6 +41,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
             out,
         )
         raise
+    inputs = list(readings(case))
     warnings = [f"warning: {remark}" for remark in (*found.warnings, *found.rough)]
     answer(
         options,
@@ -50,6 +52,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
             "warnings": warnings,
             "stages": list(case.stages),
             "period_s": found.period,
+            "inputs": [asdict(reading) for reading in inputs],
         },
         out,
     )
@@ -65,6 +68,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
             and case.frame.modulus is not None
         )
         over = "; frame.modulus is passed over, stage modulus hands its own on" if passed else ""
+        for reading in inputs:
+            out.write(f"{reading}\n")
         out.write(
             f"{options.case}: no problems; stages {', '.join(case.stages)};"
             f" {case.top.title}{period}{over}\n"

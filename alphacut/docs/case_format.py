@@ -20,8 +20,8 @@ HEAD = f"""# The case format, version {VERSION}
 
 A case is a TOML file. Quantities are text with their unit (`"80 GPa"`), numbers without a unit may stand bare. Fuzzy numbers:
 `"80 GPa"` is crisp, `"[75, 85] GPa"` an interval, `"[75, 80, 85] GPa"` a triangle (lower, modal, upper),
-`"[75, 78, 82, 85] GPa"` a trapezoid, `"80 GPa ± 5 %"` and `"80 ± 4 GPa"` symmetric
-triangles. Files that a case names are looked for from the case's own folder.
+`"[75, 78, 82, 85] GPa"` a trapezoid, `"80 GPa ± 5 %"` and `"80 ± 4 GPa"` intervals.
+`alphacut check` prints what each was read as. Files that a case names are looked for from the case's own folder.
 
 This page is made by `python -m alphacut.docs.case_format`; the same table makes `cases/case.schema.json` for editors.
 """

@@ -1,6 +1,7 @@
 """Reading quantities as engineers write them: "80 GPa", "[75, 80, 85] GPa", "20 t ± 5 %".
 
 One number is crisp, two are an interval, three a triangle (lower, modal, upper), four a trapezoid.
+A spread "± 5 %" is an interval: nothing in it is more possible than the rest.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ def listed(inner: str, unit: str, si: str) -> tuple[Decimal, ...]:
 
 
 def spread(match: re.Match[str], si: str) -> tuple[Decimal, ...]:
-    """The triangle of "20 t ± 5 %", "20 t ± 1 t" or "20 ± 1 t"."""
+    """Both ends of the interval "20 t ± 5 %", "20 t ± 1 t" or "20 ± 1 t"."""
     middle, unit, width, width_unit = match[1], match[2].strip(), match[3], match[4].strip()
     if width_unit == "%":
         modal = decimal(middle) * factor(unit, si)
@@ -62,7 +63,7 @@ def spread(match: re.Match[str], si: str) -> tuple[Decimal, ...]:
     else:
         modal = decimal(middle) * factor(unit or width_unit, si)
         half = decimal(width) * factor(width_unit or unit, si)
-    return modal - half, modal, modal + half
+    return modal - half, modal + half
 
 
 def numbers(value: object, si: str) -> tuple[float, ...]:
