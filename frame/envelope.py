@@ -90,7 +90,7 @@ class Envelope:
       trajectories passed the bounds, in the unit.
     - gap: Largest distance of attained and proved bounds, in the unit, which is that of gap_output.
       boxes: Parts of the parameters' box that the proof looked at, a count.
-      proof: What is proved and what sampled.
+      kernel: What examined them, C or NumPy. proof: What is proved and what sampled.
     - between_nodes: Largest value of `between`, in the unit.
     - claim: What the cuts claim of how often they hold, and which parameters are opinions.
     - reason: Why the method was taken, or what it fell short of.

@@ -9,14 +9,12 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial
-from alphacut.frame.certificate.branch_and_bound import BranchAndBound
-from alphacut.frame.certificate.remainder import largest_growth, suprema
+from alphacut.frame.certificate.branch_and_bound import BranchAndBound, Enclosed
+from alphacut.frame.certificate.first_optima import first_optima
+from alphacut.frame.certificate.kernel import examination
+from alphacut.frame.certificate.remainder import Remainder, largest_growth, suprema
 from alphacut.frame.certificate.wave_bounds import parts
 from alphacut.frame.modal.model import ModalModel
-from alphacut.frame.modal.search import problems
-
-ROUNDING = 1e-11
-"""Margin for floating point, as a share of the largest output."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,14 +22,15 @@ class Certificate:
     """Enclosure of an envelope.
 
     Args:
-        bounds: Attained upper bounds of (−output, output), less the model error, shape (A, T, m,
-            2).
+        bounds: Attained upper bounds of (−output, output), less the model error and rounding, shape
+            (A, T, m, 2).
         at: Their unit coordinates, shape (A, T, m, 2, d).
         outer: Proved upper bounds, shape (A, T, m, 2).
         between: Bound of what each output exceeds both ends of the step to a node by, shape (T, m),
             in its unit.
         boxes: Boxes of parameters looked at.
         scale: Size of each output beside the first, shape (m,).
+        kernel: What examined the boxes: C or NumPy.
     """
 
     bounds: Array
@@ -40,6 +39,7 @@ class Certificate:
     between: Array
     boxes: int
     scale: Array
+    kernel: str
 
     @property
     def gap(self) -> float:
@@ -49,8 +49,6 @@ class Certificate:
 
 def certify(
     model: ModalModel,
-    bounds: Array,
-    at: Array,
     *,
     gap: float,
     model_error: Array,
@@ -59,17 +57,15 @@ def certify(
     budget: float = 4000,
     progress: Callable[[float], None] | None = None,
 ) -> Certificate:
-    """Encloses all bounds found by a search.
+    """Encloses the bounds of all levels, the narrowest first.
 
     Args:
         model: The modal model.
-        bounds: Upper bounds of (−output, output), shape (A, T, m, 2).
-        at: Their unit coordinates, shape (A, T, m, 2, d).
         gap: Wanted difference between proved and attained bound, in units of the reference output.
         model_error: Bound of the difference between the modal model and the trajectories, shape (T,
             m).
         scale: Factor on the gap for each output, shape (m,); ones if not given.
-        workers: Processes.
+        workers: Threads.
         budget: Most boxes per bound on average.
         progress: Called with the fraction done.
 
@@ -77,42 +73,55 @@ def certify(
         ValueError: The model error alone exceeds the gap.
     """
     scale = np.ones(len(model.outputs)) if scale is None else scale
-    model, unit = model.in_units(scale), scale[:, None]
-    bounds = bounds / unit
-    margin = model_error / scale + ROUNDING * np.abs(bounds).max()
+    model, unit, error = model.in_units(scale), scale[:, None], model_error / scale
+    rounding = Remainder.of(model, *model.boxes.unit(0)).margin[..., 0]
     # so that rounding does not lift the gap above what was asked for
-    slack = (1 - 1e-6) * gap - 2 * float(margin.max())
+    slack = (1 - 1e-6) * gap - float((2 * error + rounding).max())
     if slack <= 0:
-        limit = 2 * float(margin.max())
+        limit = float((2 * error + rounding).max())
         raise ValueError(
             f"certify: the gap {gap:g} is not above twice the model error, {limit:.2g}; ask for a"
             " wider gap or a lower tolerance"
         )
-    inner, points, outer, boxes = bounds.copy(), at.copy(), np.empty_like(bounds), 0
-    levels = len(bounds)
+    levels, found = len(model.boxes.alpha), list[Enclosed]()
     for done, level in enumerate(reversed(range(levels))):
-        lower, upper = model.boxes.unit(level)
-        optima = problems(np.arange(len(model.time)), len(model.outputs), len(lower))
-        optima.point[:], optima.value[:] = (
-            at[level].reshape(optima.point.shape),
-            bounds[level].ravel(),
-        )
         share = None if progress is None else (lambda x, done=done: progress((done + x) / levels))
-        found = BranchAndBound(slack, budget).run(
-            model, lower, upper, optima, workers=workers, progress=share
-        )
-        inner[level], points[level] = (
-            found.value.reshape(inner[level].shape),
-            found.point.reshape(points[level].shape),
-        )
-        outer[level], boxes = found.proved.reshape(outer[level].shape), boxes + found.boxes
-    wide = margin[None, :, :, None]
+        within = found[-1] if found else None
+        method = BranchAndBound(slack, budget)
+        found.append(_level(model, level, within, method, workers=workers, progress=share))
+    shape = (levels, *error.shape, 2)
+    inner = np.stack([part.value for part in found[::-1]]).reshape(shape)
+    outer = np.stack([part.proved for part in found[::-1]]).reshape(shape)
     # what holds on a wider box holds on those inside it
-    outer = np.minimum.accumulate(outer, axis=0)
-    between = _between(model) + _growth(model, margin)
+    outer = np.minimum.accumulate(outer, axis=0) + error[..., None]
+    between = _between(model) + _growth(model, error)
     return Certificate(
-        (inner - wide) * unit, points, (outer + wide) * unit, between * scale, boxes, scale
+        (inner - (error + rounding)[..., None]) * unit,
+        np.stack([part.point for part in found[::-1]]).reshape(*shape, -1),
+        outer * unit,
+        between * scale,
+        sum(part.boxes for part in found),
+        scale,
+        examination()[0],
     )
+
+
+def _level(
+    model: ModalModel,
+    level: int,
+    within: Enclosed | None,
+    method: BranchAndBound,
+    *,
+    workers: int,
+    progress: Callable[[float], None] | None,
+) -> Enclosed:
+    """Bounds of one level; what the level inside it attains is attained here too."""
+    lower, upper = model.boxes.unit(level)
+    optima = first_optima(model, lower, upper, method.gap)
+    if within is not None:
+        kept = within.value > optima.value
+        optima.value[kept], optima.point[kept] = within.value[kept], within.point[kept]
+    return method.run(model, lower, upper, optima, workers=workers, progress=progress)
 
 
 def _between(model: ModalModel) -> Array:

@@ -32,8 +32,6 @@ USUAL = 10.0
 """Proved over sampled error, seldom less."""
 ATTEMPTS = 5
 """Models of rising degree that are tried before the error is sampled instead of proved."""
-SEARCHED = 0.1
-"""Share of the time that the search takes before the proof begins, for the progress alone."""
 PROVED = (
     "the error of its polynomials is bounded over the whole box by the energy of what they miss in"
     " the equations of motion"
@@ -144,19 +142,14 @@ def _certified(
     assert isinstance(flow.flow, LinearFlow)
     require_certifiable(len(flow.boxes.names))
     model, error, unproved = model_with_error(flow.flow, flow, method, gap)
-    searched = progress and (lambda share: progress(SEARCHED * share))
-    proved = progress and (lambda share: progress(SEARCHED + (1 - SEARCHED) * share))
-    bounds, at, _ = search_levels(flow, model, method.seed, gap, searched)
     proof = certify(
         model,
-        bounds,
-        at,
         gap=gap,
         model_error=error,
         scale=flow.scale,
         workers=method.workers,
         budget=method.boxes,
-        progress=proved,
+        progress=progress,
     )
     facts: dict[str, float | str] = {
         "model_error": float((error / flow.scale).max()),
@@ -167,6 +160,7 @@ def _certified(
         "gap_output": flow.outputs[flow.reference],
         "between_nodes": float((proof.between / flow.scale).max()),
         "boxes": proof.boxes,
+        "kernel": proof.kernel,
         "proof": f"the branch and bound is rigorous for the modal model; {PROVED}",
     }
     if unproved:
