@@ -17,6 +17,8 @@ def differences(found: Mapping[str, Any] | None = None) -> Iterator[tuple[str, s
     """Subject and differences of each module, "1. … 2. …", that concern a run."""
     for package in PACKAGES:
         for name, file in sources(package):
+            if file.suffix != ".py":
+                continue
             if found is not None and not concerns(
                 f"{package}.{name[:-3].replace('/', '.')}", found
             ):
