@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TextIO
 
 from alphacut.commands.options import add_quiet, answer
+from alphacut.export.csv_tables import write_tables
 from alphacut.io.files import write_text
 from alphacut.report.page import report
 
@@ -22,6 +23,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", metavar="FILE.html", help="where the page goes (default: FOLDER/report.html)"
     )
+    parser.add_argument(
+        "--csv", metavar="FOLDER", help="write every result as a CSV file there as well"
+    )
     add_quiet(parser)
 
 
@@ -31,5 +35,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     path = Path(options.out) if options.out else folder / "report.html"
     page = report(folder)
     write_text(path, page)
-    answer(options, {"file": str(path), "bytes": len(page.encode())}, out, f"{path}\n")
+    tables = write_tables(folder, Path(options.csv)) if options.csv else []
+    found = {"file": str(path), "bytes": len(page.encode()), "tables": [*map(str, tables)]}
+    answer(options, found, out, "".join(f"{file}\n" for file in (path, *tables)))
     return 0

@@ -14,7 +14,7 @@ INSIDE = (
     "inside ./enter only the project, the current folder, home and the temporary folder are visible"
 )
 ENDINGS = {"FILE.nc": (".nc",), "FILE.html": (".html", ".htm")}
-OUTPUTS = ("out", "json", "export", "store")
+OUTPUTS = ("out", "json", "export", "store", "csv")
 
 
 def check_destinations(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:

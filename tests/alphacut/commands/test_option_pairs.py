@@ -130,6 +130,7 @@ VALUES = {
     "--no-figures": ((),),
     "--explain": ((),),
     "--fields": ((),),
+    "--csv": ("tables",),
 }
 """Values of every option, none for a flag."""
 OWN = {
