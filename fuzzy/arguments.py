@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import pickle
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
 from typing import Any
@@ -124,19 +122,12 @@ def require_callable(function: Any, names: Sequence[str], *, by_name: bool, sent
         except ValueError:
             pass  # a function of C without a signature
     if sent:
-        main = sys.modules["__main__"]
-        if getattr(function, "__module__", None) == "__main__" and not (
-            getattr(main, "__file__", None) or getattr(main, "__spec__", None)
-        ):
-            cure = "define it in a file that is imported, or take workers=1"
-            raise ValueError(
-                "the function cannot be sent to worker processes (it was typed in, not read from a"
-                f" file): {cure}"
-            )
+        from joblib.externals import cloudpickle
+
         try:
-            pickle.dumps(function)
+            cloudpickle.dumps(function)
         except Exception as failure:
-            cure = "define it at the top level of a module, or take workers=1"
+            cure = "take out of it what cannot be copied, or take workers=1"
             raise ValueError(
                 f"the function cannot be sent to worker processes ({failure}): {cure}"
             ) from None

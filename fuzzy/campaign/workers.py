@@ -6,14 +6,21 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from concurrent.futures import BrokenExecutor, Executor, Future
 from contextlib import contextmanager, suppress
 from numbers import Integral
-from typing import Any
+from time import sleep
+from typing import ParamSpec, TypeVar
+
+P = ParamSpec("P")
+T = TypeVar("T")
+_WATCH = 0.2  # seconds between looks at the parent
 
 
 class ProcessPool(Executor):
     """Fresh processes of this machine that end with this one and are replaced when they die.
+
+    Functions go to them by value where they cannot be imported: those of a notebook, too.
 
     Args:
         workers: How many.
@@ -22,46 +29,24 @@ class ProcessPool(Executor):
     def __init__(self, workers: int) -> None:
         self._max_workers = workers
         self._inner = _processes(workers)
-        self._started = False
 
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Run a call in one of the processes, new ones if one of them has died.
-
-        Raises:
-            RuntimeError: The processes end while they start, as new ones would.
-        """
-        if not self._started:
-            self._start()
+    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        """Run a call in one of the processes, new ones if one of them has died."""
         try:
             return self._inner.submit(fn, *args, **kwargs)
         except BrokenExecutor:
-            self._inner.shutdown(wait=False, cancel_futures=True)
+            self.stop()
             self._inner = _processes(self._max_workers)
             return self._inner.submit(fn, *args, **kwargs)
 
-    def _start(self) -> None:
-        """Start all processes and wait for the first that is ready."""
-        from alphacut.fuzzy.campaign.pool_worker import GUARD
-
-        try:
-            ready = [self._inner.submit(os.getpid) for _ in range(self._max_workers)]
-            next(iter(wait(ready, return_when=FIRST_COMPLETED).done)).result()
-        except (BrokenExecutor, OSError, EOFError):
-            reason = (
-                "the worker processes ended before their first sample: each of them imports the"
-                " main script"
-            )
-            raise RuntimeError(f"{reason}; {GUARD}") from None
-        self._started = True
-
-    def alone(self, fn: Callable[..., Any], /, *args: Any) -> Any:
+    def alone(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> T:
         """Run one call in a process of its own, which may die.
 
         Raises:
             BrokenExecutor: It died.
         """
         with _processes(1) as executor:
-            return executor.submit(fn, *args).result()
+            return executor.submit(fn, *args, **kwargs).result()
 
     def stop(self) -> None:
         """End the processes in the middle of what they do: nobody waits for it any more."""
@@ -71,15 +56,16 @@ class ProcessPool(Executor):
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """End the processes."""
-        self._inner.shutdown(wait, cancel_futures=cancel_futures)
+        self._inner.shutdown(wait)
 
 
 def _processes(workers: int) -> Executor:
-    from concurrent.futures import ProcessPoolExecutor
+    from joblib.externals.loky import ProcessPoolExecutor
 
-    from alphacut.fuzzy.campaign.pool_worker import PoolContext
-
-    return ProcessPoolExecutor(workers, mp_context=PoolContext(), initializer=_end_with_parent)
+    made: Executor = ProcessPoolExecutor(
+        workers, initializer=_end_with_parent, initargs=(os.getpid(),)
+    )
+    return made
 
 
 @contextmanager
@@ -90,8 +76,7 @@ def pool(workers: int) -> Iterator[Executor | None]:
     says.
 
     Raises:
-        ValueError: `workers` is no whole number from 1, or the main script came from standard
-            input.
+        ValueError: `workers` is no whole number from 1.
     """
     require_workers(workers)
     if {"mpi4py.run", "mpi4py.futures"} <= sys.modules.keys():
@@ -102,10 +87,6 @@ def pool(workers: int) -> Iterator[Executor | None]:
     elif workers == 1:
         yield None
     else:
-        from alphacut.fuzzy.campaign.pool_worker import refuse_in_import, require_script
-
-        refuse_in_import()
-        require_script()
         processes = ProcessPool(int(workers))
         try:
             yield processes
@@ -113,7 +94,7 @@ def pool(workers: int) -> Iterator[Executor | None]:
             processes.stop()
             raise
         finally:
-            processes.shutdown(wait=True, cancel_futures=True)
+            processes.shutdown()
 
 
 def require_workers(workers: object) -> None:
@@ -143,19 +124,16 @@ def require_executor(executor: object, workers: int) -> None:
         raise ValueError("workers and an executor are both given; give one")
 
 
-def _end_with_parent() -> None:
+def _end_with_parent(parent: int) -> None:
     """Leave when the process that started this one is gone: a killed campaign leaves no orphans."""
-    from multiprocessing import parent_process
-    from multiprocessing.connection import wait as wait_for
     from threading import Thread
 
     # Ctrl-C reaches the whole group; the parent decides
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = parent_process()
 
     def watch() -> None:
-        if parent is not None:
-            wait_for([parent.sentinel])
-            os._exit(1)
+        while os.getppid() == parent:
+            sleep(_WATCH)
+        os._exit(1)
 
     Thread(target=watch, daemon=True).start()

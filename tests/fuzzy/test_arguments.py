@@ -1,5 +1,7 @@
 """Arguments that cannot work are refused before any sample is run."""
 
+from threading import Lock
+
 import pytest
 
 from alphacut.fuzzy import (
@@ -41,8 +43,8 @@ def total(a, b):
         ({"plan": Signed}, "it must be a plan such as"),
         ({"function": 3}, "the function is 3, which cannot be called"),
         (
-            {"function": lambda a, b: a, "workers": 2},
-            "cannot be sent to worker processes .*top level of a module",
+            {"function": lambda a, b, lock=Lock(): a, "workers": 2},
+            "cannot be sent to worker processes .*what cannot be copied",
         ),
     ],
 )

@@ -1,8 +1,9 @@
-"""Workers and the script that asks for them: what they cannot import is told in one line, at once."""
+"""Functions that workers run: of a file, of a script without a guard, typed in, of a notebook."""
 
 import subprocess
 import sys
 from pathlib import Path
+from threading import Lock
 
 import pytest
 
@@ -37,48 +38,28 @@ def run(*words, text=None, folder=ROOT):
     )
 
 
-def test_a_script_without_the_guard_ends_at_once_and_names_it(tmp_path):
-    (tmp_path / "script.py").write_text(BARE)
-    done = run("script.py", folder=tmp_path)
-    assert done.returncode == 1
-    assert done.stderr.count("Traceback") == 1
-    last = done.stderr.splitlines()[-1]
-    assert last.startswith("RuntimeError: the worker processes ended before their first sample")
-    assert 'under `if __name__ == "__main__":`, or take workers=1' in last
-
-
-def test_a_script_with_the_guard_runs(tmp_path):
-    (tmp_path / "script.py").write_text(GUARDED)
+@pytest.mark.parametrize("text", [GUARDED, BARE], ids=["guarded", "bare"])
+def test_a_script_runs_with_a_guard_or_without(text, tmp_path):
+    (tmp_path / "script.py").write_text(text)
     assert run("script.py", folder=tmp_path).stdout == "8.0\n"
 
 
-def test_another_process_that_imports_the_script_is_told_of_the_guard(tmp_path):
-    (tmp_path / "script.py").write_text(BARE)
-    starter = (
-        "from multiprocessing import process, spawn; process.current_process()._inheriting = True;"
-        " spawn.import_main_path('script.py')"
-    )
-    done = run("-c", starter, folder=tmp_path)
-    assert done.returncode == 1
-    assert done.stderr.startswith(
-        "a process that imports the main script would start workers in turn: put the calls in that"
-        " script"
-    )
+@pytest.mark.parametrize("words", [("-",), ("-c", BARE)], ids=["standard input", "typed in"])
+def test_a_function_without_a_file_runs(words):
+    assert run(*words, text=BARE).stdout == "8.0\n"
 
 
-def test_a_script_from_standard_input_is_refused():
-    done = run("-", text=GUARDED)
-    assert done.stderr.splitlines()[-1].startswith(
-        "ValueError: the main script is <stdin>, which worker processes cannot import; save it"
-    )
+def test_a_function_inside_a_function_runs():
+    offset = 1.0
+    inputs = {"x": Triangular(0, 1, 2)}
+    result = propagate(lambda x: x + offset, inputs, workers=2)
+    assert result.bounds()[1][0] == 3.0
 
 
-def test_a_function_that_was_typed_in_is_refused():
-    done = run("-c", GUARDED)
-    assert (
-        "it was typed in, not read from a file): define it in a file"
-        in done.stderr.splitlines()[-1]
-    )
+def test_a_function_that_holds_a_lock_is_refused():
+    lock = Lock()
+    with pytest.raises(ValueError, match=r"cannot be sent to worker processes.*copied, or take"):
+        propagate(lambda x: x if lock else 0.0, {"x": Triangular(0, 1, 2)}, workers=2)
 
 
 @pytest.mark.parametrize("workers", ["2", 1.5, None])
