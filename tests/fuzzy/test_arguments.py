@@ -1,5 +1,6 @@
 """Arguments that cannot work are refused before any sample is run."""
 
+from functools import partial
 from threading import Lock
 
 import pytest
@@ -43,7 +44,7 @@ def total(a, b):
         ({"plan": Signed}, "it must be a plan such as"),
         ({"function": 3}, "the function is 3, which cannot be called"),
         (
-            {"function": lambda a, b, lock=Lock(): a, "workers": 2},
+            {"function": partial(lambda lock, a, b: a, Lock()), "workers": 2},
             "cannot be sent to worker processes .*what cannot be copied",
         ),
     ],
