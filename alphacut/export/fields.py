@@ -71,11 +71,7 @@ def cell_fields(case: Case) -> meshio.Mesh:
         (matrix, inclusion)
     )
     phase = np.tile(plane.inside.astype(np.int64), system.grid.layers)
-    stiffness = np.array([matrix.stiffness, inclusion.stiffness])[phase][:, None]
-    stress = (
-        stiffness
-        @ system.slice_stress.strain(system.grid.cells, solved.total, reference_nodes())[0]
-    )
+    stress = system.stress(solved.total, (matrix, inclusion), reference_nodes(), solved.pressure)
     nodes, cells, mean = by_phase(system, phase, stress)
     data: dict[str, Array] = {
         f"displacement_{load + 1}_in_half_sides": np.pad(

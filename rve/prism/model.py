@@ -190,7 +190,7 @@ class PrismModel:
         self, task: PrismTask, displacements: Displacements, phases: tuple[Phase, Phase]
     ) -> Homogenised:
         loads, system = self._loads, task.system
-        means = system.means(displacements.total, phases)
+        means = system.means(displacements.total, phases, displacements.pressure)
         stress = means.stress
         stiffness = stress @ np.linalg.inv(loads).T if len(loads) == 3 else None
         curve = StressCurve(

@@ -12,11 +12,16 @@ from alphacut.rve.mesh.periodicity import identify
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.petsc import PETSc
 from alphacut.rve.prism.form import PrismForm
+from alphacut.rve.prism.mixed import UNIT_STRAINS, MixedPhase, MixedSystem
+from alphacut.rve.prism.mixed_element import NEARLY_INCOMPRESSIBLE
 from alphacut.rve.prism.slice_stress import CELL_AREA, SliceStress
 from alphacut.rve.solver.constraints import LevelNumbering
+from alphacut.rve.solver.level_stiffness import element_stiffness
 from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
 from alphacut.stochastic import RadiusMap, ThetaRule, layered_rule
 from alphacut.stochastic.theta.truncated_normal import Array
+
+_DEVIATOR = np.array([[0.5, -0.5, 0], [-0.5, 0.5, 0], [0, 0, 1]])  # of (σ11, σ22, σ12)
 
 
 class FoldedMeshError(RuntimeError):
@@ -55,6 +60,7 @@ class PrismSystem:
         self.nodes = self.form.node_of_dof()
         self.local_map = self.numbering.local_map(self.nodes, comm)
         self.pattern = self.numbering.matrix(self.local_map, comm)
+        self.mixed: MixedSystem | None = None
         self._jit = self.form.jit_seconds
 
     def take_jit_seconds(self) -> float:
@@ -87,8 +93,33 @@ class PrismSystem:
         # z < 0 in eq. 14
         return np.asarray(np.hypot(x[..., 0], x[..., 1]) < self.map(x[..., 2]), float)
 
+    def set_poisson(self, phases: tuple[Phase, Phase]) -> None:
+        """Take the phases' Poisson's ratios; nearly incompressible ones get mixed elements."""
+        self.form.set_poisson(phases)
+        near = self._nearly_incompressible(phases)
+        self.mixed = None
+        if near:
+            affine = self.affine(UNIT_STRAINS)
+            self.mixed = MixedSystem(self.numbering, near, affine, self.pattern, self.comm)
+
+    def _nearly_incompressible(self, phases: tuple[Phase, Phase]) -> dict[int, MixedPhase]:
+        inside = self.grid.plane.inside
+        return {
+            k: MixedPhase(
+                self.grid,
+                self.positions,
+                self.map.distribution,
+                np.flatnonzero(inside == bool(k)),
+                Phase(1.0, phase.poisson),
+            )
+            for k, phase in enumerate(phases)
+            if self.grid.conforming and phase.poisson > NEARLY_INCOMPRESSIBLE
+        }
+
     def stiffness(self, phase: int) -> PETSc.Mat:
-        """Reduced K_m (phase 0) or K_i (phase 1) for a unit modulus."""
+        """Reduced K_m (phase 0) or K_i (phase 1) for a unit modulus, less mean pressures."""
+        if self.mixed is not None and phase in self.mixed.phases:
+            return self.mixed.stiffness[phase]
         matrix = self.pattern.duplicate(copy=False)
         matrix.setLGMap(self.local_map, self.local_map)
         self.form.add_stiffness(phase, matrix)
@@ -97,6 +128,10 @@ class PrismSystem:
 
     def load(self, phase: int, strain: Array) -> PETSc.Vec:
         """Reduced load of one phase for a unit modulus under a strain (ε11, ε22, 2 ε12)."""
+        if self.mixed is not None and phase in self.mixed.phases:
+            vector = self.pattern.createVecLeft()
+            vector.array[:] = (self.mixed.loads[phase] @ strain)[slice(*vector.owner_range)]
+            return vector
         return self.numbering.vector(self.local_map, self.form.load(phase, strain), self.comm)
 
     @property
@@ -108,9 +143,19 @@ class PrismSystem:
         """Voigt stiffness, shape (cells, points or 1, 3, 3), in Pa."""
         return _mixed(self.share, phases)
 
-    def means(self, displacement: Array, phases: tuple[Phase, Phase]) -> SliceMeans:
-        """Stress of the slices and mean energy from displacements, shape (nodes, 2, loads)."""
+    def means(
+        self, displacement: Array, phases: tuple[Phase, Phase], pressure: Array | None = None
+    ) -> SliceMeans:
+        """Stress of the slices and mean energy.
+
+        Args:
+            displacement: Shape (nodes, 2, loads).
+            phases: Matrix and inclusion.
+            pressure: Of nearly incompressible triangles, shape (levels, triangles, loads), in Pa.
+        """
         slices, stiffness = self.slice_stress, self.stiffness_at_points(phases)
+        if self.mixed is not None:
+            stiffness[self.mixed.wedges] = 0.0
         rule = layered_rule(self.map.distribution, layers=self.grid.layers, points=slices.slices)
         weights = rule.weights / rule.weights.sum()
         shares = np.broadcast_to(self.share, (len(self.share), len(self.form.points))).reshape(
@@ -119,14 +164,42 @@ class PrismSystem:
         stress, fraction = [], []
         energy = np.zeros((displacement.shape[2],) * 2)
         for k, layer in enumerate(slices.layers(displacement, stiffness)):
-            stress.append(layer.mean)
             fraction.append(np.einsum("msp,msp->s", layer.area, shares[k]) / CELL_AREA)
+            mean, work = layer.mean, layer.energy
+            if self.mixed is not None and pressure is not None:
+                more = self.mixed.means(k, displacement, pressure, phases)
+                mean, work = (
+                    own + part / CELL_AREA for own, part in zip((mean, work), more, strict=True)
+                )
+            stress.append(mean)
             energy += np.tensordot(
-                weights[k * slices.slices : (k + 1) * slices.slices], layer.energy, axes=1
+                weights[k * slices.slices : (k + 1) * slices.slices], work, axes=1
             )
         return SliceMeans(
             ThetaRule(rule.nodes, weights), np.concatenate(stress), np.concatenate(fraction), energy
         )
+
+    def stress(
+        self,
+        displacement: Array,
+        phases: tuple[Phase, Phase],
+        points: Array,
+        pressure: Array | None = None,
+    ) -> Array:
+        """(σ11, σ22, σ12) at points (q, 3) of every wedge, shape (cells, q, 3, loads), in Pa."""
+        strain, _ = self.slice_stress.strain(self.grid.cells, displacement, points)
+        found = np.asarray(_mixed(self.share[:, :1], phases) @ strain)
+        if self.mixed is None or pressure is None:
+            return found
+        found[self.mixed.wedges] = _DEVIATOR @ found[self.mixed.wedges]
+        for layer in range(self.grid.layers):
+            for k, part in self.mixed.phases.items():
+                mean = self.mixed.pressure_at(
+                    k, layer, points, displacement, pressure, phases[k].modulus
+                )
+                cells = layer * len(self.grid.plane.triangles) + part.triangles
+                found[cells, :, :2] += mean[:, :, None]
+        return found
 
     def affine(self, loads: Array) -> Array:
         """Displacements ε̄·x of the nodes, shape (nodes, 2, loads)."""
@@ -135,15 +208,30 @@ class PrismSystem:
         return np.asarray(np.einsum("lij,nj->nil", tensors, x))
 
     def preconditioner(self, phases: tuple[Phase, Phase]) -> ThetaPreconditioner:
-        """θ-preconditioner for these phases; cut triangles take their wedges' mean stiffness."""
+        """θ-preconditioner for these phases; cut triangles take their wedges' mean stiffness.
+
+        Pressures count in units of the matrix's modulus.
+        """
         between = self.share.reshape(self.grid.layers, len(self.grid.plane.triangles), -1).mean(
             axis=2
         )
         on = (np.concatenate([between[:1], between]) + np.concatenate([between, between[-1:]])) / 2
-        stiffness = _mixed(on, phases), _mixed(between, phases)
-        return ThetaPreconditioner(
-            self.numbering, self.grid.planes(self.map), stiffness, self.map.distribution, self.comm
-        )
+        own = self.numbering.local_levels(self.comm), self.numbering.local_layers(self.comm)
+        elements, pressures = [], None
+        for planes, share, places in zip(
+            self.grid.planes(self.map), (on, between), own, strict=True
+        ):
+            corners = [planes[k][self.grid.plane.triangles] for k in places]
+            stiffness = _mixed(share, phases)
+            found = [
+                element_stiffness(x, stiffness[k]) for k, x in zip(places, corners, strict=True)
+            ]
+            if self.mixed is not None:
+                levels = self.mixed.at_levels(found, corners, phases)
+                pressures = pressures or levels
+            elements.append(found)
+        law = self.map.distribution
+        return ThetaPreconditioner(self.numbering, *elements, law, self.comm, pressures)
 
 
 def _mixed(share: Array, phases: tuple[Phase, Phase]) -> Array:

@@ -11,6 +11,7 @@ from alphacut.rve.petsc import PETSc
 from alphacut.rve.prism.system import PrismSystem
 from alphacut.rve.solver.krylov import LinearSolver
 from alphacut.rve.solver.options import SolverOptions
+from alphacut.rve.solver.saddle import Saddle
 from alphacut.rve.solver.stopwatch import Stopwatch
 from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -28,12 +29,15 @@ class Displacements:
         affine: ε̄x alone, same shape.
         iterations: Of the linear solver, for each load.
         residual: Largest relative residual.
+        pressure: Mean pressure of nearly incompressible triangles, shape (levels, triangles,
+            loads), in Pa, tension positive.
     """
 
     total: Array
     affine: Array
     iterations: tuple[int, ...]
     residual: float
+    pressure: Array | None = None
 
 
 class PrismTask:
@@ -71,7 +75,7 @@ class PrismTask:
         if poissons == self.poissons:
             return
         system, self.poissons = self.system, poissons
-        system.form.set_poisson(phases)
+        system.set_poisson(phases)
         self.matrices = [system.stiffness(k) for k in range(2)]
         self.loads = [[system.load(k, strain) for strain in self.strains] for k in range(2)]
         self.theta: tuple[int, ThetaPreconditioner] | None = None
@@ -91,12 +95,22 @@ class PrismTask:
     def _solver(self, phases: tuple[Phase, Phase]) -> LinearSolver:
         operator = self._combined(self.matrices[0].copy(), self.matrices[1], phases)
         if self.options.all["pc_type"] == "python":
-            return LinearSolver(
-                operator, self.options, self._theta(phases), together=len(self.strains)
-            )
+            whole = operator if self.system.mixed is None else self._saddle(operator, phases)
+            options = self.options if self.system.mixed is None else self.options.indefinite
+            return LinearSolver(whole, options, self._theta(phases), together=len(self.strains))
+        if self.system.mixed is not None:
+            return LinearSolver(self._saddle(operator, phases), self.options, None)
         operator = operator.convert("aij")  # PETSc's own preconditioners want it
         operator.setOption(PETSc.Mat.Option.SPD, True)
         return LinearSolver(operator, self.options, None)
+
+    def _saddle(self, operator: PETSc.Mat, phases: tuple[Phase, Phase]) -> Saddle:
+        """Stiffness and mean pressures, these in units of the matrix's modulus."""
+        mixed, unit = self.system.mixed, phases[0].modulus
+        assert mixed is not None
+        levels = self.system.numbering.local_levels(self.system.comm)
+        compliance = unit**2 * mixed.compliance(phases)
+        return Saddle(operator, unit * mixed.flux, compliance, levels, mixed.count)
 
     def _solve_loads(self, solver: LinearSolver, phases: tuple[Phase, Phase]) -> Displacements:
         size = max(phases[k].modulus * load.norm() for k in range(2) for load in self.loads[k])
@@ -104,15 +118,29 @@ class PrismTask:
             self._combined(soft.copy(), hard, phases)
             for soft, hard in zip(*self.loads, strict=True)
         ]
+        mixed, unit = self.system.mixed, phases[0].modulus
+        if mixed is not None and solver.saddle is not None:
+            uniform = mixed.uniform_pressure(phases).reshape(-1, 3) @ self.strains.T
+            forces = mixed.pressure_loads.reshape(-1, 3) @ self.strains.T
+            forces = unit * (forces + mixed.compliance(phases) @ uniform)
+            loads = [solver.saddle.vector(*pair) for pair in zip(loads, forces.T, strict=True)]
         # equal phases: the affine field is the solution
-        if all(load.norm() <= NO_LOAD * size for load in loads):
+        elif all(load.norm() <= NO_LOAD * size for load in loads):
             return Displacements(self.affine, self.affine, (0,) * len(loads), 0.0)
         solutions = solver.solve(loads)
         fluctuation = np.stack(
             [self.system.numbering.to_nodes(column) for column in solutions.values.T], axis=-1
         )
+        pressure = None
+        if mixed is not None and solutions.pressures is not None:
+            pressure = unit * solutions.pressures + uniform
+            pressure = pressure.reshape(-1, mixed.count, len(loads))
         return Displacements(
-            self.affine + fluctuation, self.affine, solutions.iterations, solutions.residual
+            self.affine + fluctuation,
+            self.affine,
+            solutions.iterations,
+            solutions.residual,
+            pressure,
         )
 
     def _theta(self, phases: tuple[Phase, Phase]) -> ThetaPreconditioner:

@@ -69,6 +69,11 @@ class LevelNumbering:
         first = [-(-layers * rank // size) for rank in range(size)] + [layers + 1]
         return range(first[comm.rank], first[comm.rank + 1])
 
+    def local_layers(self, comm: MPI.Comm) -> range:
+        """Layers of this rank."""
+        levels = self.local_levels(comm)
+        return range(levels.start, min(levels.stop, self.grid.layers))
+
     def local_size(self, comm: MPI.Comm) -> int:
         """Unknowns of this rank."""
         levels = self.local_levels(comm)

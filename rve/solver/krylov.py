@@ -11,6 +11,7 @@ import numpy as np
 from alphacut.rve.petsc import PETSc
 from alphacut.rve.solver.options import PREFIX, SolverOptions
 from alphacut.rve.solver.petsc_options import in_database
+from alphacut.rve.solver.saddle import Saddle
 from alphacut.stochastic.theta.truncated_normal import Array
 
 
@@ -33,11 +34,13 @@ class Solutions:
         values: The whole vectors, on every rank, shape (size, loads).
         iterations: For each load.
         residual: The largest relative residual, as it truly is.
+        pressures: Whole vectors of the pressures of a `Saddle`, shape (pressures, loads).
     """
 
     values: Array
     iterations: tuple[int, ...]
     residual: float
+    pressures: Array | None = None
 
 
 class SideBySide:
@@ -65,7 +68,7 @@ class LinearSolver:
     read once for all of them.
 
     Args:
-        matrix: The reduced stiffness, symmetric positive definite.
+        matrix: The reduced stiffness, symmetric positive definite, or a `Saddle`.
         options: PETSc options.
         context: What `pc_type python` stands for; None for PETSc's own preconditioners.
         together: Number of loads that the preconditioner treats together, 1 for one at a time.
@@ -76,16 +79,19 @@ class LinearSolver:
 
     def __init__(
         self,
-        matrix: PETSc.Mat,
+        matrix: PETSc.Mat | Saddle,
         options: SolverOptions,
         context: Preconditioner | None,
         *,
         together: int = 1,
     ) -> None:
-        self.matrix, self.together = matrix, together
-        self.krylov = PETSc.KSP().create(matrix.comm)
+        self.together, self.saddle = together, matrix if isinstance(matrix, Saddle) else None
+        self.matrix = matrix
+        if isinstance(matrix, Saddle):
+            self.matrix = matrix.assembled() if context is None else matrix.matrix()
+        self.krylov = PETSc.KSP().create(self.matrix.comm)
         self.krylov.setOptionsPrefix(PREFIX)
-        self.krylov.setOperators(matrix if together == 1 else self._side_by_side())
+        self.krylov.setOperators(self.matrix if together == 1 else self._side_by_side())
         with in_database(options.all, wanted=options.given):
             self.krylov.setFromOptions()
             if self.krylov.pc.getType() == "python":
@@ -93,6 +99,8 @@ class LinearSolver:
             self.krylov.setUp()
 
     def _side_by_side(self) -> PETSc.Mat:
+        if self.saddle is not None:
+            return self.saddle.matrix(self.together)
         local, size = (
             self.matrix.getLocalSize()[0] * self.together,
             self.matrix.getSize()[0] * self.together,
@@ -120,9 +128,11 @@ class LinearSolver:
         values = np.concatenate([values for values, _ in solved], axis=1) * norms
         iterations = tuple(count for values, count in solved for _ in range(values.shape[1]))
         residual = max(self._residual(load, values[:, k]) for k, load in enumerate(loads))
-        return Solutions(
-            np.concatenate(self.matrix.comm.tompi4py().allgather(values)), iterations, residual
-        )
+        if self.saddle is None:
+            whole = np.concatenate(self.matrix.comm.tompi4py().allgather(values))
+            return Solutions(whole, iterations, residual)
+        whole, pressures = self.saddle.split(values)
+        return Solutions(whole, iterations, residual, pressures)
 
     def _solve(self, columns: Array) -> tuple[Array, int]:
         """This rank's solutions for unit loads, shape (local size, loads), and iterations."""

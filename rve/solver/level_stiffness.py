@@ -14,15 +14,15 @@ from alphacut.stochastic.theta.truncated_normal import Array
 _CORNERS = np.array([[1 / 6, 1 / 6], [2 / 3, 1 / 6], [1 / 6, 2 / 3]])
 
 
-def _gradients(nodes: int) -> Array:
-    """Derivatives of the shape functions at the rule's points, (3 points, 2, nodes)."""
-    x, y = _CORNERS.T
+def gradients(points: Array, nodes: int) -> Array:
+    """Derivatives of the shape functions of 3 or 6 nodes at points (q, 2), (q, 2, nodes)."""
+    x, y = points.T
     barycentric, slopes = (
         np.array([1 - x - y, x, y]),
         np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]),
     )
     if nodes == 3:
-        return np.broadcast_to(slopes.T, (3, 2, 3))
+        return np.broadcast_to(slopes.T, (len(points), 2, 3))
     corner = (4 * barycentric.T - 1)[:, None, :] * slopes.T
     middle = [
         4 * (np.outer(barycentric[i], slopes[j]) + np.outer(barycentric[j], slopes[i]))
@@ -41,7 +41,7 @@ def element_stiffness(positions: Array, stiffness: Array) -> Array:
     Returns:
         Shape (m, 2·nodes, 2·nodes), the two components of a node side by side.
     """
-    table = _gradients(positions.shape[1])
+    table = gradients(_CORNERS, positions.shape[1])
     jacobian = np.einsum("qan,mnx->mqax", table, positions)
     determinant = (
         jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]

@@ -9,7 +9,7 @@ override a named set.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 PREFIX = "rve_"
 _CG = {
@@ -18,6 +18,8 @@ _CG = {
     "ksp_norm_type": "preconditioned",
     "ksp_max_it": "2000",
 }
+# a pressure weighs less in the residual than in the solution
+_GMRES = {"ksp_type": "gmres", "ksp_gmres_restart": "200", "ksp_rtol": "1e-10"}
 
 
 class OptionError(ValueError):
@@ -57,6 +59,11 @@ class SolverOptions:
     def all(self) -> dict[str, str]:
         """Everything that is put to PETSc."""
         return {**SOLVERS[self.solver], **self.given}
+
+    @property
+    def indefinite(self) -> SolverOptions:
+        """The same for a saddle point: GMRES in place of conjugate gradients."""
+        return replace(self, given={**_GMRES, **self.given})
 
     @property
     def residual_limit(self) -> float:

@@ -18,10 +18,16 @@ For constant K the inverse is then
 
 with K_1 = Jᵀ K J the stiffness of linear triangles; both summands are positive (semi)definite, so
 their level-wise version is too.
+
+Nearly incompressible triangles have mean pressures besides, hats along θ. Each level's matrix is
+then a saddle point, L_k J L_kᵀ with signs J, and the middle factor above becomes M ⊗ J. L_k stays
+bounded as the compressibility vanishes, so the count does not depend on Poisson's ratio either.
+The second summand has no part in the pressures.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,7 +38,8 @@ from alphacut.rve.mesh.triangulation import Integers
 from alphacut.rve.petsc import PETSc
 from alphacut.rve.solver.constraints import LevelNumbering
 from alphacut.rve.solver.level_cholesky import LevelCholesky
-from alphacut.rve.solver.level_stiffness import LevelPattern, element_stiffness
+from alphacut.rve.solver.level_ldl import LevelLDL
+from alphacut.rve.solver.level_stiffness import LevelPattern
 from alphacut.stochastic.theta.truncated_normal import Array, TruncatedNormal
 
 
@@ -83,49 +90,78 @@ def _with_components(unknown: Integers) -> Integers:
     return pairs.reshape(len(unknown), -1)
 
 
+@dataclass(frozen=True)
+class LevelPressures:
+    """Mean pressures of some triangles on the levels of one rank.
+
+    Args:
+        triangles: Those with a pressure, shape (p,).
+        flux: For each level integrals of the divergence, shape (p, 12).
+        compliance: For each level area over bulk modulus, shape (p,).
+    """
+
+    triangles: Integers
+    flux: Sequence[Array]
+    compliance: Sequence[Array]
+
+    def saddles(self, stiffness: Sequence[Array]) -> list[Array]:
+        """Element matrices with the pressure as 13th unknown, from those without."""
+        found = []
+        for one, flux, compliance in zip(stiffness, self.flux, self.compliance, strict=True):
+            whole = np.zeros((len(one), 13, 13))
+            whole[:, :12, :12] = one
+            whole[self.triangles, 12, :12] = whole[self.triangles, :12, 12] = flux
+            whole[self.triangles, 12, 12] = -compliance
+            found.append(whole)
+        return found
+
+
 class ThetaPreconditioner:
     """Applies the inverse above to a residual of the reduced product-space system.
 
     Args:
         numbering: Unknowns level by level.
-        planes: Planar positions on the levels and half-way between, shapes (layers + 1, n, 2) and
-            (layers, n, 2).
-        stiffness: Voigt stiffness of each triangle on the levels and half-way, shapes (layers + 1,
-            m, 3, 3) and (layers, m, 3, 3).
+        on: Element matrices on this rank's levels, shape (m, 12, 12) each.
+        between: The same half-way between levels.
         law: Law of θ.
         comm: Communicator; each rank factorises its own levels.
+        pressures: Mean pressures of nearly incompressible triangles.
     """
 
     def __init__(
         self,
         numbering: LevelNumbering,
-        planes: tuple[Array, Array],
-        stiffness: tuple[Array, Array],
+        on: Sequence[Array],
+        between: Sequence[Array],
         law: TruncatedNormal,
         comm: MPI.Comm,
+        pressures: LevelPressures | None = None,
     ) -> None:
         self.numbering, self.comm = numbering, comm
         grid, periodicity = numbering.grid, numbering.periodicity
         self.mass = theta_mass(law, grid.levels(law))
-        self.levels = numbering.local_levels(comm)
-        self.middles = range(self.levels.start, min(self.levels.stop, grid.layers))
+        self.levels, self.middles = numbering.local_levels(comm), numbering.local_layers(comm)
         self.injection = sp.kron(periodicity.linear_injection(grid.plane), np.eye(2), format="csr")
         triangles = grid.plane.triangles
-        on = [element_stiffness(planes[0][k][triangles], stiffness[0][k]) for k in self.levels]
-        between = [
-            element_stiffness(planes[1][k][triangles], stiffness[1][k]) for k in self.middles
-        ]
-        quadratic = LevelPattern(_with_components(periodicity.unknown[triangles]))
+        unknowns = _with_components(periodicity.unknown[triangles])
+        self.pressures = 0 if pressures is None else len(pressures.triangles)
+        self.quadratic: LevelCholesky | LevelLDL
+        if pressures is None:
+            quadratic = LevelPattern(unknowns)
+            self.quadratic = LevelCholesky(quadratic, (quadratic.values(k) for k in on))
+        else:
+            self.quadratic = LevelLDL(unknowns, pressures.triangles, pressures.saddles(on))
         linear = LevelPattern(_with_components(periodicity.unknown[triangles[:, :3]]))
-        self.quadratic = LevelCholesky(quadratic, (quadratic.values(k) for k in on))
         self.linear = LevelCholesky(
-            linear, (linear.values(_LINEAR.T @ k @ _LINEAR) for k in on + between)
+            linear, (linear.values(_LINEAR.T @ k @ _LINEAR) for k in (*on, *between))
         )
 
     def apply(self, _pc: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
         """Result = P⁻¹ residual, called by PETSc; several loads side by side."""
-        columns = residual.size // self.numbering.size
-        level, middle = self._split(self._gather(residual.array_r.reshape(-1, columns)))
+        own_size = self.numbering.local_size(self.comm) + self.pressures * len(self.levels)
+        vectors = residual.array_r.reshape(own_size, -1)
+        cut = own_size - self.pressures * len(self.levels)
+        level, middle = self._split(self._gather(vectors[:cut]))
         vertices = middle.shape[1]
         # from nodal values half-way to bubbles on top of the hats
         level[:-1, :vertices] += middle / 2
@@ -134,15 +170,22 @@ class ThetaPreconditioner:
             slice(self.levels.start, self.levels.stop),
             slice(self.middles.start, self.middles.stop),
         )
-        hats = self.quadratic.backward(
-            _along_theta(self.mass.linear[own], self._gather(self.quadratic.forward(level[own])))
+        planar = level.shape[1]
+        pressure = vectors[cut:].reshape(len(self.levels), self.pressures, vectors.shape[1])
+        both = np.concatenate([level[own], pressure], axis=1) if self.pressures else level[own]
+        solved = self.quadratic.backward(
+            _along_theta(self.mass.linear[own], self._gather(self.quadratic.forward(both)))
         )
+        hats = solved[:, :planar]
         correction, bubbles = self._excess(_in_plane(self.injection.T, level[own]), middle[between])
         hats = self._gather(hats + _in_plane(self.injection, correction))
         above = slice(between.start + 1, between.stop + 1)
         self._join(
-            hats[own], bubbles + (hats[between, :vertices] + hats[above, :vertices]) / 2, result
+            hats[own],
+            bubbles + (hats[between, :vertices] + hats[above, :vertices]) / 2,
+            result.array[: cut * vectors.shape[1]],
         )
+        result.array[cut * vectors.shape[1] :] = solved[:, planar:].ravel()
 
     def _excess(self, level: Array, middle: Array) -> tuple[Array, Array]:
         """(M_quad⁻¹ − M_lin⁻¹) ⊗ K_1⁻¹ on this rank's vertices, on and between levels."""
@@ -168,10 +211,11 @@ class ThetaPreconditioner:
         table = vectors[:-planar].reshape(-1, stride, columns)
         return np.concatenate([table[:, :planar], vectors[None, -planar:]]), table[:, planar:]
 
-    def _join(self, level: Array, middle: Array, target: PETSc.Vec) -> None:
+    @staticmethod
+    def _join(level: Array, middle: Array, target: Array) -> None:
         """This rank's part of the vectors from its levels and what lies between."""
         paired = np.concatenate([level[: len(middle)], middle], axis=1).ravel()
-        target.array[:] = np.concatenate([paired, level[len(middle) :].ravel()])
+        target[:] = np.concatenate([paired, level[len(middle) :].ravel()])
 
 
 def _along_theta(matrix: Array, vectors: Array) -> Array:
