@@ -18,6 +18,7 @@ from mpi4py import MPI
 from alphacut.rve.cell import LOADS, THREE_LOADS, Cell, Phase
 from alphacut.rve.certificate import (
     ROUND_OFF,
+    WHAT,
     CertificateError,
     Limits,
     load_checks,
@@ -28,6 +29,8 @@ from alphacut.rve.mesh.periodicity import mismatch
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import triangulate
 from alphacut.rve.prism.error_estimate import judged, moduli_of
+from alphacut.rve.prism.mixed_element import NEARLY_INCOMPRESSIBLE
+from alphacut.rve.prism.modulus_basis import BasisError, ModulusBasis
 from alphacut.rve.prism.system import PrismSystem, SliceMeans
 from alphacut.rve.prism.task import Displacements, PrismTask
 from alphacut.rve.result import Homogenised, StressCurve
@@ -57,6 +60,8 @@ class PrismModel:
         stiffness: Whether to solve a third load, for the whole planar stiffness.
         estimate: Whether to declare the errors, measured against planar elements of order 4; costs
             seconds, and a companion of a coarser mesh besides.
+        moduli: Least and greatest modulus of the particle, in Pa, between which every sample of a
+            map is projected on a few solutions; None: each is solved.
 
     Raises:
         ValueError: An option out of range or unknown.
@@ -70,6 +75,7 @@ class PrismModel:
     parallel: bool = False
     stiffness: bool = False
     estimate: bool = False
+    moduli: tuple[float, float] | None = None
     name: ClassVar[str] = "prism"
 
     def __post_init__(self) -> None:
@@ -100,9 +106,17 @@ class PrismModel:
         watch = Stopwatch()
         system = self._moved(radius_map, watch)
         task = PrismTask(system, self.options, self._loads, watch)
+        bases: dict[float, ModulusBasis | None] = {}
         results = []
         for inclusion in inclusions:
-            result, _ = self._solved(task, (matrix, inclusion))
+            if inclusion.poisson not in bases:
+                bases[inclusion.poisson] = self._basis(task, (matrix, inclusion))
+            basis = bases[inclusion.poisson]
+            result = (
+                self._solved(task, (matrix, inclusion))[0]
+                if basis is None
+                else self._projected(basis, (matrix, inclusion))
+            )
             results.append(replace(result, seconds=watch.report()))
         return self._judged(radius_map, matrix, inclusions, results) if self.estimate else results
 
@@ -161,6 +175,34 @@ class PrismModel:
         """The linear solver with what overrides it."""
         return SolverOptions(self.solver, self.petsc)
 
+    def _basis(self, task: PrismTask, phases: tuple[Phase, Phase]) -> ModulusBasis | None:
+        """Solutions to project on, or None where every sample is solved by itself."""
+        if self.moduli is None or not self._projects(phases):
+            return None
+        try:
+            return ModulusBasis(task, phases, self.moduli)
+        except (ConvergenceError, BasisError):
+            return None
+
+    def _projects(self, phases: tuple[Phase, Phase]) -> bool:
+        """Whether the solver, the mesh and the phases are those that a basis is made for."""
+        ordinary = self.options == SolverOptions() and self.interface == "conforming"
+        near = max(phase.poisson for phase in phases) > NEARLY_INCOMPRESSIBLE
+        return ordinary and not near and not self.parallel
+
+    def _projected(self, basis: ModulusBasis, phases: tuple[Phase, Phase]) -> Homogenised:
+        low, high = self.moduli or (0.0, np.inf)
+        if not low * (1 - ROUND_OFF) <= phases[1].modulus <= high * (1 + ROUND_OFF):
+            raise ValueError(
+                f"a particle has the modulus {phases[1].modulus:g} Pa; the range given is {low:g}"
+                f" to {high:g} Pa: widen it"
+            )
+        certificate = {"residual": basis.error, "periodicity": basis.mismatch}
+        means = basis.project(phases[1].modulus)
+        result = self._result(basis.task, means, phases, certificate)
+        reason = f"projected on solutions at {len(basis.nodes)} moduli of the particle"
+        return replace(result, iterations=basis.iterations, reason=reason)
+
     def _solved(
         self, task: PrismTask, phases: tuple[Phase, Phase]
     ) -> tuple[Homogenised, Displacements]:
@@ -182,29 +224,36 @@ class PrismModel:
     def _certified(
         self, task: PrismTask, phases: tuple[Phase, Phase]
     ) -> tuple[Homogenised, Displacements]:
-        displacements = task.solve(phases)
+        solved, system = task.solve(phases), task.system
         with task.watch("solve"):
-            return self._result(task, displacements, phases), displacements
+            means = system.means(solved.total, phases, solved.pressure)
+            certificate = {
+                "residual": solved.residual,
+                "periodicity": mismatch(system.positions, solved.total - solved.affine),
+            }
+            result = self._result(task, means, phases, certificate)
+            return replace(result, iterations=solved.iterations), solved
 
     def _result(
-        self, task: PrismTask, displacements: Displacements, phases: tuple[Phase, Phase]
+        self,
+        task: PrismTask,
+        means: SliceMeans,
+        phases: tuple[Phase, Phase],
+        certificate: dict[str, float],
     ) -> Homogenised:
-        loads, system = self._loads, task.system
-        means = system.means(displacements.total, phases, displacements.pressure)
-        stress = means.stress
+        loads, system, stress = self._loads, task.system, means.stress
         stiffness = stress @ np.linalg.inv(loads).T if len(loads) == 3 else None
         curve = StressCurve(
             means.rule.nodes, means.rule.weights, stress[:, 0, 0], stress[:, 2, 1], stiffness
         )
+        measured = certificate | certify(means, phases, loads)
+        checks = {name: measured[name] for name in WHAT if name in measured}
         return Homogenised(
             curve=curve,
             method="prism",
             solver=str(task.options),
             unknowns=system.numbering.size,
-            iterations=displacements.iterations,
-            checks=require(
-                certify(system, displacements, means, phases, loads), self._limits(phases)
-            ),
+            checks=require(checks, self._limits(phases)),
             cell=Cell(*phases, system.map),
         )
 
@@ -228,26 +277,16 @@ def _what(failure: Exception) -> str:
     return str(failure).partition(":")[0]
 
 
-def certify(
-    system: PrismSystem,
-    displacements: Displacements,
-    means: SliceMeans,
-    phases: tuple[Phase, Phase],
-    loads: Array,
-) -> dict[str, float]:
-    """Measures what every right result has; see `rve.certificate`."""
+def certify(means: SliceMeans, phases: tuple[Phase, Phase], loads: Array) -> dict[str, float]:
+    """Measures what the means of every right result have; see `rve.certificate`."""
     weights, stress, fraction = means.rule.weights, means.stress, means.fraction
     work = loads @ np.tensordot(weights, stress, axes=1)  # σ̄_b : ε̄_a
     if len(loads) == 3:
         bounds = stiffness_checks(stress @ np.linalg.inv(loads).T, fraction, weights, phases)
     else:
         bounds = load_checks(stress, loads, fraction, weights, phases)
-    return {
-        "residual": displacements.residual,
-        "hill_mandel": float(abs(work.T - means.energy).max() / abs(means.energy).max()),
-        "periodicity": mismatch(system.positions, displacements.total - displacements.affine),
-        **bounds,
-    }
+    gap = float(abs(work.T - means.energy).max() / abs(means.energy).max())
+    return {"hill_mandel": gap, **bounds}
 
 
 def reference_radius(radius_map: RadiusMap) -> float:

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import Integers
@@ -33,6 +34,10 @@ class LayerStress:
     stress: Array
     strain: Array
     area: Array
+
+    def of(self, triangles: NDArray[np.bool_]) -> LayerStress:
+        """The part of these triangles, given as a mask."""
+        return LayerStress(self.stress[triangles], self.strain[triangles], self.area[triangles])
 
     @property
     def mean(self) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
@@ -43,6 +43,32 @@ class SliceMeans:
     stress: Array
     fraction: Array
     energy: Array
+
+
+@dataclass(frozen=True)
+class PhaseMeans:
+    """Means over the slices, apart by phase, of fields in phases of 1 Pa.
+
+    Args:
+        rule: θ of the slices and their weights.
+        stress: Shape (2, n, 3, fields).
+        fraction: Area fraction of the particle, shape (n,).
+        energy: Shape (2, fields, fields).
+    """
+
+    rule: ThetaRule
+    stress: Array
+    fraction: Array
+    energy: Array
+
+    def combined(self, moduli: tuple[float, float], coefficients: Array) -> SliceMeans:
+        """Means of sums of the fields, coefficients (fields, loads), for moduli in Pa."""
+        stress, energy = (
+            moduli[0] * of[0] + moduli[1] * of[1] for of in (self.stress, self.energy)
+        )
+        return SliceMeans(
+            self.rule, stress @ coefficients, self.fraction, coefficients.T @ energy @ coefficients
+        )
 
 
 class PrismSystem:
@@ -177,6 +203,35 @@ class PrismSystem:
             )
         return SliceMeans(
             ThetaRule(rule.nodes, weights), np.concatenate(stress), np.concatenate(fraction), energy
+        )
+
+    def means_by_phase(self, displacement: Array, phases: tuple[Phase, Phase]) -> PhaseMeans:
+        """Means of fields (nodes, 2, fields) on a mesh that follows the interface.
+
+        Args:
+            displacement: The fields.
+            phases: Their Poisson's ratios count; moduli are 1 Pa.
+        """
+        slices, inside = self.slice_stress, self.grid.plane.inside
+        stiffness = self.stiffness_at_points(
+            (replace(phases[0], modulus=1.0), replace(phases[1], modulus=1.0))
+        )
+        rule = layered_rule(self.map.distribution, layers=self.grid.layers, points=slices.slices)
+        weights = rule.weights / rule.weights.sum()
+        stress: tuple[list[Array], list[Array]] = ([], [])
+        energy = np.zeros((2, *(displacement.shape[2],) * 2))
+        fraction = []
+        for k, layer in enumerate(slices.layers(displacement, stiffness)):
+            own = weights[k * slices.slices : (k + 1) * slices.slices]
+            for phase, part in enumerate((layer.of(~inside), layer.of(inside))):
+                stress[phase].append(part.mean)
+                energy[phase] += np.tensordot(own, part.energy, axes=1)
+            fraction.append(layer.of(inside).area.sum(axis=(0, 2)) / CELL_AREA)
+        return PhaseMeans(
+            ThetaRule(rule.nodes, weights),
+            np.array([np.concatenate(part) for part in stress]),
+            np.concatenate(fraction),
+            energy,
         )
 
     def stress(

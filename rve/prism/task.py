@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from alphacut.rve.cell import Phase
 from alphacut.rve.petsc import PETSc
 from alphacut.rve.prism.system import PrismSystem
-from alphacut.rve.solver.krylov import LinearSolver
+from alphacut.rve.solver.krylov import LinearSolver, SideBySide
 from alphacut.rve.solver.options import SolverOptions
 from alphacut.rve.solver.saddle import Saddle
 from alphacut.rve.solver.stopwatch import Stopwatch
@@ -70,6 +71,38 @@ class PrismTask:
         with self.watch("solve"):
             return self._solve_loads(solver, phases)
 
+    def fluctuations(self, samples: Sequence[tuple[Phase, Phase]]) -> tuple[Array, tuple[int, ...]]:
+        """Solutions of samples of one map side by side, shape (size, samples · loads).
+
+        Raises:
+            ConvergenceError: The linear solver stopped early.
+        """
+        with self.watch("assemble"):
+            self._assemble(samples[0])
+        with self.watch("setup"):
+            matrices = [self._stiffness(phases) for phases in samples]
+            loads = [load for phases in samples for load in self._forces(phases)]
+            operator = SideBySide(matrices, len(self.strains))
+            together = LinearSolver(
+                operator, self.options.loose, self._theta(samples[0]), together=len(loads)
+            )
+        with self.watch("solve"):
+            solved = together.solve(loads)
+        return solved.values, solved.iterations
+
+    def preconditioned(self, residual: Array, phases: tuple[Phase, Phase]) -> Array:
+        """Preconditioner times vectors of the reduced system, shape (size, k)."""
+        return self._theta(phases).solve(residual)
+
+    def _stiffness(self, phases: tuple[Phase, Phase]) -> PETSc.Mat:
+        return self._combined(self.matrices[0].copy(), self.matrices[1], phases)
+
+    def _forces(self, phases: tuple[Phase, Phase]) -> list[PETSc.Vec]:
+        return [
+            self._combined(soft.copy(), hard, phases)
+            for soft, hard in zip(*self.loads, strict=True)
+        ]
+
     def _assemble(self, phases: tuple[Phase, Phase]) -> None:
         poissons = phases[0].poisson, phases[1].poisson
         if poissons == self.poissons:
@@ -93,7 +126,7 @@ class PrismTask:
         return soft
 
     def _solver(self, phases: tuple[Phase, Phase]) -> LinearSolver:
-        operator = self._combined(self.matrices[0].copy(), self.matrices[1], phases)
+        operator = self._stiffness(phases)
         if self.options.all["pc_type"] == "python":
             whole = operator if self.system.mixed is None else self._saddle(operator, phases)
             options = self.options if self.system.mixed is None else self.options.indefinite
@@ -114,10 +147,7 @@ class PrismTask:
 
     def _solve_loads(self, solver: LinearSolver, phases: tuple[Phase, Phase]) -> Displacements:
         size = max(phases[k].modulus * load.norm() for k in range(2) for load in self.loads[k])
-        loads = [
-            self._combined(soft.copy(), hard, phases)
-            for soft, hard in zip(*self.loads, strict=True)
-        ]
+        loads = self._forces(phases)
         mixed, unit = self.system.mixed, phases[0].modulus
         if mixed is not None and solver.saddle is not None:
             uniform = mixed.uniform_pressure(phases).reshape(-1, 3) @ self.strains.T

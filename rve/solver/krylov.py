@@ -43,22 +43,47 @@ class Solutions:
     pressures: Array | None = None
 
 
-class SideBySide:
-    """The operator I ⊗ K: several vectors side by side, entry by entry, as one; called by PETSc."""
+class Operator(Protocol):
+    """A matrix that is applied to several vectors side by side."""
 
-    def __init__(self, matrix: PETSc.Mat, columns: int) -> None:
-        (rows, size), self.matrix = matrix.getSizes()[0], matrix
-        self.source = PETSc.Mat().createDense(((rows, size), (None, columns)), comm=matrix.comm)
+    def matrix(self, columns: int = 1) -> PETSc.Mat:
+        """PETSc's matrix for so many vectors side by side."""
+
+
+class SideBySide:
+    """The operator I ⊗ K: several vectors side by side, entry by entry, as one; called by PETSc.
+
+    Args:
+        matrices: One K, or several of one layout for as many groups of vectors.
+        columns: Vectors of each.
+    """
+
+    def __init__(self, matrices: Sequence[PETSc.Mat], columns: int) -> None:
+        self.matrices, self.columns = matrices, columns
+        rows, size = matrices[0].getSizes()[0]
+        self.source = PETSc.Mat().createDense(
+            ((rows, size), (None, columns)), comm=matrices[0].comm
+        )
         self.source.setUp()
         self.source.assemble()
-        self.target = matrix.matMult(self.source)
+        self.target = matrices[0].matMult(self.source)
+
+    def matrix(self, columns: int = 1) -> PETSc.Mat:
+        """PETSc's matrix of all groups side by side."""
+        sizes = [columns * size for size in self.matrices[0].getSizes()[0]]
+        operator = PETSc.Mat().createPython((sizes, sizes), self, comm=self.matrices[0].comm)
+        operator.setUp()
+        return operator
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Y = (I ⊗ K) x; K is read once for all vectors."""
         source = self.source.getDenseArray()
-        source[:] = x.array_r.reshape(source.shape)
-        self.matrix.matMult(self.source, result=self.target)
-        y.array[:] = self.target.getDenseArray(readonly=True).ravel()
+        shape = len(source), len(self.matrices), self.columns
+        values, result = x.array_r.reshape(shape), y.array.reshape(shape)
+        for k, matrix in enumerate(self.matrices):
+            source[:] = values[:, k]
+            matrix.matMult(self.source, result=self.target)
+            result[:, k] = self.target.getDenseArray(readonly=True)
 
 
 class LinearSolver:
@@ -68,7 +93,7 @@ class LinearSolver:
     read once for all of them.
 
     Args:
-        matrix: The reduced stiffness, symmetric positive definite, or a `Saddle`.
+        matrix: The reduced stiffness, symmetric positive definite, or an operator.
         options: PETSc options.
         context: What `pc_type python` stands for; None for PETSc's own preconditioners.
         together: Number of loads that the preconditioner treats together, 1 for one at a time.
@@ -79,37 +104,29 @@ class LinearSolver:
 
     def __init__(
         self,
-        matrix: PETSc.Mat | Saddle,
+        matrix: PETSc.Mat | Operator,
         options: SolverOptions,
         context: Preconditioner | None,
         *,
         together: int = 1,
     ) -> None:
-        self.together, self.saddle = together, matrix if isinstance(matrix, Saddle) else None
-        self.matrix = matrix
-        if isinstance(matrix, Saddle):
-            self.matrix = matrix.assembled() if context is None else matrix.matrix()
-        self.krylov = PETSc.KSP().create(self.matrix.comm)
+        self.together = together
+        self.saddle = matrix if isinstance(matrix, Saddle) else None
+        self.matrix = matrix if isinstance(matrix, PETSc.Mat) else None
+        if isinstance(matrix, PETSc.Mat):
+            operator = matrix if together == 1 else SideBySide([matrix], together).matrix(together)
+        elif isinstance(matrix, Saddle) and context is None:
+            operator = matrix.assembled()
+        else:
+            operator = matrix.matrix(together)
+        self.krylov = PETSc.KSP().create(operator.comm)
         self.krylov.setOptionsPrefix(PREFIX)
-        self.krylov.setOperators(self.matrix if together == 1 else self._side_by_side())
+        self.krylov.setOperators(operator)
         with in_database(options.all, wanted=options.given):
             self.krylov.setFromOptions()
             if self.krylov.pc.getType() == "python":
                 self.krylov.pc.setPythonContext(context)
             self.krylov.setUp()
-
-    def _side_by_side(self) -> PETSc.Mat:
-        if self.saddle is not None:
-            return self.saddle.matrix(self.together)
-        local, size = (
-            self.matrix.getLocalSize()[0] * self.together,
-            self.matrix.getSize()[0] * self.together,
-        )
-        operator = PETSc.Mat().createPython(
-            ((local, size),) * 2, SideBySide(self.matrix, self.together), comm=self.matrix.comm
-        )
-        operator.setUp()
-        return operator
 
     def solve(self, loads: Sequence[PETSc.Vec]) -> Solutions:
         """Solve for all loads.
@@ -127,9 +144,9 @@ class LinearSolver:
         solved = [self._solve(group) for group in groups]
         values = np.concatenate([values for values, _ in solved], axis=1) * norms
         iterations = tuple(count for values, count in solved for _ in range(values.shape[1]))
-        residual = max(self._residual(load, values[:, k]) for k, load in enumerate(loads))
+        residual = max(self._residuals(loads, values))
         if self.saddle is None:
-            whole = np.concatenate(self.matrix.comm.tompi4py().allgather(values))
+            whole = np.concatenate(self.krylov.comm.tompi4py().allgather(values))
             return Solutions(whole, iterations, residual)
         whole, pressures = self.saddle.split(values)
         return Solutions(whole, iterations, residual, pressures)
@@ -149,9 +166,21 @@ class LinearSolver:
             )
         return x.array_r.reshape(columns.shape).copy(), iterations
 
-    def _residual(self, load: PETSc.Vec, solution: Array) -> float:
-        x, residual = load.duplicate(), load.duplicate()
-        x.array[:] = solution
-        self.matrix.mult(x, residual)
-        residual.axpy(-1, load)
-        return float(residual.norm() / (load.norm() or 1.0))
+    def _residuals(self, loads: Sequence[PETSc.Vec], solutions: Array) -> list[float]:
+        """Relative residual of each load."""
+        operator, found = self.krylov.getOperators()[0], []
+        if self.matrix is None and self.together > 1:
+            x, y = operator.createVecs()
+            x.array[:] = solutions.ravel()
+            operator.mult(x, y)
+            products = y.array_r.reshape(solutions.shape)
+        for k, load in enumerate(loads):
+            x, residual = load.duplicate(), load.duplicate()
+            if self.matrix is None and self.together > 1:
+                residual.array[:] = products[:, k]
+            else:
+                x.array[:] = solutions[:, k]
+                (operator if self.matrix is None else self.matrix).mult(x, residual)
+            residual.axpy(-1, load)
+            found.append(float(residual.norm() / (load.norm() or 1.0)))
+        return found

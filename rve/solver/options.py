@@ -66,6 +66,11 @@ class SolverOptions:
         return replace(self, given={**_GMRES, **self.given})
 
     @property
+    def loose(self) -> SolverOptions:
+        """The same for solutions to be projected on, whose errors count by their square."""
+        return replace(self, given={"ksp_rtol": "1e-7", **self.given})
+
+    @property
     def residual_limit(self) -> float:
         """Relative residual above which a system counts as not solved, 1e-7 … 1e-5."""
         try:

@@ -158,9 +158,12 @@ class ThetaPreconditioner:
 
     def apply(self, _pc: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
         """Result = P⁻¹ residual, called by PETSc; several loads side by side."""
-        own_size = self.numbering.local_size(self.comm) + self.pressures * len(self.levels)
-        vectors = residual.array_r.reshape(own_size, -1)
-        cut = own_size - self.pressures * len(self.levels)
+        rows = self.numbering.local_size(self.comm) + self.pressures * len(self.levels)
+        result.array[:] = self.solve(residual.array_r.reshape(rows, -1)).ravel()
+
+    def solve(self, vectors: Array) -> Array:
+        """P⁻¹ times this rank's part of vectors, shape (unknowns, loads)."""
+        cut = self.numbering.local_size(self.comm)
         level, middle = self._split(self._gather(vectors[:cut]))
         vertices = middle.shape[1]
         # from nodal values half-way to bubbles on top of the hats
@@ -180,12 +183,10 @@ class ThetaPreconditioner:
         correction, bubbles = self._excess(_in_plane(self.injection.T, level[own]), middle[between])
         hats = self._gather(hats + _in_plane(self.injection, correction))
         above = slice(between.start + 1, between.stop + 1)
-        self._join(
-            hats[own],
-            bubbles + (hats[between, :vertices] + hats[above, :vertices]) / 2,
-            result.array[: cut * vectors.shape[1]],
+        joined = self._join(
+            hats[own], bubbles + (hats[between, :vertices] + hats[above, :vertices]) / 2
         )
-        result.array[cut * vectors.shape[1] :] = solved[:, planar:].ravel()
+        return np.concatenate([joined, solved[:, planar:].reshape(-1, vectors.shape[1])])
 
     def _excess(self, level: Array, middle: Array) -> tuple[Array, Array]:
         """(M_quad⁻¹ − M_lin⁻¹) ⊗ K_1⁻¹ on this rank's vertices, on and between levels."""
@@ -212,10 +213,11 @@ class ThetaPreconditioner:
         return np.concatenate([table[:, :planar], vectors[None, -planar:]]), table[:, planar:]
 
     @staticmethod
-    def _join(level: Array, middle: Array, target: Array) -> None:
+    def _join(level: Array, middle: Array) -> Array:
         """This rank's part of the vectors from its levels and what lies between."""
-        paired = np.concatenate([level[: len(middle)], middle], axis=1).ravel()
-        target[:] = np.concatenate([paired, level[len(middle) :].ravel()])
+        columns = level.shape[2]
+        paired = np.concatenate([level[: len(middle)], middle], axis=1).reshape(-1, columns)
+        return np.concatenate([paired, level[len(middle) :].reshape(-1, columns)])
 
 
 def _along_theta(matrix: Array, vectors: Array) -> Array:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 SOURCES = ("space", "theta", "table")  # of error, see rve.result.Homogenised
 JUDGED = ("prism", "auto")
-TABULATED = ("table", "auto")  # methods whose samples may share a table over the particle's moduli
+SPANNED = ("table", "auto", "prism")  # methods whose samples share work over the particle's moduli
 OF_CURVES = (
     1e-9  # relative tolerance on E with which the curve between the nodes is good to 1e-4 or so
 )
@@ -167,7 +167,7 @@ def campaign(
     support = case.cell.inclusion_modulus.cut(0.0)
     choice = cell_choice(case, exclude=exclude, petsc=petsc)
     # no other method's samples depend on the range, and a wider one may take them as they are
-    if choice.method in TABULATED:
+    if choice.method in SPANNED and (support.width > 0 or choice.method != "prism"):
         choice = replace(choice, moduli=(support.lower, support.upper))
     if choice.tolerance is not None and choice.named:
         choice = replace(choice, estimate=True)  # so that every sample can be held to it

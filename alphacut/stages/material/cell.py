@@ -73,8 +73,8 @@ class CellChoice:
         exclude: Models that method auto must not take.
         petsc: PETSc options that override the solver's, without their prefix.
         parallel: Whether all MPI ranks work on one cell together.
-        moduli: Moduli of the particle that all samples together span, in Pa, for a table that they
-            share; None if not known.
+        moduli: Moduli of the particle that all samples together span, in Pa, for a table or a few
+            solutions that they share; None if not known.
         estimate: Whether a model that can is to estimate its error at an extra cost.
         stiffness: Whether a model that can leave it out is to make the whole planar stiffness.
     """

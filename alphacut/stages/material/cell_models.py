@@ -106,4 +106,5 @@ def meshed(choice: CellChoice) -> CellModel:
         parallel=choice.parallel,
         stiffness=choice.stiffness,
         estimate=choice.estimate,
+        moduli=choice.moduli,
     )

@@ -107,8 +107,13 @@ class FuzzyModulus:
 
     @property
     def solves(self) -> int:
-        """Linear systems solved."""
-        return int(self.result.values.output("systems").sum())
+        """Linear systems solved; those that samples are projected on count once."""
+        systems = self.result.values.output("systems")
+        if self.choice.method != "prism" or self.choice.moduli is None:
+            return int(systems.sum())
+        columns = [k for k, name in enumerate(self.result.inputs) if name != "inclusion_modulus"]
+        _, first = np.unique(self.result.points[:, columns], axis=0, return_index=True)
+        return int(systems[first].sum())
 
     def largest(self, kind: str) -> dict[str, float]:
         """Largest of each error or property of the certificate over all samples."""

@@ -1,0 +1,136 @@
+"""Samples of the product-space cell: this version beside version 0.1.0, and each solved alone.
+
+    ./enter python -m benchmarks.rve.campaign
+
+Version 0.1.0 (commit 1cc7adc) is checked out into a temporary folder; both run the 225 samples of
+the paper's case with two processes, in turn. Then, in this version: the bits with one process and
+with two, and E of every sample solved by itself. Last, `rve solve` as a process of its own. Exit
+status 1 if bits differ or an E is off by more than 1e-10.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tarfile
+from collections.abc import Sequence
+from io import BytesIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from alphacut.case.load import load
+from alphacut.fuzzy import FuzzyResult
+from alphacut.stages.campaign import Campaign, campaign
+from alphacut.stages.cell import parts
+from alphacut.stages.cell_models import cell_model
+from alphacut.stages.modulus import compute
+from benchmarks.rows import write
+
+OLD = "1cc7adc"
+ROOT = Path(__file__).parents[2]
+RESULTS = ROOT / "benchmarks" / "results" / "cell_campaign.csv"
+E_OFF = 1e-10
+
+
+def check_out(commit: str, folder: Path) -> None:
+    """Put the files of a commit into a folder."""
+    archive = subprocess.run(
+        ["git", "archive", commit], cwd=ROOT, capture_output=True, check=True
+    ).stdout
+    with tarfile.open(fileobj=BytesIO(archive)) as files:
+        files.extractall(folder, filter="data")
+
+
+def command(folder: Path, *words: str) -> tuple[float, dict[str, Any]]:
+    """Seconds and JSON answer of a command in a version's folder."""
+    started = perf_counter()
+    done = subprocess.run(
+        [sys.executable, "-m", *words, "--json", "-"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return perf_counter() - started, json.loads(done.stdout)
+
+
+def modulus(folder: Path, workers: int) -> tuple[float, dict[str, Any]]:
+    """The paper's fuzzy modulus with a number of processes."""
+    return command(folder, "fuzzy", "modulus", "cases/paper.toml", "--workers", str(workers))
+
+
+def alone(wanted: Campaign, found: FuzzyResult) -> float:
+    """Largest relative difference in E from samples that are solved one by one, to round-off."""
+    from alphacut.rve.prism.model import PrismModel
+
+    model, task, worst = PrismModel(petsc={"ksp_rtol": "1e-11"}), wanted.task, 0.0
+    groups: dict[bytes, list[int]] = {}
+    columns = [k for k, name in enumerate(found.inputs) if name != "inclusion_modulus"]
+    for row, point in enumerate(found.points):
+        groups.setdefault(point[columns].tobytes(), []).append(row)
+    for rows in groups.values():
+        points = [dict(zip(found.inputs, found.points[row], strict=True)) for row in rows]
+        cells = [parts({**task.crisp, **point}, task.theta) for point in points]
+        results = model.solve(cells[0][0], cells[0][1], [cell[2] for cell in cells])
+        exact = np.array([result.modulus for result in results])
+        worst = max(worst, float(abs(found.values.output("E")[rows] / exact - 1).max()))
+    return worst
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run, print, keep."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--repeat", type=int, default=2, help="runs of each version (2)")
+    options = parser.parse_args(arguments)
+    seconds: dict[str, list[float]] = {"0.1.0": [], "this": []}
+    with TemporaryDirectory() as place:
+        old = Path(place)
+        check_out(OLD, old)
+        for _ in range(options.repeat):
+            for name, folder in (("0.1.0", old), ("this", ROOT)):
+                took, answer = modulus(folder, 2)
+                seconds[name].append(took)
+                print(f"{name}: {took:.1f} s, {answer['solves']} linear systems", flush=True)
+        solves = [command(folder, "rve", "solve", "cases/paper.toml")[0] for folder in (old, ROOT)]
+    ratio = min(seconds["0.1.0"]) / min(seconds["this"])
+    print(f"ratio of the quickest: {ratio:.2f}", flush=True)
+    wanted = campaign(load(ROOT / "cases" / "paper.toml"))
+    cell_model(wanted.task.choice)
+    found = [compute(wanted, workers=workers) for workers in (1, 2)]
+    first, second = (one.result for one in found)
+    same = first.points.tobytes() == second.points.tobytes() and all(
+        found[0].result.values.output(name).tobytes()
+        == found[1].result.values.output(name).tobytes()
+        for name, _ in first.values.layout
+    )
+    off = alone(wanted, first)
+    print(f"the same bits with 1 and 2 processes: {same}; E off by {off:.1e} at the most")
+    print(f"rve solve, process included: {solves[1]:.2f} s, version 0.1.0 {solves[0]:.2f} s")
+    write(
+        [
+            {
+                "seconds_0.1.0": min(seconds["0.1.0"]),
+                "seconds": min(seconds["this"]),
+                "ratio": ratio,
+                "systems": found[0].solves,
+                "same_bits": same,
+                "E_off": off,
+                "solve_seconds_0.1.0": solves[0],
+                "solve_seconds": solves[1],
+            }
+        ],
+        RESULTS,
+    )
+    return int(not same or off > E_OFF)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
