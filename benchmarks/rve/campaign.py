@@ -23,13 +23,13 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-
-from alphacut.case.load import load
-from alphacut.fuzzy import FuzzyResult
 from alphacut.stages.campaign import Campaign, campaign
 from alphacut.stages.cell import parts
 from alphacut.stages.cell_models import cell_model
 from alphacut.stages.modulus import compute
+
+from alphacut.case.load import load
+from alphacut.fuzzy import FuzzyResult
 from benchmarks.rows import write
 
 OLD = "1cc7adc"

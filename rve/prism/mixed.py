@@ -13,12 +13,12 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from alphacut.rve.cell import Phase
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import Integers
 from alphacut.rve.mesh.wedge import tabulate
+from alphacut.rve.petsc import PETSc
 from alphacut.rve.prism.mixed_element import MixedElements, mixed_elements, split_bulk
 from alphacut.rve.solver.constraints import LevelNumbering
 from alphacut.rve.solver.theta_preconditioner import LevelPressures

@@ -10,10 +10,10 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from petsc4py import PETSc
 
 from alphacut.rve.cell import Phase
 from alphacut.rve.mesh.periodicity import mismatch
+from alphacut.rve.petsc import PETSc
 from alphacut.rve.prism.slice_stress import CELL_AREA
 from alphacut.rve.prism.system import PhaseMeans, SliceMeans
 from alphacut.rve.prism.task import CONTRAST_GRID, PrismTask

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from petsc4py import PETSc
 
+from alphacut.rve.petsc import PETSc
 from alphacut.stochastic.theta.truncated_normal import Array
 
 
