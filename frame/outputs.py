@@ -8,6 +8,7 @@ def output_unit(name: str) -> str:
         "q": "m",
         "drift": "m",
         "v": "m/s",
+        "a": "m/s^2",
         "shear": "N",
         "base_shear": "N",
         "roof": "m",

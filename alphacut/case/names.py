@@ -109,7 +109,7 @@ def named_inputs(case: Case) -> Iterator[tuple[str, tuple[str, ...]]]:
 
 def known_output(case: Case, floors: int) -> Iterator[Problem]:
     """The observed quantities, and the one that a study draws."""
-    kinds = ("q", "v", "drift", "shear")
+    kinds = ("q", "v", "a", "drift", "shear")
     possible = [f"{kind}{floor + 1}" for kind in kinds for floor in range(floors)] + ["base_shear"]
     for name in case.frame.outputs:
         if name not in possible:
@@ -117,7 +117,7 @@ def known_output(case: Case, floors: int) -> Iterator[Problem]:
                 "frame.outputs",
                 f"there is no output {name}",
                 name,
-                f"q, v, drift or shear with a floor, base_shear: {', '.join(possible[:floors])} …",
+                f"q, v, a, drift, shear with a floor, base_shear: {', '.join(possible[:floors])} …",
                 nearest(name, possible),
             )
     outputs = case.frame.outputs or tuple(possible[:floors])
@@ -129,7 +129,9 @@ def known_output(case: Case, floors: int) -> Iterator[Problem]:
             )
     limited = case.exceedance.output if case.sections.exceedance else possible[0]
     if limited not in possible:
-        allowed = f"q, v, drift or shear with a floor, base_shear: {', '.join(possible[:floors])} …"
+        allowed = (
+            f"q, v, a, drift, shear with a floor, base_shear: {', '.join(possible[:floors])} …"
+        )
         yield Problem(
             "exceedance.output",
             f"there is no output {limited}",

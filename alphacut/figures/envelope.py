@@ -68,7 +68,7 @@ def envelope(dataset: xarray.Dataset, output: str, study: Study) -> Figure:
     prefix_axis(axes, output, output_unit(output))
     axes.set_xlim(time[0], time[-1])
     # letters mean something else in a pendulum
-    known = WORDS if output.startswith(("q", "v", "drift", "shear", "base", "roof")) else {}
+    known = WORDS if output.startswith(("q", "v", "a", "drift", "shear", "base", "roof")) else {}
     words = ", ".join(known.get(name, name) for name in study.task.fuzzy)
     axes.set_title(fill(f"{output}, fuzzy {words}", 84), loc="left", fontsize=10)
     alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))

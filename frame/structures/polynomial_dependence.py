@@ -47,6 +47,11 @@ def degrees(system: LinearSystem, box: Box) -> dict[str, int]:
 def _(system: StoreyFrame, box: Box) -> dict[str, int]:
     if system.damping_ratio:
         raise UnprovedError("damping by modal ratios is no polynomial in the parameters")
+    masses = [name for name in box if name[0] == "m"]
+    if masses and any(name[0] == "a" for name in system.outputs):
+        raise UnprovedError(
+            f"an acceleration is a force over a mass, no polynomial in {', '.join(masses)}"
+        )
     for name, (lower, _) in box.items():
         if (name[0] == "d" or name.startswith("rayleigh")) and lower < 0:
             raise UnprovedError(

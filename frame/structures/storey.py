@@ -38,8 +38,8 @@ class StoreyFrame:
     Parameters that can be uncertain: "E", "I", "m1" … "mn", "l1" …, "c1" … (columns of a storey),
     "d1" …, "q1_0" … (initial displacements), "v1_0" … (initial velocities), "rayleigh_mass",
     "rayleigh_stiffness", and "zeta", or "zeta1" … where each mode has its own ratio.
-    Outputs: "q1" … (displacement, m), "v1" … (velocity, m/s), "drift1" … (q_z − q_(z−1), m),
-    "shear1" … (k_z drift_z, N); "base_shear" is "shear1".
+    Outputs: "q1" … (displacement, m), "v1" … (velocity, m/s), "a1" … (absolute acceleration,
+    m/s²), "drift1" … (q_z − q_(z−1), m), "shear1" … (k_z drift_z, N); "base_shear" is "shear1".
 
     Args:
         masses: Floors from below, in kg.
@@ -231,6 +231,9 @@ class StoreyFrame:
         rows: list[list[Entry]] = []
         for output in self.outputs:
             kind, z = self._output(output)
+            if kind == "a":
+                rows.append(self._acceleration(p, z))
+                continue
             row: list[Entry] = [0.0] * (2 * self.floors)
             factor: Entry = columns[z] if kind == "shear" else 1.0
             row[z + self.floors * (kind == "v")] = factor
@@ -239,6 +242,12 @@ class StoreyFrame:
             rows.append(row)
         return stack(rows, p)
 
+    def _acceleration(self, p: Mapping[str, Jet], z: int) -> list[Entry]:
+        """Row of a floor's absolute acceleration: forces on it over its mass."""
+        at, inertia = self.matrices(p), -1.0 * p[f"m{z + 1}"] ** -1
+        forces = (at.stiffness, at.damping)
+        return [inertia * force[:, z, j] for force in forces for j in range(self.floors)]
+
     def _columns(self, p: Mapping[str, Jet]) -> list[Entry]:
         # k_z; 24 E I / l³ in section 6.1
         rigidity = 12 * p["E"] * p["I"]
@@ -246,12 +255,12 @@ class StoreyFrame:
 
     def _output(self, name: str) -> tuple[str, int]:
         found = re.fullmatch(
-            r"(q|v|drift|shear)([1-9]\d*)", "shear1" if name == "base_shear" else name
+            r"(q|v|a|drift|shear)([1-9]\d*)", "shear1" if name == "base_shear" else name
         )
         if not found or int(found[2]) > self.floors:
             raise ValueError(
-                f"output '{name}' is unknown; allowed are q, v, drift or shear with a floor from 1"
-                f" to {self.floors}, base_shear"
+                f"output '{name}' is unknown; allowed are q, v, a, drift or shear with a floor"
+                f" from 1 to {self.floors}, base_shear"
             )
         return found[1], int(found[2]) - 1
 

@@ -92,8 +92,8 @@ class Frame(Section):
     outputs: Annotated[
         tuple[str, ...],
         Key(
-            "observed quantities: q1, v1 (m/s), drift1, shear1 … (in the columns of a"
-            " storey; dampers excluded), base_shear (that of the lowest storey); all"
+            "observed quantities: q1, v1 (m/s), a1 (absolute, m/s²), drift1, shear1 … (in the"
+            " columns of a storey; dampers excluded), base_shear (that of the lowest storey); all"
             " displacements if left out"
         ),
     ] = ()

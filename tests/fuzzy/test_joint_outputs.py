@@ -1,0 +1,83 @@
+"""Hulls of two outputs: exact polygons, enclosures, and a frame's displacements together."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from alphacut.frame import Exact, LinearFlow, StoreyFrame
+from alphacut.fuzzy import BranchAndBound, Interval, QuasiMonteCarlo, Reduced, Triangular
+from alphacut.fuzzy.joint_outputs import Turned, joint_outputs
+
+BOX = {"x": Interval(0.0, 2.0), "y": Interval(-1.0, 1.0)}
+
+
+def test_a_parallelogram_is_found_exactly() -> None:
+    found = joint_outputs(lambda x, y: (x + y, x - y), BOX, Reduced(), directions=8)
+    inner, outer = found.area()
+    assert inner == pytest.approx(8.0)  # 4 · |det|
+    assert outer == pytest.approx(8.0)  # its sides lie along four of the directions
+    assert found.holds(np.array([[1.0, 1.0], [3.0, 3.0]])).tolist() == [True, False]
+
+
+def test_the_outer_polygon_is_proved_and_holds_all_pairs() -> None:
+    def pair(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return x * y, x - y**2
+
+    found = joint_outputs(
+        pair, BOX, BranchAndBound(Turned(pair, 12)), directions=12, alpha=[1.0], vectorised=True
+    )
+    assert found.nature == "guaranteed"
+    rng = np.random.default_rng()
+    x, y = rng.uniform(0, 2, 20000), rng.uniform(-1, 1, 20000)
+    pairs = np.column_stack(pair(x, y))
+    assert found.holds(pairs, slack=1e-12).all()
+    inner, outer = found.area()
+    assert inner < outer < 1.1 * inner
+
+
+def test_levels_are_nested_and_a_disc_is_met_by_many_directions() -> None:
+    def pair(r: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return r * np.cos(t), r * np.sin(t)
+
+    inputs = {"r": Triangular(0, 0, 1), "t": Interval(0, 2 * np.pi)}
+    found = joint_outputs(
+        pair, inputs, QuasiMonteCarlo(20000), directions=32, alpha=[0.0, 0.5], vectorised=True
+    )
+    inner, outer = found.area(0)
+    assert inner <= np.pi * (1 + 1e-9)
+    assert outer == pytest.approx(np.pi, rel=0.01)
+    assert found.area(1)[1] == pytest.approx(np.pi / 4, rel=0.01)
+
+
+def test_two_floors_at_a_node_and_one_floor_at_two_times() -> None:
+    frame = StoreyFrame(
+        [2e3, 1e3, 1e3], [3.0] * 3, 2.5e10, 1e-6, q0=(0.01, 0.02, 0.03), outputs=("q1", "q3")
+    )
+    flow = LinearFlow(frame, ("E", "m2"), 2.0, 0.5, Exact())
+    inputs = {"E": Interval(2.3e10, 2.7e10), "m2": Interval(900.0, 1100.0)}
+
+    def floors(E: np.ndarray, m2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        motion = flow.values(np.column_stack([np.atleast_1d(E), np.atleast_1d(m2)]))
+        return motion[:, -1, 0], motion[:, -1, 1]
+
+    def times(E: np.ndarray, m2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        motion = flow.values(np.column_stack([np.atleast_1d(E), np.atleast_1d(m2)]))
+        return motion[:, 2, 1], motion[:, -1, 1]
+
+    rng = np.random.default_rng()
+    E, m2 = rng.uniform(2.3e10, 2.7e10, 300), rng.uniform(900, 1100, 300)
+    for pair in (floors, times):
+        found = joint_outputs(
+            pair, inputs, QuasiMonteCarlo(400), directions=8, alpha=[0.0], vectorised=True
+        )
+        pairs = np.column_stack(pair(E, m2))
+        size = float(np.ptp(pairs, axis=0).max())
+        assert found.holds(pairs, slack=0.01 * size).all()
+        ranges = np.prod(np.ptp(found.outer[0], axis=0))
+        assert found.area()[1] < 0.75 * ranges  # the outputs hang together
+
+
+def test_one_direction_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"a hull needs two or more"):
+        joint_outputs(lambda x, y: (x, y), BOX, directions=1)
