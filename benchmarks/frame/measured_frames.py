@@ -5,8 +5,8 @@ Otsuki: github.com/ywang-structures/Structural-Model-Updating, folder Examples):
 laboratory frame (FourStoryStructure; the case cases/laboratory-frame.toml), and the steel frame of
 18 storeys at a third of its scale that was shaken at E-Defense in 2014 (EighteenStoryStructure;
 Suita, Suzuki and Takahashi, International Journal of High-Rise Buildings 4, 2015), measured at
-every third floor. Masses were weighed; stiffnesses may be 30 % off. No scatter was published: 1 % of a
-frequency and 2 % of a shape are assumed. Writes benchmarks/results/measured_frames.csv.
+every third floor. Masses were weighed; stiffnesses may be 30 % off. No scatter was published: 1 %
+of a frequency and 2 % of a shape are assumed. Writes benchmarks/results/measured_frames.csv.
 """
 
 from __future__ import annotations

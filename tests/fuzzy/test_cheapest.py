@@ -21,6 +21,7 @@ def test_a_linear_limit_is_shared_as_is_known():
     assert 1 <= found.unsafe < 1 + 1e-6
 
 
+@pytest.mark.slow
 def test_a_product_is_cheaper_than_equal_shares_and_safe():
     inputs, costs = {"x": 1.0, "y": 2.0}, {"x": 1.0, "y": 9.0}
     found = cheapest_tolerances(lambda x, y: x * y, inputs, costs, {"y": 2.5})
