@@ -10,6 +10,7 @@ relative errors of the modulus.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -125,6 +126,16 @@ def leja(count: int) -> Array:
     return np.cos(angles[:count])
 
 
+@cache
+def lebesgue(count: int) -> float:
+    """Lebesgue constant of the first `count` points of `leja`."""
+    points = leja(count)
+    apart = points[:, None] - points + np.eye(count)
+    grid = np.cos(np.pi * (np.arange(40 * count) + 0.382) / (40 * count))
+    terms = 1 / (np.prod(apart, axis=1) * (grid[:, None] - points))
+    return float((np.abs(terms).sum(axis=1) / np.abs(terms.sum(axis=1))).max())
+
+
 def coefficients(values: Array) -> Array:
     """Chebyshev coefficients of `values` (n_r, n_E, …) at the Leja points, same shape."""
     for axis in (0, 1):
@@ -137,7 +148,8 @@ def coefficients(values: Array) -> Array:
 def tail(coefficients: Array, axis: int, *, noise: Array | float = 0.0) -> Array:
     """Declared interpolation errors along `axis`, shape (moduli,).
 
-    The geometric series that the last coefficients begin, fivefold for the points. Coefficients
+    The geometric series that the last coefficients begin, as often as interpolation may be worse
+    than the polynomial that leaves it: one and the Lebesgue constant of the points. Coefficients
     change signs, so that one modulus may show none where another does: each counts at least a share
     of the largest.
 
@@ -152,13 +164,13 @@ def tail(coefficients: Array, axis: int, *, noise: Array | float = 0.0) -> Array
         return np.zeros(size.shape[1])
     if len(size) == 2:  # the constant tells nothing of a decay
         last, fade = size[-1], np.full(size.shape[1], 0.7)
-    elif len(size) < 5:
+    elif len(size) < 7:
         last, fade = size[-1], size[-1] / np.maximum(size[-2], _TINY)
     else:
-        last = size[-2:].max(axis=0)
-        fade = np.sqrt(last / np.maximum(size[-4:-2].max(axis=0), _TINY))
-    fade = np.clip(fade, 0.3, 0.7)
-    found = np.where(last <= noise, last, 5 * last * fade / (1 - fade))
+        last = size[-3:].max(axis=0)
+        fade = np.cbrt(last / np.maximum(size[-6:-3].max(axis=0), _TINY))
+    fade = np.clip(fade, 0.3, 0.8)
+    found = np.where(last <= noise, last, (1 + lebesgue(len(size))) * last * fade / (1 - fade))
     return np.asarray(np.maximum(found, found.max() * _SHARED))
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from alphacut.fuzzy import (
+    Automatic,
     BranchAndBound,
     Chebyshev,
     Interval,
@@ -53,6 +54,23 @@ def test_error_of_confirmed_bounds(centre):
 
     result = propagate(function, UNIT, Chebyshev(budget=17), alpha=(0.0,), vectorised=True)
     require_tight(result.error[0, 0], missed(result, function(X)))
+
+
+@pytest.mark.parametrize("seen", [0.4, 0.45])
+def test_what_the_last_look_finds_counts_twice(seen):
+    """A spike of height 1, of which the one fresh point that meets it sees a share."""
+
+    def run(centre, height):
+        def function(x):
+            spike = height * np.exp(-(((x - centre) / 1e-4) ** 2))
+            return {"y0": x / 10 + spike} | {f"y{k}": k * x for k in range(1, 14)}
+
+        return propagate(function, UNIT, Automatic(looks=1), alpha=(0.0,), vectorised=True)
+
+    fresh = run(0.5, 0.0).points[-1, 0]
+    centre = fresh + 1e-4 * np.sqrt(-np.log(seen))
+    result = run(centre, 1.0)
+    require_tight(result.error[0, 0], centre / 10 + 1 - result.upper[0, 0])
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3])

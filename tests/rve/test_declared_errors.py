@@ -7,6 +7,7 @@ from alphacut.rve import Phase
 from alphacut.rve.cell import square_moduli
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
+from alphacut.rve.slices.model import solve_slice
 from alphacut.stochastic import HermiteMap
 from benchmarks.rve.calibration import calibrate, main
 
@@ -48,6 +49,18 @@ def test_the_series_estimate_is_tight():
     ratio = cells.errors[0, 0] / true
     assert (ratio > TIGHT[0]).all()
     assert (ratio < TIGHT[1]).all()
+
+
+@pytest.mark.parametrize(
+    ("radius", "modulus", "orders"), [(0.95, 80e9, (2, 3, 4)), (0.2, 1e9, (1, 2))]
+)
+def test_the_estimate_of_a_slice_is_tight(radius, modulus, orders):
+    pytest.importorskip("alphacut.rve.planar.problem")
+    phases = [Phase(modulus)]
+    found = solve_slice(radius, MATRIX, phases, orders=orders, mesh_size=1.0)
+    exact = square_stiffness(np.array([radius]), MATRIX, phases)
+    ratio = found.error / abs(square_moduli(found.stiffness) / square_moduli(exact.matrix[0]) - 1)
+    assert TIGHT[0] < ratio.min() < TIGHT[1]
 
 
 def test_the_estimates_of_rules_in_theta_are_tight():

@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from alphacut.case.load import load
 from alphacut.entry import main
+from alphacut.stages.contract import ToleranceMissedError, keep, keep_modulus
 
 PAPER = str(Path(__file__).parents[3] / "cases" / "paper.toml")
 COARSE = ["--method", "prism", "--mesh-size", "0.5", "--layers", "3"]
@@ -15,6 +17,24 @@ SHORT = ["envelope", PAPER, "--fuzzy", "E", "--duration", "1", "--alpha", "0"]
 def lines(capfd):
     """What was said on standard error."""
     return capfd.readouterr().err.splitlines()
+
+
+@pytest.mark.parametrize("best_effort", [False, True])
+def test_a_tolerance_is_kept_to_rounding(best_effort, capfd):
+    for reached, kept in ((0.5, True), (1.0, True), (1.001, False), (1.4, False)):
+        if kept or best_effort:
+            keep(reached, 1.0, of="the error", cure="a cure", best_effort=best_effort)
+        else:
+            with pytest.raises(ToleranceMissedError, match=r"the error is up to .*; a cure, or"):
+                keep(reached, 1.0, of="the error", cure="a cure", best_effort=False)
+    assert len(lines(capfd)) == 2 * best_effort
+
+
+def test_all_parts_of_an_error_count():
+    case = load(PAPER, ["modulus.tolerance=1e-3"])
+    keep_modulus(case, "series", {"space": 4e-4, "theta": 5e-4}, best_effort=False)
+    with pytest.raises(ToleranceMissedError, match=r"series is up to 0\.0011, 0\.001 is asked"):
+        keep_modulus(case, "series", {"space": 6e-4, "theta": 5e-4}, best_effort=False)
 
 
 def test_a_named_resolution_that_misses_the_tolerance_fails_in_one_line(capfd):
