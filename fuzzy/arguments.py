@@ -26,6 +26,9 @@ def fuzzy_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNu
             f"the inputs are a {type(inputs).__name__}; they must map names to fuzzy numbers, as"
             " {'E': Triangular(24, 25, 26)}"
         )
+    for name in inputs:
+        if not isinstance(name, str):
+            raise ValueError(f"an input is named {name!r}; a name must be text, as in {{'E': …}}")
     return joined_once({name: _fuzzy(name, value) for name, value in inputs.items()})
 
 

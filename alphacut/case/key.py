@@ -36,7 +36,7 @@ class Range:
 
 POSITIVE = Range("greater than 0", lower=0.0)
 NOT_NEGATIVE = Range("0 or greater", lower=0.0, closed=True)
-NATURAL = Range("0 or more", lower=0.0, closed=True)
+NATURAL = Range("from 0 to 1e18", lower=0.0, upper=1e18, closed=True)
 POISSON = Range("inside (-1, 0.5)", lower=-1.0, upper=0.5)
 UNIT = Range("inside (0, 1)", lower=0.0, upper=1.0)
 MEMBERSHIP = Range("from 0 to 1", lower=0.0, upper=1.0, closed=True)

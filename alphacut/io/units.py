@@ -122,6 +122,8 @@ def engineering(value: float, si: str, *, digits: int = 4, beside: float = 0.0) 
     if si not in PREFIXED or not math.isfinite(value) or not (value or beside):
         return f"{value:.{digits}g} {si}".strip().replace("-", MINUS)
     largest = float(f"{max(abs(value), abs(beside)):.{digits}g}")
+    if not 1e-12 <= largest < 1e15:
+        return f"{value:.{digits}g} {si}".replace("-", MINUS)
     exponent = min(9, max(-9, 3 * math.floor(math.log10(largest) / 3)))
     scaled = float(f"{value:.{digits}g}") / 10.0**exponent
     places = max(0, digits - 1 - math.floor(math.log10(abs(scaled)))) if scaled else 0

@@ -11,6 +11,7 @@ from alphacut.case.case import Case
 from alphacut.case.names import named_inputs
 from alphacut.fuzzy import FuzzyNumber, Triangular
 from alphacut.io.problem import BadInput, Problem
+from alphacut.io.units import engineering
 from alphacut.stages.image.reading import expected_modulus, study_of
 from alphacut.stages.material import modulus
 from alphacut.stages.pipeline import studies
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from alphacut.frame import Accelerogram
 
 PERIODS = (0.02, 30.0)  # s, from a stiff machine frame to the slenderest towers
+MODULI = (1e5, 2e12)  # Pa, from soft gels to diamond
+CONTRAST = 1000.0  # between the phases
 STRONGEST = 50.0  # m/s², more than any ground acceleration recorded
 
 
@@ -71,7 +74,7 @@ def ready(case: Case) -> Readiness:
                     'stages = ["modulus", "envelope"], with a structure',
                 )
             )
-        return Readiness()
+        return Readiness(tuple(unlikely_material(case)))
     if problems := list(lacking(case)):
         raise BadInput(problems)
     wanted = structure(case, stand_in or expected(case))
@@ -82,7 +85,12 @@ def ready(case: Case) -> Readiness:
     )
     period = first_period(wanted)
     ground = None if wanted.linear is None else wanted.linear.ground
-    remarks = (*outlasted(case, ground), *unlikely(case, ground, period), *unproved(case))
+    remarks = (
+        *unlikely_material(case),
+        *outlasted(case, ground),
+        *unlikely(case, ground, period),
+        *unproved(case),
+    )
     return Readiness(remarks, tuple(found), period, wanted)
 
 
@@ -116,6 +124,24 @@ def unlikely(case: Case, ground: Accelerogram | None, period: float | None) -> I
             f"{record_key(case)}: a peak of {peak:.3g} m/s² is above any earthquake recorded; check"
             " the unit in its header"
         )
+
+
+def unlikely_material(case: Case) -> Iterator[str]:
+    """Remarks on phases and radii of which one is most likely a slip of the pen."""
+    if phases := case.sections.cell:
+        named = {"matrix": phases.matrix_modulus, "inclusion": phases.inclusion_modulus}
+        for name, modulus in named.items():
+            if not MODULI[0] <= modulus.modal <= MODULI[1]:
+                shown = engineering(modulus.modal, "Pa")
+                yield f"cell.{name}_modulus: {shown} is unusual for a solid; check its unit"
+        ratio = phases.inclusion_modulus.modal / phases.matrix_modulus.modal
+        if not 1 / CONTRAST <= ratio <= CONTRAST:
+            yield (
+                f"cell: the particle's modulus is {ratio:.3g} times the matrix's; check the units"
+                " of both, unless a pore or a rigid particle is meant"
+            )
+    if (radius := case.sections.radius) and radius.a1.modal > radius.a3.modal:
+        yield "radius: a1 is greater than a3, so the radius falls where θ rises; is that meant?"
 
 
 def record_key(case: Case) -> str:

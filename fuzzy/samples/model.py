@@ -97,7 +97,7 @@ def flatten(output: Output) -> tuple[Layout, Array]:
         ValueError: There is no number, one that is not finite, or two of the same name.
     """
     named = output if isinstance(output, Mapping) else {"y": output}
-    arrays = {str(name): np.asarray(value, float) for name, value in named.items()}
+    arrays = {str(name): _numbers(str(name), value) for name, value in named.items()}
     if not sum(array.size for array in arrays.values()):
         raise ValueError("the function returned no number; it must return one at least")
     for name, array in arrays.items():
@@ -110,6 +110,19 @@ def flatten(output: Output) -> tuple[Layout, Array]:
     if any("[" in name for name in arrays) or len(arrays) < len(named):
         _require_distinct(layout, named)
     return layout, np.concatenate([array.ravel() for array in arrays.values()])
+
+
+def _numbers(name: str, value: ArrayLike) -> Array:
+    """Real numbers of an output.
+
+    Raises:
+        ValueError: Text, dates, complex numbers, or values that are masked.
+    """
+    array = np.asanyarray(value)
+    if np.ma.is_masked(array) or array.dtype.kind not in "biufO":
+        kind = "masked" if np.ma.is_masked(array) else f"of the type {array.dtype}"
+        raise ValueError(f"output {name!r} is {kind}; every output must be a real number")
+    return np.asarray(array, float)
 
 
 def _require_distinct(layout: Layout, given: Mapping[str, ArrayLike]) -> None:

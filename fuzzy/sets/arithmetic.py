@@ -107,7 +107,7 @@ def power(base: FuzzyNumber, exponent: float) -> Expression:
     Raises:
         ValueError: The exponent is no whole number, or negative with 0 in the support.
     """
-    if int(exponent) != exponent:
+    if not np.isfinite(exponent) or int(exponent) != exponent:
         raise ValueError(f"the exponent is {exponent}; it must be a whole number")
     exponent = int(exponent)
     if exponent < 0:

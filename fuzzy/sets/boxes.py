@@ -14,14 +14,20 @@ from alphacut.fuzzy.sets.numbers import Array, FuzzyNumber, Mask
 _ROUND_OFF = 1e-12  # of the support: points this close to a cut lie in it
 
 
+MOST_LEVELS = 10_000
+
+
 def levels(steps: int) -> tuple[float, ...]:
     """The α-levels 0, 1/steps, …, 1: `steps` = 4 gives the paper's five.
 
     Raises:
-        ValueError: `steps` is below 1.
+        ValueError: `steps` is no whole number from 1 to 10,000.
     """
-    if steps < 1:
-        raise ValueError(f"the number of steps between α-levels is {steps}; it must be 1 or more")
+    if not (isinstance(steps, int) and 1 <= steps <= MOST_LEVELS):
+        raise ValueError(
+            f"the number of steps between α-levels is {steps}; it must be a whole number from 1 to"
+            f" {MOST_LEVELS:,}"
+        )
     return tuple(step / steps for step in range(steps + 1))
 
 

@@ -86,7 +86,13 @@ class Mesh(Section):
     """Discretisation of the product domain."""
 
     layers: Annotated[int, Key("element layers in θ", allowed=COUNT)] = 12
-    size: Annotated[float, Key("element size over half the cell's side", allowed=UNIT)] = 0.15
+    size: Annotated[
+        float,
+        Key(
+            "element size over half the cell's side",
+            allowed=Range("from 0.005 to below 1", 0.005, 1.0, closed=True, below=True),
+        ),
+    ] = 0.15
     interface: Annotated[
         Literal["conforming", "sign"], Key("conforming, or sign(z) at quadrature points (eq. 13)")
     ] = "conforming"

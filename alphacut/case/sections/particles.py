@@ -25,7 +25,7 @@ class Microstructure(Section):
         float, Key("level of the empirical distribution's bootstrap band", allowed=UNIT)
     ] = 0.99
     bootstrap: Annotated[
-        int, Key("resamples", allowed=Range("100 or more", 100.0, closed=True))
+        int, Key("resamples", allowed=Range("from 100 to 1e5", 100.0, 1e5, closed=True))
     ] = 500
     band: Annotated[
         float | None,
@@ -54,10 +54,10 @@ class Packing(Section):
     """
 
     packings: Annotated[
-        int, Key("independent packings", allowed=Range("5 or more", 5.0, closed=True))
+        int, Key("independent packings", allowed=Range("from 5 to 10,000", 5.0, 1e4, closed=True))
     ] = 20
     discs: Annotated[
-        int, Key("discs in each packing", allowed=Range("10 or more", 10.0, closed=True))
+        int, Key("discs in each packing", allowed=Range("from 10 to 1e6", 10.0, 1e6, closed=True))
     ]
     area_fraction: Annotated[
         float,
