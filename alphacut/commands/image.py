@@ -87,7 +87,7 @@ def quantiles(found: Mapping[str, Any]) -> str:
 def table_of(rows: Sequence[Mapping[str, Any]]) -> str:
     """The error table in lines, the source to improve first on top."""
     lines = "".join(
-        f"{row['source']:<15} {row['width_GPa']:9.2e} GPa {row['share']:6.1%}  {row['cure']}\n"
+        f"{row['source']:<15} {row['width_GPa']:9.3g} GPa {row['share']:6.1%}  {row['cure']}\n"
         for row in rows
     )
     return f"what widens E, the source to improve first on top:\n{lines}"

@@ -147,7 +147,7 @@ def image(found: Mapping[str, Any], drawn: Markup) -> Markup:
         f" {greatest}.{own}"
     )
     widths = [
-        (row["source"], f"{row['width_GPa']:.2e}", f"{row['share']:.1%}", row["cure"])
+        (row["source"], f"{row['width_GPa']:.3g}", f"{row['share']:.1%}", row["cure"])
         for row in found["error_table"]
     ]
     return section(

@@ -19,7 +19,7 @@ from alphacut.rve.image.fields.energy import UNIT
 from alphacut.rve.image.moduli import ModuliInterval
 from alphacut.stochastic.theta.truncated_normal import Array
 
-NODES = 33  # most thresholds at which an image is solved
+NODES = 65  # most thresholds at which an image is solved
 REACH = 4.0  # deviations from the mean to the outermost nodes
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
@@ -88,23 +88,27 @@ def compute(study: ImageStudy, *, progress: Tick | None = None) -> FuzzyImage:
     began = perf_counter()
     tick = progress or (lambda share: None)
     modal = study.images(None, None)
-    model, crisp = study.model.refined(modal)
+    start = study.model
+    if study.random is not None:  # many images: pixels are divided only where that is asked for
+        start = replace(start, division=start.parts)
+    model, crisp = start.refined(modal)
     tick(0.3)
-    random = None if study.random is None else responses(study, study.random)
+    random = None if study.random is None else responses(study, model, study.random)
     if random is not None:
         cuts = random.cuts
-        rows = contributions(study, random.width(None, None), random.width)
+        width = random.width
     else:
         levels = [study.images(level, level) for level in study.alpha]
         cuts = tuple(model.cuts(levels, (modal, crisp)))
         tick(0.7)
 
-        def width(threshold: Level, phases: Level) -> float:
+        def alone(threshold: Level, phases: Level) -> float:
             images = study.images(threshold, phases)
-            (alone,) = model.cuts([images], (modal, crisp))
-            return alone.modulus[1] - alone.modulus[0]
+            (cut,) = model.cuts([images], (modal, crisp))
+            return cut.modulus[1] - cut.modulus[0]
 
-        rows = contributions(study, crisp.modulus[1] - crisp.modulus[0], width)
+        width = alone
+    rows = contributions(study, crisp.modulus[1] - crisp.modulus[0], width)
     apparent = None
     if model.boundary == "window":
         tiling, _ = model.tiling(modal, 1)

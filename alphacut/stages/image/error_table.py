@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from alphacut.rve.image.random_threshold import NODES
 from alphacut.stages.image.study import ImageStudy, Level
 
 CURES = {
     "discretisation": "divide the pixels: cell.division or cell.width",
     "finite window": "take a larger window, or another number of tiles",
+    "threshold steps": f"up to {NODES} grey values within four deviations: each is solved",
     "threshold": "state cell.threshold more closely",
     "phases": "state the moduli of the phases more closely",
 }
@@ -48,6 +50,8 @@ def contributions(
     widths = {"discretisation": discretisation}
     if study.model.boundary == "window":
         widths["finite window"] = base - discretisation
+    if study.random is not None:
+        widths["threshold steps"] = base - discretisation
     if study.fuzzy_threshold:
         widths["threshold"] = width(lowest, None) - base
     if study.fuzzy_phases:

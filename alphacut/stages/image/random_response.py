@@ -8,7 +8,7 @@ from time import perf_counter
 import numpy as np
 
 from alphacut.rve.image.cuts import nested
-from alphacut.rve.image.model import ImageCut
+from alphacut.rve.image.model import ImageCut, ImageModel
 from alphacut.rve.image.random_threshold import (
     ThresholdResponse,
     threshold_nodes,
@@ -68,8 +68,13 @@ class RandomResponse:
         return high - low
 
 
-def responses(study: ImageStudy, random: RandomThreshold) -> RandomResponse:
+def responses(study: ImageStudy, model: ImageModel, random: RandomThreshold) -> RandomResponse:
     """One response for each level's phases; crisp phases have one for all.
+
+    Args:
+        study: What is solved.
+        model: How, with the division taken.
+        random: Its threshold.
 
     Raises:
         ValueError: The phases have no order.
@@ -78,7 +83,6 @@ def responses(study: ImageStudy, random: RandomThreshold) -> RandomResponse:
     nodes = threshold_nodes(random.grey, random.law(study.alpha[0]))
 
     def solved(level: Level) -> ThresholdResponse:
-        model = study.model
         return threshold_response(
             random.grey,
             nodes,

@@ -102,14 +102,17 @@ def test_a_random_threshold_gives_the_mean_and_quantiles(folder, capfd):
     low, high = (entry["E_GPa"][1] for entry in random["quantiles"])
     assert low["lower"] < cuts["lower"][1] < high["upper"]
     assert low["upper"] < high["upper"]
-    assert {row["source"] for row in found["error_table"]} == {"discretisation", "threshold"}
+    sources = {"discretisation", "threshold", "threshold steps"}
+    assert {row["source"] for row in found["error_table"]} == sources
 
 
 def test_a_random_threshold_of_crisp_parameters_and_fuzzy_phases(folder, capfd):
     law = {"threshold": "[130]", "threshold_deviation": "10"}
     fuzzy = '["[19, 20, 21] GPa", "80 GPa"]'
     found = solved(folder, capfd, **law, modulus=fuzzy)
-    assert [row["source"] for row in found["error_table"]] == ["phases", "discretisation"]
+    widths = {row["source"]: row["width_GPa"] for row in found["error_table"]}
+    assert widths["phases"] > widths["discretisation"] > widths["threshold steps"]
+    assert "threshold" not in widths
     turned = solved(folder, capfd, **law, modulus='["80 GPa", "20 GPa"]')
     assert turned["E_GPa"]["lower"] > found["E_GPa"]["upper"]
 

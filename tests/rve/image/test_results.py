@@ -108,6 +108,19 @@ def test_few_grey_values_give_the_mean_as_close_as_their_images(order):
         assert ends[0] <= ends[1] <= 80.0 + 1e-9
 
 
+def test_fewer_nodes_hold_what_more_nodes_give(response):
+    coarse = threshold_response(ramp(), [0.2, 0.5, 0.8], PHASES)
+    law = NormalThreshold((0.45, 0.5), (0.08, 0.1))
+    wide, narrow = coarse.mean(law), response.mean(law)
+    assert wide[0] < narrow[0] < narrow[1] < wide[1]
+    outer, inner = coarse.stiffness(law), response.stiffness(law)
+    assert np.linalg.eigvalsh(inner.lower - outer.lower)[0] > 0
+    assert np.linalg.eigvalsh(outer.upper - inner.upper)[0] > 0
+    for share in (0.1, 0.5, 0.9):
+        wide, narrow = coarse.quantile(law, share), response.quantile(law, share)
+        assert wide[0] <= narrow[0] < narrow[1] <= wide[1]
+
+
 def test_a_response_over_falling_stiffness_is_that_of_the_mirrored_image():
     law = NormalThreshold((0.45, 0.55), (0.05, 0.1))
     nodes = np.linspace(0.2, 0.8, 5)
