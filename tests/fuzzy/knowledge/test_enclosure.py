@@ -264,3 +264,15 @@ def test_a_reciprocal_across_zero_has_no_bounds():
     assert (lower[[0, 3]] == -np.inf).all()
     assert (upper[[0, 3]] == np.inf).all()
     np.testing.assert_allclose([lower[1:3], upper[1:3]], [[0.5, -1.0], [1.0, -0.5]])
+
+
+def test_a_power_has_no_bounds_where_its_base_may_be_negative():
+    """Where a part of the box has no value, the rest of it bounds nothing."""
+    found = Enclosed(lambda x: x**0.5, ("x",))(LOW, HIGH)["y"]
+    assert found.value == (-np.inf, np.inf)
+
+
+@pytest.mark.parametrize("options", [{"dtype": np.float32}, {"where": True}])
+def test_options_of_numpys_functions_have_no_enclosure(options):
+    with pytest.raises(ValueError, match=r"numpy\.add has no enclosure"):
+        Enclosed(lambda x: np.add(x, 1.5, **options), ("x",))(LOW, HIGH)
