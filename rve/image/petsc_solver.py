@@ -14,7 +14,7 @@ import numpy as np
 
 from alphacut.rve.image.fields.conjugate_gradient import ConvergenceError, Linear, Solution
 from alphacut.rve.petsc import PETSc
-from alphacut.rve.solver.options import PREFIX
+from alphacut.rve.solver.options import PREFIX, OptionError
 from alphacut.rve.solver.petsc_options import in_database
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -80,7 +80,13 @@ class PetscSolver:
             del options["ksp_norm_type"]  # the natural norm is for conjugate gradients
         with in_database(options, wanted=tuple(self.options)):
             ksp.setFromOptions()
-            if ksp.getPC().getType() == "python":
+            kind = ksp.getPC().getType()
+            if kind not in ("python", "none"):
+                raise OptionError(
+                    f"-{PREFIX}pc_type {kind} needs the entries of a matrix, and an image has an"
+                    " operator only: take python (Fourier transform, the default) or none"
+                )
+            if kind == "python":
                 ksp.getPC().setPythonContext(Shell(preconditioner, load.shape))
             ksp.setUp()
         right = PETSc.Vec().createWithArray(load.ravel(), comm=PETSc.COMM_SELF)

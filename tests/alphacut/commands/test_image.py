@@ -333,6 +333,8 @@ def test_options_of_petsc_count_and_strangers_are_refused(folder, capfd):
     assert np.allclose(own["lower_GPa"], other["lower_GPa"], rtol=1e-3, atol=1e-3)
     assert main([*command, "-rve_ksp_max_it", "1"]) == 1
     assert "PETSc stopped after 1 iterations" in capfd.readouterr().err
+    assert main([*command, "-rve_pc_type", "jacobi"]) == 2
+    assert "take python (Fourier transform, the default) or none" in capfd.readouterr().err
     assert main([*command, "-rve_ksp_nonsense", "1"]) == 2
     assert "no use for -rve_ksp_nonsense" in capfd.readouterr().err
 
