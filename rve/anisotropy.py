@@ -45,17 +45,20 @@ def directional_shear(stiffness: Array, angle: ArrayLike) -> Array:
 
 
 def shear_ratio(stiffness: Array) -> float:
-    """Shear modulus along the diagonals over that along the axes, (C11 − C12)/(2 C33)."""
-    return float((stiffness[0, 0] - stiffness[0, 1]) / (2 * stiffness[2, 2]))
+    """Shear modulus along the diagonals over that along the axes, (C11 − C12)/(2 C33).
+
+    Of a plane stiffness, or of one in space, whose last entry is C44.
+    """
+    return float((stiffness[0, 0] - stiffness[0, 1]) / (2 * stiffness[-1, -1]))
 
 
-def shear_ratio_in_words(ratio: float) -> str:
-    """One line on what the shear ratio means for E of eq. 16."""
+def shear_ratio_in_words(ratio: float, *, spheres: bool = False) -> str:
+    """One line on what the shear ratio means for E of eq. 16, or of Hill's average of spheres."""
     told = (
         f"shear modulus along the diagonals over that along the axes: {ratio:.3f} (1 in an"
-        " isotropic plane)"
+        f" isotropic {'material' if spheres else 'plane'})"
     )
-    if abs(ratio - 1) <= ISOTROPIC_ENOUGH:
+    if spheres or abs(ratio - 1) <= ISOTROPIC_ENOUGH:
         return told
     side = "below" if ratio > 1 else "above"
     return (

@@ -39,9 +39,10 @@ WHAT = {
     "periodicity": "the displacement fluctuation differs on opposite sides of the cell",
     "reuss": "the effective stiffness is below the Reuss bound",
     "voigt": "the effective stiffness is above the Voigt bound",
-    "hashin_shtrikman": "the in-plane bulk modulus is outside the Hashin–Shtrikman bounds",
+    "hashin_shtrikman": "the bulk modulus is outside the Hashin–Shtrikman bounds",
+    "hashin_shtrikman_shear": "the shear moduli are outside the trace bounds of Milton and Kohn",
 }
-BOUNDS = ("reuss", "voigt", "hashin_shtrikman")
+BOUNDS = ("reuss", "voigt", "hashin_shtrikman", "hashin_shtrikman_shear")
 
 
 def require(checks: Mapping[str, float], limits: Limits) -> dict[str, float]:

@@ -9,7 +9,7 @@ from functools import partial
 
 from alphacut.case.case import Case, files_of
 from alphacut.case.checks_image import image
-from alphacut.case.checks_material import particles, radius
+from alphacut.case.checks_material import particles, radius, sphere_model
 from alphacut.case.checks_structure import incomplete
 from alphacut.case.idle import idle_envelope
 from alphacut.case.limits import limit_of, storey_height
@@ -35,6 +35,7 @@ def checks(*, modal: bool = False) -> Iterator[Check]:
     yield incomplete
     yield where("microstructure", particles)
     yield where("radius", partial(radius, alpha=1.0 if modal else 0.0))
+    yield where("cell", sphere_model)
     yield where("response", stress_curves)
     yield one_modulus
     yield image

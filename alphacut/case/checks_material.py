@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Iterator
 
 from alphacut.case.case import Case
+from alphacut.case.sections.material import SPHERE_METHODS
 from alphacut.case.sections.particles import Packing
 from alphacut.io.problem import Problem
 from alphacut.stochastic import HermiteMap, TruncatedNormal
@@ -92,6 +93,18 @@ def radius(case: Case, alpha: float) -> Iterator[Problem]:
             key = guilty(corner)
             yield Problem(f"radius.{key}", str(error), str(case.written.get(f"radius.{key}", "")))
             return
+
+
+def sphere_model(case: Case) -> Iterator[Problem]:
+    """Spheres have models of their own."""
+    method = case.modulus.method if case.sections.modulus else "prism"
+    if case.cell.particles == "spheres" and method not in SPHERE_METHODS:
+        yield Problem(
+            "modulus.method",
+            "this model is one of cylinders, and cell.particles is spheres",
+            method,
+            " or ".join(SPHERE_METHODS),
+        )
 
 
 def guilty(corner: tuple[float, ...]) -> str:

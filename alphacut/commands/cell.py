@@ -30,8 +30,9 @@ from alphacut.rve.auto.model import ORDER
 from alphacut.rve.cell import STRAIN
 from alphacut.rve.model import cross_check
 from alphacut.rve.result import Homogenised, error_of_means
+from alphacut.rve.spheres.result import HomogenisedSpheres
 from alphacut.stages.contract import contract, keep_modulus, require_choice
-from alphacut.stages.material import cell
+from alphacut.stages.material import cell, spheres
 from alphacut.stages.material.cell_models import cell_model
 
 ABOUT = "homogenise the cell at crisp values; a fuzzy input takes its modal value"
@@ -46,6 +47,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
     add_keys(parser, KEYS)
     add_exclude(parser, ", ".join(ORDER))
+    parser.add_argument(
+        "--radius",
+        metavar="NUMBER",
+        help="one radius over half the cell's side in place of the map, inside (0, 1)",
+    )
     parser.add_argument(
         "--stiffness",
         action="store_true",
@@ -62,6 +68,26 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         default="",
         help="run two models; fail if E differs by more than --tolerance (1e-4)",
     )
+
+
+def one_radius(options: argparse.Namespace) -> list[str]:
+    """Changes of the case that make its map constant; none without ``--radius``.
+
+    Raises:
+        BadInput: The radius lies outside (0, 1), or a parameter of the map is given besides.
+    """
+    if options.radius is None:
+        return []
+    refuse_beside(options, "--radius", dict.fromkeys(("--a1", "--a2", "--a3", "--a4"), ""))
+    try:
+        inside = 0 < float(options.radius) < 1
+    except ValueError:
+        inside = False
+    if not inside:
+        allowed = "a number inside (0, 1), in halves of the cell's side"
+        raise BadInput(Problem("--radius", "out of range", options.radius, allowed))
+    r = options.radius
+    return [f"radius.a1={r}", "radius.a2=0", f"radius.a3={r}", "radius.a4=0"]
 
 
 def named_models(option: str, text: str) -> tuple[str, ...]:
@@ -92,7 +118,7 @@ def named_pair(text: str) -> tuple[str, ...]:
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Solve and report."""
-    case = load(options.case, changes(options, KEYS), modal=True)
+    case = load(options.case, [*changes(options, KEYS), *one_radius(options)], modal=True)
     require_read(case, READ, "cell")
     if options.export:
         check_format(options.export)
@@ -122,7 +148,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     if answer(options, found, out, summary(result)):
         out.write(agreement(pair, difference, allowed_difference(case)))
         modal = cell.parts(cell.modal_values(case), case.radius.theta)
-        out.write(remark(cell.anisotropy(*modal)))
+        particles = case.cell.particles
+        out.write(remark(cell.anisotropy(*modal, particles), particles))
     return 0
 
 
@@ -192,12 +219,12 @@ def agreement(pair: Sequence[str], difference: float | None, allowed: float) -> 
     return f"{' and '.join(pair)} differ by {difference:.1e} of E; {allowed:.1e} is allowed\n"
 
 
-def remark(ratio: tuple[float, float] | None) -> str:
-    """The square array's shear ratio as a line; where it matters, a warning besides."""
+def remark(ratio: tuple[float, float] | None, particles: str = "cylinders") -> str:
+    """The array's shear ratio as a line; where it matters to E of eq. 16, a warning besides."""
     if ratio is None:
         return ""
     value, error = ratio
-    if abs(value - 1) > ISOTROPIC_ENOUGH:
+    if particles == "cylinders" and abs(value - 1) > ISOTROPIC_ENOUGH:
         say(
             f"warning: {shear_ratio_in_words(value)}; --export and --stiffness give the whole"
             " plane-strain stiffness"
@@ -210,6 +237,8 @@ def remark(ratio: tuple[float, float] | None) -> str:
 
 def summary(result: Homogenised) -> str:
     """The result in a few lines for people, every number with its declared error."""
+    if isinstance(result, HomogenisedSpheres):
+        return spheres.lines(result)
     s11, s12 = (stress / cell.GPA for stress in result.curve.mean)
     seconds = ", ".join(f"{name} {value:.3f}" for name, value in result.seconds.items())
     parts = ", ".join(f"{name} {value:.1e}" for name, value in result.error.items())

@@ -42,6 +42,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     case = load(options.case, changes(options, MESH), modal=True)
     require_read(case, READ if options.fields else ("radius", "mesh"), "mesh")
     check_ending(Path(options.out), fields=options.fields)
+    if case.sections.cell and case.cell.particles == "spheres":
+        raise case.refuse("cell.particles", "the mesh is one of cylinders", "cylinders")
     mesh = cell_fields(case) if options.fields else prism_mesh(case)
     write_mesh(mesh, Path(options.out))
     counts: dict[str, object] = {

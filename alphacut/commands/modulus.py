@@ -145,7 +145,8 @@ def summary(found: modulus.FuzzyModulus) -> str:
         f"{found.result.runs} samples, {found.solves} linear systems, {found.result.seconds:.1f} s,"
         f" {found.choice.method}"
     )
+    particles = found.choice.particles
     return (
-        "alpha  lower GPa   upper GPa   (E of eq."
-        f" 16)\n{rows}{cost}\n{found.worth}\n{remark(found.shear_ratio)}"
+        f"alpha  lower GPa   upper GPa   (E of {modulus.AVERAGE[particles]})\n{rows}{cost}\n"
+        f"{found.worth}\n{remark(found.shear_ratio, particles)}"
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,16 +12,49 @@ import numpy as np
 from alphacut.io.files import as_json, write_text
 from alphacut.io.problem import BadInput, Problem
 from alphacut.rve.anisotropy import shear_ratio, shear_ratio_in_words
-from alphacut.rve.fibre_constants import FibreConstants, fibre_constants
+from alphacut.rve.fibre_constants import CONSTANTS, FibreConstants, fibre_constants
 from alphacut.rve.result import error_of_means, error_of_stiffness
+from alphacut.rve.spheres.cubic import cubic_constants, cubic_voigt, hill_average
+from alphacut.rve.spheres.result import HomogenisedSpheres
+from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     from alphacut.rve.result import Homogenised
 
-CONVENTION = "isotropic constants by eq. 16; a square array is not isotropic"
-PLANE = (
+
+@dataclass(frozen=True)
+class _Shape:
+    """What the shape of the particle makes of a card's words.
+
+    Args:
+        convention: What the isotropic constants are.
+        about: What the orthotropic constants are.
+        name: End of the orthotropic material's name, upper case, and key of the stiffness.
+        kind: Kind of stiffness.
+        order: Voigt order.
+    """
+
+    convention: str
+    about: str
+    name: str
+    kind: str
+    order: tuple[str, ...]
+
+
+CYLINDERS = _Shape(
+    "isotropic constants by eq. 16; a square array is not isotropic",
     "the whole stiffness as orthotropic constants, axes 1 and 2 along the array, 3 along the"
-    " particles, which are fibres; absolute errors: "
+    " particles, which are fibres; absolute errors: ",
+    "plane",
+    "plane-strain stiffness",
+    ("11", "22", "12"),
+)
+SPHERES = _Shape(
+    "isotropic constants by Hill's average; a cubic array of spheres is not isotropic",
+    "the whole stiffness as orthotropic constants, axes along the cubic array; absolute errors: ",
+    "cubic",
+    "stiffness",
+    ("11", "22", "33", "23", "13", "12"),
 )
 
 
@@ -35,7 +69,8 @@ def abaqus(result: Homogenised) -> str:
     values = [f"{value:.9e}" for value in fibres.values.values()]
     rows = f"{', '.join(values[:8])}\n{values[8]}\n"
     return (
-        f"{card}** {about(fibres)}\n*MATERIAL, NAME=HOMOGENISED_PLANE\n*ELASTIC, TYPE=ENGINEERING"
+        f"{card}** {about(result, fibres)}\n*MATERIAL,"
+        f" NAME=HOMOGENISED_{shape(result).name.upper()}\n*ELASTIC, TYPE=ENGINEERING"
         f" CONSTANTS\n{rows}"
     )
 
@@ -52,7 +87,8 @@ def aster(result: Homogenised) -> str:
     told = ", ".join(
         f"{name}={value:.9e}" for name, value in zip(names, fibres.values.values(), strict=True)
     )
-    return f"{card}# {about(fibres)}\nHOMOGENISED_PLANE = DEFI_MATERIAU(ELAS_ORTH=_F({told}))\n"
+    name = f"HOMOGENISED_{shape(result).name.upper()}"
+    return f"{card}# {about(result, fibres)}\n{name} = DEFI_MATERIAU(ELAS_ORTH=_F({told}))\n"
 
 
 def ansys(result: Homogenised) -> str:
@@ -61,7 +97,7 @@ def ansys(result: Homogenised) -> str:
     if (fibres := constants(result)) is None:
         return card
     names = ("EX", "EY", "EZ", "PRXY", "PRXZ", "PRYZ", "GXY", "GXZ", "GYZ")
-    return f"{card}! {about(fibres)}\n" + "".join(
+    return f"{card}! {about(result, fibres)}\n" + "".join(
         f"MP,{name},2,{value:.9e}\n"
         for name, value in zip(names, fibres.values.values(), strict=True)
     )
@@ -72,57 +108,92 @@ def numbers(result: Homogenised) -> str:
 
     Without a stiffness where the model did not compute it.
     """
-    modulus, nu, *_ = error_of_means(result)
+    modulus, nu = errors_of_constants(result)
+    words = shape(result)
     document: dict[str, object] = {
         "E_Pa": result.modulus,
         "nu": result.poisson,
-        "convention": CONVENTION,
+        "convention": words.convention,
     }
+    key = "cubic" if words is SPHERES else "plane_strain"
     errors: dict[str, object] = {"E_Pa": modulus, "nu": nu}
     if result.stiffness is not None:
         document["stiffness"] = {
-            "order": ["11", "22", "12"],
+            "order": list(words.order),
             "shear": "engineering",
             "unit": "Pa",
-            "plane_strain": result.stiffness,
+            key: result.stiffness,
         }
         document["shear_ratio"] = shear_ratio(result.stiffness)
-        errors["plane_strain"] = error_of_stiffness(result, np.asarray)
-        errors["shear_ratio"] = float(error_of_stiffness(result, shear_ratio))
+        errors[key], errors["shear_ratio"] = errors_of_stiffness(result)
     if (fibres := constants(result)) is not None:
-        document["plane_constants"], errors["plane_constants"] = fibres.values, fibres.errors
+        name = f"{words.name}_constants"
+        document[name], errors[name] = fibres.values, fibres.errors
     return as_json({**document, "declared_error": errors}, indent=2)
 
 
 def comments(result: Homogenised, mark: str) -> str:
     """Lines of comment: the isotropic constants' worth, and the stiffness where it is known."""
-    lines = [CONVENTION]
+    words = shape(result)
+    lines = [words.convention]
     if result.errors:
-        modulus, nu, *_ = error_of_means(result)
+        modulus, nu = errors_of_constants(result)
         lines.append(f"declared absolute errors: E {modulus:.1e} Pa, nu {nu:.1e}")
     if result.stiffness is not None:
-        ratio = float(error_of_stiffness(result, shear_ratio))
-        error = error_of_stiffness(result, np.asarray)
-        lines.append(shear_ratio_in_words(shear_ratio(result.stiffness)))
+        error, ratio = errors_of_stiffness(result)
+        of_array = shear_ratio(result.stiffness)
+        lines.append(shear_ratio_in_words(of_array, spheres=words is SPHERES))
         lines.append(f"absolute error of this ratio: {ratio:.1e}")
         lines.append(
-            "plane-strain stiffness in Pa, Voigt order 11, 22, 12 with engineering shear strain,"
-            " and the absolute errors of its entries:"
+            f"{words.kind} in Pa, Voigt order {', '.join(words.order)} with engineering shear"
+            " strain, and the absolute errors of its entries:"
         )
         lines += [", ".join(f"{entry:.9e}" for entry in row) for row in result.stiffness]
         lines += [", ".join(f"{entry:.1e}" for entry in row) for row in error]
     return "".join(f"{mark} {line}\n" for line in lines)
 
 
-def about(fibres: FibreConstants) -> str:
+def shape(result: Homogenised) -> _Shape:
+    """Words for the result's particle."""
+    return SPHERES if isinstance(result, HomogenisedSpheres) else CYLINDERS
+
+
+def errors_of_constants(result: Homogenised) -> tuple[float, float]:
+    """Declared absolute errors of E (Pa) and ν."""
+    if isinstance(result, HomogenisedSpheres):
+        modulus, nu = result.error_of(hill_average)
+        return float(modulus), float(nu)
+    modulus, nu, *_ = error_of_means(result)
+    return float(modulus), float(nu)
+
+
+def errors_of_stiffness(result: Homogenised) -> tuple[Array, float]:
+    """Declared absolute errors of the stiffness (Pa) and of its shear ratio."""
+    if isinstance(result, HomogenisedSpheres):
+        error = result.error_of(lambda moduli: cubic_voigt(*moduli))
+        return error, float(result.error_of(lambda moduli: moduli[1] / moduli[2]))
+    error = error_of_stiffness(result, np.asarray)
+    return error, float(error_of_stiffness(result, shear_ratio))
+
+
+def about(result: Homogenised, fibres: FibreConstants) -> str:
     """Line of comment on orthotropic constants."""
-    return PLANE + ", ".join(f"{name} {error:.1e}" for name, error in fibres.errors.items())
+    return shape(result).about + ", ".join(
+        f"{name} {error:.1e}" for name, error in fibres.errors.items()
+    )
 
 
 def constants(result: Homogenised) -> FibreConstants | None:
     """Orthotropic constants; None where the model did not compute the stiffness."""
     if result.stiffness is None or result.cell is None:
         return None
+    if isinstance(result, HomogenisedSpheres):
+        values, errors = cubic_constants(result.moduli), result.error_of(cubic_constants)
+        names = zip(CONSTANTS, values, errors, strict=True)
+        triples = [(name, float(value), float(error)) for name, value, error in names]
+        return FibreConstants(
+            {name: value for name, value, _ in triples}, {name: error for name, _, error in triples}
+        )
     return fibre_constants(result)
 
 

@@ -18,6 +18,7 @@ from alphacut.figures.style import (
     shaded_cuts,
 )
 from alphacut.stages.material.cell import GPA
+from alphacut.stages.material.modulus import AVERAGE
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
@@ -95,5 +96,6 @@ def fuzzy_modulus(dataset: xarray.Dataset, case: Case) -> Figure:
         x = np.array([*left, *right[::-1]]) / GPA
         axes.plot(x, [0, 1, 1, 0], color=BLUE, lw=1.2, ls="--", label="quoted in the case")
     axes.legend(loc="upper left")
-    membership_axes(axes, "effective Young's modulus E (eq. 16), GPa")
+    particles = dataset.attrs.get("particles", "cylinders")
+    membership_axes(axes, f"effective Young's modulus E ({AVERAGE[particles]}), GPa")
     return drawn

@@ -73,20 +73,29 @@ def of_map(found: Mapping[str, Any]) -> str:
     )
 
 
+MEANING = {
+    "cylinders": "E is the modulus of eq. 16, the paper's convention: a square array is not"
+    " isotropic.",
+    "spheres": "E is Hill's isotropic average of spheres in a simple cubic array.",
+}
+
+
 def modulus(found: Mapping[str, Any], drawn: Markup) -> Markup:
     """The fuzzy modulus with its α-cuts, error budget and certificate."""
     cuts = zip(found["alpha"], found["E_GPa"]["lower"], found["E_GPa"]["upper"], strict=True)
     rows = [(f"{alpha:g}", f"{low:.4f}", f"{high:.4f}") for alpha, low, high in cuts]
     words = Markup(
-        "<p>{} <strong>{}</strong>, support [{:.4f}, {:.4f}] GPa; Poisson's ratio {:.4f}. E is the"
-        " modulus of eq. 16, the paper's convention: a square array is not isotropic. {} samples,"
-        " {} linear systems, {:.1f} s. {} {}</p>"
+        "<p>{} <strong>{}</strong>, support [{:.4f}, {:.4f}] GPa; Poisson's ratio {:.4f}. {} {}"
+        " samples, {} linear systems, {:.1f} s. {} {} {}</p>"
     ).format(
         "Core" if "[" in core(found) else "Modal value",
         core(found),
-        *(found[name] for name in ("lower_GPa", "upper_GPa", "nu", "samples", "solves", "seconds")),
+        *(found[name] for name in ("lower_GPa", "upper_GPa", "nu")),
+        MEANING[found.get("particles", "cylinders")],
+        *(found[name] for name in ("samples", "solves", "seconds")),
         sentence(found.get("reason", "")),
         isotropy(found),
+        sentence(found.get("shape", "")),
     )
     budget = [(in_words(name), f"{value:.2g}") for name, value in found.get("error", {}).items()]
     checks = [(in_words(name), f"{value:.2g}") for name, value in found.get("checks", {}).items()]
@@ -181,7 +190,11 @@ def isotropy(found: Mapping[str, Any]) -> str:
     from alphacut.rve.anisotropy import shear_ratio_in_words
 
     return (
-        sentence(shear_ratio_in_words(float(found["shear_ratio"])))
+        sentence(
+            shear_ratio_in_words(
+                float(found["shear_ratio"]), spheres=found.get("particles") == "spheres"
+            )
+        )
         if found.get("shear_ratio") is not None
         else ""
     )

@@ -13,7 +13,8 @@ from alphacut.fuzzy import FuzzyNumber, Triangular
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.units import engineering
 from alphacut.stages.image.reading import expected_modulus, study_of
-from alphacut.stages.material import modulus
+from alphacut.stages.material import modulus, spheres
+from alphacut.stages.material.cell import modal_values, parts
 from alphacut.stages.pipeline import studies
 from alphacut.stages.vibration.resolution_checks import rough
 from alphacut.stages.vibration.structure import Structure, structure
@@ -74,7 +75,7 @@ def ready(case: Case) -> Readiness:
                     'stages = ["modulus", "envelope"], with a structure',
                 )
             )
-        return Readiness(tuple(unlikely_material(case)))
+        return Readiness((*shape(case), *unlikely_material(case)))
     if problems := list(lacking(case)):
         raise BadInput(problems)
     wanted = structure(case, stand_in or expected(case))
@@ -86,12 +87,21 @@ def ready(case: Case) -> Readiness:
     period = first_period(wanted)
     ground = None if wanted.linear is None else wanted.linear.ground
     remarks = (
+        *shape(case),
         *unlikely_material(case),
         *outlasted(case, ground),
         *unlikely(case, ground, period),
         *unproved(case),
     )
     return Readiness(remarks, tuple(found), period, wanted)
+
+
+def shape(case: Case) -> Iterator[str]:
+    """A remark where cylinders are computed and the case speaks of spheres."""
+    if "modulus" not in case.stages or not case.sections.radius or case.stand_ins:
+        return
+    if told := spheres.remark(case, *parts(modal_values(case), case.radius.theta)):
+        yield told
 
 
 def first_period(wanted: Structure) -> float | None:

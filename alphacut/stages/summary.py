@@ -11,11 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alphacut.io.provenance import FORMAT, command, versions
-from alphacut.stages.material import modulus, response
+from alphacut.rve.cell import Phase
+from alphacut.rve.spheres.result import volume_fraction
+from alphacut.stages.material import modulus, response, spheres
 from alphacut.stages.material.cell import GPA, modal_values, parts
 from alphacut.stages.pipeline import Results
 from alphacut.stages.vibration import exceedance as outcomes
 from alphacut.stages.vibration.structure_words import structure_words
+from alphacut.stochastic import HermiteMap
 
 if TYPE_CHECKING:
     import xarray
@@ -46,7 +49,8 @@ def summary(results: Results) -> dict[str, Any]:
     if case.sections.radius:
         found["area_fraction"] = area_fraction(results)
     if results.modulus is not None:
-        found["modulus"] = modulus_numbers(results.modulus)
+        of_shape = spheres.remark(case, *_cell(results)) or ""
+        found["modulus"] = {**modulus_numbers(results.modulus), "shape": of_shape}
     elif results.image is not None:
         found["image"] = json.loads(results.image.attrs["document"])
     elif results.handed is not None:
@@ -67,13 +71,20 @@ def summary(results: Results) -> dict[str, Any]:
 
 
 def area_fraction(results: Results) -> float:
-    """Mean area fraction of the particle at the modal map: E[π r²/4]."""
+    """Mean fraction of the cell that the particle takes: E[π r²/4], of spheres E[π r³/6]."""
     from alphacut.stochastic import gauss_rule
 
     case = results.case
-    radius, _, _ = parts(modal_values(case), case.radius.theta)
+    radius, _, _ = _cell(results)
     rule = gauss_rule(radius.distribution, points=20)
+    if case.cell.particles == "spheres":
+        return float(rule.mean(volume_fraction(radius(rule.nodes))))
     return float(rule.mean(np.pi / 4 * radius(rule.nodes) ** 2))
+
+
+def _cell(results: Results) -> tuple[HermiteMap, Phase, Phase]:
+    """The modal map, matrix and particle."""
+    return parts(modal_values(results.case), results.case.radius.theta)
 
 
 def modulus_numbers(dataset: xarray.Dataset) -> dict[str, Any]:
@@ -90,7 +101,8 @@ def modulus_numbers(dataset: xarray.Dataset) -> dict[str, Any]:
         name: dataset.attrs[name]
         for name in ("samples", "solves", "seconds", "method", "plan", "nature")
     }
-    cost["reason"] = dataset.attrs.get("reason", "")
+    cost |= {"reason": dataset.attrs.get("reason", "")}
+    cost |= {"particles": dataset.attrs.get("particles", "cylinders")}
     cost |= {name: dataset.attrs[name] for name in ("shear_ratio",) if name in dataset.attrs}
     budget = {"error": modulus.listed(dataset, "error"), "checks": modulus.listed(dataset, "check")}
     return {**cuts, **support, **cost, **budget}

@@ -16,12 +16,12 @@ AREA = 4.0
 
 
 def stresses(stiffness: Array) -> tuple[Array, Array]:
-    """σ11 under load 1 and σ12 under load 2 of eq. 15 from stiffnesses (n, 3, 3)."""
-    return STRAIN * (stiffness[:, 0, 0] + stiffness[:, 0, 1]), 2 * STRAIN * stiffness[:, 2, 2]
+    """σ11 under load 1 and σ12 under load 2 of eq. 15 from stiffnesses (n, 3, 3) or (n, 6, 6)."""
+    return STRAIN * (stiffness[:, 0, 0] + stiffness[:, 0, 1]), 2 * STRAIN * stiffness[:, -1, -1]
 
 
 def curve_of(rule: ThetaRule, stiffness: Array) -> StressCurve:
-    """Stress over θ from the stiffness (n, 3, 3) at the nodes."""
+    """Stress over θ from the stiffness (n, 3, 3) or (n, 6, 6) at the nodes."""
     return StressCurve(rule.nodes, rule.weights, *stresses(stiffness), stiffness)
 
 

@@ -102,6 +102,7 @@ def settle_rule(
     *,
     points: int | None,
     accuracy: float,
+    moduli: Callable[[Array], Array] = square_moduli,
 ) -> tuple[list[StressCurve], list[Array]]:
     """Curves whose nodes are added until the mean moduli settle, and their declared errors.
 
@@ -109,12 +110,14 @@ def settle_rule(
 
     Args:
         radius_map: The map.
-        stiffness_at: Stiffness at n radii for m inclusions, shape (n, m, 3, 3); cheap.
+        stiffness_at: Stiffness at n radii for m inclusions, shape (n, m, 3, 3) or (n, m, 6, 6);
+            cheap.
         points: Nodes, or None to have them found.
         accuracy: Relative error of every mean modulus that counts as settled.
+        moduli: The three moduli of a stiffness.
 
     Returns:
-        For each inclusion its curve and the errors of C11 + C12, C11 − C12 and C33, shape (3,).
+        For each inclusion its curve and the errors of the mean moduli, shape (3,).
 
     Raises:
         RuleError: No rule in reach settles.
@@ -126,7 +129,7 @@ def settle_rule(
         counts = [count, _finer(count), _finer(_finer(count))]
         _add_curves(known, [n for n in counts if n not in known], radius_map, stiffness_at)
         gaps = [
-            _gap(*map(_mean_moduli, three))
+            _gap(*(_mean_moduli(curve, moduli) for curve in three))
             for three in zip(*(known[n] for n in counts), strict=True)
         ]
         for k, (curve, gap) in enumerate(zip(known[count], gaps, strict=True)):
@@ -164,9 +167,9 @@ def _finer(count: int) -> int:
     return count + max(2, count // 3)
 
 
-def _mean_moduli(curve: StressCurve) -> Array:
-    """Mean C11 + C12, C11 − C12 and C33 of a curve with its stiffness, shape (3,), in Pa."""
-    return square_moduli(np.tensordot(curve.weights, np.asarray(curve.stiffness), axes=1))
+def _mean_moduli(curve: StressCurve, moduli: Callable[[Array], Array]) -> Array:
+    """The three moduli of the mean stiffness of a curve, shape (3,), in Pa."""
+    return moduli(np.tensordot(curve.weights, np.asarray(curve.stiffness), axes=1))
 
 
 def _gap(value: Array, finer: Array, finest: Array) -> Array:

@@ -24,6 +24,8 @@ from alphacut.stochastic import TruncatedNormal
 
 CellMethod = Literal["prism", "slices", "table", "series", "image", "auto"]
 PlanName = Literal["general", "reduced", "extended", "signed"]
+Particles = Literal["cylinders", "spheres"]
+SPHERE_METHODS = ("series", "auto")
 CELL_METHODS: tuple[str, ...] = get_args(CellMethod)
 PLANS: tuple[str, ...] = get_args(PlanName)
 
@@ -56,8 +58,15 @@ class Radius(Section):
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Cell(Section):
-    """The two elastic phases of the periodic cell, in plane strain."""
+    """The two elastic phases of the periodic cell, and the shape of its particle."""
 
+    particles: Annotated[
+        Particles,
+        Key(
+            "shape of the particle: cylinders in plane strain, as the paper's, or spheres in"
+            " a simple cubic array"
+        ),
+    ] = "cylinders"
     matrix_modulus: Annotated[
         FuzzyNumber, Key("Young's modulus of the matrix", "Pa", allowed=POSITIVE)
     ]
@@ -72,9 +81,10 @@ class Cell(Section):
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class CellTable(Section):
-    """The periodic cell, in plane strain: two elastic phases and a round particle, or a picture.
+    """The periodic cell: two elastic phases and a round particle, or a picture.
 
-    Of a picture of its phases (one of image, polygons, inequality) stage image gives proved bounds.
+    Of a picture of its phases (one of image, polygons, inequality), in plane strain, stage image
+    gives proved bounds.
     """
 
     parts: ClassVar[tuple[type[Section], ...]] = (Cell, Picture)

@@ -191,9 +191,10 @@ def known(case: Case, inputs: Mapping[str, FuzzyNumber]) -> Known:
     """The signs of the inputs' effects on E, where mechanics proves them.
 
     Where both phases have the same Poisson's ratio ν >= 0, more stiff material can only stiffen: A
-    and B of eq. 16 rise, and with them E = 3A/2 − A²/(2B). The radius rises with a1, a2, a3 and
-    falls with a4, since h1, h2, h3 >= 0 >= h4 (eq. 12). Nothing is stated for finite elements on
-    the product space, whose error depends on the mesh that moves with the radius.
+    and B of eq. 16 rise, and with them E = 3A/2 − A²/(2B); of spheres the bulk modulus and both
+    averages of the shear modulus, and with them E of Hill's average. The radius rises with a1, a2,
+    a3 and falls with a4, since h1, h2, h3 >= 0 >= h4 (eq. 12). Nothing is stated for finite
+    elements on the product space, whose error depends on the mesh that moves with the radius.
     """
     cell = case.cell
     matrix, inclusion = cell.matrix_modulus.support, cell.inclusion_modulus.support

@@ -15,6 +15,8 @@ from alphacut.io.provenance import versions
 from alphacut.rve.anisotropy import directional_shear, directional_young, shear_ratio
 from alphacut.rve.cell import Phase
 from alphacut.rve.result import error_of_means, error_of_stiffness
+from alphacut.rve.spheres.result import HomogenisedSpheres
+from alphacut.stages.material import spheres
 from alphacut.stochastic import HermiteMap, RadiusMap, TruncatedNormal
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -77,6 +79,7 @@ class CellChoice:
             solutions that they share; None if not known.
         estimate: Whether a model that can is to estimate its error at an extra cost.
         stiffness: Whether a model that can leave it out is to make the whole planar stiffness.
+        particles: cylinders or spheres.
     """
 
     method: str = "prism"
@@ -91,6 +94,7 @@ class CellChoice:
     moduli: tuple[float, float] | None = None
     estimate: bool = False
     stiffness: bool = False
+    particles: str = "cylinders"
 
     @property
     def words(self) -> str:
@@ -101,7 +105,10 @@ class CellChoice:
         asked = "" if self.tolerance is None else f", relative error of E up to {self.tolerance:g}"
         refined = self.tolerance is not None and not self.named
         without = f", without {', '.join(self.exclude)}" if self.exclude else ""
-        return f"each sample by method {self.method}{'' if refined else mesh}{asked}{without}"
+        shape = ", spheres" if self.particles == "spheres" else ""
+        return (
+            f"each sample by method {self.method}{shape}{'' if refined else mesh}{asked}{without}"
+        )
 
 
 def cell_choice(
@@ -125,6 +132,7 @@ def cell_choice(
         case.names_mesh or bool(petsc),
         exclude,
         petsc or {},
+        particles=case.cell.particles,
     )
 
 
@@ -154,17 +162,23 @@ def solve(case: Case, model: CellModel) -> Homogenised:
     return model.solve(radius, matrix, [inclusion])[0]
 
 
-def anisotropy(radius: HermiteMap, matrix: Phase, inclusion: Phase) -> tuple[float, float] | None:
+def anisotropy(
+    radius: HermiteMap, matrix: Phase, inclusion: Phase, particles: str = "cylinders"
+) -> tuple[float, float] | None:
     """Shear ratio of a cell and its declared error, by the series whatever model gives E.
 
     None where the series refuses. See `rve.anisotropy.shear_ratio`.
     """
     from alphacut.rve.series.model import SeriesModel
+    from alphacut.rve.spheres.series.model import SphereSeriesModel
 
+    series = SphereSeriesModel if particles == "spheres" else SeriesModel
     try:
-        result = SeriesModel(accuracy=1e-4).solve(radius, matrix, [inclusion])[0]
+        result = series(accuracy=1e-4).solve(radius, matrix, [inclusion])[0]
     except (RuntimeError, ValueError):
         return None
+    if isinstance(result, HomogenisedSpheres):
+        return spheres.shear_ratio(result)
     stiffness = np.asarray(result.stiffness)
     return shear_ratio(stiffness), float(error_of_stiffness(result, shear_ratio))
 
@@ -194,6 +208,8 @@ def _over_directions(stiffness: Array) -> Array:
 
 def declared_errors(result: Homogenised) -> dict[str, Any] | None:
     """Declared error of every number of `document`, absolute and in its unit; None without any."""
+    if isinstance(result, HomogenisedSpheres):
+        return spheres.declared_errors(result)
     if not result.errors:
         return None
     modulus, nu, s11, s12 = error_of_means(result)
@@ -225,12 +241,16 @@ def declared_errors(result: Homogenised) -> dict[str, Any] | None:
 def document(result: Homogenised) -> dict[str, Any]:
     """The result as it is printed with ``--json``; moduli and stresses in GPa."""
     mean11, mean12 = result.curve.mean
+    if isinstance(result, HomogenisedSpheres):
+        own = spheres.moduli(result)
+    else:
+        stiffness = None if result.stiffness is None else result.stiffness / GPA
+        own = {"stiffness_GPa": stiffness, "directions": directions(result)}
     return {
         "E_GPa": result.modulus / GPA,
         "nu": result.poisson,
         "stress_GPa": {"s11": mean11 / GPA, "s12": mean12 / GPA},
-        "stiffness_GPa": None if result.stiffness is None else result.stiffness / GPA,
-        "directions": directions(result),
+        **own,
         "curve": {
             "theta": result.curve.theta,
             "weights": result.curve.weights,

@@ -11,6 +11,7 @@ from alphacut.rve.auto.model import AutoModel
 from alphacut.rve.auto.refined import RefinedModel
 from alphacut.rve.image.round_particle import RasterModel
 from alphacut.rve.series.model import SeriesModel
+from alphacut.rve.spheres.series.model import SphereSeriesModel
 from alphacut.rve.table.model import TableModel
 from alphacut.stages.material.cell import CellChoice, CellModel
 
@@ -70,6 +71,11 @@ def made(choice: CellChoice) -> CellModel:
         ImportError: It needs what is not installed.
     """
     tolerance = choice.tolerance
+    if choice.particles == "spheres":
+        if tolerance is None and choice.method == "auto":
+            tolerance = AutoModel.tolerance
+        own = SphereSeriesModel.accuracy if tolerance is None else max(SHARE * tolerance, 1e-11)
+        return SphereSeriesModel(accuracy=own)
     if choice.method == "auto":
         return AutoModel(
             AutoModel.tolerance if tolerance is None else tolerance,

@@ -30,14 +30,16 @@ if TYPE_CHECKING:
     from alphacut.rve.result import Homogenised
 
 QUANTITIES = {
-    "E": ("Pa", "effective Young's modulus, eq. 16"),
-    "nu": ("1", "effective Poisson's ratio, eq. 16"),
+    "E": ("Pa", "effective Young's modulus"),
+    "nu": ("1", "effective Poisson's ratio"),
 }
 STRESSES = {
     "s11": ("Pa", "mean homogenised stress 11 under ε11 = ε22 = 0.01"),
     "s12": ("Pa", "mean homogenised stress 12 under ε12 = 0.01"),
 }
 BOUNDS = QUANTITIES | STRESSES
+AVERAGE = {"cylinders": "eq. 16", "spheres": "Hill's isotropic average"}
+"""What E and ν mean, by the shape of the particle."""
 
 
 @dataclass(frozen=True)
@@ -148,6 +150,7 @@ class FuzzyModulus:
             "notes": list(self.result.notes),
             "plan": self.result.plan,
             "method": self.choice.method,
+            "particles": self.choice.particles,
             "reason": self.reason,
             "error": self.error,
             "shear_ratio": self.shear_ratio and self.shear_ratio[0],
@@ -166,6 +169,7 @@ class FuzzyModulus:
             column = result.column(name)
             ends = np.stack(result.bounds(name), axis=1)
             places = np.stack([result.lower_at[:, column], result.upper_at[:, column]], axis=1)
+            about += f", {AVERAGE[self.choice.particles]}" if name in QUANTITIES else ""
             variables[name] = (("alpha", "bound"), ends, {"units": unit, "long_name": about})
             variables[f"{name}_at"] = (
                 ("alpha", "bound", "parameter"),
@@ -210,6 +214,7 @@ class FuzzyModulus:
             "solves": self.solves,
             "seconds": result.seconds,
             "nature": self.nature,
+            "particles": self.choice.particles,
         }
         if self.shear_ratio is not None:
             names_of_ratio = ("shear_ratio", "shear_ratio_error")
@@ -247,9 +252,9 @@ def compute(wanted: Campaign, *, workers: int = 1, progress: Tick | None = None)
     )
     modal = {name: number.modal for name, number in wanted.inputs.items()}
     cell = parts({**wanted.task.crisp, **modal}, wanted.task.theta)
-    return FuzzyModulus(
-        result, wanted.task.choice, wanted.task.theta, wanted.task.judged(modal), anisotropy(*cell)
-    )
+    choice, theta = wanted.task.choice, wanted.task.theta
+    ratio = anisotropy(*cell, choice.particles)
+    return FuzzyModulus(result, choice, theta, wanted.task.judged(modal), ratio)
 
 
 def explain(wanted: Campaign) -> Explanation:

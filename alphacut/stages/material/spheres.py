@@ -1,0 +1,112 @@
+"""Results of a cell with a sphere as documents and lines, and what spheres change by the bounds."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+
+from alphacut.case.case import Case
+from alphacut.rve.bounds import mori_tanaka as of_cylinders
+from alphacut.rve.cell import STRAIN, Phase
+from alphacut.rve.result import effective_modulus
+from alphacut.rve.spheres.bounds import mori_tanaka as of_spheres
+from alphacut.rve.spheres.cubic import cubic_voigt, hill_average, young_along
+from alphacut.rve.spheres.result import HomogenisedSpheres
+from alphacut.stochastic import HermiteMap, gauss_rule
+from alphacut.stochastic.theta.truncated_normal import Array
+
+GPA = 1e9
+WORDS = re.compile(r"\b(spher\w*|aggregates?|grains?|gravel|sand|beads?|balls?)\b", re.IGNORECASE)
+
+
+def moduli(result: HomogenisedSpheres) -> dict[str, Any]:
+    """What a document says besides E and ν, in GPa: see the keys."""
+    bulk, deviator, shear = result.moduli / GPA
+    along = young_along(result.moduli) / GPA
+    return {
+        "E_along_GPa": {"100": along[0], "111": along[1]},
+        "K_GPa": bulk,
+        "G_GPa": [shear, deviator],
+        "C_GPa": np.asarray(result.stiffness) / GPA,
+        "shear_ratio": shear_ratio(result)[0],
+    }
+
+
+def declared_errors(result: HomogenisedSpheres) -> dict[str, Any] | None:
+    """Declared absolute error of every number of a document; None without any."""
+    if not result.errors:
+        return None
+    modulus, nu = result.error_of(hill_average)
+    s11, s12 = result.error_of(_stresses) / GPA
+    along = result.error_of(young_along) / GPA
+    bulk, deviator, shear = result.error_of(lambda values: values) / GPA
+    return {
+        "E_GPa": modulus / GPA,
+        "nu": nu,
+        "stress_GPa": {"s11": s11, "s12": s12},
+        "E_along_GPa": {"100": along[0], "111": along[1]},
+        "K_GPa": bulk,
+        "G_GPa": [shear, deviator],
+        "C_GPa": result.error_of(lambda values: cubic_voigt(*values)) / GPA,
+        "shear_ratio": shear_ratio(result)[1],
+        "curve": None,
+    }
+
+
+def _stresses(values: Array) -> Array:
+    """Mean σ11 and σ12 under eq. 15, ε33 = 0, from K, (C11 − C12)/2 and C44."""
+    return STRAIN * np.array([2 * values[0] + 2 / 3 * values[1], 2 * values[2]])
+
+
+def shear_ratio(result: HomogenisedSpheres) -> tuple[float, float]:
+    """(C11 − C12)/(2 C44) and its declared error."""
+
+    def ratio(values: Array) -> float:
+        return float(values[1] / values[2])
+
+    return ratio(result.moduli), float(result.error_of(ratio))
+
+
+def lines(result: HomogenisedSpheres) -> str:
+    """The result for people, every number with its declared error."""
+    found, error = {"E_GPa": result.modulus / GPA, **moduli(result)}, declared_errors(result)
+    off = error or dict.fromkeys(found, 0.0)
+    along, slack = found["E_along_GPa"], off["E_along_GPa"]
+    first, second = found["G_GPa"]
+    return (
+        f"E = {found['E_GPa']:.6f} ± {off['E_GPa']:.1e} GPa, nu = {result.poisson:.6f} ±"
+        f" {off['nu']:.1e} (Hill's isotropic average)\n"
+        f"E along 100 = {along['100']:.6f} ± {slack['100']:.1e} GPa, along 111 ="
+        f" {along['111']:.6f} ± {slack['111']:.1e} GPa\n"
+        f"K = {found['K_GPa']:.6f} ± {off['K_GPa']:.1e} GPa, C44 = {first:.6f} ±"
+        f" {off['G_GPa'][0]:.1e} GPa, (C11 - C12)/2 = {second:.6f} ± {off['G_GPa'][1]:.1e} GPa\n"
+        f"{result.method}: {result.reason}; {result.seconds['total']:.3f} s\n"
+    )
+
+
+def remark(case: Case, radius: HermiteMap, matrix: Phase, inclusion: Phase) -> str | None:
+    """Warning to a user of cylinders whose words say spheres, with the size of the difference.
+
+    None where nothing says so, or where the case names cylinders itself. The difference is that of
+    the bounds of Hashin and Shtrikman that the matrix gives, in the plane and in space, at one
+    fraction.
+    """
+    told = " ".join(str(value) for value in case.written.values() if isinstance(value, str))
+    word = WORDS.search(told)
+    if case.asked("cell.particles") or word is None:
+        return None
+    rule = gauss_rule(radius.distribution, points=40)
+    share = float(rule.weights @ (np.pi / 4 * radius(rule.nodes) ** 2))
+    bulk, _, shear = of_cylinders(np.asarray(share), matrix, inclusion)
+    plane, _ = effective_modulus(STRAIN * bulk, 2 * STRAIN * shear)
+    k, mu = of_spheres(np.asarray(share), matrix, inclusion)
+    space = float(hill_average(np.array([k, mu, mu]))[0])
+    return (
+        f"cell.particles: the case says {word.group(0)!r}, and the particles are cylinders; of"
+        f" spheres at the same fraction {share:.4f} the Hashin–Shtrikman bound of E is"
+        f" {space / GPA:.2f} GPa, of cylinders {plane / GPA:.2f} GPa"
+        f' ({100 * (space / plane - 1):+.1f} %); cell.particles = "spheres" takes'
+        ' spheres, "cylinders" ends this warning'
+    )

@@ -1,0 +1,110 @@
+"""Bounds of the stiffness of two isotropic phases in three dimensions.
+
+Voigt and Reuss hold as matrices; Hashin and Shtrikman's (J. Mech. Phys. Solids 11, 127, 1963; with
+the extreme moduli of either phase, Walpole 1966) for the bulk modulus of any cubic or isotropic
+arrangement and for both moduli of an isotropic one. The two shear moduli of a cubic arrangement
+obey them together: Milton and Kohn (J. Mech. Phys. Solids 36, 597, 1988) bound the trace over all
+five deviators.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from alphacut.rve.cell import Phase
+from alphacut.rve.spheres.cubic import cubic_voigt
+from alphacut.stochastic.theta.truncated_normal import Array
+
+
+def bulk_and_shear(phase: Phase) -> tuple[float, float]:
+    """K and μ of a material in space, in Pa."""
+    e, nu = phase.modulus, phase.poisson
+    return e / (3 * (1 - 2 * nu)), e / (2 * (1 + nu))
+
+
+def space_stiffness(phase: Phase) -> Array:
+    """Stiffness in Voigt order (11, 22, 33, 23, 13, 12 with 2 ε), shape (6, 6), in Pa."""
+    bulk, shear = (np.asarray(modulus) for modulus in bulk_and_shear(phase))
+    return cubic_voigt(bulk, shear, shear)
+
+
+def voigt(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
+    """Stiffness at uniform strain, shape (…, 6, 6), in Pa, for volume fractions of shape (…)."""
+    share = np.asarray(fraction)[..., None, None]
+    return np.asarray((1 - share) * space_stiffness(matrix) + share * space_stiffness(inclusion))
+
+
+def reuss(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
+    """Stiffness at uniform stress, shape (…, 6, 6), in Pa."""
+    share = np.asarray(fraction)[..., None, None]
+    compliances = (np.linalg.inv(space_stiffness(phase)) for phase in (matrix, inclusion))
+    first, second = compliances
+    return np.asarray(np.linalg.inv((1 - share) * first + share * second))
+
+
+def hashin_shtrikman(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
+    """Bounds of K and μ in Pa: shape (2 moduli, 2 ends, …) for volume fractions of shape (…)."""
+    share = np.asarray(fraction, float)
+    bulks, shears = zip(bulk_and_shear(matrix), bulk_and_shear(inclusion), strict=True)
+    found = []
+    for end in (min, max):
+        bulk, shear = end(bulks), end(shears)
+        around = _around(bulk, shear)
+        found.append(
+            [_mean(share, pair, x) for pair, x in zip((bulks, shears), around, strict=True)]
+        )
+    return np.swapaxes(np.array(found), 0, 1)
+
+
+def mori_tanaka(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
+    """K and μ of spheres by Mori and Tanaka (1973), in Pa, shape (2, …).
+
+    The bound that the matrix gives: the lower one of stiffer spheres, the upper one of softer.
+    """
+    share, around = np.asarray(fraction, float), _around(*bulk_and_shear(matrix))
+    pairs = zip(bulk_and_shear(matrix), bulk_and_shear(inclusion), strict=True)
+    return np.array([_mean(share, pair, x) for pair, x in zip(pairs, around, strict=True)])
+
+
+def _around(bulk: float, shear: float) -> tuple[float, float]:
+    """What Hashin and Shtrikman add to bulk and shear moduli in a reference material."""
+    return 4 / 3 * shear, shear / 6 * (9 * bulk + 8 * shear) / (bulk + 2 * shear)
+
+
+def _mean(share: Array, moduli: tuple[float, float], around: float) -> Array:
+    """Harmonic mean of the moduli, each with `around` added, less that."""
+    first, second = moduli
+    return np.asarray(1 / ((1 - share) / (first + around) + share / (second + around)) - around)
+
+
+def are_ordered(matrix: Phase, inclusion: Phase) -> bool:
+    """Whether one phase has both the larger bulk and the larger shear modulus."""
+    pairs = zip(bulk_and_shear(matrix), bulk_and_shear(inclusion), strict=True)
+    first, second = (inner - outer for outer, inner in pairs)
+    return first * second >= 0
+
+
+def shear_against_trace_bounds(
+    deviator: float, shear: float, limits: Array, phases: tuple[Phase, Phase]
+) -> float:
+    """Relative distance by which two shear moduli miss the trace bounds; 0 inside or unordered.
+
+    Args:
+        deviator: (C11 − C12)/2 in Pa.
+        shear: C44 in Pa.
+        limits: Hashin and Shtrikman's ends of μ at the same fraction, shape (2,), in Pa.
+        phases: Matrix and inclusion.
+    """
+    softer, stiffer = sorted(bulk_and_shear(phase)[1] for phase in phases)
+    nearest = min(
+        abs(modulus / end - 1) for modulus in (deviator, shear) for end in (softer, stiffer)
+    )
+    if not are_ordered(*phases) or nearest < 1e-9:  # too near a phase to tell from round-off
+        return 0.0
+
+    def mean(around: float) -> float:
+        """Mean over the five deviators, harmonic about a phase's shear modulus."""
+        return around + 5 / (2 / (deviator - around) + 3 / (shear - around))
+
+    low, high = limits
+    return max(0.0, float(low) - mean(softer), mean(stiffer) - float(high)) / mean(softer)

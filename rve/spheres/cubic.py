@@ -1,0 +1,63 @@
+"""A stiffness of cubic symmetry, its three moduli and its isotropic average.
+
+Voigt order in three dimensions: 11, 22, 33, 23, 13, 12, shears with 2 ε.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from alphacut.stochastic.theta.truncated_normal import Array
+
+MODULI = ("K", "(C11-C12)/2", "C44")
+
+
+def cubic_voigt(bulk: Array, deviator: Array, shear: Array) -> Array:
+    """Voigt matrices (…, 6, 6) from K, (C11 − C12)/2 and C44."""
+    voigt = np.zeros((*np.shape(bulk), 6, 6))
+    voigt[..., :3, :3] = np.asarray(bulk - 2 / 3 * deviator)[..., None, None]
+    for i in range(3):
+        voigt[..., i, i] = bulk + 4 / 3 * deviator
+        voigt[..., 3 + i, 3 + i] = shear
+    return voigt
+
+
+def cubic_moduli(stiffness: Array) -> Array:
+    """K, (C11 − C12)/2 and C44 of the cubic part of matrices (…, 6, 6), shape (…, 3)."""
+    diagonal = np.diagonal(stiffness, axis1=-2, axis2=-1)
+    axial, shear = diagonal[..., :3].mean(axis=-1), diagonal[..., 3:].mean(axis=-1)
+    lateral = (stiffness[..., 0, 1] + stiffness[..., 0, 2] + stiffness[..., 1, 2]) / 3
+    return np.stack([(axial + 2 * lateral) / 3, (axial - lateral) / 2, shear], axis=-1)
+
+
+def hill_shear(moduli: Array) -> Array:
+    """Mean of the Voigt and Reuss averages of the shear modulus over all directions (Hill 1952).
+
+    Args:
+        moduli: K, (C11 − C12)/2 and C44, shape (…, 3).
+    """
+    deviator, shear = moduli[..., 1], moduli[..., 2]
+    voigt, reuss = (2 * deviator + 3 * shear) / 5, 5 / (2 / deviator + 3 / shear)
+    return np.asarray((voigt + reuss) / 2)
+
+
+def hill_average(moduli: Array) -> Array:
+    """Young's modulus (in the unit of `moduli`) and Poisson's ratio of Hill's average, (…, 2)."""
+    bulk, shear = moduli[..., 0], hill_shear(moduli)
+    young = 9 * bulk * shear / (3 * bulk + shear)
+    return np.stack([young, (3 * bulk - 2 * shear) / (6 * bulk + 2 * shear)], axis=-1)
+
+
+def young_along(moduli: Array) -> Array:
+    """Young's modulus along ⟨100⟩ and ⟨111⟩, shape (…, 2): its extremes over all directions."""
+    bulk, deviator, shear = np.moveaxis(moduli, -1, 0)
+    along = [9 * bulk * g / (3 * bulk + g) for g in (deviator, shear)]
+    return np.stack(along, axis=-1)
+
+
+def cubic_constants(moduli: Array) -> Array:
+    """E1 … E3, ν12, ν13, ν23, G12, G13, G23 from K, (C11 − C12)/2 and C44, shape (9,)."""
+    bulk, deviator, shear = moduli
+    young = 9 * bulk * deviator / (3 * bulk + deviator)
+    poisson = (3 * bulk - 2 * deviator) / (6 * bulk + 2 * deviator)
+    return np.repeat([young, poisson, shear], 3)

@@ -1,0 +1,77 @@
+"""One eighth of the cell of a sphere as curved tetrahedra of second order, by Gmsh."""
+
+from __future__ import annotations
+
+import gmsh
+from dolfinx.io import gmshio
+from mpi4py import MPI
+
+from alphacut.rve.mesh.planar import TouchingError
+
+_CLOSEST = 0.97
+MATRIX, SPHERE = 1, 2
+
+
+def octant(radius: float, *, size: float, comm: MPI.Comm = MPI.COMM_SELF) -> gmshio.MeshData:
+    """Mesh of [0, 1]³ with the sphere about the origin, cell tags `MATRIX` and `SPHERE`.
+
+    Args:
+        radius: Radius over half the cell's side, in (0, 0.97].
+        size: Wanted edge length, in halves of the cell's side, in (0, 1].
+        comm: Ranks that share the mesh.
+
+    Raises:
+        ValueError: A value out of range.
+        TouchingError: Spheres nearly touch.
+    """
+    if not 0 < radius < 1:
+        raise ValueError(
+            f"the radius is {radius:g}; it must lie in (0, 1), in halves of the cell's side"
+        )
+    if not 0 < size <= 1:
+        raise ValueError(
+            f"the mesh size is {size:g}; it must lie in (0, 1], in halves of the cell's side"
+        )
+    if radius > _CLOSEST:
+        raise TouchingError(
+            f"the radius is {radius:.6g} and meshes of spheres end at {_CLOSEST:g}: the gap between"
+            " spheres would need elements without end; lower the radius"
+        )
+    gmsh.initialize(["", "-v", "1"], readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.NumThreads", 1)
+        if comm.rank == 0:
+            _generate(radius, size)
+        return gmshio.model_to_mesh(gmsh.model, comm, 0, gdim=3)
+    finally:
+        gmsh.finalize()
+
+
+def _generate(radius: float, size: float) -> None:
+    """Box and ball fragmented, meshed, and curved."""
+    occ = gmsh.model.occ
+    ball = occ.addSphere(0, 0, 0, radius)
+    box = occ.addBox(0, 0, 0, 1, 1, 1)
+    part = occ.intersect([(3, box)], [(3, ball)], removeObject=False)[0]
+    occ.fragment([(3, box)], part)
+    occ.synchronize()
+    volumes = [tag for _, tag in gmsh.model.getEntities(3)]
+    inner = min(volumes, key=lambda tag: float(occ.getCenterOfMass(3, tag)[0]))
+    gmsh.model.addPhysicalGroup(3, [tag for tag in volumes if tag != inner], MATRIX)
+    gmsh.model.addPhysicalGroup(3, [inner], SPHERE)
+    gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)
+    gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
+    gmsh.model.mesh.setSizeCallback(
+        lambda dim, tag, x, y, z, lc: size * _grading((x, y, z), radius)
+    )
+    gmsh.option.setNumber("Mesh.ElementOrder", 2)
+    gmsh.option.setNumber("Mesh.HighOrderOptimize", 2)
+    gmsh.model.mesh.generate(3)
+
+
+def _grading(spot: tuple[float, float, float], radius: float) -> float:
+    """Local edge length over the nominal one, less at a small sphere and in gaps between two."""
+    square = sum(c * c for c in spot)
+    contact = min((square - 2 * c + 1) ** 0.5 for c in spot)  # from (1, 0, 0) and its likes
+    small = 1.5 * radius + abs(square**0.5 - radius)
+    return min(1.0, small, 4 * (1 - radius) + contact)

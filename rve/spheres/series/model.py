@@ -1,0 +1,91 @@
+"""Series model of the cell with a sphere: exact for the simple cubic array, at nodes of θ."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from alphacut.rve.cell import Phase
+from alphacut.rve.slices.theta_rule import settle_rule
+from alphacut.rve.spheres.cubic import cubic_moduli
+from alphacut.rve.spheres.result import HomogenisedSpheres, certified_spheres
+from alphacut.rve.spheres.series.stiffness import cubic_stiffness
+from alphacut.stochastic import RadiusMap
+from alphacut.stochastic.theta.truncated_normal import Array
+
+
+@dataclass(frozen=True)
+class SphereSeriesModel:
+    """Multipole series at the nodes of a Gauss rule in θ.
+
+    Args:
+        points: Nodes of the rule, or None: as many as bring two successive rules within `accuracy`
+            of one another.
+        accuracy: Relative error allowed, of the series at each θ and, without `points`, of the mean
+            moduli by the rule in θ; in [1e-11, 0.1].
+
+    Raises:
+        ValueError: A value lies outside its range.
+    """
+
+    points: int | None = None
+    accuracy: float = 1e-9
+    name = "series"
+
+    def __post_init__(self) -> None:
+        if self.points is not None and self.points < 2:
+            raise ValueError(f"the rule in θ has {self.points} points; it needs at least 2")
+        if not 1e-11 <= self.accuracy <= 0.1:
+            raise ValueError(
+                f"the accuracy of the series of spheres is {self.accuracy:g}; it must lie in"
+                " [1e-11, 0.1]"
+            )
+
+    def solve(
+        self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
+    ) -> list[HomogenisedSpheres]:
+        """One result for each of `inclusions`, in their order.
+
+        Raises:
+            SeriesError: Spheres nearly touch.
+            RuleError: No rule in θ settles (a map that is not smooth).
+        """
+        start = perf_counter()
+        used: dict[float, tuple[Array, Array]] = {}
+
+        def stiffness_at(radii: Array) -> Array:
+            cells = cubic_stiffness(radii, matrix, inclusions, tolerance=self.accuracy)
+            used.update(zip(radii, zip(cells.errors, cells.degrees, strict=True), strict=True))
+            return cells.matrix
+
+        curves, gaps = settle_rule(
+            radius_map,
+            stiffness_at,
+            points=self.points,
+            accuracy=self.accuracy,
+            moduli=cubic_moduli,
+        )
+        seconds = perf_counter() - start
+        results = []
+        for k, (curve, gap) in enumerate(zip(curves, gaps, strict=True)):
+            spent = [used[r] for r in radius_map(curve.theta)]
+            error, degree = np.array([e[k] for e, _ in spent]), max(int(n[k]) for _, n in spent)
+            moduli = cubic_moduli(np.asarray(curve.stiffness))
+            mean = curve.weights @ (moduli * error) / (curve.weights @ moduli)
+            results.append(
+                HomogenisedSpheres(
+                    curve=curve,
+                    method=self.name,
+                    unknowns=3 * (degree + 2) ** 2 // 16,
+                    seconds={"solve": seconds, "total": seconds},
+                    errors={"space": mean, "theta": gap},
+                    reason=f"{curve.theta.size} nodes in θ, multipoles up to degree {degree}",
+                )
+            )
+        return [
+            certified_spheres(result, radius_map, matrix, phase)
+            for result, phase in zip(results, inclusions, strict=True)
+        ]

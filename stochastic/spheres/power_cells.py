@@ -1,0 +1,70 @@
+"""Power (Laguerre) cells of spheres in a periodic cube, by Voro++, and their reduced radii.
+
+Voro++ (Rycroft, Chaos 19, 041111, 2009) is run as a program; Debian's package is voro++.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from alphacut.stochastic.errors import RefusedError
+from alphacut.stochastic.fit.area_weighted import AreaWeighted
+from alphacut.stochastic.spheres.spheres import Spheres
+from alphacut.stochastic.theta.truncated_normal import Array
+
+
+def cell_volumes(spheres: Spheres) -> Array:
+    """Volumes of the power cells in m³, shape (n,); they fill the cube.
+
+    Raises:
+        RefusedError: Voro++ is not installed or fails, or a sphere has no cell.
+    """
+    program = shutil.which("voro++")
+    if program is None:
+        raise RefusedError("cells of spheres need Voro++: install Debian's package voro++")
+    count = len(spheres.radii)
+    table = np.column_stack([np.arange(count), spheres.centres / spheres.side])
+    table = np.column_stack([table, spheres.radii / spheres.side])
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "spheres"
+        np.savetxt(file, table, fmt="%d %.17g %.17g %.17g %.17g")
+        command = [program, "-r", "-p", "-c", "%i %v", *"010101", str(file)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        made = file.with_name("spheres.vol")
+        if done.returncode or not made.is_file():
+            raise RefusedError(f"Voro++ fails: {done.stderr.strip() or done.stdout.strip()}")
+        found = np.loadtxt(made, ndmin=2)
+    volumes = np.zeros(count)
+    volumes[found[:, 0].astype(int)] = found[:, 1]
+    if not (volumes > 0).all() or abs(volumes.sum() - 1) > 1e-6:
+        raise RefusedError(
+            f"the power cells of {count} spheres fill {volumes.sum():.6f} of the cube, and"
+            f" {int((volumes <= 0).sum())} spheres have none: do they overlap?"
+        )
+    return volumes * spheres.side**3
+
+
+def reduced_radii(packings: Sequence[Spheres]) -> AreaWeighted:
+    """Volume-weighted r_n = r / (V^⅓/2) of all cells, one group a packing.
+
+    The cube of the cell's volume has the side 2 in its own units, so that π/6 Σ w r_n³ is the
+    volume fraction.
+    """
+    values, weights, groups = [], [], []
+    for number, packing in enumerate(packings):
+        volumes = cell_volumes(packing)
+        values.append(2 * packing.radii / np.cbrt(volumes))
+        weights.append(volumes)
+        groups.append(np.full(len(volumes), number))
+    return AreaWeighted.of(*(np.concatenate(part) for part in (values, weights, groups)))
+
+
+def volume_fraction(sample: AreaWeighted) -> float:
+    """Σ w π/6 r_n³ of a volume-weighted sample."""
+    return float(np.pi / 6 * sample.weights @ sample.values**3)

@@ -1,0 +1,126 @@
+"""A case of spheres from the command line: choice, one radius, fuzzy modulus, words."""
+
+import json
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+import pytest
+
+from alphacut.entry import main
+from alphacut.rve import Phase
+from alphacut.rve.spheres.cubic import cubic_moduli, hill_average, young_along
+from alphacut.rve.spheres.series.stiffness import cubic_stiffness
+
+PAPER = str(Path(__file__).parents[3] / "cases" / "paper.toml")
+SPHERES = ["--set", 'cell.particles="spheres"', "--method", "series"]
+
+
+def answer(capfd, *arguments):
+    """The JSON that a command prints."""
+    assert main([*arguments, "--json", "-"]) == 0
+    return json.loads(capfd.readouterr().out)
+
+
+def test_one_radius_gives_the_cubic_stiffness(capfd):
+    found = answer(capfd, "cell", PAPER, *SPHERES, "--radius", "0.6")
+    exact = cubic_stiffness([0.6], Phase(20e9), [Phase(80e9)], tolerance=1e-11).matrix[0, 0] / 1e9
+    bulk, deviator, shear = cubic_moduli(exact)
+    np.testing.assert_allclose(found["C_GPa"], exact, rtol=1e-9, atol=1e-12)
+    assert found["K_GPa"] == pytest.approx(bulk, rel=1e-9)
+    assert found["G_GPa"] == pytest.approx([shear, deviator], rel=1e-9)
+    assert [found["E_GPa"], found["nu"]] == pytest.approx(hill_average(cubic_moduli(exact)))
+    along = np.array([found["E_along_GPa"][name] for name in ("100", "111")])
+    np.testing.assert_allclose(along, young_along(cubic_moduli(exact)), rtol=1e-9)
+    compliance = np.linalg.inv(exact)
+    assert along[0] == pytest.approx(1 / compliance[0, 0])
+    # ⟨111⟩: S11 − 2 (S11 − S12 − S44/2)/3
+    anisotropy = compliance[0, 0] - compliance[0, 1] - compliance[3, 3] / 2
+    assert along[1] == pytest.approx(1 / (compliance[0, 0] - 2 / 3 * anisotropy))
+    assert found["declared_error"]["E_GPa"] < 1e-7
+
+
+def test_one_radius_of_a_cylinder_is_the_planar_cell(capfd):
+    found = answer(capfd, "cell", PAPER, "--method", "series", "--radius", "0.5")
+    assert found["stress_GPa"]["s11"] == pytest.approx(0.467852842132, abs=1e-11)
+
+
+def test_the_certificate_of_spheres_covers_their_bounds(capfd):
+    checks = answer(capfd, "cell", PAPER, *SPHERES)["checks"]
+    assert set(checks) == {
+        "symmetry", "reuss", "voigt", "hashin_shtrikman", "hashin_shtrikman_shear"
+    }  # fmt: skip
+
+
+def test_five_levels_of_the_fuzzy_modulus_to_1e_6_in_seconds(capfd):
+    start = process_time()
+    found = answer(capfd, "modulus", PAPER, *SPHERES, "--tolerance", "1e-6")
+    seconds = process_time() - start
+    exact = answer(capfd, "modulus", PAPER, *SPHERES, "--plan", "reduced", "--tolerance", "1e-9")
+    assert found["samples"] == 225
+    assert seconds <= 10  # of the processor; five on a quiet core
+    for end in ("lower", "upper"):
+        np.testing.assert_allclose(found["E_GPa"][end], exact["E_GPa"][end], rtol=1e-6)
+
+
+def test_text_says_what_e_is(capfd):
+    assert main(["cell", PAPER, *SPHERES, "--radius", "0.6"]) == 0
+    out = capfd.readouterr().out
+    assert "Hill's isotropic average" in out
+    assert "E along 100 = 23.175375" in out
+    assert "eq. 16" not in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--method", "prism"], "this model is one of cylinders"),
+        (["--method", "table"], "this model is one of cylinders"),
+        (["--method", "series", "--radius", "1.2"], "--radius = 1.2: out of range"),
+        (["--method", "series", "--radius", "nan"], "--radius = nan: out of range"),
+        (["--method", "series", "--radius", "0.5", "--a1", "0.2"], "no effect beside --radius"),
+        (["--method", "series", "--set", 'cell.particles="cubes"'], "cylinders, spheres"),
+    ],
+)
+def test_what_spheres_cannot_have_is_one_line(arguments, words, capfd):
+    chosen = [] if "cubes" in arguments[-1] else SPHERES[:2]
+    assert main(["cell", PAPER, *chosen, *arguments]) == 2
+    out, err = capfd.readouterr()
+    assert not out
+    assert words in err
+    assert err.count("\n") == 1
+
+
+def test_a_mesh_of_spheres_is_refused(tmp_path, capfd):
+    path = tmp_path / "cell.vtu"
+    assert (
+        main(["mesh", PAPER, *SPHERES[:2], "--set", "modulus.method=series", "--out", str(path)])
+        == 2
+    )
+    assert "cell.particles" in capfd.readouterr().err
+    assert not path.exists()
+
+
+def test_check_warns_of_cylinders_where_the_words_say_spheres(tmp_path, capfd):
+    path = tmp_path / "own.toml"
+    lines = Path(PAPER).read_text(encoding="utf-8").splitlines()
+    text = "\n".join(line for line in lines if not line.startswith("particles"))
+    path.write_text(text, encoding="utf-8")
+    assert main(["check", str(path)]) == 0
+    err = capfd.readouterr().err
+    assert "the case says 'aggregates'" in err
+    assert "25.78 GPa, of cylinders 24.92 GPa (+3.5 %)" in err
+    for particles in ("spheres", "cylinders"):
+        chosen = [f'cell.particles="{particles}"', "modulus.method=series"]
+        assert main(["check", str(path), "--set", chosen[0], "--set", chosen[1]]) == 0
+        assert "aggregates" not in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("ending", [".inp", ".comm", ".mac", ".json"])
+def test_a_material_card_of_spheres_is_cubic(ending, tmp_path):
+    path = tmp_path / f"card{ending}"
+    assert main(["cell", PAPER, *SPHERES, "--radius", "0.6", "--export", str(path)]) == 0
+    text = path.read_text(encoding="utf-8")
+    assert "Hill's average" in text
+    assert "2.31753751" in text.replace("23175375191", "2.3175375191")  # E along the axes
+    assert "plane" not in text.lower()

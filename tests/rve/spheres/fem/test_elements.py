@@ -1,0 +1,74 @@
+"""Finite elements on one eighth of the cell against the exact series."""
+
+import numpy as np
+import pytest
+
+from alphacut.rve import Phase
+from alphacut.rve.mesh.planar import TouchingError
+from alphacut.rve.spheres.bounds import bulk_and_shear
+from alphacut.rve.spheres.fem.octant import octant
+from alphacut.rve.spheres.fem.stiffness import cubic_stiffness_by_elements, octant_stiffness
+from alphacut.rve.spheres.series.stiffness import cubic_stiffness
+
+MATRIX = Phase(20e9)
+
+
+def exact(radius, matrix, inclusion):
+    cell = cubic_stiffness([radius], matrix, [inclusion])
+    return np.array([cell.bulk[0, 0], cell.deviator[0, 0], cell.shear[0, 0]])
+
+
+def test_homogeneous_cell_is_the_matrix():
+    bulk, shear = bulk_and_shear(MATRIX)
+    found = octant_stiffness(0.5, MATRIX, MATRIX, size=0.6)
+    np.testing.assert_allclose(found.moduli, [bulk, shear, shear], rtol=1e-9)
+
+
+@pytest.mark.parametrize("inclusion", [Phase(80e9, 0.2), Phase(2e9, 0.4)])
+def test_elements_and_series_agree_within_the_declared_error(inclusion):
+    moduli, error = cubic_stiffness_by_elements(0.6, MATRIX, inclusion, size=0.25)
+    true = abs(moduli / exact(0.6, MATRIX, inclusion) - 1)
+    assert (true <= error).all()
+    assert true.max() < 2e-3
+
+
+@pytest.mark.slow
+def test_elements_and_series_agree_to_1e_4_in_fourth_order():
+    inclusion = Phase(80e9, 0.2)
+    reference = exact(0.6, MATRIX, inclusion)
+    coarse, fine = (octant_stiffness(0.6, MATRIX, inclusion, size=h) for h in (0.16, 0.11))
+    errors = [abs(found.moduli / reference - 1).max() for found in (coarse, fine)]
+    assert errors[1] < 1e-4
+    edge = (fine.unknowns / coarse.unknowns) ** (1 / 3)
+    assert np.log(errors[0] / errors[1]) / np.log(edge) > 2.7
+
+
+@pytest.mark.slow
+def test_declared_error_holds_over_radii_and_materials():
+    generator = np.random.default_rng(8)
+    for _ in range(8):
+        radius = generator.uniform(0.2, 0.9)
+        matrix = Phase(20e9, generator.uniform(0, 0.4))
+        inclusion = Phase(20e9 * 10 ** generator.uniform(-2, 2), generator.uniform(0, 0.4))
+        moduli, error = cubic_stiffness_by_elements(radius, matrix, inclusion, size=0.2)
+        true = abs(moduli / exact(radius, matrix, inclusion) - 1)
+        assert (true <= error + 1e-7).all(), (radius, matrix, inclusion)
+
+
+@pytest.mark.slow
+def test_iterations_hardly_depend_on_mesh_and_contrast():
+    counts = [
+        max(octant_stiffness(0.6, MATRIX, Phase(20e9 * contrast), size=size).iterations)
+        for size in (0.4, 0.16)
+        for contrast in (1e-2, 1, 1e2)
+    ]
+    assert max(counts) <= 2 * min(counts)
+
+
+def test_meshes_out_of_range_are_refused():
+    with pytest.raises(ValueError, match=r"the radius is 1\.2"):
+        octant(1.2, size=0.2)
+    with pytest.raises(ValueError, match="the mesh size is 2"):
+        octant(0.5, size=2)
+    with pytest.raises(TouchingError, match=r"meshes of spheres end at 0\.97"):
+        octant(0.99, size=0.2)

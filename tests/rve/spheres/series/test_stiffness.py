@@ -1,0 +1,157 @@
+from time import perf_counter
+
+import numpy as np
+import pytest
+
+from alphacut.rve import Phase
+from alphacut.rve.series.stiffness import SeriesError
+from alphacut.rve.spheres.bounds import bulk_and_shear, hashin_shtrikman, space_stiffness
+from alphacut.rve.spheres.result import volume_fraction
+from alphacut.rve.spheres.series import stiffness as series
+from alphacut.rve.spheres.series.stiffness import cubic_stiffness
+
+MATRIX = Phase(20e9)
+MODULI = ("bulk", "deviator", "shear")
+
+
+def moduli(radius, matrix, inclusion, **options):
+    """K, (C11 − C12)/2 and C44 of one cell, in Pa."""
+    cell = cubic_stiffness([radius], matrix, [inclusion], **options)
+    return np.array([getattr(cell, name)[0, 0] for name in MODULI])
+
+
+def material(bulk, shear):
+    return Phase(
+        9 * bulk * shear / (3 * bulk + shear), (3 * bulk - 2 * shear) / (6 * bulk + 2 * shear)
+    )
+
+
+def random_cells(count, seed, *, highest):
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        phases = [
+            Phase(20e9 * 10 ** rng.uniform(-3, 3) ** k, rng.uniform(-0.5, 0.49)) for k in (0, 1)
+        ]
+        yield rng.uniform(0.05, highest), *phases
+
+
+def test_homogeneous_cell_is_the_matrix():
+    cells = cubic_stiffness([0, 0.3, 0.9], MATRIX, [MATRIX])
+    expected = np.broadcast_to(space_stiffness(MATRIX), (3, 6, 6))
+    np.testing.assert_allclose(cells.matrix[:, 0], expected, rtol=1e-13, atol=1e-3)
+
+
+@pytest.mark.parametrize("inclusion", [Phase(90e9, 0.1), Phase(1e-3, 0.2), Phase(1e22, 0.4)])
+def test_dilute_limit_of_eshelby(inclusion):
+    """One sphere in an infinite matrix (Eshelby 1957): stiff, a pore, rigid."""
+    radius = 5e-3
+    (km, gm), (ki, gi) = bulk_and_shear(MATRIX), bulk_and_shear(inclusion)
+    zeta = gm / 6 * (9 * km + 8 * gm) / (km + 2 * gm)
+    exact = volume_fraction(radius) * np.array(
+        [
+            (ki - km) * (km + 4 / 3 * gm) / (ki + 4 / 3 * gm),
+            *[(gi - gm) * (gm + zeta) / (gi + zeta)] * 2,
+        ]
+    )
+    np.testing.assert_allclose(moduli(radius, MATRIX, inclusion) - [km, gm, gm], exact, rtol=2e-6)
+
+
+@pytest.mark.parametrize("radius", [0.3, 0.8, 0.92])
+def test_equal_shear_moduli_give_hills_bulk_modulus(radius):
+    """Hill (1963): K = ⟨1/(K + 4μ/3)⟩⁻¹ − 4μ/3 for any arrangement; μ stays."""
+    shear, bulks, share = 8e9, (12e9, 300e9), volume_fraction(radius)
+    exact = 1 / ((1 - share) / (bulks[0] + 4 / 3 * shear) + share / (bulks[1] + 4 / 3 * shear))
+    found = moduli(radius, *(material(bulk, shear) for bulk in bulks), tolerance=1e-11)
+    np.testing.assert_allclose(found, [exact - 4 / 3 * shear, shear, shear], rtol=1e-10)
+
+
+def viscosity(radius, **options):
+    """Viscosities over that of the fluid, of rigid spheres in an incompressible one, less 1."""
+    nu = 0.5 - 1e-9
+    return moduli(radius, Phase(2 * (1 + nu), nu), Phase(1e13), **options)[1:] - 1
+
+
+@pytest.mark.parametrize("share", [0.005, 0.02])
+def test_rigid_spheres_in_a_fluid_of_zuzovsky(share):
+    """Zuzovsky, Adler & Brenner, Phys. Fluids 26, 1714 (1983): a, b of the simple cubic lattice."""
+    a, b = 0.2857, -0.04655
+    expected = [
+        2.5 * share / (1 - (1 - 60 * b) * share + 12 * a * share ** (5 / 3)),
+        2.5 * share / (1 - (1 + 40 * b) * share - 8 * a * share ** (5 / 3)),
+    ]
+    found = viscosity((6 * share / np.pi) ** (1 / 3))
+    np.testing.assert_allclose(found, expected, rtol=12 * share ** (7 / 3))
+
+
+def test_rigid_spheres_near_contact_follow_lubrication():
+    """The singular terms of Nunan & Keller, J. Fluid Mech. 142, 269 (1984), with gap 2(1 − r)."""
+
+    def rest(radius):
+        gap = 1 - radius
+        log = np.log(1 / gap)
+        singular = [3 / 16 * np.pi / gap + 27 / 80 * np.pi * log, np.pi / 4 * log]
+        return viscosity(radius, tolerance=1e-4) - singular
+
+    first, second = rest(0.9), rest(0.96)
+    assert abs(second - first).max() < 0.02  # while they themselves grow by 9.6 and 0.75
+
+
+def test_hashin_shtrikman_and_the_traces_enclose():
+    for radius, matrix, inclusion in random_cells(40, 3, highest=0.95):
+        bulk, deviator, shear = moduli(radius, matrix, inclusion, tolerance=1e-5)
+        limits = hashin_shtrikman(volume_fraction(radius), matrix, inclusion)
+        assert limits[0, 0] * (1 - 1e-9) <= bulk <= limits[0, 1] * (1 + 1e-9)
+        reference = [min(bulk_and_shear(p)[1] for p in (matrix, inclusion)), 0.0]
+        mean = 5 / (2 / (deviator - reference[0]) + 3 / (shear - reference[0])) + reference[0]
+        assert mean >= limits[1, 0] * (1 - 1e-4)
+
+
+def test_declared_error_holds_and_is_no_fable():
+    ratios = []
+    rng = np.random.default_rng(11)
+    for radius, matrix, inclusion in random_cells(100, 2, highest=0.95):
+        tolerance = 10 ** rng.uniform(-8, -2)
+        cell = cubic_stiffness([radius], matrix, [inclusion], tolerance=tolerance)
+        exact = moduli(radius, matrix, inclusion, tolerance=min(1e-10, tolerance / 1e3))
+        found = np.array([getattr(cell, name)[0, 0] for name in MODULI])
+        true = abs(found / exact - 1)
+        assert (cell.errors[0, 0] + 1e-12 >= true).all(), (radius, matrix, inclusion, tolerance)
+        assert cell.errors.max() <= tolerance
+        if true.max() > 1e-12:
+            ratios.append(cell.errors.max() / true.max())
+    assert len(ratios) > 60
+    assert np.median(ratios) < 30
+
+
+def test_pore_and_rigid_sphere_are_limits():
+    for contrast in (1e-9, 1e9):
+        near, far = (moduli(0.9, MATRIX, Phase(20e9 * contrast**k, 0.2)) for k in (1, 1.3))
+        np.testing.assert_allclose(near, far, rtol=1e-7)
+
+
+def test_a_radius_takes_a_tenth_of_a_second():
+    cubic_stiffness([0.8], MATRIX, [Phase(80e9)], tolerance=1e-8)  # makes the lattice sums
+    seconds = []
+    for inclusion in (Phase(20e12), Phase(20e6), Phase(80e9)):
+        start = perf_counter()
+        cell = cubic_stiffness([0.8], MATRIX, [inclusion], tolerance=1e-8)
+        seconds.append(perf_counter() - start)
+        assert cell.errors.max() <= 1e-8
+    assert np.median(seconds) <= 0.1
+
+
+@pytest.mark.parametrize("most", [16, pytest.param(64, marks=pytest.mark.slow)])
+def test_nearly_touching_spheres_are_refused(monkeypatch, most):
+    steps = tuple(step for step in series._STEPS if step <= most)
+    monkeypatch.setattr(series, "_STEPS", steps)
+    monkeypatch.setattr(series, "MOST_DEGREES", most)
+    with pytest.raises(
+        SeriesError, match=r"r = 0\.998 reaches a relative error of .* nearly touch"
+    ):
+        cubic_stiffness([0.998], MATRIX, [Phase(20e12)], tolerance=1e-8)
+
+
+@pytest.mark.parametrize("radius", [1.0, -0.1, np.nan])
+def test_a_radius_outside_is_refused(radius):
+    with pytest.raises(ValueError, match=r"it must lie in \[0, 1\)"):
+        cubic_stiffness([radius], MATRIX, [MATRIX])
