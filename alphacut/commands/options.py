@@ -32,11 +32,8 @@ class KeyOption:
 
 
 SAMPLE = {
-    "--a1": KeyOption("radius.a1", "radius at the lower end of θ", "NUMBER"),
-    "--a2": KeyOption("radius.a2", "slope there", "NUMBER"),
-    "--a3": KeyOption("radius.a3", "radius at the upper end of θ", "NUMBER"),
-    "--a4": KeyOption("radius.a4", "slope there", "NUMBER"),
-    "--matrix-modulus": KeyOption("cell.matrix_modulus", "as '20 GPa'"),
+    "--a2": KeyOption("radius.a2", "slope of the radius at the lower end of θ", "NUMBER"),
+    "--a4": KeyOption("radius.a4", "slope at the upper end", "NUMBER"),
     "--inclusion-modulus": KeyOption("cell.inclusion_modulus", "as '80 GPa'"),
 }
 MESH = {

@@ -100,11 +100,8 @@ alpha = [0, 1]
 VALUES = {
     "--json": ("-", "out.json"),
     "--quiet": ((),),
-    "--a1": ("0.31",),
     "--a2": ("0.11",),
-    "--a3": ("0.51",),
     "--a4": ("0.11",),
-    "--matrix-modulus": ("21 GPa",),
     "--inclusion-modulus": ("81 GPa",),
     "--layers": ("3",),
     "--mesh-size": ("0.3",),

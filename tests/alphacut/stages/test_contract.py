@@ -92,7 +92,7 @@ def test_an_envelope_that_misses_its_tolerance_fails_in_one_line(capfd):
         (["cell", PAPER, "--cross-check", "auto,series"], "method auto takes series here"),
         (["cell", PAPER, "--method", "series", "--stiffness"], "--stiffness: this has no effect"),
         (["cell", PAPER, "--set", "envelope.step=0.1 s"], "envelope.step"),
-        (["cell", PAPER, "--a1", "0.3", "--set", "radius.a1=0.2"], "changed twice"),
+        (["cell", PAPER, "--a2", "0.3", "--set", "radius.a2=0.2"], "changed twice"),
         (["cell", PAPER, "--best-effort"], "no tolerance can be missed here"),
         (["modulus", PAPER, "--explain", "--out", "x.nc"], "--out = x.nc: this has no effect"),
         (["modulus", PAPER, "--explain", "--workers", "2"], "--workers = 2"),
