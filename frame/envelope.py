@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -223,7 +224,19 @@ class Envelope:
         return dataset
 
 
-def signed_envelope(flow: Trajectories, bounds: Array, at: Array, **rest: Any) -> Envelope:
+def signed_envelope(
+    flow: Trajectories,
+    bounds: Array,
+    at: Array,
+    *,
+    method: str,
+    nature: str,
+    trajectories: int,
+    seconds: float,
+    error: Array | None = None,
+    between: Array | None = None,
+    facts: Mapping[str, float | str] = MappingProxyType({}),
+) -> Envelope:
     """Envelope from upper bounds of (−output, output), (A, T, m, 2), and their coordinates."""
     cuts = flow.boxes
     where = cuts.to_physical(at)
@@ -236,7 +249,13 @@ def signed_envelope(flow: Trajectories, bounds: Array, at: Array, **rest: Any) -
         bounds[..., 1],
         where[..., 0, :],
         where[..., 1, :],
-        **rest,
+        method,
+        nature,
+        trajectories,
+        seconds,
+        error,
+        between=between,
+        facts=facts,
     )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -40,7 +39,7 @@ def envelope(
     integrator: str | Integrator | None = None,
     relative: bool = False,
     progress: Progress | None = None,
-    **options: Any,
+    **options: object,
 ) -> Envelope:
     """Lower and upper envelopes of the outputs of `model`.
 

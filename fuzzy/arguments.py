@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
-from typing import Any
 
 from alphacut.fuzzy.knowledge.joint import joined_once
 from alphacut.fuzzy.knowledge.known import Known
@@ -107,7 +106,7 @@ def require_plan(plan: object) -> None:
         )
 
 
-def require_callable(function: Any, names: Sequence[str], *, by_name: bool, sent: bool) -> None:
+def require_callable(function: object, names: Sequence[str], *, by_name: bool, sent: bool) -> None:
     """Refuse a function that the inputs or the worker processes cannot call.
 
     Raises:

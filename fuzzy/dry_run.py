@@ -21,7 +21,9 @@ from alphacut.fuzzy.plans.transformation import Extended, General, Reduced
 from alphacut.fuzzy.samples.model import Values
 from alphacut.fuzzy.sets.boxes import Domain, levels
 from alphacut.fuzzy.sets.interaction import Interaction
-from alphacut.fuzzy.sets.numbers import Array
+from alphacut.fuzzy.sets.numbers import Array, FuzzyNumber
+
+Inputs = Mapping[str, FuzzyNumber | float]
 
 _SHOWN = 5
 _LISTED = 100_000  # samples that are listed at most where nothing is stored
@@ -111,8 +113,8 @@ class _Rehearsal:
 
 
 def explain(
-    function: Function | Mapping[str, Any] | None = None,
-    inputs: Mapping[str, Any] | Plan | None = None,
+    function: Function | Inputs | None = None,
+    inputs: Inputs | Plan | None = None,
     plan: Plan | None = None,
     *,
     alpha: Sequence[float] | None = None,
@@ -154,7 +156,7 @@ def explain(
     plan = plan or Automatic()
     require_plan(plan)
     domain = Domain(
-        fuzzy_inputs(cast("Mapping[str, Any]", inputs)),
+        fuzzy_inputs(cast("Inputs", inputs)),
         levels(4) if alpha is None else alpha,
         interaction_list(interactions),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from importlib import import_module
-from typing import Any, Protocol
+from typing import Protocol
 
 from alphacut.rve.cell import Phase
 from alphacut.rve.result import Homogenised
@@ -38,7 +38,7 @@ class Model(Protocol):
         """
 
 
-def named(name: str, **options: Any) -> Model:
+def named(name: str, **options: object) -> Model:
     """The model called `name` with its own options, e.g. ``named("slices", order=3)``.
 
     Raises:

@@ -18,7 +18,7 @@ EDGE = (
 )
 
 
-def summary(found: Microstructure) -> dict[str, Any]:
+def summary(found: Microstructure) -> dict[str, object]:
     """Every number found, lengths in m."""
     box, sample, discs = found.pbox, found.sample, [section.discs for section in found.sections]
     radii = np.concatenate([one.radii for one in discs])

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 from alphacut.case.case import Case
 from alphacut.case.sections.particles import Microstructure
+from alphacut.io.files import Document
 
 NODES = 120  # time steps of an envelope
 LEVELS = (0.0, 1.0)
@@ -54,7 +54,7 @@ def value_of(case: Case, key: str) -> object:
     return found
 
 
-def banner(found: Mapping[str, Any]) -> str:
+def banner(found: Document) -> str:
     """Banner above the results of a quick form, from `settings`."""
     parts = []
     for key, value in found.items():

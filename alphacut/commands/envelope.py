@@ -6,7 +6,7 @@ import argparse
 import re
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from alphacut.commands.options import (
 )
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io import quantity
+from alphacut.io.files import Document
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import progress
 from alphacut.io.provenance import fingerprint
@@ -119,7 +120,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     return 0
 
 
-def exceeded(options: argparse.Namespace, case: Case, wanted: Structure) -> dict[str, Any] | None:
+def exceeded(options: argparse.Namespace, case: Case, wanted: Structure) -> Document | None:
     """The fuzzy probability of exceeding the case's limit; None where it names none."""
     if case.sections.exceedance is None:
         return None

@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TextIO
 
 from alphacut.case.idle import require_read
 from alphacut.case.load import load
 from alphacut.commands.options import add_common, answer
-from alphacut.io.files import say
+from alphacut.io.files import Document, say
 from alphacut.io.progress import progress
 from alphacut.io.provenance import attributes, fingerprint
 from alphacut.stages.image.bounds import compute
@@ -43,7 +43,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     return 0
 
 
-def summary(found: Mapping[str, Any]) -> str:
+def summary(found: Document) -> str:
     """The bounds in a few lines for people."""
     cuts = found["cuts"]
     rows = "".join(
@@ -75,7 +75,7 @@ def summary(found: Mapping[str, Any]) -> str:
     )
 
 
-def quantiles(found: Mapping[str, Any]) -> str:
+def quantiles(found: Document) -> str:
     """Quantiles of E over a random threshold at the top level, in lines; empty without one."""
     random = found["random_threshold"]
     rows = random["quantiles"] if random else []
@@ -84,7 +84,7 @@ def quantiles(found: Mapping[str, Any]) -> str:
     )
 
 
-def table_of(rows: Sequence[Mapping[str, Any]]) -> str:
+def table_of(rows: Sequence[Document]) -> str:
     """The error table in lines, the source to improve first on top."""
     lines = "".join(
         f"{row['source']:<15} {row['width_GPa']:9.3g} GPa {row['share']:6.1%}  {row['cure']}\n"

@@ -23,7 +23,7 @@ from alphacut.commands.options import (
 )
 from alphacut.figures import all as figures
 from alphacut.figures.captions import core
-from alphacut.io.files import as_json, say, whole_file, write_text
+from alphacut.io.files import Document, as_json, say, whole_file, write_text
 from alphacut.io.output_paths import unwritable
 from alphacut.io.problem import BadInput
 from alphacut.io.provenance import attributes, door, fingerprint
@@ -155,7 +155,7 @@ def require_effect(options: argparse.Namespace, case: Case) -> None:
         require_choice(case, modulus=computed, envelope="envelope" in case.stages)
 
 
-def main_numbers(found: Mapping[str, Any]) -> str:
+def main_numbers(found: Document) -> str:
     """The fuzzy modulus and every study's extremes, a line each."""
     from alphacut.frame.outputs import output_unit
 

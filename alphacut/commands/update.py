@@ -5,19 +5,22 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from alphacut.case.idle import require_read
 from alphacut.case.load import load
 from alphacut.commands.envelope import given_modulus
 from alphacut.commands.options import add_common, answer, changes
-from alphacut.io.files import as_json, write_text
+from alphacut.io.files import Document, as_json, write_text
 from alphacut.io.output_paths import unwritable
 from alphacut.io.problem import BadInput
 from alphacut.io.progress import progress
 from alphacut.stages.material.modulus import stand_in
 from alphacut.stages.vibration.structure import structure
 from alphacut.stages.vibration.update import Learned, envelopes, learned, narrower
+
+if TYPE_CHECKING:
+    import xarray
 
 ABOUT = "learn inputs of a frame from its measured modes"
 READ = ("frame", "envelope", "update", "modulus")
@@ -63,7 +66,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     return 0
 
 
-def draw(folder: Path, found: Learned, bands: Any) -> list[str]:
+def draw(folder: Path, found: Learned, bands: xarray.Dataset | None) -> list[str]:
     """Figures of the inputs and of each output's envelope; names of the files."""
     from alphacut.figures import update as figures
     from alphacut.figures.style import save, style
@@ -77,7 +80,7 @@ def draw(folder: Path, found: Learned, bands: Any) -> list[str]:
     return [path.name for path in drawn]
 
 
-def text(found: Learned, document: Mapping[str, Any]) -> str:
+def text(found: Learned, document: Document) -> str:
     """Inputs, predictions and what was not learned, a line each, in SI."""
     posterior = found.posterior
     if posterior is None:

@@ -7,17 +7,17 @@ from __future__ import annotations
 
 import json
 import math
-from typing import Any
 
 from alphacut.case.key import Key, Section, about_of, keys_of
 from alphacut.case.schema import SECTIONS
 from alphacut.case.values import allowed
+from alphacut.io.files import Document
 from alphacut.io.units import QUANTITIES
 
 NUMBERS = {"type": "array", "items": {"type": "number"}, "minItems": 1}
 
 
-def json_schema() -> dict[str, Any]:
+def json_schema() -> Document:
     """The schema of a case file."""
     document = section_schema(SECTIONS[""])
     for name, section in SECTIONS.items():
@@ -36,7 +36,7 @@ def json_schema() -> dict[str, Any]:
     }
 
 
-def section_schema(section: type[Section]) -> dict[str, Any]:
+def section_schema(section: type[Section]) -> Document:
     """One table."""
     required = [name for name, key in keys_of(section).items() if key.required]
     ways = [required, *([name] for name in section.unless)]
@@ -53,12 +53,12 @@ def section_schema(section: type[Section]) -> dict[str, Any]:
     }
 
 
-def key_schema(key: Key) -> dict[str, Any]:
+def key_schema(key: Key) -> Document:
     """One key: its type as far as JSON Schema can tell it; units are left to `alphacut check`."""
     return {"description": f"{key.about}; {allowed(key)}", **value_schema(key)}
 
 
-def value_schema(key: Key) -> dict[str, Any]:
+def value_schema(key: Key) -> Document:
     """JSON Schema of a key's value."""
     if key.kind == "text":
         return {"type": "string"}
@@ -80,7 +80,7 @@ def value_schema(key: Key) -> dict[str, Any]:
     return {"anyOf": [listed, {"type": ["string", "number"]}]} if key.alone else listed
 
 
-def quantity_schema(key: Key) -> dict[str, Any]:
+def quantity_schema(key: Key) -> Document:
     """A quantity: text with its unit, or, where it has none, bare numbers too."""
     text = {"type": "string", "examples": [QUANTITIES[key.unit][1]]}
     if key.unit:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from typing import Any
+
+from alphacut.io.files import Document
 
 FIGURES = {
     "radii": "Distribution of the particles' radii",
@@ -96,7 +96,7 @@ def figure_words(name: str) -> str:
     return FIGURES.get(name, name.replace("-", " "))
 
 
-def core(modulus: Mapping[str, Any]) -> str:
+def core(modulus: Document) -> str:
     """Modal value or core interval of a summary's fuzzy modulus, in GPa."""
     low, high = (float(modulus["E_GPa"][side][-1]) for side in ("lower", "upper"))
     if high - low <= 1e-9 * abs(high):

@@ -32,11 +32,11 @@ def style() -> AbstractContextManager[None]:
     return figure_style.style({"axes.edgecolor": INK, "axes.labelcolor": INK})
 
 
-def figure(width: float = WIDTH, height: float = HEIGHT, **options: Any) -> tuple[Figure, Axes]:
+def figure(width: float = WIDTH, height: float = HEIGHT) -> tuple[Figure, Axes]:
     """A figure with one pair of axes."""
     import matplotlib.pyplot as plt
 
-    drawn, axes = plt.subplots(figsize=(width, height), **options)
+    drawn, axes = plt.subplots(figsize=(width, height))
     return drawn, axes
 
 
@@ -60,7 +60,13 @@ def colours(alpha: Array) -> list[tuple[float, float, float, float]]:
     return [tuple(scale(0.25 + 0.65 * float(level))) for level in alpha]  # type: ignore[misc]
 
 
-def alpha_legend(axes: Axes, alpha: Array, **options: Any) -> None:
+def alpha_legend(
+    axes: Axes,
+    alpha: Array,
+    *,
+    loc: str = "best",
+    bbox_to_anchor: tuple[float, float] | None = None,
+) -> None:
     """The α scale, explained."""
     from matplotlib.patches import Patch
 
@@ -69,7 +75,14 @@ def alpha_legend(axes: Axes, alpha: Array, **options: Any) -> None:
     from matplotlib.lines import Line2D
 
     handles: list[Any] = [*patches, Line2D([], [], color=INK, lw=1, label=f"α = {alpha[-1]:g}")]
-    axes.legend(handles=handles, title="α-cut", fontsize=8, title_fontsize=8, **options)
+    axes.legend(
+        handles=handles,
+        title="α-cut",
+        fontsize=8,
+        title_fontsize=8,
+        loc=loc,
+        bbox_to_anchor=bbox_to_anchor,
+    )
 
 
 def prefix_axis(axes: Axes, label: str, si: str) -> None:

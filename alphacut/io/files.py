@@ -16,6 +16,9 @@ import numpy as np
 RANKS = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "MPI_LOCALRANKID")
 SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS")
 
+Document = dict[str, Any]
+"""A JSON document: numbers, texts, lists and documents by name; its reader knows their types."""
+
 
 def rank() -> int:
     """This process's MPI rank as mpirun tells it, without starting MPI; 0 where there is none."""
@@ -46,7 +49,7 @@ def write_text(path: Path | str, text: str) -> None:
         partial.write_text(text, encoding="utf-8")
 
 
-def plain(value: Any) -> Any:
+def plain(value: object) -> object:
     """A value that JSON can hold; what is not finite becomes null."""
     if isinstance(value, Mapping):
         return {str(key): plain(entry) for key, entry in value.items()}
@@ -61,7 +64,7 @@ def plain(value: Any) -> Any:
     return value if isinstance(value, str | int | bool | None) else str(value)
 
 
-def as_json(document: Mapping[str, Any], *, indent: int | None = None) -> str:
+def as_json(document: Mapping[str, object], *, indent: int | None = None) -> str:
     """One JSON object, ending in a line feed; arrays of numbers stay on one line."""
     return json.dumps(plain(document), indent=indent, allow_nan=False, ensure_ascii=False) + "\n"
 

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from alphacut.io.files import Document
 from alphacut.io.output_paths import hint
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.provenance import FORMAT, own_version
@@ -101,7 +102,7 @@ def damaged(path: Path, why: str) -> BadInput:
     )
 
 
-def read_summary(folder: Path) -> dict[str, Any]:
+def read_summary(folder: Path) -> Document:
     """summary.json of a folder that a run has written.
 
     Raises:

@@ -13,7 +13,6 @@ from dataclasses import fields, is_dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
 
 # 2: the bounds of a certified envelope are the proved ones; of the NetCDF files and of summary.json
 FORMAT = 2
@@ -79,7 +78,7 @@ def source_digest(packages: tuple[str, ...]) -> str:
     return digest.hexdigest()
 
 
-def fingerprint(inputs: Mapping[str, Any], packages: Sequence[str]) -> str:
+def fingerprint(inputs: Mapping[str, object], packages: Sequence[str]) -> str:
     """Digest of everything that a result depends on: inputs, source, library versions."""
     content = {
         "inputs": inputs,

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
 
+from alphacut.io.files import Document
 from alphacut.io.provenance import sources
 
 PACKAGES = ("stochastic", "rve", "fuzzy", "frame")
 MARK = "This differs from the paper in:"
 
 
-def differences(found: Mapping[str, Any] | None = None) -> Iterator[tuple[str, str]]:
+def differences(found: Document | None = None) -> Iterator[tuple[str, str]]:
     """Subject and differences of each module, "1. … 2. …", that concern a run."""
     for package in PACKAGES:
         for name, file in sources(package):
@@ -30,7 +30,7 @@ def differences(found: Mapping[str, Any] | None = None) -> Iterator[tuple[str, s
                 yield subject, " ".join(after.split())
 
 
-def concerns(module: str, found: Mapping[str, Any]) -> bool:
+def concerns(module: str, found: Document) -> bool:
     """True if a run used the module, by its summary."""
     methods = {study["method"] for study in found.get("envelopes", {}).values()}
     if module == "stochastic.radius_map":

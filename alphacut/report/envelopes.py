@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
 
 from markupsafe import Markup
 
+from alphacut.io.files import Document
 from alphacut.io.units import engineering, largest_by_unit
 from alphacut.report.tables import items, paragraphs, section, table
 from alphacut.stages.vibration import exceedance as outcomes
 
 
-def envelopes(summary: Mapping[str, Any], exceedance: Markup) -> Markup:
+def envelopes(summary: Document, exceedance: Markup) -> Markup:
     """The interactive plot and the extremes; the picture of the exceedance where there is one."""
     controls = Markup(
         '<div class="controls"><label>study <select id="study"></select></label><label>output'
@@ -43,7 +43,7 @@ def envelopes(summary: Mapping[str, Any], exceedance: Markup) -> Markup:
     )
 
 
-def extremes(studies: Mapping[str, Any]) -> list[tuple[str, ...]]:
+def extremes(studies: Document) -> list[tuple[str, ...]]:
     """Least and greatest value of each output, and the error where one was estimated."""
     from alphacut.frame.outputs import output_unit
 
@@ -77,7 +77,7 @@ def extremes(studies: Mapping[str, Any]) -> list[tuple[str, ...]]:
     )
 
 
-def natural(summary: Mapping[str, Any]) -> Markup:
+def natural(summary: Document) -> Markup:
     """The first natural periods, where the structure is linear."""
     omega = summary.get("structure", {}).get("omega_rad_per_s")
     if not omega:
@@ -86,7 +86,7 @@ def natural(summary: Mapping[str, Any]) -> Markup:
     return paragraphs(f"First natural periods at the modal values: {periods} s.")
 
 
-def peaks(summary: Mapping[str, Any]) -> Markup:
+def peaks(summary: Document) -> Markup:
     """Fuzzy peaks of every study, and the fuzzy probability of exceeding the case's limit."""
     from alphacut.frame.outputs import output_unit
 
@@ -112,14 +112,14 @@ def peaks(summary: Mapping[str, Any]) -> Markup:
     return shown + limit if rows else limit
 
 
-def claims(studies: Mapping[str, Any]) -> Markup:
+def claims(studies: Document) -> Markup:
     """What the cuts claim of how often they hold, and which inputs are opinions, study by study."""
     each = {name: study["claim"] for name, study in studies.items() if "claim" in study}
     rows = [f"{name}: {claim}" for name, claim in each.items()]
     return Markup("<h3>How often the cuts hold</h3>") + items(rows) if rows else Markup("")
 
 
-def peak_row(of: Mapping[str, Any], unit: str, largest: float) -> Iterator[str]:
+def peak_row(of: Document, unit: str, largest: float) -> Iterator[str]:
     """Peak: its bounds, the least one tried, its error, and its interval on the highest level."""
     yield engineering(of["lower"][0], unit, beside=largest)
     yield engineering(of["tried"][0], unit, beside=largest) if "tried" in of else "not tried"

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from markupsafe import Markup
 
 from alphacut.figures.captions import caption
+from alphacut.io.files import Document
 from alphacut.report.tables import fragment, section
 
 # figures that stand in the section they belong to
@@ -26,7 +25,7 @@ WIDE = re.compile(r"envelope-|chain|record|shares-over-time|graph-follower")
 SVG_LIMIT = 200_000  # bytes; a heavier figure goes into the page as PNG
 
 
-def listed(summary: Mapping[str, Any], folder: Path, name: str) -> Markup:
+def listed(summary: Document, folder: Path, name: str) -> Markup:
     """Figure by its name without the paper's number, if this run has drawn it."""
     for file in summary.get("figures", []):
         if re.fullmatch(rf"(fig\d+-)?{name}", Path(file).stem) and file.endswith(".svg"):
@@ -36,7 +35,7 @@ def listed(summary: Mapping[str, Any], folder: Path, name: str) -> Markup:
     return Markup("")
 
 
-def gallery(summary: Mapping[str, Any], folder: Path) -> Markup:
+def gallery(summary: Document, folder: Path) -> Markup:
     """Every figure of the run that no other section shows."""
     names = [
         name

@@ -5,17 +5,18 @@ from __future__ import annotations
 import base64
 import json
 import re
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from markupsafe import Markup, escape
 
 from alphacut.case.quick import banner
+from alphacut.io.files import Document
 from alphacut.io.netcdf import damaged, read_dataset, read_summary
 from alphacut.report.sections import sections
 from alphacut.report.tables import environment
+from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     import xarray
@@ -36,7 +37,7 @@ def report(folder: Path) -> str:
         raise damaged(folder / "summary.json", f"{type(error).__name__} at {error}") from error
 
 
-def page(summary: Mapping[str, Any], folder: Path) -> str:
+def page(summary: Document, folder: Path) -> str:
     """The page for a summary."""
     text = {name: (HERE / f"report.{name}").read_text(encoding="utf-8") for name in ("css", "js")}
     about = escape(" ".join(summary.get("about", "").split()))
@@ -61,7 +62,7 @@ def embedded(document: object) -> Markup:
     return Markup(json.dumps(document, ensure_ascii=False).replace("<", "\\u003c"))
 
 
-def plots(summary: Mapping[str, Any], folder: Path) -> list[dict[str, Any]]:
+def plots(summary: Document, folder: Path) -> list[Document]:
     """The data of the interactive plot: every study's bounds as 32-bit floats."""
     found = []
     for name, study in summary.get("envelopes", {}).items():
@@ -71,7 +72,7 @@ def plots(summary: Mapping[str, Any], folder: Path) -> list[dict[str, Any]]:
     return found
 
 
-def plot(name: str, study: Mapping[str, Any], dataset: xarray.Dataset) -> dict[str, Any]:
+def plot(name: str, study: Document, dataset: xarray.Dataset) -> Document:
     """One study: lower and upper bounds by level and output, in base64."""
     from alphacut.frame.outputs import output_unit
 
@@ -95,6 +96,6 @@ def plot(name: str, study: Mapping[str, Any], dataset: xarray.Dataset) -> dict[s
     }
 
 
-def packed(row: np.ndarray[Any, Any]) -> str:
+def packed(row: Array) -> str:
     """Numbers as little-endian 32-bit floats in base64."""
     return base64.b64encode(np.ascontiguousarray(row, "<f4").tobytes()).decode()

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 from markupsafe import Markup
 
 from alphacut.figures.captions import core, in_words
 from alphacut.fuzzy.samples.nature import Nature
+from alphacut.io.files import Document
 from alphacut.io.units import engineering
 from alphacut.report.differences import differences
 from alphacut.report.envelopes import envelopes, natural
@@ -18,7 +18,7 @@ from alphacut.report.tables import citation, code, details, items, paragraphs, s
 from alphacut.stages.material import response
 
 
-def sections(summary: Mapping[str, Any], folder: Path) -> Iterator[Markup]:
+def sections(summary: Document, folder: Path) -> Iterator[Markup]:
     """All sections that the results allow, in reading order."""
     if "microstructure" in summary:
         yield microstructure(summary["microstructure"])
@@ -45,7 +45,7 @@ def sections(summary: Mapping[str, Any], folder: Path) -> Iterator[Markup]:
     yield versions(summary)
 
 
-def microstructure(found: Mapping[str, Any]) -> Markup:
+def microstructure(found: Document) -> Markup:
     """Particles, cells, and the fuzzy radius map."""
     low, high = found["limits"]
     words = paragraphs(
@@ -63,7 +63,7 @@ def microstructure(found: Mapping[str, Any]) -> Markup:
     )
 
 
-def of_map(found: Mapping[str, Any]) -> str:
+def of_map(found: Document) -> str:
     """The area fraction that the modulus gets, where it is known."""
     name = "mean_area_fraction_of_map"
     return (
@@ -80,7 +80,7 @@ MEANING = {
 }
 
 
-def modulus(found: Mapping[str, Any], drawn: Markup) -> Markup:
+def modulus(found: Document, drawn: Markup) -> Markup:
     """The fuzzy modulus with its α-cuts, error budget and certificate."""
     cuts = zip(found["alpha"], found["E_GPa"]["lower"], found["E_GPa"]["upper"], strict=True)
     rows = [(f"{alpha:g}", f"{low:.4f}", f"{high:.4f}") for alpha, low, high in cuts]
@@ -119,7 +119,7 @@ def modulus(found: Mapping[str, Any], drawn: Markup) -> Markup:
     )
 
 
-def given(found: Mapping[str, Any]) -> Markup:
+def given(found: Document) -> Markup:
     """The modulus that the case gives instead of having it computed."""
     cuts = zip(found["alpha"], found["E_GPa"]["lower"], found["E_GPa"]["upper"], strict=True)
     rows = [(f"{alpha:g}", f"{low:.4f}", f"{high:.4f}") for alpha, low, high in cuts]
@@ -127,7 +127,7 @@ def given(found: Mapping[str, Any]) -> Markup:
     return section("Fuzzy modulus", words, table(("α", "lower E, GPa", "upper E, GPa"), rows))
 
 
-def image(found: Mapping[str, Any], drawn: Markup) -> Markup:
+def image(found: Document, drawn: Markup) -> Markup:
     """The bounds of an image's modulus, what they are worth, and what widens them."""
     cuts = found["cuts"]
     ends = zip(
@@ -170,7 +170,7 @@ def image(found: Mapping[str, Any], drawn: Markup) -> Markup:
     )
 
 
-def random_threshold(found: Mapping[str, Any]) -> Markup:
+def random_threshold(found: Document) -> Markup:
     """Quantiles of E over a random threshold at the lowest and the highest level, or nothing."""
     random = found.get("random_threshold")
     if not random:
@@ -185,7 +185,7 @@ def random_threshold(found: Mapping[str, Any]) -> Markup:
     return Markup("<h3>Quantiles of E over the random threshold, proved</h3>") + table(head, rows)
 
 
-def isotropy(found: Mapping[str, Any]) -> str:
+def isotropy(found: Document) -> str:
     """Sentence on the array's anisotropy; empty where it was not computed."""
     from alphacut.rve.anisotropy import shear_ratio_in_words
 
@@ -200,7 +200,7 @@ def isotropy(found: Mapping[str, Any]) -> str:
     )
 
 
-def stress(found: Mapping[str, Any], drawn: Markup) -> Markup:
+def stress(found: Document, drawn: Markup) -> Markup:
     """The random and fuzzy stress of the cell."""
     words = paragraphs(
         f"Homogenised stress {found['quantity']}, random with θ at every fuzzy sample: intervals"
@@ -211,13 +211,13 @@ def stress(found: Mapping[str, Any], drawn: Markup) -> Markup:
     return section("Random and fuzzy stress", words, drawn, table(head, response.table(found)))
 
 
-def built(words: Mapping[str, Any], periods: Markup) -> Markup:
+def built(words: Document, periods: Markup) -> Markup:
     """The structure: what it is, its floors or inputs, its first periods."""
     sentences = paragraphs(*words["sentences"])
     return section("Structure", sentences, table(words["head"], words["rows"]), periods)
 
 
-def shares(found: Mapping[str, Any]) -> Markup:
+def shares(found: Document) -> Markup:
     """Contributions of the inputs to the widths."""
     from alphacut.figures.envelope import WORDS
 
@@ -241,7 +241,7 @@ def shares(found: Mapping[str, Any]) -> Markup:
     return section("What drives the width", words, *tables)
 
 
-def comparison(rows: Sequence[Mapping[str, Any]]) -> Markup:
+def comparison(rows: Sequence[Document]) -> Markup:
     """Paper, here, difference."""
     from alphacut.stages.summary import cells
 
@@ -255,7 +255,7 @@ def comparison(rows: Sequence[Mapping[str, Any]]) -> Markup:
     )
 
 
-def methods(summary: Mapping[str, Any]) -> Markup:
+def methods(summary: Document) -> Markup:
     """Method and cost of each stage."""
     rows: list[tuple[object, ...]] = []
     if cell := summary.get("modulus"):
@@ -299,7 +299,7 @@ def explained(rows: Sequence[tuple[object, ...]]) -> Iterator[str]:
     )
 
 
-def proofs(summary: Mapping[str, Any]) -> Iterator[str]:
+def proofs(summary: Document) -> Iterator[str]:
     """Gap of each certified envelope, and what it rests on."""
     from alphacut.frame.outputs import output_unit
 
@@ -317,7 +317,7 @@ def proofs(summary: Mapping[str, Any]) -> Iterator[str]:
             )
 
 
-def effort(study: Mapping[str, Any]) -> str:
+def effort(study: Document) -> str:
     """Cost of an envelope: trajectories, or eigen-analyses."""
     return (
         f"{study['trajectories']}"
@@ -330,7 +330,7 @@ def sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:].rstrip('.')}." if text else ""
 
 
-def case_text(summary: Mapping[str, Any]) -> Markup:
+def case_text(summary: Document) -> Markup:
     """The case file as it was, and what the command line changed."""
     changes = [code(change) for change in summary.get("changes", ())]
     return section(
@@ -340,7 +340,7 @@ def case_text(summary: Mapping[str, Any]) -> Markup:
     )
 
 
-def differing(summary: Mapping[str, Any]) -> Markup:
+def differing(summary: Document) -> Markup:
     """Differences from the paper in the modules that the run used."""
     found = tuple(differences(summary))
     listed = items(
@@ -353,7 +353,7 @@ def differing(summary: Mapping[str, Any]) -> Markup:
     return section("Differences from the paper", listed) if found else Markup("")
 
 
-def versions(summary: Mapping[str, Any]) -> Markup:
+def versions(summary: Document) -> Markup:
     """Versions, command, and how to cite."""
     found = ", ".join(f"{name} {version}" for name, version in summary["versions"].items())
     command = Markup("Made by {} in {:.0f} s.").format(code(summary["command"]), summary["seconds"])

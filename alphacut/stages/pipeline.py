@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from alphacut.case.case import Case
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.io.files import say, whole_file
+from alphacut.io.files import Document, say, whole_file
 from alphacut.io.netcdf import require_known
 from alphacut.io.progress import progress
 from alphacut.io.provenance import attributes, fingerprint
@@ -205,7 +205,7 @@ class Chain:
 
         return self.stored("exceedance.nc", key, compute)
 
-    def vibration(self, wanted: Mapping[str, Any], handed: FuzzyNumber | None) -> str:
+    def vibration(self, wanted: Document, handed: FuzzyNumber | None) -> str:
         """Fingerprint of a result for the structure, its record and the modulus."""
         given = self.case.sections
         inputs = [given.frame, given.pendulum, given.tower]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from alphacut.io.files import Document
 from alphacut.io.provenance import FORMAT, command, versions
 from alphacut.rve.cell import Phase
 from alphacut.rve.spheres.result import volume_fraction
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 Row = dict[str, Any]
 
 
-def summary(results: Results) -> dict[str, Any]:
+def summary(results: Results) -> Document:
     """Everything in numbers: inputs, fuzzy modulus, extremes, comparison."""
     case = results.case
     words = {
@@ -87,7 +88,7 @@ def _cell(results: Results) -> tuple[HermiteMap, Phase, Phase]:
     return parts(modal_values(results.case), results.case.radius.theta)
 
 
-def modulus_numbers(dataset: xarray.Dataset) -> dict[str, Any]:
+def modulus_numbers(dataset: xarray.Dataset) -> Document:
     """α-cuts in GPa, modal value, support, cost."""
     ends = dataset["E"].transpose("alpha", "bound").values / GPA
     cuts = {"alpha": dataset["alpha"].values, "E_GPa": {"lower": ends[:, 0], "upper": ends[:, 1]}}
@@ -121,7 +122,7 @@ def given(results: Results) -> Row:
     }
 
 
-def structure_numbers(results: Results) -> dict[str, Any]:
+def structure_numbers(results: Results) -> Document:
     """The structure in words, and natural frequencies at the modal values where it has any."""
     from alphacut.frame.structures.linear import frequencies
 
@@ -151,7 +152,7 @@ def counted(model: LinearSystem) -> int:
     return len(set(model.parameters) - left_out)
 
 
-def envelope_numbers(dataset: xarray.Dataset) -> dict[str, Any]:
+def envelope_numbers(dataset: xarray.Dataset) -> Document:
     """Extremes over time at the lowest level, widths, errors, cost."""
     lowest = dataset.isel(alpha=0)
     names = [str(name) for name in dataset["output"].values]
@@ -178,7 +179,7 @@ def envelope_numbers(dataset: xarray.Dataset) -> dict[str, Any]:
     )
 
 
-def comparison(path: Path, found: Mapping[str, Any]) -> list[Row]:
+def comparison(path: Path, found: Document) -> list[Row]:
     """One row for each number that the paper quotes.
 
     Args:
@@ -197,7 +198,7 @@ def comparison(path: Path, found: Mapping[str, Any]) -> list[Row]:
     return rows
 
 
-def reached(found: Mapping[str, Any], path: str) -> float | None:
+def reached(found: Document, path: str) -> float | None:
     """A number in the summary by its path; None where the run has none; "a / b" is a quotient."""
     if " / " in path:
         above, below = (reached(found, part) for part in path.split(" / "))

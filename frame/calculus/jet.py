@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[Any]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,35 +205,30 @@ def concatenate(parts: Sequence[Jet], axis: int) -> Jet:
     )
 
 
-def sin(x: Any) -> Any:
+def sin(x: T) -> T:
     """Sine of a jet, an array or a symbol of SymPy."""
-    return (
-        x.chain(np.sin(x.value), np.cos(x.value), -np.sin(x.value))
-        if isinstance(x, Jet)
-        else _elementary("sin", x)
-    )
+    return _chained(x, "sin", lambda v: (np.sin(v), np.cos(v), -np.sin(v)))
 
 
-def cos(x: Any) -> Any:
+def cos(x: T) -> T:
     """Cosine of a jet, an array or a symbol of SymPy."""
-    return (
-        x.chain(np.cos(x.value), -np.sin(x.value), -np.cos(x.value))
-        if isinstance(x, Jet)
-        else _elementary("cos", x)
-    )
+    return _chained(x, "cos", lambda v: (np.cos(v), -np.sin(v), -np.cos(v)))
 
 
-def exp(x: Any) -> Any:
+def exp(x: T) -> T:
     """Exponential of a jet, an array or a symbol of SymPy."""
+    return _chained(x, "exp", lambda v: (np.exp(v),) * 3)
+
+
+def _chained(x: T, name: str, of: Callable[[Array], tuple[Array, ...]]) -> T:
+    """A function of a jet by its value and two derivatives, of anything else by its name."""
     if isinstance(x, Jet):
-        value = np.exp(x.value)
-        return x.chain(value, value, value)
-    return _elementary("exp", x)
+        made: T = x.chain(*of(x.value))  # type: ignore[assignment]
+        return made
+    module: Any = np
+    if not isinstance(x, float | int | np.ndarray):
+        import sympy  # only for symbols
 
-
-def _elementary(name: str, x: Any) -> Any:
-    if isinstance(x, float | int | np.ndarray):
-        return getattr(np, name)(x)
-    import sympy  # only for symbols
-
-    return getattr(sympy, name)(x)
+        module = sympy
+    result: T = getattr(module, name)(x)
+    return result

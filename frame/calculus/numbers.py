@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sized
-from typing import Any
+from collections.abc import Collection
 
 import numpy as np
 
@@ -11,7 +10,7 @@ FINITE = "biuf"
 """Kinds of NumPy's data types that hold real numbers."""
 
 
-def require_number(name: str, value: Any, unit: str) -> None:
+def require_number(name: str, value: object, unit: str) -> None:
     """Refuses what is no real number.
 
     Args:
@@ -22,15 +21,16 @@ def require_number(name: str, value: Any, unit: str) -> None:
     Raises:
         ValueError: It is a text, a list or nothing.
     """
-    if np.ndim(value) or np.asarray(value).dtype.kind not in FINITE:
+    given = np.asarray(value)
+    if given.ndim or given.dtype.kind not in FINITE:
         raise ValueError(
             f"{name}: {value!r} is not allowed; it must be a number{f', in {unit}' if unit else ''}"
         )
 
 
-def require_numbers(name: str, values: Any, unit: str) -> None:
+def require_numbers(name: str, values: object, unit: str) -> None:
     """Refuses what is no sequence of real and finite numbers, as `require_number`."""
-    if isinstance(values, str) or not isinstance(values, Sized):
+    if isinstance(values, str) or not isinstance(values, Collection | np.ndarray):
         raise ValueError(
             f"{name}: {values!r} is not allowed; it must be a list of numbers, in {unit}"
         )

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet
+
+if TYPE_CHECKING:
+    from sympy import Expr, Symbol
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +56,7 @@ class Compiled:
 
 
 def compiled(
-    expressions: Sequence[Any], active: Sequence[Any], constants: Sequence[Any] = ()
+    expressions: Sequence[Expr], active: Sequence[Symbol], constants: Sequence[Symbol] = ()
 ) -> Compiled:
     """Compiles SymPy expressions, differentiated by `active`; `constants` are further arguments."""
     import sympy

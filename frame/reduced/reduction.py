@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,6 +22,9 @@ from alphacut.frame.dynamics.spectral import responses
 from alphacut.frame.reduced.response_basis import energy_basis, response_shapes
 from alphacut.frame.structures.damping import modal_damping
 from alphacut.frame.structures.linear import Accelerogram, Matrices
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
 
 Factor = Callable[[Mapping[str, Any]], Any]
 
@@ -55,7 +58,7 @@ class AffineStructure:
     v0: Array | None = None
     ratio: str | None = None
 
-    def assembled(self, p: Mapping[str, float]) -> tuple[Any, Any]:
+    def assembled(self, p: Mapping[str, float]) -> tuple[csc_matrix, csc_matrix]:
         """Sparse M and K at one parameter set."""
         M = sum(float(f(p)) * A for f, A in self.mass)
         K = sum(float(f(p)) * A for f, A in self.stiffness)

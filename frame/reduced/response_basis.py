@@ -8,12 +8,15 @@ for drifts, not only for the roof.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.structures.linear import Accelerogram
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
 
 
 class LargeStructure(Protocol):
@@ -49,7 +52,7 @@ class LargeStructure(Protocol):
         """Initial velocities, shape (N,), or None."""
         ...
 
-    def assembled(self, p: Mapping[str, float]) -> tuple[Any, Any]:
+    def assembled(self, p: Mapping[str, float]) -> tuple[csc_matrix, csc_matrix]:
         """Sparse M and K at one parameter set."""
         ...
 
@@ -87,7 +90,7 @@ def response_shapes(structure: LargeStructure, p: Mapping[str, float], frequenci
 
 
 def energy_basis(
-    shapes: Array, M: Any, K: Any, *, keep: float, always: Sequence[Array] = ()
+    shapes: Array, M: csc_matrix, K: csc_matrix, *, keep: float, always: Sequence[Array] = ()
 ) -> Array:
     """M-orthonormal shapes of strain energy above `keep` of the largest, or `always` kept.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from alphacut.frame.calculus.jet import cos
 from alphacut.frame.structures.lagrangian_check import (
@@ -14,6 +14,9 @@ from alphacut.frame.structures.lagrangian_check import (
     listed,
     require_dimensions,
 )
+
+if TYPE_CHECKING:
+    from sympy import Expr, Matrix
 
 Symbols = Sequence[Any]
 Named = Mapping[str, Any]
@@ -69,7 +72,7 @@ class LagrangianSystem:
                 " every coordinate inertia"
             )
 
-    def start(self) -> tuple[list[Any], list[Any]]:
+    def start(self) -> tuple[list[Expr], list[Expr]]:
         """The initial state (q0, v0) in symbols.
 
         Raises:
@@ -89,7 +92,7 @@ class LagrangianSystem:
             expression("initial: v0", x) for x in v0
         ]
 
-    def output(self, name: str, velocity: Symbols) -> Any:
+    def output(self, name: str, velocity: Symbols) -> Expr:
         """An observed quantity in symbols, for velocities in any symbols."""
         eq = self.symbols
         return expression(
@@ -144,12 +147,12 @@ class Equations:
             push += sympy.Matrix([expression("force", x) for x in force])
         return cls(q, v, p, momentum, push, momentum.jacobian(v))
 
-    def velocity(self, momentum: Any) -> Any:
+    def velocity(self, momentum: Matrix) -> Matrix:
         """Velocities from momenta."""
         rest = self.momentum.subs({x: 0 for x in self.v})
         return self.mass.LUsolve(momentum - rest)
 
-    def acceleration(self) -> Any:
+    def acceleration(self) -> Matrix:
         """q̈ from the Euler–Lagrange equations."""
         return self.mass.LUsolve(self.push - self.momentum.jacobian(self.q) * self.v)
 
@@ -177,7 +180,7 @@ def pendulum(
     if damping < 0:
         raise ValueError(f"damping: {damping:g} is not allowed; it must not be negative")
 
-    def lagrangian(q: Symbols, v: Symbols, p: Named) -> Any:
+    def lagrangian(q: Symbols, v: Symbols, p: Named) -> Expr:
         return p["m"] * p["l"] ** 2 * v[0] ** 2 / 2 + p["m"] * p["g"] * p["l"] * cos(q[0])
 
     return LagrangianSystem(

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, TypeVar
 
 from alphacut.frame.calculus.numbers import require_number
 
+if TYPE_CHECKING:
+    from sympy import Expr
+
+T = TypeVar("T")
 SMOOTH = "use arithmetic and frame.jet.sin, cos and exp, which are smooth and take symbols"
 ROUGH = (
     "Abs",
@@ -47,7 +51,9 @@ def require_dimensions(
         require_number(f"parameter {name}", value, "SI units")
 
 
-def called(name: str, function: Callable[..., Any], *arguments: Any) -> Any:
+def called(
+    name: str, function: Callable[..., T], *arguments: Sequence[Expr] | Mapping[str, Expr]
+) -> T:
     """Value of a function for symbols.
 
     Args:
@@ -75,7 +81,7 @@ def called(name: str, function: Callable[..., Any], *arguments: Any) -> Any:
         ) from None
 
 
-def listed(name: str, given: Any, count: int) -> list[Any]:
+def listed(name: str, given: Sequence[T], count: int) -> list[T]:
     """The entries of a sequence, one for each coordinate.
 
     Raises:
@@ -89,7 +95,7 @@ def listed(name: str, given: Any, count: int) -> list[Any]:
     return entries
 
 
-def expression(name: str, given: Any) -> Any:
+def expression(name: str, given: object) -> Expr:
     """An expression of SymPy with two derivatives.
 
     Raises:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,7 +14,7 @@ from alphacut.frame.structures.damping import modal_damping
 from alphacut.frame.structures.linear import Accelerogram, Matrices
 
 
-def require_factors(kind: str, terms: Any, parameters: Mapping[str, float]) -> None:
+def require_factors(kind: str, terms: Iterable[object], parameters: Mapping[str, float]) -> None:
     """Refuse terms that are no pairs, and factors without derivatives.
 
     Args:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -37,7 +36,7 @@ class Limited:
         precision: Gap of the proved bounds, as a share of the range of the output.
     """
 
-    function: Callable[..., Any]
+    function: Callable[..., object]
     names: tuple[str, ...]
     limits: Limits
     sign: int = 1
@@ -107,7 +106,7 @@ class Decision:
 
 
 def decide(
-    function: Callable[..., Any],
+    function: Callable[..., object],
     inputs: Mapping[str, FuzzyNumber | float],
     limits: Limits,
     *,
@@ -160,7 +159,7 @@ def _degree(found: Threshold) -> tuple[float, float]:
 
 
 def safe_scale(
-    function: Callable[..., Any],
+    function: Callable[..., object],
     nominal: Mapping[str, float],
     tolerances: Mapping[str, float | tuple[float, float]],
     limits: Limits,

@@ -6,7 +6,7 @@ import dis
 import sys
 from collections.abc import Callable, Mapping
 from types import CodeType, FrameType
-from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
+from typing import TYPE_CHECKING, NoReturn, TypeVar
 
 if TYPE_CHECKING:
     from _typeshed import TraceFunction
@@ -54,13 +54,13 @@ def path(call: Callable[[], Result]) -> tuple[Result, Path]:
     """
     found: Path = {}
 
-    def inside(frame: FrameType, event: str, argument: Any) -> TraceFunction:
+    def inside(frame: FrameType, event: str, argument: object) -> TraceFunction:
         if event in ("line", "exception"):
             kind = argument[0] if isinstance(argument, tuple) else frame.f_lineno
             found[frame.f_code].add(kind)
         return inside
 
-    def enter(frame: FrameType, event: str, argument: Any) -> TraceFunction | None:
+    def enter(frame: FrameType, event: str, argument: object) -> TraceFunction | None:
         if frame.f_code.co_filename.startswith("<frozen") or _apart(frame.f_globals):
             return None
         found.setdefault(frame.f_code, set())

@@ -222,7 +222,7 @@ for _what, _names in _REFUSED.items():
 
 
 def _left_to_arrays(operation: Callable[[Tracer, object], Tracer]) -> Callable[..., Any]:
-    def guarded(self: Tracer, other: object, *more: object) -> Any:
+    def guarded(self: Tracer, other: object, *more: object) -> object:
         return NotImplemented if _is_array(other) else operation(self, other, *more)
 
     return guarded

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -96,7 +96,7 @@ class Optimisation:
 
         factor = sign / cut.scale(output)
 
-        def objective(unit: Array) -> Any:
+        def objective(unit: Array) -> object:
             if unit.ndim > 1:  # many points, one in each column
                 return factor * cut.values(unit.T, output)
             return factor * float(cut.values(unit[None], output)[0])

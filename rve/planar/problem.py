@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
-from typing import Any
 
 import alphacut.rve.petsc  # noqa: F401
 
@@ -59,7 +58,7 @@ class PlanarCell:
         self._compile()
 
     @cached_property
-    def tags(self) -> Any:
+    def tags(self) -> dolfinx.mesh.MeshTags:
         """Cell tags: 0 in the matrix, 1 in the particle."""
         inside = self.mesh.inside[self.domain.topology.original_cell_index].astype(np.int32)
         return dolfinx.mesh.meshtags(self.domain, 2, np.arange(inside.size, dtype=np.int32), inside)

@@ -63,7 +63,7 @@ class PrismForm:
         layer = np.repeat(np.arange(grid.layers), len(grid.plane.triangles))
         owner = (layer * size // grid.layers).astype(np.int32)
 
-        def by_layer(_comm: MPI.Comm, _parts: int, _types: Any, _cells: Any) -> Any:
+        def by_layer(_comm: MPI.Comm, _parts: int, _types: object, _cells: object) -> object:
             destinations = owner if rank == 0 else owner[:0]
             ranks = dolfinx.graph.adjacencylist(
                 destinations, np.arange(len(destinations) + 1, dtype=np.int32)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import gmsh
 import numpy as np
@@ -12,10 +12,12 @@ from alphacut.stochastic.particles.discs import Discs
 from alphacut.stochastic.particles.relaxation import smallest_gap
 
 if TYPE_CHECKING:
+    from dolfinx.mesh import Mesh
+
     from alphacut.stochastic.theta.truncated_normal import Array
 
 
-def many_mesh(discs: Discs, *, size: float, around: int = 12) -> tuple[Any, Array]:
+def many_mesh(discs: Discs, *, size: float, around: int = 12) -> tuple[Mesh, Array]:
     """Mesh the periodic box of `discs`, scaled to the unit square.
 
     The box is shifted so that no circle grazes a side: the moduli do not depend on where a periodic

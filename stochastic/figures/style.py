@@ -37,7 +37,7 @@ SETTINGS: dict[str, Any] = {
 
 
 @contextmanager
-def style(more: Mapping[str, Any] = MappingProxyType({})) -> Iterator[None]:
+def style(more: Mapping[str, object] = MappingProxyType({})) -> Iterator[None]:
     """The look, for the figures drawn inside the block, with `more` of matplotlib's settings."""
     import matplotlib as mpl
 

@@ -58,6 +58,12 @@ def test_casts_are_rare():
     assert sum(map(casts, TREES.values())) < 10
 
 
+def test_no_public_signature_has_any():
+    """JSON documents are one named type, `alphacut.io.files.Document`."""
+    found = {str(file): signatures_with_any(tree) for file, tree in TREES.items()}
+    assert not {file: names for file, names in found.items() if names}
+
+
 def test_a_case_is_read_by_its_fields():
     """Only `alphacut/case` asks for a key by its name."""
     asking = ("asked", "written", "changed")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from alphacut.io.files import Document
 from alphacut.io.provenance import versions
 from alphacut.rve.image.directions import directions
 from alphacut.rve.image.model import ImageCut
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     import xarray
 
 
-def document(found: FuzzyImage) -> dict[str, Any]:
+def document(found: FuzzyImage) -> Document:
     """The result as it is printed with ``--json``; moduli in GPa."""
     cut, alpha = found.top, found.study.alpha
     bounds = cut.bounds
@@ -58,7 +59,7 @@ def document(found: FuzzyImage) -> dict[str, Any]:
     }
 
 
-def error_table(found: FuzzyImage) -> list[dict[str, Any]]:
+def error_table(found: FuzzyImage) -> list[Document]:
     """Source, width of E from it, its share of all of them, and what narrows it."""
     total = sum(row.width for row in found.contributions) or 1.0
     return [
@@ -72,7 +73,7 @@ def error_table(found: FuzzyImage) -> list[dict[str, Any]]:
     ]
 
 
-def random_threshold(found: RandomResponse) -> dict[str, Any]:
+def random_threshold(found: RandomResponse) -> Document:
     """Bounds of E over the threshold, of its mean and of its quantiles; moduli in GPa."""
     lower, upper = found.modal.modulus
     order = np.argsort(found.modal.threshold)
@@ -135,7 +136,7 @@ def dataset(found: FuzzyImage) -> xarray.Dataset:
     )
 
 
-def random_variables(found: RandomResponse) -> dict[str, Any]:
+def random_variables(found: RandomResponse) -> Document:
     """E over the random threshold, and its quantiles at each level."""
     about = {"units": "Pa", "long_name": "Young's modulus, eq. 16, over the threshold"}
     return {

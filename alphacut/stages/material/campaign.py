@@ -13,6 +13,7 @@ import numpy as np
 from alphacut.case.case import Case
 from alphacut.fuzzy import Extended, FuzzyNumber, General, Known, Reduced, Signed
 from alphacut.fuzzy.plans.plan import Plan
+from alphacut.io.files import Document
 from alphacut.io.provenance import source_digest, versions
 from alphacut.stages.material.cell import (
     SHARED,
@@ -142,7 +143,7 @@ class Campaign:
     store: Path | None = None
 
     @property
-    def identity(self) -> dict[str, Any] | None:
+    def identity(self) -> Document | None:
         """Origin of a sample besides its fuzzy inputs; None without a store."""
         return identity(self.task.choice, self.task.crisp, self.task.theta) if self.store else None
 
@@ -222,9 +223,7 @@ def known(case: Case, inputs: Mapping[str, FuzzyNumber]) -> Known:
     return Known(signs=of_inputs, source="as mechanics proves of exact cells")
 
 
-def identity(
-    choice: CellChoice, crisp: Mapping[str, float], theta: tuple[float, ...]
-) -> dict[str, Any]:
+def identity(choice: CellChoice, crisp: Mapping[str, float], theta: tuple[float, ...]) -> Document:
     """Origin of a sample besides its fuzzy inputs: model, resolution, program."""
     source = source_digest(("stochastic", "rve"))
     content = {

@@ -10,6 +10,7 @@ import numpy as np
 
 from alphacut.case.case import Case
 from alphacut.fuzzy import FuzzyNumber
+from alphacut.io.files import Document
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.provenance import versions
 from alphacut.rve.anisotropy import directional_shear, directional_young, shear_ratio
@@ -183,7 +184,7 @@ def anisotropy(
     return shear_ratio(stiffness), float(error_of_stiffness(result, shear_ratio))
 
 
-def directions(result: Homogenised) -> dict[str, Any] | None:
+def directions(result: Homogenised) -> Document | None:
     """Moduli over the direction, and shear anisotropy; None without the stiffness.
 
     "young_GPa" is stress over strain in plane strain with free sides, 1/S11 of the planar
@@ -206,7 +207,7 @@ def _over_directions(stiffness: Array) -> Array:
     return np.stack([directional_young(stiffness, angle), directional_shear(stiffness, angle)])
 
 
-def declared_errors(result: Homogenised) -> dict[str, Any] | None:
+def declared_errors(result: Homogenised) -> Document | None:
     """Declared error of every number of `document`, absolute and in its unit; None without any."""
     if isinstance(result, HomogenisedSpheres):
         return spheres.declared_errors(result)
@@ -238,7 +239,7 @@ def declared_errors(result: Homogenised) -> dict[str, Any] | None:
     return found
 
 
-def document(result: Homogenised) -> dict[str, Any]:
+def document(result: Homogenised) -> Document:
     """The result as it is printed with ``--json``; moduli and stresses in GPa."""
     mean11, mean12 = result.curve.mean
     if isinstance(result, HomogenisedSpheres):

@@ -14,7 +14,7 @@ from alphacut.fuzzy import explain as fuzzy_explain
 from alphacut.fuzzy.dry_run import Explanation
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.fuzzy.samples.result import FuzzyResult
-from alphacut.io.files import whole_file
+from alphacut.io.files import Document, whole_file
 from alphacut.io.netcdf import read_dataset
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
@@ -127,7 +127,7 @@ class FuzzyModulus:
         }
         return {name: value for name, value in found.items() if value or kind == "check"}
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> Document:
         """The result as it is printed with ``--json``; moduli and stresses in GPa."""
         found = {name: self.result.bounds(name) for name in BOUNDS}
         scaled = {

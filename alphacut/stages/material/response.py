@@ -6,7 +6,6 @@ modulus holds the whole curve.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,8 +14,10 @@ from alphacut.case.case import Case
 from alphacut.fuzzy import RandomResponse
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.io.files import Document
 from alphacut.stages.material.campaign import fuzzy_inputs
 from alphacut.stages.material.cell import GPA
+from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     import xarray
@@ -54,7 +55,7 @@ def random_response(case: Case, modulus: xarray.Dataset) -> RandomResponse:
     )
 
 
-def ends(result: FuzzyResult) -> np.ndarray[Any, Any]:
+def ends(result: FuzzyResult) -> Array:
     """Lower and upper ends, shape (levels, 2, entries)."""
     return np.stack([result.lower, result.upper], axis=1)
 
@@ -124,10 +125,10 @@ def deviation(case: Case, modulus: xarray.Dataset, response: RandomResponse) -> 
     return float(np.abs(response.ordered.mean(axis=1) / own - 1).max())
 
 
-def document(found: xarray.Dataset) -> dict[str, Any]:
+def document(found: xarray.Dataset) -> Document:
     """The response as it is printed with ``--json``; stresses in GPa."""
 
-    def cuts(name: str, unit: float = GPA, **place: float) -> dict[str, Any]:
+    def cuts(name: str, unit: float = GPA, **place: float) -> Document:
         values = found[name].sel(place) if place else found[name]
         return {str(side): values.sel(bound=side).values / unit for side in ("lower", "upper")}
 
@@ -149,7 +150,7 @@ def document(found: xarray.Dataset) -> dict[str, Any]:
     return numbers
 
 
-def table(numbers: Mapping[str, Any]) -> list[tuple[str, ...]]:
+def table(numbers: Document) -> list[tuple[str, ...]]:
     """Each fuzzy quantity with its lowest and highest cut, in words."""
     rows = [("mean", numbers["mean_GPa"], " GPa")]
     rows += [
@@ -170,7 +171,7 @@ def table(numbers: Mapping[str, Any]) -> list[tuple[str, ...]]:
     ]
 
 
-def text(numbers: Mapping[str, Any]) -> str:
+def text(numbers: Document) -> str:
     """The response as a small table."""
     lines = [
         (f"{numbers['quantity']}", f"α = {numbers['alpha'][0]:g}", f"α = {numbers['alpha'][-1]:g}"),

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from typing import Any
 
 import numpy as np
 
 from alphacut.case.case import Case
+from alphacut.io.files import Document
 from alphacut.rve.bounds import mori_tanaka as of_cylinders
 from alphacut.rve.cell import STRAIN, Phase
 from alphacut.rve.result import effective_modulus
@@ -21,7 +21,7 @@ GPA = 1e9
 WORDS = re.compile(r"\b(spher\w*|aggregates?|grains?|gravel|sand|beads?|balls?)\b", re.IGNORECASE)
 
 
-def moduli(result: HomogenisedSpheres) -> dict[str, Any]:
+def moduli(result: HomogenisedSpheres) -> Document:
     """What a document says besides E and ν, in GPa: see the keys."""
     bulk, deviator, shear = result.moduli / GPA
     along = young_along(result.moduli) / GPA
@@ -34,7 +34,7 @@ def moduli(result: HomogenisedSpheres) -> dict[str, Any]:
     }
 
 
-def declared_errors(result: HomogenisedSpheres) -> dict[str, Any] | None:
+def declared_errors(result: HomogenisedSpheres) -> Document | None:
     """Declared absolute error of every number of a document; None without any."""
     if not result.errors:
         return None

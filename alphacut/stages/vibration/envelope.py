@@ -6,11 +6,11 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from alphacut.case.case import Case
 from alphacut.case.limits import asked_tolerance
-from alphacut.io.files import say, whole_file
+from alphacut.io.files import Document, say, whole_file
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
 from alphacut.io.provenance import attributes, versions
@@ -78,7 +78,7 @@ def told_once() -> Iterator[None]:
         say(f"warning: {text}")
 
 
-def method_options(task: EnvelopeTask) -> dict[str, Any]:
+def method_options(task: EnvelopeTask) -> Document:
     """Those of the task's options that its method has."""
     from alphacut.frame.methods.named import options_of
 
@@ -89,7 +89,7 @@ def method_options(task: EnvelopeTask) -> dict[str, Any]:
     return {name: value for name, value in offered.items() if name in taken}
 
 
-def document(found: Envelope, tried: Array) -> dict[str, Any]:
+def document(found: Envelope, tried: Array) -> Document:
     """Result for ``--json``: extremes over time, (α, output), in SI.
 
     Args:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from alphacut.case.case import Case
 from alphacut.case.limits import limit_of
 from alphacut.fuzzy import FuzzyNumber
+from alphacut.io.files import Document
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
 from alphacut.io.units import engineering
@@ -231,7 +232,7 @@ def exceedance(case: Case, wanted: Structure, progress: Tick | None = None) -> x
     return xarray.Dataset({"exceedance": ends, "curve": curve}, axes, {**facts, **names})
 
 
-def exceedance_document(found: xarray.Dataset) -> dict[str, Any]:
+def exceedance_document(found: xarray.Dataset) -> Document:
     """The probability as it is printed with ``--json``; the limit in SI."""
     from alphacut.frame.outputs import output_unit
 
@@ -244,7 +245,7 @@ def exceedance_document(found: xarray.Dataset) -> dict[str, Any]:
     }
 
 
-def sentence(found: Mapping[str, Any]) -> str:
+def sentence(found: Document) -> str:
     """The probability in words, at the lowest and the highest level."""
     levels = dict.fromkeys((0, len(found["alpha"]) - 1))
     cuts = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from alphacut.case.case import Case
 from alphacut.case.names import OTHERS
 from alphacut.case.sections.structures import Frame
 from alphacut.fuzzy import FuzzyNumber, PiecewiseLinear
+from alphacut.io.files import Document
 from alphacut.io.units import MINUS, shown
 from alphacut.stages.vibration.structure import Structure, per_floor
 from alphacut.stages.vibration.structure import columns as count_columns
@@ -57,7 +58,7 @@ def in_unit(number: FuzzyNumber, unit: str, si: str) -> str:
     return f"{numbers[0] if len(numbers) == 1 else '[' + ', '.join(numbers) + ']'} {unit}".strip()
 
 
-def structure_words(case: Case, wanted: Structure) -> dict[str, Any]:
+def structure_words(case: Case, wanted: Structure) -> Document:
     """Sentences on the structure, and head and rows of a table of its floors."""
     if wanted.frame is not None:
         return {
@@ -150,7 +151,7 @@ def moves(given: Frame) -> list[str]:
     ]
 
 
-def floors(given: Frame, wanted: Structure) -> dict[str, Any]:
+def floors(given: Frame, wanted: Structure) -> Document:
     """Row for each floor, from the ground up: mass, height and what is not zero."""
     kinds: Sequence[str] = [
         "masses",

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from alphacut.case.case import Case
 from alphacut.case.limits import limit_of
 from alphacut.fuzzy import FuzzyNumber, Interval, Signed, propagate
+from alphacut.io.files import Document
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
 from alphacut.stages.material.campaign import Campaign, campaign
@@ -74,7 +75,7 @@ class Tolerances:
         scale = self.found.safe or 0.0
         return {**self.cell.at(scale), **self.frame.at(scale)}
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> Document:
         """The result as it is printed with ``--json``, in SI."""
         from alphacut.frame.outputs import output_unit
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from alphacut.case.case import Case
 from alphacut.fuzzy import FuzzyNumber
+from alphacut.io.files import Document
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
 from alphacut.stages.vibration import envelope
@@ -62,7 +63,7 @@ class Learned:
     held_out: tuple[HeldOut, ...]
     structure: Structure
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> Document:
         """The result as it is printed with ``--json``, in SI."""
         found = self.posterior
         if found is None:
