@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-import re
 from pathlib import Path
 
 from alphacut.case.case import Case
 from alphacut.fuzzy import FuzzyNumber, from_data
-from alphacut.io.output_paths import hint
-from alphacut.io.problem import BadInput, Problem
-from alphacut.io.units import factor
+from alphacut.io.csv_rows import CsvFile
 
 HEADER = "E [GPa]"
 NAMES = r"E|E_?c?m?|E_?mod(ul(us)?)?|(young'?s?[\s_-]*)?modul(us|i)|elastic[\s_-]modulus"
@@ -44,53 +41,18 @@ def measured_values(path: Path, key: str = "modulus.measured") -> list[float]:
     Raises:
         BadInput: The file is missing, its header has no unit, or a row is no positive number.
     """
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except UnicodeDecodeError:
-        raise BadInput(Problem(key, "the file is not text in UTF-8", str(path), HEADER)) from None
-    except OSError as error:
-        raise BadInput(
-            Problem(
-                key,
-                f"the file cannot be read: {(error.strerror or str(error)).lower()}",
-                str(path),
-                hint(path),
-            )
-        ) from None
-    rows = [
-        (number, line.strip())
-        for number, line in enumerate(lines, start=1)
-        if line.strip() and not line.startswith("#")
-    ]
-    if len(rows) < 2:
-        raise BadInput(
-            Problem(key, "the file needs a header and one value or more", str(path), HEADER)
-        )
-    scale = unit_of(rows[0][1], path, key)
-    return [scale * positive(text, path, number, key) for number, text in rows[1:]]
+    file = CsvFile(path, key, "file", HEADER)
+    (line, first), *rows = file.rows()
+    scale = file.scale(line, ",".join(first), "a modulus", "Pa", pattern=NAMES)
+    return [scale * positive(file, line, ",".join(row)) for line, row in rows]
 
 
-def unit_of(header: str, path: Path, key: str) -> float:
-    """Pascals in the header's unit."""
-    match = re.fullmatch(r"(.+?)\s*\[([^\]]+)\]", header)
-    try:
-        if match is None:
-            raise ValueError(f"the header {header!r} has no unit")
-        if not re.fullmatch(NAMES, match[1], flags=re.IGNORECASE):
-            raise ValueError(f"the column {match[1]!r} is not named as a modulus")
-        return float(factor(match[2], "Pa"))
-    except ValueError as error:
-        raise BadInput(Problem(key, str(error), file=str(path), line=1, allowed=HEADER)) from None
-
-
-def positive(text: str, path: Path, line: int, key: str) -> float:
+def positive(file: CsvFile, line: int, text: str) -> float:
     """One value of the column."""
     try:
         value = float(text)
     except ValueError:
         value = math.nan
     if not (math.isfinite(value) and value > 0):
-        raise BadInput(
-            Problem(key, "this row is no positive number", text, file=str(path), line=line)
-        )
+        raise file.refuse(line, "this row is no positive number", text)
     return value

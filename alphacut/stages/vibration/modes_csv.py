@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.io.problem import BadInput, Problem
-from alphacut.stages.vibration.accelerogram import table
+from alphacut.io.csv_rows import CsvFile
 from alphacut.stochastic.theta.truncated_normal import Array
 
 KEY = "update.measured"
@@ -38,29 +37,28 @@ def mode_rows(path: Path) -> tuple[ModeRows, ...]:
         BadInput: The file is missing, its header or a row is wrong, or a mode has some amplitudes
             in one row and not in another.
     """
-    (line, head), *rows = table(path, KEY, least=1)
-    floors = _floors(head, path, line)
-    numbers = [(line, _numbers(row, len(head), path, line)) for line, row in rows]
+    file = CsvFile(path, KEY, "file of modes", ALLOWED)
+    (line, head), *rows = file.rows()
+    floors = _floors(file, line, head)
+    numbers = [(line, _numbers(file, line, row, len(head))) for line, row in rows]
     modes = sorted({row[0] for _, row in numbers})
     return tuple(
-        _mode(int(mode), [(line, row) for line, row in numbers if row[0] == mode], floors, path)
+        _mode(int(mode), [(line, row) for line, row in numbers if row[0] == mode], floors, file)
         for mode in modes
     )
 
 
-def _floors(head: list[str], path: Path, line: int) -> tuple[int, ...]:
+def _floors(file: CsvFile, line: int, head: list[str]) -> tuple[int, ...]:
     words = [word.strip() for word in head]
     floors = [re.fullmatch(r"q([1-9]\d*)", word) for word in words[2:]]
     known = tuple(int(match[1]) for match in floors if match)
     first = len(words) > 1 and re.fullmatch(r"frequency(\s*\[Hz\])?", words[1])
     if words[0] != "mode" or not first or len(set(known)) != len(floors):
-        raise BadInput(
-            Problem(KEY, "the header is wrong", ",".join(head), ALLOWED, file=str(path), line=line)
-        )
+        raise file.refuse(line, "the header is wrong", ",".join(head), ALLOWED)
     return known
 
 
-def _numbers(row: list[str], count: int, path: Path, line: int) -> list[float]:
+def _numbers(file: CsvFile, line: int, row: list[str], count: int) -> list[float]:
     """Entries of a row; an empty amplitude was not measured."""
     try:
         values = [float(text) if text.strip() else float("nan") for text in row]
@@ -72,21 +70,13 @@ def _numbers(row: list[str], count: int, path: Path, line: int) -> list[float]:
         or not 0 < values[1] < float("inf")
         or np.isinf(values).any()
     ):
-        raise BadInput(
-            Problem(
-                KEY,
-                "this row is no measured mode",
-                ",".join(row),
-                "a mode from 1, a positive frequency and amplitudes, points in the numbers",
-                file=str(path),
-                line=line,
-            )
-        )
+        allowed = "a mode from 1, a positive frequency and amplitudes, points in the numbers"
+        raise file.refuse(line, "this row is no measured mode", ",".join(row), allowed)
     return values
 
 
 def _mode(
-    mode: int, rows: list[tuple[int, list[float]]], floors: tuple[int, ...], path: Path
+    mode: int, rows: list[tuple[int, list[float]]], floors: tuple[int, ...], file: CsvFile
 ) -> ModeRows:
     values = np.array([row for _, row in rows])
     amplitudes = {}
@@ -94,16 +84,8 @@ def _mode(
         missing = np.isnan(values[:, column])
         if missing.any() and not missing.all():
             line = rows[int(missing.argmax())][0]
-            raise BadInput(
-                Problem(
-                    KEY,
-                    f"mode {mode} has an amplitude of floor {floor} in some rows only",
-                    "",
-                    "one in each row of the mode, or none",
-                    file=str(path),
-                    line=line,
-                )
-            )
+            what = f"mode {mode} has an amplitude of floor {floor} in some rows only"
+            raise file.refuse(line, what, allowed="one in each row of the mode, or none")
         if not missing.any():
             amplitudes[floor] = values[:, column]
     return ModeRows(mode, values[:, 1], amplitudes if len(amplitudes) > 1 else {})

@@ -80,7 +80,7 @@ def test_what_is_most_likely_a_wrong_unit_is_remarked_on(tmp_path, capfd):
 @pytest.mark.parametrize(
     ("table", "pattern"),
     [
-        ("fc [MPa]\n30\n31\n", "'fc' is not named as a modulus.*E \\[GPa\\]"),
+        ("fc [MPa]\n30\n31\n", "'fc .MPa.' is not a modulus.*E \\[GPa\\]"),
         ("Ecm [MPa]\n30000\n31000\n", ""),
         ("Young's modulus [GPa]\n30\n31\n", ""),
     ],

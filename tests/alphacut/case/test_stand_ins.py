@@ -114,11 +114,11 @@ def test_an_earlier_run_stands_in(tmp_path, capfd):
 @pytest.mark.parametrize(
     ("content", "pattern"),
     [
-        ("E\n24\n", "header 'E' has no unit"),
+        ("E\n24\n", "the column .E. is not a modulus with its unit"),
         ("E [m]\n24\n", 'unit "m" is wrong'),
         ("E [GPa]\n24\n-3\n", "m.csv:3: .*no positive number"),
         ("E [GPa]\nx\n", "m.csv:2: .*no positive number"),
-        ("E [GPa]\n", "a header and one value"),
+        ("E [GPa]\n", "a header and a row"),
     ],
 )
 def test_measured_nonsense_is_refused_with_row_and_reason(content, pattern, tmp_path):

@@ -1,0 +1,87 @@
+"""Rows of a CSV file with a header that holds units: ``time [s],acceleration [m/s^2]``."""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from alphacut.io.output_paths import hint
+from alphacut.io.problem import BadInput, Problem
+from alphacut.io.units import factor
+
+
+@dataclass(frozen=True)
+class CsvFile:
+    """A file that a key of the case names.
+
+    Args:
+        path: The file.
+        key: The key, for messages.
+        what: What it holds, for messages: ``record``.
+        allowed: Its header, for messages.
+    """
+
+    path: Path
+    key: str
+    what: str
+    allowed: str
+
+    def rows(self, least: int = 1) -> list[tuple[int, list[str]]]:
+        """Line and entries of the header and of each row; empty lines and comments are left out.
+
+        Args:
+            least: Rows that there must be below the header.
+
+        Raises:
+            BadInput: The file cannot be read, or has fewer rows.
+        """
+        try:
+            lines = self.path.read_text(encoding="utf-8-sig").splitlines()
+        except UnicodeDecodeError:
+            raise self.unreadable(f"the {self.what} is not text in UTF-8", self.allowed) from None
+        except OSError as error:
+            reason = (error.strerror or str(error)).lower()
+            what = f"the {self.what} cannot be read: {reason}"
+            raise self.unreadable(what, hint(self.path)) from None
+        kept = [
+            (number, line)
+            for number, line in enumerate(lines, start=1)
+            if line.strip() and not line.startswith("#")
+        ]
+        if len(kept) <= least:
+            count = {1: "a row", 2: "two rows"}.get(least, f"{least} rows")
+            what = f"the {self.what} needs a header and {count} or more"
+            raise self.unreadable(what, self.allowed)
+        return [(number, next(csv.reader([line]))) for number, line in kept]
+
+    def unreadable(self, what: str, allowed: str) -> BadInput:
+        """The error of the file as a whole."""
+        return BadInput(Problem(self.key, what, str(self.path), allowed))
+
+    def refuse(self, line: int, what: str, value: str = "", allowed: str = "") -> BadInput:
+        """The error of one line."""
+        problem = Problem(self.key, what, value, allowed, file=str(self.path), line=line)
+        return BadInput(problem)
+
+    def scale(self, line: int, cell: str, name: str, si: str, *, pattern: str = "") -> float:
+        """Factor that brings a column to SI, from the unit in its header.
+
+        Args:
+            line: Line of the header.
+            cell: Its entry, ``time [s]``.
+            name: What the column is called, for messages.
+            si: SI unit.
+            pattern: Regular expression of its names; `name` unless given.
+
+        Raises:
+            BadInput: It has another name, or no unit of that kind.
+        """
+        match = re.fullmatch(r"\s*(.+?)\s*\[([^\]]+)\]\s*", cell)
+        try:
+            if match is None or not re.fullmatch(pattern or name, match[1], re.IGNORECASE):
+                raise ValueError(f"the column {cell.strip()!r} is not {name} with its unit")
+            return float(factor(match[2], si))
+        except ValueError as error:
+            raise self.refuse(line, str(error), allowed=self.allowed) from None
