@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -35,7 +34,7 @@ class Cheapest:
 
 
 def cheapest_tolerances(
-    function: Callable[..., Any],
+    function: Callable[..., object],
     nominal: Mapping[str, float],
     costs: Mapping[str, float],
     limits: Limits,
