@@ -162,13 +162,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--repetitions", type=int, default=500)
+    parser.add_argument("--records", type=int, default=40)
     parser.add_argument("--seed", type=int, default=None, help="default: a new one, printed")
     parser.add_argument("--out", type=Path, default=Path(__file__).parents[1] / "results")
     options = parser.parse_args(arguments)
     seed = np.random.SeedSequence(options.seed).entropy
     print(f"seed {seed}", flush=True)
     rng, few = np.random.default_rng(seed), max(options.repetitions // 10, 2)
-    kinds = ((False, 30, options.repetitions), (False, 10, few), (True, 30, few))
+    records = options.records
+    kinds = ((False, records, options.repetitions), (False, 10, few), (True, records, few))
     rows = []
     for masses, records, count in kinds:
         rows.append(repeat(masses, records, count, rng))

@@ -1,0 +1,94 @@
+"""Learning from a recorded motion: exact coverage of the possibility, and the sets found."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from alphacut.frame import Exact, LinearFlow, StoreyFrame, envelope
+from alphacut.frame.update.motion import RecordedMotion, learn_from_motion
+from alphacut.fuzzy import FuzzyNumber, Interval
+
+FRAME = StoreyFrame(
+    [20e3, 15e3],
+    [3.0, 3.0],
+    30e9,
+    1e-4,
+    q0=(0.01, 0.02),
+    rayleigh=(0.2, 1e-3),
+    outputs=("q1", "q2"),
+)
+NAMES = ("c1", "c2", "rayleigh_mass")
+PRIOR: dict[str, FuzzyNumber] = {
+    "c1": Interval(1.6, 2.4),
+    "c2": Interval(1.6, 2.4),
+    "rayleigh_mass": Interval(0.1, 0.3),
+}
+FLOW = LinearFlow(FRAME, NAMES, 2.0, 0.05, Exact())
+
+
+def recorded(truth: np.ndarray, rng: np.random.Generator, noise: float = 1e-3) -> RecordedMotion:
+    motion = FLOW.values(truth[None])[0]
+    return RecordedMotion(FLOW, motion + noise * rng.standard_normal(motion.shape))
+
+
+def test_the_possibility_of_the_truth_is_uniform_however_large_the_noise() -> None:
+    rng = np.random.default_rng(11)
+    for noise in (1e-4, 2e-2):  # of an amplitude of 2e-2
+        degrees = []
+        for _ in range(200):
+            truth = rng.uniform((1.6, 1.6, 0.1), (2.4, 2.4, 0.3))
+            degrees.append(float(recorded(truth, rng, noise).possibility(truth[None])[0]))
+        for level in (0.1, 0.3, 0.5, 0.7, 0.9):
+            error = np.sqrt(level * (1 - level) / 200)
+            assert abs(np.mean(np.array(degrees) < level) - level) < 4 * error
+
+
+def test_the_sets_found_hold_the_truth_and_are_nested() -> None:
+    rng = np.random.default_rng(12)
+    inside = []
+    for _ in range(6):
+        truth = rng.uniform((1.7, 1.7, 0.15), (2.3, 2.3, 0.25))
+        found = learn_from_motion(recorded(truth, rng), PRIOR, alpha=(0.1, 0.5))
+        inside.append(bool(((found.lower[0] <= truth) & (truth <= found.upper[0])).all()))
+        assert (found.lower[1] >= found.lower[0]).all()
+        assert (found.upper[1] <= found.upper[0]).all()
+        assert (found.upper[0] - found.lower[0])[:2].max() < 0.5
+    assert np.mean(inside) >= 0.9 - 4 * np.sqrt(0.09 / 6)
+
+
+def test_points_of_the_set_lie_in_its_hull() -> None:
+    rng = np.random.default_rng(13)
+    record = recorded(np.array([1.9, 2.1, 0.2]), rng)
+    found = learn_from_motion(record, PRIOR, alpha=(0.05,))
+    low, high = found.lower[0], found.upper[0]
+    points = rng.uniform(low - 0.3 * (high - low), high + 0.3 * (high - low), (3000, 3))
+    held = points[record.possibility(points) >= 0.05]
+    assert len(held) > 100
+    slack = 0.05 * (high - low)
+    assert (held >= low - slack).all()
+    assert (held <= high + slack).all()
+
+
+def test_the_numbers_feed_an_envelope_and_say_what_they_rest_on() -> None:
+    rng = np.random.default_rng(14)
+    found = learn_from_motion(recorded(np.array([1.9, 2.1, 0.2]), rng), PRIOR, alpha=(0.05, 1.0))
+    after = envelope(FRAME, found.numbers, duration=1.0, step=0.05, alpha=(0.05,))
+    before = envelope(FRAME, PRIOR, duration=1.0, step=0.05, alpha=(0.05,))
+    assert (after.upper - after.lower).mean() < 0.3 * (before.upper - before.lower).mean()
+    assert "independent normal errors" in str(found.claim)
+    with pytest.raises(ValueError, match="decide the cuts"):
+        found.numbers["c1"].cut(0.0)
+
+
+def test_records_that_do_not_fit_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"the record has the shape"):
+        RecordedMotion(FLOW, np.zeros((3, 2)))
+    short = LinearFlow(FRAME, NAMES, 0.05, 0.05, Exact())
+    with pytest.raises(ValueError, match=r"need more"):
+        RecordedMotion(short, np.zeros((2, 2)))
+    record = recorded(np.array([1.9, 2.1, 0.2]), np.random.default_rng(1))
+    with pytest.raises(ValueError, match=r"the priors are of c2"):
+        learn_from_motion(record, {"c2": Interval(1, 2)})
+    with pytest.raises(ValueError, match=r"must rise within"):
+        learn_from_motion(record, PRIOR, alpha=(0.0, 1.0))
