@@ -88,12 +88,9 @@ class FuzzyField:
 
     def values(self, **directions: float | Array) -> list[float | Array]:
         """Values at the places from the directions, each a number or an array (n,)."""
+        along = [directions[name] for name in self.names]
         return [
             self.centre
-            + self.half_width
-            * sum(
-                (part * directions[name] for name, part in zip(self.names, row, strict=True)),
-                start=0.0,
-            )
-            for row in self.shapes.tolist()
+            + self.half_width * sum(float(p) * x for p, x in zip(row, along, strict=True))
+            for row in self.shapes
         ]

@@ -116,9 +116,10 @@ class Turned:
     def __call__(self, **inputs: object) -> dict[str, object]:
         """Combination for each direction."""
         one, other = self.function(**inputs)
+        cosine, sine = _directions(self.directions).T
         return {
-            f"along {k}": a * one + b * other  # type: ignore[operator]
-            for k, (a, b) in enumerate(_directions(self.directions).tolist())
+            f"along {k}": float(a) * one + float(b) * other  # type: ignore[operator]
+            for k, (a, b) in enumerate(zip(cosine, sine, strict=True))
         }
 
     def pair(self, inputs: Mapping[str, float]) -> tuple[float, float]:
@@ -137,9 +138,10 @@ def _directions(count: int) -> Array:
 def _polygon(unit: Array, lower: Array, upper: Array) -> Array:
     """Corners of {x: lower <= unit x <= upper}: a great square, cut by each half plane in turn."""
     reach = 4 * float(np.abs([lower, upper]).max()) + 1e-300
-    corners = reach * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    for normal, low, high in zip(unit, lower, upper, strict=True):
-        corners = _cut(_cut(corners, normal, float(high)), -normal, -float(low))
+    corners: Array = reach * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    for k in range(len(unit)):
+        corners = _cut(corners, unit[k], float(upper[k]))
+        corners = _cut(corners, -unit[k], -float(lower[k]))
     return corners
 
 

@@ -178,7 +178,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     write([asdict(row) for row in rows], options.out / "frame_update.csv")
     prior = priors(False)
     truth = np.array([FRAME.parameters[name] for name in prior])
-    found = update(FRAME, prior, measure(truth, 30, False, rng), alpha=(0.05,))
+    found = update(FRAME, prior, measure(truth, records, False, rng), alpha=(0.05,))
     print(f"envelope of the roof: {narrower(found, prior):.3f} of its width before the update")
     assert all(row.worst >= -4 and row.in_box >= 0.95 - 0.05 for row in rows)
 

@@ -189,7 +189,8 @@ def _fit(record: RecordedMotion, ends: Array) -> tuple[Array, Array]:
 
 def _border(record: RecordedMotion, ends: Array, best: Array, rays: Array, level: float) -> Array:
     """Points of the set of a level on rays from the best point, itself among them."""
-    inside, outside = np.zeros(len(rays)), np.full(len(rays), 1.0)
+    inside: Array = np.zeros(len(rays))
+    outside: Array = np.ones(len(rays))
     for _ in range(8):  # outward until beyond the set or the priors
         held = _held(record, ends, best + outside[:, None] * rays, level)
         inside = np.where(held, outside, inside)
