@@ -55,7 +55,8 @@ class Row:
     width_mean: float
     width_most: float
     common_factor: float
-    """Least range of a factor common to all parameters over that of their priors, at α = 0.05."""
+    """Least range of a factor common to all parameters over that of their priors, at α = 0.05, of
+    repetitions whose true values lie in the set."""
     told: float
     tried: float
     seconds: float
@@ -122,7 +123,8 @@ def repeat(masses: bool, records: int, repetitions: int, rng: np.random.Generato
         told.append(any("common factor" in x.words and not x.learned for x in found.directions))
         factors = np.linspace(0.75, 1.25, 1001)
         held = found.agreement.possibility(factors[:, None] * truth) >= 0.05
-        common.append(float(np.ptp(factors[held]) / (2 * SPREAD)) if held.any() else 0.0)
+        if held.any():
+            common.append(float(np.ptp(factors[held]) / (2 * SPREAD)))
         tried.append(
             float(
                 np.nanmean(
@@ -140,7 +142,7 @@ def repeat(masses: bool, records: int, repetitions: int, rng: np.random.Generato
         float(np.mean(inside)),
         float(np.mean(widths)),
         float(np.max(widths)),
-        float(np.min(common)),
+        float(np.min(common or [np.nan])),
         float(np.mean(told)),
         float(np.mean(tried)),
         (time.perf_counter() - start) / repetitions,
