@@ -65,9 +65,8 @@ def over_threshold(axes: Axes, found: xarray.Dataset) -> None:
     for pair, share in zip(quantiles, shares, strict=True):
         axes.axhspan(*pair, color=INK, alpha=0.25, lw=0)
         axes.axhline(pair.mean(), color=INK, lw=0.5)
-        at = (grey[-1], pair.max())
-        above = {"xytext": (0, 1), "textcoords": "offset points", "va": "bottom", "ha": "right"}
-        axes.annotate(f"{share:g}", at, fontsize=8, color=INK, **above)
+        place = grey[-1], pair.max()
+        axes.text(*place, f"{share:g}", fontsize=8, va="bottom", ha="right", color=INK)
     axes.set_xlabel("threshold, grey value")
     axes.set_ylabel("E, GPa")
     axes.set_title("E over the threshold, its quantiles", fontsize=9)

@@ -70,11 +70,12 @@ def threshold_nodes(grey: Array, law: NormalThreshold) -> Array:
         grey: Grey values, shape (rows, columns).
         law: Law of the threshold; the widest, where it is fuzzy.
     """
-    ends = [m + s * law.deviation[1] for m, s in zip(law.mean, (-REACH, REACH), strict=True)]
+    reach = REACH * law.deviation[1]
+    low, high = law.mean[0] - reach, law.mean[1] + reach
     values = np.unique(grey)
-    values = values[(values >= ends[0]) & (values <= ends[1])].astype(float)
+    values = values[(values >= low) & (values <= high)].astype(float)
     if len(values) > NODES:
-        return np.linspace(*ends, NODES)
+        return np.linspace(low, high, NODES)
     nodes = np.sort(np.concatenate([values, np.nextafter(values, np.inf)]))
     return nodes if len(nodes) else np.array([sum(law.mean) / 2])
 
@@ -190,7 +191,7 @@ def threshold_response(
     argument = np.sort(sign * np.asarray(thresholds, float))
     # a pixel at the threshold is bright, so in the mirrored image not yet of the stiffer phase
     at = argument if sign > 0 else np.nextafter(argument, np.inf)
-    boxes = [ImageBox([(value, value)], [soft, stiff]) for value in at.tolist()]
+    boxes = [ImageBox([(value, value)], [soft, stiff]) for value in map(float, at)]
     cuts = each_cut(values, boxes, aspect=aspect, solver=solver, division=division)
     bounds = np.array([(cut.bounds.lower, cut.bounds.upper) for cut in cuts])
     pure = soft.lower.stiffness, stiff.upper.stiffness

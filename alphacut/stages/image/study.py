@@ -74,8 +74,8 @@ class ImageStudy:
             if self.young:
                 moduli.append(ModuliInterval.of_young(first, second))
             else:
-                ends = (PlaneModuli.of_bulk(first[end], second[end]) for end in (0, 1))
-                moduli.append(ModuliInterval(*ends))
+                low, high = (PlaneModuli.of_bulk(first[end], second[end]) for end in (0, 1))
+                moduli.append(ModuliInterval(low, high))
         return moduli
 
     def images(self, threshold: Level, phases: Level) -> ModuliImages:
