@@ -161,6 +161,16 @@ class Case:
         return any(self.asked(f"mesh.{name}") for name in keys_of(Mesh))
 
     @property
+    def names_particles(self) -> bool:
+        """Whether the case says of what kind its particles are."""
+        return self.asked("cell.particles")
+
+    @property
+    def words(self) -> str:
+        """Every text that the case gives."""
+        return " ".join(str(value) for value in self.written.values() if isinstance(value, str))
+
+    @property
     def modulus_tolerance(self) -> float | None:
         """Relative tolerance on E that is asked for; None where the case names none."""
         return self.modulus.tolerance if self.asked("modulus.tolerance") else None

@@ -93,9 +93,8 @@ def remark(case: Case, radius: HermiteMap, matrix: Phase, inclusion: Phase) -> s
     the bounds of Hashin and Shtrikman that the matrix gives, in the plane and in space, at one
     fraction.
     """
-    told = " ".join(str(value) for value in case.written.values() if isinstance(value, str))
-    word = WORDS.search(told)
-    if case.asked("cell.particles") or word is None:
+    word = WORDS.search(case.words)
+    if case.names_particles or word is None:
         return None
     rule = gauss_rule(radius.distribution, points=40)
     share = float(rule.weights @ (np.pi / 4 * radius(rule.nodes) ** 2))
