@@ -163,6 +163,9 @@ def require_effect(options: argparse.Namespace, case: Case, models: Sequence[str
     if options.cross_check and "modulus.method" in case.changed:
         what = "this has no effect beside --cross-check, which names both models"
         problems.append(Problem("modulus.method", what, case.modulus.method))
+    if options.cross_check and case.cell.particles == "spheres":
+        what = "spheres have one model, the series"
+        problems.append(Problem("--cross-check", what, options.cross_check))
     if options.exclude and "auto" not in models:
         what = f"the method is {' and '.join(models)}, and only method auto leaves a choice"
         problems.append(Problem("--exclude", what, options.exclude, "beside --method auto"))

@@ -7,10 +7,12 @@ from time import process_time
 import numpy as np
 import pytest
 
+from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.rve import Phase
 from alphacut.rve.spheres.cubic import cubic_moduli, hill_average, young_along
 from alphacut.rve.spheres.series.stiffness import cubic_stiffness
+from alphacut.stochastic import HermiteMap
 
 PAPER = str(Path(__file__).parents[3] / "cases" / "paper.toml")
 SPHERES = ["--set", 'cell.particles="spheres"', "--method", "series"]
@@ -79,6 +81,7 @@ def test_text_says_what_e_is(capfd):
         (["--method", "series", "--radius", "1.2"], "--radius = 1.2: out of range"),
         (["--method", "series", "--radius", "nan"], "--radius = nan: out of range"),
         (["--method", "series", "--radius", "0.5", "--a1", "0.2"], "no effect beside --radius"),
+        (["--method", "auto", "--exclude", "series"], "spheres have one model"),
         (["--method", "series", "--set", 'cell.particles="cubes"'], "cylinders, spheres"),
     ],
 )
@@ -89,6 +92,25 @@ def test_what_spheres_cannot_have_is_one_line(arguments, words, capfd):
     assert not out
     assert words in err
     assert err.count("\n") == 1
+
+
+def test_spheres_have_no_second_model(capfd):
+    case = str(Path(PAPER).with_name("paper-3d.toml"))
+    assert main(["cell", case, "--cross-check", "series,auto"]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert "--cross-check = series,auto: spheres have one model, the series" in line
+
+
+def test_the_shipped_spheres_fill_what_the_papers_circles_cover(capfd):
+    """Mean of π r³/6 over θ beside the paper's mean of π r²/4."""
+    shares = []
+    for name, power in (("paper", 2), ("paper-3d", 3)):
+        case = str(Path(PAPER).with_name(f"{name}.toml"))
+        curve = answer(capfd, "cell", case, "--method", "series")["curve"]
+        radius = load(case).radius
+        values = HermiteMap(*(slope.modal for slope in radius.slopes))(curve["theta"])
+        shares.append(np.pi / (4 if power == 2 else 6) * np.dot(curve["weights"], values**power))
+    assert shares[1] == pytest.approx(shares[0], rel=5e-3)
 
 
 def test_a_mesh_of_spheres_is_refused(tmp_path, capfd):
