@@ -19,7 +19,10 @@ from alphacut.rve.slices.theta_rule import DIGITS, extreme_radii, theta_error, t
 from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.truncated_normal import Array
 
-_IRREGULAR_FADE = 0.15  # least share of a change that is taken to be left by orders below 4
+# least share of the last change that is taken to be left: by order 4, the same where order 2 locks
+# and so changes by much, and by lower orders, which are not yet regular
+_FADE, _LOCKED_FADE, _IRREGULAR_FADE = 0.03, 0.05, 0.15
+_LOCKING = 0.45  # Poisson's ratio above which order 2 locks
 _ROUND_OFF = 1e-13
 _SAFETY = 3.3
 _POINTWISE = 2.0  # safety of a single θ, where errors do not average
@@ -80,7 +83,9 @@ class SlicesModel:
                     radius,
                     matrix,
                     inclusions,
-                    orders=range(max(1, self.order - 2), self.order + 1),
+                    # orders below 4 are judged by the next
+                    orders=range(max(1, self.order - 2), min(self.order + 1, 4) + 1),
+                    order=self.order,
                     mesh_size=self.mesh_size,
                     centre=self.centre,
                 )
@@ -130,25 +135,29 @@ class Slice:
     """A planar cell solved for m inclusions by elements of several orders on one mesh.
 
     Args:
-        order: The highest order.
+        orders: Rising.
+        order: That of the result.
         by_order: Stiffness by order, in Pa, shape (orders, m, 3, 3).
-        unknowns: Of the largest linear system.
+        unknowns: Of the result's linear system.
         solver: Its solver.
         factorisations: How many were made.
         seconds: Wall time: mesh, jit, assemble, solve.
+        locks: Whether a phase is nearly incompressible.
     """
 
+    orders: tuple[int, ...]
     order: int
     by_order: Array
     unknowns: int
     solver: str
     factorisations: int
     seconds: dict[str, float]
+    locks: bool
 
     @property
     def stiffness(self) -> Array:
-        """By the highest order, shape (m, 3, 3), in Pa."""
-        return np.asarray(self.by_order[-1])
+        """By the result's order, shape (m, 3, 3), in Pa."""
+        return np.asarray(self.by_order[self.orders.index(self.order)])
 
     @property
     def gaps(self) -> Array:
@@ -160,16 +169,26 @@ class Slice:
     def error(self) -> Array:
         """Declared relative errors of C11 + C12, C11 − C12 and C33, shape (m, 3).
 
-        The geometric series of further orders, times a safety factor. What one order more leaves
-        of the last change is what the last rise left of the one before; orders below 4 are not yet
-        regular. One modulus may change little by chance: each counts a share of the largest error.
+        The distance from the highest order, and the declared error of that one.
         """
-        gaps = self.gaps
-        fade = np.zeros(gaps.shape[1:])
+        own, highest = (square_moduli(one) for one in (self.stiffness, self.by_order[-1]))
+        return np.asarray((1 + np.abs(own / highest - 1)) * (1 + self._error_of_highest) - 1)
+
+    @property
+    def _error_of_highest(self) -> Array:
+        """Declared errors by the highest order, shape (m, 3).
+
+        The geometric series of further orders, times a safety factor. What one order more leaves
+        of the last change is what the last rise left of the one before; where order 2 locks, of
+        the modulus where it left most. One modulus may change little by chance: each counts a share
+        of the largest error.
+        """
+        gaps, least = self.gaps, _LOCKED_FADE if self.locks else _FADE
+        fade = np.full(gaps.shape[1:], least if self.orders[-1] == 4 else _IRREGULAR_FADE)
         if len(gaps) > 1:
-            fade = np.clip(gaps[-1] / np.maximum(gaps[-2], 1e-300), 0.01, 0.5)
-        if self.order < 4:
-            fade = np.maximum(fade, _IRREGULAR_FADE)
+            fade = np.clip(gaps[-1] / np.maximum(gaps[-2], 1e-300), fade, 0.5)
+        if self.locks:
+            fade = fade.max(axis=1, keepdims=True)
         found = _SAFETY * gaps[-1] * fade / (1 - fade)
         shared = _SHARED * found.max(axis=1, keepdims=True)
         return np.asarray(np.maximum(found, shared) + _ROUND_OFF)
@@ -181,11 +200,15 @@ def solve_slice(
     inclusions: Sequence[Phase],
     *,
     orders: Sequence[int],
+    order: int | None = None,
     mesh_size: float,
     centre: tuple[float, float] = (0.0, 0.0),
     share: bool = False,
 ) -> Slice:
-    """Solve one planar cell by each of the rising `orders` on one mesh."""
+    """Solve one planar cell by each of the rising `orders` on one mesh.
+
+    The result is that of `order`, by default the highest.
+    """
     from alphacut.rve.mesh.planar import planar_mesh
     from alphacut.rve.planar.problem import PlanarCell
     from alphacut.rve.planar.system import SOLVER
@@ -199,11 +222,14 @@ def solve_slice(
     seconds["solve"] = perf_counter() - started - sum(cell.seconds["assemble"] for cell in cells)
     for name in ("mesh", "jit", "assemble"):
         seconds[name] = seconds.get(name, 0.0) + sum(cell.seconds[name] for cell in cells)
+    chosen = orders[-1] if order is None else order
     return Slice(
-        orders[-1],
+        tuple(orders),
+        chosen,
         stiffness,
-        cells[-1].unknowns,
+        cells[list(orders).index(chosen)].unknowns,
         SOLVER,
         sum(cell.factorisations for cell in cells),
         seconds,
+        max(phase.poisson for phase in (matrix, *inclusions)) > _LOCKING,
     )

@@ -88,7 +88,9 @@ class PlanarSource:
             size = max(_FINEST, size * finer)
             errors = self._errors(radii[worst], size)
         self.mesh_size = size
-        self.space = np.vstack([radii, rough.T * (errors / rough[worst]).max()])
+        # on the chosen mesh: what a finer one gains differs from radius to radius
+        found = rough if size == _ROUGH else np.array([self._errors(r, size) for r in radii])
+        self.space = np.vstack([radii, found.T])
 
     def _errors(self, radius: float, size: float) -> Array:
         """Declared relative errors at one radius of both extreme inclusions, shape (3,)."""
