@@ -55,6 +55,25 @@ ACCEPTED = {
 }
 
 
+# Sizes of everyday units in SI, so that a case of these starts without Pint's registry.
+EVERYDAY = {
+    "Pa": {"Pa": "1", "kPa": "1e3", "MPa": "1e6", "GPa": "1e9"},
+    "m": {"m": "1", "mm": "1e-3", "cm": "1e-2"},
+    "m^2": {"m^2": "1"},
+    "m^4": {"m^4": "1"},
+    "kg": {"kg": "1", "t": "1e3"},
+    "s": {"s": "1", "ms": "1e-3"},
+    "m/s": {"m/s": "1"},
+    "m/s^2": {"m/s^2": "1"},
+    "N*s/m": {"N s/m": "1", "kN s/m": "1e3"},
+    "N/m": {"N/m": "1", "kN/m": "1e3"},
+    "N": {"N": "1", "kN": "1e3"},
+    "1/s": {"1/s": "1", "Hz": "1"},
+    "rad": {"rad": "1"},
+    "rad/s": {"rad/s": "1"},
+}
+
+
 # units that are others than were meant
 MEANT = {
     ("m/s^2", "g"): "g_0",
@@ -79,8 +98,6 @@ def factor(unit: str, si: str) -> Decimal:
     Raises:
         ValueError: The unit is unknown, or measures something else.
     """
-    import pint
-
     if not si:
         if unit in ("", "1"):
             return Decimal(1)
@@ -89,6 +106,10 @@ def factor(unit: str, si: str) -> Decimal:
         raise ValueError(f'the unit "{unit}" is wrong')
     if not unit:
         raise ValueError("the unit is missing")
+    if unit in EVERYDAY.get(si, {}):
+        return Decimal(EVERYDAY[si][unit])
+    import pint
+
     if re.search(r"\btons?\b", unit):
         raise ValueError(f'the unit "{unit}" means several things; write t for 1000 kg, or lb')
     # pint's tokeniser raises whatever Python's does on text that is not a unit at all

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -30,7 +31,12 @@ Moduli = Callable[[Array], Array]  # at radii (n,), shape (n, 3)
 
 
 def judged(
-    result: Homogenised, radius_map: RadiusMap, phases: tuple[Phase, Phase], *, layers: Array
+    result: Homogenised,
+    radius_map: RadiusMap,
+    phases: tuple[Phase, Phase],
+    *,
+    layers: Array,
+    cache: Path | None = None,
 ) -> Homogenised:
     """The result with its declared errors.
 
@@ -40,10 +46,14 @@ def judged(
         phases: Its matrix and inclusion.
         layers: About the relative errors that the layers in θ leave in the mean moduli, shape (3,);
             the rest is booked to the mesh.
+        cache: Folder where tables are kept; None keeps them in the process.
     """
+    enough = _ACCURACIES[0]  # accuracy that is thought to do
     for accuracy in _ACCURACIES:
+        if accuracy > enough and accuracy > _ACCURACIES[-1]:
+            continue
         try:
-            exact, left = _reference(radius_map, phases, accuracy)
+            exact, left = _reference(radius_map, phases, accuracy, cache)
         except RuntimeError:  # no planar mesh, or none fine enough
             mean, nodes = _within_bounds(result.curve, radius_map, phases)
             break
@@ -54,6 +64,7 @@ def judged(
         nodes = _apart(moduli, exact(radius_map(result.curve.theta)))
         nodes = (1 + nodes) * (1 + left(radius_map(result.curve.theta))) - 1
         settled = (noise <= _SHARE * mean)[np.isfinite(mean)].all()
+        enough = accuracy * float(np.nanmin(_SHARE * mean / noise))
         mean = (1 + mean) * (1 + noise) - 1
         if settled:
             break
@@ -79,13 +90,13 @@ def moduli_of(curve: StressCurve) -> Array:
 
 
 def _reference(
-    radius_map: RadiusMap, phases: tuple[Phase, Phase], accuracy: float
+    radius_map: RadiusMap, phases: tuple[Phase, Phase], accuracy: float, cache: Path | None
 ) -> tuple[Moduli, Moduli]:
     """Moduli at radii by a table of planar cells, and their declared relative errors."""
     matrix, inclusion = phases
     low, high = (float(r) for r in extreme_radii(radius_map))
     span = TableRange(matrix, inclusion.poisson, (low, high), (inclusion.modulus,) * 2)
-    table, _ = stored_table(span, None, accuracy=accuracy)
+    table, _ = stored_table(span, cache, accuracy=accuracy)
     modulus = np.array([inclusion.modulus])
 
     def exact(radius: Array) -> Array:

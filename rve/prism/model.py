@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -62,6 +63,8 @@ class PrismModel:
             seconds, and a companion of a coarser mesh besides.
         moduli: Least and greatest modulus of the particle, in Pa, between which every sample of a
             map is projected on a few solutions; None: each is solved.
+        cache: Folder where the tables that errors are measured against are kept; None keeps them
+            in the process.
 
     Raises:
         ValueError: An option out of range or unknown.
@@ -76,6 +79,7 @@ class PrismModel:
     stiffness: bool = False
     estimate: bool = False
     moduli: tuple[float, float] | None = None
+    cache: Path | None = None
     name: ClassVar[str] = "prism"
 
     def __post_init__(self) -> None:
@@ -132,12 +136,14 @@ class PrismModel:
         with watch("estimate"):
             layers = self._errors_of_layers(radius_map, matrix, inclusions)
             found = [
-                judged(result, radius_map, (matrix, phase), layers=left)
+                judged(result, radius_map, (matrix, phase), layers=left, cache=self.cache)
                 for result, phase, left in zip(results, inclusions, layers, strict=True)
             ]
         seconds = watch.seconds["estimate"] / len(results)
         for result in found:
-            require(result.checks, Limits(discretisation=ROUND_OFF + result.largest_error))
+            # once for the moduli and once for the bounds, averaged over the same nodes
+            allowed = ROUND_OFF + 2 * result.largest_error
+            require(result.checks, Limits(discretisation=allowed))
         return [replace(r, seconds={**r.seconds, "estimate": seconds}) for r in found]
 
     def _errors_of_layers(

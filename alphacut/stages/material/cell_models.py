@@ -113,4 +113,5 @@ def meshed(choice: CellChoice) -> CellModel:
         stiffness=choice.stiffness,
         estimate=choice.estimate,
         moduli=choice.moduli,
+        cache=table_folder(),
     )
