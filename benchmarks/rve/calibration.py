@@ -8,16 +8,19 @@ resolution or tolerance. The truth is the multipole series at 1e-12 for every mo
 whose truth is planar elements of order 4 where it claims no more than these reach, and itself at
 1e-12 otherwise. Prints how many numbers lie within their declared errors, and the median of
 declared over true for each quantity; exit status 1 if one number lies outside. A model that refuses
-is counted, not judged.
+is counted, not judged. In pieces: `--first 0 --cases 100 --out A.csv`, `--first 100 …`, then
+`--read A.csv B.csv …` sums up and keeps the table.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import sys
-from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,8 +33,11 @@ from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.stages.material.cell import declared_errors, document
 from alphacut.stochastic import HermiteMap
+from benchmarks.rows import write
 
 ROUND_OFF = 3e-11  # of the truth, relative: rounding near incompressibility
+REFUSED = "refused"
+RESULTS = Path(__file__).parents[1] / "results" / "cell_calibration.csv"
 MODELS = ("series", "slices", "table", "prism", "auto")
 
 
@@ -150,13 +156,15 @@ def truth_of(cell: Cell, result: Homogenised) -> Homogenised:
 
 
 def calibrate(
-    cases: int, seed: int, models: Sequence[str] = MODELS
+    cases: int, seed: int, models: Sequence[str] = MODELS, first: int = 0
 ) -> Iterator[tuple[str, Cell, object]]:
-    """Each case's model, cell, and its judgements or the refusal's text."""
+    """Each case's model, cell, and its judgements or the refusal's text; from `first` on."""
     rng = np.random.default_rng(seed)
-    for k in range(cases):
+    for k in range(first + cases):
         name = models[k % len(models)]
         cell, model = draw_cell(rng), draw_model(name, rng)
+        if k < first:
+            continue
         try:
             result = model.solve(cell.radius, cell.matrix, [cell.inclusion])[0]
             truth = truth_of(cell, result)
@@ -177,36 +185,78 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--cases", type=int, default=300, help="random cells (300)")
     parser.add_argument("--seed", type=int, default=1, help="seed of the draws (1)")
+    parser.add_argument("--first", type=int, default=0, help="cases to draw but leave out (0)")
+    parser.add_argument("--out", type=Path, help="CSV of every number judged, for --read")
+    parser.add_argument("--read", type=Path, nargs="+", help="sum up such files, compute nothing")
     parser.add_argument("--models", default=",".join(MODELS), help="models that take turns")
     options = parser.parse_args(arguments)
-    ratios: defaultdict[str, list[float]] = defaultdict(list)
-    refused: Counter[str] = Counter()
-    outside = judged = 0
-    for k, (name, cell, found) in enumerate(
-        calibrate(options.cases, options.seed, options.models.split(","))
-    ):
+    if options.read:
+        rows = [row for path in options.read for row in _read(path)]
+    else:
+        models = options.models.split(",")
+        rows = list(_judged(options.cases, options.seed, models, options.first))
+    if options.out:
+        write(rows, options.out)
+    summary = list(sums(rows))
+    for row in summary:
+        print(
+            "{quantity:28} {numbers:6d} numbers, {outside} outside, median {median}".format(**row)
+        )
+    if options.read:
+        write(summary, RESULTS)
+    judged = [row for row in rows if row["quantity"] != REFUSED]
+    return 1 if not judged or any(row["outside"] for row in rows) else 0
+
+
+def _judged(
+    cases: int, seed: int, models: Sequence[str], first: int
+) -> Iterator[dict[str, object]]:
+    """Rows of every number; misses and refusals are printed."""
+    for k, (name, cell, found) in enumerate(calibrate(cases, seed, models, first), start=first):
+        place = {"seed": seed, "case": k, "model": name}
         if isinstance(found, str):
-            refused[name] += 1
             print(f"case {k}: {name} refused: {found[:110]}", flush=True)
+            yield {**place, "quantity": REFUSED, "ratio": "", "outside": 0}
             continue
-        judged += 1
         worst = {}
         for one in found:
             if not one.covered:
-                outside += 1
                 worst[one.quantity] = f"{one.true / one.declared:.3g} times its declared error"
-            if one.quantity != "tolerance" and one.true > 3 * one.noise:
-                ratios[one.quantity].append(one.declared / one.true)
-                ratios[f"model {name}"].append(one.declared / one.true)
+            told = one.quantity != "tolerance" and one.true > 3 * one.noise
+            ratio = f"{one.declared / one.true:.4g}" if told else ""
+            yield {
+                **place,
+                "quantity": one.quantity,
+                "ratio": ratio,
+                "outside": int(not one.covered),
+            }
         if worst:
             print(f"case {k}: {name} {cell}: {worst}", flush=True)
-    print(f"{judged} cells judged, {outside} numbers outside their declared error", flush=True)
-    print("refused: " + (", ".join(f"{n} {name}" for name, n in refused.items()) or "none"))
-    for quantity, values in sorted(ratios.items()):
-        print(f"{quantity:28} median of declared over true {np.median(values):7.3g}")
-    every = [value for name, values in ratios.items() if name[:6] != "model " for value in values]
-    print(f"{'all':28} median of declared over true {np.median(every):7.3g}")
-    return 1 if outside or not judged else 0
+
+
+def _read(path: Path) -> Iterator[dict[str, object]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            yield {**row, "outside": int(row["outside"])}
+
+
+def sums(rows: Sequence[Mapping[str, object]]) -> Iterator[dict[str, object]]:
+    """Numbers, misses and the median of declared over true for each quantity and model."""
+    groups: defaultdict[str, list[Mapping[str, object]]] = defaultdict(list)
+    for row in rows:
+        groups[str(row["quantity"])].append(row)
+        if row["quantity"] != REFUSED:
+            groups[f"model {row['model']}"].append(row)
+            groups["all"].append(row)
+    for name, group in sorted(groups.items()):
+        ratios = [float(str(row["ratio"])) for row in group if row["ratio"]]
+        yield {
+            "quantity": name,
+            "cells": len({(row["seed"], row["case"]) for row in group}),
+            "numbers": len(group),
+            "outside": sum(int(str(row["outside"])) for row in group),
+            "median": f"{np.median(ratios):.3g}" if ratios else "",
+        }
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ import tarfile
 from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
+from resource import RUSAGE_CHILDREN, getrusage
 from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any
@@ -47,9 +48,9 @@ def check_out(commit: str, folder: Path) -> None:
         files.extractall(folder, filter="data")
 
 
-def command(folder: Path, *words: str) -> tuple[float, dict[str, Any]]:
-    """Seconds and JSON answer of a command in a version's folder."""
-    started = perf_counter()
+def command(folder: Path, *words: str) -> tuple[float, float, dict[str, Any]]:
+    """Seconds of wall and of processors, and JSON answer of a command in a version's folder."""
+    started, before = perf_counter(), _processors()
     done = subprocess.run(
         [sys.executable, "-m", *words, "--json", "-"],
         cwd=folder,
@@ -57,10 +58,16 @@ def command(folder: Path, *words: str) -> tuple[float, dict[str, Any]]:
         text=True,
         check=True,
     )
-    return perf_counter() - started, json.loads(done.stdout)
+    return perf_counter() - started, _processors() - before, json.loads(done.stdout)
 
 
-def modulus(folder: Path, workers: int) -> tuple[float, dict[str, Any]]:
+def _processors() -> float:
+    """Seconds of processors that ended children took."""
+    spent = getrusage(RUSAGE_CHILDREN)
+    return spent.ru_utime + spent.ru_stime
+
+
+def modulus(folder: Path, workers: int) -> tuple[float, float, dict[str, Any]]:
     """The paper's fuzzy modulus with a number of processes."""
     return command(folder, "fuzzy", "modulus", "cases/paper.toml", "--workers", str(workers))
 
@@ -89,19 +96,41 @@ def main(arguments: Sequence[str] | None = None) -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--repeat", type=int, default=2, help="runs of each version (2)")
+    parser.add_argument("--times", action="store_true", help="times only, no bits and no E alone")
     options = parser.parse_args(arguments)
-    seconds: dict[str, list[float]] = {"0.1.0": [], "this": []}
+    seconds: dict[str, list[tuple[float, float]]] = {"0.1.0": [], "this": []}
     with TemporaryDirectory() as place:
         old = Path(place)
         check_out(OLD, old)
         for _ in range(options.repeat):
             for name, folder in (("0.1.0", old), ("this", ROOT)):
-                took, answer = modulus(folder, 2)
-                seconds[name].append(took)
-                print(f"{name}: {took:.1f} s, {answer['solves']} linear systems", flush=True)
-        solves = [command(folder, "rve", "solve", "cases/paper.toml")[0] for folder in (old, ROOT)]
-    ratio = min(seconds["0.1.0"]) / min(seconds["this"])
-    print(f"ratio of the quickest: {ratio:.2f}", flush=True)
+                wall, processors, answer = modulus(folder, 2)
+                seconds[name].append((wall, processors))
+                print(
+                    f"{name}: {wall:.1f} s, {processors:.1f} s of processors,"
+                    f" {answer['solves']} linear systems",
+                    flush=True,
+                )
+        solves = [command(folder, "rve", "solve", "cases/paper.toml") for folder in (old, ROOT)]
+    least = {name: np.min(times, axis=0) for name, times in seconds.items()}
+    wall, processors = least["0.1.0"] / least["this"]
+    print(f"ratio of the quickest: {wall:.2f}, of processors {processors:.2f}")
+    for name, (took, spent, _) in zip(("version 0.1.0", "this version"), solves, strict=True):
+        print(f"rve solve of {name}, process included: {took:.2f} s, processors {spent:.2f} s")
+    row = {
+        "seconds_0.1.0": least["0.1.0"][0],
+        "processors_0.1.0": least["0.1.0"][1],
+        "seconds": least["this"][0],
+        "processors": least["this"][1],
+        "ratio": wall,
+        "ratio_of_processors": processors,
+        "solve_seconds_0.1.0": solves[0][0],
+        "solve_seconds": solves[1][0],
+        "solve_processors": solves[1][1],
+    }
+    if options.times:
+        write([{name: round(float(value), 2) for name, value in row.items()}], RESULTS)
+        return 0
     wanted = campaign(load(ROOT / "cases" / "paper.toml"))
     cell_model(wanted.task.choice)
     found = [compute(wanted, workers=workers) for workers in (1, 2)]
@@ -113,22 +142,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     off = alone(wanted, first)
     print(f"the same bits with 1 and 2 processes: {same}; E off by {off:.1e} at the most")
-    print(f"rve solve, process included: {solves[1]:.2f} s, version 0.1.0 {solves[0]:.2f} s")
-    write(
-        [
-            {
-                "seconds_0.1.0": min(seconds["0.1.0"]),
-                "seconds": min(seconds["this"]),
-                "ratio": ratio,
-                "systems": found[0].solves,
-                "same_bits": same,
-                "E_off": off,
-                "solve_seconds_0.1.0": solves[0],
-                "solve_seconds": solves[1],
-            }
-        ],
-        RESULTS,
-    )
+    rounded = {name: round(float(value), 2) for name, value in row.items()}
+    write([{**rounded, "same_bits": same, "E_off": f"{off:.1e}"}], RESULTS)
     return int(not same or off > E_OFF)
 
 

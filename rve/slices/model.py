@@ -21,11 +21,11 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 # least share of the last change that is taken to be left: by order 4, the same where order 2 locks
 # and so changes by much, and by lower orders, which are not yet regular
-_FADE, _LOCKED_FADE, _IRREGULAR_FADE = 0.03, 0.05, 0.15
+_FADE, _LOCKED_FADE, _IRREGULAR_FADE = 0.03, 0.05, 0.08
 _LOCKING = 0.45  # Poisson's ratio above which order 2 locks
 _ROUND_OFF = 1e-13
 _SAFETY = 3.3
-_POINTWISE = 2.0  # safety of a single θ, where errors do not average
+_POINTWISE = 1.5  # safety of a single θ, where errors do not average
 _SHARED = np.array([0.03, 0.5, 0.5])  # C11 + C12 is the easiest by far
 
 

@@ -18,7 +18,7 @@ from alphacut.rve.table.interpolant import Table, TableRange
 from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.truncated_normal import Array
 
-_POINTWISE = 3.0  # safety of a single θ, where errors do not average
+_POINTWISE = 1.5  # safety of a single θ, where errors do not average
 _THETA_SHARE = 0.05  # of the accuracy; nodes in θ cost nothing here
 
 

@@ -171,6 +171,30 @@ def test_error_of_a_slice_is_declared_at_the_edges(radius, contrast):
     assert true < solved.error[0, [0, 2]].max() < 10 * true
 
 
+@pytest.mark.parametrize(("order", "most"), [(2, 4.0), (3, 1.8)])
+def test_an_order_below_4_is_judged_by_the_next(order, most):
+    solved = solve_slice(
+        0.6, MATRIX, [Phase(80e9)], orders=range(order - 1, order + 2), order=order, mesh_size=0.4
+    )
+    exact = square_stiffness(np.array([0.6]), MATRIX, [Phase(80e9)])
+    true = abs(
+        np.array([exact.bulk, exact.deviator, exact.shear])[:, 0, 0]
+        / square_moduli(solved.stiffness)[0]
+        - 1
+    )
+    assert (true <= solved.error[0]).all()
+    assert (solved.error[0] <= most * true).all()
+
+
+def test_the_error_counts_what_locking_hides_of_the_decay():
+    """Order 2 locks, so its change to order 3 is large and tells of too fast a decay."""
+    matrix, soft = Phase(20e9, 0.4993), Phase(28e6, 0.468)
+    solved = solve_slice(0.844, matrix, [soft], orders=(2, 3, 4), mesh_size=0.6)
+    exact = square_stiffness(np.array([0.844]), matrix, [soft])
+    true = abs(square_moduli(solved.stiffness)[0, 2] / exact.shear[0, 0] - 1)
+    assert true <= solved.error[0, 2] <= 5 * true
+
+
 def test_model_declares_its_error():
     radius_map, inclusions = HermiteMap(0.1337, 0.1, 0.8663, 0.1692), [Phase(75e9), Phase(80e9)]
     progress = []
