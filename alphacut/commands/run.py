@@ -89,6 +89,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     # of what is rough the stage itself warns, with the modulus that it gets
     for warning in prepared.warnings:
         say(f"warning: {warning}")
+    if case.sections.update is not None:
+        say("section [update] is for alphacut update; this run takes the inputs as they stand")
     start = time.perf_counter()
     chain = Chain(
         case,

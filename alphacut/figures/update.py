@@ -72,6 +72,8 @@ def boxes(found: Posterior) -> Figure:
             label=f"after, α = {level:g}" if row in (0, len(found.alpha) - 1) else None,
         )
     axes.plot(found.best / nominal, places, "|", color=INK, ms=9, label="agrees best")
+    axes.use_sticky_edges = False
+    axes.autoscale_view()
     axes.set_yticks(places, found.names)
     axes.set_xlabel("value over the nominal one")
     axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
