@@ -231,7 +231,7 @@ def error_of_means(result: Homogenised) -> Array:
         return np.array([*effective_modulus(*stresses), *stresses])
 
     found = spread(printed, means, result.modulus_errors[[0, 2]])
-    found[0] = max(found[0], result.estimated_error * result.modulus)
+    found[0] = result.estimated_error * result.modulus
     return found
 
 

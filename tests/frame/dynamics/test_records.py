@@ -14,6 +14,7 @@ from scipy.linalg import expm
 from alphacut.frame import Accelerogram, Exact, LinearFlow, Midpoint, StoreyFrame, envelope
 from alphacut.frame.boxes import boxes
 from alphacut.frame.dynamics.integrators import Integrator, RungeKutta4
+from alphacut.frame.dynamics.record_load import linear_load
 from alphacut.frame.modal.model import fit_modes
 from alphacut.frame.structures.linear import evaluate
 from alphacut.fuzzy import Interval
@@ -182,3 +183,11 @@ def test_fast_motions_turn_as_far_in_a_step_as_its_rule_allows(turn: float) -> N
     noise = Accelerogram(0.013, np.random.default_rng(4).standard_normal(250))
     frame = StoreyFrame((1.0,), (1.0,), (turn / 0.1) ** 2 / 24, 1.0, outputs=("q1", "v1"))
     assert deviation(replace(frame, ground=noise), 0.1) < 1e-10
+
+
+def test_the_line_in_a_step_is_the_record_where_that_is_linear() -> None:
+    samples = np.random.default_rng(4).standard_normal(9)
+    found = linear_load(Accelerogram(0.1, samples), 0.05, 20)
+    exact = np.interp(0.05 * np.arange(17), 0.1 * np.arange(9), samples)
+    assert found[:16] == pytest.approx(np.stack([exact[:-1], exact[1:]], -1), abs=1e-13)
+    assert found[16:] == pytest.approx(0.0, abs=1e-13)
