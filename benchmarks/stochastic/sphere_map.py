@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from alphacut.stochastic.particles.log_normal import LogNormalRadii
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 
 from alphacut.stochastic.fit.hermite_fit import HermiteFit
 from alphacut.stochastic.fit.pbox import least_pbox

@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from alphacut.stochastic.particles.radius_law import RadiusLaw
 
 from alphacut.stochastic.errors import RefusedError
+from alphacut.stochastic.particles.radius_laws import RadiusLaw
 from alphacut.stochastic.spheres.spheres import Spheres, close_pairs
 from alphacut.stochastic.theta.truncated_normal import Array
 

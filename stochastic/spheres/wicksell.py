@@ -15,10 +15,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from alphacut.stochastic.particles.measured import MeasuredRadii
 from numpy.typing import ArrayLike
 
 from alphacut.stochastic.errors import RefusedError
+from alphacut.stochastic.particles.radius_laws import MeasuredRadii
 from alphacut.stochastic.theta.truncated_normal import Array
 
 # power of R from the law of spheres hit to the law by number or by volume

@@ -2,7 +2,7 @@ from time import perf_counter
 
 import numpy as np
 import pytest
-from alphacut.stochastic.particles.log_normal import LogNormalRadii
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 
 from alphacut.stochastic.errors import RefusedError
 from alphacut.stochastic.spheres import power_cells

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from alphacut.stochastic.particles.log_normal import LogNormalRadii
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 
 from alphacut.stochastic.spheres.wicksell import WEIGHTS, radii_pbox, unfolded
 
