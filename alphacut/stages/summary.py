@@ -143,12 +143,13 @@ def structure_numbers(results: Results) -> Document:
 
 
 def counted(model: LinearSystem) -> int:
-    """Parameters of the structure, initial conditions included."""
+    """Parameters of the structure, as the paper counts them: initial conditions included."""
     from alphacut.frame import StoreyFrame
 
-    left_out = (
-        {"I", "rayleigh_mass", "rayleigh_stiffness"} if isinstance(model, StoreyFrame) else set()
-    )
+    left_out: set[str] = set()
+    if isinstance(model, StoreyFrame):
+        columns = (f"c{floor + 1}" for floor in range(model.floors))
+        left_out = {"I", "rayleigh_mass", "rayleigh_stiffness", *columns}
     return len(set(model.parameters) - left_out)
 
 

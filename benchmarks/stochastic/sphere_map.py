@@ -17,10 +17,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 
 from alphacut.stochastic.fit.hermite_fit import HermiteFit
 from alphacut.stochastic.fit.pbox import least_pbox
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 from alphacut.stochastic.radius_map import HermiteMap
 from alphacut.stochastic.spheres.packing import SpherePacking
 from alphacut.stochastic.spheres.power_cells import reduced_radii, volume_fraction

@@ -2,9 +2,9 @@ from time import perf_counter
 
 import numpy as np
 import pytest
-from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 
 from alphacut.stochastic.errors import RefusedError
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 from alphacut.stochastic.spheres import power_cells
 from alphacut.stochastic.spheres.packing import SpherePacking
 from alphacut.stochastic.spheres.power_cells import cell_volumes, reduced_radii, volume_fraction

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 from alphacut.stochastic.spheres.wicksell import WEIGHTS, radii_pbox, unfolded
 
 LIMITS = {"visible": 5e-4, "smallest": 1e-3, "largest": 1.2e-2}
