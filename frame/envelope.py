@@ -67,6 +67,9 @@ class Envelope:
         between: What an output may exceed the bounds at both ends of the step to a node by, within
             the step, shape (T, m), in the units of the outputs: proved where the bounds are
             guaranteed, else estimated from some trajectories. None where none was made.
+        proved_lower: Guaranteed lower bounds of the exact motion beside those of a Graph Follower,
+            shape (A, T, m); None without.
+        proved_upper: The same, upper bounds.
         facts: Further numbers and words by name, see below.
 
     The facts that are there depend on the method. "The unit" is that of the first displacement
@@ -90,7 +93,9 @@ class Envelope:
     - estimated_error: Largest error, in the unit. missed_by_sample: By how much independent
       trajectories passed the bounds, in the unit.
     - gap: Largest distance of attained and proved bounds, in the unit, which is that of gap_output.
+      proved_gap: The same of the proved bounds beside a Graph Follower's.
       boxes: Parts of the parameters' box that the proof looked at, a count.
+      unproved: Why the bounds of a linear structure are not guaranteed.
       kernel: What examined them, C or NumPy. proof: What is proved and what sampled.
     - between_nodes: Largest value of `between`, in the unit.
     - claim: What the cuts claim of how often they hold, and which parameters are opinions.
@@ -113,6 +118,8 @@ class Envelope:
     inner_lower: Array | None = None
     inner_upper: Array | None = None
     between: Array | None = None
+    proved_lower: Array | None = None
+    proved_upper: Array | None = None
     facts: Mapping[str, float | str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
@@ -200,7 +207,7 @@ class Envelope:
         data |= {name: (at, getattr(self, name)) for name in ("lower_at", "upper_at")}
         data |= {
             name: (band, getattr(self, name))
-            for name in ("error", "inner_lower", "inner_upper")
+            for name in ("error", "inner_lower", "inner_upper", "proved_lower", "proved_upper")
             if getattr(self, name) is not None
         }
         if self.between is not None:

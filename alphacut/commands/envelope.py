@@ -280,6 +280,18 @@ def proved(found: Envelope) -> str:
     """Line on the certificate; empty without one."""
     from alphacut.frame.outputs import output_unit
 
+    if found.proved_lower is not None and found.proved_upper is not None:
+        ends = zip(
+            found.outputs,
+            found.proved_lower[0].min(0),
+            found.proved_upper[0].max(0),
+            strict=True,
+        )
+        words = (
+            f"{name} {' … '.join(engineering(float(x), output_unit(name)) for x in pair)}"
+            for name, *pair in ends
+        )
+        return f"guaranteed bounds of the exact motion: {', '.join(words)}\n"
     if "gap" not in found.facts:
         return ""
     of = str(found.facts["gap_output"])

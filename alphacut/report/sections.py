@@ -304,6 +304,17 @@ def proofs(summary: Document) -> Iterator[str]:
     from alphacut.frame.outputs import output_unit
 
     for name, study in summary.get("envelopes", {}).items():
+        if "proved" in study:
+            ends = study["proved"]
+            words = ", ".join(
+                f"{output} {engineering(ends['min'][output], output_unit(output))} …"
+                f" {engineering(ends['max'][output], output_unit(output))}"
+                for output in ends["min"]
+            )
+            yield (
+                f"Beside envelope {name} stand guaranteed bounds of the exact motion at every node"
+                f" and level, on the lowest from least to greatest {words}."
+            )
         if "gap" in study:
             of = str(study.get("gap_output", next(iter(study.get("min", {"q": 0})))))
             gap, between = (

@@ -170,7 +170,15 @@ def envelope_numbers(dataset: xarray.Dataset) -> Document:
             for name in ("gap", "gap_output", "between_nodes", "proof")
             if name in dataset.attrs
         }
-    cost |= {name: dataset.attrs[name] for name in ("claim",) if name in dataset.attrs}
+    if "proved_lower" in dataset:
+        ends = (
+            lowest["proved_lower"].min("time").values,
+            lowest["proved_upper"].max("time").values,
+        )
+        sides = (dict(zip(names, map(float, end), strict=True)) for end in ends)
+        proved = dict(zip(("min", "max"), sides, strict=True))
+        cost |= {"proved": {**proved, "gap": float(dataset.attrs["proved_gap"])}}
+    cost |= {name: dataset.attrs[name] for name in ("claim", "unproved") if name in dataset.attrs}
     if "error" in dataset:
         numbers["error"] = dict(
             zip(names, map(float, lowest["error"].max("time").values), strict=True)

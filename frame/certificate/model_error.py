@@ -5,24 +5,25 @@ that nearly obeys the equations. What it misses, λ_k φ_k − w_k and λ_k M w_
 polynomial in the parameters, bounded by its Chebyshev coefficients. Damping only takes energy, so
 the deviation from the true motion, in the norm √(qᵀ K q + vᵀ M v), grows no faster than this
 defect: no eigenvalue problem is solved anew, and nothing rests on a distance between eigenvalues.
+Damping by one ratio for all modes is no polynomial; `ratio_damping` bounds what that adds.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import ChebyshevGrid, Polynomial
+from alphacut.frame.certificate.ratio_damping import Comparison, RatioDamping
 from alphacut.frame.certificate.remainder import largest_growth, suprema
 from alphacut.frame.certificate.wave_bounds import Part, parts
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.modal.model import ModalModel, fit_states
 from alphacut.frame.structures.linear import evaluate
-from alphacut.frame.structures.polynomial_dependence import UnprovedError, degrees
+from alphacut.frame.structures.polynomial_dependence import UnprovedError, degrees, without_ratio
 
 MOST_NUMBERS = 120_000_000
 """Values of the defects on their grid, at most: 1 GB."""
@@ -43,21 +44,22 @@ def proved_error(model: ModalModel) -> Array:
             " propagator is covered"
         )
     reach, m = np.ones(len(model.boxes.names)), len(model.outputs)
-    grid = _grid(model)
+    grid, ratio = _grid(model), RatioDamping.of(model)
     structure = _expanded(grid, partial(_structure, model))
     stiffness, mass = Comparison.of(structure["stiffness"]), Comparison.of(structure["mass"])
     deviation, own = np.zeros(len(model.time)), np.zeros((len(model.time), m))
     for part, states in zip(
         parts(model, largest_growth(model.eigenvalue, reach)), fit_states(model), strict=False
     ):
-        defect = _expanded(grid, partial(_defects, model, part, states))
+        defect = _expanded(grid, partial(_defects, model, part, states, ratio))
         deviation += part.push * np.hypot(
             stiffness.sup(defect["start_q"]), mass.sup(defect["start_v"])
         )
         for k in range(model.count):
-            missed = np.hypot(
-                stiffness.sup(defect["kinematic"][:, k]), mass.sup_dual(defect["dynamic"][:, k])
-            )
+            force = mass.sup_dual(defect["dynamic"][:, k])
+            if ratio is not None:
+                force += ratio.missed(defect, k, stiffness, mass)
+            missed = np.hypot(stiffness.sup(defect["kinematic"][:, k]), force)
             deviation += 2 * missed * part.elapsed[:, k]
         largest = suprema(part.share, reach)[0].reshape(model.count, m)
         own += (
@@ -72,53 +74,6 @@ def proved_error(model: ModalModel) -> Array:
     )
     bound: Array = deviation[:, None] * reading + own
     return bound
-
-
-@dataclass(frozen=True, eq=False)
-class Comparison:
-    """Symmetric matrix A(p) against its mean A₀ = L Lᵀ: lowest A₀ ≤ A(p) ≤ highest A₀.
-
-    Args:
-        factor: L, shape (N, N).
-        lowest: See above.
-        highest: See above.
-    """
-
-    factor: Array
-    lowest: float
-    highest: float
-
-    @classmethod
-    def of(cls, coefficients: Array) -> Comparison:
-        """From the Chebyshev coefficients of A, shape (J, N, N), the mean first.
-
-        Raises:
-            UnprovedError: A(p) is not shown to stay positive definite.
-        """
-        try:
-            factor = np.linalg.cholesky(coefficients[0])
-        except np.linalg.LinAlgError:
-            raise UnprovedError(
-                "the mean mass or stiffness matrix is not positive definite"
-            ) from None
-        inverse = np.linalg.inv(factor)
-        spread = float(np.linalg.norm(np.abs(inverse @ coefficients[1:] @ inverse.T).sum(0), 2))
-        if spread >= 1:
-            raise UnprovedError(
-                "the box is so wide that mass and stiffness are not shown to stay positive definite"
-            )
-        return cls(factor, 1 - spread, 1 + spread)
-
-    def sup(self, coefficients: Array) -> float:
-        """Bound of √(x* A x) over the box from the coefficients of x, shape (J, N)."""
-        return float(
-            np.sqrt(self.highest) * np.linalg.norm(coefficients @ self.factor, axis=-1).sum()
-        )
-
-    def sup_dual(self, coefficients: Array) -> float:
-        """Bound of √(x* A⁻¹ x) over the box from the coefficients of x, shape (J, N)."""
-        solved = np.linalg.solve(self.factor, coefficients.T)
-        return float(np.linalg.norm(solved, axis=0).sum() / np.sqrt(self.lowest))
 
 
 def _grid(model: ModalModel) -> ChebyshevGrid:
@@ -160,11 +115,13 @@ def _structure(model: ModalModel, unit: Array) -> dict[str, Array]:
     return {"mass": matrices.mass.value, "stiffness": matrices.stiffness.value, "rows": rows.value}
 
 
-def _defects(model: ModalModel, part: Part, states: Polynomial, unit: Array) -> dict[str, Array]:
+def _defects(
+    model: ModalModel, part: Part, states: Polynomial, ratio: RatioDamping | None, unit: Array
+) -> dict[str, Array]:
     """Defects at unit coordinates (S, d) of the start and of each mode's motion."""
-    matrices, rows = evaluate(
-        model.flow.system, model.flow.names, model.boxes.to_physical(unit), derivatives=False
-    )
+    system, points = model.flow.system, model.boxes.to_physical(unit)
+    bare = system if ratio is None else without_ratio(system)
+    matrices, rows = evaluate(bare, model.flow.names, points, derivatives=False)
     M, D, K, C = matrices.mass.value, matrices.damping.value, matrices.stiffness.value, rows.value
     q, v = (
         (0.0, -matrices.rigid[:, 0])
@@ -174,10 +131,14 @@ def _defects(model: ModalModel, part: Part, states: Polynomial, unit: Array) -> 
     rate = model.eigenvalue(unit)[..., None]
     z = states(unit).reshape(len(unit), model.count, -1)  # (S, n, 2N)
     shape, speed = np.split(z, 2, axis=-1)
-    return {
+    defects = {
         "start_q": 2 * shape.real.sum(1) - q,
         "start_v": 2 * speed.real.sum(1) - v,
         "kinematic": rate * shape - speed,
         "dynamic": rate * (speed @ M) + speed @ D.swapaxes(-1, -2) + shape @ K,
         "outputs": part.share(unit).reshape(len(unit), model.count, -1) - z @ C.swapaxes(-1, -2),
     }
+    if ratio is not None:
+        more, own = ratio.defects(unit, points, speed, M, K)
+        defects |= {**own, "dynamic": defects["dynamic"] + more}
+    return defects

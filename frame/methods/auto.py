@@ -15,15 +15,20 @@ from alphacut.frame.checks.step_error import step_error
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.batch_graph_follower import BatchFollower
-from alphacut.frame.methods.modal import Modal
+from alphacut.frame.methods.modal import Modal, guaranteed
 from alphacut.frame.outputs import output_unit
 from alphacut.frame.structures.modes import ModalError
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
 
 Progress = Callable[[float], None]
 TOLERANCE = 1e-4
 """Wanted error unless one is given, in m."""
 SHARE = 1e-3
 """Wanted error where no output is a displacement, as a share of each output's peak."""
+GAPS = (0.1, 1.0)
+"""Gaps of a proof, as shares of the wanted error, of which the second is tried where the error of
+the modes forbids the first.
+"""
 CANDIDATES = ("modal", "improved-graph-follower")
 CHECKS = 512
 """Trajectories of the independent second pass."""
@@ -35,8 +40,9 @@ class ToleranceError(RuntimeError):
 
 @dataclass(frozen=True)
 class Auto:
-    """Envelope whose error, all of it, stays below a tolerance.
+    """Envelope whose error, all of it, stays below a tolerance; of linear structures guaranteed.
 
+    Up to six parameters are proved, unless something forbids it, which the fact "unproved" names.
     Modal intervening variables come first, since tens of eigen-analyses cost less than any number
     of trajectories; where their error estimate is too large, the Graph Follower in rounds, made
     stricter until an independent sample finds nothing above the tolerance.
@@ -81,7 +87,12 @@ class Auto:
             )
         if "modal" not in self.exclude and isinstance(flow.flow, LinearFlow):
             try:
+                proof, unproved = _proved(flow, left, progress)
+                if proof is not None:
+                    why = "modal: polynomials of the modes, whose bounds are proved"
+                    return _reported(proof, flow, begun, why)
                 found = Modal(tolerance=left / 8).run(flow, progress)
+                found = replace(found, facts={**found.facts, "unproved": unproved})
                 if _estimate(found, flow) <= left:
                     why = "modal: polynomials of the modes reach the tolerance with the fewest"
                     return _reported(found, flow, begun, f"{why} eigen-analyses")
@@ -106,6 +117,24 @@ class Auto:
         if flow.relative or any(output_unit(name) == "m" for name in flow.outputs):
             return flow, TOLERANCE
         return replace(flow, relative=True), SHARE
+
+
+def _proved(
+    flow: UnitFlow, wanted: float, progress: Progress | None
+) -> tuple[Envelope | None, str]:
+    """A guaranteed envelope within the wanted error, or None and the reason why there is none."""
+    reason = ""
+    for share in GAPS:
+        try:
+            found = guaranteed(flow, share * wanted, progress)
+        except UnprovedError as error:
+            reason = str(error)
+            continue
+        reached = _estimate(found, flow)
+        if reached <= wanted:
+            return found, ""
+        return None, f"the boxes that a proof may look at left a gap of {reached:.2g}"
+    return None, reason
 
 
 def _followed(

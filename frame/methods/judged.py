@@ -12,14 +12,17 @@ from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.envelope import Envelope
-from alphacut.frame.methods.modal import polynomial_error, search_levels
+from alphacut.frame.methods.modal import guaranteed, polynomial_error, search_levels
 from alphacut.frame.modal.model import fit_modes
 from alphacut.frame.structures.modes import ModalError
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
 
 SAMPLES = 64
 """Independent trajectories on each level, where the modes cannot judge."""
 SAFETY = 2.0
 """Factor on what they find beyond the bounds."""
+GAP = 0.25
+"""Gap of the proof that judges, as a share of the tolerance."""
 FITTED = 0.125
 """Wanted error of the modal model that judges, as a share of the tolerance."""
 
@@ -27,14 +30,19 @@ FITTED = 0.125
 def judged(found: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
     """The envelope with one error for search, polynomials and time stepping.
 
-    The distance from the envelope of the exact motion by modes, plus its own error; where the modes
-    do not resolve the tolerance, what an independent sample finds beyond the bounds.
+    The largest distance from what the exact motion's proved bounds leave possible, which the
+    envelope keeps beside its own; where there is no proof, that from its envelope by modes, plus
+    its own error; where the modes do not resolve the tolerance, what an independent sample finds
+    beyond the bounds.
 
     Args:
         found: An envelope of the Graph Follower, whose tolerance is among its facts.
         flow: Its trajectories.
         steps: Error of time stepping, shape (T, m).
     """
+    proof = _proof(found, flow)
+    if proof is not None:
+        return _beside(found, proof, flow)
     error = _by_modes(found, flow)
     judge = "the envelope of the exact motion by modes"
     if error is None:
@@ -45,6 +53,48 @@ def judged(found: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
         error = error + (steps if found.error is None else 0.0)
     facts = {**found.facts, "judged_by": judge, "estimated_error": (error / flow.scale).max()}
     return replace(found, error=error, facts=facts)
+
+
+def _proof(found: Envelope, flow: UnitFlow) -> Envelope | None:
+    """Guaranteed envelope of the exact motion, or None."""
+    if not isinstance(flow.flow, LinearFlow):
+        return None
+    exact = replace(flow, flow=replace(flow.flow, integrator=Exact()))
+    try:
+        return guaranteed(exact, GAP * float(found.facts["tolerance"]))
+    except (UnprovedError, ModalError):
+        return None
+
+
+def _beside(found: Envelope, proof: Envelope, flow: UnitFlow) -> Envelope:
+    """An envelope with proved bounds beside it and the largest error that they leave possible."""
+    assert proof.inner_lower is not None
+    assert proof.inner_upper is not None
+    error = np.max(
+        [
+            np.abs(bound - own)
+            for own, bounds in (
+                (found.lower, (proof.lower, proof.inner_lower)),
+                (found.upper, (proof.upper, proof.inner_upper)),
+            )
+            for bound in bounds
+        ],
+        axis=0,
+    )
+    facts = {
+        **found.facts,
+        "judged_by": "the guaranteed envelope of the exact motion",
+        "estimated_error": float((error / flow.scale).max()),
+        "proved_gap": proof.facts["gap"],
+        **{name: proof.facts[name] for name in ("boxes", "kernel", "proof")},
+    }
+    return replace(
+        found,
+        error=error,
+        facts=facts,
+        proved_lower=proof.lower,
+        proved_upper=proof.upper,
+    )
 
 
 def _by_modes(found: Envelope, flow: UnitFlow) -> Array | None:

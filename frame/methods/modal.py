@@ -12,7 +12,7 @@ from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.certificate.certificate import certify
 from alphacut.frame.certificate.model_error import proved_error
-from alphacut.frame.certificate.remainder import require_certifiable
+from alphacut.frame.certificate.remainder import MOST_PARAMETERS, require_certifiable
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Envelope, signed_envelope
 from alphacut.frame.modal.model import ModalModel, fit_modes
@@ -32,6 +32,8 @@ USUAL = 10.0
 """Proved over sampled error, seldom less."""
 ATTEMPTS = 5
 """Models of rising degree that are tried before the error is sampled instead of proved."""
+BOXES = 1000.0
+"""Boxes for each bound, on average, that a proof nobody asked for may look at."""
 PROVED = (
     "the error of its polynomials is bounded over the whole box by the energy of what they miss in"
     " the equations of motion"
@@ -136,12 +138,39 @@ def _short_of(model: ModalModel, tolerance: float, scale: Array) -> str | None:
     )
 
 
+def guaranteed(flow: UnitFlow, gap: float, progress: Progress | None = None) -> Envelope:
+    """Proved envelope of a linear structure, within a gap unless the boxes do not suffice.
+
+    Args:
+        flow: Trajectories of a `LinearFlow`.
+        gap: Wanted gap between attained and proved bounds, in units of the outputs.
+        progress: Called with the fraction done.
+
+    Raises:
+        UnprovedError: The error of the modal model cannot be bounded, or there are too many
+            parameters.
+        ModalError: The structure has no smooth oscillating modes over the box.
+    """
+    if len(flow.boxes.names) > MOST_PARAMETERS:
+        raise UnprovedError(f"proofs are affordable up to {MOST_PARAMETERS} parameters")
+    method = Modal(certify=gap, boxes=BOXES)
+    return _certified(flow, method, gap, time.perf_counter(), progress, insist=True)
+
+
 def _certified(
-    flow: UnitFlow, method: Modal, gap: float, begun: float, progress: Progress | None
+    flow: UnitFlow,
+    method: Modal,
+    gap: float,
+    begun: float,
+    progress: Progress | None,
+    *,
+    insist: bool = False,
 ) -> Envelope:
     assert isinstance(flow.flow, LinearFlow)
     require_certifiable(len(flow.boxes.names))
     model, error, unproved = model_with_error(flow.flow, flow, method, gap)
+    if unproved and insist:
+        raise UnprovedError(unproved)
     proof = certify(
         model,
         gap=gap,

@@ -6,6 +6,7 @@ They follow from how a structure is written, not from samples of it.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import singledispatch
 from math import ceil, log, sqrt
 
@@ -28,7 +29,9 @@ class UnprovedError(RuntimeError):
 
 @singledispatch
 def degrees(system: LinearSystem, box: Box) -> dict[str, int]:
-    """Degree of M, D, K, start and observation rows in each parameter, to round-off.
+    """Degree of M, K, start, observation rows and D in each parameter, to round-off.
+
+    Of a damping ratio of all modes it is the degree of the ratio.
 
     Args:
         system: The structure.
@@ -45,15 +48,12 @@ def degrees(system: LinearSystem, box: Box) -> dict[str, int]:
 
 @degrees.register
 def _(system: StoreyFrame, box: Box) -> dict[str, int]:
-    if system.damping_ratio:
-        raise UnprovedError("damping by modal ratios is no polynomial in the parameters")
-    masses = [name for name in box if name[0] == "m"]
-    if masses and any(name[0] == "a" for name in system.outputs):
-        raise UnprovedError(
-            f"an acceleration is a force over a mass, no polynomial in {', '.join(masses)}"
-        )
+    ratio, masses = common_ratio(system), [name for name in box if name[0] == "m"]
+    if any(name[0] == "a" for name in system.outputs) and (masses or ratio is not None):
+        of = ", ".join(masses) or "the damping ratio"
+        raise UnprovedError(f"an acceleration is a force over a mass, no polynomial in {of}")
     for name, (lower, _) in box.items():
-        if (name[0] == "d" or name.startswith("rayleigh")) and lower < 0:
+        if (name[0] == "d" or name.startswith(("rayleigh", "zeta"))) and lower < 0:
             raise UnprovedError(
                 f"{name} reaches {lower:g}: a negative damper feeds energy into the structure"
             )
@@ -62,8 +62,9 @@ def _(system: StoreyFrame, box: Box) -> dict[str, int]:
 
 @degrees.register
 def _(system: MatrixStructure, box: Box) -> dict[str, int]:
-    if system.ratios:
-        raise UnprovedError("damping by modal ratios is no polynomial in the parameters")
+    ratio = common_ratio(system)
+    if isinstance(ratio, str) and box.get(ratio, (0.0, 0.0))[0] < 0:
+        raise UnprovedError(f"the damping ratio {ratio} may be negative and feed energy in")
     for kind in ("mass", "damping", "stiffness"):
         for factor, array in getattr(system, kind):
             if callable(factor):
@@ -81,6 +82,29 @@ def _(system: MatrixStructure, box: Box) -> dict[str, int]:
                 )
                 _require_dissipation(least, np.asarray(array, float))
     return dict.fromkeys(box, 1)
+
+
+def common_ratio(system: LinearSystem) -> str | float | None:
+    """Damping ratio of all modes, a number or the name of a parameter; None where there is none.
+
+    Raises:
+        UnprovedError: Modes have ratios of their own.
+    """
+    ratios = tuple(getattr(system, "ratios", ()))
+    if len(ratios) > 1 and len(ratios) == getattr(system, "size", len(ratios)):
+        raise UnprovedError(
+            "a damping ratio for each mode follows the modes, and that their frequencies stay apart"
+            " over the box is not proved; one ratio for all modes can be proved"
+        )
+    return ratios[0] if ratios else None
+
+
+def without_ratio(system: LinearSystem) -> LinearSystem:
+    """The structure without its damping ratio, whose damping is a polynomial."""
+    if isinstance(system, StoreyFrame):
+        return replace(system, damping_ratio=())
+    assert isinstance(system, MatrixStructure)
+    return replace(system, ratios=())
 
 
 def _require_dissipation(

@@ -81,9 +81,8 @@ class Envelope(Section):
         Key(
             "gap within which the bounds of displacements of a linear structure, up to"
             " six inputs fuzzy, are enclosed and proved; for outputs of other units the"
-            " same share of their peaks as of the first displacement's; minutes of"
-            " computing; no proof if left out; with a damping ratio the error of the model"
-            " can only be sampled",
+            " same share of their peaks as of the first displacement's; if left out,"
+            " method auto proves its tolerance",
             "m",
             allowed=POSITIVE,
         ),

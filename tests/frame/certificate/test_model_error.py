@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid, solve_ivp
+from scipy.linalg import eigh
 
 from alphacut.frame import (
     Accelerogram,
@@ -22,7 +23,8 @@ from alphacut.frame import (
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.polynomial import ChebyshevGrid, Polynomial
 from alphacut.frame.certificate import model_error
-from alphacut.frame.certificate.model_error import Comparison, proved_error
+from alphacut.frame.certificate.model_error import proved_error
+from alphacut.frame.certificate.ratio_damping import Comparison, RatioDamping
 from alphacut.frame.certificate.remainder import largest_growth
 from alphacut.frame.certificate.wave_bounds import parts
 from alphacut.frame.dynamics.spectral import responses
@@ -92,6 +94,14 @@ def model(system, inputs, tolerance=1e-4, **changes) -> ModalModel:
             {"E": Interval(24e9, 26e9), "m2": Interval(14e3, 16e3), "d1": Interval(7e3, 11e3)},
         ),
         (CHAIN, {"m": Interval(1.9, 2.1), "k": Interval(75, 85), "d": Interval(0.0, 0.6)}),
+        (
+            replace(SHAKEN, dampers=(), damping_ratio=0.03),
+            {"E": Interval(24e9, 26e9), "m2": Interval(14e3, 16e3), "zeta": Interval(0.02, 0.05)},
+        ),
+        (
+            replace(CHAIN, damping=[], ratios=(0.1,)),
+            {"m": Interval(1.9, 2.1), "k": Interval(75, 85), "d": Interval(0.0, 0.6)},
+        ),
     ],
 )
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-5])
@@ -110,6 +120,41 @@ def test_no_sampled_trajectory_deviates_by_more_than_the_proved_error(
     deviation, proved = np.abs(found.values(unit) - truth).max(0), proved_error(found)
     assert (deviation <= proved + 1e-12 * np.abs(truth).max()).all()
     assert proved.max() < 1000 * deviation.max()
+
+
+@pytest.mark.parametrize(("squared", "root"), [(1.02, 1.02), (1.0, 1.03)])
+def test_what_a_damping_ratio_leaves_out_is_bounded_tightly(squared, root) -> None:
+    """For the lowest mode both bounds are what a wrong frequency does to the damping."""
+    damped = replace(FRAME, damping_ratio=0.07, dampers=())
+    found = model(damped, {"E": Interval(24.9e9, 25.1e9)})
+    matrices, _ = evaluate(damped, ("E",), np.array([[25e9]]), derivatives=False)
+    M, D, K = (part.value for part in (matrices.mass, matrices.damping, matrices.stiffness))
+    mu, shapes = eigh(K[0], M[0])
+    one = np.zeros((1, 1), int)
+    law = RatioDamping(
+        0.07,
+        0.07,
+        found,
+        Polynomial(one, np.array([[squared * mu[0]]])),
+        Polynomial(one, np.array([[(root * mu[0]) ** 0.5]])),
+    )
+    speed = shapes[None, None, :, 0]
+    force, own = law.defects(np.zeros((1, 1)), np.zeros((1, 1)), speed, M, K)
+    missed = speed[0, 0] @ D[0] - force[0, 0]
+    true = float(np.sqrt(missed @ np.linalg.solve(M[0], missed)))
+    bound = law.missed(own, 0, Comparison.of(K), Comparison.of(M))
+    assert 1 - 1e-9 <= bound / true <= 1.8
+
+
+def test_a_damping_ratio_is_proved_under_a_record() -> None:
+    inputs = {"E": Interval(24e9, 26e9), "m2": Interval(14e3, 16e3)}
+    damped = replace(SHAKEN, damping_ratio=0.03, dampers=())
+    found = envelope(damped, inputs, duration=5, step=0.1, relative=True, tolerance=1e-3)
+    assert found.nature == "guaranteed"
+    ratios = replace(damped, damping_ratio=(0.03, 0.04, 0.05))
+    other = envelope(ratios, inputs, duration=5, step=0.1, relative=True, tolerance=1e-3)
+    assert other.nature == "estimated"
+    assert "for each mode" in str(other.facts["unproved"])
 
 
 def stretched(polynomial: Polynomial) -> Polynomial:
@@ -162,9 +207,13 @@ def test_structures_that_may_gain_energy_or_are_no_polynomials_are_refused() -> 
         degrees(CHAIN, {"d": (-0.1, 0.1)})
     with pytest.raises(UnprovedError, match="symmetric"):
         degrees(replace(CHAIN, stiffness=[("k", np.array([[2.0, 1.0], [0.0, 1.0]]))]), box)
-    for damped in (replace(CHAIN, ratios=(0.05,)), replace(FRAME, damping_ratio=0.05)):
-        with pytest.raises(UnprovedError, match="modal ratios"):
+    for damped in (replace(CHAIN, ratios=(0.05, 0.04)), replace(FRAME, damping_ratio=(0.05,) * 3)):
+        with pytest.raises(UnprovedError, match="for each mode"):
             degrees(damped, {})
+    with pytest.raises(UnprovedError, match="feed energy"):
+        degrees(replace(CHAIN, ratios=("d",)), {"d": (-0.1, 0.1)})
+    with pytest.raises(UnprovedError, match="feed"):
+        degrees(replace(FRAME, damping_ratio=0.05), {"zeta": (-0.01, 0.06)})
     with pytest.raises(UnprovedError, match="nothing is known"):
         degrees(object(), box)  # type: ignore[arg-type]
 

@@ -1,0 +1,162 @@
+"""Defects of modes under one damping ratio ζ, D = D₀ + 2 ζ M √(M⁻¹K), which is no polynomial.
+
+For any number μ > 0 and vector w, in the norm of M⁻¹,
+‖2 ζ M √(M⁻¹K) w − 2 ζ √μ M w‖ ≤ 2 ζ / (√λ + √μ) ‖(K − μ M) w‖ with λ the least eigenvalue of K
+against M. With polynomials μ and σ ≈ √μ the motion is measured with 2 ζ σ M w in place of the
+damping; the rest is bounded by this and by |√μ − σ| ≤ |μ − σ²| / (√μ + σ).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.polynomial import Polynomial, fit
+from alphacut.frame.modal.model import ModalModel, analyse, fit_points
+from alphacut.frame.structures.polynomial_dependence import UnprovedError, common_ratio
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Symmetric matrix A(p) against its mean A₀ = L Lᵀ: lowest A₀ ≤ A(p) ≤ highest A₀.
+
+    Args:
+        factor: L, shape (N, N).
+        lowest: See above.
+        highest: See above.
+    """
+
+    factor: Array
+    lowest: float
+    highest: float
+
+    @classmethod
+    def of(cls, coefficients: Array) -> Comparison:
+        """From the Chebyshev coefficients of A, shape (J, N, N), the mean first.
+
+        Raises:
+            UnprovedError: A(p) is not shown to stay positive definite.
+        """
+        try:
+            factor = np.linalg.cholesky(coefficients[0])
+        except np.linalg.LinAlgError:
+            raise UnprovedError(
+                "the mean mass or stiffness matrix is not positive definite"
+            ) from None
+        inverse = np.linalg.inv(factor)
+        spread = float(np.linalg.norm(np.abs(inverse @ coefficients[1:] @ inverse.T).sum(0), 2))
+        if spread >= 1:
+            raise UnprovedError(
+                "the box is so wide that mass and stiffness are not shown to stay positive definite"
+            )
+        return cls(factor, 1 - spread, 1 + spread)
+
+    def least(self, other: Comparison) -> float:
+        """Lower bound over the box of the eigenvalues of A against another matrix B."""
+        middle = float(
+            np.linalg.eigvalsh(
+                np.linalg.solve(
+                    other.factor, np.linalg.solve(other.factor, self.factor @ self.factor.T).T
+                )
+            )[0]
+        )
+        return self.lowest / other.highest * middle
+
+    def sup(self, coefficients: Array) -> float:
+        """Bound of √(x* A x) over the box from the coefficients of x, shape (J, N)."""
+        return float(
+            np.sqrt(self.highest) * np.linalg.norm(coefficients @ self.factor, axis=-1).sum()
+        )
+
+    def sup_dual(self, coefficients: Array) -> float:
+        """Bound of √(x* A⁻¹ x) over the box from the coefficients of x, shape (J, N)."""
+        solved = np.linalg.solve(self.factor, coefficients.T)
+        return float(np.linalg.norm(solved, axis=0).sum() / np.sqrt(self.lowest))
+
+
+@dataclass(frozen=True, eq=False)
+class RatioDamping:
+    """The ratio of all modes and the polynomials that stand for their undamped frequencies.
+
+    Args:
+        ratio: ζ, a number, or the place of its parameter.
+        largest: Its largest value in the box.
+        model: The modal model.
+        squared: μ_k, n polynomials.
+        frequency: σ_k, n polynomials.
+    """
+
+    ratio: float | int
+    largest: float
+    model: ModalModel
+    squared: Polynomial
+    frequency: Polynomial
+
+    @classmethod
+    def of(cls, model: ModalModel) -> Self | None:
+        """That of a model; None without a damping ratio.
+
+        Raises:
+            UnprovedError: Modes have ratios of their own.
+        """
+        ratio = common_ratio(model.flow.system)
+        if ratio is None:
+            return None
+        value = model.flow.system.parameters[ratio] if isinstance(ratio, str) else float(ratio)
+        if ratio in model.flow.names:
+            place = model.flow.names.index(str(ratio))
+            own: tuple[float | int, float] = place, float(model.boxes.upper[0, place])
+        else:
+            own = float(value), float(value)
+        unit = fit_points(len(model.boxes.names), model.degree)
+        rate = analyse(model.flow, model.boxes, unit, model.chosen).eigenvalue
+        real, imaginary = rate.map(np.real), rate.map(np.imag)
+        squared = real * real + imaginary * imaginary
+        polynomials = (fit(unit, part, model.degree) for part in (squared, squared**0.5))
+        return cls(*own, model, *polynomials)
+
+    def defects(
+        self, unit: Array, points: Array, speed: Array, M: Array, K: Array
+    ) -> tuple[Array, dict[str, Array]]:
+        """Force of the damping on the modes (S, n, N), and what it leaves out.
+
+        Args:
+            unit: Unit coordinates, shape (S, d).
+            points: The same in SI units.
+            speed: Velocities w of the modes, shape (S, n, N).
+            M: Masses, shape (S, N, N).
+            K: Stiffnesses, shape (S, N, N).
+        """
+        zeta = (
+            points[:, self.ratio] if isinstance(self.ratio, int) else np.full(len(unit), self.ratio)
+        )
+        squared, frequency = self.squared(unit), self.frequency(unit)
+        force = 2 * (zeta[:, None] * frequency)[..., None] * (speed @ M)
+        own = speed @ K - squared[..., None] * (speed @ M)
+        return force, {"own": own, "root": squared - frequency**2, "speed": speed}
+
+    def missed(
+        self, defect: dict[str, Array], mode: int, stiffness: Comparison, mass: Comparison
+    ) -> float:
+        """Bound of what the polynomial force misses of a mode's damping, in the norm of M⁻¹."""
+        root = np.sqrt(_least(self.squared)[mode])
+        rounded = float(np.abs(defect["root"][:, mode]).sum()) / (
+            root + _least(self.frequency)[mode]
+        )
+        own = mass.sup_dual(defect["own"][:, mode]) / (np.sqrt(stiffness.least(mass)) + root)
+        return float(2 * self.largest * (rounded * mass.sup(defect["speed"][:, mode]) + own))
+
+
+def _least(polynomial: Polynomial) -> Array:
+    """Lower bounds of real polynomials over the unit box, all positive, shape (K,).
+
+    Raises:
+        UnprovedError: One may vanish.
+    """
+    least: Array = polynomial.coefficients[0] - np.abs(polynomial.coefficients[1:]).sum(0)
+    if not (least > 0).all():
+        raise UnprovedError("the box is so wide that frequencies are not shown to stay positive")
+    return least

@@ -1,0 +1,72 @@
+"""Bounds of linear structures are guaranteed unless something forbids it, which is then told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from alphacut.frame import Exact, LinearFlow, StoreyFrame, envelope
+from alphacut.fuzzy import Triangular
+
+FRAME = StoreyFrame((2e4, 1e4), (3.0, 3.0), 25e9, 1e-6, (50.0, 50.0), q0=(0.0, 0.01))
+INPUTS = {"E": Triangular(24e9, 25e9, 26e9), "m1": Triangular(1.9e4, 2e4, 2.1e4)}
+SPAN = {"duration": 3.0, "step": 0.05, "alpha": (0, 0.5, 1)}
+
+
+def trajectories(frame: StoreyFrame) -> np.ndarray:
+    """Exact motions in the support, corners among them."""
+    low, high = np.array([number.cut(0) for number in INPUTS.values()]).T
+    share = np.vstack([np.random.default_rng(7).random((500, 2)), [[0, 0], [0, 1], [1, 0], [1, 1]]])
+    return LinearFlow(frame, tuple(INPUTS), 3.0, 0.05, Exact()).values(low + (high - low) * share)
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
+def test_the_default_is_guaranteed_and_not_wide(tolerance: float) -> None:
+    found = envelope(FRAME, INPUTS, tolerance=tolerance, **SPAN)
+    assert found.nature == "guaranteed"
+    assert found.facts["kernel"] in ("C", "NumPy")
+    assert found.error is not None
+    assert found.error.max() <= tolerance
+    values = trajectories(FRAME)
+    assert (values <= found.upper[0]).all()
+    assert (values >= found.lower[0]).all()
+    assert np.abs(values.max((0, 1)) - found.maximum[0]).max() <= tolerance + 1e-4
+
+
+@pytest.mark.parametrize(
+    ("frame", "reason"),
+    [
+        (replace(FRAME, damping_ratio=(0.02, 0.03)), "for each mode"),
+        (replace(FRAME, dampers=(50.0, 50.0), damper_placement="storey"), None),
+    ],
+)
+def test_the_reason_is_told_where_nothing_is_guaranteed(frame, reason) -> None:
+    found = envelope(frame, INPUTS, **SPAN)
+    assert found.nature == ("guaranteed" if reason is None else "estimated")
+    assert reason is None or reason in str(found.facts["unproved"])
+
+
+def test_more_than_six_inputs_are_not_proved() -> None:
+    names = [*list(FRAME.parameters)[:6], "d1", "d2"]
+    many = {
+        n: Triangular(0.999 * x, x, 1.001 * x) for n, x in FRAME.parameters.items() if n in names
+    }
+    found = envelope(FRAME, many, tolerance=1e-4, **SPAN)
+    assert found.nature == "estimated"
+    assert "up to 6 parameters" in str(found.facts["unproved"])
+
+
+@pytest.mark.parametrize("method", ["graph-follower", "improved-graph-follower"])
+def test_followers_have_guaranteed_bounds_beside_their_own(method: str) -> None:
+    found = envelope(FRAME, INPUTS, method=method, integrator="exact", tolerance=1e-4, **SPAN)
+    assert found.proved_lower is not None
+    assert found.proved_upper is not None
+    assert found.error is not None
+    values = trajectories(FRAME)
+    assert (values <= found.proved_upper[0]).all()
+    assert (values >= found.proved_lower[0]).all()
+    assert (found.proved_upper - found.upper <= found.error + 1e-15).all()
+    assert float(found.facts["proved_gap"]) <= 0.25e-4
+    assert found.to_dataset()["proved_upper"].dims == ("alpha", "time", "output")
