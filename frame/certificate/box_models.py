@@ -15,6 +15,9 @@ from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial, basis, product, terms
 from alphacut.frame.modal.model import ModalModel
 
+ROWS = 1000
+"""Rows whose response to a load is computed together; more would leave the cache."""
+
 
 @dataclass(frozen=True, eq=False)
 class BoxModels:
@@ -73,5 +76,7 @@ class BoxModels:
             wave = np.exp(rate[box] * time)
             found.append(np.stack([wave, time * wave, time * time * wave], 1))
         if self.model.load is not None:
-            found.append(np.stack(self.model.load.response(rate[box], node), 1))
+            load, rows = self.model.load, range(0, len(node), ROWS)
+            parts = [load.response(rate[box[k : k + ROWS]], node[k : k + ROWS]) for k in rows]
+            found.append(np.concatenate([np.stack(part, 1) for part in parts]))
         return np.stack(found, axis=1)
