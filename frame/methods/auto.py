@@ -15,7 +15,7 @@ from alphacut.frame.checks.step_error import step_error
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.batch_graph_follower import BatchFollower
-from alphacut.frame.methods.modal import Modal, guaranteed
+from alphacut.frame.methods.modal import GapError, Modal, guaranteed
 from alphacut.frame.outputs import output_unit
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
@@ -127,9 +127,11 @@ def _proved(
     for share in GAPS:
         try:
             found = guaranteed(flow, share * wanted, progress)
-        except UnprovedError as error:
+        except GapError as error:
             reason = str(error)
             continue
+        except UnprovedError as error:
+            return None, str(error)
         reached = _estimate(found, flow)
         if reached <= wanted:
             return found, ""

@@ -30,14 +30,22 @@ PORTION = 0.2
 """Share of the gap that the error of the modal model may take on either side."""
 USUAL = 10.0
 """Proved over sampled error, seldom less."""
+TOO_WIDE = "its bound, some"
+"""Beginning of the reason where the error of the modes takes too much of the gap."""
 ATTEMPTS = 5
 """Models of rising degree that are tried before the error is sampled instead of proved."""
 BOXES = 1000.0
 """Boxes for each bound, on average, that a proof nobody asked for may look at."""
+MOST_BOXES = 2e7
+"""The same for all bounds of a level together: seconds, or a minute under a record."""
 PROVED = (
     "the error of its polynomials is bounded over the whole box by the energy of what they miss in"
     " the equations of motion"
 )
+
+
+class GapError(UnprovedError):
+    """The error of the modal model is bounded, but leaves too little of the gap."""
 
 
 @dataclass(frozen=True)
@@ -153,7 +161,8 @@ def guaranteed(flow: UnitFlow, gap: float, progress: Progress | None = None) -> 
     """
     if len(flow.boxes.names) > MOST_PARAMETERS:
         raise UnprovedError(f"proofs are affordable up to {MOST_PARAMETERS} parameters")
-    method = Modal(certify=gap, boxes=BOXES)
+    size = 2 * len(flow.outputs) * len(flow.time)
+    method = Modal(certify=gap, boxes=min(BOXES, MOST_BOXES / size))
     return _certified(flow, method, gap, time.perf_counter(), progress, insist=True)
 
 
@@ -170,7 +179,7 @@ def _certified(
     require_certifiable(len(flow.boxes.names))
     model, error, unproved = model_with_error(flow.flow, flow, method, gap)
     if unproved and insist:
-        raise UnprovedError(unproved)
+        raise (GapError if unproved.startswith(TOO_WIDE) else UnprovedError)(unproved)
     proof = certify(
         model,
         gap=gap,
@@ -242,7 +251,7 @@ def model_with_error(
             largest = float((error / flow.scale).max())
             if largest <= PORTION * gap:
                 return model, error, ""
-        reason = f"its bound, some {largest:.2g}, takes too much of the gap {gap:g}"
+        reason = f"{TOO_WIDE} {largest:.2g}, takes too much of the gap {gap:g}"
         # a degree more divides it by ten or so
         model, before = (
             fitted(sampled * min(0.99, 4 * PORTION * gap / largest)),
