@@ -75,8 +75,9 @@ def draw(folder: Path, found: Learned, bands: xarray.Dataset | None) -> list[str
         return []
     with style():
         drawn = save(figures.boxes(found.posterior), folder / "update-inputs")
-        for output in [] if bands is None else bands["output"].values:
-            drawn += save(figures.bands(bands, str(output)), folder / f"update-{output}")
+        if bands is not None:
+            for output in map(str, bands["output"].values):
+                drawn += save(figures.bands(bands, output), folder / f"update-{output}")
     return [path.name for path in drawn]
 
 

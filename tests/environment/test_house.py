@@ -44,6 +44,13 @@ def casts(tree: ast.Module) -> int:
     return sum(isinstance(called, ast.Name) and called.id == "cast" for called in calls)
 
 
+def test_the_house_does_not_grow_unseen():
+    """Whoever passes these joins or deletes first; wanted are 230 files and 30,000 lines."""
+    lines = sum(len((ROOT / file).read_text(encoding="utf-8").splitlines()) for file in FILES)
+    assert len(FILES) <= 380
+    assert lines <= 53_000
+
+
 def test_no_folder_is_full():
     counts = Counter(file.parent for file in FILES)
     assert not {str(folder): count for folder, count in counts.items() if count > 16}

@@ -40,7 +40,7 @@ def accelerogram(path: Path, key: str = "frame.accelerogram") -> Accelerogram:
     if not values[:, 1].any():
         what = "the acceleration is zero throughout"
         raise file.unreadable(what, "a record that moves the ground")
-    times = values[:, 0].tolist()
+    times = list(map(float, values[:, 0]))
     return Accelerogram(even_step(file, times, [line for line, _ in rows]), values[:, 1])
 
 
