@@ -208,9 +208,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 1 if not judged or any(row["outside"] for row in rows) else 0
 
 
-def _judged(
-    cases: int, seed: int, models: Sequence[str], first: int
-) -> Iterator[dict[str, object]]:
+def _judged(cases: int, seed: int, models: Sequence[str], first: int) -> Iterator[dict[str, Any]]:
     """Rows of every number; misses and refusals are printed."""
     for k, (name, cell, found) in enumerate(calibrate(cases, seed, models, first), start=first):
         place = {"seed": seed, "case": k, "model": name}
@@ -234,15 +232,15 @@ def _judged(
             print(f"case {k}: {name} {cell}: {worst}", flush=True)
 
 
-def _read(path: Path) -> Iterator[dict[str, object]]:
+def _read(path: Path) -> Iterator[dict[str, Any]]:
     with path.open(newline="", encoding="utf-8") as file:
         for row in csv.DictReader(file):
             yield {**row, "outside": int(row["outside"])}
 
 
-def sums(rows: Sequence[Mapping[str, object]]) -> Iterator[dict[str, object]]:
+def sums(rows: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
     """Numbers, misses and the median of declared over true for each quantity and model."""
-    groups: defaultdict[str, list[Mapping[str, object]]] = defaultdict(list)
+    groups: defaultdict[str, list[Mapping[str, Any]]] = defaultdict(list)
     for row in rows:
         groups[str(row["quantity"])].append(row)
         if row["quantity"] != REFUSED:

@@ -24,13 +24,13 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from alphacut.stages.campaign import Campaign, campaign
-from alphacut.stages.cell import parts
-from alphacut.stages.cell_models import cell_model
-from alphacut.stages.modulus import compute
 
 from alphacut.case.load import load
-from alphacut.fuzzy import FuzzyResult
+from alphacut.fuzzy.samples.result import FuzzyResult
+from alphacut.stages.material.campaign import Campaign, campaign
+from alphacut.stages.material.cell import parts
+from alphacut.stages.material.cell_models import cell_model
+from alphacut.stages.material.modulus import compute
 from benchmarks.rows import write
 
 OLD = "1cc7adc"

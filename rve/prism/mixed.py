@@ -47,7 +47,7 @@ class MixedSlice:
     def at_nodes(self, displacement: Array) -> Array:
         """Displacements of the triangles, shape (m, 12, loads), from wedges (m, 15, 2, loads)."""
         values = np.einsum("an,mnil->mail", self.trace, displacement)
-        return values.reshape(len(values), 12, -1)
+        return np.asarray(values.reshape(len(values), 12, -1))
 
 
 @dataclass(frozen=True)
@@ -198,7 +198,7 @@ class MixedSystem:
         """Numbers of all wedges of these phases."""
         grid = self.numbering.grid
         layer = np.arange(grid.layers)[:, None] * len(grid.plane.triangles)
-        return (layer + self.triangles).ravel()
+        return np.asarray((layer + self.triangles).ravel())
 
     def at_levels(
         self, elements: Sequence[Array], corners: Sequence[Array], phases: tuple[Phase, Phase]
@@ -240,9 +240,7 @@ class MixedSystem:
             shear, own, _ = split_bulk(phases[k])
             for s, one in enumerate(part.slices(layer)):
                 u = one.at_nodes(displacement[part.nodes(layer)])
-                mean = sum(
-                    hat * pressure[layer + i, self.places[k]] for i, hat in enumerate(one.hats)
-                )
+                mean = self._mean_pressure(k, layer, one, pressure)
                 strain = np.einsum("mai,mil->mal", one.elements.strain, u)
                 apart = shear * (strain[:, 0] - strain[:, 1]).sum(axis=0)
                 volume = strain[:, 0] + strain[:, 1]
@@ -252,6 +250,11 @@ class MixedSystem:
                 forces += one.elements.flux[:, :, None] * mean[:, None]
                 energy[s] += np.einsum("mia,mib->ab", forces, u)
         return stress, energy
+
+    def _mean_pressure(self, k: int, layer: int, one: MixedSlice, pressure: Array) -> Array:
+        """In a slice, shape (m, loads), from pressures on the levels."""
+        below, above = (pressure[layer + i, self.places[k]] for i in (0, 1))
+        return np.asarray(one.hats[0] * below + one.hats[1] * above)
 
     def pressure_at(
         self,
@@ -282,6 +285,6 @@ class MixedSystem:
             volume = (one.elements.flux[:, None] @ u) / one.elements.area[:, None, None]
             slopes = one.elements.slopes @ u
             offset = points[at, :2] - one.elements.centre[:, None]
-            mean = sum(hat * pressure[layer + i, self.places[k]] for i, hat in enumerate(one.hats))
+            mean = self._mean_pressure(k, layer, one, pressure)
             found[:, at] = modulus * (own * volume + offset @ slopes) + mean[:, None]
         return found

@@ -52,7 +52,7 @@ class ModulusBasis:
     ) -> None:
         self.task, self.matrix, self.poisson = task, phases[0], phases[1].poisson
         self.iterations: tuple[int, ...] = ()
-        self._solutions = np.empty((task.system.numbering.size, 0))
+        self._solutions: Array = np.empty((task.system.numbering.size, 0))
         low, high = moduli
         nodes = [low]
         if high > low:  # Chebyshev's two points: the error is the same at the ends and between

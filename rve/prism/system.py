@@ -17,7 +17,7 @@ from alphacut.rve.prism.mixed_element import NEARLY_INCOMPRESSIBLE
 from alphacut.rve.prism.slice_stress import CELL_AREA, SliceStress
 from alphacut.rve.solver.constraints import LevelNumbering
 from alphacut.rve.solver.level_stiffness import element_stiffness
-from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
+from alphacut.rve.solver.theta_preconditioner import LevelPressures, ThetaPreconditioner
 from alphacut.stochastic import RadiusMap, ThetaRule, layered_rule
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -272,7 +272,8 @@ class PrismSystem:
         )
         on = (np.concatenate([between[:1], between]) + np.concatenate([between, between[-1:]])) / 2
         own = self.numbering.local_levels(self.comm), self.numbering.local_layers(self.comm)
-        elements, pressures = [], None
+        elements: list[list[Array]] = []
+        pressures: LevelPressures | None = None
         for planes, share, places in zip(
             self.grid.planes(self.map), (on, between), own, strict=True
         ):
@@ -285,8 +286,9 @@ class PrismSystem:
                 levels = self.mixed.at_levels(found, corners, phases)
                 pressures = pressures or levels
             elements.append(found)
-        law = self.map.distribution
-        return ThetaPreconditioner(self.numbering, *elements, law, self.comm, pressures)
+        return ThetaPreconditioner(
+            self.numbering, elements[0], elements[1], self.map.distribution, self.comm, pressures
+        )
 
 
 def _mixed(share: Array, phases: tuple[Phase, Phase]) -> Array:

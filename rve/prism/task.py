@@ -153,7 +153,8 @@ class PrismTask:
             uniform = mixed.uniform_pressure(phases).reshape(-1, 3) @ self.strains.T
             forces = mixed.pressure_loads.reshape(-1, 3) @ self.strains.T
             forces = unit * (forces + mixed.compliance(phases) @ uniform)
-            loads = [solver.saddle.vector(*pair) for pair in zip(loads, forces.T, strict=True)]
+            pairs = zip(loads, np.asarray(forces).T, strict=True)
+            loads = [solver.saddle.vector(load, np.asarray(force)) for load, force in pairs]
         # equal phases: the affine field is the solution
         elif all(load.norm() <= NO_LOAD * size for load in loads):
             return Displacements(self.affine, self.affine, (0,) * len(loads), 0.0)

@@ -14,6 +14,7 @@ import numpy as np
 from cvxopt import cholmod, matrix, spmatrix
 
 from alphacut.rve.mesh.triangulation import Integers
+from alphacut.rve.solver.krylov import ConvergenceError
 from alphacut.rve.solver.level_stiffness import LevelPattern
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -40,7 +41,7 @@ class LevelLDL:
         elements: Of each matrix: element matrices, shape (m, 13, 13), the pressure last.
 
     Raises:
-        RuntimeError: A pivot has the wrong sign.
+        ConvergenceError: A pivot has the wrong sign.
     """
 
     def __init__(self, unknowns: Integers, triangles: Integers, elements: Sequence[Array]) -> None:
@@ -64,8 +65,8 @@ class LevelLDL:
         self._root = np.sqrt(np.abs(inverse))[:, :, None]
         self.signs = np.where(self._order < displacements, 1.0, -1.0)[:, None]
         if any((np.sign(one) != self.signs[:, 0]).any() for one in inverse):
-            raise RuntimeError(
-                "a level's stiffness is not positive definite: an element is inverted or the"
+            raise ConvergenceError(
+                "a level's factors have a pivot of the wrong sign: an element is inverted or the"
                 " contrast is too high"
             )
 
@@ -84,7 +85,7 @@ class LevelLDL:
 
     def forward(self, vectors: Array) -> Array:
         """J L_k⁻¹ P v_k for each k and column, shape (matrices, size, columns)."""
-        return self.signs * self._root * self._apply(vectors[:, self._order], _SOLVE_L)
+        return np.asarray(self.signs * self._root * self._apply(vectors[:, self._order], _SOLVE_L))
 
     def backward(self, vectors: Array) -> Array:
         """Pᵀ L_k⁻ᵀ v_k for each k and column, shape (matrices, size, columns)."""

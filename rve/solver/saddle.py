@@ -40,7 +40,7 @@ class Saddle:
     def local_size(self) -> int:
         """Entries of a vector on this rank."""
         u, p = self._displacements, self._pressures
-        return u.stop - u.start + p.stop - p.start
+        return int(u.stop - u.start + p.stop - p.start)
 
     def matrix(self, columns: int = 1) -> PETSc.Mat:
         """PETSc's matrix of this operator for so many vectors side by side."""

@@ -106,9 +106,9 @@ class LevelPressures:
 
     def saddles(self, stiffness: Sequence[Array]) -> list[Array]:
         """Element matrices with the pressure as 13th unknown, from those without."""
-        found = []
+        found: list[Array] = []
         for one, flux, compliance in zip(stiffness, self.flux, self.compliance, strict=True):
-            whole = np.zeros((len(one), 13, 13))
+            whole: Array = np.zeros((len(one), 13, 13))
             whole[:, :12, :12] = one
             whole[self.triangles, 12, :12] = whole[self.triangles, :12, 12] = flux
             whole[self.triangles, 12, 12] = -compliance
