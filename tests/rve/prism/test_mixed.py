@@ -87,3 +87,11 @@ def test_an_element_carries_uniform_strain_and_does_not_stiffen_with_its_bulk_mo
         )
         assert energy == pytest.approx(area * np.array([2, 3, 0]) @ phase.stiffness @ [2, 3, 0])
         assert np.linalg.eigvalsh(element.stiffness[0])[-1] < 40
+
+
+def test_a_level_without_factors_gives_way_to_a_direct_solver():
+    bent = HermiteMap(0.126375, 0.0353527, 0.966353, -0.311758)
+    phases = Phase(20e9, 0.49966), [Phase(1.37e13, 0.49984)]
+    result = PrismModel(mesh_size=0.432, layers=2).solve(bent, *phases)[0]
+    assert "a level's factors have a pivot of the wrong sign" in result.reason
+    assert result.solver == "mumps"
