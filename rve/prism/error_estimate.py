@@ -59,8 +59,14 @@ def judged(
             break
         fine = theta_rule(radius_map, points=_FINE)
         moduli = moduli_of(result.curve)
-        own, other = result.curve.weights @ moduli, fine.weights @ exact(radius_map(fine.nodes))
-        mean, noise = _apart(own, other), left(radius_map(fine.nodes)).max(axis=0)
+        other, noise = fine.weights @ exact(radius_map(fine.nodes)), left(radius_map(fine.nodes))
+        noise = noise.max(axis=0)
+        # σ11 is printed, the whole stiffness exported: on a mesh x1 is not quite x2
+        both = (
+            moduli,
+            moduli if result.curve.stiffness is None else square_moduli(result.curve.stiffness),
+        )
+        mean = np.max([_apart(result.curve.weights @ one, other) for one in both], axis=0)
         nodes = _apart(moduli, exact(radius_map(result.curve.theta)))
         nodes = (1 + nodes) * (1 + left(radius_map(result.curve.theta))) - 1
         settled = (noise <= _SHARE * mean)[np.isfinite(mean)].all()
