@@ -50,6 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--mesh-size", type=float, default=0.15, help="edge length (0.15)")
     parser.add_argument("--layers", type=int, default=12, help="layers in θ (12)")
+    parser.add_argument("--out", type=Path, default=RESULTS, help="table to write")
     options = parser.parse_args(arguments)
     found = []
     for row in rows(options.mesh_size, options.layers):
@@ -61,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             ),
             flush=True,
         )
-    write(found, RESULTS)
+    write(found, options.out)
     return int(max(row["iterations"] for row in found) > 2 * found[0]["iterations"])
 
 

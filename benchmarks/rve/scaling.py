@@ -96,6 +96,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         writer.writerows(
             [c, v, t.unknowns, max(t.iterations), f"{t.seconds:.4f}"] for c, v, t in rows
         )
+    counts = [max(timing.iterations) for _, _, timing in rows]
+    print(f"iterations from {min(counts)} to {max(counts)}")
     found = spreads(rows)
     for change, (pace, count) in found.items():
         print(
