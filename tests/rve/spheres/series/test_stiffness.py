@@ -1,4 +1,4 @@
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 import pytest
@@ -133,9 +133,9 @@ def test_a_radius_takes_a_tenth_of_a_second():
     cubic_stiffness([0.8], MATRIX, [Phase(80e9)], tolerance=1e-8)  # makes the lattice sums
     seconds = []
     for inclusion in (Phase(20e12), Phase(20e6), Phase(80e9)):
-        start = perf_counter()
+        start = process_time()
         cell = cubic_stiffness([0.8], MATRIX, [inclusion], tolerance=1e-8)
-        seconds.append(perf_counter() - start)
+        seconds.append(process_time() - start)
         assert cell.errors.max() <= 1e-8
     assert np.median(seconds) <= 0.1
 
