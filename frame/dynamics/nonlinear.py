@@ -238,6 +238,7 @@ class RungeKutta:
         eq = system.symbols
         own = [eq.p[name] for name in names]
         rest = [symbol for name, symbol in eq.p.items() if name not in names]
+        # eq. 17 of a Lagrangian system
         self.flow = compiled([*eq.v, *eq.acceleration()], [*eq.q, *eq.v, *own], rest)
 
     def __call__(

@@ -82,7 +82,7 @@ def _forced(step_map: StepMap, rows: Jet, load: Array, size: int, blocks: int) -
     state = step_map.load @ np.zeros((load.shape[1], blocks))
     seen = []
     for k in range(size):
-        seen.append(rows @ state)
+        seen.append(rows @ state)  # eq. 18, of a linear structure
         state = step_map.transfer @ state + step_map.load @ columns[:, k].T
     return concatenate(seen, -2), state
 

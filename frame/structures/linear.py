@@ -1,4 +1,4 @@
-"""Linear structures M(p) q̈ + D(p) q̇ + K(p) q = −M(p) ι a(t) with parameters p (paper, eq. 23)."""
+"""Linear structures M(p) q̈ + D(p) q̇ + K(p) q = −M(p) ι a(t) with parameters p (section 6.1)."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from alphacut.frame.structures.linear import Matrices
 
 
 def state_matrix(m: Matrices) -> Jet:
-    """A with [q; v]˙ = A [q; v], shape (S, 2n, 2n) (eq. 17, 23)."""
+    """A with [q; v]˙ = A [q; v], shape (S, 2n, 2n) (eq. 17, eq. 23)."""
     light = inverse(m.mass)
     lower = concatenate([-(light @ m.stiffness), -(light @ m.damping)], -1)
     n = m.mass.value.shape[-1]

@@ -92,7 +92,7 @@ class PrismForm:
         measure = self._measure()
         phases = zip(self._stiffness, shares, strict=True)
         parts = [(c, weight * part, measure(k)) for k, (c, part) in enumerate(phases)]
-        # eq. 7: the Galerkin projection (eq. 4) of −div σ (eq. 2, 5) on the wedges' basis (eq. 3)
+        # eq. 7: the Galerkin projection (eq. 4) of −div σ (eq. 2, eq. 5) on wedges (eq. 3)
         self._forms = [
             self._jit(w * ufl.inner(_stress(c, _strain(u)), _strain(v)) * dx) for c, w, dx in parts
         ]

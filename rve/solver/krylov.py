@@ -156,7 +156,7 @@ class LinearSolver:
         load = self.krylov.getOperators()[0].createVecLeft()
         load.array[:] = columns.ravel()
         x = load.duplicate()
-        self.krylov.solve(load, x)
+        self.krylov.solve(load, x)  # eq. 7: K U = F
         reason, iterations = self.krylov.getConvergedReason(), self.krylov.getIterationNumber()
         if reason <= 0 or not np.isfinite(x.norm()):
             raise ConvergenceError(

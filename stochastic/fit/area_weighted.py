@@ -1,4 +1,4 @@
-"""Area-weighted distribution of r_n, with bootstrap bands (eq. 8–10, Figs. 12, 13)."""
+"""Area-weighted distribution of r_n, with bootstrap bands (eq. 8, eq. 9, eq. 10, Figs. 12, 13)."""
 
 from __future__ import annotations
 
