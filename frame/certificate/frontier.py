@@ -88,7 +88,8 @@ class Frontier:
     def _places(self, keys: Array, count: int) -> Array:
         """Intervals of the children with these keys, shape (K, d)."""
         d = self.place.shape[1]
-        place, local = self.place[keys // count].copy(), keys % count
+        place: Array = self.place[keys // count].copy()
+        local = keys % count
         rows = np.flatnonzero(local < 2 * d)
         axis, half = np.divmod(local[rows], 2)
         place[rows, axis] = 2 * place[rows, axis] + half

@@ -63,7 +63,8 @@ class Items:
     @cached_property
     def pull(self) -> Array:
         """Twice what third derivatives may change the gradient by, shape (I, d)."""
-        return np.einsum("nijk,nj,nk->ni", self.third, self.r, self.r)
+        pull: Array = np.einsum("nijk,nj,nk->ni", self.third, self.r, self.r)
+        return pull
 
     @cached_property
     def rest(self) -> Array:
@@ -132,7 +133,8 @@ def composed(piece: Piece) -> Array:
     out[:, :, 0] = np.moveaxis(C, 0, -1)
     for i in range(d):
         out[:, :, 1, ..., 1 + i] = C[0] * rate[1 + i]
-    for a, (i, j) in enumerate(zip(*np.triu_indices(d), strict=True), 1 + d):
+    for a, (row, column) in enumerate(zip(*np.triu_indices(d), strict=True), 1 + d):
+        i, j = int(row), int(column)
         x, y = rate[1 + i], rate[1 + j]
         out[:, :, 1, ..., a] = C[1 + i] * y + C[1 + j] * x + C[0] * rate[a]
         out[:, :, 2, ..., a] = C[0] * x * y
