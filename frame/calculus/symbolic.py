@@ -24,12 +24,18 @@ class Compiled:
             the second ones.
         components: Number of components m.
         active: Number of variables to differentiate by; they come first among the K.
+        arguments: Their symbols.
+        expressions: The components.
+        derivatives: What follows them in `full`.
     """
 
     plain: Callable[..., Any]
     full: Callable[..., Any]
     components: int
     active: int
+    arguments: Sequence[Any]
+    expressions: Sequence[Any]
+    derivatives: Sequence[Any]
 
     def values(self, x: Sequence[Array]) -> Array:
         """Components at S points, shape (m, S)."""
@@ -71,7 +77,9 @@ def compiled(
     ]
     plain = sympy.lambdify(arguments, list(expressions), modules="numpy", cse=True)
     full = sympy.lambdify(arguments, [*expressions, *first, *second], modules="numpy", cse=True)
-    return Compiled(plain, full, len(expressions), len(active))
+    derivatives = [*first, *second]
+    sizes = (len(expressions), len(active))
+    return Compiled(plain, full, *sizes, arguments, list(expressions), derivatives)
 
 
 def _stacked(parts: Sequence[Any], shape: tuple[int, ...]) -> Array:

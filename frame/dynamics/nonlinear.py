@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet, concatenate
 from alphacut.frame.calculus.symbolic import Compiled, compiled
+from alphacut.frame.dynamics.compiled_march import CompiledMarch, compiled_march
 from alphacut.frame.dynamics.flow import March, StepError, nodes
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 
@@ -69,11 +69,12 @@ class LagrangianFlow(March):
     def halved(self) -> LagrangianFlow:
         """The same with half the step; what is compiled is shared."""
         fine = replace(self, step=self.step / 2)
-        fine.__dict__.update({"_stepper": self._stepper, "_observation": self._observation})
+        shared = ("_stepper", "_observation", "_compiled")
+        fine.__dict__.update({name: getattr(self, name) for name in shared})
         return fine
 
     @cached_property
-    def _stepper(self) -> Callable[[Jet, Jet, tuple[Array, ...], float], Jet]:
+    def _stepper(self) -> RungeKutta | Variational:
         return (
             RungeKutta(self.system, self.names)
             if self.scheme == "rk4"
@@ -96,6 +97,18 @@ class LagrangianFlow(March):
         )
         return compiled(seen, [*state, *own], rest), compiled([*q0, *second], own, rest)
 
+    @cached_property
+    def _compiled(self) -> CompiledMarch | None:
+        """The march in C; None where there is no compiler."""
+        own, all_ = len(self.names), len(self.system.parameters)
+        return compiled_march(
+            {**self._stepper.functions, "observe": self._observation[0]},
+            coordinates=self.system.coordinates,
+            own=own,
+            rest=all_ - own,
+            outputs=len(self.outputs),
+        )
+
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
         d = len(self.names) if derivatives else 0
         fixed = [value for name, value in self.system.parameters.items() if name not in self.names]
@@ -105,8 +118,15 @@ class LagrangianFlow(March):
             parameters.first[i, i] = 1.0
         observe, initial = self._observation
         state = initial.chain(parameters, constants)
-        states = [state]
         lengths = TRIPLE_JUMP if self.scheme == "composition4" else (1.0,)
+        if self._compiled is not None:
+            given = np.hstack([points, np.tile(fixed, (len(points), 1))])
+            parts = [share * self.step for share in lengths]
+            found, failure = self._compiled.run(state, given, parts, len(self.time))
+            if failure:
+                raise StepError(f"a step of {self.step:g} s {failure}")
+            return found
+        states = [state]
         for _ in range(len(self.time) - 1):
             for share in lengths:
                 state = self._stepper(state, parameters, constants, share * self.step)
@@ -162,6 +182,7 @@ class Variational:
         slopes = [sympy.diff(e, x) for e in start for x in new]
         self.newton = compiled([*start, *slopes], [], [*new, *old, *own, *rest, h])
         self.both = compiled([*start, *end], [*new, *old, *own], [*rest, h])
+        self.functions = {"newton": self.newton, "both": self.both}
 
     def __call__(
         self, state: Jet, parameters: Jet, constants: tuple[Array, ...], step: float
@@ -240,6 +261,7 @@ class RungeKutta:
         rest = [symbol for name, symbol in eq.p.items() if name not in names]
         # eq. 17 of a Lagrangian system
         self.flow = compiled([*eq.v, *eq.acceleration()], [*eq.q, *eq.v, *own], rest)
+        self.functions = {"flow": self.flow}
 
     def __call__(
         self, state: Jet, parameters: Jet, constants: tuple[Array, ...], step: float
