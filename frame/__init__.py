@@ -15,7 +15,7 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.follower_record import FollowerRecord, record
 from alphacut.frame.methods.graph_follower import GraphFollower
 from alphacut.frame.methods.named import METHODS
-from alphacut.frame.propagation import envelope
+from alphacut.frame.propagation import envelope, plan
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 from alphacut.frame.structures.linear import Accelerogram
 from alphacut.frame.structures.matrix import MatrixStructure
@@ -42,5 +42,6 @@ __all__ = [
     "envelope",
     "guard",
     "pendulum",
+    "plan",
     "record",
 ]

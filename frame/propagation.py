@@ -18,7 +18,8 @@ from alphacut.frame.dynamics.integrators import INTEGRATORS, Integrator
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.judged import judged
-from alphacut.frame.methods.named import named, options_of
+from alphacut.frame.methods.named import Method, named, options_of
+from alphacut.frame.methods.plan import Candidate, planned
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy import FuzzyNumber
@@ -64,7 +65,8 @@ def envelope(
     displacement, others in proportion:
 
     - auto: `tolerance` (wanted error, 1e-4), `exclude` (of modal and improved-graph-follower),
-      `budget` (most trajectories, 20000).
+      `budget` (most trajectories, 20000), `seconds` (largest estimate of a method that is started,
+      3600).
     - modal: `tolerance` (of the polynomials of the modes, 1e-6), `budget` (most eigen-analyses,
       280), `seed`; `certify` (wanted gap between attained and proved bounds; none), then `boxes`
       (most boxes for each bound, 4000) and `workers` (processes, 1).
@@ -88,6 +90,58 @@ def envelope(
         UserWarning: The error of time stepping passes a hundredth of a peak; or the method is
             modal, and its error passes that and the tolerance.
     """
+    method, way, over, scheme = _prepared(
+        model, inputs, duration, step, alpha, method, integrator, relative, options
+    )
+    steps = step_error(over)
+    found = with_step_error(way.run(over, progress), over, scheme, steps)
+    if method.endswith("graph-follower"):
+        found = judged(found, over, steps)
+    found = with_stray(found, over)
+    claim = str(JointClaim.of(fuzzy_inputs(inputs)).resting_on(found.nature))
+    found = replace(found, facts={**found.facts, "claim": claim}) if claim else found
+    if method == "modal":
+        warn_of_roughness(found)
+    return found
+
+
+def plan(
+    model: LinearSystem | LagrangianSystem,
+    inputs: Mapping[str, FuzzyNumber | float],
+    *,
+    duration: float,
+    step: float,
+    alpha: Sequence[float] = ALPHA,
+    method: str | None = None,
+    integrator: str | Integrator | None = None,
+    relative: bool = False,
+    **options: object,
+) -> tuple[Candidate, ...]:
+    """What `envelope` would do with the same arguments, with the seconds expected.
+
+    Of auto the methods that it may take, in their order; else the one method.
+
+    Raises:
+        ValueError: As `envelope`.
+    """
+    method, way, over, _ = _prepared(
+        model, inputs, duration, step, alpha, method, integrator, relative, options
+    )
+    return planned(method, way, over)
+
+
+def _prepared(
+    model: LinearSystem | LagrangianSystem,
+    inputs: Mapping[str, FuzzyNumber | float],
+    duration: float,
+    step: float,
+    alpha: Sequence[float],
+    method: str | None,
+    integrator: str | Integrator | None,
+    relative: bool,
+    options: Mapping[str, object],
+) -> tuple[str, Method, UnitFlow, str]:
+    """The method's name, the method, the trajectories, and the name of the time stepping."""
     if not isinstance(model, LagrangianSystem) and not hasattr(model, "matrices"):
         raise ValueError(
             f"model: {model!r} is no structure; take a StoreyFrame, a MatrixStructure or a"
@@ -106,17 +160,7 @@ def envelope(
         scheme = flow.integrator.name
     require_admissible(model, cuts)
     require_stable(flow, cuts)
-    over = UnitFlow(flow, cuts, relative)
-    steps = step_error(over)
-    found = with_step_error(way.run(over, progress), over, scheme, steps)
-    if method.endswith("graph-follower"):
-        found = judged(found, over, steps)
-    found = with_stray(found, over)
-    claim = str(JointClaim.of(fuzzy_inputs(inputs)).resting_on(found.nature))
-    found = replace(found, facts={**found.facts, "claim": claim}) if claim else found
-    if method == "modal":
-        warn_of_roughness(found)
-    return found
+    return method, way, UnitFlow(flow, cuts, relative), scheme
 
 
 def _default(nonlinear: bool, options: Mapping[str, object]) -> str:

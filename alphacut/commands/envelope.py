@@ -24,6 +24,7 @@ from alphacut.commands.options import (
     answer,
     changes,
     check_workers,
+    refuse_beside,
 )
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io import quantity
@@ -55,6 +56,7 @@ KEYS = {
 }
 READ = ("frame", "pendulum", "tower", "envelope", "exceedance")
 GIVEN = ("modulus.value", "modulus.file", "modulus.measured")
+UNEXPLAINED = {"--out": "", "--workers": "1", "--best-effort": "", "--strict": ""}
 OF_AUTO = ("modal", "improved-graph-follower")
 
 
@@ -74,6 +76,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="refuse a step or tolerance too coarse for the motion",
     )
+    parser.add_argument(
+        "--explain", action="store_true", help="say what would be run, in seconds; run nothing"
+    )
     parser.add_argument("--out", metavar="FILE.nc", help="write the envelopes as NetCDF")
 
 
@@ -90,6 +95,11 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     wanted = structure(case, handed)
     if case.sections.exceedance:
         outcomes.require_random(case, wanted)  # before anything is computed
+    if options.explain:
+        refuse_beside(options, "--explain", UNEXPLAINED)
+        plan = envelope.explain(wanted, task)
+        answer(options, {"plan": plan}, out, "".join(f"{line}\n" for line in plan))
+        return 0
     with progress("Envelopes", quiet=options.quiet) as tick:
         found = envelope.compute(
             wanted,

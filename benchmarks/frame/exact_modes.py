@@ -15,12 +15,13 @@ import numpy as np
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.modal.exact_response import ExactResponse
 from alphacut.frame.modal.model import fit_modes
 from alphacut.frame.modal.search import problems, refine
 from alphacut.frame.structures.linear import Accelerogram, evaluate
 from alphacut.frame.structures.modes import ModalError
 
-MOST = 1500
+MOST = 3000
 """Polished points whose exact trajectories are computed."""
 
 
@@ -85,26 +86,39 @@ def _phi(z: Array) -> tuple[Array, Array, Array]:
     )
 
 
-def inner_bounds(flow: UnitFlow, level: int, *, samples: int, starts: int, seed: int) -> Array:
+def inner_bounds(
+    flow: UnitFlow, level: int, *, samples: int, starts: int, seed: int, nodes: int = 16
+) -> Array:
     """Attained upper bounds of (−output, output) over a level's box, shape (T, m, 2).
+
+    All nodes are sampled, and get what is found for the others; some are polished.
 
     Args:
         flow: Time nodes, boxes and structure; its integrator is not used.
         level: Index of the α-cut.
         samples: Random points of the box.
-        starts: Points from which every bound is polished.
-        seed: Of the points.
+        starts: Points from which every bound of a polished node begins.
+        seed: Of the points and nodes.
+        nodes: Number of nodes that are polished.
     """
     assert isinstance(flow.flow, LinearFlow)
     rng, (lower, upper) = np.random.default_rng((seed, level)), flow.boxes.unit(level)
     best = np.full((len(flow.time), len(flow.outputs), 2), -np.inf)
-    points = _drawn(rng, lower, upper, samples)
-    ends = [_offer(flow, best, chunk) for chunk in np.array_split(points, starts)]
-    polished = _polished(flow, np.array(ends), lower, upper, rng)
-    for spread in (0.0, 0.1, 0.02):
+    ends = [_offer(flow, best, chunk) for chunk in _parts(rng, lower, upper, samples, starts)]
+    if not (upper > lower).any():
+        return best
+    chosen = np.unique([*rng.integers(len(flow.time), size=nodes), best.max((1, 2)).argmax()])
+    polished = _polished(flow, np.array(ends)[:, chosen], chosen, lower, upper, rng)
+    for spread in (0.0, 0.02):
         near = polished + spread * (upper - lower) * rng.normal(size=polished.shape)
         _offer(flow, best, np.clip(near, lower, upper))
     return best
+
+
+def _parts(
+    rng: np.random.Generator, lower: Array, upper: Array, samples: int, starts: int
+) -> list[Array]:
+    return np.array_split(_drawn(rng, lower, upper, samples), starts)
 
 
 def _drawn(rng: np.random.Generator, lower: Array, upper: Array, count: int) -> Array:
@@ -130,26 +144,21 @@ def _offer(flow: UnitFlow, best: Array, points: Array) -> Array:
 
 
 def _polished(
-    flow: UnitFlow, ends: Array, lower: Array, upper: Array, rng: np.random.Generator
+    flow: UnitFlow, ends: Array, nodes: Array, lower: Array, upper: Array, rng: np.random.Generator
 ) -> Array:
-    """Where Newton's method leads from `ends` (starts, T, m, 2, d), thinned, shape (S, d)."""
+    """Where Newton's method leads from `ends` (starts, nodes, m, 2, d), thinned, shape (S, d)."""
     try:
-        model = fit_modes(
-            flow.flow,
-            flow.boxes,
-            tolerance=1e-3,
-            scale=flow.scale,  # type: ignore[arg-type]
-        )
+        guide = ExactResponse.of(
+            fit_modes(flow.flow, flow.boxes, tolerance=1e-4, budget=120), flow.scale
+        )  # type: ignore[arg-type]
     except ModalError:
         return np.unique(ends.reshape(-1, ends.shape[-1]), axis=0)
     found = []
     for start in ends:
-        optima = problems(np.arange(len(flow.time)), len(flow.outputs), len(lower))
-        optima.point[:] = start.reshape(optima.point.shape)
-        optima.value[:] = optima.side * model.value_at(optima.point, optima.node, optima.output)
-        small = 1e-5 * float(np.abs(optima.value).max())
-        refine(model, optima, np.arange(len(optima.value)), lower, upper, small)
+        optima = problems(nodes, len(flow.outputs), len(lower))
+        optima.offer(guide, start.reshape(optima.point.shape), np.arange(len(optima.value)))
+        refine(guide, optima, np.arange(len(optima.value)), lower, upper, 1e-7)
         found.append(optima.point)
-    unique = np.unique(np.round(np.concatenate(found), 2), axis=0)
+    unique = np.unique(np.round(np.concatenate(found), 4), axis=0)
     exact: Array = rng.permutation(unique)[:MOST]
     return exact

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import ctypes
 from itertools import combinations, product
+from pathlib import Path
 
 import numpy as np
 
+from alphacut.frame.calculus.c_library import address, c_library
 from alphacut.frame.calculus.jet import Array
 
+SOURCE = Path(__file__).with_name("box_quadratic.c").read_text(encoding="utf-8")
 FACES_UP_TO = 6
 """Number of parameters up to which all faces of the box are enumerated."""
 
@@ -41,7 +45,9 @@ def local_maximum(
         start: Where to start, inside the boxes.
         rounds: Most repetitions.
     """
-    x = np.zeros_like(g) if start is None else start.copy()
+    x = np.zeros_like(g) if start is None else np.ascontiguousarray(start, float).copy()
+    if _compiled_maximum(g, H, lower, upper, x, rounds):
+        return x
     todo: Array = np.arange(len(g))
     for _ in range(rounds):
         part = (g[todo], H[todo], lower[todo], upper[todo])
@@ -54,6 +60,18 @@ def local_maximum(
         if not len(todo):
             break
     return x
+
+
+def _compiled_maximum(
+    g: Array, H: Array, lower: Array, upper: Array, x: Array, rounds: int
+) -> bool:
+    """Moves `x` uphill by compiled code; False where there is none."""
+    library = c_library(SOURCE)
+    if library is None:
+        return False
+    parts = [np.ascontiguousarray(part, float) for part in (g, H, lower, upper)]
+    counts = (ctypes.c_long(len(x)), ctypes.c_int(x.shape[1]), ctypes.c_int(rounds))
+    return bool(library.local_maximum(*counts, *map(address, parts), address(x)))
 
 
 def _axes_ascent(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> None:
@@ -75,7 +93,7 @@ def _newton(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> Array:
     eye = np.eye(g.shape[1])
     reduced = (
         np.where(free[:, :, None] & free[:, None, :], H, -eye)
-        - 1e-13 * np.abs(H).max(initial=0.0) * eye
+        - 1e-13 * np.abs(H).max((1, 2), keepdims=True) * eye
     )
     step = -np.linalg.solve(reduced, np.where(free, slope, 0.0)[..., None])[..., 0]
     best, top = x, gain(g, H, x)
@@ -90,8 +108,7 @@ def global_maximum(g: Array, H: Array, lower: Array, upper: Array) -> Array:
     """Global maximum, shape (N, d), by the stationary points of all faces.
 
     With more than `FACES_UP_TO` parameters the number of faces forbids this; then the best local
-    maximum from 0, from the corner that the gradient points to, and from the ends of the axis of
-    most gain.
+    maximum from 0 and from the corner that the gradient points to.
     """
     d = g.shape[1]
     if d > FACES_UP_TO:
@@ -132,11 +149,6 @@ def _face_points(g: Array, H: Array, lower: Array, upper: Array, free: tuple[int
 
 def _best_of_starts(g: Array, H: Array, lower: Array, upper: Array) -> Array:
     starts = [np.zeros_like(g), linear_maximum(g, lower, upper)]
-    axis = np.abs(g).argmax(1)
-    for end in (lower, upper):
-        start = np.zeros_like(g)
-        start[np.arange(len(g)), axis] = end[np.arange(len(g)), axis]
-        starts.append(start)
     found = np.stack([local_maximum(g, H, lower, upper, start) for start in starts], 1)
     pick = gain(g, H, found).argmax(1)
     best: Array = found[np.arange(len(g)), pick]

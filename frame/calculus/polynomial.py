@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from itertools import combinations_with_replacement
+from itertools import combinations_with_replacement, pairwise
 from math import comb, prod
 
 import numpy as np
@@ -36,18 +36,24 @@ def exponents(dimension: int, degree: int) -> Index:
 
 def basis(u: Array, index: Index) -> Array:
     """Monomials at points (S, d), shape (S, terms)."""
-    top = int(index.max(initial=0))
-    powers = np.ones((u.shape[1], top + 1, len(u)))
-    for k in range(1, top + 1):
-        powers[:, k] = powers[:, k - 1] * u.T
-    out = np.ones((len(u), len(index)))
-    for start in range(0, len(u), 2048):  # pieces that stay in the cache
-        piece = powers[..., start : start + 2048]
-        monomials: Array = piece[0, index[:, 0]]
-        for i in range(1, u.shape[1]):
-            monomials *= piece[i, index[:, i]]
-        out[start : start + 2048] = monomials.T
-    return out
+    axis, parent, starts = _parents(index.tobytes(), index.shape)
+    out, points = np.ones((len(index), len(u))), np.ascontiguousarray(u.T)
+    for first, last in pairwise(starts):
+        rows = slice(first, last)
+        out[rows] = out[parent[rows]] * points[axis[rows]]
+    return out.T
+
+
+@lru_cache(64)
+def _parents(index: bytes, shape: tuple[int, int]) -> tuple[Index, Index, list[int]]:
+    """Each monomial's first variable and the monomial without it; where total degrees begin."""
+    rows = np.frombuffer(index, np.int64).reshape(shape)
+    axis, total = (rows > 0).argmax(1), rows.sum(1)
+    parent = np.zeros(len(rows), np.int64)
+    for i in range(shape[1]):
+        parent[axis == i] = lowered(index, shape, i)[axis == i]
+    starts = np.searchsorted(total, np.arange(1, total.max(initial=0) + 2)).tolist()
+    return axis, parent, starts
 
 
 def derivative(index: Index, axis: int, coefficients: Array) -> Array:
@@ -107,6 +113,13 @@ class Polynomial:
                 out[i, j] = out[j, i] = derivative(self.index, j, self.slope[i])
         return out
 
+    def quadratic(self, u: Array) -> tuple[Array, Array, Array]:
+        """Values (S, K), first derivatives (S, d, K), second ones (d, d, K), of degree 2."""
+        bent = self.curve[:, :, 0]
+        turned = product(u, bent.reshape(u.shape[1], -1)).reshape(len(u), *bent.shape[1:])
+        value = self.coefficients[0] + (u[:, :, None] * (self.slope[:, 0] + turned / 2)).sum(1)
+        return value, self.slope[:, 0] + turned, bent
+
     def __call__(self, u: Array) -> Array:
         """Values at (S, d), shape (S, K)."""
         return product(basis(u, self.index), self.coefficients)
@@ -128,17 +141,17 @@ class Polynomial:
 def fit(u: Array, data: Jet, degree: int) -> Polynomial:
     """Least-squares fit to values and derivatives, V = (S, K), at unit points (S, d)."""
     index = exponents(u.shape[1], degree)
-    d = u.shape[1]
-    unit = Polynomial(index, np.eye(len(index)))
+    d, w = u.shape[1], 1 / max(degree, 1)
     B = basis(u, index)
     pairs = [(i, j) for i in range(d) for j in range(i, d)]
-    left = [B, *(B @ unit.slope[i] for i in range(d)), *(B @ unit.curve[i, j] for i, j in pairs)]
-    right = [data.value, *data.first, *(data.second[i, j] for i, j in pairs)]
-    weights = [1.0, *[1 / max(degree, 1)] * d, *[1 / max(degree, 1) ** 2] * len(pairs)]
-    rows = np.vstack([w * x for w, x in zip(weights, left, strict=True)])
-    values = np.vstack([w * x for w, x in zip(weights, right, strict=True)])
+    slopes = [_differentiated(B, index, (i,)) for i in range(d)]
+    curves = [_differentiated(B, index, pair) for pair in pairs]
+    rows = np.vstack([B, *(w * x for x in slopes), *(w * w * x for x in curves)])
+    bent = [data.second[pair] for pair in pairs]
+    values = np.vstack([data.value, *(w * x for x in data.first), *(w * w * x for x in bent)])
     scale = np.linalg.norm(rows, axis=0)
-    solution = np.linalg.lstsq(rows / scale, values, rcond=1e-15)[0] / scale[:, None]
+    q, r = np.linalg.qr(rows / scale)
+    solution = np.linalg.solve(r, product(q.T, values)) / scale[:, None]
     return Polynomial(index, solution)
 
 
@@ -178,3 +191,13 @@ class ChebyshevGrid:
             out[(slice(None),) * axis + (0,)] /= 2
         coefficients: Array = out.reshape(values.shape)
         return coefficients
+
+
+def _differentiated(B: Array, index: Index, axes: tuple[int, ...]) -> Array:
+    """Derivatives along `axes` of the monomials (S, terms) with values B."""
+    position, factor = np.arange(len(index)), np.ones(len(index))
+    for axis in axes:
+        factor = factor * index[position, axis]
+        position = lowered(index.tobytes(), index.shape, axis)[position]
+    out: Array = B[:, position] * factor
+    return out

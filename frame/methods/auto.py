@@ -12,10 +12,10 @@ from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.checks.step_error import step_error
-from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.batch_graph_follower import BatchFollower
 from alphacut.frame.methods.modal import GapError, Modal, guaranteed
+from alphacut.frame.methods.plan import Candidate, candidates
 from alphacut.frame.outputs import output_unit
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
@@ -52,6 +52,7 @@ class Auto:
             output; unless given `TOLERANCE`, or where no output is a displacement `SHARE`.
         exclude: Methods that must not be taken, out of `CANDIDATES`.
         budget: Most trajectories of the Graph Follower.
+        seconds: Largest estimate of a method that is started.
 
     Raises:
         ValueError: An excluded name is unknown, or the tolerance is not positive.
@@ -60,6 +61,7 @@ class Auto:
     tolerance: float | None = None
     exclude: Sequence[str] = ()
     budget: int = 20000
+    seconds: float = 3600.0
 
     def __post_init__(self) -> None:
         for name in self.exclude:
@@ -67,6 +69,8 @@ class Auto:
                 raise ValueError(
                     f"exclude: '{name}' is unknown; allowed are {', '.join(CANDIDATES)}"
                 )
+        if not self.seconds > 0:
+            raise ValueError(f"seconds: {self.seconds:g} is not allowed; it must be positive")
         if self.tolerance is not None and not self.tolerance > 0:
             raise ValueError(f"tolerance: {self.tolerance:g} is not allowed; it must be positive")
 
@@ -85,7 +89,14 @@ class Auto:
                 f"auto: the error of time stepping, {reached:.2g}, is above the tolerance"
                 f" {tolerance:g}; take the integrator exact, a smaller step or a larger tolerance"
             )
-        if "modal" not in self.exclude and isinstance(flow.flow, LinearFlow):
+        plan = self.plan(flow)
+        tried = [candidate.name for candidate in plan if candidate.seconds <= self.seconds]
+        refused += [
+            f"{candidate.name} not started: {candidate}"
+            for candidate in plan
+            if candidate.seconds > self.seconds
+        ]
+        if "modal" in tried:
             try:
                 proof, unproved = _proved(flow, left, progress)
                 if proof is not None:
@@ -94,12 +105,11 @@ class Auto:
                 found = Modal(tolerance=left / 8).run(flow, progress)
                 found = replace(found, facts={**found.facts, "unproved": unproved})
                 if _estimate(found, flow) <= left:
-                    why = "modal: polynomials of the modes reach the tolerance with the fewest"
-                    return _reported(found, flow, begun, f"{why} eigen-analyses")
+                    return _reported(found, flow, begun, _why(found))
                 refused.append(f"modal estimates {_estimate(found, flow):.2g}")
             except ModalError as error:
                 refused.append(str(error))
-        if "improved-graph-follower" not in self.exclude:
+        if "improved-graph-follower" in tried:
             followed = _followed(flow, left, self.budget, progress)
             if followed is not None:
                 why = "; ".join(refused) or "the system is not linear"
@@ -109,6 +119,11 @@ class Auto:
             f"auto: no method reaches {tolerance:g} ({'; '.join(refused)}); allow more methods, a"
             " larger budget or tolerance"
         )
+
+    def plan(self, flow: UnitFlow) -> tuple[Candidate, ...]:
+        """What would be tried, one after the other, with the seconds expected."""
+        found = candidates(flow, self.budget)
+        return tuple(candidate for candidate in found if candidate.name not in self.exclude)
 
     def wanted(self, flow: UnitFlow) -> tuple[UnitFlow, float]:
         """The flow with the scale of the tolerance, and the tolerance."""
@@ -176,6 +191,13 @@ def second_pass(found: Envelope, flow: UnitFlow, *, skip: int) -> float:
         beyond = np.maximum(values.max(0) - found.upper[0], found.lower[0] - values.min(0))
         worst = max(worst, float((beyond / flow.scale).max()))
     return worst
+
+
+def _why(found: Envelope) -> str:
+    """The reason for modal intervening variables."""
+    if "bounds" in found.facts:
+        return "modal: polynomials of the modes lead exact trajectories to the tolerance"
+    return "modal: polynomials of the modes reach the tolerance with the fewest eigen-analyses"
 
 
 def _estimate(found: Envelope, flow: UnitFlow) -> float:

@@ -12,7 +12,8 @@ from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.envelope import Envelope
-from alphacut.frame.methods.modal import guaranteed, polynomial_error, search_levels
+from alphacut.frame.methods.modal import guaranteed, polynomial_error
+from alphacut.frame.modal.levels import search_levels
 from alphacut.frame.modal.model import fit_modes
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError

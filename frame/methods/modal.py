@@ -14,9 +14,12 @@ from alphacut.frame.certificate.certificate import certify
 from alphacut.frame.certificate.model_error import proved_error
 from alphacut.frame.certificate.remainder import MOST_PARAMETERS, require_certifiable
 from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.envelope import Envelope, signed_envelope
+from alphacut.frame.modal.exact_response import ExactResponse
+from alphacut.frame.modal.levels import SEEN, judged_at_optima, polished_levels, search_levels
 from alphacut.frame.modal.model import ModalModel, fit_modes
-from alphacut.frame.modal.search import ModalSearch
+from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 
 Progress = Callable[[float], None]
@@ -38,6 +41,15 @@ BOXES = 1000.0
 """Boxes for each bound, on average, that a proof nobody asked for may look at."""
 MOST_BOXES = 2e7
 """The same for all bounds of a level together: seconds, or a minute under a record."""
+ENOUGH = 2.0
+"""Error of the polynomials, as a multiple of the tolerance, from which on exact trajectories take
+over."""
+ROUGH = 0.3
+"""Error of the polynomials, as a share of an output's peak, above which they lead nowhere: where
+the basins are is then unknown, and no estimate of the search could be defended."""
+GUIDED = 0.3
+"""Share of the time that the polynomials' search takes before that, for the progress alone."""
+EXACT = "values of exact trajectories at the parameters given; polynomials only led there"
 PROVED = (
     "the error of its polynomials is bounded over the whole box by the energy of what they miss in"
     " the equations of motion"
@@ -84,8 +96,8 @@ class Modal:
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Envelope of a linear structure from a polynomial modal model over the widest box.
 
-        Where the polynomials do not reach the tolerance, `error` says what they do, and the fact
-        "reason" that it is more.
+        Where the polynomials do not reach the tolerance, or the parameters are more than six,
+        exact trajectories polish their optima, and `error` is what the search may have missed.
 
         Args:
             flow: Trajectories of a `LinearFlow`.
@@ -98,18 +110,36 @@ class Modal:
         linear, begun = flow.flow, time.perf_counter()
         if not isinstance(linear, LinearFlow):
             raise ValueError("method: 'modal' needs a linear structure; take graph-follower")
+        if self.certify is not None and not isinstance(linear.integrator, Exact):
+            raise ValueError(
+                f"certify: with the integrator '{linear.integrator.name}' nothing is proved, since"
+                " a proof is of the exact motion; take the integrator exact"
+            )
         if self.certify is not None:
             return _certified(flow, self, self.certify, begun, progress)
         model = fit_modes(
             linear, flow.boxes, tolerance=self.tolerance, budget=self.budget, scale=flow.scale
         )
-        bounds, at, left = search_levels(flow, model, self.seed, self.tolerance, progress)
-        facts: dict[str, float | str] = {
-            "model_error": float(model.error.max()),
-            "degree": model.degree,
-            "search_error": float((left.max(-1) / flow.scale).max()),
-        }
-        if (short := _short_of(model, self.tolerance, flow.scale)) is not None:
+        exact = self._exact(model, flow)
+        guided = progress and (lambda share: progress(GUIDED * share if exact else share))
+        bounds, at, left = search_levels(
+            flow, model, self.seed, self.tolerance, guided, guide=exact is not None
+        )
+        if exact is None:
+            model = judged_at_optima(model, at, self.seed)
+            exact = self._exact(model, flow)
+        error = polynomial_error(model) + left.max(-1)
+        facts: dict[str, float | str] = {"degree": model.degree}
+        if exact is not None:
+            polished = progress and (lambda share: progress(GUIDED + (1 - GUIDED) * share))
+            bounds, at, left = polished_levels(flow, exact, at, self.seed, self.tolerance, polished)
+            error = left.max(-1)
+            facts["bounds"] = EXACT
+        else:
+            facts["model_error"] = float(model.error.max())
+            facts["judged_by"] = f"trajectories at held-out parameters and at {SEEN} optima"
+        facts["search_error"] = float((left.max(-1) / flow.scale).max())
+        if exact is None and (short := _short_of(model, self.tolerance, flow.scale)) is not None:
             facts["reason"] = short
         return signed_envelope(
             flow,
@@ -117,11 +147,22 @@ class Modal:
             at,
             method="modal",
             nature="estimated",
-            error=polynomial_error(model) + left.max(-1),
+            error=error,
             facts=facts,
             trajectories=model.analyses,
             seconds=time.perf_counter() - begun,
         )
+
+    def _exact(self, model: ModalModel, flow: UnitFlow) -> ExactResponse | None:
+        """What polishes the bounds; None where the polynomials do, or nothing can."""
+        peak = np.abs(flow.flow.values(flow.boxes.modal[None])[0]).max(0)
+        enough = (model.error / flow.scale).max() <= ENOUGH * self.tolerance
+        if enough or (model.error.max(0) > ROUGH * peak).any():
+            return None
+        try:
+            return ExactResponse.of(model, flow.scale)
+        except ModalError:
+            return None
 
 
 def polynomial_error(model: ModalModel) -> Array:
@@ -260,28 +301,3 @@ def model_with_error(
         if model.degree <= before:
             break
     return first, SAFETY * first.error, reason
-
-
-def search_levels(
-    flow: UnitFlow,
-    model: ModalModel,
-    seed: int,
-    wanted: float,
-    progress: Callable[[float], None] | None,
-) -> tuple[Array, Array, Array]:
-    """Nested bounds (A, T, m, 2), unit coordinates (A, T, m, 2, d) and what is left to gain."""
-    cuts, scaled = model.boxes, model.in_units(flow.scale)
-    search = ModalSearch.suited(scaled, seed, wanted)
-    shape = (len(cuts.alpha), len(model.time), len(model.outputs), 2)
-    bounds, at, left = np.empty(shape), np.empty((*shape, len(cuts.names))), np.empty(shape)
-    for done, level in enumerate(reversed(range(shape[0]))):
-        if progress:
-            progress(done / shape[0])
-        box = cuts.unit(level)
-        bounds[level], at[level], left[level], gained = search.run(scaled, *box)
-        left[level] += gained[:, None]
-        if done:
-            kept = bounds[level + 1] > bounds[level]
-            bounds[level][kept], at[level][kept] = bounds[level + 1][kept], at[level + 1][kept]
-    unit = flow.scale[:, None]
-    return bounds * unit, at, left * unit

@@ -7,9 +7,10 @@ motion again.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import ceil
+from math import ceil, log
 
 import numpy as np
 
@@ -29,6 +30,12 @@ from alphacut.frame.structures.modes import (
     state_matrix,
 )
 
+MANY = 6
+"""Number of parameters up to which polynomials may replace trajectories; beyond, they only guide
+Newton's method."""
+MOST_TERMS = 2500
+"""Most monomials of a polynomial."""
+
 
 @dataclass(frozen=True, eq=False)
 class ModalModel:
@@ -41,6 +48,7 @@ class ModalModel:
         coefficient: C_k, n m polynomials.
         load: Response to the ground's motion, or None.
         chosen: Which modes it has, by rising |λ|, shape (n,).
+        modes: How many the structure has.
         error: Largest deviation of held-out trajectories, shape (T, m).
         analyses: Eigen-analyses made.
     """
@@ -51,6 +59,7 @@ class ModalModel:
     coefficient: Polynomial
     load: LoadTables | None
     chosen: Array
+    modes: int
     error: Array
     analyses: int
 
@@ -73,6 +82,19 @@ class ModalModel:
     def degree(self) -> int:
         """Total degree of the polynomials."""
         return int(self.eigenvalue.index.sum(1).max())
+
+    @property
+    def fastest(self) -> float:
+        """Largest |λ| in the middle of the box, in 1/s."""
+        return float(np.abs(self.eigenvalue.coefficients[0]).max())
+
+    @property
+    def turned(self) -> float:
+        """Largest change of a lasting mode's phase over the box, in rad."""
+        middle, rest = self.eigenvalue.coefficients[0], self.eigenvalue.coefficients[1:]
+        # a mode that has died down has no basins
+        lasting = np.minimum(self.time[-1], 5 / np.maximum(-middle.real, 1e-300))
+        return float((np.abs(rest).sum(0) * lasting).max())
 
     def in_units(self, scale: Array) -> ModalModel:
         """The same with every output divided by its scale (m,)."""
@@ -122,18 +144,48 @@ class ModalModel:
         f, g, H = np.empty(len(unit)), np.empty((len(unit), d)), np.empty((len(unit), d, d))
         for o in np.unique(output):
             rows = np.flatnonzero(output == o)
-            f[rows], g[rows], H[rows] = self._taylor(self.of_output[o].jet(unit[rows]), node[rows])
+            own = self.of_output[o]
+            if self.degree <= 2:
+                f[rows], g[rows], H[rows] = self._quadratic(own, unit[rows], node[rows])
+            else:
+                f[rows], g[rows], H[rows] = self._taylor(own.jet(unit[rows]), node[rows])
         return f, g, H
+
+    def _quadratic(self, own: Polynomial, unit: Array, node: Array) -> tuple[Array, Array, Array]:
+        """As `_taylor`, for degree 2, whose second derivatives are the same everywhere."""
+        n, (both, first, second) = self.count, own.quadratic(unit)
+        rate, slope = both[:, :n], first[:, :, :n]
+        excited = [(slice(n, 2 * n), self._free(rate, node))]
+        if self.load is not None:
+            excited.append((slice(2 * n, 3 * n), self.load.response(rate, node)))
+        f = g = 0.0
+        weight = np.zeros_like(both)
+        crossed = np.zeros_like(slope)
+        for part, (w, dw, ddw) in excited:
+            share, bent = both[:, part], first[:, :, part]
+            f = f + 2 * (share * w).real.sum(1)
+            g = g + 2 * (bent * w[:, None] + slope * (share * dw)[:, None]).real.sum(2)
+            weight[:, part] = w
+            weight[:, :n] += share * dw
+            crossed += bent * dw[:, None] + slope * (share * ddw)[:, None] / 2
+        H = 2 * _real_product(crossed, slope.swapaxes(1, 2))
+        curved = 2 * _real_product(weight, second.reshape(-1, second.shape[-1]).T)
+        return f, g, H + H.swapaxes(1, 2) + curved.reshape(H.shape)
 
     def _taylor(self, both: Jet, node: Array) -> tuple[Array, Array, Array]:
         n = self.count
-        rate, t = both[..., :n], self.time[node][:, None]
-        wave = np.exp(rate.value * t)
-        f, g, H = composed(rate, both[..., n : 2 * n], (wave, t * wave, t * t * wave))
+        rate = both[..., :n]
+        f, g, H = composed(rate, both[..., n : 2 * n], self._free(rate.value, node))
         if self.load is not None:
             more = composed(rate, both[..., 2 * n :], self.load.response(rate.value, node))
             f, g, H = f + more[0], g + more[1], H + more[2]
         return f, g, H
+
+    def _free(self, rate: Array, node: Array) -> tuple[Array, Array, Array]:
+        """Exp(λ t) and its derivatives by λ at one node per point, (N, n)."""
+        t = self.time[node][:, None]
+        wave = np.exp(rate * t)
+        return wave, t * wave, t * t * wave
 
     def value_at(self, unit: Array, node: Array, output: Array) -> Array:
         """Values (N,) of one output at one node per point (N, d)."""
@@ -147,6 +199,11 @@ class ModalModel:
                 total = total + both[:, 2 * n :] * self.load.response_alone(rate, node[rows])
             values[rows] = 2 * total.real.sum(1)
         return values
+
+
+def _real_product(a: Array, b: Array) -> Array:
+    """Real part of a @ b for complex arrays."""
+    return np.concatenate([a.real, -a.imag], -1) @ np.concatenate([b.real, b.imag], -2)
 
 
 def composed(rate: Jet, share: Jet, wave: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
@@ -191,7 +248,8 @@ def analyse(
         )
     found = modes(matrices, rows, chosen)
     rate = _discrete(found.eigenvalue, flow)
-    return Modes(*(boxes.in_unit(jet) for jet in (rate, found.coefficient, found.load)))
+    parts = (boxes.in_unit(jet) for jet in (rate, found.coefficient, found.load))
+    return Modes(*parts, found.of)
 
 
 def _discrete(rate: Jet, flow: LinearFlow) -> Jet:
@@ -237,22 +295,20 @@ def fit_modes(
     """
     d = len(flow.names)
     held = _held_out(d)
-    truth = flow.values(boxes.to_physical(held))
-    used, best, chosen = (
-        len(held),
-        None,
-        _needed(flow, boxes, tolerance / 4 * np.broadcast_to(scale, truth.shape[-1:])),
-    )
-    for degree in range(2, 13):
+    truth, scale = flow.values(boxes.to_physical(held)), np.asarray(scale)
+    allowed = tolerance / 4 * np.broadcast_to(scale, truth.shape[-1:])
+    samples, best = _Samples(flow, boxes, _needed(flow, boxes, allowed)), None
+    reached: list[float] = []
+    for degree in range(2, 13 if d <= MANY else 3):
         points = fit_points(d, degree)
-        if used + len(points) > budget or terms(d, degree) > 2500:
+        if len(held) + len(points) > budget or terms(d, degree) > MOST_TERMS:
             break
-        model = _fitted(flow, boxes, points, degree, chosen)
-        model = replace(model, analyses=used + len(points))
+        model = samples.fitted(points, degree)
         error = np.abs(model.values(held) - truth).max(0)
-        if best is None or (error / scale).max() < (best.error / scale).max():
-            best = replace(model, error=error)
-        if (error / scale).max() <= tolerance:
+        reached.append(float((error / scale).max()))
+        if best is None or reached[-1] < (best.error / scale).max():
+            best = replace(model, error=error, analyses=len(held) + len(points))
+        if reached[-1] <= tolerance or hopeless(reached, tolerance, d, budget):
             break
     if best is None:
         raise ModalError(
@@ -261,9 +317,50 @@ def fit_modes(
         )
     if (best.error / scale).max() > tolerance:
         require_single(
-            evaluate(flow.system, flow.names, boxes.to_physical(held), derivatives=False)[0], chosen
+            evaluate(flow.system, flow.names, boxes.to_physical(held), derivatives=False)[0],
+            best.chosen,
         )
     return best
+
+
+def hopeless(reached: Sequence[float], tolerance: float, d: int, budget: int) -> bool:
+    """Whether no degree within the budget reaches the tolerance at the rate seen so far.
+
+    Args:
+        reached: Errors of degrees 2, 3, …
+        tolerance: The error wanted.
+        d: Number of parameters.
+        budget: Most eigen-analyses.
+    """
+    if len(reached) < 3 or not 0 < reached[-1] < reached[-3]:
+        return len(reached) >= 4 and reached[-1] >= reached[-3]
+    rate = (reached[-1] / reached[-3]) ** 0.5
+    degree = 1 + len(reached) + log(tolerance / reached[-1]) / log(rate)
+    wanted = ceil(degree) - 1  # a degree of grace
+    return (
+        wanted > 12
+        or terms(d, wanted) > MOST_TERMS
+        or len(_held_out(d)) + len(fit_points(d, wanted)) > budget
+    )
+
+
+@dataclass(eq=False)
+class _Samples:
+    """Eigen-analyses at the points of rising degrees, each made once: the points are nested."""
+
+    flow: LinearFlow
+    boxes: Boxes
+    chosen: Array
+    found: Modes | None = None
+
+    def fitted(self, points: Array, degree: int) -> ModalModel:
+        """The model of a degree from analyses at `points`."""
+        known = 0 if self.found is None else self.found.eigenvalue.value.shape[0]
+        if known < len(points):
+            fresh = analyse(self.flow, self.boxes, points[known:], self.chosen)
+            self.found = fresh if self.found is None else self.found.joined(fresh)
+        assert self.found is not None
+        return _fitted(self.flow, self.boxes, points, self.found, degree, self.chosen)
 
 
 def _needed(flow: LinearFlow, boxes: Boxes, allowed: Array) -> Array:
@@ -314,29 +411,18 @@ def fit_states(model: ModalModel) -> tuple[Polynomial, Polynomial]:
 
 
 def _fitted(
-    flow: LinearFlow, boxes: Boxes, points: Array, degree: int, chosen: Array
+    flow: LinearFlow, boxes: Boxes, points: Array, found: Modes, degree: int, chosen: Array
 ) -> ModalModel:
-    found = analyse(flow, boxes, points, chosen)
     flat = [
         jet.map(lambda x: x.reshape((*x.shape[:-2], -1))) for jet in (found.coefficient, found.load)
     ]
     rate = fit(points, found.eigenvalue, degree)
-    ground = flow.system.ground
-    load = (
-        None
-        if ground is None
-        else LoadTables.build(ground, flow.time, rate, fit(points, flat[1], degree))
-    )
-    return ModalModel(
-        flow,
-        boxes,
-        rate,
-        fit(points, flat[0], degree),
-        load,
-        chosen,
-        np.zeros((len(flow.time), len(flow.outputs))),
-        0,
-    )
+    ground, load = flow.system.ground, None
+    if ground is not None:
+        load = LoadTables.build(ground, flow.time, rate, fit(points, flat[1], degree))
+    share = fit(points, flat[0], degree)
+    nothing = np.zeros((len(flow.time), len(flow.outputs)))
+    return ModalModel(flow, boxes, rate, share, load, chosen, found.of, nothing, 0)
 
 
 def _held_out(d: int) -> Array:

@@ -15,8 +15,10 @@ import numpy as np
 from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_maximum
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
+from alphacut.frame.modal.exact_response import ExactResponse
 from alphacut.frame.modal.model import ModalModel
 
+Response = ModalModel | ExactResponse
 RIVAL = 0.05
 """Share of the largest bound by which a rival basin may lie behind and still be followed."""
 
@@ -59,7 +61,7 @@ class Optima:
         """A copy of the problems `which`."""
         return Optima(*(getattr(self, part.name)[which].copy() for part in fields(self)))
 
-    def offer(self, model: ModalModel, points: Array, which: Array) -> Array:
+    def offer(self, model: Response, points: Array, which: Array) -> Array:
         """Try `points` (W, d) on problems `which` (W,), keep and return the better ones."""
         if not len(which):
             return which
@@ -95,16 +97,10 @@ class ModalSearch:
     @classmethod
     def suited(cls, model: ModalModel, seed: int = 0, wanted: float = 1e-6) -> ModalSearch:
         """More samples and starts where phases vary much over the box."""
-        middle, rest = model.eigenvalue.coefficients[0], model.eigenvalue.coefficients[1:]
-        # a mode that has died down has no basins
-        lasting = np.minimum(model.time[-1], 5 / np.maximum(-middle.real, 1e-300))
-        turned = float((np.abs(rest).sum(0) * lasting).max())  # rad
-        more = int(np.clip(np.log2(max(turned, 1.0) / CALM), 0, 2))
+        more = int(np.clip(np.log2(max(model.turned, 1.0) / CALM), 0, 2))
         return cls(512 * 2**more, 2 + more, SMALL * wanted, QUIET * wanted, seed=seed)
 
-    def run(
-        self, model: ModalModel, lower: Array, upper: Array
-    ) -> tuple[Array, Array, Array, Array]:
+    def run(self, model: Response, lower: Array, upper: Array) -> tuple[Array, Array, Array, Array]:
         """Upper bounds of (−output, output), their unit coordinates, and what may be missing.
 
         Args:
@@ -133,12 +129,11 @@ class ModalSearch:
         value, left = found.value.reshape(shape), found.left.reshape(shape)
         return value, found.point.reshape(*shape, d), left, gained
 
-    def stride(self, model: ModalModel) -> int:
+    def stride(self, model: Response) -> int:
         """Nodes from one that is searched anew to the next."""
-        fastest = float(np.abs(model.eigenvalue.coefficients[0]).max())
-        return max(1, int(self.resolution / (fastest * model.flow.step)))
+        return max(1, int(self.resolution / (model.fastest * (model.time[1] - model.time[0]))))
 
-    def _second_passes(self, model: ModalModel, found: Optima, lower: Array, upper: Array) -> Array:
+    def _second_passes(self, model: Response, found: Optima, lower: Array, upper: Array) -> Array:
         """Independent passes over `found` until one gains nothing; the last one's gain, (m,)."""
         gained = np.zeros(len(model.outputs))
         for count in range(1, self.passes + 1):
@@ -153,11 +148,11 @@ class ModalSearch:
         return gained
 
     def _search(
-        self, model: ModalModel, lower: Array, upper: Array, pool: tuple[Array, Array], stride: int
+        self, model: Response, lower: Array, upper: Array, pool: tuple[Array, Array], stride: int
     ) -> tuple[Optima, list[Optima]]:
         """Optima on every stride-th node, and the local optima of other basins."""
         nodes = np.unique(np.append(np.arange(0, len(model.time), stride), len(model.time) - 1))
-        best = _best_of_pool(*pool, nodes, self.starts)
+        best = best_of_pool(*pool, nodes, self.starts)
         for optima in best:
             refine(model, optima, np.arange(len(optima.value)), lower, upper, self.small)
         found = replace(best[0], point=best[0].point.copy(), value=best[0].value.copy())
@@ -169,7 +164,7 @@ class ModalSearch:
 
     def _follow(
         self,
-        model: ModalModel,
+        model: Response,
         found: Optima,
         nodes: int,
         lower: Array,
@@ -194,7 +189,7 @@ class ModalSearch:
 
     def _spread(
         self,
-        model: ModalModel,
+        model: Response,
         coarse: list[Optima],
         lower: Array,
         upper: Array,
@@ -221,7 +216,7 @@ class ModalSearch:
         margin = RIVAL * np.abs(found.value).max()
         for rival in [
             *(carried(other) for other in coarse[1:]),
-            _best_of_pool(*pool, np.arange(total), 1)[0],
+            best_of_pool(*pool, np.arange(total), 1)[0],
         ]:
             apart = np.abs(rival.point - found.point).max(1) > 0.1 * (upper - lower).max()
             which = np.flatnonzero(apart & (rival.value > found.value - margin))
@@ -230,7 +225,7 @@ class ModalSearch:
         self._contest(model, found, lower, upper)
         return found
 
-    def _contest(self, model: ModalModel, found: Optima, lower: Array, upper: Array) -> None:
+    def _contest(self, model: Response, found: Optima, lower: Array, upper: Array) -> None:
         """Refine either optimum at both nodes of a jump, until no jump moves."""
         grid = np.arange(len(found.value)).reshape(-1, 2 * len(model.outputs))
         open_ = np.ones(len(found.value), bool)
@@ -270,7 +265,7 @@ class ModalSearch:
 
 
 def second_pass(
-    model: ModalModel,
+    model: Response,
     found: Optima,
     lower: Array,
     upper: Array,
@@ -297,10 +292,8 @@ def second_pass(
     groups = [(np.arange(len(model.time)), search.samples // 2)]
     groups += [(nodes, search.samples // 4**k) for k in range(search.starts)]
     for chosen, size in groups:
-        pool = rng.uniform(lower, upper, (size, len(lower)))
-        faces = rng.random(pool.shape) < rng.choice([0.0, 0.3, 0.6], (size, 1))
-        pool[faces] = np.where(rng.random(pool.shape) < 0.5, lower, upper)[faces]
-        rival = _best_of_pool(pool, trajectories(model, pool, chosen), chosen, 1)[0]
+        pool = fresh_points(rng, lower, upper, size)
+        rival = best_of_pool(pool, trajectories(model, pool, chosen), chosen, 1)[0]
         which = every[chosen].ravel()
         if len(chosen) == len(nodes):
             refine(model, rival, np.arange(len(which)), lower, upper, search.quiet / 4)
@@ -308,7 +301,15 @@ def second_pass(
     return improved
 
 
-def trajectories(model: ModalModel, points: Array, nodes: Array | None = None) -> Array:
+def fresh_points(rng: np.random.Generator, lower: Array, upper: Array, size: int) -> Array:
+    """Random points of a box, two thirds of them with coordinates on faces, shape (size, d)."""
+    pool = rng.uniform(lower, upper, (size, len(lower)))
+    faces = rng.random(pool.shape) < rng.choice([0.0, 0.3, 0.6], (size, 1))
+    pool[faces] = np.where(rng.random(pool.shape) < 0.5, lower, upper)[faces]
+    return pool
+
+
+def trajectories(model: Response, points: Array, nodes: Array | None = None) -> Array:
     """Values of the model at points (P, d) and the nodes, all unless given, shape (P, T, m)."""
     pieces = [model.values(chunk) for chunk in np.array_split(points, -(-len(points) // 256))]
     return np.concatenate([x if nodes is None else x[:, nodes] for x in pieces])
@@ -341,7 +342,7 @@ def problems(nodes: Array, outputs: int, d: int) -> Optima:
     )
 
 
-def _best_of_pool(pool: Array, values: Array, nodes: Array, starts: int) -> list[Optima]:
+def best_of_pool(pool: Array, values: Array, nodes: Array, starts: int) -> list[Optima]:
     """Best points of the pool (P, d) for every problem, and rivals elsewhere."""
     m = values.shape[-1]
     chosen = (values if len(nodes) == values.shape[1] else values[:, nodes]).reshape(len(pool), -1)
@@ -364,15 +365,16 @@ def _best_of_pool(pool: Array, values: Array, nodes: Array, starts: int) -> list
 
 
 def refine(
-    model: ModalModel, optima: Optima, which: Array, lower: Array, upper: Array, small: float
+    model: Response, optima: Optima, which: Array, lower: Array, upper: Array, small: float
 ) -> None:
     """Newton's method in the box on `which`, until none promises more than `small`."""
-    for piece in np.array_split(which, -(-len(which) // PIECE) or 1):
+    size = int(np.clip(PIECE * 36 / lower.size**2, PIECE // 8, PIECE))
+    for piece in np.array_split(which, -(-len(which) // size) or 1):
         _newton(model, optima, piece, lower, upper, small)
 
 
 def _newton(
-    model: ModalModel, optima: Optima, which: Array, lower: Array, upper: Array, small: float
+    model: Response, optima: Optima, which: Array, lower: Array, upper: Array, small: float
 ) -> None:
     """End a problem when its model, not held back by the trust region, promises at most `small`.
 
@@ -412,7 +414,7 @@ def _newton(
 
 
 def _signed(
-    model: ModalModel, optima: Optima, points: Array, which: Array
+    model: Response, optima: Optima, points: Array, which: Array
 ) -> tuple[Array, Array, Array]:
     """Side × output with gradient and Hessian, of problems `which` at points (W, d)."""
     side = optima.side[which]

@@ -38,11 +38,22 @@ class Modes:
         eigenvalue: λ_k with Im λ_k > 0, by rising |λ_k|, complex jet, V = (S, n), in 1/s.
         coefficient: C_k, what the initial state puts into the outputs, V = (S, n, m).
         load: The same for a unit impulse of the ground's acceleration, V = (S, n, m).
+        of: How many the structure has.
     """
 
     eigenvalue: Jet
     coefficient: Jet
     load: Jet
+    of: int
+
+    def joined(self, other: Modes) -> Modes:
+        """Those of both sets of parameters."""
+        pairs = (
+            (self.eigenvalue, other.eigenvalue, -2),
+            (self.coefficient, other.coefficient, -3),
+            (self.load, other.load, -3),
+        )
+        return Modes(*(concatenate([a, b], axis) for a, b, axis in pairs), self.of)
 
 
 def modes(matrices: Matrices, rows: Jet, chosen: Array | None = None) -> Modes:
@@ -73,7 +84,7 @@ def modes(matrices: Matrices, rows: Jet, chosen: Array | None = None) -> Modes:
         share = (Y @ excitation)[..., wanted, 0][..., None, :]
         return (seen * share).map(lambda x: x.swapaxes(-1, -2))
 
-    return Modes(values, through(start), through(kick))
+    return Modes(values, through(start), through(kick), len(kick) // 2)
 
 
 def require_single(matrices: Matrices, chosen: Array) -> None:
@@ -106,16 +117,21 @@ def oscillating(rate: Array) -> Array:
     return yes
 
 
+def ordered_eigenvectors(A: Array) -> tuple[Array, Array]:
+    """Eigenvalues (S, 2n), upper, real, lower, each by |λ|, and vectors (S, 2n, 2n)."""
+    values, X = np.linalg.eig(A)
+    group = np.where(oscillating(values), 0, np.where(oscillating(values.conj()), 2, 1))
+    order = np.lexsort((np.abs(values), group), axis=-1)
+    return np.take_along_axis(values, order, -1), np.take_along_axis(X, order[:, None, :], -1)
+
+
 def eigenvectors(A: Jet) -> tuple[Jet, Jet, Jet]:
     """Eigenvalues (upper, real, lower, by |λ|), right and left vectors, V = (S, 2n, 2n).
 
     With X(p) = X(p0) Z(p), Z(p0) = I and diag Z = I, second-order perturbation in the eigenbasis
     gives all derivatives.
     """
-    values, X = np.linalg.eig(A.value)
-    group = np.where(oscillating(values), 0, np.where(oscillating(values.conj()), 2, 1))
-    order = np.lexsort((np.abs(values), group), axis=-1)
-    values, X = np.take_along_axis(values, order, -1), np.take_along_axis(X, order[:, None, :], -1)
+    values, X = ordered_eigenvectors(A.value)
     Y = np.linalg.inv(X)
     gap = values[:, None, :] - values[:, :, None]
     size = values.shape[-1]

@@ -45,25 +45,39 @@ def compute(
     """
     from alphacut import frame
 
-    inputs = wanted.inputs(task.fuzzy)
     guard_against(wanted, task, strict=strict)
+    given = arguments(wanted, task)
+    if task.certify is not None:
+        given["workers"] = workers
     try:
         with told_once():
-            return frame.envelope(
-                wanted.model,
-                inputs,
-                alpha=task.alpha,
-                duration=task.duration,
-                step=task.step,
-                method=task.method,
-                integrator=task.integrator,
-                relative=task.relative and task.certify is None,
-                progress=progress,
-                **method_options(task),
-                **({"workers": workers} if task.certify is not None else {}),
-            )
+            return frame.envelope(wanted.model, progress=progress, **given)
     except ValueError as error:
         raise BadInput(Problem("envelope", str(error))) from None
+
+
+def explain(wanted: Structure, task: EnvelopeTask) -> list[str]:
+    """A line for each method that would be tried: what it does, and the seconds expected."""
+    from alphacut import frame
+
+    try:
+        return [str(candidate) for candidate in frame.plan(wanted.model, **arguments(wanted, task))]
+    except ValueError as error:
+        raise BadInput(Problem("envelope", str(error))) from None
+
+
+def arguments(wanted: Structure, task: EnvelopeTask) -> Document:
+    """What `frame.envelope` and `frame.plan` are called with."""
+    return {
+        "inputs": wanted.inputs(task.fuzzy),
+        "alpha": task.alpha,
+        "duration": task.duration,
+        "step": task.step,
+        "method": task.method,
+        "integrator": task.integrator,
+        "relative": task.relative and task.certify is None,
+        **method_options(task),
+    }
 
 
 @contextmanager

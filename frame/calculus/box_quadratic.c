@@ -1,0 +1,129 @@
+/* Local maxima of quadratics g.x + x.H.x/2 over boxes: the twin of box_quadratic.py. */
+#include <math.h>
+#include <string.h>
+
+#define MOST 64
+
+static double gain(int d, const double *g, const double *H, const double *x)
+{
+    double total = 0;
+    for (int i = 0; i < d; i++) {
+        double row = 0;
+        for (int j = 0; j < d; j++) row += H[i * d + j] * x[j];
+        total += (g[i] + 0.5 * row) * x[i];
+    }
+    return total;
+}
+
+static void slopes(int d, const double *g, const double *H, const double *x, double *s)
+{
+    for (int i = 0; i < d; i++) {
+        double row = g[i];
+        for (int j = 0; j < d; j++) row += H[i * d + j] * x[j];
+        s[i] = row;
+    }
+}
+
+static void axes_ascent(int d, const double *g, const double *H, const double *low,
+                        const double *high, double *x)
+{
+    double s[MOST];
+    slopes(d, g, H, x, s);
+    for (int i = 0; i < d; i++) {
+        double c = H[i * d + i], level = s[i] - c * x[i], new;
+        if (c < 0) {
+            new = -level / c;
+            new = new < low[i] ? low[i] : new > high[i] ? high[i] : new;
+        } else
+            new = level * (high[i] - low[i]) + 0.5 * c * (high[i] * high[i] - low[i] * low[i]) > 0
+                      ? high[i] : low[i];
+        if (new != x[i]) {
+            for (int j = 0; j < d; j++) s[j] += H[j * d + i] * (new - x[i]);
+            x[i] = new;
+        }
+    }
+}
+
+/* Gaussian elimination with partial pivoting of A y = b; 0 where A is singular. */
+static int solved(int m, double *A, double *b)
+{
+    for (int k = 0; k < m; k++) {
+        int p = k;
+        for (int i = k + 1; i < m; i++)
+            if (fabs(A[i * m + k]) > fabs(A[p * m + k])) p = i;
+        if (A[p * m + k] == 0) return 0;
+        if (p != k) {
+            double t = b[k]; b[k] = b[p]; b[p] = t;
+            for (int j = k; j < m; j++) {
+                t = A[k * m + j]; A[k * m + j] = A[p * m + j]; A[p * m + j] = t;
+            }
+        }
+        for (int i = k + 1; i < m; i++) {
+            double f = A[i * m + k] / A[k * m + k];
+            if (f == 0) continue;
+            for (int j = k; j < m; j++) A[i * m + j] -= f * A[k * m + j];
+            b[i] -= f * b[k];
+        }
+    }
+    for (int i = m - 1; i >= 0; i--) {
+        for (int j = i + 1; j < m; j++) b[i] -= A[i * m + j] * b[j];
+        b[i] /= A[i * m + i];
+    }
+    return 1;
+}
+
+/* Projected Newton step on the free axes, halved at most twice. */
+static void newton(int d, const double *g, const double *H, const double *low,
+                   const double *high, double *x, double shift)
+{
+    double s[MOST], A[MOST * MOST], step[MOST], trial[MOST], best[MOST], top;
+    int free[MOST], m = 0;
+    slopes(d, g, H, x, s);
+    for (int i = 0; i < d; i++)
+        if (!((x[i] <= low[i] && s[i] <= 0) || (x[i] >= high[i] && s[i] >= 0))) free[m++] = i;
+    for (int a = 0; a < m; a++) {
+        for (int b = 0; b < m; b++)
+            A[a * m + b] = H[free[a] * d + free[b]] - (a == b ? shift : 0);
+        step[a] = -s[free[a]];
+    }
+    if (!m || !solved(m, A, step)) return;
+    top = gain(d, g, H, x);
+    memcpy(best, x, d * sizeof(double));
+    for (double length = 1; length >= 0.25; length /= 2) {
+        memcpy(trial, x, d * sizeof(double));
+        for (int a = 0; a < m; a++) {
+            int i = free[a];
+            double t = x[i] + length * step[a];
+            trial[i] = t < low[i] ? low[i] : t > high[i] ? high[i] : t;
+        }
+        double value = gain(d, g, H, trial);
+        if (value > top) {
+            top = value;
+            memcpy(best, trial, d * sizeof(double));
+        }
+    }
+    memcpy(x, best, d * sizeof(double));
+}
+
+int local_maximum(long count, int d, int rounds, const double *g, const double *H,
+                  const double *lower, const double *upper, double *x)
+{
+    if (d > MOST) return 0;
+    for (long n = 0; n < count; n++) {
+        const double *gn = g + n * d, *Hn = H + n * d * d;
+        const double *low = lower + n * d, *high = upper + n * d;
+        double *xn = x + n * d, shift = 0, before = gain(d, gn, Hn, xn);
+        for (int k = 0; k < d * d; k++)
+            if (fabs(Hn[k]) > shift) shift = fabs(Hn[k]);
+        shift *= 1e-13;
+        for (int r = 0; r < rounds; r++) {
+            axes_ascent(d, gn, Hn, low, high, xn);
+            newton(d, gn, Hn, low, high, xn, shift);
+            newton(d, gn, Hn, low, high, xn, shift);
+            double after = gain(d, gn, Hn, xn);
+            if (!(after - before > 1e-10 * (1e-6 + fabs(before)))) break;
+            before = after;
+        }
+    }
+    return 1;
+}

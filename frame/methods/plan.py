@@ -1,0 +1,137 @@
+"""Seconds that methods are expected to take, before any of them starts."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.frame.boxes import UnitFlow
+from alphacut.frame.calculus.box_quadratic import local_maximum
+from alphacut.frame.calculus.low_discrepancy import chebyshev_points
+from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.modal.exact_response import ExactResponse
+from alphacut.frame.modal.model import MANY, ModalModel, fit_modes
+from alphacut.frame.modal.search import Response
+from alphacut.frame.structures.modes import ModalError
+
+PROBED = 200
+"""Problems on which a step of Newton's method is timed."""
+STEPS = 30
+"""Steps a problem takes on polynomials, all passes together."""
+RISE = 3.0
+"""Cost of the final polynomials beside those of degree 2, which are timed."""
+POLISHING = (4.0, 8.0)
+"""Steps a problem takes on exact trajectories: the first plus (d / the second)²."""
+GRAPHS = 1500
+"""Trajectories that the Graph Follower takes on all levels, where its budget does not end it."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A way to the envelope, and what it is expected to cost.
+
+    Args:
+        name: Of the method.
+        seconds: Estimate of its processor time, seldom wrong by more than a factor of four;
+            infinite where the method cannot be applied.
+        words: What would be done, or why it cannot be.
+    """
+
+    name: str
+    seconds: float
+    words: str
+
+    def __str__(self) -> str:
+        """One line."""
+        cost = f"some {self.seconds:.1g} s" if np.isfinite(self.seconds) else "not possible"
+        return f"{self.name}: {cost}; {self.words}"
+
+
+def candidates(flow: UnitFlow, budget: int) -> tuple[Candidate, ...]:
+    """What auto may take, in the order in which it tries them.
+
+    Args:
+        flow: Trajectories.
+        budget: Most trajectories of the Graph Follower.
+    """
+    follower = _follower("improved-graph-follower", flow, budget)
+    return (_modal(flow), follower) if isinstance(flow.flow, LinearFlow) else (follower,)
+
+
+def planned(name: str, method: object, flow: UnitFlow) -> tuple[Candidate, ...]:
+    """What a method would do; of auto each that it may take.
+
+    Args:
+        name: Of the method.
+        method: The method.
+        flow: Trajectories.
+    """
+    if hasattr(method, "plan"):
+        found: tuple[Candidate, ...] = method.plan(flow)
+        return found
+    if name == "modal":
+        return (_modal(flow),)
+    if name.endswith("graph-follower"):
+        return (_follower(name, flow, getattr(method, "budget", None) or GRAPHS),)
+    d, levels = len(flow.boxes.names), len(flow.boxes.alpha)
+    runs = levels * int(getattr(method, "samples", 2**d))
+    centre = np.zeros((1, d))
+    flow.values(centre)
+    each = _seconds(lambda: flow.values(centre))
+    return (Candidate(name, runs * each, f"{runs} trajectories of {each:.1g} s each"),)
+
+
+def _follower(name: str, flow: UnitFlow, budget: int) -> Candidate:
+    centre = np.zeros((1, len(flow.boxes.names)))
+    if not isinstance(flow.flow, LinearFlow):
+        flow.taylor(centre)  # writes and compiles what is kept
+    each, graphs = _seconds(lambda: flow.taylor(centre)), min(budget, GRAPHS)
+    words = f"some {graphs} trajectories with derivatives of {each:.1g} s each"
+    return Candidate(name, graphs * each, words)
+
+
+def _modal(flow: UnitFlow) -> Candidate:
+    assert isinstance(flow.flow, LinearFlow)
+    d, begun = len(flow.boxes.names), time.process_time()
+    try:
+        model = fit_modes(flow.flow, flow.boxes, tolerance=np.inf, budget=1000)
+    except ModalError as error:
+        return Candidate("modal", np.inf, str(error))
+    fitting = time.process_time() - begun
+    wide = sum(
+        (np.diff(flow.boxes.unit(level), axis=0) > 0).any()
+        for level in range(len(flow.boxes.alpha))
+    )
+    problems = 2 * len(flow.time) * len(flow.outputs) * wide
+    steps = STEPS * (1 if d > MANY else RISE)
+    seconds = fitting * (1 if d > MANY else 10) + problems * steps * _step(model, d)
+    words = f"{problems} bounds by polynomials of the modes"
+    if d > MANY:
+        first, second = POLISHING
+        polish = first + (d / second) ** 2
+        seconds += problems * polish * _step(ExactResponse.of(model, flow.scale), d)
+        words += f", since {d} inputs are many polished on exact trajectories"
+    return Candidate("modal", seconds, words)
+
+
+def _step(model: ModalModel | Response, d: int) -> float:
+    """Seconds of one step of Newton's method for one problem."""
+    unit = chebyshev_points(d, PROBED)
+    node = np.arange(PROBED) * (len(model.time) - 1) // PROBED
+    output = np.arange(PROBED) % len(model.outputs)
+
+    def step() -> None:
+        _, g, H = model.at(unit, node, output)
+        local_maximum(g, H, -1 - unit, 1 - unit, rounds=2)
+
+    step()  # makes what is kept
+    return _seconds(step) / PROBED
+
+
+def _seconds(call: Callable[[], object]) -> float:
+    begun = time.process_time()
+    call()
+    return max(time.process_time() - begun, 1e-6)

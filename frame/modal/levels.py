@@ -1,0 +1,100 @@
+"""Bounds on all α-levels, from the narrowest box to the widest, so that they are nested."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from alphacut.frame.boxes import Boxes, UnitFlow
+from alphacut.frame.calculus.jet import Array
+from alphacut.frame.modal.exact_response import ExactResponse
+from alphacut.frame.modal.model import ModalModel
+from alphacut.frame.modal.polish import Polish
+from alphacut.frame.modal.search import ModalSearch, fresh_points
+
+Progress = Callable[[float], None]
+Levels = tuple[Array, Array, Array]
+"""Bounds (A, T, m, 2) of (−output, output), unit coordinates (A, T, m, 2, d), what is left."""
+SEEN = 96
+"""Trajectories at optima, and as many fresh ones, by which polynomials are judged."""
+LEFT, ENDS = 0.1, 0.5
+"""Shares of the wanted error that Newton's method may leave, and that a last pass may gain."""
+UNSEEN = 2.0
+"""Factor on what the last independent pass gained, or might have without being followed."""
+
+
+def search_levels(
+    flow: UnitFlow,
+    model: ModalModel,
+    seed: int,
+    wanted: float,
+    progress: Progress | None,
+    *,
+    guide: bool = False,
+) -> Levels:
+    """Optima of the polynomials; `guide` takes less effort, for those that are polished."""
+    cuts, scaled = model.boxes, model.in_units(flow.scale)
+    search = ModalSearch.suited(scaled, seed, wanted)
+    if guide:
+        search = replace(search, passes=1, resolution=1.0, small=LEFT * wanted)
+
+    def level(index: int, inner: Array | None) -> tuple[Array, Array, Array]:
+        del inner
+        bounds, at, left, gained = search.run(scaled, *cuts.unit(index))
+        return bounds, at, left + gained[:, None]
+
+    return _nested(cuts, flow, level, progress)
+
+
+def polished_levels(
+    flow: UnitFlow,
+    exact: ExactResponse,
+    at: Array,
+    seed: int,
+    wanted: float,
+    progress: Progress | None,
+) -> Levels:
+    """Bounds of exact trajectories from the polynomials' optima `at` (A, T, m, 2, d)."""
+    cuts, polish = flow.boxes, Polish(LEFT * wanted, ENDS * wanted, seed=seed)
+
+    def level(index: int, inner: Array | None) -> tuple[Array, Array, Array]:
+        starts = [at[index]] if inner is None else [at[index], inner]
+        bounds, points, left, gained = polish.run(exact, starts, *cuts.unit(index))
+        return bounds, points, left + UNSEEN * np.maximum(gained, polish.quiet)[:, None]
+
+    return _nested(cuts, flow, level, progress)
+
+
+def _nested(
+    cuts: Boxes,
+    flow: UnitFlow,
+    level: Callable[[int, Array | None], tuple[Array, Array, Array]],
+    progress: Progress | None,
+) -> Levels:
+    count = len(cuts.alpha)
+    found: list[tuple[Array, Array, Array]] = []
+    for done, index in enumerate(reversed(range(count))):
+        if progress:
+            progress(done / count)
+        bounds, at, left = level(index, found[0][1] if found else None)
+        if found:
+            kept = found[0][0] > bounds
+            bounds[kept], at[kept] = found[0][0][kept], found[0][1][kept]
+        found.insert(0, (bounds, at, left))
+    bounds, at, left = (np.stack(part) for part in zip(*found, strict=True))
+    unit = flow.scale[:, None]
+    return bounds * unit, at, left * unit
+
+
+def judged_at_optima(model: ModalModel, at: Array, seed: int) -> ModalModel:
+    """The model with deviations at optima (…, d), and at as many fresh points, in its error."""
+    rng = np.random.default_rng((seed, 11))
+    points = np.unique(np.round(at.reshape(-1, at.shape[-1]), 2), axis=0)
+    ends = np.ones(at.shape[-1])
+    fresh = fresh_points(rng, -ends, ends, SEEN)
+    points = np.vstack([np.clip(rng.permutation(points)[:SEEN], -1, 1), fresh])
+    truth = model.flow.values(model.boxes.to_physical(points))
+    wrong = np.abs(model.values(points) - truth).max(0)
+    return replace(model, error=np.maximum(model.error, wrong))

@@ -1,0 +1,107 @@
+"""Exact trajectories take over from polynomials: optima, values and what may be missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.frame.calculus.jet import Array
+from alphacut.frame.modal.exact_response import ExactResponse
+from alphacut.frame.modal.search import (
+    Optima,
+    best_of_pool,
+    fresh_points,
+    problems,
+    refine,
+    trajectories,
+)
+
+CALM_PASSES = 2
+"""Passes one after the other that must gain too little before the search ends."""
+
+
+@dataclass(frozen=True)
+class Polish:
+    """Newton's method by exact gradients from the optima of polynomials, and independent passes.
+
+    Each pass offers whole exact trajectories to all nodes, of points where the last pass moved and
+    of fresh ones, and solves some problems anew from the best of the fresh ones alone.
+
+    Args:
+        small: Gain that Newton's method leaves, in units of the outputs.
+        quiet: Gain of a pass that is too little to go on for, in units of the outputs.
+        passes: Most passes.
+        graphs: Trajectories of moved points, and as many fresh ones, in a pass.
+        anew: Problems solved anew in the first pass; four times as many in each further one.
+        seed: Of the fresh points.
+    """
+
+    small: float
+    quiet: float
+    passes: int = 6
+    graphs: int = 512
+    anew: int = 256
+    seed: int = 0
+
+    def run(
+        self, exact: ExactResponse, starts: Sequence[Array], lower: Array, upper: Array
+    ) -> tuple[Array, Array, Array, Array]:
+        """Upper bounds of (−output, output) over a box, as `ModalSearch.run` returns them.
+
+        Args:
+            exact: The outputs.
+            starts: Unit coordinates to start from, each of shape (T, m, 2, d).
+            lower: Lower ends of the box, shape (d,).
+            upper: Upper ends.
+        """
+        *shape, d = starts[0].shape
+        found = problems(np.arange(shape[0]), shape[1], d)
+        every, gained = np.arange(len(found.value)), np.zeros(shape[1])
+        for points in starts:
+            found.offer(exact, np.clip(points.reshape(-1, d), lower, upper), every)
+        if (upper > lower).any():
+            moved = self._pass(exact, found, every, lower, upper, (0, 0))
+            anew, calm = self.anew, 0
+            for count in range(1, self.passes + 1):
+                before = found.value.copy()
+                moved = self._pass(exact, found, moved, lower, upper, (count, anew))
+                gained = (found.value - before).reshape(shape).max((0, 2))
+                calm = calm + 1 if gained.max() <= self.quiet else 0
+                if calm == CALM_PASSES:
+                    break
+                anew = min(4 * anew, len(before))
+        value, left = found.value.reshape(shape), found.left.reshape(shape)
+        return value, found.point.reshape(*shape, d), left, gained
+
+    def _pass(
+        self,
+        exact: ExactResponse,
+        found: Optima,
+        moved: Array,
+        lower: Array,
+        upper: Array,
+        effort: tuple[int, int],
+    ) -> Array:
+        """Improve `found`; returns the problems that did. Effort: number of pass, solved anew."""
+        count, anew = effort
+        rng, before = np.random.default_rng((self.seed, 7, count)), found.value.copy()
+        nodes = np.arange(len(exact.time))
+        known = np.unique(np.round(found.point[moved], 3), axis=0)
+        known = np.clip(rng.permutation(known)[: self.graphs], lower, upper)
+        _take(found, best_of_pool(known, trajectories(exact, known), nodes, 1)[0])
+        fresh = fresh_points(rng, lower, upper, self.graphs)
+        rival = best_of_pool(fresh, trajectories(exact, fresh), nodes, 1)[0]
+        if count:
+            some = rng.permutation(len(rival.value))[:anew]
+            refine(exact, rival, some, lower, upper, self.small)
+        _take(found, rival)
+        open_ = np.arange(len(before)) if not count else np.flatnonzero(found.value > before)
+        refine(exact, found, open_, lower, upper, self.small)
+        return np.flatnonzero(found.value > before)
+
+
+def _take(found: Optima, rival: Optima) -> None:
+    better = rival.value > found.value + 1e-12
+    found.point[better], found.value[better] = rival.point[better], rival.value[better]

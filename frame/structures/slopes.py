@@ -1,0 +1,100 @@
+"""First derivatives alone of a structure's arrays, for many parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.frame.calculus.jet import Array, Jet, concatenate
+from alphacut.frame.structures.linear import LinearSystem, Matrices
+
+
+@dataclass(frozen=True, eq=False)
+class Slopes:
+    """A structure at S parameter sets with derivatives by d parameters.
+
+    Args:
+        matrices: Values.
+        rows: Observation rows, shape (S, m, 2n).
+        mass: Derivatives of M, shape (d, S, n, n).
+        damping: Of D.
+        stiffness: Of K.
+        state: Of the initial state, shape (d, S, 2n).
+        observation: Of the rows, shape (d, S, m, 2n).
+    """
+
+    matrices: Matrices
+    rows: Array
+    mass: Array
+    damping: Array
+    stiffness: Array
+    state: Array
+    observation: Array
+
+    @classmethod
+    def of(cls, system: LinearSystem, names: Sequence[str], points: Array) -> Slopes:
+        """Of `system` at `points` (S, d), the values of `names`; others keep modal values.
+
+        A set is taken once for each parameter, since jets carry all pairs of theirs.
+        """
+        (total, d), fixed = points.shape, [name for name in system.parameters if name not in names]
+        modal = [system.parameters[name] for name in fixed]
+        values = np.hstack([points, np.tile(modal, (total, 1))])
+        p = {
+            name: Jet(
+                np.tile(values[:, k], d),
+                np.repeat(np.arange(d) == k, total).astype(float)[None],
+                np.zeros((1, 1, d * total)),
+            )
+            for k, name in enumerate([*names, *fixed])
+        }
+        matrices, rows = system.matrices(p), system.observation(p)
+        state = concatenate([matrices.q0, matrices.v0], -2)[..., 0]
+        jets = (matrices.mass, matrices.damping, matrices.stiffness, state, rows)
+        first = [jet.first[0].reshape(d, total, *jet.value.shape[1:]) for jet in jets]
+        return cls(_values_of(matrices, total), rows.value[:total], *first)
+
+    def gradient(
+        self, own: Array, through: Array, state: Array, back: Array, row: Array, output: Array
+    ) -> Array:
+        """Gradients (N, d) of r exp(A t) s from what each of its parts does to it.
+
+        Args:
+            own: Parameter set of each problem, shape (N,).
+            through: Derivative by the entries of A, shape (N, 2n, 2n).
+            state: The state exp(A t) s, shape (N, 2n), by which r is multiplied.
+            back: r exp(A t), shape (N, 2n), by which s is multiplied.
+            row: Factor of the rows, shape (N,).
+            output: Row of each problem, shape (N,).
+        """
+        M, D, K = (getattr(self.matrices, k).value[own] for k in ("mass", "damping", "stiffness"))
+        n = M.shape[-1]
+        by_K, by_D = np.split(np.linalg.solve(M.swapaxes(1, 2), through[:, n:]), 2, axis=-1)
+        light = np.linalg.solve(M, np.concatenate([K, D], -1)).swapaxes(1, 2)
+        by_M = by_K @ light[:, :n] + by_D @ light[:, n:]
+        total = _inner(self.mass, own, by_M) - _inner(self.stiffness, own, by_K)
+        total -= _inner(self.damping, own, by_D)
+        total += np.einsum("dns,ns->nd", self.state[:, own], back)
+        seen = self.observation[:, own, output]
+        slope: Array = total + np.einsum("dns,ns->nd", seen, state * row[:, None])
+        return slope
+
+
+def _inner(derivative: Array, own: Array, by: Array) -> Array:
+    """Sum over entries of derivatives (d, S, n, n) times sensitivities (N, n, n), (N, d)."""
+    moved = np.flatnonzero(derivative.any((1, 2, 3)))
+    out = np.zeros((len(own), len(derivative)))
+    for i in moved:
+        out[:, i] = np.einsum("nij,nij->n", derivative[i][own], by)
+    return out
+
+
+def _values_of(matrices: Matrices, total: int) -> Matrices:
+    """The first `total` sets without derivatives."""
+    parts = ("mass", "damping", "stiffness", "q0", "v0")
+    return Matrices(
+        *(Jet.constant(getattr(matrices, part).value[:total], 0) for part in parts),
+        matrices.pattern,
+    )
