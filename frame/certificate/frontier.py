@@ -96,4 +96,4 @@ class Frontier:
         rows = np.flatnonzero(local >= 2 * d)
         ternary = (local[rows, None] - 2 * d) // 3 ** np.arange(d) % 3
         place[rows] = np.select([ternary == 1, ternary == 2], [LOWER, UPPER], place[rows])
-        return place
+        return np.asarray(place)

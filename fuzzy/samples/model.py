@@ -119,8 +119,9 @@ def _numbers(name: str, value: ArrayLike) -> Array:
         ValueError: Text, dates, complex numbers, or values that are masked.
     """
     array = np.asanyarray(value)
-    if np.ma.is_masked(array) or array.dtype.kind not in "biufO":
-        kind = "masked" if np.ma.is_masked(array) else f"of the type {array.dtype}"
+    masked = isinstance(array, np.ma.MaskedArray) and bool(np.any(array.mask))
+    if masked or array.dtype.kind not in "biufO":
+        kind = "masked" if masked else f"of the type {array.dtype}"
         raise ValueError(f"output {name!r} is {kind}; every output must be a real number")
     return np.asarray(array, float)
 

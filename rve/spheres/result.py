@@ -96,8 +96,8 @@ def certified_spheres(
     least, greatest = limits[0] @ weights
     pointwise = cubic_moduli(np.asarray(result.curve.stiffness))
     sheared = max(
-        shear_against_trace_bounds(*pair, ends, phases)
-        for pair, ends in zip(pointwise[:, 1:], limits[1].T, strict=True)
+        shear_against_trace_bounds(first, second, ends, phases)
+        for (first, second), ends in zip(pointwise[:, 1:], limits[1].T, strict=True)
     )
     checks = {
         "symmetry": float(abs(mean - mean.T).max()) / scale,

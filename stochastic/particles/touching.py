@@ -60,7 +60,8 @@ def split(rows: Array, columns: Array, least: float, smallest: float) -> Labels:
         Number of the part of each pixel, from 0, shape (n,); all 0 where the piece stays whole.
     """
     points = np.stack([rows, columns], axis=1).astype(float)
-    best, parts_of = roundness(rows, columns), np.zeros(len(points), np.intp)
+    best = roundness(rows, columns)
+    parts_of: Labels = np.zeros(len(points), np.intp)
     if best >= least or convexity(rows, columns) >= CONVEX:
         return parts_of
     best += GAIN

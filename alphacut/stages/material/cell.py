@@ -57,7 +57,7 @@ class CellModel(Protocol):
 
     def solve(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
-    ) -> list[Homogenised]:
+    ) -> Sequence[Homogenised]:
         """One result for each inclusion material; mesh and assembly are shared."""
 
 

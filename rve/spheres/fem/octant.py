@@ -74,4 +74,4 @@ def _grading(spot: tuple[float, float, float], radius: float) -> float:
     square = sum(c * c for c in spot)
     contact = min((square - 2 * c + 1) ** 0.5 for c in spot)  # from (1, 0, 0) and its likes
     small = 1.5 * radius + abs(square**0.5 - radius)
-    return min(1.0, small, 4 * (1 - radius) + contact)
+    return float(min(1.0, small, 4 * (1 - radius) + contact))

@@ -85,14 +85,15 @@ def cubic_stiffness(
         todo = todo[errors[todo].max(axis=(1, 2)) > allowed]
         _refuse_touching(radius[todo], step[todo], errors[todo], tolerance)
         step[todo] += 1
-    return CubicStiffness(*np.moveaxis(moduli, -1, 0), errors, used)
+    bulk, deviator, shear = np.moveaxis(moduli, -1, 0)
+    return CubicStiffness(bulk, deviator, shear, errors, used)
 
 
 def _first_step(radius: Array, tolerance: float) -> Array:
     """Index in `_STEPS` for each radius, from the decay of images between two spheres."""
     rate = 2 * np.arccosh(1 / np.maximum(radius, 1e-3))
     needed = np.log(1 / tolerance) / rate
-    return np.minimum(np.searchsorted(_STEPS, needed), len(_STEPS) - 1)
+    return np.asarray(np.minimum(np.searchsorted(_STEPS, needed), len(_STEPS) - 1))
 
 
 def _with_errors(
