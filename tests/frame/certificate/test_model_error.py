@@ -235,6 +235,12 @@ def test_certificate_says_why_it_is_only_sampled() -> None:
     assert np.abs(proved.upper - sampled.upper).max() < 1e-4
 
 
+def test_no_certificate_of_a_scheme_that_is_not_the_motion() -> None:
+    inputs, way = {"k": Interval(75, 85)}, {"duration": 4, "step": 0.5, "method": "modal"}
+    with pytest.raises(ValueError, match="integrator 'midpoint' nothing is proved"):
+        envelope(CHAIN, inputs, certify=1e-4, integrator="midpoint", **way)
+
+
 @pytest.mark.parametrize(("lower", "upper"), [(3.96, 4.04), (3.0, 5.0), (1.0, 4.0)])
 def test_degree_of_the_inverse_cube_reaches_round_off_and_not_far_beyond(lower, upper) -> None:
     degree = inverse_cube_degree(lower, upper)
