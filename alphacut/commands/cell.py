@@ -78,7 +78,7 @@ def one_radius(options: argparse.Namespace) -> list[str]:
     """
     if options.radius is None:
         return []
-    refuse_beside(options, "--radius", dict.fromkeys(("--a1", "--a2", "--a3", "--a4"), ""))
+    refuse_beside(options, "--radius", dict.fromkeys(("--a2", "--a4"), ""))
     try:
         inside = 0 < float(options.radius) < 1
     except ValueError:

@@ -89,16 +89,19 @@ title = "imaged"
 about = "A few pixels."
 stages = ["image"]
 
-[image]
-file = "a.npy"
+[cell]
+image = "a.npy"
 pixel = "2 µm"
 labels = [0, 1]
 modulus = ["20 GPa", "80 GPa"]
 poisson = [0.3]
+
+[modulus]
 alpha = [0, 1]
 """
 VALUES = {
     "--json": ("-", "out.json"),
+    "--radius": ("0.4",),
     "--quiet": ((),),
     "--a2": ("0.11",),
     "--a4": ("0.11",),
@@ -155,7 +158,7 @@ OWN = {
     ("microstructure", "--set"): ("microstructure.seed=2",),
     ("microstructure", "--out"): ("particles",),
     ("report", "--out"): ("page.html",),
-    ("image", "--set"): ("image.poisson=[0.25]",),
+    ("image", "--set"): ("cell.poisson=[0.25]",),
     ("image", "--out"): ("image.nc",),
 }
 EXPLAINED = {
