@@ -65,13 +65,15 @@ def _generate(radius: float, size: float) -> None:
         lambda dim, tag, x, y, z, lc: size * _grading((x, y, z), radius)
     )
     gmsh.option.setNumber("Mesh.ElementOrder", 2)
-    gmsh.option.setNumber("Mesh.HighOrderOptimize", 2)
+    gmsh.option.setNumber("Mesh.HighOrderOptimize", 4)
     gmsh.model.mesh.generate(3)
 
 
 def _grading(spot: tuple[float, float, float], radius: float) -> float:
     """Local edge length over the nominal one, less at a small sphere and in gaps between two."""
-    square = sum(c * c for c in spot)
-    contact = min((square - 2 * c + 1) ** 0.5 for c in spot)  # from (1, 0, 0) and its likes
-    small = 1.5 * radius + abs(square**0.5 - radius)
-    return float(min(1.0, small, 4 * (1 - radius) + contact))
+    square: float = sum(c * c for c in spot)
+    contact: float = min(
+        max(square - 2 * c + 1, 0.0) ** 0.5 for c in spot
+    )  # from (1, 0, 0) and its likes
+    small: float = 1.5 * radius + abs(square**0.5 - radius)
+    return min(1.0, small, 4 * (1 - radius) + contact)

@@ -107,9 +107,9 @@ def _coupling(to: int, of: int, at: _Pair, poisson: float, sums: tuple[Array, Ar
         return np.asarray(factors[to] * same)
     if 2 in (to, of):
         turned = (n * at.j + k * at.m) * _scaled(sums[0], at, -1)
-        return np.asarray(
-            -turned / k if to == 1 else 4 * (2 * n - 1) * (1 - poisson) / (k * (k + 1)) * turned
-        )
+        if to == 1:
+            return np.asarray(-turned / k)
+        return np.asarray(4 * (2 * n - 1) * (1 - poisson) / (k * (k + 1)) * turned)
     alpha, c = 4 - 4 * poisson - n, 2 * (3 * n + 2 - 2 * poisson * (2 * n + 1))
     tilt = (2 * alpha * (k - 1) + c) / (2 * (n + k) - 1)
     far = (alpha - tilt) * 4 * _scaled(sums[1], at, 0)
