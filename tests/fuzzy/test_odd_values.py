@@ -23,7 +23,7 @@ INPUT = {"x": Interval(1, 2)}
         None,
         object(),
     ],
-    ids=str,
+    ids=lambda value: type(value).__name__,
 )
 def test_an_output_is_a_real_number(value):
     with pytest.raises(CampaignError, match=r"real number|finite number"):
