@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -144,10 +145,11 @@ def unlikely_material(case: Case) -> Iterator[str]:
                 shown = engineering(modulus.modal, "Pa")
                 yield f"cell.{name}_modulus: {shown} is unusual for a solid; check its unit"
         ratio = phases.inclusion_modulus.modal / phases.matrix_modulus.modal
-        if not 1 / CONTRAST <= ratio <= CONTRAST:
+        meant = re.search(r"(?i)\b(pore|void|hole|rigid)", case.text_of_file)
+        if not 1 / CONTRAST <= ratio <= CONTRAST and not meant:
             yield (
                 f"cell: the particle's modulus is {ratio:.3g} times the matrix's; check the units"
-                " of both, unless a pore or a rigid particle is meant"
+                " of both, or name pores or rigid particles in the case's text"
             )
     if (radius := case.sections.radius) and radius.a1.modal > radius.a3.modal:
         yield "radius: a1 is greater than a3, so the radius falls where θ rises; is that meant?"

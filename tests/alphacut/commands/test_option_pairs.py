@@ -66,6 +66,13 @@ LIMITED = """
 output = "v1"
 limit = "25 mm/s"
 """
+MEASURED = """
+[update]
+measured = "modes.csv"
+learn = ["E"]
+frequency_deviation = 0.01
+"""
+MODES = "mode,frequency [Hz],q1\n1,0.315,1\n"
 PACKED = """
 schema = 1
 title = "packed"
@@ -160,6 +167,9 @@ OWN = {
     ("report", "--out"): ("page.html",),
     ("image", "--set"): ("cell.poisson=[0.25]",),
     ("image", "--out"): ("image.nc",),
+    ("update", "--set"): ("update.frequency_deviation=0.02",),
+    ("update", "--modulus"): ("[21, 25, 29] GPa",),
+    ("update", "--out"): ("learned",),
 }
 EXPLAINED = {
     ("--quiet", "--json"): "as with --json -",
@@ -182,6 +192,10 @@ NEEDED = {
     ("envelope", "--best-effort"): ("--method", "graph-follower", *MISSED),
     ("envelope", "--workers"): ("--certify", "1e-3"),
     ("microstructure", "--no-figures"): ("--out", "particles"),
+    ("run", "--best-effort"): (
+        *("--set", "envelope.method=graph-follower"),
+        *("--set", "envelope.tolerance=1e-9 m"),
+    ),
 }
 """Options that are refused alone, with those that they need; --strict is to refuse, no more."""
 NEEDS_RESULTS = {"run": ("--fresh",), "modulus": ("--store", "--resume")}
@@ -244,6 +258,10 @@ class Watched:
             text = CASE.format(stages=stages, modulus='modulus = "25.5 GPa"\n') + LIMITED
         if self.command == "report":
             text = CASE.format(stages='["envelope"]', modulus='modulus = "25.5 GPa"\n')
+        if self.command == "update":
+            text = CASE.format(stages=stages, modulus='modulus = "[20, 25.5, 30] GPa"\n') + MEASURED
+            text = text.replace('fuzzy = ["m"]', 'fuzzy = ["m", "E"]')
+            (place / "modes.csv").write_text(MODES, encoding="utf-8")
         text = {"microstructure": PACKED, "image": IMAGED}.get(self.command, text)
         Store(place / "a.db").close()
         np.save(place / "a.npy", np.pad(np.ones((4, 4), int), 4))
