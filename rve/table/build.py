@@ -74,23 +74,31 @@ class PlanarSource:
 
     def __post_init__(self) -> None:
         radii = np.unique(np.clip([0.3, 0.6, 0.72, 0.85, *self.span.radii], *self.span.radii))
-        rough = np.array([self._errors(radius, _ROUGH) for radius in radii])
-        worst = int(rough.max(axis=1).argmax())
-        size, errors = _ROUGH, rough[worst]
+        size, found = _ROUGH, self._all_errors(radii, _ROUGH)
+        while found.max() > self.accuracy:  # what a finer mesh gains differs from radius to radius
+            worst = int(found.max(axis=1).argmax())
+            size = self._fine_enough(radii[worst], size, found[worst])
+            found = self._all_errors(radii, size)
+        self.mesh_size = size
+        self.space = np.vstack([radii, found.T])
+
+    def _fine_enough(self, radius: float, size: float, errors: Array) -> float:
+        """Mesh size at which one radius keeps the accuracy, from a rougher one and its errors."""
         while errors.max() > self.accuracy:
             if size <= _FINEST:
                 raise TableError(
-                    f"planar cells at r = {radii[worst]:.4g} leave a relative error of"
+                    f"planar cells at r = {radius:.4g} leave a relative error of"
                     f" {errors.max():.1e} on the finest mesh ({_FINEST:g}) and {self.accuracy:.1e}"
                     " is wanted: allow a larger error, or take the series"
                 )
             finer = min(0.9, (0.8 * self.accuracy / errors.max()) ** (1 / _RATE))
             size = max(_FINEST, size * finer)
-            errors = self._errors(radii[worst], size)
-        self.mesh_size = size
-        # on the chosen mesh: what a finer one gains differs from radius to radius
-        found = rough if size == _ROUGH else np.array([self._errors(r, size) for r in radii])
-        self.space = np.vstack([radii, found.T])
+            errors = self._errors(radius, size)
+        return size
+
+    def _all_errors(self, radii: Array, size: float) -> Array:
+        """Declared relative errors at all radii, shape (radii, 3)."""
+        return np.array([self._errors(radius, size) for radius in radii])
 
     def _errors(self, radius: float, size: float) -> Array:
         """Declared relative errors at one radius of both extreme inclusions, shape (3,)."""

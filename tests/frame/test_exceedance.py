@@ -26,14 +26,14 @@ INPUTS = {"E": Triangular(23e9, 25e9, 26e9), "m2": Triangular(6.8e3, 7e3, 7.3e3)
 
 
 def test_no_trajectory_peaks_outside_the_fuzzy_peak() -> None:
-    found = peaks(envelope(FRAME, INPUTS, duration=5, step=0.02))
+    found = peaks(envelope(FRAME, INPUTS, duration=5, step=0.02, tolerance=1e-6))
     rng = np.random.default_rng(0)
     points = np.column_stack([rng.uniform(*INPUTS[name].cut(0), 500) for name in INPUTS])
     sampled = np.abs(LinearFlow(FRAME, tuple(INPUTS), 5, 0.02, Exact()).values(points)).max(1)
     assert (sampled <= found.upper[0] * (1 + 1e-5)).all()
     assert (sampled >= found.lower[0] * (1 - 1e-5)).all()
     assert (found.upper[-1] <= found.upper[0]).all()
-    assert found.upper[-1] == pytest.approx(found.lower[-1])
+    assert found.upper[-1] == pytest.approx(found.lower[-1], rel=1e-4)
 
 
 def test_probability_of_exceedance_is_fuzzy_and_nested() -> None:
@@ -60,13 +60,13 @@ def test_probability_of_exceedance_is_fuzzy_and_nested() -> None:
 
 
 def test_the_least_peak_tried_lies_between_the_bounds_and_is_attained() -> None:
-    found = envelope(FRAME, INPUTS, duration=5, step=0.02, alpha=(0, 0.5, 1))
+    found = envelope(FRAME, INPUTS, duration=5, step=0.02, alpha=(0, 0.5, 1), tolerance=1e-6)
     cuts, flow = boxes(INPUTS, (0, 0.5, 1)), LinearFlow(FRAME, tuple(INPUTS), 5, 0.02, Exact())
     tried, of = tried_peaks(flow, cuts), peaks(found)
     assert (tried >= of.lower * (1 - 1e-5)).all()
     assert (tried <= of.upper * (1 + 1e-5)).all()
     assert (np.diff(tried, axis=0) >= 0).all()
-    assert tried[-1] == pytest.approx(of.upper[-1])
+    assert tried[-1] == pytest.approx(of.upper[-1], rel=1e-4)
     points = np.column_stack(
         [np.random.default_rng(1).uniform(*INPUTS[name].cut(0), 3000) for name in INPUTS]
     )

@@ -56,7 +56,10 @@ def test_odd_files(name, words, tmp_path, capfd, monkeypatch):
     ("arguments", "words"),
     [
         ("check paper --set =3", "there is no key before the ="),
-        ("check paper --set cell=3", "cell is a section; allowed: cell.matrix_modulus"),
+        (
+            "check paper --set cell=3",
+            "cell is a section; allowed: cell.particles, cell.matrix_modulus",
+        ),
         ("check paper --set study.name=x", "changed in the case file"),
         ("check paper --set study[0].name=x", "changed in the case file"),
         ("check paper --set frame.damping_ratio=5", '"5": 5 is out of range'),

@@ -175,8 +175,9 @@ EXPLAINED = {
     ("--quiet", "--json"): "as with --json -",
     ("--best-effort", ""): "above the tolerance",
     ("--resume", ""): "the default",
+    ("", "--explain"): "run nothing",
 }
-"""An option, beside which other one (or any) it may be idle, and where its help says so."""
+"""An option (or any), beside which other one (or any) it may be idle, and what help says so."""
 BASE = {"mesh": ["--out", "mesh.vtu"]}
 PRISM = ("--method", "prism")
 MISSED = ("--tolerance", "1e-9")
@@ -381,9 +382,10 @@ def told(text):
 
 def explained(parser, option, other):
     """Whether the help of an option says that it may be idle beside another one."""
-    words = EXPLAINED.get((option, other)) or EXPLAINED.get((option, ""))
-    about = [a.help for a in parser._actions if option in a.option_strings]
-    return bool(words) and words in about[0]
+    own = EXPLAINED.get((option, other)) or EXPLAINED.get((option, ""))
+    helps = {name: a.help or "" for a in parser._actions for name in a.option_strings}
+    others = EXPLAINED.get(("", other))
+    return bool((own and own in helps[option]) or (others and others in helps[other]))
 
 
 def ignored(watched, parser, first, second):

@@ -80,7 +80,7 @@ def test_text_says_what_e_is(capfd):
         (["--method", "table"], "this model is one of cylinders"),
         (["--method", "series", "--radius", "1.2"], "--radius = 1.2: out of range"),
         (["--method", "series", "--radius", "nan"], "--radius = nan: out of range"),
-        (["--method", "series", "--radius", "0.5", "--a1", "0.2"], "no effect beside --radius"),
+        (["--method", "series", "--radius", "0.5", "--a2", "0.2"], "no effect beside --radius"),
         (["--method", "auto", "--exclude", "series"], "spheres have one model"),
         (["--method", "series", "--set", 'cell.particles="cubes"'], "cylinders, spheres"),
     ],

@@ -115,7 +115,7 @@ def test_default_method_is_modal_and_meets_the_certified_envelope(certified: Env
     options = {"duration": 6.0, "step": 0.1, "alpha": (0, 0.5, 1), "tolerance": 5e-6}
     found = envelope(FRAME, INPUTS, **options)  # type: ignore[arg-type]
     assert found.method == "modal"
-    assert found.trajectories < 60
+    assert found.trajectories < 90
     assert (certified.upper - found.upper).max() < 5e-6
     assert (found.lower - certified.lower).max() < 5e-6
     assert (found.upper - certified.upper).max() < 0

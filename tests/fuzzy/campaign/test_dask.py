@@ -46,11 +46,13 @@ def at_once(values, share):
     return float(work / (until - since))
 
 
+@pytest.mark.slow  # a time
 def test_all_slots_work(executor):
     found = propagate(sleep, UNIT, Points(320), alpha=[0.0], executor=executor)
     assert at_once(found.values, 0) >= 14
 
 
+@pytest.mark.slow  # a time
 def test_an_executor_that_does_not_say_is_filled_as_it_takes_more(executor):
     class Silent(Executor):
         def submit(self, function, /, *args, **kwargs):
