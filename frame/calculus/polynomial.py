@@ -52,8 +52,8 @@ def _parents(index: bytes, shape: tuple[int, int]) -> tuple[Index, Index, list[i
     parent = np.zeros(len(rows), np.int64)
     for i in range(shape[1]):
         parent[axis == i] = lowered(index, shape, i)[axis == i]
-    starts = np.searchsorted(total, np.arange(1, total.max(initial=0) + 2)).tolist()
-    return axis, parent, starts
+    starts = np.searchsorted(total, np.arange(1, total.max(initial=0) + 2))
+    return axis, parent, [int(start) for start in starts]
 
 
 def derivative(index: Index, axis: int, coefficients: Array) -> Array:

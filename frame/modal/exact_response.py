@@ -173,7 +173,7 @@ class _AtNode:
     @property
     def wave(self) -> Array:
         """Exp(λ t)."""
-        return np.exp(self.rate * self.time[:, None])
+        return np.asarray(np.exp(self.rate * self.time[:, None]))
 
     @property
     def motion(self) -> Array:

@@ -158,7 +158,7 @@ class ModalModel:
         excited = [(slice(n, 2 * n), self._free(rate, node))]
         if self.load is not None:
             excited.append((slice(2 * n, 3 * n), self.load.response(rate, node)))
-        f = g = 0.0
+        f, g = np.zeros(len(unit)), np.zeros(first.shape[:2])
         weight = np.zeros_like(both)
         crossed = np.zeros_like(slope)
         for part, (w, dw, ddw) in excited:
@@ -203,7 +203,8 @@ class ModalModel:
 
 def _real_product(a: Array, b: Array) -> Array:
     """Real part of a @ b for complex arrays."""
-    return np.concatenate([a.real, -a.imag], -1) @ np.concatenate([b.real, b.imag], -2)
+    left, right = np.concatenate([a.real, -a.imag], -1), np.concatenate([b.real, b.imag], -2)
+    return np.asarray(left @ right)
 
 
 def composed(rate: Jet, share: Jet, wave: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
@@ -248,8 +249,12 @@ def analyse(
         )
     found = modes(matrices, rows, chosen)
     rate = _discrete(found.eigenvalue, flow)
-    parts = (boxes.in_unit(jet) for jet in (rate, found.coefficient, found.load))
-    return Modes(*parts, found.of)
+    return Modes(
+        boxes.in_unit(rate),
+        boxes.in_unit(found.coefficient),
+        boxes.in_unit(found.load),
+        found.of,
+    )
 
 
 def _discrete(rate: Jet, flow: LinearFlow) -> Jet:

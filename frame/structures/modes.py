@@ -48,12 +48,12 @@ class Modes:
 
     def joined(self, other: Modes) -> Modes:
         """Those of both sets of parameters."""
-        pairs = (
-            (self.eigenvalue, other.eigenvalue, -2),
-            (self.coefficient, other.coefficient, -3),
-            (self.load, other.load, -3),
+        return Modes(
+            concatenate([self.eigenvalue, other.eigenvalue], -2),
+            concatenate([self.coefficient, other.coefficient], -3),
+            concatenate([self.load, other.load], -3),
+            self.of,
         )
-        return Modes(*(concatenate([a, b], axis) for a, b, axis in pairs), self.of)
 
 
 def modes(matrices: Matrices, rows: Jet, chosen: Array | None = None) -> Modes:

@@ -93,8 +93,7 @@ def _inner(derivative: Array, own: Array, by: Array) -> Array:
 
 def _values_of(matrices: Matrices, total: int) -> Matrices:
     """The first `total` sets without derivatives."""
-    parts = ("mass", "damping", "stiffness", "q0", "v0")
-    return Matrices(
-        *(Jet.constant(getattr(matrices, part).value[:total], 0) for part in parts),
-        matrices.pattern,
-    )
+    m = matrices
+    first = [Jet.constant(part.value[:total], 0) for part in (m.mass, m.damping, m.stiffness)]
+    start = [Jet.constant(part.value[:total], 0) for part in (m.q0, m.v0)]
+    return Matrices(first[0], first[1], first[2], start[0], start[1], m.pattern)
