@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Exact, LinearFlow, StoreyFrame
-from alphacut.fuzzy import BranchAndBound, Interval, QuasiMonteCarlo, Reduced, Triangular
+from alphacut.fuzzy import Automatic, BranchAndBound, Interval, QuasiMonteCarlo, Reduced, Triangular
 from alphacut.fuzzy.joint_outputs import Turned, joint_outputs
 
 BOX = {"x": Interval(0.0, 2.0), "y": Interval(-1.0, 1.0)}
@@ -68,9 +68,7 @@ def test_two_floors_at_a_node_and_one_floor_at_two_times() -> None:
     rng = np.random.default_rng()
     E, m2 = rng.uniform(2.3e10, 2.7e10, 300), rng.uniform(900, 1100, 300)
     for pair in (floors, times):
-        found = joint_outputs(
-            pair, inputs, QuasiMonteCarlo(400), directions=8, alpha=[0.0], vectorised=True
-        )
+        found = joint_outputs(pair, inputs, Automatic(), directions=8, alpha=[0.0], vectorised=True)
         pairs = np.column_stack(pair(E, m2))
         size = float(np.ptp(pairs, axis=0).max())
         assert found.holds(pairs, slack=0.01 * size).all()
