@@ -103,6 +103,8 @@ def named_inputs(case: Case) -> Iterator[tuple[str, tuple[str, ...]]]:
         yield "envelope.fuzzy", given.envelope.fuzzy
     if given.exceedance:
         yield "exceedance.random", given.exceedance.random
+    if given.update:
+        yield "update.learn", given.update.learn
     for index, study in enumerate(given.study):
         yield f"study[{index}].fuzzy", study.fuzzy
 

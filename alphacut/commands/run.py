@@ -34,6 +34,7 @@ from alphacut.stages.contract import require_choice
 from alphacut.stages.pipeline import Chain, Results
 from alphacut.stages.readiness import ready
 from alphacut.stages.vibration import exceedance as outcomes
+from alphacut.stages.vibration.update import sentences
 
 ABOUT = (
     "run every stage of a case: files, figures, summary, and the comparison with the paper where"
@@ -89,8 +90,6 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     # of what is rough the stage itself warns, with the modulus that it gets
     for warning in prepared.warnings:
         say(f"warning: {warning}")
-    if case.sections.update is not None:
-        say("section [update] is for alphacut update; this run takes the inputs as they stand")
     start = time.perf_counter()
     chain = Chain(
         case,
@@ -130,7 +129,7 @@ PARTS = {
     "microstructure": ("microstructure",),
     "modulus": ("radius", "cell", "mesh", "modulus", "response"),
     "image": ("cell", "modulus.alpha"),
-    "envelope": ("frame", "pendulum", "tower", "envelope", "exceedance", "modulus"),
+    "envelope": ("frame", "pendulum", "tower", "envelope", "update", "exceedance", "modulus"),
 }
 """Sections that a stage reads."""
 
@@ -181,6 +180,7 @@ def main_numbers(found: Document) -> str:
         for output, unit, *values in ends:
             low, high = (engineering(value, unit, beside=largest[unit]) for value in values)
             lines.append(f"{output} from {low} to {high} at the lowest α (study {name})")
+    lines += sentences(found["update"]) if "update" in found else []
     limit = outcomes.sentence(found["exceedance"]) if "exceedance" in found else ""
     return "".join(f"{line}\n" for line in lines) + limit
 

@@ -11,13 +11,13 @@ from alphacut.case.idle import require_read
 from alphacut.case.load import load
 from alphacut.commands.envelope import given_modulus
 from alphacut.commands.options import add_common, answer, changes
-from alphacut.io.files import Document, as_json, write_text
+from alphacut.io.files import as_json, write_text
 from alphacut.io.output_paths import unwritable
 from alphacut.io.problem import BadInput
 from alphacut.io.progress import progress
 from alphacut.stages.material.modulus import stand_in
 from alphacut.stages.vibration.structure import structure
-from alphacut.stages.vibration.update import Learned, envelopes, learned, narrower
+from alphacut.stages.vibration.update import Learned, envelopes, learned, narrower, sentences
 
 if TYPE_CHECKING:
     import xarray
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         folder.mkdir(parents=True, exist_ok=True)
         document["figures"] = draw(folder, found, bands)
         write_text(folder / "update.json", as_json(document, indent=2))
-    answer(options, document, out, text(found, document))
+    answer(options, document, out, "\n".join([*sentences(document), ""]))
     return 0
 
 
@@ -79,25 +79,3 @@ def draw(folder: Path, found: Learned, bands: xarray.Dataset | None) -> list[str
             for output in map(str, bands["output"].values):
                 drawn += save(figures.bands(bands, output), folder / f"update-{output}")
     return [path.name for path in drawn]
-
-
-def text(found: Learned, document: Document) -> str:
-    """Inputs, predictions and what was not learned, a line each, in SI."""
-    posterior = found.posterior
-    if posterior is None:
-        return f"{found.refuted}\n"
-    lines = [f"inputs at α = {posterior.alpha[0]:g}, proved to hold all that agree:"]
-    for column, name in enumerate(posterior.names):
-        low, high = posterior.lower[0, column], posterior.upper[0, column]
-        share = posterior.narrowed[name]
-        lines.append(f"  {name}: {low:.6g} … {high:.6g}, {100 * share:.3g} % of its prior's width")
-    for held in found.held_out:
-        low, high = held.predicted
-        where = "inside" if held.inside else "OUTSIDE"
-        lines.append(
-            f"mode {held.mode} was held out: {low:.4g} … {high:.4g} Hz predicted,"
-            f" {held.measured:.4g} Hz measured: {where}"
-        )
-    for output, share in document.get("envelope_width", {}).items():
-        lines.append(f"envelope of {output}: {100 * share:.3g} % of its width before")
-    return "\n".join([*lines, posterior.words, ""])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ from alphacut.figures import modulus as figure_modulus
 from alphacut.figures import radius as figure_radius
 from alphacut.figures import response as figure_response
 from alphacut.figures import shares as figure_shares
+from alphacut.figures import update as figure_update
 from alphacut.figures.style import save, style
 from alphacut.io.progress import progress
 from alphacut.stages.pipeline import Results
@@ -62,10 +64,21 @@ def drawings(results: Results) -> Iterator[Drawing]:
     ):
         richest = max(results.studies, key=lambda study: len(study.task.fuzzy))
         yield "fig21-25-graph-follower", lambda: figure_follower.follower(results, richest)
+    yield from update_drawings(results)
     if (limited := results.exceedance) is not None:
         yield "exceedance", lambda: figure_envelope.exceedance(limited)
     for study in results.studies:
         yield from figure_envelope.drawings(study, results.envelopes[study.name])
+
+
+def update_drawings(results: Results) -> Iterator[Drawing]:
+    """Inputs and envelopes before and after measured modes, unless they refute the frame."""
+    bands = results.update
+    if results.learned is None or bands is None or (after := results.learned.posterior) is None:
+        return
+    yield "update-inputs", lambda: figure_update.boxes(after)
+    for output in map(str, bands["output"].values):
+        yield f"update-{output}", partial(figure_update.bands, bands, output)
 
 
 def share_drawings(driving: xarray.Dataset) -> Iterator[Drawing]:

@@ -32,6 +32,7 @@ FIGURES = {
     "exceedance": "Fuzzy probability of exceeding a limit, over the limit",
     "shares-modulus": "Share of each input in the width of the modulus",
     "shares-over-time": "Share of each input in the width of the vibration over time",
+    "update-inputs": "Inputs before and after natural modes were measured, level by level",
     "two-point": (
         "Why two points do not describe particles: equal discs of the same area fraction, for"
         " illustration"
@@ -83,7 +84,9 @@ def caption(stem: str, *, paper: bool) -> str:
     number, name = (
         (" to ".join(str(int(n)) for n in found[1].split("-")), found[2]) if found else ("", stem)
     )
-    words = figure_words(name.replace("_", "-") if not name.startswith("envelope-") else name)
+    words = figure_words(
+        name if name.startswith(("envelope-", "update-")) else name.replace("_", "-")
+    )
     if not (paper and number):
         return words
     return f"{'Figs.' if 'to' in number else 'Fig.'} {number}: {words}"
@@ -93,6 +96,8 @@ def figure_words(name: str) -> str:
     """Words for a figure without its number."""
     if match := re.fullmatch(r"envelope-(.+)-([^-]+)", name):
         return f"Envelope of {match[2]}" + ("" if match[1] == "all" else f", study {match[1]}")
+    if name not in FIGURES and name.startswith("update-"):
+        return f"Envelope of {name.removeprefix('update-')} before and after the measurement"
     return FIGURES.get(name, name.replace("-", " "))
 
 

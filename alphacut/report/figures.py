@@ -13,13 +13,7 @@ from alphacut.io.files import Document
 from alphacut.report.tables import fragment, section
 
 # figures that stand in the section they belong to
-ELSEWHERE = (
-    "fig18-modulus",
-    "modulus",
-    "image",
-    "response",
-    "exceedance",
-)
+ELSEWHERE = re.compile(r"(fig18-)?modulus|image|response|exceedance|update-.+")
 # figures that need the page's whole width
 WIDE = re.compile(r"envelope-|chain|record|shares-over-time|graph-follower")
 SVG_LIMIT = 200_000  # bytes; a heavier figure goes into the page as PNG
@@ -40,7 +34,7 @@ def gallery(summary: Document, folder: Path) -> Markup:
     names = [
         name
         for name in summary.get("figures", [])
-        if name.endswith(".png") and Path(name).stem not in ELSEWHERE
+        if name.endswith(".png") and not ELSEWHERE.fullmatch(Path(name).stem)
     ]
     paper = bool(summary.get("paper"))
     figures = [

@@ -11,10 +11,20 @@ from alphacut.figures.captions import core, in_words
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.io.files import Document
 from alphacut.io.units import engineering
+from alphacut.report.decisions import learned
 from alphacut.report.differences import differences
 from alphacut.report.envelopes import envelopes, natural
 from alphacut.report.figures import gallery, listed
-from alphacut.report.tables import citation, code, details, items, paragraphs, section, table
+from alphacut.report.tables import (
+    citation,
+    code,
+    details,
+    items,
+    paragraphs,
+    section,
+    sentence,
+    table,
+)
 from alphacut.stages.material import response
 
 
@@ -32,6 +42,8 @@ def sections(summary: Document, folder: Path) -> Iterator[Markup]:
         yield stress(summary["response"], listed(summary, folder, "response"))
     if words := summary.get("structure", {}).get("words"):
         yield built(words, natural(summary))
+    if "update" in summary:
+        yield learned(summary, folder)
     if summary.get("envelopes"):
         yield envelopes(summary, listed(summary, folder, "exceedance"))
     if summary.get("shares"):
@@ -334,11 +346,6 @@ def effort(study: Document) -> str:
         f"{study['trajectories']}"
         f" {'eigen-analyses' if study['method'] == 'modal' else 'trajectories'}"
     )
-
-
-def sentence(text: str) -> str:
-    """Text as a sentence: a capital at its head, a full stop at its end."""
-    return f"{text[0].upper()}{text[1:].rstrip('.')}." if text else ""
 
 
 def case_text(summary: Document) -> Markup:

@@ -64,6 +64,11 @@ def code(text: str, tag: str = "code") -> Markup:
     return Markup("<{0}>{1}</{0}>").format(tag, text)
 
 
+def sentence(text: str) -> str:
+    """Text as a sentence: a capital at its head, a full stop at its end."""
+    return f"{text[0].upper()}{text[1:].rstrip('.')}." if text else ""
+
+
 def citation() -> str:
     """The citations in BibTeX, from CITATION.cff where that is at hand."""
     file = Path(__file__).resolve().parents[2] / "CITATION.cff"

@@ -19,7 +19,7 @@ from alphacut.stages.image.reading import study_of
 from alphacut.stages.material import microstructure, modulus, response
 from alphacut.stages.material.campaign import campaign
 from alphacut.stages.material.microstructure import write as write_microstructure
-from alphacut.stages.vibration import envelope
+from alphacut.stages.vibration import envelope, update
 from alphacut.stages.vibration import exceedance as outcomes
 from alphacut.stages.vibration.envelope_task import EnvelopeTask, task_of
 from alphacut.stages.vibration.structure import Structure, structure
@@ -89,9 +89,13 @@ class Chain:
         handed = modulus.read_number(self.file("modulus.nc")) if cell is not None else handed
         picture = self.image() if "image" in self.case.stages else None
         handed = modulus.read_number(self.file("image.nc")) if picture is not None else handed
-        wanted, envelopes = None, {}
+        wanted, envelopes, learned, bands = None, {}, None, None
         if "envelope" in self.case.stages:
             wanted = (self.built or structure(self.case, handed)).with_modulus(handed)
+            if self.case.sections.update is not None:
+                learned = update.learned(self.case, wanted)
+                bands = self.update(handed, wanted, learned)
+                wanted = learned.structure
             envelopes = {
                 study.name: self.envelope(study, handed, wanted) for study in studies(self.case)
             }
@@ -100,7 +104,17 @@ class Chain:
         if wanted is not None and self.case.sections.exceedance:
             limit = self.exceedance(handed, wanted)
         return Results(
-            self.case, self.folder, cell, envelopes, handed, stress, limit, wanted, picture
+            self.case,
+            self.folder,
+            cell,
+            envelopes,
+            handed,
+            stress,
+            limit,
+            wanted,
+            picture,
+            learned,
+            bands,
         )
 
     def with_particles(self) -> Case:
@@ -194,6 +208,19 @@ class Chain:
         envelope.keep_tolerance(self.case, found, best_effort=self.best_effort)
         return found
 
+    def update(
+        self, handed: FuzzyNumber | None, wanted: Structure, learned: update.Learned
+    ) -> xarray.Dataset:
+        """Inputs and envelope before and after the measured modes, in update.nc."""
+        key = self.vibration({"wanted": [self.case.update, self.case.envelope]}, handed)
+
+        def compute(path: Path) -> None:
+            with progress("Update", quiet=self.quiet) as tick:
+                found = update.dataset(self.case, wanted, learned, tick)
+            envelope.write(found, path, case_text=self.case.text_of_file, key=key)
+
+        return self.stored("update.nc", key, compute)
+
     def exceedance(self, handed: FuzzyNumber | None, wanted: Structure) -> xarray.Dataset:
         """The fuzzy probability of exceeding the case's limit, in exceedance.nc."""
         key = self.vibration({"wanted": [self.case.exceedance, self.case.envelope]}, handed)
@@ -208,7 +235,7 @@ class Chain:
     def vibration(self, wanted: Document, handed: FuzzyNumber | None) -> str:
         """Fingerprint of a result for the structure, its record and the modulus."""
         given = self.case.sections
-        inputs = [given.frame, given.pendulum, given.tower]
+        inputs = [given.frame, given.pendulum, given.tower, given.update]
         record = self.case.digests(*inputs)
         return fingerprint(
             {"case": inputs, "record": record, "modulus": handed, **wanted}, ("fuzzy", "frame")
@@ -242,6 +269,8 @@ class Results:
         exceedance: Dataset of exceedance.nc; None where the case names no limit.
         structure: The structure with that modulus; None where none vibrates.
         image: Dataset of image.nc; None where the case shows none.
+        learned: What measured modes leave of the inputs; None where the case has none.
+        update: Dataset of update.nc, likewise.
     """
 
     case: Case
@@ -253,6 +282,8 @@ class Results:
     exceedance: xarray.Dataset | None = None
     structure: Structure | None = None
     image: xarray.Dataset | None = None
+    learned: update.Learned | None = None
+    update: xarray.Dataset | None = None
 
     @property
     def studies(self) -> tuple[Study, ...]:

@@ -80,7 +80,7 @@ def ready(case: Case) -> Readiness:
     if problems := list(lacking(case)):
         raise BadInput(problems)
     wanted = structure(case, stand_in or expected(case))
-    if problems := list(crisp_names(case, wanted)):
+    if problems := [*crisp_names(case, wanted)] or [*unlearned(case, wanted)]:
         raise BadInput(problems)
     found = dict.fromkeys(
         problem for study in studies(case) for problem in rough(wanted, study.task)
@@ -194,6 +194,19 @@ def crisp_names(case: Case, wanted: Structure) -> Iterator[Problem]:
             except BadInput as error:
                 (problem,) = error.problems
                 yield case.located(Problem(key, problem.what, name, problem.allowed))
+
+
+def unlearned(case: Case, wanted: Structure) -> Iterator[Problem]:
+    """Envelopes whose inputs leave out one that is learned: it would not be fuzzy there."""
+    if case.sections.update is None:
+        return
+    learned = set(wanted.inputs(case.update.learn))
+    for key, names in named_inputs(case):
+        missing = sorted(learned - set(wanted.inputs(names)))
+        if key.endswith(".fuzzy") and missing:
+            what = f"{', '.join(missing)} of [update] learn are missing"
+            cure = "all inputs that are learned, among others"
+            yield case.located(Problem(key, what, ", ".join(names), cure))
 
 
 def outlasted(case: Case, record: Accelerogram | None) -> Iterator[str]:

@@ -19,6 +19,7 @@ from alphacut.stages.material.cell import GPA, modal_values, parts
 from alphacut.stages.pipeline import Results
 from alphacut.stages.vibration import exceedance as outcomes
 from alphacut.stages.vibration.structure_words import structure_words
+from alphacut.stages.vibration.update import narrower
 from alphacut.stochastic import HermiteMap
 
 if TYPE_CHECKING:
@@ -65,10 +66,20 @@ def summary(results: Results) -> Document:
             name: {"fuzzy": fuzzy[name], **envelope_numbers(dataset)}
             for name, dataset in results.envelopes.items()
         }
+    if results.learned is not None:
+        found["update"] = learned_numbers(results)
     if results.exceedance is not None:
         found["exceedance"] = outcomes.exceedance_document(results.exceedance)
     found["paper"] = comparison(case.quoted, found) if case.quoted else []
     return found
+
+
+def learned_numbers(results: Results) -> Document:
+    """What measured modes leave of the inputs, and of the widths of the envelopes."""
+    assert results.learned is not None
+    assert results.update is not None
+    found = results.learned.document()
+    return found if "refuted" in found else {**found, "envelope_width": narrower(results.update)}
 
 
 def area_fraction(results: Results) -> float:

@@ -10,7 +10,7 @@ from alphacut.case.key import MEMBERSHIP, POSITIVE, Key, Section
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Update(Section):
-    """Measured natural modes of a storey frame, from which `alphacut update` learns its inputs."""
+    """Measured natural modes of a storey frame, from which `run` and `update` learn its inputs."""
 
     measured: Annotated[
         str,

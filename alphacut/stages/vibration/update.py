@@ -74,6 +74,7 @@ class Learned:
                 name: {"lower": found.lower[:, k], "upper": found.upper[:, k]}
                 for k, name in enumerate(found.names)
             },
+            "prior": {name: list(prior_support(x)) for name, x in self.prior.items()},
             "narrowed": found.narrowed,
             "agreement": found.height,
             "not_learned": [x.words for x in found.directions if not x.learned],
@@ -89,6 +90,36 @@ class Learned:
             "claim": str(found.claim),
             "seconds": found.seconds,
         }
+
+
+def prior_support(number: FuzzyNumber) -> tuple[float, float]:
+    """The widest cut that a prior decides, in SI."""
+    from alphacut.frame.update.agreement import widest
+
+    return widest(number)
+
+
+def sentences(found: Document) -> list[str]:
+    """Inputs, predictions and what was not learned, from `Learned.document`, in SI."""
+    if "refuted" in found:
+        return [str(found["refuted"])]
+    lines = [f"inputs at α = {found['alpha'][0]:g}, proved to hold all that agree:"]
+    for name, ends in found["inputs"].items():
+        low, high, share = ends["lower"][0], ends["upper"][0], found["narrowed"][name]
+        lines.append(f"  {name}: {low:.6g} … {high:.6g}, {100 * share:.3g} % of its prior's width")
+    for held in found["held_out"]:
+        low, high = held["predicted"]
+        where = "inside" if held["inside"] else "OUTSIDE"
+        lines.append(
+            f"mode {held['mode']} was held out: {low:.4g} … {high:.4g} Hz predicted,"
+            f" {held['measured']:.4g} Hz measured: {where}"
+        )
+    for output, share in found.get("envelope_width", {}).items():
+        lines.append(f"envelope of {output}: {100 * share:.3g} % of its width before")
+    least, most = found["agreement"]
+    lines.append(f"prior and measurement agree to {least:.3g} (to {most:.3g} at most)")
+    lost = [f"not learned: {one}" for one in found["not_learned"]]
+    return [*lines, *(lost or ["every combination of the inputs is learned"]), str(found["claim"])]
 
 
 def learned(case: Case, wanted: Structure) -> Learned:
@@ -199,6 +230,23 @@ def envelopes(
         [side[shared] for side in sides],
         xarray.DataArray(["prior", "posterior"], dims="knowledge", name="knowledge"),
     )
+
+
+def dataset(
+    case: Case, wanted: Structure, found: Learned, progress: Tick | None = None
+) -> xarray.Dataset:
+    """Inputs and envelope before and after, over `knowledge`; without any where refuted."""
+    import xarray
+
+    if found.posterior is None:
+        return xarray.Dataset(attrs={"refuted": found.refuted})
+    bands, after = envelopes(case, wanted, found, progress), found.posterior
+    before = np.array([prior_support(number) for number in found.prior.values()]).T
+    ends = np.stack([after.lower, after.upper], axis=1)
+    ends = np.stack([np.broadcast_to(before, ends.shape), ends])
+    return bands.assign(
+        inputs=(("knowledge", "alpha", "bound", "parameter"), ends, {"units": "SI, by input"})
+    ).assign_coords(bound=["lower", "upper"], parameter=list(after.names))
 
 
 def narrower(bands: xarray.Dataset) -> dict[str, float]:
