@@ -116,7 +116,7 @@ def relative_errors(
         data: The fields at the exported nodes by name.
     """
     from alphacut.rve.series.field import SeriesField
-    from alphacut.rve.series.stiffness import SeriesError
+    from alphacut.rve.series.truncation import SeriesError
 
     points, inside = system.positions[nodes], np.zeros(len(nodes), bool)
     inside[cells[phase == 1]] = True

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from alphacut.rve.auto.model import ChoiceError
 from alphacut.rve.cell import Phase
 from alphacut.rve.result import Homogenised
+from alphacut.rve.settings import require_accuracy
 from alphacut.stochastic import RadiusMap
 
 STEERED = ("prism", "slices")
@@ -31,10 +32,7 @@ class RefinedModel:
     def __post_init__(self) -> None:
         if self.name not in STEERED:
             raise ValueError(f"model {self.name!r} cannot be refined; allowed: prism, slices")
-        if not 1e-10 <= self.tolerance <= 0.1:
-            raise ValueError(
-                f"the tolerance on E is {self.tolerance:g}; it must lie in [1e-10, 0.1]"
-            )
+        require_accuracy(self.tolerance, 1e-10, "tolerance on E")
 
     def solve(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]

@@ -20,6 +20,7 @@ from alphacut.rve.image.outlines.outline import Grid, phase_ranges
 from alphacut.rve.image.phase_images import moduli_images
 from alphacut.rve.image.solve import CrispBounds, solve_between
 from alphacut.rve.result import Homogenised
+from alphacut.rve.settings import require_points
 from alphacut.rve.slices.curve import certified, curve_of, mean_errors, with_errors
 from alphacut.rve.slices.theta_rule import DIGITS, extreme_radii, theta_error, theta_rule
 from alphacut.stochastic import RadiusMap
@@ -44,8 +45,7 @@ class RasterModel:
     def __post_init__(self) -> None:
         if self.pixels < 8 or self.pixels % 2:
             raise ValueError(f"the cell has {self.pixels} pixels; take an even number from 8 on")
-        if self.points < 2:
-            raise ValueError(f"the rule in θ has {self.points} points; it needs at least 2")
+        require_points(self.points)
 
     def solve(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from alphacut.rve.mesh.geometry import PeriodicSquare
 from alphacut.rve.mesh.triangulation import Integers
+from alphacut.rve.settings import require_mesh_size, require_radius
 from alphacut.stochastic.theta.truncated_normal import Array
 
 EDGES = ((1, 2), (0, 2), (0, 1))  # of a triangle, in the order of Basix
@@ -58,14 +59,8 @@ def planar_mesh(
             without crossing it.
         TouchingError: Particles nearly touch.
     """
-    if not 0 < radius < 1:
-        raise ValueError(
-            f"the radius is {radius:g}; it must lie in (0, 1), in halves of the cell's side"
-        )
-    if not 0 < size <= 1:
-        raise ValueError(
-            f"the mesh size is {size:g}; it must lie in (0, 1], in halves of the cell's side"
-        )
+    require_radius(radius)
+    require_mesh_size(size)
     if radius > _CLOSEST:
         raise TouchingError(
             f"the radius is {radius:.6g} and planar meshes end at {_CLOSEST:g}: the gap between"

@@ -8,6 +8,7 @@ import gmsh
 import numpy as np
 from numpy.typing import NDArray
 
+from alphacut.rve.settings import require_mesh_size
 from alphacut.stochastic.theta.truncated_normal import Array
 
 Integers = NDArray[np.int64]
@@ -49,10 +50,7 @@ def triangulate(*, size: float, radius: float) -> Triangulation:
     Raises:
         ValueError: `size` or `radius` out of range.
     """
-    if not 0 < size <= 1:
-        raise ValueError(
-            f"the mesh size is {size:g}; it must lie in (0, 1], in halves of the cell's side"
-        )
+    require_mesh_size(size)
     if not 0 <= radius < 1:
         raise ValueError(f"the reference radius is {radius:g}; it must lie in [0, 1)")
     points, triangles, inside = _gmsh_triangles(size, radius)

@@ -35,6 +35,7 @@ from alphacut.rve.prism.modulus_basis import BasisError, ModulusBasis
 from alphacut.rve.prism.system import PrismSystem, SliceMeans
 from alphacut.rve.prism.task import Displacements, PrismTask
 from alphacut.rve.result import Homogenised, StressCurve
+from alphacut.rve.settings import require_mesh_size
 from alphacut.rve.solver.krylov import ConvergenceError
 from alphacut.rve.solver.options import SolverOptions
 from alphacut.rve.solver.stopwatch import Stopwatch
@@ -83,11 +84,7 @@ class PrismModel:
     name: ClassVar[str] = "prism"
 
     def __post_init__(self) -> None:
-        if not 0 < self.mesh_size <= 1:
-            raise ValueError(
-                f"the mesh size is {self.mesh_size:g}; it must lie in (0, 1], in halves of the"
-                " cell's side"
-            )
+        require_mesh_size(self.mesh_size)
         if self.layers < 1:
             raise ValueError(f"the number of layers is {self.layers}; at least 1 is needed")
         if self.interface not in INTERFACES:

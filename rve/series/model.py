@@ -14,6 +14,7 @@ import numpy as np
 from alphacut.rve.cell import Phase
 from alphacut.rve.result import Homogenised
 from alphacut.rve.series.stiffness import square_stiffness
+from alphacut.rve.settings import require_accuracy, require_points
 from alphacut.rve.slices.curve import certified, mean_errors, with_errors
 from alphacut.rve.slices.theta_rule import settle_rule
 from alphacut.stochastic import RadiusMap
@@ -39,12 +40,8 @@ class SeriesModel:
     name = "series"
 
     def __post_init__(self) -> None:
-        if self.points is not None and self.points < 2:
-            raise ValueError(f"the rule in θ has {self.points} points; it needs at least 2")
-        if not 1e-12 <= self.accuracy <= 0.1:
-            raise ValueError(
-                f"the accuracy of the series is {self.accuracy:g}; it must lie in [1e-12, 0.1]"
-            )
+        require_points(self.points)
+        require_accuracy(self.accuracy, 1e-12, "accuracy of the series")
 
     def solve(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]

@@ -10,6 +10,7 @@ import numpy as np
 from alphacut.rve.cell import Phase, square_voigt
 from alphacut.rve.series.lattice_sums import ZETA_PERIOD, lattice_images, lattice_sums
 from alphacut.rve.series.multipoles import LOADS, MOST_HARMONICS, Contrast, modulus, multipoles
+from alphacut.rve.series.truncation import Truncation, error_by_more_terms, require_radii
 from alphacut.stochastic.theta.truncated_normal import Array
 
 _FEWEST, _MOST, _WANTED = 4, 128, 1e-12
@@ -54,6 +55,9 @@ def _modulus(radius: float, matrix: float, inclusion: float, count: int) -> floa
 _BATCH = 2_000_000  # entries of one batch of matrices
 _ROUND_OFF = 2e-14
 _SAFETY = 1.6
+_TRUNCATION = Truncation(
+    lambda harmonics: harmonics * 4 // 3 + 2, MOST_HARMONICS, "harmonics", "particles"
+)
 
 
 @dataclass(frozen=True)
@@ -104,31 +108,23 @@ def square_stiffness(
         ValueError: A radius lies outside [0, 1).
         SeriesError: The series does not reach `tolerance` (particles nearly in touch).
     """
-    radius = np.atleast_1d(np.asarray(radius, float))
-    if not (np.all(radius >= 0) and np.all(radius < 1)):
-        worst = radius[np.argmax(np.abs(radius - 0.5))]
-        raise ValueError(f"a radius is {worst:g} halves of the cell's side; it must lie in [0, 1)")
+    radius, count = require_radii(radius), len(inclusions)
     contrast = Contrast.of(matrix, inclusions)
-    shape = (radius.size, len(inclusions))
-    found = {load: np.full(shape, np.nan) for load in loads}
-    errors, used = np.full((*shape, len(LOADS)), np.inf), np.zeros(shape, int)
-    allowed = max(tolerance, _ROUND_OFF)
-    todo, harmonics = np.arange(radius.size), _first_guess(radius, tolerance)
-    while todo.size:
-        for count in np.unique(harmonics[todo]):
-            for rows in _batches(todo[harmonics[todo] == count], shape[1] * count**2):
-                # what is settled stays, whatever its companions need
-                open_ = errors[rows].max(axis=2) > allowed
-                values, left = _solve_batch(radius[rows], contrast, int(count), loads)
-                for load in loads:
-                    found[load][rows] = np.where(open_, values[load], found[load][rows])
-                errors[rows] = np.where(open_[..., None], left, errors[rows])
-                used[rows] = np.where(open_, count, used[rows])
-        worst = errors[todo].max(axis=(1, 2))
-        todo, worst = todo[worst > allowed], worst[worst > allowed]
-        _refuse_touching(radius[todo], harmonics[todo], worst, tolerance)
-        harmonics[todo] = np.minimum(harmonics[todo] * 4 // 3 + 2, MOST_HARMONICS)
-    bulk, deviator, shear = (found.get(load, np.full(shape, np.nan)) for load in LOADS)
+
+    def solve(rows: Array, harmonics: int) -> tuple[Array, Array]:
+        parts = _batches(rows, count * harmonics**2)
+        solved = [_solve_batch(radius[part], contrast, harmonics, loads) for part in parts]
+        values, errors = zip(*solved, strict=True)
+        return np.concatenate(values), np.concatenate(errors)
+
+    moduli, errors, used = _TRUNCATION.settle(
+        radius,
+        count,
+        _first_guess(radius, tolerance),
+        solve,
+        tolerance=max(tolerance, _ROUND_OFF),
+    )
+    bulk, deviator, shear = np.moveaxis(moduli, -1, 0)
     return SquareStiffness(bulk, deviator, shear, errors, used)
 
 
@@ -148,35 +144,18 @@ def _batches(rows: Array, entries: int) -> list[Array]:
 
 def _solve_batch(
     radius: Array, contrast: Contrast, count: int, loads: Sequence[str]
-) -> tuple[dict[str, Array], Array]:
-    """Moduli by load, shape (rows, m), and their declared relative errors, shape (rows, m, 3).
+) -> tuple[Array, Array]:
+    """Moduli and their declared relative errors, shape (rows, m, 3) each, nan of other loads.
 
-    A quarter and a half more harmonics tell the error of `count`: the larger distance, with a
-    margin. One alone may meet the value by chance, for changes have either sign.
+    A quarter and a half more harmonics tell the error of `count`, with a margin.
     """
-    values = {}
-    errors = np.full((radius.size, contrast.kappa_i.size, len(LOADS)), _ROUND_OFF / 10)
+    shape = (radius.size, contrast.kappa_i.size, len(LOADS))
+    values, errors = np.full(shape, np.nan), np.full(shape, _ROUND_OFF / 10)
     for load in loads:
         own, finer, finest = (
             modulus(load, multipoles(load, radius, contrast, harmonics=n), radius, contrast)
             for n in (count, count + max(2, count // 4), count + max(4, count // 2))
         )
-        values[load] = own
-        gap = np.maximum(np.abs(own / finer - 1), np.abs(own / finest - 1))
-        errors[..., LOADS.index(load)] += _SAFETY * gap
+        values[..., LOADS.index(load)] = own
+        errors[..., LOADS.index(load)] += _SAFETY * error_by_more_terms(own, finer, finest)
     return values, errors
-
-
-class SeriesError(RuntimeError):
-    """The multipole series does not reach the wanted tolerance."""
-
-
-def _refuse_touching(radius: Array, harmonics: Array, error: Array, tolerance: float) -> None:
-    """Raise where no more harmonics are to be had."""
-    stuck = harmonics >= MOST_HARMONICS
-    if stuck.any():
-        raise SeriesError(
-            f"the series at r = {radius[stuck].max():.6g} reaches a relative error of"
-            f" {error[stuck].max():.1e} with {MOST_HARMONICS} harmonics and {tolerance:.1e} is"
-            " wanted: particles nearly touch; lower the radius or raise the tolerance"
-        )

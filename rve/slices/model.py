@@ -14,6 +14,7 @@ import numpy as np
 
 from alphacut.rve.cell import Phase, square_moduli
 from alphacut.rve.result import Homogenised
+from alphacut.rve.settings import require_mesh_size, require_points
 from alphacut.rve.slices.curve import certified, curve_of, mean_errors, with_errors
 from alphacut.rve.slices.theta_rule import DIGITS, extreme_radii, theta_error, theta_rule
 from alphacut.stochastic import RadiusMap
@@ -56,13 +57,8 @@ class SlicesModel:
             raise ValueError(
                 f"the order of the planar elements is {self.order}; it must be 2, 3 or 4"
             )
-        if not 0 < self.mesh_size <= 1:
-            raise ValueError(
-                f"the mesh size is {self.mesh_size:g}; it must lie in (0, 1], in halves of the"
-                " cell's side"
-            )
-        if self.points < 2:
-            raise ValueError(f"the rule in θ has {self.points} points; it needs at least 2")
+        require_mesh_size(self.mesh_size)
+        require_points(self.points)
 
     def solve(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
@@ -76,6 +72,40 @@ class SlicesModel:
         rule = theta_rule(radius_map, points=self.points)
         at_nodes = np.round(radius_map(rule.nodes), DIGITS)
         radii = np.unique(np.concatenate([at_nodes, np.round(extreme_radii(radius_map), DIGITS)]))
+        slices = self._slices(radii, matrix, inclusions)
+        seconds = {stage: sum(s.seconds[stage] for s in slices) for stage in slices[0].seconds}
+        seconds["total"] = perf_counter() - start - seconds["jit"]
+        results = []
+        for m, inclusion in enumerate(inclusions):
+            stiffness = np.array([s.stiffness[m] for s in slices])
+            in_theta = theta_error(
+                radius_map,
+                rule,
+                radii=radii,
+                moduli=square_moduli(stiffness),
+                phases=(matrix, inclusion),
+            )
+            nodes = np.searchsorted(radii, at_nodes)
+            error = np.array([s.error[m] for s in slices])[nodes]
+            curve = curve_of(rule, stiffness[nodes])
+            result = Homogenised(
+                with_errors(curve, _POINTWISE * error),
+                self.name,
+                slices[0].solver,
+                max(s.unknowns for s in slices),
+                (),
+                seconds,
+                {"space": mean_errors(curve, error), "theta": in_theta},
+                self._reason(rule.nodes.size),
+            )
+            results.append(certified(result, radius_map, matrix, inclusion))
+        return results
+
+    def _reason(self, nodes: int) -> str:
+        return f"{nodes} nodes in θ, elements of order {self.order}, mesh size {self.mesh_size:g}"
+
+    def _slices(self, radii: Array, matrix: Phase, inclusions: Sequence[Phase]) -> list[Slice]:
+        """The cells solved, one for each radius; orders below 4 are judged by the next."""
         slices = []
         for radius in radii:
             slices.append(
@@ -83,7 +113,6 @@ class SlicesModel:
                     radius,
                     matrix,
                     inclusions,
-                    # orders below 4 are judged by the next
                     orders=range(max(1, self.order - 2), min(self.order + 1, 4) + 1),
                     order=self.order,
                     mesh_size=self.mesh_size,
@@ -92,42 +121,7 @@ class SlicesModel:
             )
             if self.progress:
                 self.progress(len(slices) / radii.size)
-        seconds = {stage: sum(s.seconds[stage] for s in slices) for stage in slices[0].seconds}
-        seconds["total"] = perf_counter() - start - seconds["jit"]
-        nodes = np.searchsorted(radii, at_nodes)
-        results = []
-        for m in range(len(inclusions)):
-            stiffness, error_of_slice = (
-                np.array([s.stiffness[m] for s in slices]),
-                np.array([s.error[m] for s in slices]),
-            )
-            curve = curve_of(rule, stiffness[nodes])
-            errors = {
-                "space": mean_errors(curve, error_of_slice[nodes]),
-                "theta": theta_error(
-                    radius_map,
-                    rule,
-                    radii=radii,
-                    moduli=square_moduli(stiffness),
-                    phases=(matrix, inclusions[m]),
-                ),
-            }
-            reason = (
-                f"{rule.nodes.size} nodes in θ, elements of order {self.order}, mesh size"
-                f" {self.mesh_size:g}"
-            )
-            result = Homogenised(
-                with_errors(curve, _POINTWISE * error_of_slice[nodes]),
-                self.name,
-                slices[0].solver,
-                max(s.unknowns for s in slices),
-                (),
-                seconds,
-                errors,
-                reason,
-            )
-            results.append(certified(result, radius_map, matrix, inclusions[m]))
-        return results
+        return slices
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import numpy as np
 
 from alphacut.rve.cell import Phase
 from alphacut.rve.result import Homogenised
+from alphacut.rve.settings import require_accuracy
 from alphacut.rve.slices.curve import certified, mean_errors, with_errors
 from alphacut.rve.slices.theta_rule import extreme_radii, settle_rule
 from alphacut.rve.table.cache import stored_table
@@ -49,10 +50,7 @@ class TableModel:
     name = "table"
 
     def __post_init__(self) -> None:
-        if not 1e-9 <= self.accuracy <= 0.1:
-            raise ValueError(
-                f"the accuracy of the table is {self.accuracy:g}; it must lie in [1e-9, 0.1]"
-            )
+        require_accuracy(self.accuracy, 1e-9, "accuracy of the table")
         if self.source not in ("planar", "series"):
             raise ValueError(
                 f"the source of the table is {self.source!r}; it must be planar or series"
@@ -109,12 +107,7 @@ class TableModel:
             "solve": perf_counter() - started,
             "total": built + perf_counter() - started,
         }
-        origin = (
-            "kept"
-            if found
-            else f"built in {table.seconds:.2f} s from {table.systems} linear solves"
-        )
-        shape = f"{table.coefficients.shape[0]} radii by {table.coefficients.shape[1]} moduli"
+        origin = _origin(table, found=found)
         results = []
         for curve, gap in zip(curves, gaps, strict=True):
             space = table.space_error(radius_map(curve.theta))
@@ -131,13 +124,20 @@ class TableModel:
                     unknowns=table.unknowns,
                     seconds=seconds,
                     errors=errors,
-                    reason=(
-                        f"table of {shape}, mesh size {table.mesh_size:.3g}, {origin};"
-                        f" {curve.theta.size} nodes in θ"
-                    ),
+                    reason=f"{origin}; {curve.theta.size} nodes in θ",
                 )
             )
         return results
+
+
+def _origin(table: Table, *, found: bool) -> str:
+    """The table in words, and whether it was kept from before."""
+    radii, moduli = table.coefficients.shape[:2]
+    made = f"built in {table.seconds:.2f} s from {table.systems} linear solves"
+    return (
+        f"table of {radii} radii by {moduli} moduli, mesh size {table.mesh_size:.3g},"
+        f" {'kept' if found else made}"
+    )
 
 
 def _rounded_radii(low: float, high: float) -> tuple[float, float]:

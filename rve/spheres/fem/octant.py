@@ -7,6 +7,7 @@ from dolfinx.io import gmshio
 from mpi4py import MPI
 
 from alphacut.rve.mesh.planar import TouchingError
+from alphacut.rve.settings import require_mesh_size, require_radius
 
 _CLOSEST = 0.97
 MATRIX, SPHERE = 1, 2
@@ -24,14 +25,8 @@ def octant(radius: float, *, size: float, comm: MPI.Comm = MPI.COMM_SELF) -> gms
         ValueError: A value out of range.
         TouchingError: Spheres nearly touch.
     """
-    if not 0 < radius < 1:
-        raise ValueError(
-            f"the radius is {radius:g}; it must lie in (0, 1), in halves of the cell's side"
-        )
-    if not 0 < size <= 1:
-        raise ValueError(
-            f"the mesh size is {size:g}; it must lie in (0, 1], in halves of the cell's side"
-        )
+    require_radius(radius)
+    require_mesh_size(size)
     if radius > _CLOSEST:
         raise TouchingError(
             f"the radius is {radius:.6g} and meshes of spheres end at {_CLOSEST:g}: the gap between"

@@ -9,6 +9,7 @@ from time import perf_counter
 import numpy as np
 
 from alphacut.rve.cell import Phase
+from alphacut.rve.settings import require_accuracy, require_points
 from alphacut.rve.slices.theta_rule import settle_rule
 from alphacut.rve.spheres.cubic import cubic_moduli
 from alphacut.rve.spheres.result import HomogenisedSpheres, certified_spheres
@@ -36,13 +37,8 @@ class SphereSeriesModel:
     name = "series"
 
     def __post_init__(self) -> None:
-        if self.points is not None and self.points < 2:
-            raise ValueError(f"the rule in θ has {self.points} points; it needs at least 2")
-        if not 1e-11 <= self.accuracy <= 0.1:
-            raise ValueError(
-                f"the accuracy of the series of spheres is {self.accuracy:g}; it must lie in"
-                " [1e-11, 0.1]"
-            )
+        require_points(self.points)
+        require_accuracy(self.accuracy, 1e-11, "accuracy of the series of spheres")
 
     def solve(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]

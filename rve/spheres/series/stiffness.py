@@ -10,17 +10,23 @@ from itertools import pairwise
 import numpy as np
 
 from alphacut.rve.cell import Phase
-from alphacut.rve.series.stiffness import SeriesError
+from alphacut.rve.series.truncation import Truncation, error_by_more_terms, require_radii
 from alphacut.rve.spheres.cubic import cubic_voigt
 from alphacut.rve.spheres.series.interface import scattering, shear_modulus
 from alphacut.rve.spheres.series.translation import VOLUME, Multipoles, couplings
 from alphacut.stochastic.theta.truncated_normal import Array
 
 MOST_DEGREES = 64  # reaches 1e-8 at r = 0.985
-_STEPS = (4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, MOST_DEGREES)
+_DEGREES = np.array([4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, MOST_DEGREES])
 _BATCH = 2_000_000  # entries of one batch of matrices
 _ROUND_OFF = 2e-13
 _SAFETY = 2.0
+_TRUNCATION = Truncation(
+    lambda degrees: _DEGREES[np.searchsorted(_DEGREES, degrees, "right")],
+    MOST_DEGREES,
+    "degrees of multipoles",
+    "spheres",
+)
 
 
 @dataclass(frozen=True)
@@ -66,34 +72,27 @@ def cubic_stiffness(
         ValueError: A radius lies outside [0, 1).
         SeriesError: The series does not reach `tolerance` (spheres nearly in touch).
     """
-    radius = np.atleast_1d(np.asarray(radius, float))
-    if not (np.all(radius >= 0) and np.all(radius < 1)):
-        worst = radius[np.argmax(np.abs(radius - 0.5))]
-        raise ValueError(f"a radius is {worst:g} halves of the cell's side; it must lie in [0, 1)")
-    shape, allowed = (radius.size, len(inclusions)), max(tolerance, 2 * _ROUND_OFF)
-    moduli, errors, used = np.zeros((*shape, 3)), np.full((*shape, 3), np.inf), np.zeros(shape, int)
-    todo, step = np.arange(radius.size), _first_step(radius, tolerance)
-    while todo.size:
-        for at in np.unique(step[todo]):
-            rows = todo[step[todo] == at]
-            values, left = _with_errors(radius[rows], matrix, inclusions, _STEPS[at])
-            # what is settled stays, whatever its companions need
-            open_ = errors[rows].max(axis=2) > allowed
-            moduli[rows] = np.where(open_[..., None], values, moduli[rows])
-            errors[rows] = np.where(open_[..., None], left, errors[rows])
-            used[rows] = np.where(open_, _STEPS[at], used[rows])
-        todo = todo[errors[todo].max(axis=(1, 2)) > allowed]
-        _refuse_touching(radius[todo], step[todo], errors[todo], tolerance)
-        step[todo] += 1
+    radius = require_radii(radius)
+
+    def solve(rows: Array, degree: int) -> tuple[Array, Array]:
+        return _with_errors(radius[rows], matrix, inclusions, degree)
+
+    moduli, errors, used = _TRUNCATION.settle(
+        radius,
+        len(inclusions),
+        _first_degrees(radius, tolerance),
+        solve,
+        tolerance=max(tolerance, 2 * _ROUND_OFF),
+    )
     bulk, deviator, shear = np.moveaxis(moduli, -1, 0)
     return CubicStiffness(bulk, deviator, shear, errors, used)
 
 
-def _first_step(radius: Array, tolerance: float) -> Array:
-    """Index in `_STEPS` for each radius, from the decay of images between two spheres."""
+def _first_degrees(radius: Array, tolerance: float) -> Array:
+    """Degree for each radius, from the decay of images between two spheres."""
     rate = 2 * np.arccosh(1 / np.maximum(radius, 1e-3))
     needed = np.log(1 / tolerance) / rate
-    return np.asarray(np.minimum(np.searchsorted(_STEPS, needed), len(_STEPS) - 1))
+    return _DEGREES[np.minimum(np.searchsorted(_DEGREES, needed), _DEGREES.size - 1)]
 
 
 def _with_errors(
@@ -101,14 +100,13 @@ def _with_errors(
 ) -> tuple[Array, Array]:
     """Moduli and their declared relative errors, shape (rows, m, 3) each.
 
-    A quarter and a half more degrees tell the error: the larger distance, with a margin.
+    A quarter and a half more degrees tell the error, with a margin.
     """
     own, finer, finest = (
         _moduli(radius, matrix, inclusions, n)
         for n in (degree, degree + max(2, degree // 4), degree + max(4, degree // 2))
     )
-    gap = np.maximum(np.abs(own / finer - 1), np.abs(own / finest - 1))
-    return own, _SAFETY * gap + _ROUND_OFF
+    return own, _SAFETY * error_by_more_terms(own, finer, finest) + _ROUND_OFF
 
 
 def _moduli(radius: Array, matrix: Phase, inclusions: Sequence[Phase], degree: int) -> Array:
@@ -206,15 +204,3 @@ class Scatterers:
         (a, b), (c, d) = np.moveaxis(self.pair[..., None], 0, 2)
         answers = (a * first + b * third, self.torsion[:, None] * second, c * first + d * third)
         return np.concatenate(answers, axis=-2)
-
-
-def _refuse_touching(radius: Array, step: Array, error: Array, tolerance: float) -> None:
-    """Raise where no more degrees are to be had."""
-    stuck = step == len(_STEPS) - 1
-    if stuck.any():
-        raise SeriesError(
-            f"the series at r = {radius[stuck].max():.6g} reaches a relative error of"
-            f" {error[stuck].max():.1e} with multipoles up to degree {MOST_DEGREES} and"
-            f" {tolerance:.1e} is wanted: spheres nearly touch; lower the radius or raise the"
-            " tolerance"
-        )

@@ -3,7 +3,8 @@ import pytest
 
 from alphacut.rve import Phase
 from alphacut.rve.series.model import SeriesModel
-from alphacut.rve.series.stiffness import SeriesError, square_stiffness
+from alphacut.rve.series.stiffness import square_stiffness
+from alphacut.rve.series.truncation import SeriesError
 from alphacut.rve.slices.theta_rule import breaks, theta_rule
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 

@@ -1,10 +1,11 @@
+from dataclasses import replace
 from time import process_time
 
 import numpy as np
 import pytest
 
 from alphacut.rve import Phase
-from alphacut.rve.series.stiffness import SeriesError
+from alphacut.rve.series.truncation import SeriesError
 from alphacut.rve.spheres.bounds import bulk_and_shear, hashin_shtrikman, space_stiffness
 from alphacut.rve.spheres.result import volume_fraction
 from alphacut.rve.spheres.series import stiffness as series
@@ -142,9 +143,7 @@ def test_a_radius_takes_a_tenth_of_a_second():
 
 @pytest.mark.parametrize("most", [16, pytest.param(64, marks=pytest.mark.slow)])
 def test_nearly_touching_spheres_are_refused(monkeypatch, most):
-    steps = tuple(step for step in series._STEPS if step <= most)
-    monkeypatch.setattr(series, "_STEPS", steps)
-    monkeypatch.setattr(series, "MOST_DEGREES", most)
+    monkeypatch.setattr(series, "_TRUNCATION", replace(series._TRUNCATION, most=most))
     with pytest.raises(
         SeriesError, match=r"r = 0\.998 reaches a relative error of .* nearly touch"
     ):
