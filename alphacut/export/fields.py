@@ -54,15 +54,7 @@ def cell_fields(case: Case) -> meshio.Mesh:
     from alphacut.rve.solver.options import SolverOptions
     from alphacut.rve.solver.stopwatch import Stopwatch
 
-    if case.mesh.interface != "conforming":
-        raise BadInput(
-            Problem(
-                "mesh.interface",
-                "fields need a mesh that follows the interface",
-                case.mesh.interface,
-                "conforming",
-            )
-        )
+    require_conforming(case)
     radius, matrix, inclusion = parts(modal_values(case), case.radius.theta)
     plane = triangulate(size=case.mesh.size, radius=reference_radius(radius))
     system = PrismSystem(PrismGrid(plane, case.mesh.layers), MPI.COMM_SELF)
@@ -73,26 +65,48 @@ def cell_fields(case: Case) -> meshio.Mesh:
     phase = np.tile(plane.inside.astype(np.int64), system.grid.layers)
     stress = system.stress(solved.total, (matrix, inclusion), reference_nodes(), solved.pressure)
     nodes, cells, mean = by_phase(system, phase, stress)
-    data: dict[str, Array] = {
-        f"displacement_{load + 1}_in_half_sides": np.pad(
-            solved.total[nodes, :, load], ((0, 0), (0, 1))
+    data = point_data(solved.total[nodes], mean)
+    topological_dimension.setdefault("wedge15", 3)  # see alphacut.export.prism_mesh
+    errors = relative_errors(system, (matrix, inclusion), nodes, cells, phase, data)
+    wedges = [("wedge15", cells[:, ORDER])]
+    return meshio.Mesh(system.positions[nodes], wedges, data, {"phase": [phase]}, info=errors)
+
+
+def require_conforming(case: Case) -> None:
+    """Refuse a mesh that does not follow the interface.
+
+    Raises:
+        BadInput: It does not.
+    """
+    if case.mesh.interface != "conforming":
+        raise BadInput(
+            Problem(
+                "mesh.interface",
+                "mesh.interface",
+                "fields need a mesh that follows the interface",
+                case.mesh.interface,
+                "conforming",
+            )
         )
+
+
+def point_data(displacement: Array, stress: Array) -> dict[str, Array]:
+    """Fields of both loads by name.
+
+    Args:
+        displacement: At n nodes, shape (n, 2, loads), in halves of the cell's side.
+        stress: At the nodes, shape (n, 3, loads), in Pa.
+    """
+    displacements = {
+        f"displacement_{load + 1}_in_half_sides": np.pad(displacement[..., load], ((0, 0), (0, 1)))
         for load in (0, 1)
     }
-    data |= {
-        f"stress_{load + 1}_{name}_Pa": mean[:, row, load]
+    stresses = {
+        f"stress_{load + 1}_{name}_Pa": stress[:, row, load]
         for load in (0, 1)
         for row, name in enumerate(COMPONENTS)
     }
-    topological_dimension.setdefault("wedge15", 3)  # see alphacut.prism_mesh
-    errors = relative_errors(system, (matrix, inclusion), nodes, cells, phase, data)
-    return meshio.Mesh(
-        system.positions[nodes],
-        [("wedge15", cells[:, ORDER])],
-        data,
-        {"phase": [phase]},
-        info=errors,
-    )
+    return displacements | stresses
 
 
 def relative_errors(

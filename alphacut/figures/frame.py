@@ -26,41 +26,39 @@ def frame(case: Case) -> Figure:
     drawn, axes = figure(high * 2.15 * span / (1.13 * height), high)
     ground(axes, 0.0, span)
     for floor, (length, mass) in enumerate(zip(lengths, masses, strict=True), start=1):
-        for x in (0.0, span):
-            axes.plot([x, x], [level, level + length], color=INK, lw=1.4)
-        axes.annotate(
-            f"$l_{{{floor}}}$ = {length:.2f} m",
-            (-0.06 * span, level + length / 2),
-            ha="right",
-            va="center",
-            fontsize=8,
-        )
+        columns(axes, floor, level, length, span)
         level += length
-        axes.plot(
-            [-0.03 * span, 1.03 * span], [level, level], color=INK, lw=6, solid_capstyle="butt"
-        )
-        label = f"$m_{{{floor}}}$ = {mass / 1000:g} t"
-        axes.annotate(
-            label,
-            (span / 2, level),
-            xytext=(0, 6),
-            textcoords="offset points",
-            ha="center",
-            va="bottom",
-            fontsize=8,
-        )
-        axes.annotate(
-            "",
-            (1.32 * span, level),
-            (1.08 * span, level),
-            arrowprops={"arrowstyle": "-|>", "color": ORANGE},
-        )
-        axes.annotate(f"$q_{{{floor}}}$", (1.35 * span, level), va="center", color=ORANGE)
+        beam(axes, floor, level, mass, span)
     axes.set_xlim(-0.6 * span, 1.55 * span)
     axes.set_ylim(-0.05 * height, 1.08 * height)
     axes.set_aspect("equal")
     axes.axis("off")
     return drawn
+
+
+def columns(axes: Axes, floor: int, foot: float, length: float, span: float) -> None:
+    """Both columns of a storey with their length."""
+    for x in (0.0, span):
+        axes.plot([x, x], [foot, foot + length], color=INK, lw=1.4)
+    spot = (-0.06 * span, foot + length / 2)
+    axes.annotate(f"$l_{{{floor}}}$ = {length:.2f} m", spot, ha="right", va="center", fontsize=8)
+
+
+def beam(axes: Axes, floor: int, level: float, mass: float, span: float) -> None:
+    """A floor with its mass and the arrow of its displacement."""
+    axes.plot([-0.03 * span, 1.03 * span], [level, level], color=INK, lw=6, solid_capstyle="butt")
+    axes.annotate(
+        f"$m_{{{floor}}}$ = {mass / 1000:g} t",
+        (span / 2, level),
+        xytext=(0, 6),
+        textcoords="offset points",
+        ha="center",
+        va="bottom",
+        fontsize=8,
+    )
+    arrow = {"arrowstyle": "-|>", "color": ORANGE}
+    axes.annotate("", (1.32 * span, level), (1.08 * span, level), arrowprops=arrow)
+    axes.annotate(f"$q_{{{floor}}}$", (1.35 * span, level), va="center", color=ORANGE)
 
 
 def tower(case: Case) -> Figure:
@@ -89,16 +87,9 @@ def tower(case: Case) -> Figure:
 
 def ground(axes: Axes, left: float, right: float) -> None:
     """Hatched ground line at height 0."""
-    axes.fill_between(
-        [left - 0.1 * right, 1.1 * right],
-        [0, 0],
-        [-0.03 * right] * 2,
-        hatch="////",
-        facecolor="white",
-        edgecolor=GREY,
-        lw=0,
-    )
-    axes.plot([left - 0.1 * right, 1.1 * right], [0, 0], color=INK, lw=1)
+    across = (left - 0.1 * right, 1.1 * right)
+    hatched(axes, across, (-0.03 * right, 0))
+    axes.plot(across, [0, 0], color=INK, lw=1)
 
 
 def chain(case: Case) -> Figure:
@@ -110,60 +101,65 @@ def chain(case: Case) -> Figure:
     drawn, axes = figure(wide, 2.15 * wide / (1.6 * floors + 0.5) + 0.1)
     foot = -0.9 if placement == "ground" else -0.5
     axes.plot([0, 0], [foot, 0.75], color=INK, lw=1)
-    axes.fill_betweenx(
-        [foot, 0.75], [-0.12] * 2, [0, 0], hatch="////", facecolor="white", edgecolor=GREY, lw=0
-    )
+    hatched(axes, (-0.12, 0), (foot, 0.75))
     for floor in range(1, floors + 1):
-        left, right = 1.6 * floor - 1.0, 1.6 * floor
-        start = 0.0 if floor == 1 else left - 0.6
-        spring(axes, start, left, 0.2)
-        axes.annotate(f"$k_{{{floor}}}$", ((start + left) / 2, 0.36), ha="center", fontsize=9)
-        axes.fill_between(
-            [left, right], [-0.3] * 2, [0.6] * 2, facecolor="#dbe9f4", edgecolor=INK, lw=1
-        )
-        axes.annotate(f"$m_{{{floor}}}$", ((left + right) / 2, 0.15), ha="center", va="center")
-        axes.annotate(
-            "",
-            (right + 0.12, 0.85),
-            (left + 0.4, 0.85),
-            arrowprops={"arrowstyle": "-|>", "color": ORANGE},
-        )
-        axes.annotate(
-            f"$q_{{{floor}}}$", (left + 0.25, 0.85), ha="center", va="center", color=ORANGE
-        )
+        link(axes, floor)
         if placement == "ground":
-            damper(axes, ((left + right) / 2, -0.3), ((left + right) / 2, -0.9))
-            axes.annotate(
-                f"$d_{{{floor}}}$", ((left + right) / 2 + 0.16, -0.6), va="center", fontsize=9
-            )
+            ground_damper(axes, floor)
         elif placement == "storey":
-            damper(axes, (start, -0.1), (left, -0.1))
-            axes.annotate(
-                f"$d_{{{floor}}}$", ((start + left) / 2, -0.3), ha="center", va="top", fontsize=9
-            )
+            storey_damper(axes, floor)
     if placement == "ground":
-        axes.plot([-0.12, 1.6 * floors + 0.2], [-0.9, -0.9], color=INK, lw=1)
-        axes.fill_between(
-            [-0.12, 1.6 * floors + 0.2],
-            [-1.02] * 2,
-            [-0.9] * 2,
-            hatch="////",
-            facecolor="white",
-            edgecolor=GREY,
-            lw=0,
-        )
+        right = 1.6 * floors + 0.2
+        axes.plot([-0.12, right], [foot, foot], color=INK, lw=1)
+        hatched(axes, (-0.12, right), (foot - 0.12, foot))
     if words := "; ".join(spread_damping(case.frame)):
-        axes.annotate(
-            f"damping besides: {words}" if damped else f"damping: {words}",
-            (0.1, foot),
-            va="top",
-            fontsize=9,
-        )
+        besides = " besides" if damped else ""
+        axes.annotate(f"damping{besides}: {words}", (0.1, foot), va="top", fontsize=9)
     axes.set_xlim(-0.2, 1.6 * floors + 0.3)
     axes.set_ylim(-1.1 if placement == "ground" else -0.7, 1.05)
     axes.set_aspect("equal")
     axes.axis("off")
     return drawn
+
+
+def hatched(axes: Axes, across: tuple[float, float], up: tuple[float, float]) -> None:
+    """A rectangle that stands for the ground."""
+    axes.fill_between(across, *up, hatch="////", facecolor="white", edgecolor=GREY, lw=0)
+
+
+def places(floor: int) -> tuple[float, float, float]:
+    """Where the spring of a floor's mass starts, and the mass's left and right edges."""
+    left = 1.6 * floor - 1.0
+    return (0.0 if floor == 1 else left - 0.6), left, 1.6 * floor
+
+
+def link(axes: Axes, floor: int) -> None:
+    """A mass with its spring and the arrow of its displacement."""
+    start, left, right = places(floor)
+    spring(axes, start, left, 0.2)
+    axes.annotate(f"$k_{{{floor}}}$", ((start + left) / 2, 0.36), ha="center", fontsize=9)
+    axes.fill_between(
+        [left, right], [-0.3] * 2, [0.6] * 2, facecolor="#dbe9f4", edgecolor=INK, lw=1
+    )
+    axes.annotate(f"$m_{{{floor}}}$", ((left + right) / 2, 0.15), ha="center", va="center")
+    arrow = {"arrowstyle": "-|>", "color": ORANGE}
+    axes.annotate("", (right + 0.12, 0.85), (left + 0.4, 0.85), arrowprops=arrow)
+    axes.annotate(f"$q_{{{floor}}}$", (left + 0.25, 0.85), ha="center", va="center", color=ORANGE)
+
+
+def ground_damper(axes: Axes, floor: int) -> None:
+    """The damper between a mass and the ground."""
+    _, left, right = places(floor)
+    middle = (left + right) / 2
+    damper(axes, (middle, -0.3), (middle, -0.9))
+    axes.annotate(f"$d_{{{floor}}}$", (middle + 0.16, -0.6), va="center", fontsize=9)
+
+
+def storey_damper(axes: Axes, floor: int) -> None:
+    """The damper beside a spring."""
+    start, left, _ = places(floor)
+    damper(axes, (start, -0.1), (left, -0.1))
+    axes.annotate(f"$d_{{{floor}}}$", ((start + left) / 2, -0.3), ha="center", va="top", fontsize=9)
 
 
 def spring(axes: Axes, left: float, right: float, height: float) -> None:

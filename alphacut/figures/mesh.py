@@ -1,6 +1,6 @@
 """Fig. 15: the prism mesh, cut open, by PyVista in a process of its own.
 
-xvfb-run -a python -m alphacut.figure_mesh MESH.vtu PICTURE.png
+xvfb-run -a python -m alphacut.figures.mesh KIND MESH.vtu PICTURE.png
 """
 
 from __future__ import annotations
@@ -19,16 +19,27 @@ from alphacut.export.prism_mesh import prism_mesh, write_mesh
 from alphacut.io.files import say, whole_file
 
 if TYPE_CHECKING:
-    import pyvista
+    from pyvista import Plotter, PolyData, UnstructuredGrid
 
 MATRIX, PARTICLE = "#f0a860", "#b79ad9"  # orange and lilac, as in the paper
 PIXELS = (1000, 1100)
-SHEETS, HEIGHT = (
-    5,
-    6.9,
-    # slices in the picture of stress, and their stack's height in halves of the cell: none hides
-    # another
-)
+SHEETS = 5  # slices in the picture of stress
+HEIGHT = 6.9  # of their stack, in halves of the cell: none hides another
+BAR = {
+    "title": "stress 11 under strain 11 = 22 = 0.01, GPa\n",
+    "color": "black",
+    "vertical": False,
+    "fmt": "%.2f",
+    "position_x": 0.2,
+    "width": 0.6,
+}
+LABEL = {  # VTK's own fonts have no θ
+    "font_size": 26,
+    "text_color": "black",
+    "shape": None,
+    "show_points": False,
+    "always_visible": True,
+}
 FLATTENED = 0.6  # scale of the θ-axis in the picture
 # end, middle, end
 EDGES = [
@@ -94,7 +105,7 @@ def mesh(file: str, picture: str) -> None:
     plotter.screenshot(picture)
 
 
-def edges(part: pyvista.UnstructuredGrid) -> pyvista.PolyData:
+def edges(part: UnstructuredGrid) -> PolyData:
     """Edges of quadratic wedges in VTK's order, each as two straight pieces."""
     import numpy as np
     import pyvista
@@ -115,43 +126,14 @@ def stress(file: str, picture: str) -> None:
     low, high = np.quantile(grid["stress"], [0.01, 0.99])
     plotter = pyvista.Plotter(off_screen=True, window_size=list(PIXELS))
     plotter.set_background("white")
-    bar = {
-        "title": "stress 11 under strain 11 = 22 = 0.01, GPa\n",
-        "color": "black",
-        "vertical": False,
-        "fmt": "%.2f",
-        "position_x": 0.2,
-        "width": 0.6,
-    }
     bottom, top = grid.bounds[4:6]
     apart = HEIGHT / (top - bottom)
     for theta in np.linspace(bottom + 1e-6, top - 1e-6, SHEETS):
         # each phase by itself: slicing both at once would blend the stresses across the interface
         for part in parts:
-            sheet = part.slice(normal="z", origin=(0, 0, theta))
-            plotter.add_mesh(
-                sheet,
-                scalars="stress",
-                clim=(low, high),
-                cmap="cividis",
-                scalar_bar_args=bar,
-                lighting=False,
-            )
-            plotter.add_mesh(
-                sheet.extract_feature_edges(feature_edges=False, manifold_edges=False),
-                color="#222222",
-                line_width=1.5,
-            )
-        label = {
-            "font_size": 26,
-            "text_color": "black",
-            "shape": None,
-            "show_points": False,
-            "always_visible": True,
-        }
-        plotter.add_point_labels(
-            np.array([[1.15, 1.0, theta * apart]]), [f"theta = {theta:.1f}"], **label
-        )
+            add_sheet(plotter, part.slice(normal="z", origin=(0, 0, theta)), (low, high))
+        spot = np.array([[1.15, 1.0, theta * apart]])
+        plotter.add_point_labels(spot, [f"theta = {theta:.1f}"], **LABEL)
     plotter.set_scale(zscale=apart)
     middle = apart * (bottom + top) / 2
     plotter.camera_position = [(6.8, -11.0, middle + 6.8), (0.3, 0.0, middle - 0.7), (0, 0, 1)]
@@ -159,6 +141,20 @@ def stress(file: str, picture: str) -> None:
     plotter.camera.parallel_scale = 4.7  # half the picture's height
     plotter.enable_anti_aliasing("ssaa")
     plotter.screenshot(picture)
+
+
+def add_sheet(plotter: Plotter, sheet: PolyData, limits: tuple[float, float]) -> None:
+    """One slice in colours of its stress, with its outline."""
+    plotter.add_mesh(
+        sheet,
+        scalars="stress",
+        clim=limits,
+        cmap="cividis",
+        scalar_bar_args=BAR,
+        lighting=False,
+    )
+    outline = sheet.extract_feature_edges(feature_edges=False, manifold_edges=False)
+    plotter.add_mesh(outline, color="#222222", line_width=1.5)
 
 
 if __name__ == "__main__":

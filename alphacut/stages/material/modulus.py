@@ -38,6 +38,11 @@ STRESSES = {
     "s12": ("Pa", "mean homogenised stress 12 under ε12 = 0.01"),
 }
 BOUNDS = QUANTITIES | STRESSES
+CURVES = {
+    "s11": ("curve11", "stress 11 under ε11 = ε22 = 0.01"),
+    "s12": ("curve12", "stress 12 under ε12 = 0.01"),
+}
+"""Variables with the stress over θ of each mean stress, and their words."""
 AVERAGE = {"cylinders": "eq. 16", "spheres": "Hill's isotropic average"}
 """What E and ν mean, by the shape of the particle."""
 
@@ -163,67 +168,67 @@ class FuzzyModulus:
         """α-cuts of every quantity (alpha, bound), where reached, and all samples."""
         import xarray
 
-        result = self.result
+        result, checks = self.result, self.largest("check")
         variables: dict[str, Any] = {}
         for name, (unit, about) in BOUNDS.items():
-            column = result.column(name)
-            ends = np.stack(result.bounds(name), axis=1)
-            places = np.stack([result.lower_at[:, column], result.upper_at[:, column]], axis=1)
-            about += f", {AVERAGE[self.choice.particles]}" if name in QUANTITIES else ""
-            variables[name] = (("alpha", "bound"), ends, {"units": unit, "long_name": about})
-            variables[f"{name}_at"] = (
-                ("alpha", "bound", "parameter"),
-                places,
-                {"long_name": f"inputs that reach the ends of {name}, in SI"},
-            )
-            variables[f"{name}_sample"] = (
-                ("sample",),
-                result.values.output(name),
-                {"units": unit, "long_name": about},
-            )
-        variables["point"] = (
-            ("sample", "parameter"),
-            result.points,
-            {"long_name": "inputs of each sample, in SI"},
-        )
-        for name, about in (
-            ("curve11", "stress 11 under ε11 = ε22 = 0.01"),
-            ("curve12", "stress 12 under ε12 = 0.01"),
-        ):
-            variables[name] = (
-                ("sample", "theta"),
-                result.values.output(name),
-                {"units": "Pa", "long_name": f"homogenised {about}"},
-            )
-        for kind in ("error", "check"):
-            largest = self.error if kind == "error" else self.largest(kind)
-            variables[kind] = (
-                (f"{kind}_name",),
-                list(largest.values()),
-                {"long_name": f"largest {kind} of all samples"},
-            )
-        names = {"error_name": list(self.error), "check_name": list(self.largest("check"))}
-        coordinates = names | {
+            words = f", {AVERAGE[self.choice.particles]}" if name in QUANTITIES else ""
+            variables |= self._cuts(name, unit, about + words)
+        point = {"long_name": "inputs of each sample, in SI"}
+        variables["point"] = (("sample", "parameter"), result.points, point)
+        variables |= self._curves()
+        for kind, largest in (("error", self.error), ("check", checks)):
+            words = {"long_name": f"largest {kind} of all samples"}
+            variables[kind] = ((f"{kind}_name",), list(largest.values()), words)
+        coordinates = {
+            "error_name": list(self.error),
+            "check_name": list(checks),
             "theta": theta_shown(self.theta),
             "alpha": result.alpha,
             "bound": ["lower", "upper"],
             "parameter": list(result.inputs),
         }
-        numbers = {
-            "samples": result.runs,
+        return xarray.Dataset(variables, coordinates, self._facts())
+
+    def _cuts(self, name: str, unit: str, about: str) -> dict[str, Any]:
+        """Variables of one quantity: its cuts, the inputs that reach them, and its samples."""
+        result = self.result
+        column = result.column(name)
+        places = np.stack([result.lower_at[:, column], result.upper_at[:, column]], axis=1)
+        words = {"units": unit, "long_name": about}
+        reached = {"long_name": f"inputs that reach the ends of {name}, in SI"}
+        return {
+            name: (("alpha", "bound"), np.stack(result.bounds(name), axis=1), words),
+            f"{name}_at": (("alpha", "bound", "parameter"), places, reached),
+            f"{name}_sample": (("sample",), result.values.output(name), words),
+        }
+
+    def _curves(self) -> dict[str, Any]:
+        """Stress over θ of every sample."""
+        return {
+            name: (
+                ("sample", "theta"),
+                self.result.values.output(name),
+                {"units": "Pa", "long_name": f"homogenised {about}"},
+            )
+            for name, about in CURVES.values()
+        }
+
+    def _facts(self) -> dict[str, Any]:
+        """Attributes of the dataset."""
+        facts: dict[str, Any] = {
+            "method": self.choice.method,
+            "reason": self.reason,
+            "plan": self.result.plan,
+            "samples": self.result.runs,
             "solves": self.solves,
-            "seconds": result.seconds,
+            "seconds": self.result.seconds,
             "nature": self.nature,
             "particles": self.choice.particles,
         }
         if self.shear_ratio is not None:
-            names_of_ratio = ("shear_ratio", "shear_ratio_error")
-            numbers |= dict(zip(names_of_ratio, self.shear_ratio, strict=True))
-        return xarray.Dataset(
-            variables,
-            coordinates,
-            {"method": self.choice.method, "reason": self.reason, "plan": result.plan, **numbers},
-        )
+            names = ("shear_ratio", "shear_ratio_error")
+            facts |= dict(zip(names, self.shear_ratio, strict=True))
+        return facts
 
 
 def compute(wanted: Campaign, *, workers: int = 1, progress: Tick | None = None) -> FuzzyModulus:

@@ -17,16 +17,14 @@ from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.io.files import Document
 from alphacut.stages.material.campaign import fuzzy_inputs
 from alphacut.stages.material.cell import GPA
+from alphacut.stages.material.modulus import CURVES
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     import xarray
 
-CURVES = {
-    "s11": ("curve11", "stress 11 under ε11 = ε22 = 0.01"),
-    "s12": ("curve12", "stress 12 under ε12 = 0.01"),
-}
 GRID = 81  # stresses at which the p-box is stored
+CUT = ("alpha", "bound")
 
 
 def random_response(case: Case, modulus: xarray.Dataset) -> RandomResponse:
@@ -67,56 +65,57 @@ def dataset(case: Case, modulus: xarray.Dataset) -> xarray.Dataset:
     wanted = case.response
     response, about = random_response(case, modulus), CURVES[wanted.quantity][1]
     stress = np.linspace(response.ordered.min(), response.ordered.max(), GRID)
-    probabilities = wanted.quantiles
-    quantiles, pascal = response.quantile(probabilities), {"units": "Pa"}
-    places = np.stack([quantiles.lower_at, quantiles.upper_at], axis=1)
-    cut = ("alpha", "bound")
-    found: dict[str, Any] = {
-        "mean": (cut, ends(response.mean())[..., 0], {**pascal, "long_name": f"mean of {about}"}),
-        "cdf": (
-            (*cut, "stress"),
-            ends(response.p_box(stress)),
-            {"units": "1", "long_name": f"distribution function of {about}"},
-        ),
-        "quantile": (
-            (*cut, "probability"),
-            ends(quantiles),
-            {**pascal, "long_name": f"quantile of {about}"},
-        ),
-        "quantile_at": (
-            (*cut, "probability", "parameter"),
-            places,
-            {"long_name": "inputs that reach it, in SI"},
-        ),
-    }
+    quantiles = response.quantile(wanted.quantiles)
+    found = _cuts(response, quantiles, stress, about)
     if wanted.limit is not None:
-        words = {
-            "units": "1",
-            "long_name": f"probability that {about} exceeds the limit",
-            "limit": wanted.limit,
-        }
         found["exceedance"] = (
-            cut,
+            CUT,
             ends(response.exceedance(wanted.limit))[..., 0],
-            words,
+            {
+                "units": "1",
+                "long_name": f"probability that {about} exceeds the limit",
+                "limit": wanted.limit,
+            },
         )
-    axes = {
+    coordinates: dict[str, Any] = {
         "alpha": quantiles.alpha,
         "bound": ["lower", "upper"],
-        "stress": stress,
-        "probability": list(probabilities),
+        "stress": ("stress", stress, {"units": "Pa"}),
+        "probability": list(wanted.quantiles),
+        "parameter": list(quantiles.inputs),
     }
-    coordinates: dict[str, Any] = {**axes, "parameter": list(quantiles.inputs)}
     facts = {
         "quantity": wanted.quantity,
         "nature": str(quantiles.nature),
         "note": quantiles.notes[0],
+        "mean_deviation": deviation(case, modulus, response),
     }
-    made = xarray.Dataset(
-        found, coordinates, {**facts, "mean_deviation": deviation(case, modulus, response)}
-    )
-    made["stress"].attrs["units"] = "Pa"
-    return made
+    return xarray.Dataset(found, coordinates, facts)
+
+
+def _cuts(
+    response: RandomResponse, quantiles: FuzzyResult, stress: Array, about: str
+) -> dict[str, Any]:
+    """Variables with the fuzzy mean, the p-box at `stress` and the quantiles."""
+
+    def words(what: str, unit: str = "Pa") -> dict[str, str]:
+        return {"units": unit, "long_name": f"{what} of {about}"}
+
+    places = np.stack([quantiles.lower_at, quantiles.upper_at], axis=1)
+    return {
+        "mean": (CUT, ends(response.mean())[..., 0], words("mean")),
+        "cdf": (
+            (*CUT, "stress"),
+            ends(response.p_box(stress)),
+            words("distribution function", "1"),
+        ),
+        "quantile": ((*CUT, "probability"), ends(quantiles), words("quantile")),
+        "quantile_at": (
+            (*CUT, "probability", "parameter"),
+            places,
+            {"long_name": "inputs that reach it, in SI"},
+        ),
+    }
 
 
 def deviation(case: Case, modulus: xarray.Dataset, response: RandomResponse) -> float:
