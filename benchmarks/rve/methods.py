@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from time import process_time
 
 import numpy as np
@@ -15,6 +16,9 @@ from alphacut.stochastic import HermiteMap
 
 PAPER_MAP = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)  # modal values of the paper, section 4.1
 MATRIX, PARTICLE = Phase(20e9), Phase(80e9)
+ACCURACIES = (1e-2, 1e-4, 1e-5, 1e-6, 1e-7)  # of tables
+PLANAR = ((0.6, 4), (0.45, 5), (0.3, 6), (0.2, 8), (0.14, 9), (0.1, 10))  # mesh size, nodes in θ
+PRISMS = ((0.5, 4), (0.3, 6), (0.2, 9), (0.15, 12), (0.1, 12), (0.07, 12), (0.05, 12))  # layers
 
 
 @dataclass(frozen=True)
@@ -190,7 +194,6 @@ def auto(tolerance: float, *, exclude: tuple[str, ...] = ()) -> Way:
 
 def families(*, small: bool = False) -> list[Family]:
     """All families, every one from coarse to fine; two short ones if `small`."""
-    planar = ((0.6, 4), (0.45, 5), (0.3, 6), (0.2, 8), (0.14, 9), (0.1, 10))
     if small:
         return [
             ("series", [(f"{n} nodes", series(n)) for n in (3, 5)]),
@@ -199,66 +202,30 @@ def families(*, small: bool = False) -> list[Family]:
     return [
         ("auto", [(f"tolerance {t:g}", auto(t)) for t in (1e-2, 1e-4, 1e-6, 1e-8)]),
         ("series", [(f"{n} nodes in θ", series(n)) for n in (2, 3, 4, 5, 6, 8, 10, 12)]),
-        (
-            "table, kept",
-            [(f"accuracy {a:g}", table_reused(a)) for a in (1e-2, 1e-4, 1e-5, 1e-6, 1e-7)],
-        ),
-        (
-            "table, made",
-            [(f"accuracy {a:g}", table_built(a)) for a in (1e-2, 1e-4, 1e-5, 1e-6, 1e-7)],
-        ),
-        *(
-            (
-                f"slices, order {p}",
-                [(f"h {h:g}, {n} nodes in θ", slices(p, h, n)) for h, n in planar],
-            )
-            for p in (2, 3, 4)
-        ),
-        *(
-            (
-                f"dolfinx_mpc, order {p}",
-                [(f"h {h:g}, {n} nodes in θ", mpc(p, h, n)) for h, n in planar],
-            )
-            for p in (2, 3)
-        ),
-        (
-            "prism",
-            [
-                (f"h {h:g}, {n} layers", prism(h, n))
-                for h, n in (
-                    (0.5, 4),
-                    (0.3, 6),
-                    (0.2, 9),
-                    (0.15, 12),
-                    (0.1, 12),
-                    (0.07, 12),
-                    (0.05, 12),
-                )
-            ],
-        ),
-        (
-            "prism, MUMPS",
-            [
-                (f"h {h:g}, {n} layers", prism(h, n, solver="mumps"))
-                for h, n in ((0.5, 4), (0.3, 6), (0.2, 9), (0.15, 12), (0.1, 12))
-            ],
-        ),
-        (
-            "prism, CG + GAMG",
-            [
-                (f"h {h:g}, {n} layers", prism(h, n, solver="gamg"))
-                for h, n in ((0.5, 4), (0.3, 6), (0.2, 9), (0.15, 12))
-            ],
-        ),
-        (
+        ("table, kept", [(f"accuracy {a:g}", table_reused(a)) for a in ACCURACIES]),
+        ("table, made", [(f"accuracy {a:g}", table_built(a)) for a in ACCURACIES]),
+        *(planar_family(f"slices, order {p}", partial(slices, p)) for p in (2, 3, 4)),
+        *(planar_family(f"dolfinx_mpc, order {p}", partial(mpc, p)) for p in (2, 3)),
+        prism_family("prism", PRISMS),
+        prism_family("prism, MUMPS", PRISMS[:5], solver="mumps"),
+        prism_family("prism, CG + GAMG", PRISMS[:4], solver="gamg"),
+        prism_family(
             "prism, interface ignored",
-            [
-                (f"h {h:g}, 12 layers", prism(h, 12, interface="sign"))
-                for h in (0.3, 0.15, 0.1, 0.07, 0.05)
-            ],
+            [(h, 12) for h in (0.3, 0.15, 0.1, 0.07, 0.05)],
+            interface="sign",
         ),
         ("Monte Carlo over θ", [(f"{n} samples", monte_carlo(n)) for n in (10, 100, 1000, 10_000)]),
     ]
+
+
+def planar_family(name: str, way: Callable[[float, int], Way]) -> Family:
+    """Planar solves at nodes of θ, both refined together."""
+    return name, [(f"h {h:g}, {n} nodes in θ", way(h, n)) for h, n in PLANAR]
+
+
+def prism_family(name: str, meshes: Sequence[tuple[float, int]], **options: str) -> Family:
+    """Prisms refined in the plane and in θ."""
+    return name, [(f"h {h:g}, {n} layers", prism(h, n, **options)) for h, n in meshes]
 
 
 def measure(family: Family, *, exact: float, cap: float) -> Iterator[Run]:

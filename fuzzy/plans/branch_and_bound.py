@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from alphacut.fuzzy.knowledge.enclosure import Enclosed
 from alphacut.fuzzy.knowledge.interval_arithmetic import Pair, negative
-from alphacut.fuzzy.samples.model import Model
+from alphacut.fuzzy.samples.model import Model, Values
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
@@ -69,34 +70,19 @@ class BranchAndBound:
         first = model(tried)
         columns = first.columns
         function = Enclosed(self.function, domain.names)
-        found = function(tried, tried)
-        for name in columns:
-            if name not in found:
-                raise ValueError(
-                    f"the function of BranchAndBound has no output {name}, as the model has: give"
-                    " it the model itself"
-                )
-            require_agreement(
-                found[name].value, first.select([name])[:, 0], name, domain.names, tried
-            )
-        shape = (len(domain.alpha), len(columns), 2)
-        proved, attained, places = (
-            np.empty(shape),
-            np.empty(shape),
-            np.empty((*shape, len(domain.names))),
-        )
-        runs = len(tried)
+        _require_the_model(function, domain, tried, first)
+        proved, attained = (np.empty((len(domain.alpha), len(columns), 2)) for _ in range(2))
+        places, runs = np.empty((*proved.shape, len(domain.names))), len(tried)
         for level in reversed(range(len(domain.alpha))):
-            for column, name in enumerate(columns):
-                for side, sign in enumerate((1.0, -1.0)):
-                    search = _Search(
-                        self, model, domain, function=function, level=level, output=name, sign=sign
-                    )
-                    search.run()
-                    proved[level, column, side] = sign * search.proved
-                    attained[level, column, side] = sign * search.best
-                    places[level, column, side] = search.place
-                    runs += search.runs
+            for (column, name), (side, sign) in product(enumerate(columns), enumerate((1.0, -1.0))):
+                search = _Search(
+                    self, model, domain, function=function, level=level, output=name, sign=sign
+                )
+                search.run()
+                here = level, column, side
+                proved[here], attained[here] = sign * search.proved, sign * search.best
+                places[here] = search.place
+                runs += search.runs
             model.report(1 - level / len(domain.alpha))
         return FuzzyResult(
             domain=domain,
@@ -110,10 +96,27 @@ class BranchAndBound:
             plan="branch and bound",
             runs=runs,
             error=np.abs(proved - attained).max(axis=2),
-            proved=np.ones(shape[:2], bool),
-            enforced=np.zeros(shape[:2], bool),
+            proved=np.ones(proved.shape[:2], bool),
+            enforced=np.zeros(proved.shape[:2], bool),
             given=(f"the enclosed function is the model, as at all {runs} samples",),
         )
+
+
+def _require_the_model(function: Enclosed, domain: Domain, tried: Array, first: Values) -> None:
+    """Refuse a function that is not the model at the points tried.
+
+    Raises:
+        ValueError: An output is missing, or differs.
+    """
+    found = function(tried, tried)
+    for name in first.columns:
+        if name not in found:
+            raise ValueError(
+                f"the function of BranchAndBound has no output {name}, as the model has: give"
+                " it the model itself"
+            )
+        values = first.select([name])[:, 0]
+        require_agreement(found[name].value, values, name, domain.names, tried)
 
 
 def _tried(domain: Domain) -> Array:
