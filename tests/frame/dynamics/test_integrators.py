@@ -20,17 +20,8 @@ from alphacut.frame import (
 )
 from alphacut.frame.dynamics.integrators import Integrator
 from alphacut.frame.structures.linear import evaluate
+from benchmarks.frame.envelopes import FRAME
 
-FRAME = StoreyFrame(
-    (20e3, 10e3, 5e3),
-    (2.5, 2.7, 2.7),
-    24.7561e9,
-    1e-6,
-    (50, 50, 50),
-    "ground",
-    (0.01, 0.03, 0.08),
-    (0, -0.5, -0.5),
-)
 SHAKEN = replace(
     FRAME,
     ground=Accelerogram(0.5, np.random.default_rng(3).standard_normal(41)),

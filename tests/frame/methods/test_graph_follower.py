@@ -6,22 +6,13 @@ import numpy as np
 import pytest
 
 from alphacut import frame
-from alphacut.frame import Envelope, GraphFollower, StoreyFrame, envelope
+from alphacut.frame import Envelope, GraphFollower, envelope
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_maximum
 from alphacut.frame.methods.alpha_cut_optimisation import CutOptimisation
 from alphacut.fuzzy import Triangular
+from benchmarks.frame.envelopes import FRAME
 
-FRAME = StoreyFrame(
-    (20e3, 10e3, 5e3),
-    (2.5, 2.7, 2.7),
-    24.7561e9,
-    1e-6,
-    (50, 50, 50),
-    "ground",
-    (0.01, 0.03, 0.08),
-    (0, -0.5, -0.5),
-)
 E = {"E": Triangular(22.7626e9, 24.7561e9, 25.8312e9)}
 MASSES = {f"m{i + 1}": Triangular(0.95 * m, m, 1.05 * m) for i, m in enumerate(FRAME.masses)}
 

@@ -18,7 +18,6 @@ from alphacut.frame import (
     LinearFlow,
     Midpoint,
     RungeKutta4,
-    StoreyFrame,
     envelope,
 )
 from alphacut.frame.boxes import Boxes, UnitFlow, boxes
@@ -30,17 +29,8 @@ from alphacut.frame.modal.model import fit_modes
 from alphacut.frame.modal.search import ModalSearch
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy import Triangular
+from benchmarks.frame.envelopes import FRAME
 
-FRAME = StoreyFrame(
-    (20e3, 10e3, 5e3),
-    (2.5, 2.7, 2.7),
-    24.7561e9,
-    1e-6,
-    (50, 50, 50),
-    "ground",
-    (0.01, 0.03, 0.08),
-    (0, -0.5, -0.5),
-)
 INPUTS = {"E": Triangular(22.7626e9, 24.7561e9, 25.8312e9)} | {
     f"m{i + 1}": Triangular(0.95 * m, m, 1.05 * m) for i, m in enumerate(FRAME.masses)
 }
