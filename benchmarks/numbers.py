@@ -25,6 +25,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 ROOT = Path(__file__).parents[1]
@@ -226,8 +227,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     outputs = {}
     for command in options.check or registry()["command"]:
+        started = perf_counter()
         outputs[command] = printed(command)
-        print(f"{command}: {registry()['command'][command]}", flush=True)
+        seconds = perf_counter() - started
+        print(f"{seconds:6.0f} s  {command}: {registry()['command'][command]}", flush=True)
         if options.keep:
             PRINTED.mkdir(parents=True, exist_ok=True)
             (PRINTED / f"{command}.txt").write_text(outputs[command], encoding="utf-8")

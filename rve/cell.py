@@ -78,3 +78,21 @@ def square_moduli(stiffness: Array) -> Array:
     """C11 + C12, C11 − C12 and C33 of the square-symmetric part, shape (…, 3)."""
     mean, lateral = (stiffness[..., 0, 0] + stiffness[..., 1, 1]) / 2, stiffness[..., 0, 1]
     return np.stack([mean + lateral, mean - lateral, stiffness[..., 2, 2]], axis=-1)
+
+
+def with_ratio(moduli: Array) -> Array:
+    """C11 + C12, C11 − C12, C33 and the ratio of the last two, shape (…, 4), from the first three.
+
+    Both moduli of the ratio come from one discretisation and err alike, so that its error is judged
+    by itself.
+    """
+    return np.concatenate([moduli, moduli[..., 1:2] / moduli[..., 2:3]], axis=-1)
+
+
+def with_ratio_errors(errors: Array) -> Array:
+    """Relative errors of the three moduli and of the ratio, shape (…, 4), from the first three.
+
+    For errors that know nothing of one another.
+    """
+    apart = (1 + errors[..., 1:2]) * (1 + errors[..., 2:3]) - 1
+    return np.concatenate([errors, apart], axis=-1)

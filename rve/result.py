@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.rve.cell import STRAIN, Cell, square_moduli, square_voigt
+from alphacut.rve.cell import STRAIN, Cell, square_moduli, square_voigt, with_ratio_errors
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
@@ -71,8 +71,9 @@ class Homogenised:
         iterations: Iterations of the linear solver, one number per load.
         seconds: Wall time by stage: mesh, assemble, setup, solve, total, jit.
         errors: Declared relative errors of the mean moduli by source (space, theta, table): of
-            C11 + C12, C11 − C12 and C33, shape (3,), nan for a modulus that was not computed; empty
-            where none were estimated.
+            C11 + C12, C11 − C12, C33 and, where it is known by itself, the ratio of the last two,
+            shape (3,) or (4,), nan for a modulus that was not computed; empty where none were
+            estimated.
         reason: Why this model and resolution were taken.
         checks: Certificate: name of each property to its measured violation, within its bound.
         cell: What was homogenised.
@@ -154,9 +155,21 @@ class Homogenised:
 
         All sources together; nan where unknown.
         """
+        return self._all_errors[:3]
+
+    @property
+    def ratio_error(self) -> float:
+        """Declared relative error of (C11 − C12)/C33, all sources together; nan where unknown."""
+        return float(self._all_errors[3])
+
+    @property
+    def _all_errors(self) -> Array:
+        """Declared relative errors of the three moduli and of the ratio, shape (4,)."""
         if not self.errors:
-            return np.full(3, np.nan)
-        return np.asarray(np.prod([1 + error for error in self.errors.values()], axis=0) - 1)
+            return np.full(4, np.nan)
+        found = np.prod([1 + error for error in self.errors.values()], axis=0) - 1
+        propagated = with_ratio_errors(found[:3])
+        return np.minimum(found, propagated) if found.size == 4 else propagated
 
     @property
     def estimated_error(self) -> float:
@@ -256,3 +269,17 @@ def error_of_stiffness(result: Homogenised, function: Callable[[Array], Array | 
 
     uneven = abs(np.asarray(function(stiffness)) - of_moduli(moduli))
     return np.asarray(uneven + spread(of_moduli, moduli, result.modulus_errors))
+
+
+def error_of_ratio(result: Homogenised, function: Callable[[Array], float]) -> float:
+    """Absolute error of a number that is proportional to (C11 − C12)/C33; nan where unknown.
+
+    Both moduli come from one discretisation and err alike, so that the ratio is surer than they.
+
+    Args:
+        result: With its whole plane stiffness.
+        function: Takes a Voigt matrix, shape (3, 3), in Pa.
+    """
+    stiffness = np.asarray(result.stiffness)
+    square = function(square_voigt(*square_moduli(stiffness)))
+    return float(abs(function(stiffness) - square) + abs(square) * result.ratio_error)

@@ -13,7 +13,7 @@ from alphacut.io.files import as_json, write_text
 from alphacut.io.problem import BadInput, Problem
 from alphacut.rve.anisotropy import shear_ratio, shear_ratio_in_words
 from alphacut.rve.fibre_constants import CONSTANTS, FibreConstants, fibre_constants
-from alphacut.rve.result import error_of_means, error_of_stiffness
+from alphacut.rve.result import error_of_means, error_of_ratio, error_of_stiffness
 from alphacut.rve.spheres.cubic import cubic_constants, cubic_voigt, hill_average
 from alphacut.rve.spheres.result import HomogenisedSpheres
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -172,8 +172,7 @@ def errors_of_stiffness(result: Homogenised) -> tuple[Array, float]:
     if isinstance(result, HomogenisedSpheres):
         error = result.error_of(lambda moduli: cubic_voigt(*moduli))
         return error, float(result.error_of(lambda moduli: moduli[1] / moduli[2]))
-    error = error_of_stiffness(result, np.asarray)
-    return error, float(error_of_stiffness(result, shear_ratio))
+    return error_of_stiffness(result, np.asarray), error_of_ratio(result, shear_ratio)
 
 
 def about(result: Homogenised, fibres: FibreConstants) -> str:

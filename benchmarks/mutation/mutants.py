@@ -5,20 +5,23 @@
 
 `mutants.toml` holds the table: a file, a piece of its text, the fault that takes its place, and
 the tests that must fail with it. Every fault is planted in a copy of the checkout of its own. A
-mutant is caught when one of its tests fails; one that is argued instead (`argued = "…"`) stays
-green for the reason given. The results go to `benchmarks/results/mutants.csv`.
+mutant is caught when one of its tests fails that passes without it; one that is argued instead
+(`argued = "…"`) stays green for the reason given. The results go to
+`benchmarks/results/mutants.csv`, each with the test that saw it, which is run first the next time.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import os
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,8 +32,11 @@ from benchmarks.rows import write
 ROOT = Path(__file__).resolve().parents[2]
 TABLE = Path(__file__).with_name("mutants.toml")
 FOLDERS = ("alphacut", "stochastic", "rve", "fuzzy", "frame", "tests", "benchmarks", "cases")
+RESULTS = ROOT / "benchmarks/results/mutants.csv"
 LEAST_CAUGHT = 0.95
 SECONDS = 600  # after which the tests of a mutant are stopped; that counts as red
+SLOW = "stopped"  # in place of a test's name
+_RED = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -75,52 +81,86 @@ def mutants() -> list[Mutant]:
 
 
 def copied(folder: Path) -> Path:
-    """A copy of what the tests need, links kept."""
+    """A copy of what the tests need, links and compiled Python kept."""
     for name in FOLDERS:
-        leave_out = shutil.ignore_patterns("__pycache__", "results")
+        leave_out = shutil.ignore_patterns("results")
         shutil.copytree(ROOT / name, folder / name, symlinks=True, ignore=leave_out)
     for name in ("pyproject.toml", "README.md", "CITATION.cff", "enter", "Makefile"):
         shutil.copy2(ROOT / name, folder / name)
     return folder
 
 
-def is_red(folder: Path, tests: Sequence[str]) -> bool:
-    """True if one of the tests fails in a copy of the checkout.
+def plant(mutant: Mutant, folder: Path) -> None:
+    """Put a fault into a copy of the checkout."""
+    there = folder / mutant.file
+    there.write_text(mutant.applied(there.read_text(encoding="utf-8")), encoding="utf-8")
+    for compiled in there.parent.glob(f"__pycache__/{there.stem}.*"):
+        compiled.unlink()
+
+
+def red_tests(folder: Path, tests: Sequence[str], *, stop: bool = True) -> list[str]:
+    """Those of the tests that fail in a copy of the checkout, the first only where `stop`.
 
     Raises:
         RuntimeError: The tests could not be run at all.
     """
-    options = ["-x", "-q", "-m", "not slow", "-p", "no:cacheprovider"]
-    command = [sys.executable, "-m", "pytest", *options, *tests]
-    there = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
+    options = ["-q", "-rfE", "--tb=no", "-m", "not slow", "-p", "no:cacheprovider"]
+    command = [sys.executable, "-m", "pytest", *options, *(["-x"] if stop else []), *tests]
+    wide = {"COLUMNS": "2000", "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
     try:
         done = subprocess.run(
-            command, cwd=folder, env=there, capture_output=True, text=True, timeout=SECONDS
+            command,
+            cwd=folder,
+            env={**os.environ, **wide},
+            capture_output=True,
+            text=True,
+            timeout=SECONDS if stop else None,
         )
     except subprocess.TimeoutExpired:
-        return True
+        return [SLOW]
     if done.returncode not in (0, 1, 2):  # 2: the fault shows while tests are collected
         raise RuntimeError(f"{' '.join(tests)}: pytest ended with status {done.returncode}")
-    return done.returncode != 0
+    return _RED.findall(done.stdout) or list(tests) * bool(done.returncode)
 
 
-def judged(mutant: Mutant) -> dict[str, object]:
-    """Plant one fault and run its tests."""
+def seen_before() -> dict[str, str]:
+    """By the names of mutants, the tests that saw them the last time."""
+    if not RESULTS.is_file():
+        return {}
+    with RESULTS.open(newline="", encoding="utf-8") as file:
+        return {row["name"]: row.get("seen_by", "") for row in csv.DictReader(file)}
+
+
+def judged(mutant: Mutant, before: str = "") -> dict[str, object]:
+    """Plant one fault and run its tests, first the one that saw it before."""
     started = perf_counter()
+    first = [before] if before.startswith(mutant.tests) else []
     with tempfile.TemporaryDirectory() as folder:
-        there = copied(Path(folder)) / mutant.file
-        there.write_text(mutant.applied(there.read_text(encoding="utf-8")), encoding="utf-8")
-        caught = is_red(Path(folder), mutant.tests)
+        plant(mutant, copied(Path(folder)))
+        red = first and _quietly(Path(folder), first)
+        red = red or red_tests(Path(folder), mutant.tests)
     seconds = round(perf_counter() - started, 1)
-    verdict = "caught" if caught else "argued" if mutant.argued else "MISSED"
+    verdict = "caught" if red else "argued" if mutant.argued else "MISSED"
     print(f"{verdict:7s} {seconds:6.1f} s  {mutant.name}", flush=True)
-    return {"name": mutant.name, "file": mutant.file, "verdict": verdict, "seconds": seconds}
+    found = {"verdict": verdict, "seconds": seconds, "seen_by": red[0] if red else ""}
+    return {"name": mutant.name, "file": mutant.file, **found}
 
 
-def tests_are_green(chosen: Sequence[Mutant]) -> bool:
-    """True if all tests pass in a copy without a fault: red must come from the fault."""
+def _quietly(folder: Path, tests: Sequence[str]) -> list[str]:
+    """Red tests; none where the tests are no more."""
+    try:
+        return red_tests(folder, tests)
+    except RuntimeError:
+        return []
+
+
+def red_without_a_fault(rows: Sequence[Mapping[str, object]], tests: Sequence[str]) -> list[str]:
+    """Tests said to have seen a fault that fail in a copy without one as well."""
+    seen = {str(row["seen_by"]) for row in rows} - {"", SLOW} | set(tests)
+    if not seen:
+        return []
     with tempfile.TemporaryDirectory() as folder:
-        return not is_red(copied(Path(folder)), sorted({t for m in chosen for t in m.tests}))
+        return red_tests(copied(Path(folder)), sorted(seen), stop=False)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -128,14 +168,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--only", default="", help="part of the names of those to plant")
     parser.add_argument("--jobs", type=int, default=2, help="at once (default 2)")
-    parser.add_argument("--out", type=Path, default=ROOT / "benchmarks/results/mutants.csv")
+    parser.add_argument("--out", type=Path, default=RESULTS)
     options = parser.parse_args(arguments)
-    chosen = [mutant for mutant in mutants() if options.only in mutant.name]
-    if not tests_are_green(chosen):
-        print("the tests fail without a fault: make them green first")
-        return 1
+    chosen, before = [mutant for mutant in mutants() if options.only in mutant.name], seen_before()
     with ThreadPoolExecutor(options.jobs) as pool:
-        rows = list(pool.map(judged, chosen))
+        rows = list(pool.map(lambda one: judged(one, before.get(one.name, "")), chosen))
+    stopped = {m.name for m, row in zip(chosen, rows, strict=True) if row["seen_by"] == SLOW}
+    tests = {test for mutant in chosen if mutant.name in stopped for test in mutant.tests}
+    if red := red_without_a_fault(rows, sorted(tests)):
+        print(f"red without a fault, make them green first: {', '.join(red)}")
+        return 1
     if not options.only:
         write(rows, options.out)
     caught = sum(row["verdict"] == "caught" for row in rows)

@@ -12,7 +12,7 @@ from time import perf_counter
 
 import numpy as np
 
-from alphacut.rve.cell import Phase, square_moduli
+from alphacut.rve.cell import Phase, square_moduli, with_ratio_errors
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
 from alphacut.rve.image.outlines.equation import Equation
@@ -60,7 +60,7 @@ class RasterModel:
         for inclusion in inclusions:
             slices = [self.slice(radius, matrix, inclusion) for radius in radii]
             stiffness = np.array([(s.bounds.lower + s.bounds.upper) / 2 for s in slices])
-            error = np.array([s.bounds.relative_error for s in slices])
+            error = with_ratio_errors(np.array([s.bounds.relative_error for s in slices]))
             curve = curve_of(rule, stiffness[nodes])
             moduli = square_moduli(stiffness)
             errors = {

@@ -18,6 +18,7 @@ from alphacut.stochastic.theta.truncated_normal import Array
 EDGES = ((1, 2), (0, 2), (0, 1))  # of a triangle, in the order of Basix
 _TOUCH = 1e-6
 _CLOSEST = 0.9995
+_COARSEST = 0.9  # mesh size: three edges a side, for two tell nothing of their error
 
 
 class TouchingError(RuntimeError):
@@ -67,6 +68,7 @@ def planar_mesh(
             " particles would need elements without end; lower the radius"
         )
     _refuse_touching_side(radius, centre)
+    size = min(size, _COARSEST)
     gmsh.initialize(["", "-v", "1"], readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.setNumber("General.NumThreads", 1)

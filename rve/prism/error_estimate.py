@@ -15,8 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from alphacut.rve.bounds import hashin_shtrikman_bulk, reuss, voigt
-from alphacut.rve.cell import STRAIN, Phase, square_moduli
+from alphacut.rve.cell import STRAIN, Phase, square_moduli, with_ratio, with_ratio_errors
 from alphacut.rve.result import Homogenised, StressCurve
+from alphacut.rve.slices.curve import ratio_error
 from alphacut.rve.slices.theta_rule import extreme_radii, theta_rule
 from alphacut.rve.table.cache import stored_table
 from alphacut.rve.table.interpolant import TableRange
@@ -44,8 +45,8 @@ def judged(
         result: Of the product space.
         radius_map: Its map.
         phases: Its matrix and inclusion.
-        layers: About the relative errors that the layers in θ leave in the mean moduli, shape (3,);
-            the rest is booked to the mesh.
+        layers: About the relative errors that the layers in θ leave in the mean moduli and the
+            ratio, shape (4,); the rest is booked to the mesh.
         cache: Folder where tables are kept; None keeps them in the process.
     """
     enough = _ACCURACIES[0]  # accuracy that is thought to do
@@ -59,18 +60,20 @@ def judged(
             break
         fine = theta_rule(radius_map, points=_FINE)
         moduli = moduli_of(result.curve)
-        other, noise = fine.weights @ exact(radius_map(fine.nodes)), left(radius_map(fine.nodes))
-        noise = noise.max(axis=0)
+        slices, noise = exact(radius_map(fine.nodes)), left(radius_map(fine.nodes))
+        other = with_ratio(fine.weights @ slices)
+        noise = np.append(noise[:, :3].max(axis=0), ratio_error(fine.weights, slices, noise))
         # σ11 is printed, the whole stiffness exported: on a mesh x1 is not quite x2
         both = (
             moduli,
             moduli if result.curve.stiffness is None else square_moduli(result.curve.stiffness),
         )
-        mean = np.max([_apart(result.curve.weights @ one, other) for one in both], axis=0)
+        means = [with_ratio(result.curve.weights @ one) for one in both]
+        mean = np.max([_apart(one, other) for one in means], axis=0)
         nodes = _apart(moduli, exact(radius_map(result.curve.theta)))
-        nodes = (1 + nodes) * (1 + left(radius_map(result.curve.theta))) - 1
-        settled = (noise <= _SHARE * mean)[np.isfinite(mean)].all()
-        enough = accuracy * float(np.nanmin(_SHARE * mean / noise))
+        nodes = (1 + nodes) * (1 + left(radius_map(result.curve.theta))[:, :3]) - 1
+        settled = (noise <= _SHARE * mean)[:3][np.isfinite(mean[:3])].all()
+        enough = accuracy * float(np.nanmin((_SHARE * mean / noise)[:3]))
         mean = (1 + mean) * (1 + noise) - 1
         if settled:
             break
@@ -117,7 +120,7 @@ def _reference(
 def _within_bounds(
     curve: StressCurve, radius_map: RadiusMap, phases: tuple[Phase, Phase]
 ) -> tuple[Array, Array]:
-    """Errors of the mean moduli and of those at the nodes that no exact value can exceed."""
+    """Errors of the mean moduli and ratio, and of those at nodes, that no exact value exceeds."""
     fraction = np.pi / 4 * radius_map(curve.theta) ** 2
     moduli = moduli_of(curve)
     bounds = [square_moduli(bound(fraction, *phases)) for bound in (reuss, voigt)]
@@ -127,7 +130,7 @@ def _within_bounds(
     mean = np.max(
         [_apart(curve.weights @ moduli, curve.weights @ bound) for bound in bounds], axis=0
     )
-    return mean, nodes
+    return with_ratio_errors(mean), nodes
 
 
 def _apart(first: Array, second: Array) -> Array:

@@ -16,7 +16,7 @@ from typing import ClassVar
 import numpy as np
 from mpi4py import MPI
 
-from alphacut.rve.cell import LOADS, THREE_LOADS, Cell, Phase
+from alphacut.rve.cell import LOADS, THREE_LOADS, Cell, Phase, with_ratio
 from alphacut.rve.certificate import (
     ROUND_OFF,
     WHAT,
@@ -146,7 +146,7 @@ class PrismModel:
     def _errors_of_layers(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
     ) -> list[Array]:
-        """About the relative errors that the layers leave in the mean moduli, shape (3,).
+        """About the relative errors that layers leave in the mean moduli and the ratio, shape (4,).
 
         Half as many layers, on a mesh twice as coarse, show them.
         """
@@ -157,8 +157,11 @@ class PrismModel:
         try:
             pairs = [one.solve(radius_map, matrix, inclusions) for one in (coarse, thick)]
         except RuntimeError:  # folded, or not solved: the share stays unknown, the sum does not
-            return [np.zeros(3) for _ in inclusions]
-        means = [[one.curve.weights @ moduli_of(one.curve) for one in results] for results in pairs]
+            return [np.zeros(4) for _ in inclusions]
+        means = [
+            [with_ratio(one.curve.weights @ moduli_of(one.curve)) for one in results]
+            for results in pairs
+        ]
         return [abs(two / one - 1) / _GAIN for one, two in zip(*means, strict=True)]
 
     def _moved(self, radius_map: RadiusMap, watch: Stopwatch) -> PrismSystem:

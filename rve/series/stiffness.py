@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.rve.cell import Phase, square_voigt
+from alphacut.rve.cell import Phase, square_voigt, with_ratio
 from alphacut.rve.series.lattice_sums import ZETA_PERIOD, lattice_images, lattice_sums
 from alphacut.rve.series.multipoles import LOADS, MOST_HARMONICS, Contrast, modulus, multipoles
 from alphacut.rve.series.truncation import Truncation, error_by_more_terms, require_radii
@@ -58,6 +58,7 @@ _SAFETY = 1.6
 _TRUNCATION = Truncation(
     lambda harmonics: harmonics * 4 // 3 + 2, MOST_HARMONICS, "harmonics", "particles"
 )
+_SHARED_BY_RATIO = 0.1  # of the errors of two moduli, by the error of their ratio
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,8 @@ class SquareStiffness:
         bulk: C11 + C12, from ε11 = ε22.
         deviator: C11 − C12, from ε11 = −ε22.
         shear: C33, σ12 over 2 ε12.
-        errors: Declared relative truncation errors of the three, shape (…, 3).
+        errors: Declared relative truncation errors of the three and of deviator over shear, shape
+            (…, 4).
         harmonics: Harmonics per potential that reached it.
     """
 
@@ -123,6 +125,7 @@ def square_stiffness(
         _first_guess(radius, tolerance),
         solve,
         tolerance=max(tolerance, _ROUND_OFF),
+        errors=4,
     )
     bulk, deviator, shear = np.moveaxis(moduli, -1, 0)
     return SquareStiffness(bulk, deviator, shear, errors, used)
@@ -145,17 +148,19 @@ def _batches(rows: Array, entries: int) -> list[Array]:
 def _solve_batch(
     radius: Array, contrast: Contrast, count: int, loads: Sequence[str]
 ) -> tuple[Array, Array]:
-    """Moduli and their declared relative errors, shape (rows, m, 3) each, nan of other loads.
+    """Moduli, shape (rows, m, 3), and their declared relative errors and the ratio's, (rows, m, 4).
 
-    A quarter and a half more harmonics tell the error of `count`, with a margin.
+    They are nan and zero of other loads. A quarter and a half more harmonics tell the error of
+    `count`, with a margin. The ratio may change little by chance: it counts a share of what
+    deviator and shear do.
     """
-    shape = (radius.size, contrast.kappa_i.size, len(LOADS))
-    values, errors = np.full(shape, np.nan), np.full(shape, _ROUND_OFF / 10)
+    counts = count, count + max(2, count // 4), count + max(4, count // 2)
+    found = np.full((len(counts), radius.size, contrast.kappa_i.size, len(LOADS)), np.nan)
     for load in loads:
-        own, finer, finest = (
+        found[..., LOADS.index(load)] = [
             modulus(load, multipoles(load, radius, contrast, harmonics=n), radius, contrast)
-            for n in (count, count + max(2, count // 4), count + max(4, count // 2))
-        )
-        values[..., LOADS.index(load)] = own
-        errors[..., LOADS.index(load)] += _SAFETY * error_by_more_terms(own, finer, finest)
-    return values, errors
+            for n in counts
+        ]
+    gap = np.nan_to_num(error_by_more_terms(*with_ratio(found)))
+    gap[..., 3] = np.maximum(gap[..., 3], _SHARED_BY_RATIO * gap[..., 1:3].max(axis=-1))
+    return found[0], _ROUND_OFF / 10 + _SAFETY * gap

@@ -33,7 +33,14 @@ class Truncation:
     particles: str
 
     def settle(
-        self, radius: Array, inclusions: int, first: Array, solve: Solve, *, tolerance: float
+        self,
+        radius: Array,
+        inclusions: int,
+        first: Array,
+        solve: Solve,
+        *,
+        tolerance: float,
+        errors: int = 3,
     ) -> tuple[Array, Array, Array]:
         """Moduli of n cells times m inclusions, each with as many terms as it needs.
 
@@ -41,33 +48,35 @@ class Truncation:
             radius: Radii over half the cell's side, shape (n,).
             inclusions: m.
             first: Numbers of terms to begin with, shape (n,).
-            solve: Three moduli of k cells and their declared relative errors, shape (k, m, 3) each,
-                from the cells' rows and the number of terms.
-            tolerance: Relative error allowed.
+            solve: Three moduli of k cells and their declared relative errors, shape (k, m, 3) and
+                (k, m, errors), from the cells' rows and the number of terms.
+            tolerance: Relative error allowed, of the moduli.
+            errors: 3, or more where numbers made of the moduli declare one of their own.
 
         Returns:
-            Moduli and declared relative errors, shape (n, m, 3), and terms used, (n, m).
+            Moduli and declared relative errors, shape (n, m, 3) and (n, m, errors), and terms used,
+            (n, m).
 
         Raises:
             SeriesError: `most` terms do not suffice.
         """
         shape = (radius.size, inclusions)
-        moduli, errors = np.zeros((*shape, 3)), np.full((*shape, 3), np.inf)
+        moduli, found = np.zeros((*shape, 3)), np.full((*shape, errors), np.inf)
         used, todo = np.zeros(shape, int), np.arange(radius.size)
         terms = np.minimum(first, self.most)
         while todo.size:
             for count in np.unique(terms[todo]):
                 rows = todo[terms[todo] == count]
                 # what is settled stays, whatever its companions need
-                open_ = errors[rows].max(axis=2) > tolerance
+                open_ = found[rows, :, :3].max(axis=2) > tolerance
                 values, left = solve(rows, int(count))
                 moduli[rows] = np.where(open_[..., None], values, moduli[rows])
-                errors[rows] = np.where(open_[..., None], left, errors[rows])
+                found[rows] = np.where(open_[..., None], left, found[rows])
                 used[rows] = np.where(open_, count, used[rows])
-            todo = todo[errors[todo].max(axis=(1, 2)) > tolerance]
-            self._refuse(radius[todo], terms[todo], errors[todo], tolerance)
+            todo = todo[found[todo, :, :3].max(axis=(1, 2)) > tolerance]
+            self._refuse(radius[todo], terms[todo], found[todo, :, :3], tolerance)
             terms[todo] = np.minimum(self.following(terms[todo]), self.most)
-        return moduli, errors, used
+        return moduli, found, used
 
     def _refuse(self, radius: Array, terms: Array, errors: Array, tolerance: float) -> None:
         """Raise where no more terms are to be had."""

@@ -30,7 +30,8 @@ def with_errors(curve: StressCurve, error: Array) -> StressCurve:
 
     Args:
         curve: With its stiffness.
-        error: Relative errors of C11 + C12, C11 − C12 and C33 at the nodes, shape (n, 3).
+        error: Relative errors of C11 + C12, C11 − C12, C33 and their ratio at the nodes, shape
+            (n, 4).
     """
     moduli = square_moduli(np.asarray(curve.stiffness))
     uneven = abs(STRAIN * moduli[:, 0] / curve.s11 - 1)  # of the mesh: x1 is not quite x2
@@ -38,11 +39,33 @@ def with_errors(curve: StressCurve, error: Array) -> StressCurve:
 
 
 def mean_errors(curve: StressCurve, error: Array) -> Array:
-    """Relative errors of the mean moduli, shape (3,), from those at the nodes, shape (n, 3)."""
+    """Relative errors of the mean moduli and their ratio from those at the nodes, shape (n, 4).
+
+    Returns:
+        Of C11 + C12, C11 − C12, C33 and the ratio of the last two means, shape (4,).
+    """
     moduli = square_moduli(np.asarray(curve.stiffness))
-    mean, uneven = curve.weights @ moduli, np.zeros(3)
-    uneven[0] = abs(STRAIN * mean[0] / curve.mean[0] - 1)  # of the mesh: x1 is not quite x2
-    return np.asarray(curve.weights @ (moduli * error) / mean + uneven)
+    mean = curve.weights @ moduli
+    own = curve.weights @ (moduli * error[:, :3]) / mean
+    found = np.append(own, ratio_error(curve.weights, moduli, error))
+    found[0] += abs(STRAIN * mean[0] / curve.mean[0] - 1)  # of the mesh: x1 is not quite x2
+    return found
+
+
+def ratio_error(weights: Array, moduli: Array, error: Array) -> float:
+    """Relative error of the ratio of the mean C11 − C12 and C33 from those at n nodes.
+
+    With shares p and q of the nodes in either mean and errors d of C11 − C12, s of C33 and ρ of
+    their ratio, it is Σ p d − Σ q s = Σ p ρ + Σ (p − q) s = Σ q ρ + Σ (p − q) d.
+
+    Args:
+        weights: Shape (n,).
+        moduli: C11 + C12, C11 − C12 and C33 at the nodes, shape (n, 3).
+        error: Relative, of the three moduli and the ratio, shape (n, 4).
+    """
+    p, q = (weights[:, None] * moduli / (weights @ moduli))[:, 1:].T
+    _, d, s, ratio = error.T
+    return float(min(p @ ratio + abs(p - q) @ s, q @ ratio + abs(p - q) @ d))
 
 
 def certified(

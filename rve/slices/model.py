@@ -12,7 +12,7 @@ from time import perf_counter
 
 import numpy as np
 
-from alphacut.rve.cell import Phase, square_moduli
+from alphacut.rve.cell import Phase, square_moduli, with_ratio
 from alphacut.rve.result import Homogenised
 from alphacut.rve.settings import require_mesh_size, require_points
 from alphacut.rve.slices.curve import certified, curve_of, mean_errors, with_errors
@@ -24,10 +24,12 @@ from alphacut.stochastic.theta.truncated_normal import Array
 # and so changes by much, and by lower orders, which are not yet regular
 _FADE, _LOCKED_FADE, _IRREGULAR_FADE = 0.03, 0.05, 0.08
 _LOCKING = 0.45  # Poisson's ratio above which order 2 locks
+_ORDERS = 2, 3, 4
 _ROUND_OFF = 1e-13
 _SAFETY = 3.3
+_COARSE, _COARSE_SAFETY = 0.6, 6.6  # mesh size above which orders do not yet leave what they should
 _POINTWISE = 1.5  # safety of a single θ, where errors do not average
-_SHARED = np.array([0.03, 0.5, 0.5])  # C11 + C12 is the easiest by far
+_SHARED = np.array([0.03, 0.5, 0.5, 0.5])  # C11 + C12 is the easiest by far
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ class SlicesModel:
     name = "slices"
 
     def __post_init__(self) -> None:
-        if self.order not in (2, 3, 4):
+        if self.order not in _ORDERS:
             raise ValueError(
                 f"the order of the planar elements is {self.order}; it must be 2, 3 or 4"
             )
@@ -113,7 +115,7 @@ class SlicesModel:
                     radius,
                     matrix,
                     inclusions,
-                    orders=range(max(1, self.order - 2), min(self.order + 1, 4) + 1),
+                    orders=_ORDERS,  # whichever the result is taken from: the rest judge it
                     order=self.order,
                     mesh_size=self.mesh_size,
                     centre=self.centre,
@@ -137,6 +139,7 @@ class Slice:
         factorisations: How many were made.
         seconds: Wall time: mesh, jit, assemble, solve.
         locks: Whether a phase is nearly incompressible.
+        mesh_size: Edge length of the mesh, in halves of the cell's side.
     """
 
     orders: tuple[int, ...]
@@ -147,6 +150,7 @@ class Slice:
     factorisations: int
     seconds: dict[str, float]
     locks: bool
+    mesh_size: float
 
     @property
     def stiffness(self) -> Array:
@@ -155,22 +159,23 @@ class Slice:
 
     @property
     def gaps(self) -> Array:
-        """Relative change of the three moduli by each rise of order, (orders − 1, m, 3)."""
-        moduli = square_moduli(self.by_order)
+        """Relative change of the moduli and the ratio by each rise of order, (orders − 1, m, 4)."""
+        moduli = with_ratio(square_moduli(self.by_order))
         return np.asarray(np.abs(moduli[:-1] / moduli[1:] - 1))
 
     @property
     def error(self) -> Array:
-        """Declared relative errors of C11 + C12, C11 − C12 and C33, shape (m, 3).
+        """Declared relative errors of C11 + C12, C11 − C12, C33 and the ratio, shape (m, 4).
 
         The distance from the highest order, and the declared error of that one.
         """
-        own, highest = (square_moduli(one) for one in (self.stiffness, self.by_order[-1]))
+        both = self.stiffness, self.by_order[-1]
+        own, highest = (with_ratio(square_moduli(one)) for one in both)
         return np.asarray((1 + np.abs(own / highest - 1)) * (1 + self._error_of_highest) - 1)
 
     @property
     def _error_of_highest(self) -> Array:
-        """Declared errors by the highest order, shape (m, 3).
+        """Declared errors by the highest order, shape (m, 4).
 
         The geometric series of further orders, times a safety factor. What one order more leaves
         of the last change is what the last rise left of the one before; where order 2 locks, of
@@ -183,8 +188,9 @@ class Slice:
             fade = np.clip(gaps[-1] / np.maximum(gaps[-2], 1e-300), fade, 0.5)
         if self.locks:
             fade = fade.max(axis=1, keepdims=True)
-        found = _SAFETY * gaps[-1] * fade / (1 - fade)
-        shared = _SHARED * found.max(axis=1, keepdims=True)
+        safety = _SAFETY if self.mesh_size <= _COARSE else _COARSE_SAFETY
+        found = safety * gaps[-1] * fade / (1 - fade)
+        shared = _SHARED * found[:, :3].max(axis=1, keepdims=True)
         return np.asarray(np.maximum(found, shared) + _ROUND_OFF)
 
 
@@ -226,4 +232,5 @@ def solve_slice(
         sum(cell.factorisations for cell in cells),
         seconds,
         max(phase.poisson for phase in (matrix, *inclusions)) > _LOCKING,
+        mesh_size,
     )

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from alphacut.rve.bounds import mori_tanaka
-from alphacut.rve.cell import Phase, square_moduli
+from alphacut.rve.cell import Phase, square_moduli, with_ratio
 from alphacut.rve.result import StressCurve
 from alphacut.rve.slices.curve import curve_of
 from alphacut.stochastic import HermiteMap, RadiusMap, ThetaRule, gauss_rule
@@ -96,13 +96,17 @@ def theta_rule(radius_map: RadiusMap, *, points: int) -> ThetaRule:
     return ThetaRule(nodes, weights / weights.sum())
 
 
+def _square_moduli_and_ratio(stiffness: Array) -> Array:
+    return with_ratio(square_moduli(stiffness))
+
+
 def settle_rule(
     radius_map: RadiusMap,
     stiffness_at: Callable[[Array], Array],
     *,
     points: int | None,
     accuracy: float,
-    moduli: Callable[[Array], Array] = square_moduli,
+    moduli: Callable[[Array], Array] = _square_moduli_and_ratio,
 ) -> tuple[list[StressCurve], list[Array]]:
     """Curves whose nodes are added until the mean moduli settle, and their declared errors.
 
@@ -114,10 +118,10 @@ def settle_rule(
             cheap.
         points: Nodes, or None to have them found.
         accuracy: Relative error of every mean modulus that counts as settled.
-        moduli: The three moduli of a stiffness.
+        moduli: The three moduli of a stiffness, and what else of it is to be judged.
 
     Returns:
-        For each inclusion its curve and the errors of the mean moduli, shape (3,).
+        For each inclusion its curve and the errors of `moduli` of the mean stiffness.
 
     Raises:
         RuleError: No rule in reach settles.
@@ -133,7 +137,7 @@ def settle_rule(
             for three in zip(*(known[n] for n in counts), strict=True)
         ]
         for k, (curve, gap) in enumerate(zip(known[count], gaps, strict=True)):
-            if k not in settled and (points or gap.max() <= accuracy):
+            if k not in settled and (points or gap[:3].max() <= accuracy):
                 settled[k] = curve, gap  # each inclusion by itself, whatever its companions need
         if len(settled) == len(gaps):
             return [settled[k][0] for k in range(len(gaps))], [
@@ -168,7 +172,7 @@ def _finer(count: int) -> int:
 
 
 def _mean_moduli(curve: StressCurve, moduli: Callable[[Array], Array]) -> Array:
-    """The three moduli of the mean stiffness of a curve, shape (3,), in Pa."""
+    """The moduli of the mean stiffness of a curve, shape (3,) or (4,), in Pa."""
     return moduli(np.tensordot(curve.weights, np.asarray(curve.stiffness), axes=1))
 
 
@@ -197,7 +201,9 @@ def theta_error(
     moduli: Array,
     phases: tuple[Phase, Phase],
 ) -> Array:
-    """Declared relative errors of the mean moduli by `rule`, shape (3,), from slices solved.
+    """Declared relative errors by `rule`, shape (4,), from slices solved.
+
+    Of the mean C11 + C12, C11 − C12, C33 and of the ratio of the last two.
 
     The logarithm of a modulus over that of Mori and Tanaka is smooth in √(1 − r²), also where soft
     particles or an incompressible matrix make the modulus itself steep: polynomials through the
@@ -220,12 +226,12 @@ def theta_error(
     scale, logarithm = _dilute(between, phases), np.log(moduli / _dilute(radii, phases))
     low, high, span = logarithm.min(axis=0), logarithm.max(axis=0), np.ptp(logarithm, axis=0)
     touch, target = np.sqrt(1 - radii**2), np.sqrt(1 - between**2)
-    own, gaps = rule.weights @ moduli[places], []
+    own, gaps = with_ratio(rule.weights @ moduli[places]), []
     for degree in range(min(max(0, radii.size - 4), 9), min(radii.size, 15)):
         basis, carried = (_chebyshev(x, touch.min(), touch.max(), degree) for x in (touch, target))
         coefficients = np.linalg.lstsq(basis * root, logarithm * root, rcond=1e-14)[0]
         refined = scale * np.exp(np.clip(carried @ coefficients, low - span, high + span))
-        gaps.append(fine.weights @ refined / own - 1)
+        gaps.append(with_ratio(fine.weights @ refined) / own - 1)
     return np.asarray(SAFETY * np.abs(gaps).max(axis=0) + _NOISE)
 
 

@@ -21,7 +21,9 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 _SLACK = 1e-9
 _TINY = 1e-300
-_SHARED = np.array([0.1, 1.0, 1.0])  # C11 + C12 hardly depends on the arrangement
+# least share of the largest error: C11 + C12 hardly depends on the arrangement, and errors of
+# C11 − C12 and C33 leave their ratio in part
+_SHARED = np.array([0.1, 1.0, 1.0, 0.1])
 
 
 @dataclass(frozen=True)
@@ -146,7 +148,7 @@ def coefficients(values: Array) -> Array:
 
 
 def tail(coefficients: Array, axis: int, *, noise: Array | float = 0.0) -> Array:
-    """Declared interpolation errors along `axis`, shape (moduli,).
+    """Declared interpolation errors of the three moduli and of the ratio along `axis`, shape (4,).
 
     The geometric series that the last coefficients begin, as often as interpolation may be worse
     than the polynomial that leaves it: one and the Lebesgue constant of the points. Coefficients
@@ -154,12 +156,14 @@ def tail(coefficients: Array, axis: int, *, noise: Array | float = 0.0) -> Array
     of the largest.
 
     Args:
-        coefficients: Shape (n_r, n_E, moduli).
+        coefficients: Of the three logarithms, shape (n_r, n_E, 3).
         axis: 0 or 1.
         noise: Error of the values themselves: where the last coefficients are no larger, they tell
             of nothing else, and count once.
     """
-    size = np.abs(np.moveaxis(coefficients, axis, 0)).sum(axis=1)
+    ratio = coefficients[..., 1:2] - coefficients[..., 2:3]
+    both = np.concatenate([coefficients, ratio], axis=-1)
+    size = np.abs(np.moveaxis(both, axis, 0)).sum(axis=1)
     if len(size) == 1:
         return np.zeros(size.shape[1])
     if len(size) == 2:  # the constant tells nothing of a decay
@@ -171,7 +175,7 @@ def tail(coefficients: Array, axis: int, *, noise: Array | float = 0.0) -> Array
         fade = np.cbrt(last / np.maximum(size[-6:-3].max(axis=0), _TINY))
     fade = np.clip(fade, 0.3, 0.8)
     found = np.where(last <= noise, last, (1 + lebesgue(len(size))) * last * fade / (1 - fade))
-    return np.asarray(np.maximum(found, found.max() * _SHARED))
+    return np.asarray(np.maximum(found, found[:3].max() * _SHARED))
 
 
 @dataclass(frozen=True)
@@ -182,8 +186,8 @@ class Table:
         span: What it covers.
         coefficients: Over u and t, of the logarithms of C11 + C12, C11 − C12 and C33 over those of
             `TableRange.dilute`, shape (n_r, n_E, 3).
-        space: Declared relative errors of the three moduli that it interpolates, at some radii:
-            radius and errors, shape (4, k).
+        space: Declared relative errors of the three moduli that it interpolates, and of the ratio
+            of the last two, at some radii: radius and errors, shape (5, k).
         mesh_size: Of the planar cells behind it; 0 for the series.
         unknowns: Of their linear systems.
         systems: Number of linear systems solved to build it.
@@ -200,12 +204,12 @@ class Table:
 
     @property
     def interpolation(self) -> Array:
-        """Declared relative errors of interpolation, of the three moduli, shape (3,)."""
+        """Declared relative errors of interpolation, of the moduli and the ratio, shape (4,)."""
         noise = self.space[1:].max(axis=1)
         return tail(self.coefficients, 0, noise=noise) + tail(self.coefficients, 1, noise=noise)
 
     def space_error(self, radius: Array) -> Array:
-        """Declared relative errors of the interpolated moduli at n radii, shape (n, 3)."""
+        """Declared relative errors of moduli and ratio at n radii, shape (n, 4)."""
         places, errors = self.space[0], np.log(self.space[1:])
         return np.asarray(
             np.exp(np.stack([np.interp(radius, places, one) for one in errors], axis=-1))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.mutation.mutants import ROOT, Mutant, is_red, mutants
+from benchmarks.mutation.mutants import ROOT, Mutant, mutants, red_tests
 
 TABLE = mutants()
 
@@ -31,7 +31,9 @@ def test_a_fault_that_does_not_fit_is_refused(find):
 def test_red_is_told_from_green(tmp_path):
     (tmp_path / "test_red.py").write_text("def test_it():\n    assert False\n")
     (tmp_path / "test_green.py").write_text("def test_it():\n    pass\n")
-    assert is_red(tmp_path, ["test_red.py"])
-    assert not is_red(tmp_path, ["test_green.py"])
+    (tmp_path / "test_broken.py").write_text("1 / 0\n")
+    assert red_tests(tmp_path, ["test_green.py", "test_red.py"]) == ["test_red.py::test_it"]
+    assert red_tests(tmp_path, ["test_broken.py"]) == ["test_broken.py"]
+    assert red_tests(tmp_path, ["test_green.py"]) == []
     with pytest.raises(RuntimeError, match="status 4"):
-        is_red(tmp_path, ["test_missing.py"])
+        red_tests(tmp_path, ["test_missing.py"])

@@ -15,7 +15,7 @@ from alphacut.io.problem import BadInput, Problem
 from alphacut.io.provenance import versions
 from alphacut.rve.anisotropy import directional_shear, directional_young, shear_ratio
 from alphacut.rve.cell import Phase
-from alphacut.rve.result import error_of_means, error_of_stiffness
+from alphacut.rve.result import error_of_means, error_of_ratio, error_of_stiffness
 from alphacut.rve.spheres.result import HomogenisedSpheres
 from alphacut.stages.material import spheres
 from alphacut.stochastic import HermiteMap, RadiusMap, TruncatedNormal
@@ -184,7 +184,7 @@ def anisotropy(
     if isinstance(result, HomogenisedSpheres):
         return spheres.shear_ratio(result)
     stiffness = np.asarray(result.stiffness)
-    return shear_ratio(stiffness), float(error_of_stiffness(result, shear_ratio))
+    return shear_ratio(stiffness), error_of_ratio(result, shear_ratio)
 
 
 def directions(result: Homogenised) -> Document | None:
@@ -237,7 +237,7 @@ def declared_errors(result: Homogenised) -> Document | None:
         found["directions"] = {
             "young_GPa": young,
             "shear_GPa": shear,
-            "shear_ratio": float(error_of_stiffness(result, shear_ratio)),
+            "shear_ratio": error_of_ratio(result, shear_ratio),
         }
     return found
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from alphacut.rve import Phase
-from alphacut.rve.cell import square_moduli
+from alphacut.rve.cell import square_moduli, with_ratio
 from alphacut.rve.model import CrossCheckError, cross_check, named
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
@@ -171,17 +171,13 @@ def test_error_of_a_slice_is_declared_at_the_edges(radius, contrast):
     assert true < solved.error[0, [0, 2]].max() < 10 * true
 
 
-@pytest.mark.parametrize(("order", "most"), [(2, 4.0), (3, 1.8)])
-def test_an_order_below_4_is_judged_by_the_next(order, most):
-    solved = solve_slice(
-        0.6, MATRIX, [Phase(80e9)], orders=range(order - 1, order + 2), order=order, mesh_size=0.4
-    )
-    exact = square_stiffness(np.array([0.6]), MATRIX, [Phase(80e9)])
-    true = abs(
-        np.array([exact.bulk, exact.deviator, exact.shear])[:, 0, 0]
-        / square_moduli(solved.stiffness)[0]
-        - 1
-    )
+@pytest.mark.parametrize(("order", "most"), [(2, 1.1), (3, 1.8)])
+def test_an_order_below_4_is_judged_by_order_4(order, most):
+    orders = (2, 3, 4)
+    solved = solve_slice(0.6, MATRIX, [Phase(80e9)], orders=orders, order=order, mesh_size=0.4)
+    exact = square_stiffness(np.array([0.6]), MATRIX, [Phase(80e9)]).matrix[0]
+    own, right = (with_ratio(square_moduli(one)) for one in (solved.stiffness, exact))
+    true = abs(right / own - 1)[0]
     assert (true <= solved.error[0]).all()
     assert (solved.error[0] <= most * true).all()
 
@@ -236,8 +232,9 @@ def estimated_and_true(points, *, seed, decades):
         fine = theta_rule(radius_map, points=200)
         exact = square_moduli(square_stiffness(radius_map(fine.nodes), matrix, [inclusion]).matrix)
         own = moduli[np.searchsorted(radii, np.round(radius_map(rule.nodes), 12))]
-        pairs.append((estimate, abs(rule.weights @ own / (fine.weights @ exact[:, 0]) - 1)))
-    return np.array(pairs).reshape(-1, 2, 3).swapaxes(0, 1).reshape(2, -1)
+        means = with_ratio(rule.weights @ own), with_ratio(fine.weights @ exact[:, 0])
+        pairs.append((estimate, abs(means[0] / means[1] - 1)))
+    return np.array(pairs).reshape(-1, 2, 4).swapaxes(0, 1).reshape(2, -1)
 
 
 def test_estimate_of_the_rule_bounds_its_error():
