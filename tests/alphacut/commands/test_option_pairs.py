@@ -32,7 +32,7 @@ a4 = 0.1
 [cell]
 matrix_modulus = "20 GPa"
 matrix_poisson = 0.3
-inclusion_modulus = "[75, 80, 85] GPa"
+inclusion_modulus = "80 GPa"
 inclusion_poisson = 0.3
 
 [mesh]
@@ -114,7 +114,7 @@ VALUES = {
     "--a4": ("0.11",),
     "--inclusion-modulus": ("81 GPa",),
     "--layers": ("3",),
-    "--mesh-size": ("0.3",),
+    "--mesh-size": ("0.9",),
     "--interface": ("sign",),
     "--plan": ("general",),
     "--alpha": ("0.4",),
