@@ -1,7 +1,14 @@
 """Sphinx settings: `make docs` builds the pages into build/docs."""
 
+from __future__ import annotations
+
+import shutil
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
@@ -9,14 +16,49 @@ project = "alphacut"
 author = "The alphacut developers"
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax"]
 myst_enable_extensions = ["dollarmath", "colon_fence"]
+myst_update_mathjax = False
 myst_heading_anchors = 3
 source_suffix = {".md": "markdown"}
 exclude_patterns = ["README.md"]
-html_theme = "alabaster"
-html_theme_options = {
-    "description": "From an uncertain microstructure to the fuzzy vibration of a structure",
-    "fixed_sidebar": True,
+html_theme = "furo"
+html_title = "alphacut"
+html_theme_options = {"source_repository": "", "navigation_with_keys": True}
+html_static_path = ["static"]
+html_css_files = ["pages.css"]
+# formulas are drawn without a network, by Debian's copy of MathJax 2
+MATHJAX = Path("/usr/share/javascript/mathjax")
+MATHJAX_PARTS = ("MathJax.js", "extensions", "jax/element", "jax/input/TeX", "jax/output/SVG")
+mathjax_path = "mathjax/MathJax.js"
+mathjax2_config = {
+    "jax": ["input/TeX", "output/SVG"],
+    "extensions": ["tex2jax.js"],
+    "TeX": {"extensions": ["AMSmath.js", "AMSsymbols.js"]},
+    "tex2jax": {
+        "inlineMath": [["\\(", "\\)"]],
+        "displayMath": [["\\[", "\\]"]],
+        "ignoreClass": "tex2jax_ignore|mathjax_ignore",
+        "processClass": "tex2jax_process|mathjax_process|math",
+    },
+    "SVG": {"linebreaks": {"automatic": True}},  # on narrow screens
+    "showMathMenu": False,
+    "messageStyle": "none",
 }
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
 nitpicky = False
+
+
+def copy_mathjax(app: Sphinx) -> None:
+    """Put what draws formulas beside the pages."""
+    for part in MATHJAX_PARTS:
+        source, target = MATHJAX / part, Path(app.outdir) / "_static/mathjax" / part
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if source.is_dir():
+            shutil.copytree(source, target, dirs_exist_ok=True)
+        else:
+            shutil.copyfile(source, target)
+
+
+def setup(app: Sphinx) -> None:
+    """Hook into the build."""
+    app.connect("builder-inited", copy_mathjax)
