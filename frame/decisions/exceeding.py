@@ -1,19 +1,22 @@
 """Possibility that a storey frame exceeds a limit at some time, with its fuzzy safety margin.
 
 The cuts of the inputs are a family of boxes that grow as α falls. The largest one proved safe and
-the least one with a motion beyond a limit bound the possibility from both sides. Necessity is 0
-where some motion of the highest cut keeps all limits, and is not told otherwise.
+the least one with a motion beyond a limit bound the possibility from both sides. The largest one
+all of whose motions are proved to pass a limit, and the least one with a motion that keeps all,
+bound the necessity. That any of several limits is exceeded is as possible as the most possible of
+them, and may be more necessary than each.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.decisions.safe_scale import Progress, SafeScale, safe_scale
+from alphacut.frame.decisions.safe_scale import Progress, SafeScale, limit_search, safe_scale
+from alphacut.frame.decisions.sure_exceeding import sure_exceeding
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arguments import fuzzy_inputs
@@ -29,19 +32,21 @@ class Exceeding:
         necessity: Lower and upper bound.
         scale: What was proved of boxes of size 1 − α, and the witness.
         claim: What the cuts of the inputs claim.
+        lowest: Lowest level looked at.
     """
 
     possibility: tuple[float, float]
     necessity: tuple[float, float]
     scale: SafeScale
     claim: str
+    lowest: float = 0.0
 
     @property
     def verdict(self) -> str:
         """Safe where exceeding is proved impossible at the lowest cut, unsafe where it is sure."""
-        if self.possibility[1] == 0:
+        if self.possibility[1] <= self.lowest:
             return "safe"
-        return "unsafe" if self.necessity[0] == 1 else "undecided"
+        return "unsafe" if self.necessity[0] >= 1 - self.lowest else "undecided"
 
     def __str__(self) -> str:
         """The decision with what it rests on."""
@@ -62,7 +67,7 @@ def exceeding(
     workers: int = 1,
     progress: Progress | None = None,
 ) -> Exceeding:
-    """Bounds of the possibility that some |output| exceeds its limit at some node.
+    """Bounds of the possibility and the necessity that some |output| exceeds its limit at a node.
 
     Args:
         frame: The structure with its ground motion and initial state.
@@ -78,7 +83,8 @@ def exceeding(
     Raises:
         ValueError: A limit is not positive, or an input is no parameter.
     """
-    numbers = joined_once(fuzzy_inputs(inputs))
+    numbers, most = joined_once(fuzzy_inputs(inputs)), 1.0 - lowest
+    nominal = {name: number.modal for name, number in numbers.items()}
 
     def reach(size: float) -> tuple[Array, Array]:
         cuts = np.array([x.cut(max(1 - size, lowest)) for x in numbers.values()])
@@ -86,18 +92,41 @@ def exceeding(
 
     found = safe_scale(
         frame,
-        {name: number.modal for name, number in numbers.items()},
+        nominal,
         reach,
         limits,
         duration=duration,
         step=step,
-        most=1.0 - lowest,
+        most=most,
         workers=workers,
         progress=progress,
     )
     safe = 0.0 if found.safe is None else found.safe
-    upper = 0.0 if found.safe is not None and safe >= 1 - lowest and lowest == 0 else 1 - safe
+    upper = 1 - safe if safe < most or lowest else 0.0
     lower = 1 - found.unsafe if np.isfinite(found.unsafe) else 0.0
-    necessity = (0.0, 1.0 if found.safe is None else 0.0)
+    necessity, sampled = (0.0, 0.0), ""
+    if found.safe is None:
+        search = limit_search(frame, nominal, reach, limits, duration, step)
+        sure = sure_exceeding(search, most)
+        necessity = (sure.size or 0.0, min(sure.kept, 1.0))
+        sampled = search.reason
+    if sampled:
+        found = replace(found, nature="verified by sampling", reason=sampled)
     claim = str(JointClaim.of(numbers).resting_on(found.nature))
-    return Exceeding((max(lower, 0.0), upper), necessity, found, claim)
+    return Exceeding((max(lower, 0.0), upper), necessity, found, claim, lowest)
+
+
+def any_exceeding(each: Mapping[str, Exceeding], together: Exceeding | None = None) -> Exceeding:
+    """That any limit is exceeded, from each by itself.
+
+    Args:
+        each: The decision on each limit, one at least.
+        together: The decision on all limits at once, where one of them is passed at the nominal
+            values; its necessity may be greater than that of each.
+    """
+    most = max(each.values(), key=lambda one: one.possibility)
+    lower, upper = (max(one.possibility[side] for one in each.values()) for side in (0, 1))
+    least, high = (max(one.necessity[side] for one in each.values()) for side in (0, 1))
+    if together is not None:
+        least, high = max(least, together.necessity[0]), together.necessity[1]
+    return replace(most, possibility=(lower, upper), necessity=(least, high))

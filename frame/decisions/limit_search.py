@@ -86,17 +86,22 @@ class LimitSearch:
         for row in np.argsort(-found.value)[:4]:
             point = self.model.boxes.to_physical(found.point[row])
             if self.share(point) > 1:
-                return self._pulled(point)
+                return self.pulled(point, beyond=True)
         return None
 
-    def _pulled(self, point: Array) -> Array:
-        """The nearest point on the way to the nominal one that still breaks a limit."""
-        safe, unsafe = 0.0, 1.0
+    def pulled(self, point: Array, *, beyond: bool) -> Array:
+        """The nearest point found on the way to the nominal one that also breaks or keeps limits.
+
+        Args:
+            point: Parameters, shape (d,), that break a limit, or keep all.
+            beyond: Which of both.
+        """
+        other, same = 0.0, 1.0
         for _ in range(12):
-            middle = (safe + unsafe) / 2
-            beyond = self.share(self.nominal + middle * (point - self.nominal)) > 1
-            safe, unsafe = (safe, middle) if beyond else (middle, unsafe)
-        pulled: Array = self.nominal + unsafe * (point - self.nominal)
+            middle = (other + same) / 2
+            held = (self.share(self.nominal + middle * (point - self.nominal)) > 1) == beyond
+            other, same = (other, middle) if held else (middle, same)
+        pulled: Array = self.nominal + same * (point - self.nominal)
         return pulled
 
     def refuted(self, precision: float) -> tuple[float, Array | None]:
@@ -136,11 +141,38 @@ def unproved(
 ) -> tuple[Array, Array | None, int]:
     """Problems that stay unproved in a box, a point beyond a limit, and boxes looked at."""
     lower, upper = search.unit(size)
-    total, m, gap = len(search.model.time), len(search.model.outputs), 0.1 * search.gap
-    allowed = 1 - np.repeat(search.error.reshape(total * m), 2)
-    optima = problems(np.arange(total), m, len(lower)).take(pending)
-    optima.point[:], optima.value[:] = (lower + upper) / 2, allowed[pending] - gap
-    found = BranchAndBound(gap, budget).run(search.model, lower, upper, optima, workers=workers)
-    left = pending[found.proved > allowed[pending] + 1e-12]
-    point = search.model.boxes.to_physical(found.point[int(found.value.argmax())])
-    return left, point if search.share(point) > 1 else None, found.boxes
+    allowed = (1 - np.repeat(search.error.ravel(), 2))[pending]
+    left, at, boxes = enclosed(search, lower, upper, pending, allowed, budget, workers)
+    return left, at if search.share(at) > 1 else None, boxes
+
+
+def enclosed(
+    search: LimitSearch,
+    lower: Array,
+    upper: Array,
+    pending: Array,
+    allowed: Array,
+    budget: float,
+    workers: int = 1,
+) -> tuple[Array, Array, int]:
+    """Problems whose side × output is not proved to stay at most at what is allowed.
+
+    Args:
+        search: The motion with its model.
+        lower: Lower ends of a box in the model's coordinates, shape (d,).
+        upper: Upper ends.
+        pending: Numbers of N problems, (node · m + output) · 2 + (1 for upper bounds).
+        allowed: What each may reach, shape (N,), in units of the limits.
+        budget: Most boxes per problem on average.
+        workers: Threads.
+
+    Returns:
+        Those problems, the parameters of the greatest value found, and boxes looked at.
+    """
+    model, gap = search.model, 0.1 * search.gap
+    nodes = np.arange(len(model.time))
+    optima = problems(nodes, len(model.outputs), len(lower)).take(pending)
+    optima.point[:], optima.value[:] = (lower + upper) / 2, allowed - gap
+    found = BranchAndBound(gap, budget).run(model, lower, upper, optima, workers=workers)
+    at = model.boxes.to_physical(found.point[int(found.value.argmax())])
+    return pending[found.proved > allowed + 1e-12], at, found.boxes

@@ -108,9 +108,8 @@ def safe_scale(
     if not most > 0:
         raise ValueError(f"most: {most:g} is not allowed; the largest scale must be positive")
     begun, names = time.perf_counter(), tuple(nominal)
-    flow = LinearFlow(replace(frame, outputs=tuple(limits)), names, duration, step, Exact())
-    centre = np.array([*nominal.values()], float)
-    search = LimitSearch(flow, reach, np.array([*limits.values()], float), centre, GAP)
+    search = limit_search(frame, nominal, reach, limits, duration, step)
+    flow, centre = search.flow, search.nominal
     if (nominal_share := search.share(centre)) >= 1:
         seconds = time.perf_counter() - begun
         box, shares = (centre, centre), (nominal_share, nominal_share)
@@ -153,6 +152,21 @@ def safe_scale(
         boxes,
         seconds,
     )
+
+
+def limit_search(
+    frame: StoreyFrame,
+    nominal: Mapping[str, float],
+    reach: Reach,
+    limits: Mapping[str, float],
+    duration: float,
+    step: float,
+) -> LimitSearch:
+    """The exact motion of the limited outputs, and the boxes, as for `safe_scale`."""
+    limited = replace(frame, outputs=tuple(limits))
+    flow = LinearFlow(limited, tuple(nominal), duration, step, Exact())
+    sizes, centre = np.array([*limits.values()], float), np.array([*nominal.values()], float)
+    return LimitSearch(flow, reach, sizes, centre, GAP)
 
 
 def scaled(nominal: Array, below: Array, above: Array) -> Reach:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Exact, LinearFlow, StoreyFrame, envelope
-from alphacut.frame.decisions.exceeding import exceeding
-from alphacut.fuzzy import Interval, Triangular
+from alphacut.frame.decisions.exceeding import any_exceeding, exceeding
+from alphacut.fuzzy import FuzzyNumber, Interval, Triangular
 
 # one floor without damping: |q| = v0 / ω, absolute acceleration v0 ω, ω² = 24 E I / (l³ m)
 RIGIDITY = 24 * 2.5e10 * 1e-6 / 27
@@ -67,7 +67,61 @@ def test_safe_and_hopeless_limits_are_told() -> None:
     assert exceeding(ONE, modulus, {"q1": 10.0}, **TIME).verdict == "safe"
     broken = exceeding(ONE, modulus, {"q1": 1e-3}, **TIME)
     assert broken.possibility == (1, 1)
-    assert broken.necessity == (0, 1)
+    assert broken.necessity == (1, 1)
+    assert broken.verdict == "unsafe"
+
+
+def test_exceeding_is_as_necessary_as_keeping_is_impossible() -> None:
+    inputs = {"m1": Triangular(800.0, 1000.0, 1200.0), "E": Triangular(2e10, 2.5e10, 3e10)}
+    rng = np.random.default_rng()
+    alpha = float(rng.uniform(0.1, 0.9))
+    mass, modulus = inputs["m1"].cut(alpha).lower, inputs["E"].cut(alpha).upper
+    limit = 0.5 * np.sqrt(mass / (RIGIDITY * modulus / 2.5e10))  # the least peak of this cut
+    found = exceeding(ONE, inputs, {"q1": float(limit)}, **TIME)
+    assert found.possibility == (1, 1)
+    low, high = found.necessity
+    assert low <= 1 - alpha + 1e-3
+    assert high >= 1 - alpha - 1e-3  # nodes miss the peak by less
+    assert high - low < 0.01
+    assert found.scale.nature == "guaranteed"
+
+
+def test_one_of_several_limits_may_surely_be_passed_where_none_is_by_itself() -> None:
+    modulus = {"E": Triangular(2e10, 2.5e10, 3e10)}
+    drift = 0.5 * np.sqrt(1e3 / (RIGIDITY * 1.08))  # passed up to E = 27 GPa: kept to 0.6
+    acceleration = 0.5 * np.sqrt(RIGIDITY * 0.92 / 1e3)  # passed from 23 GPa on: kept to 0.6
+    limits = {"drift1": float(drift), "a1": float(acceleration)}
+    each = {k: exceeding(ONE, modulus, {k: x}, **TIME) for k, x in limits.items()}
+    assert all(x.necessity == pytest.approx((0.4, 0.4), abs=0.01) for x in each.values())
+    together = any_exceeding(each, exceeding(ONE, modulus, limits, **TIME))
+    assert together.possibility == (1, 1)
+    assert together.necessity[0] == 1
+    assert any_exceeding(each).necessity[0] == pytest.approx(0.4, abs=0.01)
+
+
+def test_no_point_of_a_box_called_sure_keeps_the_limits() -> None:
+    rng = np.random.default_rng()
+    for _ in range(2):
+        stiffness = 10 ** rng.uniform(-6.2, -5.8)
+        frame = StoreyFrame([1e3, 800.0], [3.0, 2.8], 2.5e10, stiffness, v0=[0.3, 0.5])
+        inputs: dict[str, FuzzyNumber] = {
+            "E": Triangular(2e10, 2.5e10, 3.2e10),
+            "m1": Triangular(700, 1000, 1200),
+            "l2": Triangular(2.5, 2.8, 3.0),
+        }
+        flow = LinearFlow(frame, tuple(inputs), 2.0, 0.01, Exact())
+        supports = np.array([x.support for x in inputs.values()])
+        points = rng.uniform(*supports.T, (2000, 3))
+        peaks = np.abs(flow.values(points)).max(1)
+        limits = {"q1": float(np.quantile(peaks[:, 0], 0.1)), "q2": float(peaks[:, 1].max() * 1.1)}
+        found = exceeding(frame, inputs, limits, duration=2.0, step=0.01)
+        kept = (peaks <= [*limits.values()]).all(1)
+        columns = zip(inputs.values(), points.T, strict=True)
+        degree = np.min([number.membership(x) for number, x in columns], axis=0)
+        assert degree[kept].max() <= 1 - found.necessity[0]
+        assert degree[~kept].max() <= found.possibility[1]
+        assert found.necessity[0] <= found.necessity[1] <= 1
+        assert found.necessity[1] - found.necessity[0] < 0.05
 
 
 def test_accelerations_under_unknown_masses_are_not_called_proved() -> None:
