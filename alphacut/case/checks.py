@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Iterator
 from functools import partial
 
+from alphacut.case import limits as questions
 from alphacut.case.case import Case, files_of
 from alphacut.case.checks_image import image
 from alphacut.case.checks_material import particles, radius, sphere_model
@@ -51,7 +52,10 @@ def checks(*, modal: bool = False) -> Iterator[Check]:
     yield where("envelope", integrators)
     yield where("envelope", idle_envelope)
     yield where("exceedance", exceedance)
-    yield where("update", update)
+    yield where("update", lambda case: levels("update.alpha", case.update.alpha))
+    yield where("update", questions.update)
+    yield where("decision", questions.decision)
+    yield where("joint", questions.joint)
 
 
 def where(section: str, check: Check) -> Check:
@@ -277,21 +281,6 @@ def exceedance(case: Case) -> Iterator[Problem]:
             limit_of(case)  # of a storey that is not there nothing can be said
     except BadInput as error:
         yield from error.problems
-
-
-def update(case: Case) -> Iterator[Problem]:
-    """Modes are those of a storey frame, and levels rise from above 0."""
-    alpha = case.update.alpha
-    yield from levels("update.alpha", alpha)
-    if case.sections.frame is None:
-        yield Problem("update", "natural modes are learned from for a storey frame", "", "[frame]")
-    if alpha[0] <= 0:
-        yield Problem(
-            "update.alpha",
-            "measured values decide no cut at α = 0",
-            str(list(alpha)),
-            "levels above 0, as [0.05, 0.5, 1]",
-        )
 
 
 def times(case: Case) -> Iterator[Problem]:

@@ -1,22 +1,55 @@
-"""Limit of an exceedance and tolerance of envelopes, each in the unit of its output."""
+"""Limits and tolerances in the unit of their output, and checks of questions to the motion."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from alphacut.case.case import Case
+from alphacut.case.names import OUTPUTS, structures
+from alphacut.case.values import nearest
 from alphacut.io import quantity
+from alphacut.io.problem import BadInput, Problem
 
 
 def limit_of(case: Case) -> float:
+    """The limit of [exceedance] in the SI unit of its output, as `limit_in`."""
+    return limit_in(case, "exceedance.limit", case.exceedance.output, case.exceedance.limit)
+
+
+def limits_of(case: Case) -> dict[str, float]:
+    """The limits of [decision] by output, as `limit_in`.
+
+    Raises:
+        BadInput: One is no sentence such as "drift1 <= 40 mm", or an output has two.
+    """
+    key, found = "decision.limits", {}
+    for text in case.decision.limits:
+        name, bound, limit = (part.strip() for part in text.partition("<="))
+        if not bound or not re.fullmatch(r"\w+", name):
+            what = f"'{text}' is no limit"
+            raise case.refuse(key, what, "an output, <= and a quantity, as 'drift1 <= 40 mm'")
+        if name in found:
+            raise case.refuse(key, f"{name} has two limits", "one for each output")
+        found[name] = limit_in(case, key, name, limit)
+    return found
+
+
+def limit_in(case: Case, key: str, name: str, text: str) -> float:
     """Limit in the SI unit of its output; a drift also as a share of the height.
+
+    Args:
+        case: The case.
+        key: The key that gives it, for the message.
+        name: The output.
+        text: The limit with its unit.
 
     Raises:
         BadInput: It is no positive quantity of that unit.
     """
     from alphacut.frame.outputs import output_unit
 
-    name, text = case.exceedance.output, case.exceedance.limit
     unit, height = output_unit(name), storey_height(case, name)
     try:
         share = height is not None and text.rstrip().endswith("%")
@@ -27,9 +60,9 @@ def limit_of(case: Case) -> float:
         kind = f"a quantity in {unit}, as the output is" + (
             ", or a share of the storey's height such as 0.5 %" if height else ""
         )
-        raise case.refuse("exceedance.limit", str(error), kind) from None
+        raise case.refuse(key, str(error), kind) from None
     if not limit > 0:
-        raise case.refuse("exceedance.limit", "out of range", "greater than 0")
+        raise case.refuse(key, "out of range", "greater than 0")
     return limit
 
 
@@ -72,3 +105,69 @@ def asked_tolerance(case: Case) -> AskedTolerance | None:
         if value is not None and case.asked(key):
             return AskedTolerance(value, unit, key in case.changed)
     return None
+
+
+def observed(case: Case) -> tuple[str, ...]:
+    """Outputs of the case's structure."""
+    if case.sections.frame is None:
+        return next((OUTPUTS[name] for name in structures(case)), ())
+    every = tuple(f"q{floor + 1}" for floor in range(len(case.frame.masses)))
+    return case.frame.outputs or every
+
+
+def unobserved(case: Case, key: str, names: tuple[str, ...]) -> Iterator[Problem]:
+    """Outputs that the structure does not have, or is not asked for."""
+    known = observed(case)
+    for name in names:
+        if name not in known:
+            what = f"{name} is not among the structure's outputs"
+            yield Problem(key, what, name, ", ".join(known), nearest(name, known))
+
+
+def decision(case: Case) -> Iterator[Problem]:
+    """Limits are on observed outputs of a storey frame that vibrates."""
+    if case.sections.envelope is None or "envelope" not in case.stages:
+        yield Problem("decision", "limits are judged over stage envelope", "", "that stage")
+    if case.sections.frame is None:
+        yield Problem("decision", "limits are judged for a storey frame", "", "[frame]")
+        return
+    try:
+        yield from unobserved(case, "decision.limits", tuple(limits_of(case)))
+    except BadInput as error:
+        yield from error.problems
+
+
+def joint(case: Case) -> Iterator[Problem]:
+    """Two outputs at a time, or one at two, within the duration."""
+    outputs, times = case.joint.outputs, case.joint.times
+    yield from unobserved(case, "joint.outputs", outputs)
+    if sorted((len(outputs), len(times))) != [1, 2]:
+        got = f"{len(outputs)} outputs and {len(times)} times"
+        allowed = "two outputs and one time, or one output and two times"
+        yield Problem("joint", f"got {got}", "", allowed)
+    if case.sections.envelope is None or "envelope" not in case.stages:
+        yield Problem("joint", "outputs are followed over stage envelope", "", "that stage")
+        return
+    step, duration = case.envelope.step, case.envelope.duration
+    for time in times:
+        whole = abs(round(time / step) * step - time) <= 1e-9 * max(time, step)
+        if not whole or time > duration * (1 + 1e-9):
+            what = f"{time:g} s is no node of the simulation"
+            allowed = f"multiples of envelope.step, {step:g} s, up to {duration:g} s"
+            yield Problem("joint.times", what, f"{time:g} s", allowed)
+    if len(times) == 2 and times[0] == times[1]:
+        yield Problem("joint.times", "both times are the same", f"{times[0]:g} s")
+
+
+def update(case: Case) -> Iterator[Problem]:
+    """Modes are those of a storey frame, and levels begin above 0."""
+    alpha = case.update.alpha
+    if case.sections.frame is None:
+        yield Problem("update", "natural modes are learned from for a storey frame", "", "[frame]")
+    if alpha[0] <= 0:
+        yield Problem(
+            "update.alpha",
+            "measured values decide no cut at α = 0",
+            str(list(alpha)),
+            "levels above 0, as [0.05, 0.5, 1]",
+        )

@@ -33,8 +33,8 @@ from alphacut.stages import width_shares as shares
 from alphacut.stages.contract import require_choice
 from alphacut.stages.pipeline import Chain, Results
 from alphacut.stages.readiness import ready
+from alphacut.stages.vibration import decision, update
 from alphacut.stages.vibration import exceedance as outcomes
-from alphacut.stages.vibration.update import sentences
 
 ABOUT = (
     "run every stage of a case: files, figures, summary, and the comparison with the paper where"
@@ -129,7 +129,17 @@ PARTS = {
     "microstructure": ("microstructure",),
     "modulus": ("radius", "cell", "mesh", "modulus", "response"),
     "image": ("cell", "modulus.alpha"),
-    "envelope": ("frame", "pendulum", "tower", "envelope", "update", "exceedance", "modulus"),
+    "envelope": (
+        "frame",
+        "pendulum",
+        "tower",
+        "envelope",
+        "update",
+        "exceedance",
+        "decision",
+        "joint",
+        "modulus",
+    ),
 }
 """Sections that a stage reads."""
 
@@ -180,7 +190,8 @@ def main_numbers(found: Document) -> str:
         for output, unit, *values in ends:
             low, high = (engineering(value, unit, beside=largest[unit]) for value in values)
             lines.append(f"{output} from {low} to {high} at the lowest α (study {name})")
-    lines += sentences(found["update"]) if "update" in found else []
+    lines += update.sentences(found["update"]) if "update" in found else []
+    lines += decision.sentences(found["decision"]) if "decision" in found else []
     limit = outcomes.sentence(found["exceedance"]) if "exceedance" in found else ""
     return "".join(f"{line}\n" for line in lines) + limit
 

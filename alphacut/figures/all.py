@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from alphacut.figures import decision as figure_decision
 from alphacut.figures import envelope as figure_envelope
 from alphacut.figures import follower as figure_follower
 from alphacut.figures import frame as figure_frame
@@ -67,6 +68,8 @@ def drawings(results: Results) -> Iterator[Drawing]:
     yield from update_drawings(results)
     if (limited := results.exceedance) is not None:
         yield "exceedance", lambda: figure_envelope.exceedance(limited)
+    if (decided := results.decision) is not None:
+        yield "decision", lambda: figure_decision.decision(decided)
     for study in results.studies:
         yield from figure_envelope.drawings(study, results.envelopes[study.name])
 

@@ -32,6 +32,7 @@ FIGURES = {
     "exceedance": "Fuzzy probability of exceeding a limit, over the limit",
     "shares-modulus": "Share of each input in the width of the modulus",
     "shares-over-time": "Share of each input in the width of the vibration over time",
+    "decision": "Fuzzy peak of each limited output beside its limit",
     "update-inputs": "Inputs before and after natural modes were measured, level by level",
     "two-point": (
         "Why two points do not describe particles: equal discs of the same area fraction, for"

@@ -7,9 +7,10 @@ from pathlib import Path
 from markupsafe import Markup
 
 from alphacut.io.files import Document
+from alphacut.io.units import engineering
 from alphacut.report.figures import listed
 from alphacut.report.tables import paragraphs, section, sentence, table
-from alphacut.stages.vibration.update import sentences
+from alphacut.stages.vibration import decision, update
 
 
 def learned(summary: Document, folder: Path) -> Markup:
@@ -18,7 +19,7 @@ def learned(summary: Document, folder: Path) -> Markup:
     if "refuted" in found:
         refuted = sentence(found["refuted"]) + " The envelopes rest on the priors."
         return section(title, paragraphs(refuted))
-    words = [sentence(line) for line in sentences(found)[1 + len(found["inputs"]) :]]
+    words = [sentence(line) for line in update.sentences(found)[1 + len(found["inputs"]) :]]
     rows = [
         (
             name,
@@ -36,3 +37,35 @@ def learned(summary: Document, folder: Path) -> Markup:
         table(head, rows),
         *(listed(summary, folder, f"update-{name}") for name in names),
     )
+
+
+def decided(summary: Document, folder: Path) -> Markup:
+    """How possible and how necessary it is that limits are exceeded, and the safety margins."""
+    found = summary["decision"]
+    words = [sentence(line) for line in decision.sentences(found)][len(found["limits"]) :]
+    rows = []
+    for name, one in found["limits"].items():
+        allowed, margins = "", ["", ""]
+        if (margin := found["margins"].get(name)) is not None:
+            unit, largest = margin["unit"], float(margin["limit"])
+            allowed = engineering(largest, unit)
+            margins = [
+                " … ".join(
+                    engineering(margin[side][level], unit, beside=largest)
+                    for side in ("lower", "upper")
+                )
+                for level in (0, -1)
+            ]
+        degrees = (
+            f"{low:.4g} … {high:.4g}" for low, high in (one["possibility"], one["necessity"])
+        )
+        rows.append((name, allowed, *degrees, one["verdict"], *margins))
+    levels = (f"margin at α = {found['alpha'][level]:g}" for level in (0, -1))
+    head = ("magnitude of", "limit", "possibly exceeded", "necessarily", "verdict", *levels)
+    meaning = (
+        "Exceeding a limit at any node is possible to the degree of the highest α-cut that holds"
+        " such a motion, and necessary to one less the degree to which keeping it is possible."
+        ""
+    )
+    drawn = listed(summary, folder, "decision")
+    return section("Decision", paragraphs(meaning), table(head, rows), drawn, paragraphs(*words))

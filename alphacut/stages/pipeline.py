@@ -19,7 +19,7 @@ from alphacut.stages.image.reading import study_of
 from alphacut.stages.material import microstructure, modulus, response
 from alphacut.stages.material.campaign import campaign
 from alphacut.stages.material.microstructure import write as write_microstructure
-from alphacut.stages.vibration import envelope, update
+from alphacut.stages.vibration import decision, envelope, update
 from alphacut.stages.vibration import exceedance as outcomes
 from alphacut.stages.vibration.envelope_task import EnvelopeTask, task_of
 from alphacut.stages.vibration.structure import Structure, structure
@@ -100,9 +100,11 @@ class Chain:
                 study.name: self.envelope(study, handed, wanted) for study in studies(self.case)
             }
         stress = self.response(cell) if cell is not None and self.case.sections.response else None
-        limit = None
+        limit, decided = None, None
         if wanted is not None and self.case.sections.exceedance:
             limit = self.exceedance(handed, wanted)
+        if wanted is not None and self.case.sections.decision:
+            decided = self.decision(handed, wanted, envelopes)
         return Results(
             self.case,
             self.folder,
@@ -115,6 +117,7 @@ class Chain:
             picture,
             learned,
             bands,
+            decided,
         )
 
     def with_particles(self) -> Case:
@@ -232,6 +235,26 @@ class Chain:
 
         return self.stored("exceedance.nc", key, compute)
 
+    def decision(
+        self,
+        handed: FuzzyNumber | None,
+        wanted: Structure,
+        envelopes: Mapping[str, xarray.Dataset],
+    ) -> xarray.Dataset:
+        """How possible and how necessary it is that limits are exceeded, in decision.nc."""
+        key = self.vibration({"wanted": [self.case.decision, self.case.envelope]}, handed)
+        task = task_of(self.case)
+        peaks = [envelopes[study.name] for study in studies(self.case) if study.task == task]
+
+        def compute(path: Path) -> None:
+            with progress("Decision", quiet=self.quiet) as tick:
+                found = decision.decision(
+                    self.case, wanted, next(iter(peaks), None), workers=self.workers, progress=tick
+                )
+            envelope.write(found, path, case_text=self.case.text_of_file, key=key)
+
+        return self.stored("decision.nc", key, compute)
+
     def vibration(self, wanted: Document, handed: FuzzyNumber | None) -> str:
         """Fingerprint of a result for the structure, its record and the modulus."""
         given = self.case.sections
@@ -271,6 +294,7 @@ class Results:
         image: Dataset of image.nc; None where the case shows none.
         learned: What measured modes leave of the inputs; None where the case has none.
         update: Dataset of update.nc, likewise.
+        decision: Dataset of decision.nc; None where the case has no such section.
     """
 
     case: Case
@@ -284,6 +308,7 @@ class Results:
     image: xarray.Dataset | None = None
     learned: update.Learned | None = None
     update: xarray.Dataset | None = None
+    decision: xarray.Dataset | None = None
 
     @property
     def studies(self) -> tuple[Study, ...]:

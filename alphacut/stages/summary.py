@@ -18,6 +18,7 @@ from alphacut.stages.material import modulus, response, spheres
 from alphacut.stages.material.cell import GPA, modal_values, parts
 from alphacut.stages.pipeline import Results
 from alphacut.stages.vibration import exceedance as outcomes
+from alphacut.stages.vibration.decision import decision_document
 from alphacut.stages.vibration.structure_words import structure_words
 from alphacut.stages.vibration.update import narrower
 from alphacut.stochastic import HermiteMap
@@ -70,6 +71,8 @@ def summary(results: Results) -> Document:
         found["update"] = learned_numbers(results)
     if results.exceedance is not None:
         found["exceedance"] = outcomes.exceedance_document(results.exceedance)
+    if results.decision is not None:
+        found["decision"] = decision_document(results.decision)
     found["paper"] = comparison(case.quoted, found) if case.quoted else []
     return found
 

@@ -102,7 +102,7 @@ def exceeding(
         progress=progress,
     )
     safe = 0.0 if found.safe is None else found.safe
-    upper = 1 - safe if safe < most or lowest else 0.0
+    upper = lowest if safe >= most else 1 - safe
     lower = 1 - found.unsafe if np.isfinite(found.unsafe) else 0.0
     necessity, sampled = (0.0, 0.0), ""
     if found.safe is None:

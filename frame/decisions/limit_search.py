@@ -22,6 +22,9 @@ from alphacut.frame.modal.search import Optima, problems, refine, trajectories
 REFINED = 64
 """Motions of a search that are driven to their local extreme."""
 
+LEAST = 1e-9
+"""Share of the largest size below which a witness lies in the core that all boxes hold."""
+
 Reach = Callable[[float], tuple[Array, Array]]
 
 
@@ -110,7 +113,7 @@ class LimitSearch:
         if witness is None:
             return np.inf, None
         low, high = 0.0, self.size_of(witness)
-        while high - low > precision * high:
+        while high - low > precision * high and high > LEAST * self.size:
             middle = low + (high - low) * (0.9 if low == 0 else 0.5)
             found = self.witness(middle)
             if found is None:

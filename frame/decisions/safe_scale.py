@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.decisions.limit_search import LimitSearch, Reach, unproved
+from alphacut.frame.decisions.limit_search import LEAST, LimitSearch, Reach, unproved
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.structures.storey import StoreyFrame
@@ -118,11 +118,12 @@ def safe_scale(
     search.gap = min(GAP, FINE * (1 - nominal_share))
     search.fit(most)
     unsafe, witness = search.refuted(precision)
-    if witness is not None and unsafe < 0.9 * most:
+    if LEAST * most < unsafe < 0.9 * most:
         search.fit(unsafe)
     pending: Array = np.arange(2 * len(flow.time) * len(limits))
     boxes, safe = 0, 0.0
-    for done, shrink in enumerate((0.0, *SHRINK) if witness is None else SHRINK):
+    shrinks = (0.0, *SHRINK) if witness is None else SHRINK
+    for done, shrink in enumerate(shrinks if unsafe > LEAST * most else ()):
         size = (1 - shrink) * min(unsafe, most)
         pending, beyond, looked = unproved(search, size, pending, budget, workers)
         boxes += looked

@@ -18,8 +18,10 @@ from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.decisions.limit_search import LimitSearch, enclosed
 from alphacut.frame.modal.search import trajectories
 
-PARTS = 400
+PARTS = 200
 """Parts of a box that are looked at before its proof is given up."""
+UNDECIDED = 3
+"""Sizes without a proof or a refutation after which the search ends."""
 POINTS = 64
 """Points besides corners at which a part is looked at."""
 
@@ -55,16 +57,17 @@ def sure_exceeding(search: LimitSearch, most: float, precision: float = 1e-3) ->
     if not proved:
         witness = witness if found is None else found
         return Sure(None, high if witness is None else search.size_of(witness), witness)
-    top = most
+    top, undecided = most, 0
     if witness is not None:
         high = top = min(search.size_of(witness), most)
-    while top - low > precision * most:
+    while top - low > precision * most and undecided < UNDECIDED:
         middle = (low + top) / 2
         proved, found = surely(search, middle)
         if not proved and found is None:
             found = keeping(search, middle)
         if found is not None:
             high, witness = min(search.size_of(found), middle), found
+        undecided += not proved and found is None
         low, top = (middle, top) if proved else (low, middle)
     return Sure(low, high, witness)
 

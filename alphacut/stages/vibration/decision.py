@@ -1,0 +1,184 @@
+"""How possibly and how necessarily a case's frame exceeds its limits, and its safety margin."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from alphacut.case.case import Case
+from alphacut.case.limits import limits_of
+from alphacut.io.files import Document
+from alphacut.io.problem import BadInput, Problem
+from alphacut.io.progress import Tick
+from alphacut.io.units import engineering
+from alphacut.stages.vibration import envelope
+from alphacut.stages.vibration.envelope_task import EnvelopeTask, task_of
+from alphacut.stages.vibration.exceedance import with_peaks
+from alphacut.stages.vibration.structure import Structure
+
+if TYPE_CHECKING:
+    import xarray
+
+    from alphacut.frame.decisions.exceeding import Exceeding
+
+ANY = "any of them"
+
+
+def decision(
+    case: Case,
+    wanted: Structure,
+    peaks: xarray.Dataset | None = None,
+    *,
+    workers: int = 1,
+    progress: Tick | None = None,
+) -> xarray.Dataset:
+    """Decisions on every limit of [decision] and on any of them, with the margins of the peaks.
+
+    Args:
+        case: With the sections decision, envelope and frame.
+        wanted: The structure.
+        peaks: The envelope that [envelope] asks for, where it is computed already.
+        workers: Processes of the proof.
+        progress: Told the share done.
+
+    Raises:
+        BadInput: The motion has no model that a proof could rest on.
+    """
+    from alphacut.frame.structures.modes import ModalError
+
+    limits, task = limits_of(case), task_of(case)
+    if peaks is None:
+        peaks = with_peaks(envelope.compute(wanted, task), wanted, task)
+    try:
+        found = _decisions(wanted, task, limits, workers, progress)
+    except (ValueError, ModalError) as error:
+        raise BadInput(Problem("decision", str(error), file=str(case.path))) from None
+    return _dataset(found, limits, peaks, task)
+
+
+def _decisions(
+    wanted: Structure,
+    task: EnvelopeTask,
+    limits: Mapping[str, float],
+    workers: int,
+    progress: Tick | None,
+) -> dict[str, Exceeding]:
+    from alphacut.frame.decisions.exceeding import any_exceeding, exceeding
+
+    assert wanted.frame is not None
+    frame, inputs, count = wanted.frame, wanted.inputs(task.fuzzy), len(limits) + 1
+
+    def of(part: Mapping[str, float]) -> Exceeding:
+        return exceeding(
+            frame,
+            inputs,
+            part,
+            duration=task.duration,
+            step=task.step,
+            lowest=task.alpha[0],
+            workers=workers,
+        )
+
+    each = {}
+    for name, limit in limits.items():
+        each[name] = of({name: limit})
+        if progress:
+            progress(len(each) / count)
+    if count == 2:
+        return each
+    passed = any(one.scale.safe is None for one in each.values())
+    return {**each, ANY: any_exceeding(each, of(limits) if passed else None)}
+
+
+def _dataset(
+    found: Mapping[str, Exceeding],
+    limits: Mapping[str, float],
+    peaks: xarray.Dataset,
+    task: EnvelopeTask,
+) -> xarray.Dataset:
+    import xarray
+
+    names = [*next(iter(found.values())).scale.names]
+    nowhere = np.full(len(names), np.nan)
+    witness = [nowhere if x.scale.witness is None else x.scale.witness for x in found.values()]
+    of = peaks["peak"].sel(output=list(limits)).transpose("alpha", "bound", "output").values
+    beyond = peaks["peak_error"].sel(output=list(limits)).values if "peak_error" in peaks else 0.0
+    ends = np.stack([of[:, 1] + beyond, np.maximum(of[:, 0] - beyond, 0.0)], axis=1)
+    margin = np.array([*limits.values()]) - ends
+    words = {"units": "SI, by output", "long_name": "limit less the peak of the magnitude"}
+    return xarray.Dataset(
+        {
+            "possibility": (("limit", "bound"), [x.possibility for x in found.values()]),
+            "necessity": (("limit", "bound"), [x.necessity for x in found.values()]),
+            "witness": (("limit", "parameter"), witness, {"units": "SI, by input"}),
+            "margin": (("alpha", "bound", "output"), margin, words),
+        },
+        {
+            "limit": list(found),
+            "bound": ["lower", "upper"],
+            "parameter": names,
+            "alpha": peaks["alpha"].values,
+            "output": list(limits),
+            "allowed": ("output", [*limits.values()], {"units": "SI, by output"}),
+        },
+        {
+            "verdict": ", ".join(x.verdict for x in found.values()),
+            "nature": ", ".join(x.scale.nature for x in found.values()),
+            "reason": next((x.scale.reason for x in found.values() if x.scale.reason), ""),
+            "claim": next(iter(found.values())).claim,
+            "step": task.step,
+            "peaks": str(peaks.attrs["nature"]),
+        },
+    )
+
+
+def decision_document(found: xarray.Dataset) -> Document:
+    """Decisions as they are printed with ``--json``, in SI."""
+    from alphacut.frame.outputs import output_unit
+
+    limits, margins = {}, {}
+    told = zip(found.attrs["verdict"].split(", "), found.attrs["nature"].split(", "), strict=True)
+    for name, (verdict, nature) in zip(map(str, found["limit"].values), told, strict=True):
+        one = found.sel(limit=name)
+        point = dict(zip(map(str, one["parameter"].values), one["witness"].values, strict=True))
+        limits[name] = {
+            "possibility": one["possibility"].values,
+            "necessity": one["necessity"].values,
+            "verdict": verdict,
+            "nature": nature,
+            "witness": None if np.isnan(one["witness"].values).any() else point,
+        }
+    for name in map(str, found["output"].values):
+        margins[name] = {
+            "limit": float(found["allowed"].sel(output=name)),
+            "unit": output_unit(name),
+            **{side: found["margin"].sel(output=name, bound=side).values for side in SIDES},
+        }
+    facts = {key: found.attrs[key] for key in ("reason", "claim", "step", "peaks")}
+    return {"limits": limits, "alpha": found["alpha"].values, "margins": margins, **facts}
+
+
+SIDES = ("lower", "upper")
+
+
+def sentences(found: Document) -> Iterator[str]:
+    """A line for each limit and one for any of them, then the proof and what is claimed."""
+    for name, one in found["limits"].items():
+        of = name
+        if name in found["margins"]:
+            margin = found["margins"][name]
+            of = f"|{name}| > {engineering(margin['limit'], margin['unit'])}"
+        (a, b), (c, d) = one["possibility"], one["necessity"]
+        degrees = f"possible to {a:.4g} … {b:.4g}, necessary to {c:.4g} … {d:.4g}"
+        worth = f"{one['nature']}, at nodes every {found['step']:g} s"
+        yield f"{of}: {degrees}: {one['verdict']} ({worth})"
+    for name, margin in found["margins"].items():
+        ends = (engineering(float(margin[side][0]), margin["unit"], digits=3) for side in SIDES)
+        level = f"α = {found['alpha'][0]:g}"
+        yield f"safety margin of {name} at {level}: {' … '.join(ends)} (peaks {found['peaks']})"
+    if found["reason"]:
+        yield str(found["reason"])
+    if found["claim"]:
+        yield f"a limit is exceeded with P at most as it is possible: {found['claim']}"

@@ -1,0 +1,109 @@
+"""Section [decision]: degrees, margins, report, and limits that make no sense."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from alphacut.entry import main
+
+# one floor without damping: |q| = v0 / ω with ω² = 24 E I / (l³ m), base shear v0 ω m
+CASE = """
+schema = 1
+title = "One floor"
+about = "A mass that is pushed"
+stages = ["envelope"]
+[frame]
+masses = ["[800, 1000, 1200] kg"]
+lengths = ["3 m"]
+modulus = "25 GPa"
+second_moment = "1e-6 m^4"
+rayleigh_mass = "0 1/s"
+displacements = ["0 m"]
+velocities = ["0.5 m/s"]
+outputs = ["q1", "drift1", "base_shear"]
+[envelope]
+fuzzy = ["m1"]
+duration = "2 s"
+step = "1 ms"
+[decision]
+limits = LIMITS
+"""
+RIGIDITY = 24 * 2.5e10 * 1e-6 / 27
+
+
+def written(folder: Path, limits: object, more: str = "") -> Path:
+    path = folder / "one.toml"
+    path.write_text(CASE.replace("LIMITS", json.dumps(limits)) + more, encoding="utf-8")
+    return path
+
+
+def peak(mass: float) -> float:
+    return 0.5 * float(np.sqrt(mass / RIGIDITY))
+
+
+def test_degrees_and_margins_of_limits_and_of_any(tmp_path: Path) -> None:
+    share = 100 * peak(900) / 3  # of the storey's height: exceeded beyond 900 kg, kept to 0.5
+    shear = 0.5 * np.sqrt(1100 * RIGIDITY)  # exceeded from m = 1100 on: possible to 0.5
+    limits = [f"drift1 <= {share} %", f"base_shear <= {shear} N"]
+    out = tmp_path / "out"
+    assert main(["run", str(written(tmp_path, limits)), "--out", str(out), "--quiet"]) == 0
+    found = json.loads((out / "summary.json").read_text(encoding="utf-8"))["decision"]
+    one, two, both = (found["limits"][x] for x in ("drift1", "base_shear", "any of them"))
+    assert one["possibility"] == [1, 1]
+    assert one["necessity"] == pytest.approx([0.5, 0.5], abs=0.01)
+    assert two["possibility"] == pytest.approx([0.5, 0.5], abs=0.01)
+    assert two["necessity"] == [0, 0]
+    assert two["witness"]["m1"] == pytest.approx(1100, rel=0.01)
+    assert both["possibility"] == [1, 1]
+    assert both["necessity"] == pytest.approx([0.5, 0.5], abs=0.01)
+    assert all(x["nature"] == "guaranteed" for x in found["limits"].values())
+    margin = found["margins"]["drift1"]
+    assert margin["limit"] == pytest.approx(peak(900))
+    assert margin["lower"][0] == pytest.approx(peak(900) - peak(1200), abs=1e-4)
+    assert margin["lower"][-1] == pytest.approx(peak(900) - peak(1000), abs=1e-4)
+    assert margin["upper"][0] >= peak(900) - peak(800) - 1e-9
+    assert main(["report", str(out), "--quiet"]) == 0
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "<h2>Decision</h2>" in page
+    assert "<td>any of them</td>" in page
+    assert "Fuzzy peak of each limited output beside its limit" in page
+
+
+def test_a_safe_limit_and_a_sure_failure(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = written(tmp_path, ["q1 <= 1 m"])
+    asked = ["--out", str(tmp_path / "out"), "--no-figures"]
+    assert main(["run", str(path), *asked]) == 0
+    assert "|q1| > 1.000 m: possible to 0 … 0, necessary to 0 … 0: safe" in capsys.readouterr().out
+    assert main(["run", str(path), *asked, "--set", "decision.limits=['q1 <= 1 mm']"]) == 0
+    assert "possible to 1 … 1, necessary to 1 … 1: unsafe" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("limits", "pattern"),
+    [
+        (["q1 40 mm"], "'q1 40 mm' is no limit"),
+        (["q1 <= 40"], "decision.limits"),
+        (["q1 <= 40 kN"], "a quantity in m"),
+        (["q1 <= -4 mm"], "greater than 0"),
+        (["q1 <= 4 mm", "q1 <= 5 mm"], "q1 has two limits"),
+        (["q7 <= 4 mm"], "q7 is not among the structure's outputs"),
+        (["a1 <= 4 m/s^2"], "a1 is not among the structure's outputs"),
+        ([], "the array is empty"),
+        (3, "decision.limits"),
+    ],
+)
+def test_limits_that_make_no_sense(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], limits: object, pattern: str
+) -> None:
+    out = tmp_path / "out"
+    assert main(["run", str(written(tmp_path, limits)), "--out", str(out)]) == 2
+    told = capsys.readouterr().err.strip()
+    assert pattern in told
+    assert len(told.splitlines()) == 1
+    assert not out.exists()
