@@ -86,10 +86,11 @@ def joint_outputs(
     unit = _directions(directions)
     outer, inner = [], []
     for level in range(len(found.domain.alpha)):
-        outer.append(_polygon(unit, found.lower[level], found.upper[level]))
         reached = np.vstack([found.lower_at[level], found.upper_at[level]])
         pairs = [turned.pair(dict(zip(found.domain.names, row, strict=True))) for row in reached]
         inner.append(_hull(np.array(pairs)))
+        cut = _polygon(unit, found.lower[level], found.upper[level])
+        outer.append(cut if len(cut) else inner[-1])  # of one pair alone rounding leaves nothing
     natures = {str(found.nature)}
     return JointOutputs(
         tuple(found.domain.alpha),

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from alphacut.case.case import Case
-from alphacut.case.names import OUTPUTS, structures
+from alphacut.case.names import OUTPUTS, frame_outputs, structures
 from alphacut.case.values import nearest
 from alphacut.io import quantity
 from alphacut.io.problem import BadInput, Problem
@@ -115,9 +115,8 @@ def observed(case: Case) -> tuple[str, ...]:
     return case.frame.outputs or every
 
 
-def unobserved(case: Case, key: str, names: tuple[str, ...]) -> Iterator[Problem]:
+def unknown(key: str, names: Iterable[str], known: Sequence[str]) -> Iterator[Problem]:
     """Outputs that the structure does not have, or is not asked for."""
-    known = observed(case)
     for name in names:
         if name not in known:
             what = f"{name} is not among the structure's outputs"
@@ -125,14 +124,15 @@ def unobserved(case: Case, key: str, names: tuple[str, ...]) -> Iterator[Problem
 
 
 def decision(case: Case) -> Iterator[Problem]:
-    """Limits are on observed outputs of a storey frame that vibrates."""
+    """Limits are on outputs of a storey frame that vibrates."""
     if case.sections.envelope is None or "envelope" not in case.stages:
         yield Problem("decision", "limits are judged over stage envelope", "", "that stage")
     if case.sections.frame is None:
         yield Problem("decision", "limits are judged for a storey frame", "", "[frame]")
         return
     try:
-        yield from unobserved(case, "decision.limits", tuple(limits_of(case)))
+        known = frame_outputs(len(case.frame.masses))
+        yield from unknown("decision.limits", limits_of(case), known)
     except BadInput as error:
         yield from error.problems
 
@@ -140,7 +140,7 @@ def decision(case: Case) -> Iterator[Problem]:
 def joint(case: Case) -> Iterator[Problem]:
     """Two outputs at a time, or one at two, within the duration."""
     outputs, times = case.joint.outputs, case.joint.times
-    yield from unobserved(case, "joint.outputs", outputs)
+    yield from unknown("joint.outputs", outputs, observed(case))
     if sorted((len(outputs), len(times))) != [1, 2]:
         got = f"{len(outputs)} outputs and {len(times)} times"
         allowed = "two outputs and one time, or one output and two times"

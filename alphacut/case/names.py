@@ -109,10 +109,15 @@ def named_inputs(case: Case) -> Iterator[tuple[str, tuple[str, ...]]]:
         yield f"study[{index}].fuzzy", study.fuzzy
 
 
+def frame_outputs(floors: int) -> list[str]:
+    """Outputs that a storey frame may have."""
+    kinds = ("q", "v", "a", "drift", "shear")
+    return [f"{kind}{floor + 1}" for kind in kinds for floor in range(floors)] + ["base_shear"]
+
+
 def known_output(case: Case, floors: int) -> Iterator[Problem]:
     """The observed quantities, and the one that a study draws."""
-    kinds = ("q", "v", "a", "drift", "shear")
-    possible = [f"{kind}{floor + 1}" for kind in kinds for floor in range(floors)] + ["base_shear"]
+    possible = frame_outputs(floors)
     for name in case.frame.outputs:
         if name not in possible:
             yield Problem(

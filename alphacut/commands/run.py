@@ -33,7 +33,7 @@ from alphacut.stages import width_shares as shares
 from alphacut.stages.contract import require_choice
 from alphacut.stages.pipeline import Chain, Results
 from alphacut.stages.readiness import ready
-from alphacut.stages.vibration import decision, update
+from alphacut.stages.vibration import decision, joint, update
 from alphacut.stages.vibration import exceedance as outcomes
 
 ABOUT = (
@@ -192,6 +192,7 @@ def main_numbers(found: Document) -> str:
             lines.append(f"{output} from {low} to {high} at the lowest α (study {name})")
     lines += update.sentences(found["update"]) if "update" in found else []
     lines += decision.sentences(found["decision"]) if "decision" in found else []
+    lines += [joint.sentence(found["joint"])] if "joint" in found else []
     limit = outcomes.sentence(found["exceedance"]) if "exceedance" in found else ""
     return "".join(f"{line}\n" for line in lines) + limit
 

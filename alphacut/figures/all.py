@@ -14,6 +14,7 @@ from alphacut.figures import follower as figure_follower
 from alphacut.figures import frame as figure_frame
 from alphacut.figures import fuzzy as figure_fuzzy
 from alphacut.figures import image as figure_image
+from alphacut.figures import joint as figure_joint
 from alphacut.figures import modulus as figure_modulus
 from alphacut.figures import radius as figure_radius
 from alphacut.figures import response as figure_response
@@ -70,6 +71,8 @@ def drawings(results: Results) -> Iterator[Drawing]:
         yield "exceedance", lambda: figure_envelope.exceedance(limited)
     if (decided := results.decision) is not None:
         yield "decision", lambda: figure_decision.decision(decided)
+    if (hull := results.joint) is not None:
+        yield "joint", lambda: figure_joint.joint(hull)
     for study in results.studies:
         yield from figure_envelope.drawings(study, results.envelopes[study.name])
 

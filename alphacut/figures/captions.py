@@ -33,6 +33,10 @@ FIGURES = {
     "shares-modulus": "Share of each input in the width of the modulus",
     "shares-over-time": "Share of each input in the width of the vibration over time",
     "decision": "Fuzzy peak of each limited output beside its limit",
+    "joint": (
+        "What two values may be together: enclosing polygons shaded, hulls of pairs reached as"
+        " lines, the rectangle of both ranges dashed"
+    ),
     "update-inputs": "Inputs before and after natural modes were measured, level by level",
     "two-point": (
         "Why two points do not describe particles: equal discs of the same area fraction, for"

@@ -10,7 +10,7 @@ from alphacut.io.files import Document
 from alphacut.io.units import engineering
 from alphacut.report.figures import listed
 from alphacut.report.tables import paragraphs, section, sentence, table
-from alphacut.stages.vibration import decision, update
+from alphacut.stages.vibration import decision, joint, update
 
 
 def learned(summary: Document, folder: Path) -> Markup:
@@ -69,3 +69,17 @@ def decided(summary: Document, folder: Path) -> Markup:
     )
     drawn = listed(summary, folder, "decision")
     return section("Decision", paragraphs(meaning), table(head, rows), drawn, paragraphs(*words))
+
+
+def together(summary: Document, folder: Path) -> Markup:
+    """What two values of the motion may be together."""
+    found = summary["joint"]
+    shares = found["share_of_rectangle"]
+    rows = [
+        (f"{alpha:g}", *(f"{shares[kind][level]:.1%}" for kind in ("inner", "outer")))
+        for level, alpha in enumerate(found["alpha"])
+    ]
+    head = ("α", "reached, of the rectangle", "enclosed, of the rectangle")
+    words = [sentence(x) for x in (joint.sentence(found), found["claim"]) if x]
+    drawn = listed(summary, folder, "joint")
+    return section("What goes together", paragraphs(*words), table(head, rows), drawn)

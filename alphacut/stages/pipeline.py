@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from alphacut.case.case import Case
+from alphacut.case.key import Section
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import Document, say, whole_file
 from alphacut.io.netcdf import require_known
-from alphacut.io.progress import progress
+from alphacut.io.progress import Tick, progress
 from alphacut.io.provenance import attributes, fingerprint
 from alphacut.stages.contract import keep_modulus
 from alphacut.stages.image import bounds, document
@@ -19,7 +20,7 @@ from alphacut.stages.image.reading import study_of
 from alphacut.stages.material import microstructure, modulus, response
 from alphacut.stages.material.campaign import campaign
 from alphacut.stages.material.microstructure import write as write_microstructure
-from alphacut.stages.vibration import decision, envelope, update
+from alphacut.stages.vibration import decision, envelope, joint, update
 from alphacut.stages.vibration import exceedance as outcomes
 from alphacut.stages.vibration.envelope_task import EnvelopeTask, task_of
 from alphacut.stages.vibration.structure import Structure, structure
@@ -89,36 +90,51 @@ class Chain:
         handed = modulus.read_number(self.file("modulus.nc")) if cell is not None else handed
         picture = self.image() if "image" in self.case.stages else None
         handed = modulus.read_number(self.file("image.nc")) if picture is not None else handed
-        wanted, envelopes, learned, bands = None, {}, None, None
-        if "envelope" in self.case.stages:
-            wanted = (self.built or structure(self.case, handed)).with_modulus(handed)
-            if self.case.sections.update is not None:
-                learned = update.learned(self.case, wanted)
-                bands = self.update(handed, wanted, learned)
-                wanted = learned.structure
-            envelopes = {
-                study.name: self.envelope(study, handed, wanted) for study in studies(self.case)
-            }
-        stress = self.response(cell) if cell is not None and self.case.sections.response else None
-        limit, decided = None, None
-        if wanted is not None and self.case.sections.exceedance:
-            limit = self.exceedance(handed, wanted)
-        if wanted is not None and self.case.sections.decision:
-            decided = self.decision(handed, wanted, envelopes)
-        return Results(
-            self.case,
-            self.folder,
-            cell,
-            envelopes,
-            handed,
-            stress,
-            limit,
-            wanted,
-            picture,
-            learned,
-            bands,
-            decided,
-        )
+        found = Results(self.case, self.folder, cell, {}, handed, image=picture)
+        if cell is not None and self.case.sections.response:
+            found = replace(found, response=self.response(cell))
+        return self.after_modulus(found) if "envelope" in self.case.stages else found
+
+    def after_modulus(self, found: Results) -> Results:
+        """The structure, its envelopes, and what the case asks of its motion."""
+        case, asked, handed = self.case, self.case.sections, found.handed
+        wanted = (self.built or structure(case, handed)).with_modulus(handed)
+        if asked.update is not None:
+            learned = update.learned(case, wanted)
+            before, wanted = wanted, learned.structure
+            bands = self.asked(
+                "update",
+                asked.update,
+                handed,
+                lambda tick: update.dataset(case, before, learned, tick),
+            )
+            found = replace(found, learned=learned, update=bands)
+        envelopes = {study.name: self.envelope(study, handed, wanted) for study in studies(case)}
+        found = replace(found, envelopes=envelopes, structure=wanted)
+        if asked.exceedance:
+            told = self.asked(
+                "exceedance",
+                asked.exceedance,
+                handed,
+                lambda tick: outcomes.exceedance(case, wanted, tick),
+            )
+            found = replace(found, exceedance=told)
+        if asked.decision:
+            same = (x.name for x in studies(case) if x.task == task_of(case))
+            peaks = envelopes.get(next(same, ""))
+            told = self.asked(
+                "decision",
+                asked.decision,
+                handed,
+                lambda tick: decision.decision(
+                    case, wanted, peaks, workers=self.workers, progress=tick
+                ),
+            )
+            found = replace(found, decision=told)
+        if asked.joint:
+            told = self.asked("joint", asked.joint, handed, lambda _: joint.joint(case, wanted))
+            found = replace(found, joint=told)
+        return found
 
     def with_particles(self) -> Case:
         """Case with the radius map of its particles; the stage's files are stored."""
@@ -211,49 +227,22 @@ class Chain:
         envelope.keep_tolerance(self.case, found, best_effort=self.best_effort)
         return found
 
-    def update(
-        self, handed: FuzzyNumber | None, wanted: Structure, learned: update.Learned
-    ) -> xarray.Dataset:
-        """Inputs and envelope before and after the measured modes, in update.nc."""
-        key = self.vibration({"wanted": [self.case.update, self.case.envelope]}, handed)
-
-        def compute(path: Path) -> None:
-            with progress("Update", quiet=self.quiet) as tick:
-                found = update.dataset(self.case, wanted, learned, tick)
-            envelope.write(found, path, case_text=self.case.text_of_file, key=key)
-
-        return self.stored("update.nc", key, compute)
-
-    def exceedance(self, handed: FuzzyNumber | None, wanted: Structure) -> xarray.Dataset:
-        """The fuzzy probability of exceeding the case's limit, in exceedance.nc."""
-        key = self.vibration({"wanted": [self.case.exceedance, self.case.envelope]}, handed)
-
-        def compute(path: Path) -> None:
-            with progress("Exceedance", quiet=self.quiet) as tick:
-                found = outcomes.exceedance(self.case, wanted, tick)
-            envelope.write(found, path, case_text=self.case.text_of_file, key=key)
-
-        return self.stored("exceedance.nc", key, compute)
-
-    def decision(
+    def asked(
         self,
+        name: str,
+        section: Section,
         handed: FuzzyNumber | None,
-        wanted: Structure,
-        envelopes: Mapping[str, xarray.Dataset],
+        make: Callable[[Tick | None], xarray.Dataset],
     ) -> xarray.Dataset:
-        """How possible and how necessary it is that limits are exceeded, in decision.nc."""
-        key = self.vibration({"wanted": [self.case.decision, self.case.envelope]}, handed)
-        task = task_of(self.case)
-        peaks = [envelopes[study.name] for study in studies(self.case) if study.task == task]
+        """What a section asks of the motion of [envelope], in NAME.nc."""
+        key = self.vibration({"wanted": [section, self.case.envelope]}, handed)
 
         def compute(path: Path) -> None:
-            with progress("Decision", quiet=self.quiet) as tick:
-                found = decision.decision(
-                    self.case, wanted, next(iter(peaks), None), workers=self.workers, progress=tick
-                )
+            with progress(name.capitalize(), quiet=self.quiet) as tick:
+                found = make(tick)
             envelope.write(found, path, case_text=self.case.text_of_file, key=key)
 
-        return self.stored("decision.nc", key, compute)
+        return self.stored(f"{name}.nc", key, compute)
 
     def vibration(self, wanted: Document, handed: FuzzyNumber | None) -> str:
         """Fingerprint of a result for the structure, its record and the modulus."""
@@ -295,6 +284,7 @@ class Results:
         learned: What measured modes leave of the inputs; None where the case has none.
         update: Dataset of update.nc, likewise.
         decision: Dataset of decision.nc; None where the case has no such section.
+        joint: Dataset of joint.nc, likewise.
     """
 
     case: Case
@@ -309,6 +299,7 @@ class Results:
     learned: update.Learned | None = None
     update: xarray.Dataset | None = None
     decision: xarray.Dataset | None = None
+    joint: xarray.Dataset | None = None
 
     @property
     def studies(self) -> tuple[Study, ...]:

@@ -19,6 +19,7 @@ from alphacut.stages.material.cell import GPA, modal_values, parts
 from alphacut.stages.pipeline import Results
 from alphacut.stages.vibration import exceedance as outcomes
 from alphacut.stages.vibration.decision import decision_document
+from alphacut.stages.vibration.joint import joint_document
 from alphacut.stages.vibration.structure_words import structure_words
 from alphacut.stages.vibration.update import narrower
 from alphacut.stochastic import HermiteMap
@@ -73,6 +74,8 @@ def summary(results: Results) -> Document:
         found["exceedance"] = outcomes.exceedance_document(results.exceedance)
     if results.decision is not None:
         found["decision"] = decision_document(results.decision)
+    if results.joint is not None:
+        found["joint"] = joint_document(results.joint)
     found["paper"] = comparison(case.quoted, found) if case.quoted else []
     return found
 

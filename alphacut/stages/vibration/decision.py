@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -49,8 +50,10 @@ def decision(
     from alphacut.frame.structures.modes import ModalError
 
     limits, task = limits_of(case), task_of(case)
-    if peaks is None:
-        peaks = with_peaks(envelope.compute(wanted, task), wanted, task)
+    if peaks is None or not set(limits) <= set(map(str, peaks["output"].values)):
+        assert wanted.frame is not None
+        limited = replace(wanted, model=replace(wanted.frame, outputs=tuple(limits)))
+        peaks = with_peaks(envelope.compute(limited, task), limited, task)
     try:
         found = _decisions(wanted, task, limits, workers, progress)
     except (ValueError, ModalError) as error:

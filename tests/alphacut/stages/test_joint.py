@@ -1,0 +1,96 @@
+"""Section [joint]: two outputs at a time, one at two times, on a motion that is known."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from alphacut.entry import main
+
+# q = q0 cos ωt + v0 / ω sin ωt, without damping: linear in both starts, ω² = 24 E I / (l³ m)
+OMEGA = float(np.sqrt(24 * 2.5e10 * 1e-6 / 27 / 1e3))
+STEP = 2 * np.pi / OMEGA / 64
+CASE = f"""
+schema = 1
+title = "One floor"
+about = "A mass that is moved and pushed"
+stages = ["envelope"]
+[frame]
+masses = ["1000 kg"]
+lengths = ["3 m"]
+modulus = "25 GPa"
+second_moment = "1e-6 m^4"
+rayleigh_mass = "0 1/s"
+displacements = ["[9, 10, 11] mm"]
+velocities = ["[{9e-3 * OMEGA}, {10e-3 * OMEGA}, {11e-3 * OMEGA}] m/s"]
+outputs = ["q1", "v1"]
+[envelope]
+fuzzy = ["q0", "v0"]
+duration = "{2 * np.pi / OMEGA} s"
+step = "{STEP} s"
+[joint]
+"""
+
+
+def run(folder: Path, joint: str) -> dict[str, object]:
+    """The document of a run with that section."""
+    path = folder / "one.toml"
+    path.write_text(CASE + joint, encoding="utf-8")
+    out = folder / "out"
+    assert main(["run", str(path), "--out", str(out), "--quiet"]) == 0
+    assert main(["report", str(out), "--quiet"]) == 0
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "<h2>What goes together</h2>" in page
+    assert "the rectangle of both ranges dashed" in page
+    found: dict[str, object] = json.loads((out / "summary.json").read_text())["joint"]
+    return found
+
+
+@pytest.mark.parametrize(("eighths", "share"), [(1, 0.5), (2, 1.0)])
+def test_one_output_at_two_times_is_a_parallelogram(
+    tmp_path: Path, eighths: int, share: float
+) -> None:
+    time = eighths * 2 * np.pi / OMEGA / 8
+    found = run(tmp_path, f'outputs = ["q1"]\ntimes = ["0 s", "{time} s"]\n')
+    shares = found["share_of_rectangle"]
+    assert isinstance(shares, dict)
+    assert shares["inner"][:-1] == pytest.approx([share] * 4, rel=1e-6)
+    assert all(share - 1e-9 <= x <= 1.1 * share for x in shares["outer"][:-1])
+    assert found["lower"][0][0] == pytest.approx(9e-3)  # type: ignore[index]
+
+
+def test_two_outputs_at_one_time_of_other_units(tmp_path: Path) -> None:
+    time = 2 * np.pi / OMEGA / 8  # v / ω = −q0 sin + v0 / ω cos: the square of both starts, turned
+    found = run(tmp_path, f'outputs = ["q1", "v1"]\ntimes = ["{time} s"]\n')
+    assert found["units"] == ["m", "m/s"]
+    shares = found["share_of_rectangle"]
+    assert isinstance(shares, dict)
+    assert shares["inner"][0] == pytest.approx(0.5, rel=1e-6)
+    assert shares["outer"][0] == pytest.approx(0.5, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("joint", "pattern"),
+    [
+        (f'outputs = ["q1", "v1"]\ntimes = ["0 s", "{STEP} s"]\n', "2 outputs and 2 times"),
+        ('outputs = ["q1"]\ntimes = ["0 s"]\n', "1 outputs and 1 times"),
+        ('outputs = ["q1"]\ntimes = ["0 s", "0 s"]\n', "both times are the same"),
+        ('outputs = ["q1", "q2"]\ntimes = ["0 s"]\n', "q2 is not among"),
+        ('outputs = ["q1"]\ntimes = ["0 s", "0.123456 s"]\n', "no node of the simulation"),
+        ('outputs = ["q1"]\ntimes = ["0 s", "99 s"]\n', "no node of the simulation"),
+        ('outputs = ["q1"]\ntimes = ["0 s", "-1 s"]\n', "joint.times"),
+    ],
+)
+def test_pairs_that_make_no_sense(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], joint: str, pattern: str
+) -> None:
+    path, out = tmp_path / "one.toml", tmp_path / "out"
+    path.write_text(CASE + joint, encoding="utf-8")
+    assert main(["run", str(path), "--out", str(out)]) == 2
+    told = capsys.readouterr().err.strip()
+    assert pattern in told
+    assert len(told.splitlines()) == 1
+    assert not out.exists()
