@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.rve.image.bounds import StiffnessBounds
-from alphacut.rve.image.fields.conjugate_gradient import Solver
+from alphacut.rve.image.fields.solver import Solver
 from alphacut.rve.image.moduli import ModuliInterval
 from alphacut.rve.image.phase_images import ModuliImages, moduli_images, threshold_ranges
 from alphacut.rve.image.solve import CrispBounds, solve_between

@@ -11,7 +11,8 @@ import numpy as np
 from alphacut.rve.cell import STRAIN, square_moduli
 from alphacut.rve.image.bounds import StiffnessBounds
 from alphacut.rve.image.cuts import ENCLOSED, TWO_CORNERS, nested
-from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, Solver
+from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
+from alphacut.rve.image.fields.solver import Solver
 from alphacut.rve.image.phase_images import ModuliImages
 from alphacut.rve.image.read import require_memory
 from alphacut.rve.image.solve import CrispBounds, both_sides, solve_between

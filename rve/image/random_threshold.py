@@ -14,8 +14,8 @@ from scipy.special import ndtr
 
 from alphacut.rve.image.bounds import StiffnessBounds
 from alphacut.rve.image.cuts import ImageBox, each_cut
-from alphacut.rve.image.fields.conjugate_gradient import Solver
 from alphacut.rve.image.fields.energy import UNIT
+from alphacut.rve.image.fields.solver import Solver
 from alphacut.rve.image.moduli import ModuliInterval
 from alphacut.stochastic.theta.truncated_normal import Array
 

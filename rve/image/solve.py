@@ -7,8 +7,9 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 from alphacut.rve.image.bounds import StiffnessBounds, inverse_below
-from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, Solver
+from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.side import DISPLACEMENT, STRESS, SideSolution, solve_side
+from alphacut.rve.image.fields.solver import Solver
 from alphacut.rve.image.phase_images import ModuliImages
 from alphacut.stochastic.theta.truncated_normal import Array
 

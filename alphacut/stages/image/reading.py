@@ -11,7 +11,8 @@ from alphacut.case.case import Case
 from alphacut.case.sections.picture import Picture
 from alphacut.fuzzy import Crisp
 from alphacut.io.problem import BadInput, Problem
-from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, Solver
+from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
+from alphacut.rve.image.fields.solver import Solver
 from alphacut.rve.image.model import ImageModel
 from alphacut.rve.image.phase_images import threshold_ranges
 from alphacut.rve.image.random_threshold import ordered

@@ -13,12 +13,14 @@ from alphacut.rve.image.fields.clamped import (
     ClampedPreconditioner,
     free_unknowns,
 )
-from alphacut.rve.image.fields.conjugate_gradient import Solver
 from alphacut.rve.image.fields.division import divided, prolonged
 from alphacut.rve.image.fields.element import Element, airy_element, displacement_element
 from alphacut.rve.image.fields.energy import Energy, energy
 from alphacut.rve.image.fields.operator import Operator
 from alphacut.rve.image.fields.preconditioner import FourierPreconditioner
+from alphacut.rve.image.fields.reference import Reference
+from alphacut.rve.image.fields.solver import Solver
+from alphacut.rve.image.fields.system import System
 from alphacut.stochastic.theta.truncated_normal import Array
 
 UNIT_LOADS = np.eye(3)
@@ -127,23 +129,24 @@ def _fields(
     clamped: bool,
 ) -> tuple[Array, int]:
     """Fields of the unit loads and the most iterations; large images load by load."""
-    periodic = Operator(element, trace, deviator)
-    bulk, shear = (float(np.sqrt(c.min() * c.max())) for c in (trace, deviator))
+    shape = (trace.shape[1], trace.shape[2])
+    constant = Reference.between(trace, deviator, exchange=element.order == 2)
     kind = ClampedPreconditioner if clamped else FourierPreconditioner
-    preconditioner = kind.of(element, bulk, shear, (trace.shape[1], trace.shape[2]))
-    free = free_unknowns(element, (trace.shape[1], trace.shape[2]))
-    operator = ClampedOperator(periodic, free) if clamped else periodic
+    preconditioner = kind.of(element, constant.trace, constant.deviator, shape)
+    periodic = Operator(element, trace, deviator)
+    operator = ClampedOperator(periodic, free_unknowns(element, shape)) if clamped else periodic
     scale = least_energy(element, trace, deviator, modes)
+    least = constant.least(trace, deviator)
     loads = modes.shape[1]
-    fields = np.empty((len(trace), loads, element.types, *trace.shape[1:]))
+    fields = np.empty((len(trace), loads, element.types, *shape))
     iterations = 0
     together = loads if trace.size <= SMALL else 1
     for first in range(0, loads, together):
         part = slice(first, first + together)
         guess = None if start is None else start[:, part]
-        solution = solver.solve(
-            operator, preconditioner, operator.load(modes[:, part]), scale[:, part], guess
-        )
+        load = operator.load(modes[:, part])
+        system = System(operator, preconditioner, load, scale[:, part], least, guess)
+        solution = solver.solve(system)
         fields[:, part] = solution.fields
         iterations = max(iterations, solution.iterations)
     return fields, iterations

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from alphacut.rve.image.bounds import StiffnessBounds, inverse_below
-from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, ConvergenceError
+from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.energy import energy
 from alphacut.rve.image.fields.side import DISPLACEMENT, STRESS, UNIT_LOADS, solve_side
+from alphacut.rve.image.fields.solver import ConvergenceError
 from alphacut.rve.image.moduli import PlaneModuli
 from alphacut.rve.image.solve import solve_image
 

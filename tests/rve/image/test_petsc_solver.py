@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, ConvergenceError
+from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.side import DISPLACEMENT, STRESS, solve_side
+from alphacut.rve.image.fields.solver import ConvergenceError
 from alphacut.rve.solver.options import OptionError
 
 pytest.importorskip("petsc4py")
