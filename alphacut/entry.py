@@ -12,6 +12,7 @@ from alphacut.commands import cell as command_cell
 from alphacut.commands import check as command_check
 from alphacut.commands import envelope as command_envelope
 from alphacut.commands import image as command_image
+from alphacut.commands import measure_next as command_measure_next
 from alphacut.commands import mesh as command_mesh
 from alphacut.commands import microstructure as command_microstructure
 from alphacut.commands import modulus as command_modulus
@@ -39,6 +40,7 @@ COMMANDS: dict[str, ModuleType] = {
     "envelope": command_envelope,
     "tolerances": command_tolerances,
     "update": command_update,
+    "measure-next": command_measure_next,
     "report": command_report,
     "repair": command_repair,
 }

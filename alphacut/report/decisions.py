@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 from markupsafe import Markup
 
+from alphacut.figures.captions import caption, in_words
 from alphacut.io.files import Document
 from alphacut.io.units import engineering
-from alphacut.report.figures import listed
+from alphacut.report.figures import listed, picture
 from alphacut.report.tables import paragraphs, section, sentence, table
 from alphacut.stages.vibration import decision, joint, update
 
@@ -83,3 +85,24 @@ def together(summary: Document, folder: Path) -> Markup:
     words = [sentence(x) for x in (joint.sentence(found), found["claim"]) if x]
     drawn = listed(summary, folder, "joint")
     return section("What goes together", paragraphs(*words), table(head, rows), drawn)
+
+
+def next_measured(folder: Path) -> Markup:
+    """Which input to measure next, where `alphacut measure-next` left its answer in the folder."""
+    found = json.loads((folder / "measure-next.json").read_text(encoding="utf-8"))
+    rows = [
+        (in_words(name), *(f"{gain[kind]:.1%}" for kind in GAINS))
+        for name, gain in found["gains"].items()
+    ]
+    words = [
+        f"Width of {found['answer']} at α = {found['alpha']:g} lost if one input is known better:"
+        " about its modal value, and at least, wherever in its cut the better value may lie."
+    ]
+    head = ("input", "twice as well", "at least", "exactly", "at least")
+    stem = "measure-next"
+    drawn = picture(folder / "figures" / f"{stem}.svg", caption(stem, paper=False))
+    note = [sentence(found["note"])] if found["note"] else []
+    return section("What to measure next", paragraphs(*words, *note), table(head, rows), drawn)
+
+
+GAINS = ("half", "half_least", "exact", "exact_least")

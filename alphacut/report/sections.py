@@ -11,7 +11,7 @@ from alphacut.figures.captions import core, in_words
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.io.files import Document
 from alphacut.io.units import engineering
-from alphacut.report.decisions import decided, learned, together
+from alphacut.report.decisions import decided, learned, next_measured, together
 from alphacut.report.differences import differences
 from alphacut.report.envelopes import envelopes, natural
 from alphacut.report.figures import gallery, listed
@@ -50,6 +50,8 @@ def sections(summary: Document, folder: Path) -> Iterator[Markup]:
         yield decided(summary, folder)
     if "joint" in summary:
         yield together(summary, folder)
+    if (folder / "measure-next.json").is_file():
+        yield next_measured(folder)
     if summary.get("shares"):
         yield shares(summary["shares"])
     if summary.get("paper"):

@@ -16,7 +16,7 @@ import numpy as np
 from alphacut.case.case import Case
 from alphacut.fuzzy import Crisp, FuzzyNumber, Reduced, propagate
 from alphacut.io.files import say
-from alphacut.stages.material.campaign import campaign
+from alphacut.stages.material.campaign import Campaign, campaign
 from alphacut.stages.pipeline import Results, Study
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -31,21 +31,24 @@ def modulus_shares(case: Case) -> Shares:
     from alphacut.fuzzy.width_contributions import width_shares
 
     wanted = campaign(case)
-    choice = replace(wanted.task.choice, method="series")
+    return width_shares(lambda inputs: cell_range(wanted, inputs, wanted.alpha), wanted.inputs)
 
-    def bounds(inputs: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
-        fuzzy = {name: number for name, number in inputs.items() if not isinstance(number, Crisp)}
-        crisp = {
-            **wanted.task.crisp,
-            **{name: number.modal for name, number in inputs.items() if name not in fuzzy},
-        }
-        if not fuzzy:
-            return np.zeros(len(wanted.alpha)), np.zeros(len(wanted.alpha))
-        shared = tuple(name for name in fuzzy if name != "inclusion_modulus") or tuple(fuzzy)
-        task = replace(wanted.task, choice=choice, crisp=crisp)
-        return propagate(task, fuzzy, Reduced(), alpha=wanted.alpha, shared=shared).bounds("E")
 
-    return width_shares(bounds, wanted.inputs)
+def cell_range(
+    wanted: Campaign, inputs: Mapping[str, FuzzyNumber], alpha: tuple[float, ...]
+) -> tuple[Array, Array]:
+    """Ends of E on each level, (A,), by the series, for other numbers as the cell's inputs."""
+    fuzzy = {name: number for name, number in inputs.items() if not isinstance(number, Crisp)}
+    crisp = {
+        **wanted.task.crisp,
+        **{name: number.modal for name, number in inputs.items() if name not in fuzzy},
+    }
+    task = replace(wanted.task, choice=replace(wanted.task.choice, method="series"), crisp=crisp)
+    if not fuzzy:
+        alone = np.full(len(alpha), float(np.asarray(task([{}])[0]["E"])))
+        return alone, alone
+    shared = tuple(name for name in fuzzy if name != "inclusion_modulus") or tuple(fuzzy)
+    return propagate(task, fuzzy, Reduced(), alpha=alpha, shared=shared).bounds("E")
 
 
 def envelope_shares(results: Results, study: Study) -> tuple[Shares, Array]:

@@ -170,6 +170,9 @@ OWN = {
     ("update", "--set"): ("update.frequency_deviation=0.02",),
     ("update", "--modulus"): ("[21, 25, 29] GPa",),
     ("update", "--out"): ("learned",),
+    ("measure-next", "--set"): ("frame.dampers=60 N s/m",),
+    ("measure-next", "--output"): ("v1",),
+    ("measure-next", "--out"): ("advice",),
 }
 EXPLAINED = {
     ("--quiet", "--json"): "as with --json -",
@@ -253,7 +256,8 @@ class Watched:
         """The case of the command."""
         stages = '["modulus", "envelope"]' if self.command in ("run", "check") else '["envelope"]'
         stages = '["modulus"]' if self.command == "modulus" else stages
-        own = 'modulus = "25.5 GPa"\n' if self.command == "envelope" else ""
+        plain = self.command in ("envelope", "measure-next")
+        own = 'modulus = "25.5 GPa"\n' if plain else ""
         text = CASE.format(stages=stages, modulus=own)
         if self.command == "tolerances":
             text = CASE.format(stages=stages, modulus='modulus = "25.5 GPa"\n') + LIMITED

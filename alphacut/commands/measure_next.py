@@ -1,0 +1,67 @@
+"""Command ``alphacut measure-next``: by how much the answer narrows if an input is known better."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TextIO
+
+from alphacut.case.idle import require_read
+from alphacut.case.load import load
+from alphacut.commands.envelope import given_modulus
+from alphacut.commands.options import KeyOption, add_common, add_keys, answer, changes
+from alphacut.io.files import as_json, write_text
+from alphacut.io.output_paths import unwritable
+from alphacut.io.problem import BadInput
+from alphacut.io.progress import progress
+from alphacut.stages.material.modulus import stand_in
+from alphacut.stages.measure_next import advice_document, measure_next
+
+ABOUT = "by how much the answer narrows if an input is known better"
+KEYS = {
+    "--fuzzy": KeyOption("envelope.fuzzy", "inputs that may be measured, as E,m", "NAMES"),
+    "--duration": KeyOption("envelope.duration", "length of the simulation", bare="s"),
+}
+READ = ("stages", "frame", "tower", "envelope", "update", "radius", "cell", "mesh", "modulus")
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the command."""
+    add_common(parser)
+    add_keys(parser, KEYS)
+    parser.add_argument(
+        "--modulus",
+        metavar="QUANTITY|FILE.nc",
+        help="Young's modulus in place of the cell's: '[22, 24, 26] GPa', or α-cuts",
+    )
+    parser.add_argument(
+        "--output", metavar="NAME", help="output whose width is compared (default: the first)"
+    )
+    parser.add_argument(
+        "--out",
+        metavar="FOLDER",
+        help="write measure-next.json and its figure; the report of a run in FOLDER shows them",
+    )
+
+
+def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
+    """Compute again for every input, and report."""
+    case = load(options.case, changes(options, KEYS))
+    require_read(case, READ, "measure-next")
+    folder = Path(options.out) if options.out else None
+    if folder is not None and (problems := list(unwritable("--out", folder, folder=True))):
+        raise BadInput(problems)
+    handed = given_modulus(options.modulus) or stand_in(case)
+    with progress("Measure next", quiet=options.quiet) as tick:
+        name, found = measure_next(case, handed, options.output, tick)
+    document = advice_document(found, name)
+    if folder is not None:
+        from alphacut.figures.measure_next import gains
+        from alphacut.figures.style import save, style
+
+        with style():
+            save(gains(document), folder / "figures" / "measure-next")
+        write_text(folder / "measure-next.json", as_json(document, indent=2))
+    answer(options, document, out, f"{name}: {found}\n")
+    return 0

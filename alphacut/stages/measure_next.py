@@ -1,0 +1,158 @@
+"""Which input of a case to measure next: how much narrower the answer is if one is known better.
+
+The answer is the width of an output's envelope at the lowest level, its mean over time; without a
+structure it is the width of E. Where the cell gives E, its own inputs stand in E's place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from alphacut.case.case import Case
+from alphacut.fuzzy import Crisp, FuzzyNumber, Interval
+from alphacut.fuzzy.decisions.measure_next import Advice, Answer, advice
+from alphacut.fuzzy.knowledge.joint import joined_once
+from alphacut.io.files import Document
+from alphacut.io.problem import BadInput, Problem
+from alphacut.io.progress import Tick
+from alphacut.stages.material.campaign import Campaign, campaign
+from alphacut.stages.vibration.envelope_task import EnvelopeTask, task_of
+from alphacut.stages.vibration.structure import Structure, structure
+from alphacut.stages.vibration.update import learned
+from alphacut.stages.width_shares import cell_range, thinned
+
+TOLERANCE = 1e-3
+"""Error of the envelopes, as a share of each output's peak."""
+
+
+def measure_next(
+    case: Case, handed: FuzzyNumber | None, output: str | None = None, progress: Tick | None = None
+) -> tuple[str, Advice]:
+    """The answer's name, and gains of knowing each input of [envelope] fuzzy better.
+
+    Args:
+        case: With a linear structure and [envelope], or with a cell.
+        handed: Modulus in Pa that stands in for the cell, if any.
+        output: The output; the first if not given.
+        progress: Told the share done.
+
+    Raises:
+        BadInput: There is no such output, or the structure is not linear.
+    """
+    cell = campaign(case) if handed is None and "modulus" in case.stages else None
+    if "envelope" not in case.stages:
+        if cell is None or output is not None:
+            raise BadInput(Problem("stages", "there is no envelope", allowed="stage envelope"))
+        return "E", _advice(lambda x: _moduli(cell, x), cell.inputs, 0.0, progress)
+    wanted, task = structure(case, handed or _expected(case, cell)), task_of(case)
+    if case.sections.update is not None:
+        wanted = learned(case, wanted).structure
+    if wanted.linear is None:
+        raise BadInput(Problem("pendulum", "widths are compared for linear structures"))
+    column = _column(case, wanted, output)
+    inputs, of_cell = wanted.inputs(task.fuzzy), dict(cell.inputs) if cell else {}
+    if cell is not None and "E" in inputs:
+        del inputs["E"]
+
+    def answer(changed: Mapping[str, FuzzyNumber]) -> tuple[float, float]:
+        own = {name: changed[name] for name in inputs}
+        if cell is not None and of_cell:
+            own["E"] = _interval(*_ends(cell, {name: changed[name] for name in of_cell}))
+        return _width(wanted, task, own, column)
+
+    found = _advice(answer, {**of_cell, **inputs}, task.alpha[0], progress)
+    return wanted.outputs[column], found
+
+
+def _expected(case: Case, cell: Campaign | None) -> FuzzyNumber | None:
+    """Modulus that the cell's modal values give, fuzzy so that it may be named as an input."""
+    if cell is None:
+        return None
+    return _interval(*_ends(cell, cell.inputs))
+
+
+def _ends(cell: Campaign, inputs: Mapping[str, FuzzyNumber]) -> tuple[float, float]:
+    lower, upper = cell_range(cell, inputs, (0.0,))
+    return float(lower[0]), float(upper[0])
+
+
+def _moduli(cell: Campaign, inputs: Mapping[str, FuzzyNumber]) -> tuple[float, float]:
+    low, high = _ends(cell, inputs)
+    return high - low, 1e-9 * high
+
+
+def _interval(low: float, high: float) -> FuzzyNumber:
+    return Interval(low, high) if high > low else Crisp(low)
+
+
+def _column(case: Case, wanted: Structure, output: str | None) -> int:
+    if output is not None and output not in wanted.outputs:
+        problem = Problem("--output", "there is no such output", output, ", ".join(wanted.outputs))
+        raise BadInput(replace(problem, file=str(case.path)))
+    return 0 if output is None else wanted.outputs.index(output)
+
+
+def _width(
+    wanted: Structure, task: EnvelopeTask, inputs: Mapping[str, FuzzyNumber], column: int
+) -> tuple[float, float]:
+    """Mean width over time of an output's envelope, and its error."""
+    from alphacut import frame
+
+    assert wanted.linear is not None
+    if all(isinstance(number, Crisp) for number in inputs.values()):
+        return 0.0, 0.0
+    still = wanted.linear.ground is None
+    step = task.step if still else thinned(task.duration, task.step)
+    found = frame.envelope(
+        wanted.linear,
+        inputs,
+        alpha=(0.0,),
+        duration=task.duration,
+        step=step,
+        method="modal",
+        tolerance=TOLERANCE,
+        relative=True,
+    )
+    width = (found.upper - found.lower)[0, :, column].mean()
+    error = np.inf if found.error is None else 2 * found.error[0, :, column].mean()
+    return float(width), float(error)
+
+
+def _advice(
+    answer: Answer, inputs: Mapping[str, FuzzyNumber], alpha: float, progress: Tick | None
+) -> Advice:
+    numbers, done = joined_once(dict(inputs)), 0
+
+    def told(changed: Mapping[str, FuzzyNumber]) -> tuple[float, float]:
+        nonlocal done
+        found = answer(changed)
+        done += 1
+        if progress:
+            progress(min(done / (1 + 6 * len(numbers)), 1.0))
+        return found
+
+    return advice(told, numbers, alpha=alpha)
+
+
+def advice_document(found: Advice, answer: str) -> Document:
+    """The advice as it is printed with ``--json``; gains as shares of the width."""
+    unit = 1 / found.width if found.width > 0 else 0.0
+    return {
+        "answer": answer,
+        "width": found.width,
+        "error": found.error,
+        "alpha": found.alpha,
+        "gains": {
+            x.name: {
+                "half": unit * x.half,
+                "half_least": unit * x.half_least,
+                "exact": unit * x.exact,
+                "exact_least": unit * x.exact_least,
+            }
+            for x in found.gains
+        },
+        "note": found.note,
+    }
