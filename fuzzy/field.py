@@ -3,7 +3,7 @@
 Values at places z are centre + half width · Σ_k √λ_k φ_k(z) ξ_k with the largest eigenvalues λ_k of
 the correlation exp(−|z − z'| / length), as in a Karhunen–Loève expansion; the directions ξ lie in a
 ball. All directions together leave each place its own interval; few of them leave out a part that
-is told.
+is told. For methods that know boxes alone the directions may vary freely, `free_shapes`.
 """
 
 from __future__ import annotations
@@ -70,6 +70,21 @@ class FuzzyField:
         """Largest share of a place's half width that the directions do not reach."""
         reached = np.minimum(np.linalg.norm(self.shapes, axis=1), 1.0)
         return float(1 - reached.min())
+
+    @property
+    def free_shapes(self) -> Array:
+        """Parts of directions that vary freely within [-1, 1], shape (places, directions).
+
+        Each place's parts are scaled to a sum of 1: it reaches its own interval and no more.
+        """
+        shapes: Array = self.shapes / np.abs(self.shapes).sum(1, keepdims=True)
+        return shapes
+
+    @property
+    def apart(self) -> float:
+        """Largest difference of two neighbouring places whose directions vary freely."""
+        steps = np.abs(np.diff(self.free_shapes, axis=0)).sum(1)
+        return self.half_width * float(steps.max(initial=0.0))
 
     @property
     def inputs(self) -> dict[str, FuzzyNumber]:

@@ -12,7 +12,7 @@ from alphacut.case.key import Key, Section, UnknownValueError, keys_of
 from alphacut.case.sections.material import Cell, Mesh, Modulus, Radius, Response
 from alphacut.case.sections.particles import Microstructure
 from alphacut.case.sections.picture import Picture
-from alphacut.case.sections.questions import Decision, Joint
+from alphacut.case.sections.questions import Decision, Field, Joint
 from alphacut.case.sections.structures import Frame, Pendulum, Tower
 from alphacut.case.sections.top import Top
 from alphacut.case.sections.update import Update
@@ -44,6 +44,7 @@ class Sections:
     envelope: Envelope | None = None
     exceedance: Exceedance | None = None
     update: Update | None = None
+    field: Field | None = None
     decision: Decision | None = None
     joint: Joint | None = None
 
@@ -112,6 +113,7 @@ class Case:
     envelope = Needed[Envelope]()
     exceedance = Needed[Exceedance]()
     update = Needed[Update]()
+    field = Needed[Field]()
     decision = Needed[Decision]()
     joint = Needed[Joint]()
 

@@ -54,6 +54,7 @@ def checks(*, modal: bool = False) -> Iterator[Check]:
     yield where("exceedance", exceedance)
     yield where("update", lambda case: levels("update.alpha", case.update.alpha))
     yield where("update", questions.update)
+    yield where("field", questions.field)
     yield where("decision", questions.decision)
     yield where("joint", questions.joint)
 

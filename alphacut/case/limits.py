@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from alphacut.case.case import Case
 from alphacut.case.names import OUTPUTS, frame_outputs, structures
 from alphacut.case.values import nearest
+from alphacut.fuzzy import FuzzyNumber
 from alphacut.io import quantity
 from alphacut.io.problem import BadInput, Problem
 
@@ -121,6 +122,32 @@ def unknown(key: str, names: Iterable[str], known: Sequence[str]) -> Iterator[Pr
         if name not in known:
             what = f"{name} is not among the structure's outputs"
             yield Problem(key, what, name, ", ".join(known), nearest(name, known))
+
+
+def field(case: Case) -> Iterator[Problem]:
+    """A field is of one symmetric fuzzy value of all storeys of a frame."""
+    if case.sections.frame is None:
+        yield Problem("field", "storeys are those of a storey frame", "", "[frame]")
+        return
+    key = {"c": "columns", "m": "masses"}[case.field.of]
+    values = getattr(case.frame, key)
+    allowed = "one value for all storeys, with as much below its middle as above"
+    if len(set(values)) > 1 or values[0].support.width == 0:
+        what = "a field needs one fuzzy value, the same for all"
+        yield Problem(f"frame.{key}", what, str(case.written.get(f"frame.{key}", "")), allowed)
+    elif not symmetric(values[0]):
+        what = "a field needs a symmetric fuzzy value"
+        yield Problem(f"frame.{key}", what, str(case.written.get(f"frame.{key}", "")), allowed)
+    if case.sections.update is not None and case.field.of in (x[0] for x in case.update.learn):
+        yield Problem("update.learn", "these inputs are a field", case.field.of, "other inputs")
+
+
+def symmetric(number: FuzzyNumber) -> bool:
+    """Whether all cuts of a fuzzy number have the same middle."""
+    (low, high), (left, right) = number.support, number.cut(1.0)
+    half = [number.cut(0.5).lower, number.cut(0.5).upper]
+    middles = [(low + high) / 2, (left + right) / 2, sum(half) / 2]
+    return max(middles) - min(middles) <= 1e-12 * max(abs(low), abs(high))
 
 
 def decision(case: Case) -> Iterator[Problem]:

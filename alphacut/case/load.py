@@ -15,7 +15,7 @@ from alphacut.case.schema import IMPLIED, SECTIONS, dotted, every_key
 from alphacut.case.sections.material import Cell, Mesh, Modulus, Radius, Response
 from alphacut.case.sections.particles import Microstructure
 from alphacut.case.sections.picture import PICTURES, Picture
-from alphacut.case.sections.questions import Decision, Joint
+from alphacut.case.sections.questions import Decision, Field, Joint
 from alphacut.case.sections.structures import Frame, Pendulum, Tower
 from alphacut.case.sections.top import Top
 from alphacut.case.sections.update import Update
@@ -105,6 +105,7 @@ def built(tables: Tables, written: Collection[str], broken: Collection[str]) -> 
         envelope=given(Envelope, "envelope"),
         exceedance=given(Exceedance, "exceedance"),
         update=given(Update, "update"),
+        field=given(Field, "field"),
         decision=given(Decision, "decision"),
         joint=given(Joint, "joint"),
         study=tuple(section_of(Study, name, sound) for name in sound if name.startswith("study[")),

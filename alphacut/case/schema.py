@@ -7,7 +7,7 @@ from functools import cache
 from alphacut.case.key import Key, Section, keys_of
 from alphacut.case.sections.material import CellTable, Mesh, Modulus, Radius, Response
 from alphacut.case.sections.particles import Circles, Microstructure, Packing, Photograph
-from alphacut.case.sections.questions import Decision, Joint
+from alphacut.case.sections.questions import Decision, Field, Joint
 from alphacut.case.sections.structures import Frame, Pendulum, Tower
 from alphacut.case.sections.top import Top
 from alphacut.case.sections.update import Update
@@ -31,6 +31,7 @@ SECTIONS: dict[str, type[Section]] = {
     "envelope": Envelope,
     "exceedance": Exceedance,
     "update": Update,
+    "field": Field,
     "decision": Decision,
     "joint": Joint,
 }

@@ -54,7 +54,7 @@ KEYS = {
     "--tolerance": KeyOption("envelope.tolerance", "error that must be kept", bare="m"),
     "--certify": KeyOption("envelope.certify", "gap of proved bounds", bare="m"),
 }
-READ = ("frame", "pendulum", "tower", "envelope", "exceedance")
+READ = ("frame", "field", "pendulum", "tower", "envelope", "exceedance")
 GIVEN = ("modulus.value", "modulus.file", "modulus.measured")
 UNEXPLAINED = {"--out": "", "--workers": "1", "--best-effort": "", "--strict": ""}
 OF_AUTO = ("modal", "improved-graph-follower")

@@ -23,7 +23,18 @@ KEYS = {
     "--fuzzy": KeyOption("envelope.fuzzy", "inputs that may be measured, as E,m", "NAMES"),
     "--duration": KeyOption("envelope.duration", "length of the simulation", bare="s"),
 }
-READ = ("stages", "frame", "tower", "envelope", "update", "radius", "cell", "mesh", "modulus")
+READ = (
+    "stages",
+    "frame",
+    "field",
+    "tower",
+    "envelope",
+    "update",
+    "radius",
+    "cell",
+    "mesh",
+    "modulus",
+)
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -131,6 +131,7 @@ PARTS = {
     "image": ("cell", "modulus.alpha"),
     "envelope": (
         "frame",
+        "field",
         "pendulum",
         "tower",
         "envelope",

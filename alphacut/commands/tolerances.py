@@ -30,7 +30,7 @@ KEYS = {
     "--duration": KeyOption("envelope.duration", "length of the simulation", bare="s"),
     "--step": KeyOption("envelope.step", "time step", bare="s"),
 }
-READ = ("frame", "envelope", "exceedance", "radius", "cell", "mesh", "modulus")
+READ = ("frame", "field", "envelope", "exceedance", "radius", "cell", "mesh", "modulus")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

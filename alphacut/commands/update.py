@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import xarray
 
 ABOUT = "learn inputs of a frame from its measured modes"
-READ = ("frame", "envelope", "update", "modulus")
+READ = ("frame", "field", "envelope", "update", "modulus")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -33,6 +33,8 @@ Drawing = tuple[str, Callable[[], "Figure"]]
 
 def drawings(results: Results) -> Iterator[Drawing]:
     """Name and function of each figure that the results allow."""
+    from alphacut.frame.structures.field_frame import FieldFrame
+
     if results.case.sections.radius:
         if "microstructure" not in results.case.stages:  # that stage draws both from its particles
             if results.case.quoted:
@@ -54,6 +56,9 @@ def drawings(results: Results) -> Iterator[Drawing]:
     if results.envelopes and results.case.sections.frame:
         yield "fig26-frame", lambda: figure_frame.frame(results.case)
         yield "fig27-chain", lambda: figure_frame.chain(results.case)
+        built = None if results.structure is None else results.structure.frame
+        if isinstance(built, FieldFrame):
+            yield "field", partial(figure_frame.field, built.field)
     if results.envelopes and results.case.sections.tower:
         yield "tower", lambda: figure_frame.tower(results.case)
     model = None if results.structure is None else results.structure.linear

@@ -37,6 +37,7 @@ FIGURES = {
         "What two values may be together: enclosing polygons shaded, hulls of pairs reached as"
         " lines, the rectangle of both ranges dashed"
     ),
+    "field": "Storeys that are alike: what each direction of their field does by itself",
     "measure-next": "Width lost if an input is known twice as well, and exactly",
     "update-inputs": "Inputs before and after natural modes were measured, level by level",
     "two-point": (

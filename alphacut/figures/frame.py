@@ -1,4 +1,4 @@
-"""Structure to scale (Fig. 26), and as masses, springs and dampers (Fig. 27)."""
+"""Structure to scale (Fig. 26), as masses, springs and dampers (Fig. 27), and its fuzzy field."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from alphacut.stages.vibration.structure_words import spread_damping
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from alphacut.fuzzy.field import FuzzyField
 
 
 def frame(case: Case) -> Figure:
@@ -182,3 +184,21 @@ def damper(axes: Axes, start: tuple[float, float], end: tuple[float, float]) -> 
         [piston, b],
     ):
         axes.plot(*np.array(points).T, color=INK, lw=1)
+
+
+def field(given: FuzzyField) -> Figure:
+    """What each direction of a field adds to each storey's value, within the storeys' interval."""
+    drawn, axes = figure(5.6, 3.6)
+    places = np.asarray(given.places)
+    low, high = given.centre - given.half_width, given.centre + given.half_width
+    axes.axvspan(low, high, color=GREY, alpha=0.3, lw=0, label="each storey's interval")
+    for k, (name, style) in enumerate(zip(given.names, LINES * len(given.names), strict=False)):
+        values = given.centre + given.half_width * given.free_shapes[:, k]
+        axes.plot(values, places, style, color=INK, marker="o", ms=4, label=f"{name} = 1 alone")
+    axes.set_xlabel("columns c of a storey" if given.name == "c" else "mass of a floor, kg")
+    axes.set_ylabel("height, m")
+    axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return drawn
+
+
+LINES = ("-", "--", ":", "-.")

@@ -247,7 +247,7 @@ class Chain:
     def vibration(self, wanted: Document, handed: FuzzyNumber | None) -> str:
         """Fingerprint of a result for the structure, its record and the modulus."""
         given = self.case.sections
-        inputs = [given.frame, given.pendulum, given.tower, given.update]
+        inputs = [given.frame, given.field, given.pendulum, given.tower, given.update]
         record = self.case.digests(*inputs)
         return fingerprint(
             {"case": inputs, "record": record, "modulus": handed, **wanted}, ("fuzzy", "frame")

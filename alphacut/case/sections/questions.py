@@ -1,11 +1,11 @@
-"""Sections on questions to the motion of a frame: are limits exceeded, what goes together."""
+"""Sections on a frame beyond one envelope: storeys that are alike, limits, what goes together."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
-from alphacut.case.key import NOT_NEGATIVE, Key, Section
+from alphacut.case.key import NOT_NEGATIVE, POSITIVE, Key, Range, Section
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -34,3 +34,27 @@ class Joint(Section):
         tuple[float, ...],
         Key("one time, or two: multiples of [envelope] step", "s", allowed=NOT_NEGATIVE),
     ]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Field(Section):
+    """Storeys of a frame that are alike but not equal: a fuzzy field, correlated by distance.
+
+    The one fuzzy value of all storeys is the support of each; few directions of a Karhunen–Loève
+    expansion, c_1, c_2 …, stand for the storeys' own values c1, c2 …
+    """
+
+    of: Annotated[
+        Literal["c", "m"],
+        Key("what varies: c, the columns of a storey, or m, masses of the floors"),
+    ]
+    length: Annotated[
+        float, Key("height over which the correlation falls to 1/e", "m", allowed=POSITIVE)
+    ]
+    share: Annotated[
+        float,
+        Key(
+            "part of the variance that the directions hold",
+            allowed=Range("above 0 and up to 1", 1e-6, 1.0, closed=True),
+        ),
+    ] = 0.95

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from alphacut.case.case import Case
 from alphacut.case.sections.structures import Frame, Pendulum, Tower
 from alphacut.fuzzy import FuzzyNumber
@@ -207,7 +209,32 @@ def storey_frame(case: Case, modulus: FuzzyNumber) -> Structure:
         damping_ratio=tuple(ratio.modal for ratio in given.damping_ratio or ()),
         columns=tuple(number.modal for number in columns(given)),
     )
-    return Structure(model, parameters(given, modulus))
+    numbers = parameters(given, modulus)
+    return (
+        Structure(model, numbers)
+        if case.sections.field is None
+        else with_field(case, model, numbers)
+    )
+
+
+def with_field(case: Case, model: StoreyFrame, numbers: Mapping[str, FuzzyNumber]) -> Structure:
+    """The frame with directions of [field] in place of the values of its storeys."""
+    from dataclasses import fields
+
+    from alphacut.frame.structures.field_frame import FieldFrame
+    from alphacut.fuzzy.field import FuzzyField
+
+    given, heights = case.field, np.cumsum(model.lengths)
+    places = heights if given.of == "m" else heights - np.array(model.lengths) / 2
+    value = numbers[f"{given.of}1"]
+    (low, high), middle = value.support, sum(value.support) / 2
+    half = (high - low) / 2
+    field = FuzzyField(given.of, tuple(places), middle, half, given.length, given.share)
+    own = {entry.name: getattr(model, entry.name) for entry in fields(model)}
+    framed = FieldFrame(**own, field=field)
+    kept = {name: number for name, number in numbers.items() if name in framed.parameters}
+    unit = (value - middle) * (1 / half)
+    return Structure(framed, {**kept, **dict.fromkeys(field.names, unit)})
 
 
 def parameters(given: Frame, modulus: FuzzyNumber) -> dict[str, FuzzyNumber]:

@@ -18,6 +18,7 @@ from alphacut.stages.vibration.structure import columns as count_columns
 
 if TYPE_CHECKING:
     from alphacut.frame.structures.linear import Accelerogram
+    from alphacut.fuzzy.field import FuzzyField
 
 PLACEMENT = {"ground": "from each floor to the ground", "storey": "between neighbouring floors"}
 UNITS = {  # those in which people say the SI units of the schema
@@ -84,6 +85,8 @@ def inputs(case: Case) -> Iterator[list[str]]:
 
 def frame_sentences(given: Frame, wanted: Structure) -> Iterator[str]:
     """Stiffness, damping, and what moves the frame."""
+    from alphacut.frame.structures.field_frame import FieldFrame
+
     assert wanted.frame is not None
     modulus, moment = wanted.numbers["E"], wanted.numbers["I"]
     counts = set(given.columns)
@@ -100,11 +103,24 @@ def frame_sentences(given: Frame, wanted: Structure) -> Iterator[str]:
         f"{len(wanted.frame.masses)} rigid floors on columns clamped at both ends, {number}:"
         f" stiffness {formula}. E = {in_unit(modulus, 'GPa', 'Pa')}, {section}{rigidity}."
     )
+    if isinstance(wanted.frame, FieldFrame):
+        yield field_words(wanted.frame.field)
     yield f"Damping: {'; '.join(damping(given)) or 'none'}."
     if wanted.frame.ground is not None:
         yield motion(str(given.accelerogram), wanted.frame.ground)
     elif moves(given):
         yield "The frame starts from the displacements and velocities of the table."
+
+
+def field_words(field: FuzzyField) -> str:
+    """A field of columns or masses in words."""
+    what, unit = ("columns", "") if field.name == "c" else ("masses", " kg")
+    low, high = field.centre - field.half_width, field.centre + field.half_width
+    return (
+        f"The {what} of the storeys are alike but not equal, each in [{low:.5g}, {high:.5g}]{unit},"
+        f" correlated over {field.length:g} m: {', '.join(field.names)} move them together, and"
+        f" neighbours differ by {field.apart:.3g}{unit} at most."
+    )
 
 
 def damping(given: Frame) -> Iterator[str]:

@@ -258,6 +258,7 @@ class Watched:
         stages = '["modulus"]' if self.command == "modulus" else stages
         plain = self.command in ("envelope", "measure-next")
         own = 'modulus = "25.5 GPa"\n' if plain else ""
+        own += 'outputs = ["q1", "v1"]\n' if self.command == "measure-next" else ""
         text = CASE.format(stages=stages, modulus=own)
         if self.command == "tolerances":
             text = CASE.format(stages=stages, modulus='modulus = "25.5 GPa"\n') + LIMITED
