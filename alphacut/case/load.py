@@ -15,10 +15,9 @@ from alphacut.case.schema import IMPLIED, SECTIONS, dotted, every_key
 from alphacut.case.sections.material import Cell, Mesh, Modulus, Radius, Response
 from alphacut.case.sections.particles import Microstructure
 from alphacut.case.sections.picture import PICTURES, Picture
-from alphacut.case.sections.questions import Decision, Field, Joint
+from alphacut.case.sections.questions import Decision, Field, Joint, Update
 from alphacut.case.sections.structures import Frame, Pendulum, Tower
 from alphacut.case.sections.top import Top
-from alphacut.case.sections.update import Update
 from alphacut.case.sections.vibration import Envelope, Exceedance, Study
 from alphacut.case.toml_file import contents, lines_of_keys, parsed
 from alphacut.case.values import Unfit, allowed, nearest, read

@@ -7,10 +7,9 @@ from functools import cache
 from alphacut.case.key import Key, Section, keys_of
 from alphacut.case.sections.material import CellTable, Mesh, Modulus, Radius, Response
 from alphacut.case.sections.particles import Circles, Microstructure, Packing, Photograph
-from alphacut.case.sections.questions import Decision, Field, Joint
+from alphacut.case.sections.questions import Decision, Field, Joint, Update
 from alphacut.case.sections.structures import Frame, Pendulum, Tower
 from alphacut.case.sections.top import Top
-from alphacut.case.sections.update import Update
 from alphacut.case.sections.vibration import Envelope, Exceedance, Study
 
 SECTIONS: dict[str, type[Section]] = {

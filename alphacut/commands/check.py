@@ -15,8 +15,8 @@ from alphacut.io.problem import BadInput
 from alphacut.stages.readiness import ready
 
 ABOUT = (
-    "check a case without computing anything: one line for each problem, with line, key, value,"
-    " what is allowed, the nearest key"
+    "check a case without computing anything: a line for each problem, with its key and what is"
+    " allowed"
 )
 
 

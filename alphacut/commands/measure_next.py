@@ -68,7 +68,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         name, found = measure_next(case, handed, options.output, tick)
     document = advice_document(found, name)
     if folder is not None:
-        from alphacut.figures.measure_next import gains
+        from alphacut.figures.questions import gains
         from alphacut.figures.style import save, style
 
         with style():

@@ -8,14 +8,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from alphacut.figures import decision as figure_decision
 from alphacut.figures import envelope as figure_envelope
 from alphacut.figures import follower as figure_follower
 from alphacut.figures import frame as figure_frame
 from alphacut.figures import fuzzy as figure_fuzzy
 from alphacut.figures import image as figure_image
-from alphacut.figures import joint as figure_joint
 from alphacut.figures import modulus as figure_modulus
+from alphacut.figures import questions as figure_questions
 from alphacut.figures import radius as figure_radius
 from alphacut.figures import response as figure_response
 from alphacut.figures import shares as figure_shares
@@ -75,9 +74,9 @@ def drawings(results: Results) -> Iterator[Drawing]:
     if (limited := results.exceedance) is not None:
         yield "exceedance", lambda: figure_envelope.exceedance(limited)
     if (decided := results.decision) is not None:
-        yield "decision", lambda: figure_decision.decision(decided)
+        yield "decision", lambda: figure_questions.decision(decided)
     if (hull := results.joint) is not None:
-        yield "joint", lambda: figure_joint.joint(hull)
+        yield "joint", lambda: figure_questions.joint(hull)
     for study in results.studies:
         yield from figure_envelope.drawings(study, results.envelopes[study.name])
 

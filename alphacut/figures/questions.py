@@ -1,0 +1,95 @@
+"""What is asked of a motion: limits with their peaks, two values together, what to measure next."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from alphacut.figures.captions import in_words
+from alphacut.figures.style import BLUE, GREY, INK, ORANGE, alpha_legend, colours, figure
+from alphacut.io.files import Document
+from alphacut.io.units import MINUS, axis_prefix
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
+
+
+def decision(found: xarray.Dataset) -> Figure:
+    """Peak of each limited output over its limit, a bar for each level, and both degrees."""
+    names, alpha = [str(name) for name in found["output"].values], found["alpha"].values
+    drawn, axes = figure(7.2, 1.1 + 0.75 * len(names))
+    share = 1 - found["margin"] / found["allowed"]
+    places = np.arange(len(names))[::-1]
+    for place, name in zip(places, names, strict=True):
+        ends = share.sel(output=name)
+        low, high = ends.sel(bound="upper").values, ends.sel(bound="lower").values
+        for level, left, right, shade in zip(alpha, low, high, colours(alpha), strict=True):
+            height = 0.66 - 0.4 * float(level)
+            axes.barh(place, right - left, left=left, height=height, color=shade, lw=0)
+        axes.plot([low[-1], high[-1]], [place, place], color=INK, lw=2)
+        words, across = degrees(found.sel(limit=name)), axes.get_yaxis_transform()
+        axes.text(0.01, place + 0.38, words, fontsize=8, transform=across)
+    axes.axvline(1.0, color=ORANGE, lw=1.4, ls="--")
+    axes.set_ylim(-0.5, len(names) - 0.2)
+    left, right = axes.get_xlim()
+    axes.set_xlim(left, max(right, 1 + 0.1 * (1 - left)))
+    axes.set_yticks(places, names)
+    axes.set_xlabel("peak over its limit (dashed), the darker the higher α")
+    return drawn
+
+
+def degrees(found: xarray.Dataset) -> str:
+    """Bounds of possibility and necessity of exceeding one limit."""
+    words = []
+    for kind, word in (("possibility", "possible"), ("necessity", "necessary")):
+        low, high = found[kind].values
+        ends = f"{low:.3g}" if high - low < 5e-4 else f"{low:.3g} … {high:.3g}"
+        words.append(f"{word} to {ends}")
+    return f"exceeding is {', '.join(words)}"
+
+
+def joint(found: xarray.Dataset) -> Figure:
+    """Enclosing polygons shaded, hulls of pairs reached as lines, and the rectangle of ranges."""
+    drawn, axes = figure(6.4, 4.4)
+    alpha = found["alpha"].values
+    for level, shade in enumerate(colours(alpha)):
+        axes.fill(*found["outer"].values[level].T, color=shade, lw=0)
+        reached = found["inner"].values[level]
+        axes.plot(*np.vstack([reached, reached[:1]]).T, color=INK, lw=0.7)
+    (left, low), (right, high) = (end(found["outer"].values[0], axis=0) for end in (np.min, np.max))
+    axes.plot([left, right, right, left, left], [low, low, high, high, low], color=GREY, ls="--")
+    sides = ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim()))
+    words = zip(found["value"].values, found["unit"].values, strict=True)
+    for (axis, ends), (name, si) in zip(sides, words, strict=True):
+        factor, unit = axis_prefix(max(map(abs, ends)), str(si))
+        axis.set_label_text(f"{name}, {unit}")
+        axis.set_major_formatter(partial(_ticks, factor))
+    alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return drawn
+
+
+def _ticks(factor: float, value: float, _: int) -> str:
+    return f"{value * factor:.10g}".replace("-", MINUS)
+
+
+def gains(found: Document) -> Figure:
+    """Bars of both gains by input, with the least over where the better value may lie."""
+    names = [*found["gains"]]
+    drawn, axes = figure(7.2, 1.0 + 0.42 * max(len(names), 1))
+    places = np.arange(len(names))[::-1]
+    for kind, colour, shift, words in (
+        ("exact", GREY, 0.19, "known exactly"),
+        ("half", BLUE, -0.19, "known twice as well"),
+    ):
+        share = [100 * found["gains"][name][kind] for name in names]
+        least = [100 * found["gains"][name][f"{kind}_least"] for name in names]
+        axes.barh(places + shift, share, height=0.36, color=colour, lw=0, label=words)
+        label = "at least" if kind == "half" else None
+        axes.plot(least, places + shift, "|", color=INK, ms=9, label=label)
+    axes.set_yticks(places, [in_words(name) for name in names])
+    axes.set_xlabel(f"width lost at α = {found['alpha']:g}, %")
+    axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return drawn
