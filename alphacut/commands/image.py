@@ -67,11 +67,22 @@ def summary(found: Document) -> str:
     return (
         f"alpha  lower GPa   upper GPa   (E of eq. 16, plane strain)\n{rows}"
         f"width of the stiffness's bounds at the top level: {found['width']:.2e}\n"
-        f"plane-strain bulk modulus: {_interval(bulk)}\n"
+        f"plane-strain bulk modulus: {_interval(bulk)}\n{anisotropy(found)}"
         f"{apparent}{quantiles(found)}"
         f"if the particles are grains, E (Hashin-Shtrikman): {_interval(grains)}\n"
         f"{table_of(found['error_table'])}"
         f"{found['iterations']} iterations, {found['seconds']:.1f} s\n"
+    )
+
+
+def anisotropy(found: Document) -> str:
+    """E over all directions, and the nearest isotropic tensor, in two lines."""
+    turned, nearest = found["directions_E_GPa"], found["isotropic"]
+    return (
+        f"plane-strain Young's modulus of the softest direction: {_interval(turned['least'])}, "
+        f"of the stiffest: {_interval(turned['greatest'])}\n"
+        f"nearest isotropic tensor: plane-strain bulk {nearest['plane_strain_bulk_GPa']:.4f} GPa, "
+        f"shear {nearest['shear_GPa']:.4f} GPa, {nearest['distance']:.1%} away\n"
     )
 
 

@@ -43,7 +43,8 @@ def read_grey(path: Path, *, division: int = 1, square: bool = True) -> Array:
 
 def _array(path: Path) -> Array:
     try:
-        return np.asarray(np.load(path, allow_pickle=False))
+        # mapped: one too large for memory must come as far as the question of how large it is
+        return np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
     except (ValueError, EOFError) as error:
         raise ValueError(f"{path.name} cannot be read as a NumPy array: {error}") from error
 

@@ -10,6 +10,7 @@ from alphacut.stages.image.study import ImageStudy, Level
 
 CURES = {
     "discretisation": "divide the pixels: cell.division or cell.width",
+    "outline": "take more pixels across: cell.pixels",
     "finite window": "take a larger window, or another number of tiles",
     "threshold steps": f"up to {NODES} grey values within four deviations: each is solved",
     "threshold": "state cell.threshold more closely",
@@ -23,8 +24,8 @@ class Contribution:
 
     Args:
         source: A key of `CURES`.
-        width: Width of E that it adds to that of crisp inputs, in Pa; of the discretisation, that
-            width itself.
+        width: Width of E that it adds to that of crisp inputs, in Pa; of the discretisation, or of
+            the pixels that an outline cuts, that width itself.
     """
 
     source: str
@@ -47,7 +48,7 @@ def contributions(
         width: Width of E with the threshold and the phases at levels, in Pa.
     """
     base, lowest = width(None, None), study.alpha[0]
-    widths = {"discretisation": discretisation}
+    widths = {"outline" if study.outlined else "discretisation": discretisation}
     if study.model.boundary == "window":
         widths["finite window"] = base - discretisation
     if study.random is not None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.rve.image.model import ImageModel
 from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
@@ -81,6 +83,11 @@ class ImageStudy:
     def images(self, threshold: Level, phases: Level) -> ModuliImages:
         """Least and greatest moduli of each pixel, at levels of threshold and phases."""
         return moduli_images(*self.ranges(threshold), self.phases(phases))
+
+    @property
+    def outlined(self) -> bool:
+        """Whether an outline cuts pixels, whose phase stays open then."""
+        return not np.array_equal(*self.ranges(None))
 
     @property
     def fuzzy_phases(self) -> bool:

@@ -128,6 +128,8 @@ def test_labels_and_an_inequality_give_what_a_threshold_does(folder, capfd):
     drawn = {"inequality": '"(x - 0.5)**2 + (y - 0.5)**2 <= 0.05"', "pixels": "32"}
     found = solved(folder, capfd, **outline, **drawn)
     assert found["nature"] == "guaranteed, at two corners"
+    (widest,) = (row for row in found["error_table"] if row["source"] == "outline")
+    assert widest["cure"] == "take more pixels across: cell.pixels"
     corners = 0.5 + np.sqrt(0.05) * np.array(
         [(np.cos(a), np.sin(a)) for a in np.linspace(0, 6.28, 400)]
     )
@@ -160,6 +162,8 @@ def test_the_words_name_the_plane_strain_bulk_modulus(folder, capfd):
     assert main(["image", written(folder)]) == 0
     told = capfd.readouterr().out
     assert "plane-strain bulk modulus: [" in told
+    assert "plane-strain Young's modulus of the softest direction: [" in told
+    assert "nearest isotropic tensor: plane-strain bulk " in told
     assert "if the particles are grains, E (Hashin-Shtrikman): [" in told
     assert "the source to improve first on top:\nthreshold " in told
 
@@ -309,6 +313,8 @@ def test_an_image_too_large_for_memory_is_refused_with_a_window_that_fits(folder
     image = pytest.importorskip("PIL.Image")
     image.new("L", (1200, 1200)).save(folder / "b.png")
     bad_picture(folder, capfd, '"b.png"', "crop a window of ", division="16")
+    np.lib.format.open_memmap(folder / "b.npy", "w+", np.uint8, (200_000, 200_000))  # sparse
+    bad_picture(folder, capfd, '"b.npy"', "crop a window of ")
 
 
 def bad_picture(folder, capfd, name, told, **changes):
