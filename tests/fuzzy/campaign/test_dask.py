@@ -3,11 +3,13 @@
 import time
 from concurrent.futures import Executor
 from contextlib import closing
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from alphacut.fuzzy import Interval, Store, Triangular
+from alphacut.fuzzy.campaign import dispatch
 from alphacut.fuzzy.campaign.sample_store import Shelf
 from benchmarks.fuzzy.overhead import Points, nothing
 from tests.fuzzy.general import propagate
@@ -50,6 +52,17 @@ def at_once(values, share):
 def test_all_slots_work(executor):
     found = propagate(sleep, UNIT, Points(320), alpha=[0.0], executor=executor)
     assert at_once(found.values, 0) >= 14
+
+
+def test_load_doubles_until_slots_are_full_and_no_further(monkeypatch):
+    """Calls of 0.1 s at an executor of 16 slots that does not say so, on a clock of its own."""
+    now = [0.0]
+    monkeypatch.setattr(dispatch, "perf_counter", lambda: now[0])
+    load, call = dispatch._Load(4, _since=0.0), SimpleNamespace(seconds=0.1)
+    for _ in range(500):
+        now[0] += call.seconds / min(load.room, 16)
+        load.note([[call]])
+    assert load.room == 32
 
 
 @pytest.mark.slow  # a time
