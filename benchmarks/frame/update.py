@@ -7,8 +7,7 @@ parameters have a joint possibility of α at least, beside the 1 − α claimed,
 in the box at α = 0.05; widths of its stiffnesses over those of the priors. Where masses are
 unknown too the true values lie within ±5 %, so that the priors do not pin their common factor. The
 last line compares the envelope of the roof before and after. Writes
-benchmarks/results/frame_update.csv; the table kept there holds two runs, 30 records with 500
-repetitions and 40 records with 100.
+benchmarks/results/frame_update.csv; the table kept there is that of `--seed 201803`.
 """
 
 from __future__ import annotations
