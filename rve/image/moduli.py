@@ -8,6 +8,7 @@ import numpy as np
 
 from alphacut.stochastic.theta.truncated_normal import Array
 
+LEAST, GREATEST = 1e-60, 1e60  # Pa; products of four moduli must be numbers
 SOFTEST = -0.25  # Poisson's ratio of the least plane-strain bulk modulus at a given E
 
 
@@ -16,11 +17,12 @@ class PlaneModuli:
     """Moduli of an isotropic material in plane strain.
 
     Args:
-        bulk: Plane-strain bulk modulus K + G/3, in Pa, positive; K is that of three dimensions.
-        shear: Shear modulus G, in Pa, positive.
+        bulk: Plane-strain bulk modulus K + G/3, in Pa, from `LEAST` to `GREATEST`; K is that of
+            three dimensions.
+        shear: Shear modulus G, in Pa, of the same range.
 
     Raises:
-        ValueError: A modulus is not positive or not finite.
+        ValueError: A modulus lies outside its range.
     """
 
     bulk: float
@@ -28,9 +30,10 @@ class PlaneModuli:
 
     def __post_init__(self) -> None:
         for name, value in (("plane-strain bulk", self.bulk), ("shear", self.shear)):
-            if not 0 < value < np.inf:
+            if not LEAST < value < GREATEST:
                 raise ValueError(
-                    f"the {name} modulus of a phase is {value:g} Pa; it must be positive and finite"
+                    f"the {name} modulus of a phase is {value:g} Pa; it must lie inside"
+                    f" ({LEAST:g}, {GREATEST:g}) Pa"
                 )
 
     @classmethod

@@ -50,9 +50,11 @@ def study_of(case: Case, *, petsc: Mapping[str, str] | None = None) -> ImageStud
         if study.model.boundary == "window":
             source = "cell.tiles"
             tiles_of(study.ranges(None)[0], study.model.tiles)
+        source = "cell.bulk" if given.modulus is None else "cell.modulus"
+        phases = study.phases(study.alpha[0])
         if study.random is not None:
             source = "cell.threshold_deviation"
-            ordered(study.phases(study.alpha[0]))
+            ordered(phases)
     except ValueError as error:
         raise BadInput(case.located(Problem(source, str(error)))) from None
     return study
