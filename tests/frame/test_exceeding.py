@@ -7,6 +7,8 @@ import pytest
 
 from alphacut.frame import Exact, LinearFlow, StoreyFrame, envelope
 from alphacut.frame.decisions.exceeding import any_exceeding, exceeding
+from alphacut.frame.decisions.safe_scale import limit_search
+from alphacut.frame.decisions.sure_exceeding import surely
 from alphacut.fuzzy import FuzzyNumber, Interval, Triangular
 
 # one floor without damping: |q| = v0 / ω, absolute acceleration v0 ω, ω² = 24 E I / (l³ m)
@@ -97,6 +99,21 @@ def test_one_of_several_limits_may_surely_be_passed_where_none_is_by_itself() ->
     assert together.possibility == (1, 1)
     assert together.necessity[0] == 1
     assert any_exceeding(each).necessity[0] == pytest.approx(0.4, abs=0.01)
+
+
+def test_what_the_model_may_be_wrong_by_counts_against_the_proof() -> None:
+    number = Triangular(900.0, 1000.0, 1100.0)
+    limit = float(0.5 * np.sqrt(900.0 / RIGIDITY) / 1.2)  # all peaks are 1.2 times it at least
+
+    def reach(size: float) -> tuple[np.ndarray, np.ndarray]:
+        low, high = number.cut(1 - size)
+        return np.array([low]), np.array([high])
+
+    search = limit_search(ONE, {"m1": 1e3}, reach, {"q1": limit}, 5.0, 0.001)
+    search.fit(1.0)
+    assert surely(search, 1.0) == (True, None)
+    search.error = search.error + 0.3
+    assert not surely(search, 1.0)[0]
 
 
 def test_no_point_of_a_box_called_sure_keeps_the_limits() -> None:
