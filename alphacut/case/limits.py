@@ -188,7 +188,13 @@ def joint(case: Case) -> Iterator[Problem]:
 
 def update(case: Case) -> Iterator[Problem]:
     """Modes are those of a storey frame, and levels begin above 0."""
-    alpha = case.update.alpha
+    alpha, given = case.update.alpha, case.update
+    if (given.measured is None) == (given.recorded is None):
+        allowed = "measured (modes) or recorded (a motion)"
+        yield Problem("update.measured", "inputs are learned from one file", "", allowed)
+    for key in ("held_out", "frequency_deviation", "shape_deviation", "independent"):
+        if given.recorded is not None and case.asked(f"update.{key}"):
+            yield Problem(f"update.{key}", "this is of measured modes", allowed="beside measured")
     if case.sections.frame is None:
         yield Problem("update", "natural modes are learned from for a storey frame", "", "[frame]")
     if alpha[0] <= 0:

@@ -74,7 +74,7 @@ def draw(folder: Path, found: Learned, bands: xarray.Dataset | None) -> list[str
     if found.posterior is None:
         return []
     with style():
-        drawn = save(figures.boxes(found.posterior), folder / "update-inputs")
+        drawn = save(figures.boxes(found), folder / "update-inputs")
         if bands is not None:
             for output in map(str, bands["output"].values):
                 drawn += save(figures.bands(bands, output), folder / f"update-{output}")

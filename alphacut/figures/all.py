@@ -83,10 +83,10 @@ def drawings(results: Results) -> Iterator[Drawing]:
 
 def update_drawings(results: Results) -> Iterator[Drawing]:
     """Inputs and envelopes before and after measured modes, unless they refute the frame."""
-    bands = results.update
-    if results.learned is None or bands is None or (after := results.learned.posterior) is None:
+    bands, learned = results.update, results.learned
+    if learned is None or bands is None or learned.posterior is None:
         return
-    yield "update-inputs", lambda: figure_update.boxes(after)
+    yield "update-inputs", partial(figure_update.boxes, learned)
     for output in map(str, bands["output"].values):
         yield f"update-{output}", partial(figure_update.bands, bands, output)
 

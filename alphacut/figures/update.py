@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-    from alphacut.frame.update.posterior import Posterior
+    from alphacut.stages.vibration.update import Learned
 
 
 def bands(dataset: xarray.Dataset, output: str) -> Figure:
@@ -41,14 +41,16 @@ def bands(dataset: xarray.Dataset, output: str) -> Figure:
     return drawn
 
 
-def boxes(found: Posterior) -> Figure:
+def boxes(learned: Learned) -> Figure:
     """Each input's interval at every level over that of its prior, as shares of its modal value."""
+    from alphacut.stages.vibration.update import prior_support
+
+    found = learned.posterior
+    assert found is not None
     drawn, axes = figure(7.2, 0.9 + 0.32 * len(found.names))
     places = np.arange(len(found.names))[::-1]
-    prior = np.array(
-        [x.cut(x.decided if hasattr(x, "decided") else 0.0) for x in found.agreement.prior.values()]
-    )
-    nominal = found.agreement.chain.nominal
+    prior = np.array([prior_support(number) for number in learned.prior.values()])
+    nominal = np.array([number.modal for number in learned.prior.values()])
     axes.barh(
         places,
         np.ptp(prior, axis=1) / nominal,

@@ -88,6 +88,7 @@ class MotionPosterior:
         upper: Greatest values found.
         best: The parameters that fit best, shape (d,).
         claim: What the cuts claim.
+        prior: Fuzzy number of each parameter before.
     """
 
     names: tuple[str, ...]
@@ -96,20 +97,28 @@ class MotionPosterior:
     upper: Array
     best: Array
     claim: Claim
+    prior: Mapping[str, FuzzyNumber]
+
+    @property
+    def narrowed(self) -> dict[str, float]:
+        """Width of each parameter's lowest cut over that of its prior's support."""
+        widths = np.array([number.support.width for number in self.prior.values()])
+        shares = (self.upper[0] - self.lower[0]) / widths
+        return dict(zip(self.names, map(float, shares), strict=True))
 
     @property
     def numbers(self) -> dict[str, FuzzyNumber]:
-        """The parameters as fuzzy numbers that hold together."""
+        """The parameters as fuzzy numbers that hold together.
+
+        Below the lowest level the prior's support holds.
+        """
         rule = Joint(("record",), False, self.claim.about, named=True)
-        return {
-            name: Claimed(
-                outer_steps(self.alpha, self.lower[:, k], self.upper[:, k]),
-                self.claim,
-                float(self.alpha[0]),
-                joint=rule,
-            )
-            for k, name in enumerate(self.names)
-        }
+        alpha, found = (0.0, *map(float, self.alpha)), {}
+        for k, name in enumerate(self.names):
+            low, high = self.prior[name].support
+            lower, upper = np.append(low, self.lower[:, k]), np.append(high, self.upper[:, k])
+            found[name] = Claimed(outer_steps(alpha, lower, upper), self.claim, joint=rule)
+        return dict(found)
 
 
 def learn_from_motion(
@@ -156,7 +165,13 @@ def learn_from_motion(
         "the sets found about the best values are whole",
     )
     return MotionPosterior(
-        record.flow.names, levels, np.array(lower), np.array(upper), best, Claim(about, given)
+        record.flow.names,
+        levels,
+        np.array(lower),
+        np.array(upper),
+        best,
+        Claim(about, given),
+        dict(prior),
     )
 
 

@@ -62,17 +62,25 @@ class Field(Section):
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Update(Section):
-    """Measured natural modes of a storey frame, from which `run` and `update` learn its inputs."""
+    """Measured natural modes or a recorded motion, from which `run` and `update` learn inputs."""
 
     measured: Annotated[
-        str,
+        str | None,
         Key(
             "CSV file mode,frequency,q1,q2 …: number of the mode, natural frequency in Hz, and"
             " amplitudes of the floors that were measured, to any scale; a row for each time that"
             " the mode was measured",
             file=True,
         ),
-    ]
+    ] = None
+    recorded: Annotated[
+        str | None,
+        Key(
+            "CSV file time [s],q1 [mm],a2 [m/s^2] … in place of measured modes: outputs of the"
+            " frame recorded from t = 0 on at even steps, with errors alike and independent",
+            file=True,
+        ),
+    ] = None
     learn: Annotated[
         tuple[str, ...],
         Key("fuzzy inputs that are learned: E, I, c (columns), l, m, or single ones as c1"),

@@ -1,18 +1,72 @@
-"""Measured natural modes from a CSV file: ``mode,frequency,q1,q2``, a row for each measurement."""
+"""Measured natural modes, ``mode,frequency,q1,q2``, or a recorded motion from a CSV file."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from alphacut.frame.outputs import output_unit
 from alphacut.io.csv_rows import CsvFile
+from alphacut.stages.vibration.accelerogram import even_step
 from alphacut.stochastic.theta.truncated_normal import Array
 
 KEY = "update.measured"
 ALLOWED = "mode,frequency [Hz],q1,q2 … with the floors that were measured"
+
+RECORDED = "time [s],q1 [mm],a2 [m/s^2] … with the outputs that were recorded"
+
+
+@dataclass(frozen=True, eq=False)
+class MotionRows:
+    """A recorded motion.
+
+    Args:
+        step: Distance of its times, which begin at 0, in s.
+        outputs: What was recorded, m of them.
+        values: In SI units, shape (T, m).
+    """
+
+    step: float
+    outputs: tuple[str, ...]
+    values: Array
+
+
+def motion_rows(path: Path, known: Sequence[str]) -> MotionRows:
+    """A recorded motion.
+
+    Args:
+        path: The file.
+        known: Outputs that may be recorded.
+
+    Raises:
+        BadInput: The file is missing, its header or a row is wrong, or its steps are not even.
+    """
+    file = CsvFile(path, "update.recorded", "recorded motion", RECORDED)
+    (line, head), *rows = file.rows(least=2)
+    names = [cell.partition("[")[0].strip() for cell in head]
+    wrong = [name for name in names[1:] if name not in known]
+    if names[0] != "time" or wrong or len(set(names)) < max(len(names), 2):
+        raise file.refuse(line, "the header is wrong", ",".join(head), RECORDED)
+    units = ["s", *map(output_unit, names[1:])]
+    cells = zip(head, names, units, strict=True)
+    scales = [file.scale(line, cell, name, unit) for cell, name, unit in cells]
+    table = []
+    for number, row in rows:
+        try:
+            values = [float(text) for text in row]
+        except ValueError:
+            values = []
+        if len(values) != len(head) or not np.isfinite(values).all():
+            allowed = f"{len(head)} finite numbers, with points in them"
+            raise file.refuse(number, "this row is no instant", ",".join(row), allowed)
+        table.append(values)
+    found = np.array(table) * scales
+    step = even_step(file, [*map(float, found[:, 0])], [number for number, _ in rows])
+    return MotionRows(step, tuple(names[1:]), found[:, 1:])
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,20 +9,27 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.case.case import Case
+from alphacut.case.names import frame_outputs
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import Document
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
 from alphacut.stages.vibration import envelope
 from alphacut.stages.vibration.envelope_task import task_of
-from alphacut.stages.vibration.modes_csv import ModeRows, mode_rows
+from alphacut.stages.vibration.modes_csv import ModeRows, mode_rows, motion_rows
 from alphacut.stages.vibration.structure import Structure
 
 if TYPE_CHECKING:
     import xarray
 
+    from alphacut.frame import StoreyFrame
     from alphacut.frame.update.measured import MeasuredMode
+    from alphacut.frame.update.motion import MotionPosterior
     from alphacut.frame.update.posterior import Posterior
+
+
+WIDE = 0.9
+"""Share of its prior's width that an input keeps where a recorded motion teaches nothing of it."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +64,7 @@ class Learned:
         structure: The structure with the inputs learned.
     """
 
-    posterior: Posterior | None
+    posterior: Posterior | MotionPosterior | None
     refuted: str
     prior: Mapping[str, FuzzyNumber]
     held_out: tuple[HeldOut, ...]
@@ -76,8 +83,7 @@ class Learned:
             },
             "prior": {name: list(prior_support(x)) for name, x in self.prior.items()},
             "narrowed": found.narrowed,
-            "agreement": found.height,
-            "not_learned": [x.words for x in found.directions if not x.learned],
+            **self._identified,
             "held_out": [
                 {
                     "mode": x.mode,
@@ -88,8 +94,19 @@ class Learned:
                 for x in self.held_out
             ],
             "claim": str(found.claim),
-            "seconds": found.seconds,
         }
+
+    @property
+    def _identified(self) -> Document:
+        """How well prior and measurement agree, and combinations that are not learned."""
+        from alphacut.frame.update.posterior import Posterior
+
+        found = self.posterior
+        if isinstance(found, Posterior):
+            lost = [x.words for x in found.directions if not x.learned]
+            return {"agreement": found.height, "not_learned": lost}
+        shares = {} if found is None else found.narrowed
+        return {"not_learned": [name for name, share in shares.items() if share > WIDE]}
 
 
 def prior_support(number: FuzzyNumber) -> tuple[float, float]:
@@ -116,8 +133,9 @@ def sentences(found: Document) -> list[str]:
         )
     for output, share in found.get("envelope_width", {}).items():
         lines.append(f"envelope of {output}: {100 * share:.3g} % of its width before")
-    least, most = found["agreement"]
-    lines.append(f"prior and measurement agree to {least:.3g} (to {most:.3g} at most)")
+    if "agreement" in found:
+        least, most = found["agreement"]
+        lines.append(f"prior and measurement agree to {least:.3g} (to {most:.3g} at most)")
     lost = [f"not learned: {one}" for one in found["not_learned"]]
     return [*lines, *(lost or ["every combination of the inputs is learned"]), str(found["claim"])]
 
@@ -138,7 +156,9 @@ def learned(case: Case, wanted: Structure) -> Learned:
     if wanted.frame is None:
         raise BadInput(Problem("update", "natural modes are learned from for a storey frame"))
     given = case.update
-    rows = mode_rows(case.beside(given.measured))
+    if given.recorded is not None:
+        return _from_motion(case, wanted, wanted.frame)
+    rows = mode_rows(case.beside(str(given.measured)))
     held = {round(number) for number in given.held_out}
     used = [row for row in rows if row.mode not in held]
     prior = inputs(case, wanted)
@@ -161,6 +181,24 @@ def learned(case: Case, wanted: Structure) -> Learned:
     )
     after = replace(wanted, numbers={**wanted.numbers, **found.numbers})
     return Learned(found, "", prior, predicted, after)
+
+
+def _from_motion(case: Case, wanted: Structure, frame: StoreyFrame) -> Learned:
+    """The inputs after a recorded motion."""
+    from alphacut.frame import Exact, LinearFlow
+    from alphacut.frame.update.motion import RecordedMotion, learn_from_motion
+
+    known, prior = frame_outputs(frame.floors), inputs(case, wanted)
+    rows = motion_rows(case.beside(str(case.update.recorded)), known)
+    duration, recorded = (len(rows.values) - 1) * rows.step, replace(frame, outputs=rows.outputs)
+    flow = LinearFlow(recorded, tuple(prior), duration, rows.step, Exact())
+    try:
+        record = RecordedMotion(flow, rows.values)
+        found = learn_from_motion(record, prior, alpha=case.update.alpha)
+    except ValueError as error:
+        raise BadInput(Problem("update", str(error), file=str(case.path))) from None
+    after = replace(wanted, numbers={**wanted.numbers, **found.numbers})
+    return Learned(found, "", prior, (), after)
 
 
 def inputs(case: Case, wanted: Structure) -> dict[str, FuzzyNumber]:
