@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid, solve_ivp
 from scipy.linalg import eigh
+from scipy.sparse.linalg import expm_multiply
 
 from alphacut.frame import (
     Accelerogram,
@@ -400,3 +401,28 @@ def test_each_of_the_two_defects_counts(kind, monkeypatch) -> None:
     deviation = np.abs(moved.y.T @ rows.value[0].T)
     assert (deviation <= bound + 1e-15).all()
     assert deviation.max() > bound.max() / 50
+
+
+@pytest.mark.parametrize(("kind", "most"), [("start_q", 1.8), ("start_v", 2.5)])
+def test_a_wrong_start_counts_by_its_energy(kind, most, monkeypatch) -> None:
+    """A start that is off by what moves the last storey most moves on freely, within the bound."""
+    found = model(FRAME, {"E": Interval(24.9e9, 25.1e9)}, 1e-7)
+    physical, true = found.boxes.to_physical(np.zeros((1, 1))), model_error._defects
+    matrices, rows = evaluate(found.flow.system, found.flow.names, physical, derivatives=False)
+    M, D, K = (part.value[0] for part in (matrices.mass, matrices.damping, matrices.stiffness))
+    strange, zero, inverse = np.linalg.inv(K)[:, 2], np.zeros(3), np.linalg.inv(M)
+
+    def only(*args):
+        defects = {name: np.zeros_like(values) for name, values in true(*args).items()}
+        return defects | {kind: np.zeros_like(defects[kind]) + strange}
+
+    monkeypatch.setattr(model_error, "_defects", only)
+    bound = proved_error(found)
+    moved = expm_multiply(
+        np.block([[np.zeros((3, 3)), np.eye(3)], [-inverse @ K, -inverse @ D]]),
+        np.concatenate([strange, zero] if kind == "start_q" else [zero, strange]),
+        *(0.0, found.time[-1], len(found.time)),
+    )
+    deviation = np.abs(moved @ rows.value[0].T)
+    assert (deviation <= bound * (1 + 1e-6)).all()
+    assert deviation.max() > bound.max() / most
