@@ -53,8 +53,10 @@ class Envelope:
             shape (A, T, m, d), in SI units.
         upper_at: Parameters that reach the upper bounds, shape (A, T, m, d).
         method: Name of the method.
-        nature: "inner": attained by the given parameters; "estimated": with `error`; "verified by
-            sampling" or "guaranteed": certified.
+        nature: "inner": attained by the given parameters; "estimated": with `error`; "searched":
+            with `error`, but that no better optimum is left rests on samples alone, since there are
+            more than six parameters, the motion is not linear, or polynomials of the modes do not
+            lead; "verified by sampling" or "guaranteed": certified.
         trajectories: Number of trajectories (or eigen-analyses) computed.
         seconds: Wall time of computing.
         error: Estimated envelope error, shape (A, T, m), in the units of the outputs; None where
@@ -80,7 +82,7 @@ class Envelope:
       modal parameters and the widest box's corners, in the unit of the first displacement; added to
       `error`, for each output in its own unit, where that was estimated.
     - dominant_error: Said where time stepping adds more to an output than the search.
-    - tolerance: What the Graph Follower computed a graph for, or what auto keeps, in the unit.
+    - gain: What the Graph Follower computed a graph for, in the unit.
       judged_by: What `error` was found with, where the method itself has no estimate.
       order: Degree of its Taylor models. recomputed: Derivatives computed again.
       corners: Trajectories at corners, beside `trajectories`.
@@ -90,8 +92,8 @@ class Envelope:
     - search_error: What the search may have missed, at most, in the unit: what Newton's method
       still promises and what the last independent pass gained; the rest of `error` is that of the
       polynomials and of time stepping.
-    - estimated_error: Largest error, in the unit. missed_by_sample: By how much independent
-      trajectories passed the bounds, in the unit.
+    - estimated_error: Largest error, in the unit. second_pass: By how much the bounds
+      of two passes that share no starting points differ, in the unit.
     - gap: Largest distance of attained and proved bounds, in the unit, which is that of gap_output.
       proved_gap: The same of the proved bounds beside a Graph Follower's.
       boxes: Parts of the parameters' box that the proof looked at, a count.

@@ -10,7 +10,6 @@ import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.checks.step_error import step_error
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.batch_graph_follower import BatchFollower
@@ -30,8 +29,10 @@ GAPS = (0.1, 1.0)
 the modes forbids the first.
 """
 CANDIDATES = ("modal", "improved-graph-follower")
-CHECKS = 512
-"""Trajectories of the independent second pass."""
+AGREED = 0.25
+"""Share of the wanted error by which two passes that share no starting points may differ."""
+UNSEEN = 2.0
+"""Factor on that difference, for what neither has seen."""
 
 
 class ToleranceError(RuntimeError):
@@ -45,7 +46,7 @@ class Auto:
     Up to six parameters are proved, unless something forbids it, which the fact "unproved" names.
     Modal intervening variables come first, since tens of eigen-analyses cost less than any number
     of trajectories; where their error estimate is too large, the Graph Follower in rounds, made
-    stricter until an independent sample finds nothing above the tolerance.
+    stricter until a second pass from other points agrees with it.
 
     Args:
         tolerance: Wanted envelope error, in units of the first displacement, else of the first
@@ -157,40 +158,41 @@ def _proved(
 def _followed(
     flow: UnitFlow, tolerance: float, budget: int, progress: Progress | None
 ) -> Envelope | None:
-    """The Graph Follower, begun with more points until an independent sample agrees."""
+    """The Graph Follower, begun with more points until one that shares none with it agrees."""
     spread, strict, used = 256, tolerance / 4, 0
     for attempt in range(4):
-        method = BatchFollower(strict, budget, spread, contests=3)
-        found = method.run(flow, progress)
-        used += found.trajectories
-        if "reason" in found.facts:
+        method = BatchFollower(strict, budget, spread, contests=3, seed=2 * attempt)
+        first = method.run(flow, progress)
+        used += first.trajectories
+        if "reason" in first.facts:
             return None
-        missed = second_pass(found, flow, skip=100_003 * (attempt + 1))
-        used += CHECKS
-        if missed <= tolerance / 20:
-            error = np.full_like(found.lower, 1.0) * flow.scale * max(missed, strict)
-            return replace(
-                found,
-                trajectories=used,
-                error=error,
-                facts={**found.facts, "missed_by_sample": missed},
-            )
+        second = replace(method, seed=2 * attempt + 1).run(flow, progress)
+        used += second.trajectories
+        apart = distance(first, second, flow)
+        if apart <= AGREED * tolerance and "reason" not in second.facts:
+            error = np.full_like(first.lower, 1.0) * flow.scale * (strict + UNSEEN * apart)
+            facts = {**first.facts, "second_pass": apart}
+            return replace(outer(first, second), trajectories=used, error=error, facts=facts)
         spread, strict = 4 * spread, strict / 2
     return None
 
 
-def second_pass(found: Envelope, flow: UnitFlow, *, skip: int) -> float:
-    """Gain of an independent sample of the widest box, in units of the tolerance."""
-    lower, upper = flow.boxes.unit(0)
-    points = (lower + upper) / 2 + (upper - lower) / 2 * chebyshev_points(
-        len(lower), CHECKS, skip=skip
+def distance(first: Envelope, second: Envelope, flow: UnitFlow) -> float:
+    """Largest distance of the bounds of two envelopes, in units of the tolerance."""
+    off = np.maximum(np.abs(first.lower - second.lower), np.abs(first.upper - second.upper))
+    return float((off / flow.scale).max())
+
+
+def outer(first: Envelope, second: Envelope) -> Envelope:
+    """The first envelope with the bounds of the second where these lie further out."""
+    below, above = second.lower < first.lower, second.upper > first.upper
+    return replace(
+        first,
+        lower=np.where(below, second.lower, first.lower),
+        upper=np.where(above, second.upper, first.upper),
+        lower_at=np.where(below[..., None], second.lower_at, first.lower_at),
+        upper_at=np.where(above[..., None], second.upper_at, first.upper_at),
     )
-    worst = 0.0
-    for chunk in np.array_split(points, 8):
-        values = flow.values(chunk)
-        beyond = np.maximum(values.max(0) - found.upper[0], found.lower[0] - values.min(0))
-        worst = max(worst, float((beyond / flow.scale).max()))
-    return worst
 
 
 def _why(found: Envelope) -> str:

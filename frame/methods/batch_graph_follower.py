@@ -23,6 +23,8 @@ from alphacut.frame.checks.corners import taken_in
 from alphacut.frame.envelope import Envelope, signed_envelope
 
 Progress = Callable[[float], None]
+APART = 100_003
+"""Points of the sequence between those that two seeds spread."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,7 @@ class BatchFollower:
         order: Degree κ of the Taylor models, which must be 2.
         contests: How often, when no model promises more, those of neighbouring nodes are asked
             where the optimum jumps in between.
+        seed: Which points are spread.
 
     Raises:
         ValueError: A switch is out of its range.
@@ -50,6 +53,7 @@ class BatchFollower:
     reach: float = 0.6
     order: int = 2
     contests: int = 0
+    seed: int = 0
 
     def __post_init__(self) -> None:
         if not (self.tolerance > 0 and np.isfinite(self.tolerance)):
@@ -80,7 +84,7 @@ class BatchFollower:
         promised = np.maximum(found.correction, found.open_gain).max(-1)
         error = SAFETY * (promised + self.tolerance / 2 * flow.scale) + missed[:, None]
         facts: dict[str, float | str] = {
-            "tolerance": self.tolerance,
+            "gain": self.tolerance,
             "order": 2,
             "corners": corners,
         }
@@ -94,7 +98,7 @@ class BatchFollower:
             bounds,
             where,
             method="improved-graph-follower",
-            nature="estimated",
+            nature="searched",
             error=error,
             facts=facts,
             trajectories=len(found.points),
@@ -131,12 +135,9 @@ class BatchFollower:
         if not (upper > lower).any():
             return modal if not len(out.points) else np.zeros((0, len(lower)))
         middle, half = (lower + upper) / 2, (upper - lower) / 2
-        return np.vstack(
-            [
-                modal,
-                middle + half * chebyshev_points(len(lower), self.spread, skip=1 + len(out.points)),
-            ]
-        )
+        skip = 1 + len(out.points) + APART * self.seed
+        spread = chebyshev_points(len(lower), self.spread, skip=skip)
+        return np.vstack([modal, middle + half * spread])
 
 
 @dataclass(eq=False)

@@ -18,7 +18,7 @@ from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.envelope import Envelope, signed_envelope
 from alphacut.frame.modal.exact_response import ExactResponse
 from alphacut.frame.modal.levels import SEEN, judged_at_optima, polished_levels, search_levels
-from alphacut.frame.modal.model import ModalModel, fit_modes
+from alphacut.frame.modal.model import MANY, ModalModel, fit_modes
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 
@@ -45,8 +45,8 @@ ENOUGH = 2.0
 """Error of the polynomials, as a multiple of the tolerance, from which on exact trajectories take
 over."""
 ROUGH = 0.3
-"""Error of the polynomials, as a share of an output's peak, above which they lead nowhere: where
-the basins are is then unknown, and no estimate of the search could be defended."""
+"""Error of the polynomials, as a share of an output's peak, above which they lead nowhere, and
+Newton's method learns second derivatives from gradients."""
 GUIDED = 0.3
 """Share of the time that the polynomials' search takes before that, for the progress alone."""
 EXACT = "values of exact trajectories at the parameters given; polynomials only led there"
@@ -146,7 +146,7 @@ class Modal:
             bounds,
             at,
             method="modal",
-            nature="estimated",
+            nature=_nature(flow, exact),
             error=error,
             facts=facts,
             trajectories=model.analyses,
@@ -155,14 +155,20 @@ class Modal:
 
     def _exact(self, model: ModalModel, flow: UnitFlow) -> ExactResponse | None:
         """What polishes the bounds; None where the polynomials do, or nothing can."""
-        peak = np.abs(flow.flow.values(flow.boxes.modal[None])[0]).max(0)
-        enough = (model.error / flow.scale).max() <= ENOUGH * self.tolerance
-        if enough or (model.error.max(0) > ROUGH * peak).any():
+        if (model.error / flow.scale).max() <= ENOUGH * self.tolerance:
             return None
+        peak = np.abs(flow.flow.values(flow.boxes.modal[None])[0]).max(0)
+        bent = not (model.error.max(0) > ROUGH * peak).any()
         try:
-            return ExactResponse.of(model, flow.scale)
+            return ExactResponse.of(model, flow.scale, bent=bent)
         except ModalError:
             return None
+
+
+def _nature(flow: UnitFlow, exact: ExactResponse | None) -> str:
+    """Worth of the error: that of a search without a guide, or in many dimensions, is less."""
+    led = len(flow.boxes.names) <= MANY and (exact is None or exact.bent)
+    return "estimated" if led else "searched"
 
 
 def polynomial_error(model: ModalModel) -> Array:

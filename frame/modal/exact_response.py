@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -41,14 +42,18 @@ class ExactResponse:
             derivatives.
         scale: What the outputs are divided by, shape (m,).
         load: Tables of all modes' answer to the ground, or None.
+        bent: Whether the polynomials are good enough for second derivatives; else these are zero,
+            and Newton's method learns them from gradients.
     """
 
     model: ModalModel
     scale: Array
     load: LoadTables | None
+    bent: bool = True
+    secant: ClassVar[bool] = True
 
     @classmethod
-    def of(cls, model: ModalModel, scale: Array) -> ExactResponse:
+    def of(cls, model: ModalModel, scale: Array, *, bent: bool = True) -> ExactResponse:
         """Of the structure whose polynomials are `model`, in units of `scale` (m,).
 
         Raises:
@@ -60,7 +65,7 @@ class ExactResponse:
             rate = fit(points, analyse(flow, cuts, points).eigenvalue, 2)
             nothing = Polynomial(rate.index, np.zeros_like(rate.coefficients))
             load = LoadTables.build(flow.system.ground, flow.time, rate, nothing)
-        return cls(model.in_units(scale), scale, load)
+        return cls(model.in_units(scale), scale, load, bent)
 
     @property
     def time(self) -> Array:
@@ -96,10 +101,12 @@ class ExactResponse:
         return out
 
     def at(self, unit: Array, node: Array, output: Array) -> tuple[Array, Array, Array]:
-        """Values (N,) and gradients (N, d), exact, and Hessians (N, d, d) of the polynomials."""
+        """Values (N,) and gradients (N, d), exact; Hessians (N, d, d) of the polynomials, or 0."""
         f, g = np.empty(len(unit)), np.empty(unit.shape)
         for rows, points, own in _pieces(unit):
             f[rows], g[rows] = self._sloped(points, own, node[rows], output[rows])
+        if not self.bent:
+            return f, g, np.zeros((*unit.shape, unit.shape[1]))
         return f, g, self.model.at(unit, node, output)[2]
 
     def _sloped(self, points: Array, own: Array, node: Array, output: Array) -> tuple[Array, Array]:

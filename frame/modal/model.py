@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, log
+from typing import ClassVar
 
 import numpy as np
 
@@ -62,6 +63,7 @@ class ModalModel:
     modes: int
     error: Array
     analyses: int
+    secant: ClassVar[bool] = False
 
     @property
     def time(self) -> Array:

@@ -12,6 +12,7 @@ from alphacut.frame.modal.exact_response import ExactResponse
 from alphacut.frame.modal.search import (
     Optima,
     best_of_pool,
+    contest,
     fresh_points,
     problems,
     refine,
@@ -20,6 +21,12 @@ from alphacut.frame.modal.search import (
 
 CALM_PASSES = 2
 """Passes one after the other that must gain too little before the search ends."""
+VALUES = 16e6
+"""Most numbers of the trajectories of a pass that are kept at a time: 128 MB."""
+ROUNDS = 3
+"""Rounds of a contest of optima on either side of a jump, in a pass."""
+RIVALS = 2
+"""Basins from which a problem is solved anew."""
 
 
 @dataclass(frozen=True)
@@ -40,9 +47,9 @@ class Polish:
 
     small: float
     quiet: float
-    passes: int = 6
-    graphs: int = 512
-    anew: int = 256
+    passes: int = 8
+    graphs: int = 2048
+    anew: int = 4096
     seed: int = 0
 
     def run(
@@ -88,17 +95,19 @@ class Polish:
         count, anew = effort
         rng, before = np.random.default_rng((self.seed, 7, count)), found.value.copy()
         nodes = np.arange(len(exact.time))
+        graphs = int(np.clip(VALUES / (len(nodes) * len(exact.outputs)), 256, self.graphs))
         known = np.unique(np.round(found.point[moved], 3), axis=0)
-        known = np.clip(rng.permutation(known)[: self.graphs], lower, upper)
+        known = np.clip(rng.permutation(known)[:graphs], lower, upper)
         _take(found, best_of_pool(known, trajectories(exact, known), nodes, 1)[0])
-        fresh = fresh_points(rng, lower, upper, self.graphs)
-        rival = best_of_pool(fresh, trajectories(exact, fresh), nodes, 1)[0]
-        if count:
-            some = rng.permutation(len(rival.value))[:anew]
-            refine(exact, rival, some, lower, upper, self.small)
-        _take(found, rival)
+        fresh = fresh_points(rng, lower, upper, graphs)
+        some = rng.permutation(len(before))[:anew]
+        for rival in best_of_pool(fresh, trajectories(exact, fresh), nodes, RIVALS):
+            if count:
+                refine(exact, rival, some, lower, upper, self.small)
+            _take(found, rival)
         open_ = np.arange(len(before)) if not count else np.flatnonzero(found.value > before)
         refine(exact, found, open_, lower, upper, self.small)
+        contest(exact, found, lower, upper, self.small, ROUNDS)
         return np.flatnonzero(found.value > before)
 
 

@@ -141,7 +141,7 @@ class ModalSearch:
             improved = second_pass(model, found, lower, upper, self, count)
             if improved.any():
                 self._follow(model, found, len(model.time), lower, upper, improved)
-                self._contest(model, found, lower, upper)
+                contest(model, found, lower, upper, self.small)
             gained = (found.value - before).reshape(len(model.time), -1, 2).max((0, 2))
             if gained.max() <= self.quiet:
                 break
@@ -222,37 +222,8 @@ class ModalSearch:
             which = np.flatnonzero(apart & (rival.value > found.value - margin))
             refine(model, rival, which, lower, upper, self.small)
             found.offer(model, rival.point[which], which)
-        self._contest(model, found, lower, upper)
+        contest(model, found, lower, upper, self.small)
         return found
-
-    def _contest(self, model: Response, found: Optima, lower: Array, upper: Array) -> None:
-        """Refine either optimum at both nodes of a jump, until no jump moves."""
-        grid = np.arange(len(found.value)).reshape(-1, 2 * len(model.outputs))
-        open_ = np.ones(len(found.value), bool)
-        for _ in range(20):
-            moved: list[Array] = []
-            for here, there in (
-                (grid[1:].ravel(), grid[:-1].ravel()),
-                (grid[:-1].ravel(), grid[1:].ravel()),
-            ):
-                jump = (
-                    np.abs(found.point[here] - found.point[there]).max(1)
-                    > 0.05 * (upper - lower).max()
-                )
-                jump &= open_[here] | open_[there]
-                rival = found.take(here[jump])
-                rival.point[:] = found.point[there[jump]]
-                rival.value[:] = (
-                    rival.side * model.value_at(rival.point, rival.node, rival.output)
-                    if jump.any()
-                    else 0.0
-                )
-                refine(model, rival, np.arange(len(rival.value)), lower, upper, self.small)
-                moved.append(found.offer(model, rival.point, here[jump]))
-            open_[:] = False
-            open_[np.concatenate(moved)] = True
-            if not open_.any():
-                return
 
     def _samples(self, lower: Array, upper: Array) -> Array:
         d = len(lower)
@@ -262,6 +233,55 @@ class ModalSearch:
         points = np.vstack([unit, tensor_points(d, count)])
         scaled: Array = (lower + upper) / 2 + (upper - lower) / 2 * points
         return scaled
+
+
+def contest(
+    model: Response, found: Optima, lower: Array, upper: Array, small: float, rounds: int = 20
+) -> None:
+    """Refine either optimum at both nodes of a jump, until no jump moves or the rounds are over.
+
+    Args:
+        model: The modal model.
+        found: All problems, node by node, which keep what is better.
+        lower: Lower ends of the box, shape (d,).
+        upper: Upper ends.
+        small: Gain that Newton's method leaves.
+        rounds: Most rounds.
+    """
+    grid = np.arange(len(found.value)).reshape(-1, 2 * len(model.outputs))
+    open_ = np.ones(len(found.value), bool)
+    for _ in range(rounds):
+        moved: list[Array] = []
+        for here, there in (
+            (grid[1:].ravel(), grid[:-1].ravel()),
+            (grid[:-1].ravel(), grid[1:].ravel()),
+        ):
+            apart = np.abs(found.point[here] - found.point[there]).max(1)
+            jump = (apart > 0.05 * (upper - lower).max()) & (open_[here] | open_[there])
+            if jump.any():
+                moved.append(_contested(model, found, here[jump], there[jump], lower, upper, small))
+        open_[:] = False
+        if moved:
+            open_[np.concatenate(moved)] = True
+        if not open_.any():
+            return
+
+
+def _contested(
+    model: Response,
+    found: Optima,
+    here: Array,
+    there: Array,
+    lower: Array,
+    upper: Array,
+    small: float,
+) -> Array:
+    """Refine the optima of `there` as rivals of those of `here`; which of these improved."""
+    rival = found.take(here)
+    rival.point[:] = found.point[there]
+    rival.value[:] = rival.side * model.value_at(rival.point, rival.node, rival.output)
+    refine(model, rival, np.arange(len(rival.value)), lower, upper, small)
+    return found.offer(model, rival.point, here)
 
 
 def second_pass(
@@ -382,6 +402,7 @@ def _newton(
     """
     radius: Array = np.full(len(which), 0.5)
     f, g, H = _signed(model, optima, optima.point[which], which)
+    bend = np.zeros_like(H)  # what gradients have shown H to lack
     for count in range(ITERATIONS):
         low = np.maximum(lower - optima.point[which], -radius[:, None])
         high = np.minimum(upper - optima.point[which], radius[:, None])
@@ -394,13 +415,18 @@ def _newton(
         optima.left[which] = promised
         held = np.abs(step).max(1, initial=0.0) >= 0.999 * radius
         open_ = (promised > small) | (held & (promised > 1e-3 * small))
-        which, radius, step, promised, g, H = (
-            x[open_] for x in (which, radius, step, promised, g, H)
+        which, radius, step, promised, g, H, bend = (
+            x[open_] for x in (which, radius, step, promised, g, H, bend)
         )
         if not len(which):
             return
         trial = np.clip(optima.point[which] + step, lower, upper)
+        step = trial - optima.point[which]
         f, g2, H2 = _signed(model, optima, trial, which)
+        if model.secant:
+            lack = _symmetric_rank_one(H2 + bend, step, g2 - g)
+            bend += lack
+            H, H2 = H + lack, H2 + bend
         got = f - optima.value[which]
         better = got > 0
         optima.point[which[better]], optima.value[which[better]] = trial[better], f[better]
@@ -411,6 +437,17 @@ def _newton(
             np.minimum(2 * radius, 2.0),
             np.where(ratio < 0.25, 0.3 * np.abs(step).max(1), radius),
         )
+
+
+def _symmetric_rank_one(H: Array, step: Array, change: Array) -> Array:
+    """Least correction of Hessians (N, d, d) that explains a change of gradients over a step."""
+    lack = change - (H @ step[..., None])[..., 0]
+    weight = (lack * step).sum(1)
+    size = np.sqrt((lack**2).sum(1) * (step**2).sum(1))
+    sound = np.abs(weight) > 1e-6 * size
+    scaled = lack / np.where(sound, weight, 1.0)[:, None] * sound[:, None]
+    correction: Array = lack[:, :, None] * scaled[:, None, :]
+    return correction
 
 
 def _signed(

@@ -13,6 +13,7 @@ class Nature(StrEnum):
     VERIFIED = "verified by sampling"
     INNER = "inner"
     ESTIMATED = "estimated"
+    SEARCHED = "searched"
 
     def sentence(self, given: Sequence[str] = ()) -> str:
         """The nature in words, with what it rests on.
@@ -28,6 +29,7 @@ _MEANING = {
     Nature.VERIFIED: "the search is proved to leave nothing out, the error of its model is sampled",
     Nature.INNER: "attained by the parameters stored with them; the true range may go further",
     Nature.ESTIMATED: "from a surrogate whose error is estimated, not proved",
+    Nature.SEARCHED: "that no better optimum is left rests on samples alone, and so does the error",
 }
 
 

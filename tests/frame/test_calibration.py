@@ -14,7 +14,9 @@ from alphacut.frame.certificate.remainder import Remainder
 from alphacut.frame.methods import auto
 from alphacut.frame.methods.auto import Auto, ToleranceError
 from alphacut.frame.methods.modal import Modal, polynomial_error
+from alphacut.frame.modal.exact_response import ExactResponse
 from alphacut.frame.modal.model import ModalModel, fit_modes
+from alphacut.frame.modal.search import problems, refine
 from alphacut.fuzzy import Interval
 from benchmarks.frame.calibration import judged, random_case
 
@@ -115,6 +117,38 @@ def test_midpoint_rule_is_part_of_the_declared_error() -> None:
     assert found.error.max() < TIGHT * wrong.max()
     with pytest.raises(ToleranceError, match="time stepping"):
         envelope(TWO, inputs, integrator="midpoint", tolerance=1e-6, **common)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("seed", [pytest.param(61006, marks=pytest.mark.slow), 61032])
+def test_optima_beside_jumps_are_found_where_polynomials_lead_little(seed: int) -> None:
+    row = judged(
+        random_case(seed), method="auto", tolerance=1e-3, samples=2000, starts=6, seed=61001
+    )
+    assert row["method"] == "modal"
+    assert row["error"] <= 1e-3
+    assert row["above_declared"] == 0
+
+
+def test_newton_learns_curvature_from_gradients() -> None:
+    inputs = {name: TWO.parameters[name] for name in ("E", "m1", "m2")}
+    cuts = boxes({n: Interval(0.9 * x, 1.1 * x) for n, x in inputs.items()}, (0,))
+    flow = LinearFlow(TWO, cuts.names, 10, 0.1, Exact())
+    model, ends = fit_modes(flow, cuts, tolerance=1e-3), np.ones(3)
+    found = {}
+    for bent in (True, False):
+        exact = ExactResponse.of(model, np.ones(2), bent=bent)
+        optima = problems(np.arange(20, 100, 10), 2, 3)
+        every = np.arange(len(optima.value))
+        optima.offer(exact, np.full((len(every), 3), 0.1), every)
+        refine(exact, optima, every, -ends, ends, 1e-9)
+        assert optima.left.max() <= 1e-9
+        slope = optima.side[:, None] * exact.at(optima.point, optima.node, optima.output)[1]
+        free = np.abs(optima.point) < 1 - 1e-9
+        assert np.abs(np.where(free, slope, np.minimum(slope * np.sign(optima.point), 0))).max() < (
+            1e-4
+        )
+        found[bent] = optima.value
+    assert np.median(np.abs(found[True] - found[False])) < 1e-8
 
 
 @pytest.mark.slow

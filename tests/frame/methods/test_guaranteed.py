@@ -54,7 +54,7 @@ def test_more_than_six_inputs_are_not_proved() -> None:
         n: Triangular(0.999 * x, x, 1.001 * x) for n, x in FRAME.parameters.items() if n in names
     }
     found = envelope(FRAME, many, tolerance=1e-4, **SPAN)
-    assert found.nature == "estimated"
+    assert found.nature == "searched"
     assert "up to 6 parameters" in str(found.facts["unproved"])
 
 
