@@ -17,6 +17,7 @@ OF_MODELS = {
 """Keys of the mesh with the models of the cell that have them; `alphacut mesh` has them always."""
 OF_ENVELOPES = {
     "envelope.order": FOLLOWERS,
+    "envelope.gain": FOLLOWERS,
     "envelope.tolerance": STEERED,
     "envelope.relative_tolerance": STEERED,
     "pendulum.tolerance": STEERED,

@@ -39,6 +39,7 @@ NOT_NEGATIVE = Range("0 or greater", lower=0.0, closed=True)
 NATURAL = Range("from 0 to 1e18", lower=0.0, upper=1e18, closed=True)
 POISSON = Range("inside (-1, 0.5)", lower=-1.0, upper=0.5)
 UNIT = Range("inside (0, 1)", lower=0.0, upper=1.0)
+SHARE = Range("from 1e-6 to 1", lower=1e-6, upper=1.0, closed=True)
 MEMBERSHIP = Range("from 0 to 1", lower=0.0, upper=1.0, closed=True)
 RATIO = Range(
     '0 or greater and below 1, such as 0.05 or "5 %"', lower=0.0, upper=1.0, closed=True, below=True

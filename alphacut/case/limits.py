@@ -86,12 +86,10 @@ class AskedTolerance:
     Args:
         value: In SI, or a share of a peak.
         unit: Its unit in words, such as `` m`` or `` of a peak``.
-        changed: Whether the command line names it.
     """
 
     value: float
     unit: str
-    changed: bool
 
 
 def asked_tolerance(case: Case) -> AskedTolerance | None:
@@ -104,7 +102,7 @@ def asked_tolerance(case: Case) -> AskedTolerance | None:
         named.append(("pendulum.tolerance", case.pendulum.tolerance, " N"))
     for key, value, unit in named:
         if value is not None and case.asked(key):
-            return AskedTolerance(value, unit, key in case.changed)
+            return AskedTolerance(value, unit)
     return None
 
 
@@ -204,3 +202,13 @@ def update(case: Case) -> Iterator[Problem]:
             str(list(alpha)),
             "levels above 0, as [0.05, 0.5, 1]",
         )
+
+
+def asked_gap(case: Case) -> float | None:
+    """Gap of proved bounds that a case names, in m; None where it names none."""
+    return case.envelope.certify if case.asked("envelope.certify") else None
+
+
+def names_rough_integrator(case: Case) -> bool:
+    """Whether the case names a time stepping that is not exact."""
+    return case.asked("envelope.integrator") and case.envelope.integrator != "exact"

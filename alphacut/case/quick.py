@@ -33,6 +33,13 @@ COARSE = {
     ),
 }
 """Keys that the quick form changes, by the stage that reads them."""
+WAIVED = (
+    "envelope.tolerance",
+    "envelope.relative_tolerance",
+    "envelope.certify",
+    "pendulum.tolerance",
+)
+"""Tolerances of the case that numbers without a meaning are not held to."""
 
 
 def settings(case: Case) -> dict[str, object]:
@@ -73,6 +80,7 @@ def quick(case: Case) -> Case:
     longest = NODES * old.envelope.step if old.envelope else 0.0
     return replace(
         case,
+        written={key: text for key, text in case.written.items() if key not in WAIVED},
         sections=replace(
             old,
             microstructure=old.microstructure and few_particles(old.microstructure),

@@ -99,8 +99,8 @@ def recorded(results: Results, study: Study) -> tuple[FollowerRecord, str]:
         wanted.flow(cuts.names, steps * study.task.step, study.task.step), cuts, study.task.relative
     )
     output = max(0, len([name for name in flow.outputs if name.startswith("q")]) - 1)
-    for tolerance in (1.0, 1e-2, 1e-4, 1e-8):  # fine enough that there is something to see
-        found = record_flow(flow, output=output, tolerance=tolerance * study.task.tolerance)
+    for share in (1.0, 1e-2, 1e-4, 1e-8):  # fine enough that there is something to see
+        found = record_flow(flow, output=output, tolerance=share * study.task.resolution)
         if any(step.found >= 0 for step in found.steps):
             break
     return found, flow.outputs[output]

@@ -76,8 +76,9 @@ def require_choice(case: Case, *, modulus: bool, envelope: bool) -> None:
     """
     fixed = modulus and case.modulus_tolerance is not None and case.names_mesh
     fixed = fixed and case.modulus.method not in STEERED
-    own = envelope and asked_tolerance(case) is not None
-    if not fixed and not (own and case.envelope.method != "auto"):
+    own = envelope and (asked_tolerance(case) is not None or case.envelope.certify is not None)
+    own = own and (case.envelope.method != "auto" or case.envelope.certify is not None)
+    if not fixed and not own:
         raise BadInput(
             Problem(
                 "--best-effort",

@@ -109,8 +109,8 @@ def with_step_error(found: Envelope, flow: UnitFlow, scheme: str, steps: Array) 
 
 def _dominance(found: Envelope, flow: UnitFlow, steps: Array) -> dict[str, str]:
     """A fact where time stepping adds more to some output than the search for the bounds."""
-    tolerance = float(found.facts.get("tolerance", 0.0))
-    own = tolerance * flow.scale if found.error is None else found.error.max((0, 1))
+    gain = float(found.facts.get("gain", 0.0))
+    own = gain * flow.scale if found.error is None else found.error.max((0, 1))
     ratio = np.divide(steps, own, out=np.zeros_like(steps), where=own > 0)
     worst = int(ratio.argmax())
     if ratio[worst] <= 1:

@@ -106,7 +106,7 @@ class GraphFollower:
         """Envelope of what was followed."""
         facts: dict[str, float | str] = {
             "order": self.order,
-            "tolerance": self.tolerance,
+            "gain": self.tolerance,
             "recomputed": followed.storage.recomputed,
         }
         if followed.exhausted:

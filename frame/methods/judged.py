@@ -23,37 +23,63 @@ SAMPLES = 64
 SAFETY = 2.0
 """Factor on what they find beyond the bounds."""
 GAP = 0.25
-"""Gap of the proof that judges, as a share of the tolerance."""
+"""Gap of the proof that judges, as a share of the gain worth a graph."""
 FITTED = 0.125
-"""Wanted error of the modal model that judges, as a share of the tolerance."""
+"""Wanted error of the modal model that judges, as a share of the gain worth a graph."""
+
+BY_MODES = "the envelope of the exact motion by modes"
 
 
 def judged(found: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
     """The envelope with one error for search, polynomials and time stepping.
 
     The largest distance from what the exact motion's proved bounds leave possible, which the
-    envelope keeps beside its own; where there is no proof, that from its envelope by modes, plus
-    its own error; where the modes do not resolve the tolerance, what an independent sample finds
-    beyond the bounds.
+    envelope keeps beside its own; where there is no proof, or it leaves more than the gain worth a
+    graph, that from its envelope by modes, plus its own error; where the modes do not resolve the
+    gain, what an independent sample finds beyond the bounds.
 
     Args:
-        found: An envelope of the Graph Follower, whose tolerance is among its facts.
+        found: An envelope of the Graph Follower, whose gain worth a graph is among its facts.
         flow: Its trajectories.
         steps: Error of time stepping, shape (T, m).
     """
     proof = _proof(found, flow)
     if proof is not None:
-        return _beside(found, proof, flow)
+        proved = _beside(found, proof, flow)
+        return proved if _resolved(proof, found) else _sharper(proved, found, flow)
     error = _by_modes(found, flow)
-    judge = "the envelope of the exact motion by modes"
-    if error is None:
-        judge = f"{SAMPLES} independent trajectories on each level"
-        own = float(found.facts["tolerance"]) * flow.scale if found.error is None else found.error
-        missed = np.array([_missed(found, flow, level) for level in range(len(found.alpha))])
-        error = np.broadcast_to(own, found.lower.shape) + SAFETY * missed[:, None]
-        error = error + (steps if found.error is None else 0.0)
-    facts = {**found.facts, "judged_by": judge, "estimated_error": (error / flow.scale).max()}
-    return replace(found, error=error, facts=facts)
+    if error is not None:
+        return _told(found, error, flow, BY_MODES)
+    own = float(found.facts["gain"]) * flow.scale if found.error is None else found.error
+    missed = np.array([_missed(found, flow, level) for level in range(len(found.alpha))])
+    error = np.broadcast_to(own, found.lower.shape) + SAFETY * missed[:, None]
+    error = error + (steps if found.error is None else 0.0)
+    return _told(found, error, flow, f"{SAMPLES} independent trajectories on each level")
+
+
+def _resolved(proof: Envelope, found: Envelope) -> bool:
+    """Whether the proved bounds are sharp enough to judge a Graph Follower's."""
+    return float(proof.facts["gap"]) <= float(found.facts["gain"])
+
+
+def _sharper(proved: Envelope, found: Envelope, flow: UnitFlow) -> Envelope:
+    """An envelope beside a proof that is not sharp, with the error by modes where that is less."""
+    error = _by_modes(found, flow)
+    assert proved.error is not None
+    if error is None or error.max() >= proved.error.max():
+        return proved
+    return _told(proved, np.minimum(error, proved.error), flow, BY_MODES)
+
+
+def _told(found: Envelope, error: Array, flow: UnitFlow, judge: str) -> Envelope:
+    """The envelope with an error and what it was found with."""
+    facts = {
+        **found.facts,
+        "judged_by": judge,
+        "estimated_error": float((error / flow.scale).max()),
+    }
+    nature = "estimated" if judge == BY_MODES and found.nature == "searched" else found.nature
+    return replace(found, error=error, facts=facts, nature=nature)
 
 
 def _proof(found: Envelope, flow: UnitFlow) -> Envelope | None:
@@ -62,7 +88,7 @@ def _proof(found: Envelope, flow: UnitFlow) -> Envelope | None:
         return None
     exact = replace(flow, flow=replace(flow.flow, integrator=Exact()))
     try:
-        return guaranteed(exact, GAP * float(found.facts["tolerance"]))
+        return guaranteed(exact, GAP * float(found.facts["gain"]))
     except (UnprovedError, ModalError):
         return None
 
@@ -91,6 +117,7 @@ def _beside(found: Envelope, proof: Envelope, flow: UnitFlow) -> Envelope:
     }
     return replace(
         found,
+        nature="estimated" if found.nature == "searched" else found.nature,
         error=error,
         facts=facts,
         proved_lower=proof.lower,
@@ -102,14 +129,14 @@ def _by_modes(found: Envelope, flow: UnitFlow) -> Array | None:
     """Distance from the modal envelope and the error of that; None where it resolves too little."""
     if not isinstance(flow.flow, LinearFlow):
         return None
-    wanted = FITTED * float(found.facts["tolerance"])
+    wanted = FITTED * float(found.facts["gain"])
     exact = replace(flow.flow, integrator=Exact())
     try:
         model = fit_modes(exact, flow.boxes, tolerance=wanted, scale=flow.scale)
     except ModalError:
         return None
     own = polynomial_error(model)
-    if (own / flow.scale).max() > 2 * float(found.facts["tolerance"]):
+    if (own / flow.scale).max() > 2 * float(found.facts["gain"]):
         return None
     bounds, _, left = search_levels(flow, model, 0, wanted, None)
     apart = np.abs(bounds - np.stack([-found.lower, found.upper], -1))

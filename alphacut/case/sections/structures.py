@@ -172,5 +172,9 @@ class Pendulum(Section):
     angular_velocity: Annotated[FuzzyNumber, Key("angular velocity at the start", "rad/s")]
     tolerance: Annotated[
         float,
-        Key("wanted error of the force, or gain worth a new trajectory", "N", allowed=POSITIVE),
+        Key(
+            "wanted error of the force; a declared error above it is a failure",
+            "N",
+            allowed=POSITIVE,
+        ),
     ] = 0.001

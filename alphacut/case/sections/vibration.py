@@ -5,7 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal, get_args
 
-from alphacut.case.key import ALPHA, COUNT, MEMBERSHIP, NATURAL, POSITIVE, UNIT, Key, Range, Section
+from alphacut.case.key import (
+    ALPHA,
+    COUNT,
+    MEMBERSHIP,
+    NATURAL,
+    POSITIVE,
+    SHARE,
+    UNIT,
+    Key,
+    Range,
+    Section,
+)
 
 EnvelopeMethod = Literal[
     "auto",
@@ -66,8 +77,7 @@ class Envelope(Section):
         float,
         Key(
             "wanted error of displacements; of other outputs the same share of their"
-            " peaks as of the first displacement's; for graph-follower the gain that is"
-            " worth a new trajectory",
+            " peaks as of the first displacement's; a declared error above it is a failure",
             "m",
             allowed=POSITIVE,
         ),
@@ -76,6 +86,13 @@ class Envelope(Section):
         float | None,
         Key("the same as a share of each output's peak, in place of tolerance", allowed=UNIT),
     ] = None
+    gain: Annotated[
+        float,
+        Key(
+            "gain that is worth a new trajectory to a Graph Follower, as a share of the tolerance",
+            allowed=SHARE,
+        ),
+    ] = 0.25
     certify: Annotated[
         float | None,
         Key(

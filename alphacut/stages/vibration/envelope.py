@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from alphacut.case.case import Case
-from alphacut.case.limits import asked_tolerance
+from alphacut.case.limits import asked_gap, asked_tolerance, names_rough_integrator
 from alphacut.io.files import Document, say, whole_file
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
@@ -97,7 +97,7 @@ def method_options(task: EnvelopeTask) -> Document:
     from alphacut.frame.methods.named import options_of
 
     taken = options_of(task.method)
-    offered = {"order": task.order, "tolerance": task.tolerance, "exclude": task.exclude}
+    offered = {"order": task.order, "tolerance": task.resolution, "exclude": task.exclude}
     if task.certify is not None:
         return {"tolerance": task.tolerance, "certify": task.certify}
     return {name: value for name, value in offered.items() if name in taken}
@@ -142,17 +142,35 @@ def keep_tolerance(case: Case, dataset: xarray.Dataset, *, best_effort: bool) ->
         ToleranceMissedError: The error is larger.
     """
     asked = asked_tolerance(case)
-    if asked is None or "reached" not in dataset.attrs:
-        return
-    # there the file's tolerance is the gain worth a trajectory; an error over it is only told
-    gain = dataset.attrs["method"] == "graph-follower" and not asked.changed
-    keep(
-        float(dataset.attrs["reached"]),
-        asked.value,
-        of=f"the error of the envelope by method {dataset.attrs['method']}, in{asked.unit},",
-        cure="--method auto reaches it",
-        best_effort=best_effort or gain,
-    )
+    if asked is not None and "reached" in dataset.attrs:
+        keep(
+            float(dataset.attrs["reached"]),
+            asked.value,
+            of=f"the error of the envelope by method {dataset.attrs['method']}, in{asked.unit},",
+            cure=cure(case, dataset),
+            best_effort=best_effort,
+        )
+    gap = asked_gap(case)
+    if gap is not None and "gap" in dataset.attrs:
+        keep(
+            float(dataset.attrs["gap"]),
+            gap,
+            of=f"the gap of the proved bounds of {dataset.attrs['gap_output']}",
+            cure="narrower supports or fewer inputs reach it",
+            best_effort=best_effort,
+        )
+
+
+def cure(case: Case, dataset: xarray.Dataset) -> str:
+    """What would bring the declared error of an envelope below the tolerance."""
+    if case.sections.pendulum is None:
+        rough = names_rough_integrator(case)
+        return f"--method auto {'and envelope.integrator=exact reach' if rough else 'reaches'} it"
+    if "dominant_error" in dataset.attrs:
+        return "a smaller envelope.step, or envelope.integrator=composition4, reaches it"
+    if dataset.attrs["method"] == "graph-follower":
+        return "a smaller envelope.gain, or --method auto, reaches it"
+    return "--method auto reaches it"
 
 
 def write(dataset: xarray.Dataset, path: Path | str, *, case_text: str, key: str) -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from alphacut.case.case import Case
 from alphacut.case.checks import forces_only
+from alphacut.case.idle import FOLLOWERS
 
 SHARE = 1e-3  # the tolerance where no output is a displacement: of their peaks
 
@@ -23,12 +24,12 @@ class EnvelopeTask:
         method: How the envelope is found.
         integrator: Time stepping; None leaves it to the method.
         order: Order κ of the Taylor models.
-        tolerance: Gain that is worth a new trajectory, or the error wanted of auto, in the unit of
-            the outputs.
+        tolerance: Wanted error, in the unit of the outputs.
         exclude: Methods that auto must not take.
         certify: Gap between attained and proved bounds that is wanted, in the unit of the outputs;
             None for no certificate.
         relative: Whether the tolerance is a share of each output's peak.
+        gain: Gain that is worth a new trajectory to a Graph Follower, as a share of the tolerance.
     """
 
     fuzzy: tuple[str, ...]
@@ -42,6 +43,12 @@ class EnvelopeTask:
     exclude: tuple[str, ...] = ()
     certify: float | None = None
     relative: bool = False
+    gain: float = 0.25
+
+    @property
+    def resolution(self) -> float:
+        """Tolerance of the method itself, of a Graph Follower the gain worth a trajectory."""
+        return self.tolerance * (self.gain if self.method in FOLLOWERS else 1.0)
 
     @property
     def scheme(self) -> str:
@@ -67,4 +74,5 @@ def task_of(
         length if share is None else share,
         certify=given.certify,
         relative=share is not None,
+        gain=given.gain,
     )

@@ -193,6 +193,7 @@ def test_a_coarse_step_warns_with_its_phase_error(capfd):
                 "0.2",
                 "--alpha",
                 "[0, 1]",
+                "--best-effort",
                 "--json",
                 "-",
             ]
@@ -307,6 +308,7 @@ def test_warnings_of_the_library_are_told_once_and_without_python_s_words(capfd)
                 "0.2",
                 "--alpha",
                 "[0, 1]",
+                "--best-effort",
             ]
         )
         == 0

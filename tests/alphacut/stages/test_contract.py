@@ -1,13 +1,20 @@
 """A tolerance is a contract: kept, or exit status 1 in one line, or taken on request."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
+import xarray
 
+from alphacut.case.limits import asked_tolerance
 from alphacut.case.load import load
+from alphacut.case.quick import quick
 from alphacut.entry import main
+from alphacut.io.problem import BadInput
 from alphacut.stages.contract import ToleranceMissedError, keep, keep_modulus
+from alphacut.stages.vibration.envelope import keep_tolerance, method_options
+from alphacut.stages.vibration.envelope_task import task_of
 
 PAPER = str(Path(__file__).parents[3] / "cases" / "paper.toml")
 COARSE = ["--method", "prism", "--mesh-size", "0.5", "--layers", "3"]
@@ -80,6 +87,53 @@ def test_an_envelope_that_misses_its_tolerance_fails_in_one_line(capfd):
     assert main(asked) == 1
     assert "--method auto reaches it" in lines(capfd)[-1]
     assert main([*asked, "--best-effort"]) == 0
+
+
+@pytest.mark.parametrize("method", ["graph-follower", "modal"])
+def test_a_fixed_method_is_held_to_the_tolerance_of_the_file(method, capfd, tmp_path):
+    case, text = tmp_path / "case.toml", Path(PAPER).read_text(encoding="utf-8")
+    old = 'method = "graph-follower"                   # section 5.3\norder = 2 '
+    assert old in text
+    text = text.replace(old, f'method = "{method}"\norder = 2 ')
+    text = text.replace('tolerance = "1 mm" ', 'tolerance = "1e-10 m" ')
+    if method == "modal":  # which has neither
+        text = re.sub(r"(?m)^(order|gain) = .*\n", "", text)
+    case.write_text(text, encoding="utf-8")
+    words = [*SHORT, "--set", "envelope.step=0.05 s"]
+    words[1] = str(case)
+    assert main(words) == 1
+    last = lines(capfd)[-1]
+    assert f"by method {method}, in m, is up to" in last
+    assert "1e-10 is asked for; --method auto reaches it" in last
+    assert main([*words, "--best-effort"]) == 0
+
+
+def test_a_graph_follower_takes_a_share_of_the_tolerance_for_its_gain():
+    def gain(*changes):
+        task = task_of(load(PAPER, list(changes)))
+        return task.tolerance, method_options(task)["tolerance"]
+
+    assert gain() == (1e-3, pytest.approx(1e-4))
+    assert gain("envelope.gain=0.5") == (1e-3, pytest.approx(5e-4))
+    assert gain("envelope.tolerance=2 mm") == (2e-3, pytest.approx(2e-4))
+    for changes in (["envelope.method=modal", "envelope.gain=0.5"], ["envelope.gain=2"]):
+        with pytest.raises(BadInput, match=r"envelope\.gain"):
+            load(PAPER, changes)
+
+
+def test_numbers_of_the_quick_form_are_held_to_no_tolerance():
+    assert asked_tolerance(load(PAPER)) is not None
+    assert asked_tolerance(quick(load(PAPER))) is None
+
+
+def test_a_certificate_is_held_to_its_gap(capfd):
+    case = load(PAPER, ["envelope.certify=1 um", "envelope.method=modal"])
+    attrs = {"method": "modal", "gap": 2e-6, "gap_output": "q3"}
+    found = xarray.Dataset(attrs=attrs)
+    with pytest.raises(ToleranceMissedError, match="gap of the proved bounds of q3 is up to 2e-06"):
+        keep_tolerance(case, found, best_effort=False)
+    keep_tolerance(case, found, best_effort=True)
+    assert "warning: the gap" in lines(capfd)[-1]
 
 
 @pytest.mark.parametrize(
