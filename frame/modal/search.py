@@ -33,6 +33,8 @@ QUIET = 0.05
 """Share of the wanted error that the last independent pass may gain."""
 USUAL = 6
 """Newton steps after which quadratic models are maximised over all faces: the rest is on ridges."""
+NEAR, DECADES = 8, 8.0
+"""One in how many fresh points lies near the faces, and how near: decades of the box's width."""
 ITERATIONS = 300
 """Newton steps after which a problem that has not converged is left as it is."""
 
@@ -322,10 +324,14 @@ def second_pass(
 
 
 def fresh_points(rng: np.random.Generator, lower: Array, upper: Array, size: int) -> Array:
-    """Random points of a box, two thirds of them with coordinates on faces, shape (size, d)."""
+    """Random points of a box, many with coordinates on or near faces, shape (size, d)."""
     pool = rng.uniform(lower, upper, (size, len(lower)))
     faces = rng.random(pool.shape) < rng.choice([0.0, 0.3, 0.6], (size, 1))
-    pool[faces] = np.where(rng.random(pool.shape) < 0.5, lower, upper)[faces]
+    nearest = np.where(rng.random(pool.shape) < 0.5, lower, upper)
+    near = np.arange(size) % NEAR == 0  # where an extreme beside a face would be too thin to meet
+    away = 10.0 ** rng.uniform(-DECADES, 0, (int(near.sum()), 1))
+    pool[near] = nearest[near] + away * (pool[near] - nearest[near])
+    pool[faces] = nearest[faces]
     return pool
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Exact, LinearFlow, MatrixStructure, StoreyFrame, envelope
+from alphacut.frame.modal.exact_response import ExactResponse
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy import Interval, Triangular
 
@@ -38,13 +39,18 @@ def test_a_support_too_wide_for_polynomials_keeps_the_wanted_error() -> None:
     values = LinearFlow(FRAME, ("m1",), 1.0, 0.02, Exact()).values(
         np.geomspace(1e-3, 2e4, 1500)[:, None]
     )
-    assert (
-        max((values.max(0) - found.upper[0]).max(), (found.lower[0] - values.min(0)).max()) < 1e-4
-    )
-    assert "since modal estimates" in str(found.facts["reason"])
+    missed = max((values.max(0) - found.upper[0]).max(), (found.lower[0] - values.min(0)).max())
+    assert found.error is not None
+    assert missed <= found.error.max() <= 1e-4
+    assert found.nature == "searched"
+    assert "lead exact trajectories" in str(found.facts["reason"])
 
 
-def test_a_modal_model_that_misses_its_tolerance_says_so() -> None:
+def test_a_modal_model_that_misses_its_tolerance_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object, **__: object) -> ExactResponse:
+        raise ModalError("modal: not here")
+
+    monkeypatch.setattr(ExactResponse, "of", refused)
     with pytest.warns(
         UserWarning, match="reach .* and not the tolerance 1e-06.*take the method auto"
     ):
