@@ -109,6 +109,18 @@ def test_the_best_point_is_not_trusted_beyond_its_remainder(
     assert 0.25 <= found.proved[0] <= 0.252
 
 
+@pytest.mark.parametrize("kernel", ["c", "numpy"])
+def test_boxes_given_up_within_the_gap_are_in_the_bound(
+    kernel: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beside 0.97³ the first box of x³ holds no more than the gap: nothing is looked at, 1 is."""
+    take(kernel, monkeypatch)
+    one, best = np.ones(1, int), np.full((1, 1), 0.97)
+    optima = Optima(one, 0 * one, np.ones(1), best, best[0] ** 3, np.zeros(1))
+    found = BranchAndBound(0.1).run(cube(), -np.ones(1), np.ones(1), optima)
+    assert 1 <= found.proved[0] <= 1.02
+
+
 def test_rounding_of_late_phases_is_in_the_margin() -> None:
     model, narrow = spring(1.0, None, 1e8, 1e6), np.full(1, 1e-8)
     margin = Remainder.of(model, -narrow, narrow).margin[:, 0, 0]
