@@ -31,11 +31,14 @@ step = "20 ms"
 """
 
 
-def run(folder: Path, name: str, more: str = "", *changes: str) -> dict[str, float]:
+def run(
+    folder: Path, name: str, more: str = "", *changes: str, figures: bool = False
+) -> dict[str, float]:
     """The envelope's numbers of a run."""
     path, out = folder / f"{name}.toml", folder / name
     path.write_text(CASE + more, encoding="utf-8")
     asked = [word for change in changes for word in ("--set", change)]
+    asked += [] if figures else ["--no-figures"]
     assert main(["run", str(path), "--out", str(out), "--quiet", *asked]) == 0
     found: dict[str, float] = json.loads((out / "summary.json").read_text())["envelopes"]["all"]
     return found
@@ -58,7 +61,7 @@ def test_the_report_names_and_draws_the_field(tmp_path: Path) -> None:
     run(tmp_path, "alike", '[field]\nof = "m"\nlength = "5 m"\n[joint]\noutputs = ["q3"]\n'
         'times = ["0.5 s", "1 s"]\n[decision]\nlimits = ["q3 <= 1 m"]\n',
         "frame.masses=['[0.9, 1, 1.1] t', '[0.9, 1, 1.1] t', '[0.9, 1, 1.1] t']",
-        "frame.columns=2", "envelope.fuzzy=m")  # fmt: skip
+        "frame.columns=2", "envelope.fuzzy=m", figures=True)  # fmt: skip
     out = tmp_path / "alike"
     assert main(["report", str(out), "--quiet"]) == 0
     page = (out / "report.html").read_text(encoding="utf-8")
