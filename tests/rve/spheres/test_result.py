@@ -46,6 +46,22 @@ def test_bounds_meet_the_phases_and_mori_and_tanaka():
     assert hill_average(np.array([bulk, shear, shear]))[0] == pytest.approx(25.78e9, abs=5e6)
 
 
+def test_hill_average_of_copper_lies_between_the_means_of_stiffness_and_compliance():
+    stiffness = cubic_voigt(137.07e9, 23.5e9, 75.4e9)
+    soft = np.linalg.inv(stiffness)
+
+    def invariants(matrix):
+        along, cross = matrix[:3, :3].trace(), matrix[0, 1] + matrix[0, 2] + matrix[1, 2]
+        return along - cross, matrix[3:, 3:].trace()
+
+    (first, second), (soft_first, soft_second) = map(invariants, (stiffness, soft))
+    voigt, reuss = (first + 3 * second) / 15, 15 / (4 * soft_first + 3 * soft_second)
+    bulk, shear = 137.07e9, (voigt + reuss) / 2
+    assert reuss < 0.8 * voigt
+    young = hill_average(np.array([137.07e9, 23.5e9, 75.4e9]))[0]
+    assert young == pytest.approx(9 * bulk * shear / (3 * bulk + shear), rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("factors", "words"),
     [
