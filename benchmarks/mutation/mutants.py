@@ -2,12 +2,14 @@
 
     make mutants
     ./enter python -m benchmarks.mutation.mutants --only radius --jobs 2
+    ./enter python -m benchmarks.mutation.mutants --left
 
 `mutants.toml` holds the table: a file, a piece of its text, the fault that takes its place, and
 the tests that must fail with it. Every fault is planted in a copy of the checkout of its own. A
 mutant is caught when one of its tests fails that passes without it; one that is argued instead
 (`argued = "…"`) stays green for the reason given. The results go to
-`benchmarks/results/mutants.csv`, each with the test that saw it, which is run first the next time.
+`benchmarks/results/mutants.csv`, each with the test that saw it, which is run first the next time;
+`--left` plants those that the table does not call caught, and keeps its other rows.
 """
 
 from __future__ import annotations
@@ -123,26 +125,26 @@ def red_tests(folder: Path, tests: Sequence[str], *, stop: bool = True) -> list[
     return _RED.findall(done.stdout) or list(tests) * bool(done.returncode)
 
 
-def seen_before() -> dict[str, str]:
-    """By the names of mutants, the tests that saw them the last time."""
+def kept_rows() -> dict[str, dict[str, object]]:
+    """Rows of the last table by the names of mutants."""
     if not RESULTS.is_file():
         return {}
     with RESULTS.open(newline="", encoding="utf-8") as file:
-        return {row["name"]: row.get("seen_by", "") for row in csv.DictReader(file)}
+        return {row["name"]: {"seen_by": "", **row} for row in csv.DictReader(file)}
 
 
-def judged(mutant: Mutant, before: str = "") -> dict[str, object]:
+def judged(mutant: Mutant, before: Mapping[str, object] | None = None) -> dict[str, object]:
     """Plant one fault and run its tests, first the one that saw it before."""
-    started = perf_counter()
-    first = [before] if before.startswith(mutant.tests) else []
+    started, last = perf_counter(), str((before or {}).get("seen_by", ""))
+    first = [last] if last.startswith(mutant.tests) else []
     with tempfile.TemporaryDirectory() as folder:
         plant(mutant, copied(Path(folder)))
         red = first and _quietly(Path(folder), first)
         red = red or red_tests(Path(folder), mutant.tests)
     seconds = round(perf_counter() - started, 1)
-    verdict = "caught" if red else "argued" if mutant.argued else "MISSED"
-    print(f"{verdict:7s} {seconds:6.1f} s  {mutant.name}", flush=True)
-    found = {"verdict": verdict, "seconds": seconds, "seen_by": red[0] if red else ""}
+    word = "caught" if red else "argued" if mutant.argued else "MISSED"
+    print(f"{word:7s} {seconds:6.1f} s  {mutant.name}", flush=True)
+    found = {"verdict": word, "seconds": seconds, "seen_by": red[0] if red else ""}
     return {"name": mutant.name, "file": mutant.file, **found}
 
 
@@ -154,9 +156,13 @@ def _quietly(folder: Path, tests: Sequence[str]) -> list[str]:
         return []
 
 
-def red_without_a_fault(rows: Sequence[Mapping[str, object]], tests: Sequence[str]) -> list[str]:
+def red_without_a_fault(
+    planted: Sequence[Mutant], rows: Sequence[Mapping[str, object]]
+) -> list[str]:
     """Tests said to have seen a fault that fail in a copy without one as well."""
-    seen = {str(row["seen_by"]) for row in rows} - {"", SLOW} | set(tests)
+    seen = {str(row["seen_by"]) for row in rows} - {"", SLOW}
+    for mutant, row in zip(planted, rows, strict=True):
+        seen |= set(mutant.tests) if row["seen_by"] == SLOW else set()
     if not seen:
         return []
     with tempfile.TemporaryDirectory() as folder:
@@ -167,19 +173,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Plant every fault in turn; exit 1 where too few are caught."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--only", default="", help="part of the names of those to plant")
+    parser.add_argument("--left", action="store_true", help="those not caught the last time")
     parser.add_argument("--jobs", type=int, default=2, help="at once (default 2)")
     parser.add_argument("--out", type=Path, default=RESULTS)
     options = parser.parse_args(arguments)
-    chosen, before = [mutant for mutant in mutants() if options.only in mutant.name], seen_before()
+    every, before = [one for one in mutants() if options.only in one.name], kept_rows()
+    done = {name for name, row in before.items() if options.left and row["verdict"] == "caught"}
+    chosen = [mutant for mutant in every if mutant.name not in done]
     with ThreadPoolExecutor(options.jobs) as pool:
-        rows = list(pool.map(lambda one: judged(one, before.get(one.name, "")), chosen))
-    stopped = {m.name for m, row in zip(chosen, rows, strict=True) if row["seen_by"] == SLOW}
-    tests = {test for mutant in chosen if mutant.name in stopped for test in mutant.tests}
-    if red := red_without_a_fault(rows, sorted(tests)):
+        found = list(pool.map(lambda one: judged(one, before.get(one.name)), chosen))
+    if red := red_without_a_fault(chosen, found):
         print(f"red without a fault, make them green first: {', '.join(red)}")
         return 1
+    latest = before | {str(row["name"]): row for row in found}
+    rows = [latest[mutant.name] for mutant in every]
     if not options.only:
         write(rows, options.out)
+    return verdict(rows)
+
+
+def verdict(rows: Sequence[Mapping[str, object]]) -> int:
+    """Print how many are caught; 1 where too few are."""
     caught = sum(row["verdict"] == "caught" for row in rows)
     missed = [row["name"] for row in rows if row["verdict"] == "MISSED"]
     print(f"{caught} of {len(rows)} caught; missed: {', '.join(map(str, missed)) or 'none'}")
