@@ -178,6 +178,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=RESULTS)
     options = parser.parse_args(arguments)
     every, before = [one for one in mutants() if options.only in one.name], kept_rows()
+    for mutant in every:  # all apply, or nothing is begun
+        mutant.applied((ROOT / mutant.file).read_text(encoding="utf-8"))
     done = {name for name, row in before.items() if options.left and row["verdict"] == "caught"}
     chosen = [mutant for mutant in every if mutant.name not in done]
     with ThreadPoolExecutor(options.jobs) as pool:
