@@ -171,8 +171,8 @@ class FuzzyModulus:
         result, checks = self.result, self.largest("check")
         variables: dict[str, Any] = {}
         for name, (unit, about) in BOUNDS.items():
-            words = f", {AVERAGE[self.choice.particles]}" if name in QUANTITIES else ""
-            variables |= self._cuts(name, unit, about + words)
+            average = f", {AVERAGE[self.choice.particles]}" if name in QUANTITIES else ""
+            variables |= self._cuts(name, unit, about + average)
         point = {"long_name": "inputs of each sample, in SI"}
         variables["point"] = (("sample", "parameter"), result.points, point)
         variables |= self._curves()
