@@ -21,7 +21,7 @@ SEEN = 96
 """Trajectories at optima, and as many fresh ones, by which polynomials are judged."""
 LEFT, ENDS = 0.1, 0.5
 """Shares of the wanted error that Newton's method may leave, and that a last pass may gain."""
-UNSEEN = 2.0
+UNSEEN = 3.0
 """Factor on what the last independent pass gained, or might have without being followed."""
 
 

@@ -25,7 +25,7 @@ VALUES = 16e6
 """Most numbers of the trajectories of a pass that are kept at a time: 128 MB."""
 ROUNDS = 3
 """Rounds of a contest of optima on either side of a jump, in a pass."""
-RIVALS = 2
+RIVALS = 4
 """Basins from which a problem is solved anew."""
 
 

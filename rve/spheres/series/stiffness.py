@@ -92,7 +92,8 @@ def _first_degrees(radius: Array, tolerance: float) -> Array:
     """Degree for each radius, from the decay of images between two spheres."""
     rate = 2 * np.arccosh(1 / np.maximum(radius, 1e-3))
     needed = np.log(1 / tolerance) / rate
-    return _DEGREES[np.minimum(np.searchsorted(_DEGREES, needed), _DEGREES.size - 1)]
+    place = np.minimum(np.searchsorted(_DEGREES, needed), _DEGREES.size - 1)
+    return np.asarray(_DEGREES[place])
 
 
 def _with_errors(
