@@ -85,7 +85,7 @@ class AskedTolerance:
 
     Args:
         value: In SI, or a share of a peak.
-        unit: Its unit in words, such as `` m`` or `` of a peak``.
+        unit: Its unit in words, such as ``m`` or ``shares of the peaks``.
     """
 
     value: float
@@ -95,11 +95,11 @@ class AskedTolerance:
 def asked_tolerance(case: Case) -> AskedTolerance | None:
     """Tolerance of envelopes that a case names; None where a default stands in."""
     named: list[tuple[str, float | None, str]] = [
-        ("envelope.relative_tolerance", case.envelope.relative_tolerance, " of a peak"),
-        ("envelope.tolerance", case.envelope.tolerance, " m"),
+        ("envelope.relative_tolerance", case.envelope.relative_tolerance, "shares of the peaks"),
+        ("envelope.tolerance", case.envelope.tolerance, "m"),
     ]
     if case.sections.pendulum:
-        named.append(("pendulum.tolerance", case.pendulum.tolerance, " N"))
+        named.append(("pendulum.tolerance", case.pendulum.tolerance, "N"))
     for key, value, unit in named:
         if value is not None and case.asked(key):
             return AskedTolerance(value, unit)

@@ -146,7 +146,7 @@ def keep_tolerance(case: Case, dataset: xarray.Dataset, *, best_effort: bool) ->
         keep(
             float(dataset.attrs["reached"]),
             asked.value,
-            of=f"the error of the envelope by method {dataset.attrs['method']}, in{asked.unit},",
+            of=f"the error of the envelope by method {dataset.attrs['method']}, in {asked.unit},",
             cure=cure(case, dataset),
             best_effort=best_effort,
         )
