@@ -38,7 +38,7 @@ def search_levels(
     cuts, scaled = model.boxes, model.in_units(flow.scale)
     search = ModalSearch.suited(scaled, seed, wanted)
     if guide:
-        search = replace(search, passes=1, resolution=1.0, small=LEFT * wanted)
+        search = replace(search, passes=1, basins=1, resolution=1.0, small=LEFT * wanted)
 
     def level(index: int, inner: Array | None) -> tuple[Array, Array, Array]:
         del inner

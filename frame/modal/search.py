@@ -21,8 +21,12 @@ from alphacut.frame.modal.model import ModalModel
 Response = ModalModel | ExactResponse
 RIVAL = 0.05
 """Share of the largest bound by which a rival basin may lie behind and still be followed."""
-
-
+BEHIND = 0.1
+"""The same for fresh starts, which begin farther from their optima."""
+FRESH = 8
+"""Fresh points of an independent pass at every node, over the samples of the search."""
+VALUES = 16e6
+"""Most numbers of their trajectories that are kept at a time: 128 MB."""
 CALM = 20.0
 """Change of phase (rad) over the box up to which the least effort finds the basins."""
 PIECE = 2000
@@ -84,6 +88,7 @@ class ModalSearch:
         small: Gain that Newton's method leaves, in units of the outputs.
         quiet: Gain of an independent pass that ends the search, in units of the outputs.
         passes: Most independent passes.
+        basins: Those of fresh points that a pass follows at every node.
         resolution: Phase of the fastest mode (rad) between nodes that are searched anew.
         seed: Of the samples.
     """
@@ -93,6 +98,7 @@ class ModalSearch:
     small: float = 1e-9
     quiet: float = 1e-7
     passes: int = 8
+    basins: int = 4
     resolution: float = 0.25
     seed: int = 0
 
@@ -310,16 +316,20 @@ def second_pass(
     rng = np.random.default_rng((search.seed, count))
     stride, improved = search.stride(model), np.zeros(len(found.value), bool)
     nodes = np.arange(rng.integers(stride), len(model.time), stride)
+    every_node = np.arange(len(model.time))
     every = np.arange(len(found.value)).reshape(len(model.time), -1)
-    groups = [(np.arange(len(model.time)), search.samples // 2)]
-    groups += [(nodes, search.samples // 4**k) for k in range(search.starts)]
-    for chosen, size in groups:
-        pool = fresh_points(rng, lower, upper, size)
-        rival = best_of_pool(pool, trajectories(model, pool, chosen), chosen, 1)[0]
-        which = every[chosen].ravel()
-        if len(chosen) == len(nodes):
-            refine(model, rival, np.arange(len(which)), lower, upper, search.quiet / 4)
-        improved[found.offer(model, rival.point, which)] = True
+    wide = FRESH * search.samples * float((upper - lower).max()) / 2
+    pool = fresh_points(rng, lower, upper, int(np.clip(wide, 64, VALUES / len(found.value))))
+    behind = BEHIND * np.abs(found.value).max()
+    for rival in best_of_pool(pool, trajectories(model, pool), every_node, search.basins):
+        open_ = np.flatnonzero(rival.value > found.value - behind)
+        refine(model, rival, open_, lower, upper, search.quiet / 4)
+        improved[found.offer(model, rival.point, every.ravel())] = True
+    for k in range(search.starts):
+        pool = fresh_points(rng, lower, upper, search.samples // 4**k)
+        rival = best_of_pool(pool, trajectories(model, pool, nodes), nodes, 1)[0]
+        refine(model, rival, np.arange(len(rival.value)), lower, upper, search.quiet / 4)
+        improved[found.offer(model, rival.point, every[nodes].ravel())] = True
     return improved
 
 
