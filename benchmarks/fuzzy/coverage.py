@@ -4,8 +4,9 @@ For every law and number of values: 1e4 samples (2e3 for means within bounds), a
 each, and at 20 levels α the share of samples whose cut holds the truth (a new value, the law's
 median, quantile, mean). `worst` is the least (share − (1 − α)) / standard error: it must not be
 below −4. `above` is the largest share − (1 − α) − 4 standard errors: of a continuous law at most
-1/(n + 1), for its quantiles without a named law at most the largest probability of one count; a
-mean within bounds, and that of a log-normal law, may lie above by more. Recipes: triangle from
+1/(n + 1); where coverage is made exact (`rng`) at most 0. Quantiles without `rng` may lie above by
+the largest probability of one count, which no rule that looks at the ranks alone avoids; a mean
+within bounds, and that of a log-normal law, by more. Recipes: triangle from
 least over mean to greatest value; Dubois and Prade's possibility of a histogram; triangle mean ± 2
 s. They claim the next value. Widths are means at α = 0.5 and 0.05, NaN where the values do not
 decide. Writes benchmarks/results/fuzzy_coverage.csv.
@@ -209,6 +210,8 @@ def exact_ends(
     n, law = sample.shape[1], options.get("law")
     if claim == "mean" and law != "normal":
         return ends_of(sample, lambda row: from_data(row, claim, bounds=bounds, **options))
+    if "rng" in options:
+        return drawn_ends(sample, claim, bounds, options["rng"])
     if law is None:
         number = from_data(np.arange(float(n)), claim, bounds=(-1, n), **options)
         ends = rank_ends(sample, sample, bounds, number)
@@ -226,12 +229,51 @@ def exact_ends(
     return ends
 
 
-def claims_of(source: Source) -> Iterator[tuple[str, Mapping[str, Any]]]:
+def drawn_ends(
+    sample: Array, claim: str, bounds: tuple[float, float], rng: np.random.Generator
+) -> Array:
+    """Cuts of quantiles with a random number for each row; the last one is a point.
+
+    The first rows are compared with `from_data` itself, given the same numbers.
+    """
+    n, quantile = sample.shape[1], probability(claim)
+    own = [from_data(row, claim, bounds=bounds, rng=k) for k, row in enumerate(sample[:CHECKED])]
+    share = rng.random((len(sample), 1))
+    share[:CHECKED, 0] = [1 - np.random.default_rng(k).random() for k in range(len(own))]
+    found = windows(n, quantile, "both", (False, False))
+    level = np.append(found.level, 1.0)
+    change = level[:-1] + share * np.diff(level)  # where the next cut begins, per row
+    at = (change[:, None, :] <= ALPHA[None, :, None]).sum(-1)
+    ordered = np.sort(sample, axis=1)
+    edge, point = np.ones((len(sample), 1)), np.quantile(sample, quantile, axis=1)[:, None]
+    low, high = np.hstack([bounds[0] * edge, ordered]), np.hstack([ordered, bounds[1] * edge])
+    last = np.clip(point, low[:, found.low[-1:]], high[:, found.high[-1:]])
+    ends = np.stack(
+        [
+            np.take_along_axis(np.hstack([rows[:, gaps], last]), at, axis=1)
+            for rows, gaps in ((low, found.low), (high, found.high))
+        ],
+        axis=-1,
+    )
+    np.testing.assert_allclose(
+        ends[:CHECKED], [[number.cut(a) for a in ALPHA] for number in own], rtol=1e-12, atol=1e-12
+    )
+    return ends
+
+
+def probability(claim: str) -> float:
+    """Probability of a claimed quantile."""
+    return 0.5 if claim == "median" else float(claim.split()[1])
+
+
+def claims_of(source: Source, rng: np.random.Generator) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """What is claimed of a law: without its name, and with it."""
     yield "next value", {}
     yield "next value", {"side": "upper"}
     yield "median", {}
     yield "quantile 0.9", {}
+    for claim in ("median", "quantile 0.9"):
+        yield claim, {"rng": rng}
     if np.abs(source.bounds).max() < FAR:
         yield "mean", {}
     if source.law:
@@ -247,23 +289,30 @@ def allowed_above(source: Source, n: int, claim: str, options: Mapping[str, Any]
         return np.inf
     if claim == "next value" or "law" in options:
         return 1 / (n + 1)
-    level = windows(
-        n, 0.5 if claim == "median" else float(claim.split()[1]), "both", (False, False)
-    ).level
+    if "rng" in options:
+        return 0.0
+    level = windows(n, probability(claim), "both", (False, False)).level
     return float(np.diff(np.append(level, 1.0)).max())
 
 
 def own_rows(
-    source: Source, n: int, sample: Array, fresh: Array, claims: Sequence[str] = ()
+    source: Source,
+    n: int,
+    sample: Array,
+    fresh: Array,
+    rng: np.random.Generator,
+    claims: Sequence[str] = (),
 ) -> Iterator[Row]:
     """Rows of `from_data`."""
-    for claim, options in claims_of(source):
+    for claim, options in claims_of(source, rng):
         if (options.get("law") and n < 2) or (claims and claim not in claims):
             continue
         few = len(sample) if claim != "mean" or options else max(len(sample) // 5, 100)
         ends = exact_ends(sample[:few], claim, source.bounds, options)
         truth = fresh if claim == "next value" else np.full(few, source.truth(claim))
-        named = " ".join(("from_data", *map(str, options.values())))
+        named = " ".join(
+            ("from_data", *("rng" if key == "rng" else str(x) for key, x in options.items()))
+        )
         yield row_of(source, n, named, claim, ends, truth, allowed_above(source, n, claim, options))
 
 
@@ -325,7 +374,7 @@ def measure(
     """All rows of one law at one number of values."""
     drawn = source.draw(rng, (repetitions, n + 1))
     sample, fresh = drawn[:, :n], drawn[:, n]
-    rows = list(own_rows(source, n, sample, fresh, claims))
+    rows = list(own_rows(source, n, sample, fresh, rng, claims))
     if not claims:
         rows += coarse_rows(source, n, sample, fresh) if source.continuous else ()
         rows += recipe_rows(source, n, sample, fresh)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
+
 from alphacut.fuzzy.knowledge.bounded_mean import mean_cuts
 from alphacut.fuzzy.knowledge.named_law import Law, law_cuts
 from alphacut.fuzzy.knowledge.observations import Bounds, Observations, Values
@@ -12,6 +14,8 @@ from alphacut.fuzzy.sets.claimed import Claim, Claimed
 from alphacut.fuzzy.sets.stepwise import Stepwise
 
 CLAIMS = "'next value', 'mean', 'median' or 'quantile Q' with Q in (0, 1)"
+LEAST_SHARE = 1e-9
+"""Least share drawn, so that levels stay apart in floating point; it only widens cuts."""
 
 
 def from_data(
@@ -22,15 +26,20 @@ def from_data(
     law: Law | None = None,
     side: Side = "both",
     resolution: float = 0.0,
+    rng: np.random.Generator | int | None = None,
 ) -> Claimed:
     """Fuzzy number of measured values: P(claimed quantity in its cut at α) >= 1 − α at every α.
 
     The probability is over repeated samples.
 
     For the next value, the median and a quantile this holds for every law, with ties and steps, at
-    any number of values, exactly where the law is continuous. Values are taken as drawn
-    independently, or at least exchangeably, from one law. What n values decide without bounds: the
-    next value from α = 2/(n + 1) on, the median from 2^(1 − n), quantile q from qⁿ + (1 − q)ⁿ.
+    any number of values. Values are taken as drawn independently, or at least exchangeably, from
+    one law. What n values decide without bounds: the next value from α = 2/(n + 1) on, the median
+    from 2^(1 − n), quantile q from qⁿ + (1 − q)ⁿ.
+
+    Where the law is continuous the cuts hold more than 1 − α by one step of the ranks at most: by
+    1/(n + 1) for the next value, by one binomial probability for a quantile (five values, median:
+    up to 0.31). With `rng` they hold 1 − α exactly, and are narrower.
 
     Args:
         values: Numbers, or pairs (lower, upper) of what each value is known to lie between; an
@@ -43,6 +52,9 @@ def from_data(
         side: "both" ends from the values, or an "upper" or "lower" limit only; the other end is
             then the bound, which is needed.
         resolution: Step to which the values were rounded.
+        rng: Random generator, or its seed, for exact coverage of the next value, the median or a
+            quantile: one number drawn from it, apart from the values, decides where between two
+            levels the cut changes. Over repeated samples each needs a draw of its own.
 
     Raises:
         ValueError: An argument is wrong, or the values decide nothing.
@@ -54,22 +66,47 @@ def from_data(
         raise ValueError(f"the side is {side!r}; it must be 'both', 'lower' or 'upper'")
     data = Observations.of(values, bounds, resolution)
     _require_fixed_end(data, side)
-    number, decided = _cuts(data, claim, quantile, law, side)
     ranked = law is None and claim != "mean"
+    share = _share(rng, ranked)
+    number, decided = _cuts(data, claim, quantile, law, side, share)
     return Claimed(
         number,
-        Claim(claim, _given(data, law, bounds)),
+        Claim(claim, _given(data, law, bounds, drawn=rng is not None)),
         decided,
         _enough(claim, quantile, side) if ranked and decided else "",
     )
 
 
 def _cuts(
-    data: Observations, claim: str, quantile: float | None, law: Law | None, side: Side
+    data: Observations,
+    claim: str,
+    quantile: float | None,
+    law: Law | None,
+    side: Side,
+    share: float,
 ) -> tuple[Stepwise, float]:
     if law is not None:
         return law_cuts(data, law, quantile, side, mean=claim == "mean")
-    return (mean_cuts(data, side), 0.0) if claim == "mean" else rank_cuts(data, quantile, side)
+    if claim == "mean":
+        return mean_cuts(data, side), 0.0
+    return rank_cuts(data, quantile, side, share)
+
+
+def _share(rng: np.random.Generator | int | None, ranked: bool) -> float:
+    """Share of the way to the next level at which a cut changes: 1 without a generator."""
+    if rng is None:
+        return 1.0
+    if not ranked:
+        raise ValueError(
+            "rng is given, but a mean or a named law leaves nothing to draw: leave rng out, or"
+            " claim the next value, the median or a quantile without a law"
+        )
+    try:
+        return max(1.0 - float(np.random.default_rng(rng).random()), LEAST_SHARE)
+    except (TypeError, ValueError) as wrong:
+        raise ValueError(
+            f"rng is {rng!r}; it must be a NumPy random generator or a whole number >= 0"
+        ) from wrong
 
 
 def _quantile(claim: str) -> float | None:
@@ -97,13 +134,17 @@ def _require_fixed_end(data: Observations, side: Side) -> None:
         )
 
 
-def _given(data: Observations, law: Law | None, bounds: Bounds | None) -> tuple[str, ...]:
+def _given(
+    data: Observations, law: Law | None, bounds: Bounds | None, *, drawn: bool
+) -> tuple[str, ...]:
     """Conditions of the claim."""
-    drawn = f"{data.count} values drawn alike and independently" + (
-        f" from a {law} law" if law else ""
-    )
     low, high = data.bounds
-    return (drawn,) if bounds is None else (drawn, f"bounds [{low:g}, {high:g}]")
+    return (
+        f"{data.count} values drawn alike and independently"
+        + (f" from a {law} law" if law else ""),
+        *(() if bounds is None else (f"bounds [{low:g}, {high:g}]",)),
+        *(("a random number drawn apart from them",) if drawn else ()),
+    )
 
 
 def _enough(claim: str, quantile: float | None, side: Side) -> str:

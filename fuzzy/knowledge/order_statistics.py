@@ -5,6 +5,11 @@ probability that the quantity lies in gap k does not depend on the law: 1/(n + 1
 (conformal prediction), binomial for a quantile. Gaps are taken away from the ends; the cut is what
 is left, and its level the probability taken away. Ties and discrete laws only add coverage.
 
+Between two gaps the cut holds more than it claims: for the next value by 1/(n + 1) at most, for a
+quantile by up to one binomial probability, which no rule that looks at the ranks alone can avoid. A
+random number, drawn apart from the values, makes the coverage exact: it decides where between the
+two levels the gap goes (a randomised, or smoothed, test turned into a set).
+
 Sources: Wilks, Annals of Mathematical Statistics 12 (1941), 91-96; David and Nagaraja, Order
 Statistics, section 7.1; Vovk, Gammerman and Shafer, Algorithmic Learning in a Random World, chapter
 2.
@@ -112,18 +117,29 @@ def _takes_lower(
     return outside(low, n) <= outside(0, high)
 
 
-def rank_cuts(data: Observations, quantile: float | None, side: Side) -> tuple[Stepwise, float]:
+def rank_cuts(
+    data: Observations, quantile: float | None, side: Side, share: float = 1.0
+) -> tuple[Stepwise, float]:
     """Cuts by ranks, and the least level at which the values (and bounds) decide both ends.
+
+    Args:
+        data: The values.
+        quantile: Probability of the quantile; None for the next value.
+        side: Ends that move.
+        share: Share in (0, 1] of the way to the next level at which a gap goes: 1 never claims too
+            much; one drawn evenly makes the coverage exact.
 
     Raises:
         ValueError: They decide no cut at all.
     """
     low, high = data.bounds
     found = windows(data.count, quantile, side, (bool(np.isinf(low)), bool(np.isinf(high))))
+    levels = np.append(found.level, 1.0)
+    levels[1:] = levels[:-1] + share * np.diff(levels)
     lower, upper = np.append(low, data.lower)[found.low], np.append(data.upper, high)[found.high]
     centre = _centre(data, 0.5 if quantile is None else quantile, side)
     finite = np.flatnonzero(np.isfinite(lower) & np.isfinite(upper))
-    decided = float(found.level[finite[0]]) if len(finite) else 1.0
+    decided = float(levels[finite[0]]) if len(finite) else 1.0
     if not len(finite) and not np.isfinite(centre):
         raise ValueError(
             "the values decide no cut: give bounds=(lower, upper), what is physically possible"
@@ -132,7 +148,7 @@ def rank_cuts(data: Observations, quantile: float | None, side: Side) -> tuple[S
         return Stepwise((0.0,), (centre,), (centre,)), decided
     lower[: finite[0]], upper[: finite[0]] = lower[finite[0]], upper[finite[0]]
     centre = float(np.clip(centre, lower[-1], upper[-1]))
-    return Stepwise((*found.level, 1.0), (*lower, centre), (*upper, centre)), decided
+    return Stepwise(tuple(levels), (*lower, centre), (*upper, centre)), decided
 
 
 def _centre(data: Observations, quantile: float, side: Side) -> float:

@@ -68,6 +68,29 @@ def test_levels_are_the_exact_probability_outside(n, quantile, side, data):
     assert (np.diff(found.high) <= 0).all()
 
 
+@pytest.mark.parametrize(("n", "claim", "q"), [(5, "median", 0.5), (4, "quantile 0.8", 0.8)])
+def test_a_drawn_number_makes_the_coverage_exact(n, claim, q):
+    rng = np.random.default_rng()
+    data, alpha, truth = rng.random((4000, n)), rng.uniform(0.02, 0.98, 4000), q
+    cuts = [
+        from_data(row, claim, bounds=(0, 1), rng=rng).cut(a)
+        for row, a in zip(data, alpha, strict=True)
+    ]
+    held = np.array([low <= truth <= high for low, high in cuts])
+    assert abs((held - (1 - alpha)).sum()) < 4.5 * np.sqrt((alpha * (1 - alpha)).sum())
+    always = [from_data(row, claim, bounds=(0, 1)).cut(0.55) for row in data[:500]]
+    above = np.mean([low <= truth <= high for low, high in always]) - 0.45
+    assert above > 0.1  # without it by a binomial probability, the reason for the option
+
+
+def test_a_drawn_number_is_refused_where_there_is_nothing_to_draw():
+    with pytest.raises(ValueError, match="rng is given, but a mean or a named law"):
+        from_data(SEVEN, "mean", law="normal", rng=1)
+    with pytest.raises(ValueError, match="rng is 'dice'; it must be a NumPy random generator"):
+        from_data(SEVEN, "median", rng="dice")
+    assert "random number drawn apart" in str(from_data(SEVEN, "median", rng=3).claim)
+
+
 @pytest.mark.parametrize(
     ("claim", "side", "level"),
     [
