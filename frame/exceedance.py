@@ -74,25 +74,20 @@ def within_steps(size: Array, between: Array) -> Array:
     return out
 
 
-def tried_peaks(
-    flow: Flow, cuts: Boxes, between: Array | None = None, *, spread: int = 32
-) -> Array:
-    """Least peak of |output| among points tried on each level, shape (A, m).
+def tried_peaks(flow: Flow, cuts: Boxes, *, spread: int = 32) -> Array:
+    """Least peak of |output| at the nodes among points tried on each level, shape (A, m).
 
     The true lower end of the fuzzy peak lies between that of `peaks` and this.
 
     Args:
         flow: The trajectories.
         cuts: The boxes.
-        between: What trajectories may add within the step to each node, shape (T, m); nothing when
-            None.
         spread: Points tried besides corners, on each level.
     """
     least, found = np.full(len(flow.outputs), np.inf), []
     for level in reversed(range(len(cuts.alpha))):
         size = np.abs(flow.values(_tried(cuts, level, spread, corner=5)))
-        peak = (size if between is None else within_steps(size, between)).max(1)
-        least = np.minimum(least, peak.min(0))
+        least = np.minimum(least, size.max(1).min(0))
         found.append(least)
     return np.array(found[::-1])
 

@@ -100,8 +100,8 @@ def peaks(summary: Document) -> Markup:
     words = paragraphs(
         "Fuzzy peak of each output's magnitude at the nodes. On the lowest level no trajectory"
         " peaks below the first value or above the last by more than the error, which covers what"
-        " lies between nodes; the second is the least peak among some tried, so the least of all"
-        " lies between the first two."
+        " lies between nodes; the second is the least peak at the nodes among some tried, so the"
+        " least of all lies between the first two."
     )
     limit = Markup("")
     if "exceedance" in summary:

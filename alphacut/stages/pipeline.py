@@ -209,7 +209,9 @@ class Chain:
         self, study: Study, handed: FuzzyNumber | None, wanted: Structure
     ) -> xarray.Dataset:
         """One study's envelope, in envelope_NAME.nc."""
-        key = self.vibration({"task": study.task, "holds": ("bounds", "peaks", "tried")}, handed)
+        key = self.vibration(
+            {"task": study.task, "holds": ("bounds", "peaks", "tried at nodes")}, handed
+        )
 
         def compute(path: Path) -> None:
             with progress(f"Envelope {study.name}", quiet=self.quiet) as tick:

@@ -44,8 +44,8 @@ def with_peaks(found: Envelope, wanted: Structure, task: EnvelopeTask) -> xarray
     """The envelope's dataset with the fuzzy peak of each output's magnitude.
 
     ``peak`` (alpha, bound, output) holds bounds of it at the nodes, ``peak_error`` (alpha, output)
-    what it may lie outside them by, and ``peak_tried`` (alpha, output) the least peak among some
-    trajectories, with what they may add between nodes.
+    what it may lie outside them by, and ``peak_tried`` (alpha, output) the least one among some
+    trajectories.
     """
     from alphacut.frame.boxes import boxes
     from alphacut.frame.exceedance import peaks, tried_peaks
@@ -56,7 +56,6 @@ def with_peaks(found: Envelope, wanted: Structure, task: EnvelopeTask) -> xarray
             cuts.names, task.duration, task.step, task.scheme if wanted.linear else task.integrator
         ),
         cuts,
-        found.between,
     )
     words = {
         "units": "SI, by output",
@@ -68,7 +67,8 @@ def with_peaks(found: Envelope, wanted: Structure, task: EnvelopeTask) -> xarray
     least = {
         "units": "SI, by output",
         "long_name": (
-            "least peak among trajectories tried; the true one lies between the bound and this"
+            "least peak at the nodes among trajectories tried; the true one lies between the"
+            " bound and this"
         ),
     }
     if of.error is not None:
