@@ -11,7 +11,13 @@ from alphacut.stages.vibration import structure
 CASES = Path(__file__).parents[3] / "cases"
 
 
-@pytest.mark.parametrize("name", ["tower", "building"])
+SMALL = {
+    "tower": ["--set", "tower.storeys=3", "--set", "tower.bays=1"],
+    "building": ["--set", 'envelope.fuzzy=["E"]', "--set", "envelope.duration=1 s"],
+}
+
+
+@pytest.mark.parametrize("name", SMALL)
 def test_a_run_builds_its_structure_once_and_reads_its_record_once(name, tmp_path, monkeypatch):
     counts = {"structure": 0, "record": 0}
     real, read = structure.structure, structure.accelerogram
@@ -27,7 +33,6 @@ def test_a_run_builds_its_structure_once_and_reads_its_record_once(name, tmp_pat
     for module in (pipeline, readiness):
         monkeypatch.setattr(module, "structure", built)
     monkeypatch.setattr(structure, "accelerogram", record)
-    small = ["--set", "tower.storeys=3", "--set", "tower.bays=1"] if name == "tower" else []
-    asked = ["run", str(CASES / f"{name}.toml"), *small, "--quick", "--no-figures", "--quiet"]
+    asked = ["run", str(CASES / f"{name}.toml"), *SMALL[name], "--quick", "--no-figures", "--quiet"]
     assert main([*asked, "--out", str(tmp_path / "out")]) == 0
     assert counts == {"structure": 1, "record": 1}

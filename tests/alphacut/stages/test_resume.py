@@ -55,6 +55,7 @@ def test_another_record_of_the_same_name_makes_the_shares_anew(tmp_path, capfd):
         str(tmp_path / "building.toml"),
         "--quick",
         "--no-figures",
+        *("--set", 'envelope.fuzzy=["E"]', "--set", "envelope.duration=1 s"),
         "--out",
         str(tmp_path / "out"),
     ]
