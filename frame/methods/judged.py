@@ -12,9 +12,10 @@ from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.envelope import Envelope
-from alphacut.frame.methods.modal import guaranteed, polynomial_error
+from alphacut.frame.methods.modal import guaranteed
 from alphacut.frame.modal.levels import search_levels
 from alphacut.frame.modal.model import fit_modes
+from alphacut.frame.modal.polynomial_error import judged_at_optima, polynomial_error
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 
@@ -135,10 +136,13 @@ def _by_modes(found: Envelope, flow: UnitFlow) -> Array | None:
         model = fit_modes(exact, flow.boxes, tolerance=wanted, scale=flow.scale)
     except ModalError:
         return None
-    own = polynomial_error(model)
-    if (own / flow.scale).max() > 2 * float(found.facts["gain"]):
+    resolved = 2 * float(found.facts["gain"]) * flow.scale
+    if (polynomial_error(model) > resolved).any():
         return None
-    bounds, _, left = search_levels(flow, model, 0, wanted, None)
+    bounds, at, left = search_levels(flow, model, 0, wanted, None)
+    own = polynomial_error(judged_at_optima(model, at, 0)[0])
+    if (own > resolved).any():
+        return None
     apart = np.abs(bounds - np.stack([-found.lower, found.upper], -1))
     distance: Array = (apart + left).max(-1) + own
     return distance

@@ -17,16 +17,13 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.envelope import Envelope, signed_envelope
 from alphacut.frame.modal.exact_response import ExactResponse
-from alphacut.frame.modal.levels import SEEN, judged_at_optima, polished_levels, search_levels
+from alphacut.frame.modal.levels import polished_levels, search_levels
 from alphacut.frame.modal.model import MANY, ModalModel, fit_modes
+from alphacut.frame.modal.polynomial_error import judged_at_optima, polynomial_error
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 
 Progress = Callable[[float], None]
-MARGIN = 2.0
-"""Factor on the deviation of held-out trajectories up to a node."""
-FLOOR = 0.1
-"""Least deviation at a node, as a share of the output's largest."""
 SAFETY = 3.0
 """Factor on the model error sampled at held-out points."""
 PORTION = 0.2
@@ -125,8 +122,9 @@ class Modal:
         bounds, at, left = search_levels(
             flow, model, self.seed, self.tolerance, guided, guide=exact is not None
         )
+        points = 0
         if exact is None:
-            model = judged_at_optima(model, at, self.seed)
+            model, points = judged_at_optima(model, at, self.seed)
             exact = self._exact(model, flow)
         error = polynomial_error(model) + left.max(-1)
         facts: dict[str, float | str] = {"degree": model.degree}
@@ -137,7 +135,7 @@ class Modal:
             facts["bounds"] = EXACT
         else:
             facts["model_error"] = float(model.error.max())
-            facts["judged_by"] = f"trajectories at held-out parameters and at {SEEN} optima"
+            facts["judged_by"] = f"trajectories at {points} optima, corners and random points"
         facts["search_error"] = float((left.max(-1) / flow.scale).max())
         if exact is None and (short := _short_of(model, self.tolerance, flow.scale)) is not None:
             facts["reason"] = short
@@ -169,16 +167,6 @@ def _nature(flow: UnitFlow, exact: ExactResponse | None) -> str:
     """Worth of the error: that of a search without a guide, or in many dimensions, is less."""
     led = len(flow.boxes.names) <= MANY and (exact is None or exact.bent)
     return "estimated" if led else "searched"
-
-
-def polynomial_error(model: ModalModel) -> Array:
-    """Estimated deviation of the model from the trajectories, shape (T, m).
-
-    Held-out trajectories are few, so a node takes the largest deviation up to it, and the floor.
-    """
-    so_far = np.maximum.accumulate(model.error, axis=0)
-    estimate: Array = MARGIN * np.maximum(so_far, FLOOR * so_far[-1])
-    return estimate
 
 
 def _short_of(model: ModalModel, tolerance: float, scale: Array) -> str | None:

@@ -12,13 +12,11 @@ from alphacut.frame.calculus.jet import Array
 from alphacut.frame.modal.exact_response import ExactResponse
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.polish import Polish
-from alphacut.frame.modal.search import ModalSearch, fresh_points
+from alphacut.frame.modal.search import ModalSearch
 
 Progress = Callable[[float], None]
 Levels = tuple[Array, Array, Array]
 """Bounds (A, T, m, 2) of (−output, output), unit coordinates (A, T, m, 2, d), what is left."""
-SEEN = 96
-"""Trajectories at optima, and as many fresh ones, by which polynomials are judged."""
 LEFT, ENDS = 0.1, 0.5
 """Shares of the wanted error that Newton's method may leave, and that a last pass may gain."""
 UNSEEN = 3.0
@@ -86,15 +84,3 @@ def _nested(
     bounds, at, left = (np.stack(part) for part in zip(*found, strict=True))
     unit = flow.scale[:, None]
     return bounds * unit, at, left * unit
-
-
-def judged_at_optima(model: ModalModel, at: Array, seed: int) -> ModalModel:
-    """The model with deviations at optima (…, d), and at as many fresh points, in its error."""
-    rng = np.random.default_rng((seed, 11))
-    points = np.unique(np.round(at.reshape(-1, at.shape[-1]), 2), axis=0)
-    ends = np.ones(at.shape[-1])
-    fresh = fresh_points(rng, -ends, ends, SEEN)
-    points = np.vstack([np.clip(rng.permutation(points)[:SEEN], -1, 1), fresh])
-    truth = model.flow.values(model.boxes.to_physical(points))
-    wrong = np.abs(model.values(points) - truth).max(0)
-    return replace(model, error=np.maximum(model.error, wrong))
