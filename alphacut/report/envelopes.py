@@ -98,15 +98,24 @@ def peaks(summary: Document) -> Markup:
     largest = largest_by_unit((of["upper"][0], unit) for _, _, unit, of in each)
     rows = [(name, output, *peak_row(of, unit, largest[unit])) for name, output, unit, of in each]
     words = paragraphs(
-        "Fuzzy peak of each output's magnitude at the nodes. On the lowest level no trajectory"
-        " peaks below the first value or above the last by more than the error, which covers what"
-        " lies between nodes; the second is the least peak at the nodes among some tried, so the"
-        " least of all lies between the first two."
+        "The peak is the largest magnitude of an output over the motion. The least peak on the"
+        " lowest level lies between two values: a bound, and the least one among some motions"
+        " tried. No motion peaks higher than the greatest. All are peaks at the nodes; the error"
+        " covers what lies between nodes."
     )
     limit = Markup("")
     if "exceedance" in summary:
         limit = paragraphs(f"P{outcomes.sentence(summary['exceedance'])[1:].rstrip()}.")
-    head = ("study", "output", "not below", "least tried", "greatest", "error up to", "highest α")
+    study = next(iter(summary["envelopes"].values()))
+    low, high = (f"at α = {study['alpha'][level]:g}" for level in (0, -1))
+    head = (
+        "study",
+        "output",
+        f"least peak {low}",
+        f"greatest {low}",
+        "error up to",
+        f"peak {high}",
+    )
     told = claims(summary["envelopes"])
     shown = Markup("<h3>Peaks</h3>") + words + table(head, rows, numbers=2) + told
     return shown + limit if rows else limit
@@ -120,9 +129,8 @@ def claims(studies: Document) -> Markup:
 
 
 def peak_row(of: Document, unit: str, largest: float) -> Iterator[str]:
-    """Peak: its bounds, the least one tried, its error, and its interval on the highest level."""
-    yield engineering(of["lower"][0], unit, beside=largest)
-    yield engineering(of["tried"][0], unit, beside=largest) if "tried" in of else "not tried"
+    """Peak: where the least and the greatest lie, the error, and both on the highest level."""
+    yield between(of["lower"][0], of["tried" if "tried" in of else "lower"][0], unit, largest)
     yield engineering(of["upper"][0], unit, beside=largest)
     yield engineering(of["error"][0], unit, digits=2) if "error" in of else "not estimated"
     yield between(of["tried" if "tried" in of else "lower"][-1], of["upper"][-1], unit, largest)

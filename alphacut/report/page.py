@@ -14,6 +14,7 @@ from markupsafe import Markup, escape
 from alphacut.case.quick import banner
 from alphacut.io.files import Document
 from alphacut.io.netcdf import damaged, read_dataset, read_summary
+from alphacut.report.glossary import explained
 from alphacut.report.sections import sections
 from alphacut.report.tables import environment
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -51,7 +52,7 @@ def page(summary: Document, folder: Path) -> str:
             banner=banner(summary["quick"]) if "quick" in summary else "",
             css=Markup(text["css"]),
             js=Markup(text["js"]),
-            sections=Markup("\n").join(sections(summary, folder)),
+            sections=explained(Markup("\n").join(sections(summary, folder))),
             envelopes=embedded(plots(summary, folder)),
         )
     )

@@ -11,10 +11,12 @@ from alphacut.figures.captions import core, in_words
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.io.files import Document
 from alphacut.io.units import engineering
+from alphacut.report import glossary
 from alphacut.report.decisions import decided, learned, next_measured, together
 from alphacut.report.differences import differences
 from alphacut.report.envelopes import envelopes, natural
 from alphacut.report.figures import gallery, listed
+from alphacut.report.key_results import key_results
 from alphacut.report.tables import (
     citation,
     code,
@@ -30,6 +32,7 @@ from alphacut.stages.material import response
 
 def sections(summary: Document, folder: Path) -> Iterator[Markup]:
     """All sections that the results allow, in reading order."""
+    yield key_results(summary)
     if "microstructure" in summary:
         yield microstructure(summary["microstructure"])
     if "modulus" in summary:
@@ -57,6 +60,7 @@ def sections(summary: Document, folder: Path) -> Iterator[Markup]:
     if summary.get("paper"):
         yield comparison(summary["paper"])
     yield methods(summary)
+    yield section("Terms", glossary.box())
     yield gallery(summary, folder)
     yield case_text(summary)
     yield differing(summary)
@@ -266,7 +270,7 @@ def comparison(rows: Sequence[Document]) -> Markup:
     return section(
         "Paper and here",
         table(
-            ("quantity", "place", "paper", "here", "difference", ""),
+            ("quantity", "place", "paper", "here", "difference", "share"),
             [cells(dict(row)) for row in rows],
             numbers=2,
         ),

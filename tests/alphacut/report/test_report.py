@@ -8,6 +8,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from markupsafe import Markup
 
 from alphacut.entry import main
 
@@ -29,6 +30,11 @@ window.addEventListener("load", () => {
   const box = plot.getBoundingClientRect();
   plot.dispatchEvent(new WheelEvent("wheel", { deltaY: -1, clientX: box.left + box.width / 2, clientY: box.top + 50, cancelable: true }));
   seen.zoomed = band();
+  const term = document.querySelector("a.term");
+  term.focus();
+  seen.tip = getComputedStyle(term, "::after").content;
+  seen.term = document.activeElement === term && document.getElementById(term.hash.slice(1)) !== null;
+  seen.wide = document.documentElement.scrollWidth - window.innerWidth;
   seen.resources = performance.getEntriesByType("resource").length;
   document.body.dataset.seen = JSON.stringify(seen);
 });
@@ -77,8 +83,35 @@ def test_the_page_holds_what_a_colleague_asks_for(results):
     assert f"{summary['modulus']['modal_GPa']:.4f} GPa" in page
 
 
+def test_key_results_come_first_and_each_term_is_explained_once(results):
+    page = (results / "report.html").read_text(encoding="utf-8")
+    assert re.findall(r"<h2>([^<]*)</h2>", page)[0] == "Key results"
+    linked = re.findall(r'class="term" href="#([^"]*)"', page)
+    assert {"term-inner", "term-nature", "term-support"} <= set(linked)
+    assert len(set(linked)) == len(linked)
+    assert all(f'<dt id="{name}"' in page for name in linked)
+    assert "<th></th>" not in page
+
+
+def test_terms_are_left_alone_in_code_drawings_headings_and_attributes():
+    from alphacut.report.glossary import explained
+
+    kept = '<h2>Nature</h2><pre>inner <b>x</b></pre><svg><text>inner</text></svg><p title="inner">'
+    found = explained(Markup(kept + "an inner, INNER bound; inner-most</p>"))
+    assert found.startswith(kept + 'an <a class="term" href="#term-inner" data-meaning="Of bounds')
+    assert found.endswith(">inner</a>, INNER bound; inner-most</p>")
+
+
+def test_the_report_explains_its_terms_as_the_documentation_does():
+    from alphacut.report.glossary import TERMS
+
+    docs = " ".join((PAPER.parents[1] / "docs" / "glossary.md").read_text(encoding="utf-8").split())
+    assert [name for name, text in TERMS.items() if f"{name} {text}" not in docs] == []
+
+
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
-def test_the_slider_moves_the_band_in_a_browser(results, tmp_path):
+@pytest.mark.parametrize("width", [400, 1280])
+def test_the_slider_moves_the_band_in_a_browser(results, tmp_path, width):
     page = (results / "report.html").read_text(encoding="utf-8")
     probed = tmp_path / "probed.html"
     probed.write_text(page.replace("<style>", PROBE + "<style>", 1), encoding="utf-8")
@@ -87,6 +120,7 @@ def test_the_slider_moves_the_band_in_a_browser(results, tmp_path):
         "--no-sandbox",
         "--disable-gpu",
         "--disable-dev-shm-usage",
+        f"--window-size={width},900",
         f"--user-data-dir={tmp_path / 'profile'}",
     ]
     command = [CHROMIUM, *flags, "--virtual-time-budget=5000", "--dump-dom", probed.as_uri()]
@@ -94,6 +128,9 @@ def test_the_slider_moves_the_band_in_a_browser(results, tmp_path):
     seen = json.loads(html.unescape(re.search(r'data-seen="([^"]*)"', dom)[1]))
     assert seen["errors"] == []
     assert seen["resources"] == 0
+    assert seen["wide"] <= 0
+    assert seen["term"]
+    assert len(seen["tip"]) > 20
     assert seen["before"].startswith("M")
     assert len({seen["before"], seen["after"], seen["zoomed"]}) == 3
 
