@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,3 +98,35 @@ class ModuliInterval:
         )
         upper = PlaneModuli(max(bulks), PlaneModuli.of_young(stiff, low).shear)
         return cls(lower, upper, attained=low == high)
+
+
+def grain_modulus(
+    fractions: Sequence[float], softest: Sequence[PlaneModuli], stiffest: Sequence[PlaneModuli]
+) -> tuple[float, float]:
+    """Bounds of Young's modulus of an isotropic solid of grains, in Pa.
+
+    An image read as plane strain is the section of a prismatic material: fibres. If its particles
+    are grains, this interval bounds what the solid can be (Hashin and Shtrikman 1963; Walpole 1966
+    where the phases have no order).
+
+    Args:
+        fractions: Share of each phase, sum 1.
+        softest: Least moduli of each phase.
+        stiffest: Greatest moduli of each phase.
+    """
+    ends = []
+    for phases, pick in ((softest, min), (stiffest, max)):
+        pairs = [(p.bulk - p.shear / 3, p.shear) for p in phases]
+        bulk, shear = pick(k for k, _ in pairs), pick(g for _, g in pairs)
+        about_bulk = 4 / 3 * shear
+        about_shear = shear * (9 * bulk + 8 * shear) / (6 * (bulk + 2 * shear))
+        k, g = (
+            1 / sum(f / (value + around) for f, value in zip(fractions, values, strict=True))
+            - around
+            for values, around in (
+                ([k for k, _ in pairs], about_bulk),
+                ([g for _, g in pairs], about_shear),
+            )
+        )
+        ends.append(9 * k * g / (3 * k + g))
+    return ends[0], ends[1]

@@ -9,8 +9,8 @@ import numpy as np
 
 from alphacut.io.progress import Tick
 from alphacut.rve.image.gap import constitutive_gap
-from alphacut.rve.image.grains import grain_modulus
 from alphacut.rve.image.model import ImageCut, ImageModel, reduced_to_pixels
+from alphacut.rve.image.moduli import grain_modulus
 from alphacut.stages.image.error_table import Contribution, contributions
 from alphacut.stages.image.random_response import RandomResponse, responses
 from alphacut.stages.image.study import ImageStudy, Level

@@ -164,7 +164,7 @@ def _outline(case: Case) -> Parted:
     """Phases of an outline's pixels."""
     from alphacut.rve.image.outlines.equation import Equation
     from alphacut.rve.image.outlines.outline import Grid, Outline, phase_ranges
-    from alphacut.rve.image.outlines.polygon_file import read_polygons
+    from alphacut.rve.image.outlines.polygon import read_polygons
 
     given = case.picture
     width, height = given.size or ()

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from alphacut.rve.image.outlines.outline import CUT, INSIDE, OUTSIDE, Grid
+from alphacut.stochastic.particles.csv_columns import length_columns
 from alphacut.stochastic.theta.truncated_normal import Array
 
 MARGIN = (
@@ -83,3 +85,15 @@ def _reach(x0: float, y0: float, x1: float, y1: float, row: int) -> tuple[float,
         ends = x0 + shares * (x1 - x0)
     slack = MARGIN * (1 + abs(x1 - x0))
     return float(ends.min()) - slack, float(ends.max()) + slack
+
+
+def read_polygons(path: Path) -> Polygons:
+    """The polygons of a file, in m: one, or several with a row ``nan, nan`` between them.
+
+    Raises:
+        ValueError: The file cannot be read, or a polygon has fewer than three corners.
+    """
+    corners = length_columns(path, ("x", "y")).values
+    gaps = np.flatnonzero(np.isnan(corners).any(axis=1))
+    parts = [part[~np.isnan(part).any(axis=1)] for part in np.split(corners, gaps)]
+    return Polygons([part for part in parts if len(part)])

@@ -9,9 +9,8 @@ from alphacut.rve.image.bounds import StiffnessBounds
 from alphacut.rve.image.directions import directions
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.gap import constitutive_gap
-from alphacut.rve.image.grains import grain_modulus
 from alphacut.rve.image.model import ImageModel, usual_division
-from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
+from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli, grain_modulus
 from alphacut.rve.image.phase_images import ModuliImages
 from alphacut.rve.image.random_threshold import (
     NormalThreshold,
