@@ -16,8 +16,9 @@ from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.modal.exact_response import ExactResponse
-from alphacut.frame.modal.model import fit_modes
-from alphacut.frame.modal.search import problems, refine
+from alphacut.frame.modal.fitting import fit_modes
+from alphacut.frame.modal.newton import refine
+from alphacut.frame.modal.optima import problems
 from alphacut.frame.structures.linear import Accelerogram, evaluate
 from alphacut.frame.structures.modes import ModalError
 

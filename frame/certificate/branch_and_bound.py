@@ -24,7 +24,8 @@ from alphacut.frame.certificate.numpy_kernel import bounds
 from alphacut.frame.certificate.piece import Piece, Problems
 from alphacut.frame.certificate.remainder import Remainder
 from alphacut.frame.modal.model import ModalModel
-from alphacut.frame.modal.search import Optima, refine
+from alphacut.frame.modal.newton import refine
+from alphacut.frame.modal.optima import Optima
 
 PIECE = 30_000
 """Items examined together."""

@@ -7,7 +7,9 @@ import numpy as np
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.modal.model import ModalModel
-from alphacut.frame.modal.search import Optima, problems, refine, trajectories
+from alphacut.frame.modal.newton import refine
+from alphacut.frame.modal.optima import Optima, problems
+from alphacut.frame.modal.starting_points import trajectories
 
 SAMPLES = 256
 """Trajectories of the modal model."""

@@ -21,7 +21,8 @@ from alphacut.frame.certificate.ratio_damping import Comparison, RatioDamping
 from alphacut.frame.certificate.remainder import largest_growth, suprema
 from alphacut.frame.certificate.wave_bounds import Part, parts
 from alphacut.frame.dynamics.integrators import Exact
-from alphacut.frame.modal.model import ModalModel, fit_states
+from alphacut.frame.modal.fitting import fit_states
+from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.structures.linear import evaluate
 from alphacut.frame.structures.polynomial_dependence import UnprovedError, degrees, without_ratio
 

@@ -17,7 +17,9 @@ from alphacut.frame.checks.admissible import require_admissible
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.methods.modal import Modal, model_with_error
 from alphacut.frame.modal.model import ModalModel
-from alphacut.frame.modal.search import Optima, problems, refine, trajectories
+from alphacut.frame.modal.newton import refine
+from alphacut.frame.modal.optima import Optima, problems
+from alphacut.frame.modal.starting_points import trajectories
 
 REFINED = 64
 """Motions of a search that are driven to their local extreme."""

@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.decisions.limit_search import LimitSearch, enclosed
-from alphacut.frame.modal.search import trajectories
+from alphacut.frame.modal.starting_points import trajectories
 
 PARTS = 200
 """Parts of a box that are looked at before its proof is given up."""

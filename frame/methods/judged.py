@@ -13,8 +13,8 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.modal import guaranteed
+from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.levels import search_levels
-from alphacut.frame.modal.model import fit_modes
 from alphacut.frame.modal.polynomial_error import judged_at_optima, polynomial_error
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError

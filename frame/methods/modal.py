@@ -17,8 +17,9 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.envelope import Envelope, signed_envelope
 from alphacut.frame.modal.exact_response import ExactResponse
+from alphacut.frame.modal.fitting import MANY, fit_modes
 from alphacut.frame.modal.levels import polished_levels, search_levels
-from alphacut.frame.modal.model import MANY, ModalModel, fit_modes
+from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.polynomial_error import judged_at_optima, polynomial_error
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError

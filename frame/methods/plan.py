@@ -13,8 +13,9 @@ from alphacut.frame.calculus.box_quadratic import local_maximum
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.modal.exact_response import ExactResponse
-from alphacut.frame.modal.model import MANY, ModalModel, fit_modes
-from alphacut.frame.modal.search import Response
+from alphacut.frame.modal.fitting import MANY, fit_modes
+from alphacut.frame.modal.model import ModalModel
+from alphacut.frame.modal.optima import Response
 from alphacut.frame.structures.modes import ModalError
 
 PROBED = 200

@@ -8,16 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
+from alphacut.frame.modal.contest import contest
 from alphacut.frame.modal.exact_response import ExactResponse
-from alphacut.frame.modal.search import (
-    Optima,
-    best_of_pool,
-    contest,
-    fresh_points,
-    problems,
-    refine,
-    trajectories,
-)
+from alphacut.frame.modal.newton import refine
+from alphacut.frame.modal.optima import Optima, best_of_pool, problems
+from alphacut.frame.modal.starting_points import fresh_points, trajectories
 
 CALM_PASSES = 2
 """Passes one after the other that must gain too little before the search ends."""

@@ -8,8 +8,9 @@ from itertools import product
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.modal.model import MANY, ModalModel
-from alphacut.frame.modal.search import fresh_points
+from alphacut.frame.modal.fitting import MANY
+from alphacut.frame.modal.model import ModalModel
+from alphacut.frame.modal.starting_points import fresh_points
 
 MARGIN = 2.0
 """Factor on the deviation of judging trajectories up to a node."""

@@ -15,9 +15,11 @@ from alphacut.frame.methods import auto
 from alphacut.frame.methods.auto import Auto, ToleranceError
 from alphacut.frame.methods.modal import Modal
 from alphacut.frame.modal.exact_response import ExactResponse
-from alphacut.frame.modal.model import ModalModel, fit_modes
+from alphacut.frame.modal.fitting import fit_modes
+from alphacut.frame.modal.model import ModalModel
+from alphacut.frame.modal.newton import refine
+from alphacut.frame.modal.optima import problems
 from alphacut.frame.modal.polynomial_error import polynomial_error
-from alphacut.frame.modal.search import problems, refine
 from alphacut.fuzzy import Interval
 from benchmarks.frame.calibration import judged, random_case
 

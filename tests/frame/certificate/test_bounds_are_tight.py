@@ -16,8 +16,9 @@ from alphacut.frame.certificate.numpy_kernel import Items, stays_below
 from alphacut.frame.certificate.remainder import Remainder, largest_growth
 from alphacut.frame.certificate.wave_bounds import parts
 from alphacut.frame.dynamics.spectral import responses
-from alphacut.frame.modal.model import ModalModel, fit_modes
-from alphacut.frame.modal.search import Optima
+from alphacut.frame.modal.fitting import fit_modes
+from alphacut.frame.modal.model import ModalModel
+from alphacut.frame.modal.optima import Optima
 from alphacut.fuzzy import Interval
 from tests.frame.certificate.test_kernels import take
 

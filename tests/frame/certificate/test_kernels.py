@@ -13,8 +13,10 @@ from alphacut.frame.certificate import branch_and_bound, kernel
 from alphacut.frame.certificate.branch_and_bound import BranchAndBound, Enclosed
 from alphacut.frame.certificate.frontier import Frontier
 from alphacut.frame.certificate.numpy_kernel import examine
-from alphacut.frame.modal.model import ModalModel, fit_modes
-from alphacut.frame.modal.search import ModalSearch, problems
+from alphacut.frame.modal.fitting import fit_modes
+from alphacut.frame.modal.model import ModalModel
+from alphacut.frame.modal.optima import problems
+from alphacut.frame.modal.search import ModalSearch
 from alphacut.fuzzy import Interval
 
 PULSE = Accelerogram(0.13, np.array([0.0, 3.0, -2.0, 2.0]))

@@ -29,8 +29,9 @@ from alphacut.frame.certificate.ratio_damping import Comparison, RatioDamping
 from alphacut.frame.certificate.remainder import largest_growth
 from alphacut.frame.certificate.wave_bounds import parts
 from alphacut.frame.dynamics.spectral import responses
+from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.ground_response import left_out
-from alphacut.frame.modal.model import ModalModel, fit_modes
+from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.structures.linear import evaluate
 from alphacut.frame.structures.polynomial_dependence import (
     UnprovedError,

@@ -15,7 +15,7 @@ from alphacut.frame import Accelerogram, Exact, LinearFlow, Midpoint, StoreyFram
 from alphacut.frame.boxes import boxes
 from alphacut.frame.dynamics.integrators import Integrator, RungeKutta4
 from alphacut.frame.dynamics.record_load import linear_load
-from alphacut.frame.modal.model import fit_modes
+from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.structures.linear import evaluate
 from alphacut.fuzzy import Interval
 

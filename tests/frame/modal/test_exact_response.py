@@ -13,10 +13,10 @@ from alphacut.frame.calculus import box_quadratic
 from alphacut.frame.methods.auto import Auto, ToleranceError
 from alphacut.frame.methods.modal import Modal
 from alphacut.frame.methods.plan import candidates
-from alphacut.frame.modal import model as modal_model
+from alphacut.frame.modal import fitting
 from alphacut.frame.modal.exact_response import ExactResponse
+from alphacut.frame.modal.fitting import fit_modes, fit_points, hopeless
 from alphacut.frame.modal.levels import ENDS, UNSEEN
-from alphacut.frame.modal.model import fit_modes, fit_points, hopeless
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy import Interval
@@ -131,7 +131,7 @@ def test_what_the_last_passes_would_not_follow_is_declared() -> None:
 
 
 def test_polynomials_are_judged_where_the_optima_lie(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(modal_model, "_held_out", lambda d: np.zeros((1, d)))  # says nothing
+    monkeypatch.setattr(fitting, "_held_out", lambda d: np.zeros((1, d)))  # says nothing
     flow = unit_flow(replace(FRAME, outputs=("q3",)), ("E", "m3"), 0.2)
     found = Modal(tolerance=1e-3).run(flow)
     corners = np.array([[a, b] for a in np.linspace(-1, 1, 21) for b in np.linspace(-1, 1, 21)])

@@ -25,7 +25,7 @@ from alphacut.frame.certificate import certificate
 from alphacut.frame.certificate.branch_and_bound import BranchAndBound
 from alphacut.frame.certificate.remainder import Remainder
 from alphacut.frame.dynamics.integrators import Gauss4, Integrator, Newmark
-from alphacut.frame.modal.model import fit_modes
+from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.search import ModalSearch
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy import Triangular
@@ -170,7 +170,7 @@ def test_third_derivatives_stay_below_their_bound() -> None:
 def test_branch_and_bound_finds_what_a_search_missed() -> None:
     model = fit_modes(LinearFlow(FRAME, CUTS.names, 20, 0.5, Exact()), CUTS)
     lower, upper = -np.ones(4), np.ones(4)
-    from alphacut.frame.modal.search import problems
+    from alphacut.frame.modal.optima import problems
 
     optima = problems(np.arange(41), 3, 4)
     # starts from the middle only
@@ -203,6 +203,7 @@ def test_step_error_is_kept_apart() -> None:
 
 def test_what_one_node_finds_reaches_all_others(monkeypatch) -> None:
     from alphacut.frame.modal import search as modal_search
+    from alphacut.frame.modal.optima import problems
 
     monkeypatch.setattr(modal_search, "refine", lambda *_: None)
     offered: list[int] = []
@@ -215,7 +216,7 @@ def test_what_one_node_finds_reaches_all_others(monkeypatch) -> None:
             return -np.abs(unit[:, 0] - 0.7)
 
     count = 400
-    found = modal_search.problems(np.arange(count), 1, 1)
+    found = problems(np.arange(count), 1, 1)
     found.value[:] = np.where(found.side > 0, -0.7, -1e9)
     found.point[found.side > 0] = 0.0
     first = np.flatnonzero(found.side > 0)[0]

@@ -8,7 +8,7 @@ import pytest
 
 from alphacut.frame import Exact, LinearFlow, StoreyFrame
 from alphacut.frame.boxes import boxes
-from alphacut.frame.modal.model import fit_modes
+from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.polynomial_error import FRESH, judged_at_optima, judging_points
 from alphacut.fuzzy import Interval
 from benchmarks.frame.calibration import judged, random_case

@@ -5,8 +5,11 @@ import pytest
 
 from alphacut.frame import Exact, LinearFlow, StoreyFrame
 from alphacut.frame.boxes import boxes
-from alphacut.frame.modal import search
-from alphacut.frame.modal.model import ModalModel, fit_modes
+from alphacut.frame.modal import newton, search
+from alphacut.frame.modal.fitting import fit_modes
+from alphacut.frame.modal.model import ModalModel
+from alphacut.frame.modal.optima import Optima, problems
+from alphacut.frame.modal.starting_points import trajectories
 from alphacut.fuzzy import Triangular
 
 RIDGED = StoreyFrame(
@@ -26,18 +29,18 @@ INPUTS = {"E": Triangular(22.7626e9, 24.7561e9, 25.8312e9)} | {
 SMALL = 1e-9
 
 
-def ridges(start: float) -> tuple[ModalModel, search.Optima]:
+def ridges(start: float) -> tuple[ModalModel, Optima]:
     cuts = boxes(INPUTS, (0,))
     model = fit_modes(LinearFlow(RIDGED, cuts.names, 30, 0.25, Exact()), cuts)
-    optima = search.problems(np.arange(len(model.time)), 3, 4)
+    optima = problems(np.arange(len(model.time)), 3, 4)
     optima.point[:] = start
     optima.value[:] = optima.side * model.value_at(optima.point, optima.node, optima.output)
     return model, optima
 
 
-def refined(start: float) -> search.Optima:
+def refined(start: float) -> Optima:
     model, optima = ridges(start)
-    search.refine(model, optima, np.arange(len(optima.value)), -np.ones(4), np.ones(4), SMALL)
+    newton.refine(model, optima, np.arange(len(optima.value)), -np.ones(4), np.ones(4), SMALL)
     return optima
 
 
@@ -46,11 +49,11 @@ def test_newton_ends_when_it_has_converged_and_not_after_a_count(
 ) -> None:
     settled = refined(0.3)
     assert settled.left.max() <= SMALL
-    monkeypatch.setattr(search, "ITERATIONS", 10)
+    monkeypatch.setattr(newton, "ITERATIONS", 10)
     hasty = refined(0.3)
     assert (settled.value - hasty.value).max() > 1e-5  # ten steps are too few here
     assert hasty.left[settled.value > hasty.value + 1e-5].min() > SMALL  # and it is said
-    monkeypatch.setattr(search, "ITERATIONS", 3000)
+    monkeypatch.setattr(newton, "ITERATIONS", 3000)
     assert np.abs(refined(0.3).value - settled.value).max() < 10 * SMALL
 
 
@@ -64,7 +67,7 @@ def test_independent_passes_find_the_basins_that_a_search_has_missed() -> None:
     )
     model = fit_modes(LinearFlow(RIDGED, cuts.names, 12, 0.25, Exact()), cuts, tolerance=1e-3)
     lower, upper = -np.ones(3), np.ones(3)
-    dense = search.trajectories(model, np.random.default_rng(5).uniform(-1, 1, (8000, 3)))
+    dense = trajectories(model, np.random.default_rng(5).uniform(-1, 1, (8000, 3)))
     top = np.stack([-dense.min(0), dense.max(0)], -1)
     alone = search.ModalSearch(8, 1, passes=0).run(model, lower, upper)
     judged = search.ModalSearch(8, 1, passes=20).run(model, lower, upper)

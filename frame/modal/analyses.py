@@ -1,0 +1,97 @@
+"""Eigen-analyses of a structure at points of its box, and which of its modes matter."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from alphacut.frame.boxes import Boxes
+from alphacut.frame.calculus.jet import Array, Jet
+from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.structures.linear import evaluate
+from alphacut.frame.structures.modes import (
+    ModalError,
+    Modes,
+    eigenvectors,
+    modes,
+    state_matrix,
+)
+
+
+def analyse(
+    flow: LinearFlow,
+    boxes: Boxes,
+    unit: Array,
+    chosen: Array | None = None,
+    *,
+    states: bool = False,
+) -> Modes:
+    """Eigen-analyses with derivatives at unit coordinates (S, d), of the integrator.
+
+    Args:
+        flow: The trajectories.
+        boxes: The parameters' boxes.
+        unit: Where to analyse, shape (S, d).
+        chosen: Indices of the modes wanted; all when None.
+        states: Whether to observe the whole state [q; v] in place of the outputs.
+
+    Raises:
+        ModalError: The structure has no such modes, or the integrator mixes them.
+    """
+    matrices, rows = evaluate(flow.system, flow.names, boxes.to_physical(unit), derivatives=True)
+    if states:
+        rows = Jet.constant(
+            np.broadcast_to(np.eye(rows.value.shape[-1]), (len(unit), *2 * rows.value.shape[-1:])),
+            rows.directions,
+        )
+    found = modes(matrices, rows, chosen)
+    rate = _discrete(found.eigenvalue, flow)
+    return Modes(
+        boxes.in_unit(rate),
+        boxes.in_unit(found.coefficient),
+        boxes.in_unit(found.load),
+        found.of,
+    )
+
+
+def _discrete(rate: Jet, flow: LinearFlow) -> Jet:
+    """Log R(hλ)/h: the rate at which the integrator's modes advance."""
+    rational = flow.integrator.amplification
+    if rational is None or (flow.system.ground is not None and rational[0]):
+        raise ModalError(
+            f"modal: the integrator '{flow.integrator.name}' keeps no modes here; take exact, or"
+            " the method graph-follower"
+        )
+    if not rational[0]:
+        return rate
+    h, z = flow.step, flow.step * rate.value
+    parts = []
+    for coefficients in rational:
+        p = np.polynomial.Polynomial(coefficients)
+        value, slope, curve = p(z), p.deriv(1)(z), p.deriv(2)(z)
+        parts.append((np.log(value), slope / value, curve / value - (slope / value) ** 2))
+    f, df, ddf = (a - b for a, b in zip(*parts, strict=True))
+    return rate.chain(f / h, df, ddf * h)
+
+
+def needed_modes(flow: LinearFlow, boxes: Boxes, allowed: Array) -> Array:
+    """Indices of the modes whose share in some output matters.
+
+    Args:
+        flow: The trajectories.
+        boxes: The parameters' boxes.
+        allowed: What all modes left out may reach together, for each output, shape (m,).
+    """
+    matrices, rows = evaluate(flow.system, flow.names, boxes.centre[None], derivatives=False)
+    rate, X, Y = (jet.value[0] for jet in eigenvectors(state_matrix(matrices)))
+    state = np.abs(Y @ np.vstack([matrices.q0.value[0], matrices.v0.value[0]]))
+    ground = flow.system.ground
+    if ground is not None:
+        record = np.abs(ground.acceleration)
+        # bound of |R(t; λ)|
+        push = np.minimum(record.sum() * ground.step, record.max() / np.maximum(-rate.real, 1e-300))
+        state += np.abs(Y[:, len(matrices.rigid) :] @ matrices.rigid) * push[:, None]
+    upper = np.flatnonzero(rate.imag >= 0)
+    size = (2 * np.abs(rows.value[0] @ X).T * state / allowed)[upper]
+    order = np.argsort(size.max(1))
+    small = order[:-1][(np.cumsum(size[order[:-1]], 0) <= 1).all(1)]
+    return np.setdiff1d(upper, upper[small])

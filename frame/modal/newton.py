@@ -1,0 +1,91 @@
+"""Newton's method with a trust region in a box, for many problems together."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_maximum
+from alphacut.frame.calculus.jet import Array
+from alphacut.frame.modal.optima import Optima, Response
+
+PIECE = 2000
+"""Problems treated together; more would leave the cache."""
+USUAL = 6
+"""Newton steps after which quadratic models are maximised over all faces: the rest is on ridges."""
+ITERATIONS = 300
+"""Newton steps after which a problem that has not converged is left as it is."""
+
+
+def refine(
+    model: Response, optima: Optima, which: Array, lower: Array, upper: Array, small: float
+) -> None:
+    """Newton's method in the box on `which`, until none promises more than `small`."""
+    size = int(np.clip(PIECE * 36 / lower.size**2, PIECE // 8, PIECE))
+    for piece in np.array_split(which, -(-len(which) // size) or 1):
+        _newton(model, optima, piece, lower, upper, small)
+
+
+def _newton(
+    model: Response, optima: Optima, which: Array, lower: Array, upper: Array, small: float
+) -> None:
+    """End a problem when its model, not held back by the trust region, promises at most `small`.
+
+    What the models last promised is kept in `optima.left`.
+    """
+    radius: Array = np.full(len(which), 0.5)
+    f, g, H = _signed(model, optima, optima.point[which], which)
+    bend = np.zeros_like(H)  # what gradients have shown H to lack
+    for count in range(ITERATIONS):
+        low = np.maximum(lower - optima.point[which], -radius[:, None])
+        high = np.minimum(upper - optima.point[which], radius[:, None])
+        step = (
+            local_maximum(g, H, low, high, rounds=2)
+            if count < USUAL
+            else global_maximum(g, H, low, high)
+        )
+        promised = gain(g, H, step)
+        optima.left[which] = promised
+        held = np.abs(step).max(1, initial=0.0) >= 0.999 * radius
+        open_ = (promised > small) | (held & (promised > 1e-3 * small))
+        which, radius, step, promised, g, H, bend = (
+            x[open_] for x in (which, radius, step, promised, g, H, bend)
+        )
+        if not len(which):
+            return
+        trial = np.clip(optima.point[which] + step, lower, upper)
+        step = trial - optima.point[which]
+        f, g2, H2 = _signed(model, optima, trial, which)
+        if model.secant:
+            lack = _symmetric_rank_one(H2 + bend, step, g2 - g)
+            bend += lack
+            H, H2 = H + lack, H2 + bend
+        got = f - optima.value[which]
+        better = got > 0
+        optima.point[which[better]], optima.value[which[better]] = trial[better], f[better]
+        g[better], H[better] = g2[better], H2[better]
+        ratio = got / promised
+        radius = np.where(
+            ratio > 0.75,
+            np.minimum(2 * radius, 2.0),
+            np.where(ratio < 0.25, 0.3 * np.abs(step).max(1), radius),
+        )
+
+
+def _symmetric_rank_one(H: Array, step: Array, change: Array) -> Array:
+    """Least correction of Hessians (N, d, d) that explains a change of gradients over a step."""
+    lack = change - (H @ step[..., None])[..., 0]
+    weight = (lack * step).sum(1)
+    size = np.sqrt((lack**2).sum(1) * (step**2).sum(1))
+    sound = np.abs(weight) > 1e-6 * size
+    scaled = lack / np.where(sound, weight, 1.0)[:, None] * sound[:, None]
+    correction: Array = lack[:, :, None] * scaled[:, None, :]
+    return correction
+
+
+def _signed(
+    model: Response, optima: Optima, points: Array, which: Array
+) -> tuple[Array, Array, Array]:
+    """Side × output with gradient and Hessian, of problems `which` at points (W, d)."""
+    side = optima.side[which]
+    f, g, H = model.at(points, optima.node[which], optima.output[which])
+    return side * f, side[:, None] * g, side[:, None, None] * H

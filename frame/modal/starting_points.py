@@ -1,0 +1,38 @@
+"""Points of a box from which searches begin, and their trajectories."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from alphacut.frame.calculus.jet import Array
+from alphacut.frame.modal.optima import Response
+
+NEAR, DECADES = 8, 8.0
+"""One in how many fresh points lies near the faces, and how near: decades of the box's width."""
+
+
+def fresh_points(rng: np.random.Generator, lower: Array, upper: Array, size: int) -> Array:
+    """Random points of a box, many with coordinates on or near faces, shape (size, d)."""
+    pool = rng.uniform(lower, upper, (size, len(lower)))
+    faces = rng.random(pool.shape) < rng.choice([0.0, 0.3, 0.6], (size, 1))
+    nearest = np.where(rng.random(pool.shape) < 0.5, lower, upper)
+    near = np.arange(size) % NEAR == 0  # where an extreme beside a face would be too thin to meet
+    away = 10.0 ** rng.uniform(-DECADES, 0, (int(near.sum()), 1))
+    pool[near] = nearest[near] + away * (pool[near] - nearest[near])
+    pool[faces] = nearest[faces]
+    return pool
+
+
+def tensor_points(d: int, most: int) -> Array:
+    """Finest grid of extreme Chebyshev points with at most `most`, shape (k^d, d)."""
+    k = int(most ** (1 / d) + 1e-9)
+    if k < 2:
+        return np.zeros((0, d))
+    axis = -np.cos(np.pi * np.arange(k) / (k - 1))
+    return np.array(np.meshgrid(*[axis] * d, indexing="ij")).reshape(d, -1).T
+
+
+def trajectories(model: Response, points: Array, nodes: Array | None = None) -> Array:
+    """Values of the model at points (P, d) and the nodes, all unless given, shape (P, T, m)."""
+    pieces = [model.values(chunk) for chunk in np.array_split(points, -(-len(points) // 256))]
+    return np.concatenate([x if nodes is None else x[:, nodes] for x in pieces])
