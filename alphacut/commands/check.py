@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TextIO
 
+from alphacut.case.case import Case
 from alphacut.case.load import load
 from alphacut.case.readings import readings
 from alphacut.commands.options import add_common, answer
@@ -31,47 +32,33 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         case = load(options.case, options.set)
         found = ready(case)
     except BadInput as error:
-        answer(
-            options,
-            {
-                "case": options.case,
-                "ok": False,
-                "problems": [asdict(problem) for problem in error.problems],
-            },
-            out,
-        )
+        problems = [asdict(problem) for problem in error.problems]
+        answer(options, {"case": options.case, "ok": False, "problems": problems}, out)
         raise
     inputs = list(readings(case))
     warnings = [f"warning: {remark}" for remark in (*found.warnings, *found.rough)]
-    answer(
-        options,
-        {
-            "case": options.case,
-            "ok": True,
-            "problems": [],
-            "warnings": warnings,
-            "stages": list(case.stages),
-            "period_s": found.period,
-            "inputs": [asdict(reading) for reading in inputs],
-        },
-        out,
-    )
+    document = {
+        "case": options.case,
+        "ok": True,
+        "problems": [],
+        "warnings": warnings,
+        "stages": list(case.stages),
+        "period_s": found.period,
+        "inputs": [asdict(reading) for reading in inputs],
+    }
+    answer(options, document, out)
     for warning in warnings:
         say(warning)
     if options.json != "-" and not options.quiet:
-        # the modulus is yet to be computed
-        about = "about " if {"modulus", "image"} & set(case.stages) else ""
-        period = f"; first natural period {about}{found.period:.3g} s" if found.period else ""
-        passed = (
-            {"modulus", "image"} & set(case.stages)
-            and case.sections.frame
-            and case.frame.modulus is not None
-        )
-        over = "; frame.modulus is passed over, stage modulus hands its own on" if passed else ""
-        for reading in inputs:
-            out.write(f"{reading}\n")
-        out.write(
-            f"{options.case}: no problems; stages {', '.join(case.stages)};"
-            f" {case.top.title}{period}{over}\n"
-        )
+        out.writelines(f"{line}\n" for line in (*inputs, verdict(options.case, case, found.period)))
     return 0
+
+
+def verdict(name: str, case: Case, period: float | None) -> str:
+    """The last line: that nothing is wrong, what would run, and the first natural period."""
+    computed = {"modulus", "image"} & set(case.stages)  # the modulus is yet to be had
+    about = "about " if computed else ""
+    first = f"; first natural period {about}{period:.3g} s" if period else ""
+    passed = computed and case.sections.frame and case.frame.modulus is not None
+    over = "; frame.modulus is passed over, stage modulus hands its own on" if passed else ""
+    return f"{name}: no problems; stages {', '.join(case.stages)}; {case.top.title}{first}{over}"

@@ -15,6 +15,7 @@ from alphacut.case.idle import changed_moduli, require_read
 from alphacut.case.load import load
 from alphacut.case.sections.vibration import ENVELOPE_METHODS
 from alphacut.case.values import nearest
+from alphacut.commands.given_modulus import add_modulus, given_modulus
 from alphacut.commands.options import (
     KeyOption,
     add_common,
@@ -26,15 +27,13 @@ from alphacut.commands.options import (
     check_workers,
     refuse_beside,
 )
-from alphacut.fuzzy import FuzzyNumber
-from alphacut.io import quantity
 from alphacut.io.files import Document
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import progress
 from alphacut.io.provenance import fingerprint
 from alphacut.io.units import engineering, largest_by_unit
 from alphacut.stages.contract import require_choice
-from alphacut.stages.material.modulus import read_number, stand_in
+from alphacut.stages.material.modulus import stand_in
 from alphacut.stages.vibration import envelope
 from alphacut.stages.vibration import exceedance as outcomes
 from alphacut.stages.vibration.envelope_task import EnvelopeTask, task_of
@@ -64,11 +63,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_common(parser)
     add_keys(parser, KEYS)
-    parser.add_argument(
-        "--modulus",
-        metavar="QUANTITY|FILE.nc",
-        help="Young's modulus: '[22, 24, 26] GPa', or α-cuts (default: the case's)",
-    )
+    add_modulus(parser)
     add_exclude(parser, " or ".join(OF_AUTO))
     add_workers(parser, "the proof of --certify")
     parser.add_argument(
@@ -203,28 +198,6 @@ def excluded(text: str) -> tuple[str, ...]:
             Problem("--exclude", "no method is left for auto to take", text, " or ".join(OF_AUTO))
         )
     return names
-
-
-def given_modulus(text: str | None) -> FuzzyNumber | None:
-    """The modulus of ``--modulus`` in Pa: a quantity, or the α-cuts of a file."""
-    if text is None:
-        return None
-    if text.endswith(".nc"):
-        return read_number(text)
-    try:
-        number = quantity.fuzzy(text, "Pa")
-    except ValueError as error:
-        raise BadInput(
-            Problem(
-                "--modulus",
-                str(error),
-                text,
-                "a stress such as '[22.8, 24.8, 25.8] GPa', or FILE.nc",
-            )
-        ) from None
-    if not number.support.lower > 0:
-        raise BadInput(Problem("--modulus", "out of range", text, "greater than 0"))
-    return number
 
 
 def summary(found: Envelope, tried: Array | None = None) -> str:

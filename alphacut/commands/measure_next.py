@@ -9,7 +9,7 @@ from typing import TextIO
 
 from alphacut.case.idle import require_read
 from alphacut.case.load import load
-from alphacut.commands.envelope import given_modulus
+from alphacut.commands.given_modulus import add_modulus, given_modulus
 from alphacut.commands.options import KeyOption, add_common, add_keys, answer, changes
 from alphacut.io.files import as_json, write_text
 from alphacut.io.output_paths import unwritable
@@ -41,11 +41,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_common(parser)
     add_keys(parser, KEYS)
-    parser.add_argument(
-        "--modulus",
-        metavar="QUANTITY|FILE.nc",
-        help="Young's modulus in place of the cell's: '[22, 24, 26] GPa', or α-cuts",
-    )
+    add_modulus(parser)
     parser.add_argument(
         "--output", metavar="NAME", help="output whose width is compared (default: the first)"
     )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from alphacut.case.idle import require_read
 from alphacut.case.load import load
-from alphacut.commands.envelope import given_modulus
+from alphacut.commands.given_modulus import add_modulus, given_modulus
 from alphacut.commands.options import add_common, answer, changes
 from alphacut.io.files import as_json, write_text
 from alphacut.io.output_paths import unwritable
@@ -29,11 +29,7 @@ READ = ("frame", "field", "envelope", "update", "modulus")
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     add_common(parser)
-    parser.add_argument(
-        "--modulus",
-        metavar="QUANTITY|FILE.nc",
-        help="Young's modulus in place of the case's: '[22, 24, 26] GPa', or α-cuts",
-    )
+    add_modulus(parser)
     parser.add_argument(
         "--out",
         metavar="FOLDER",

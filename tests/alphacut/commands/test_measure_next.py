@@ -9,29 +9,16 @@ import numpy as np
 import pytest
 
 from alphacut.entry import main
+from tests.alphacut.one_floor import OMEGA, one_floor
 
-# q = q0 cos ωt + v0 / ω sin ωt over a whole period, ω² = 24 E I / (l³ m): the mean width is in
-# proportion to the sum of the widths of q0 and of v0 / ω
-OMEGA = float(np.sqrt(24 * 2.5e10 * 1e-6 / 27 / 1e3))
-CASE = f"""
-schema = 1
-title = "One floor"
-about = "A mass that is moved and pushed"
-stages = ["envelope"]
-[frame]
-masses = ["1000 kg"]
-lengths = ["3 m"]
-modulus = "25 GPa"
-second_moment = "1e-6 m^4"
-rayleigh_mass = "0 1/s"
-displacements = ["[8, 10, 12] mm"]
-velocities = ["[{9e-3 * OMEGA}, {10e-3 * OMEGA}, {11e-3 * OMEGA}] m/s"]
-outputs = ["q1", "v1"]
-[envelope]
-fuzzy = ["v0", "q0"]
-duration = "{2 * np.pi / OMEGA} s"
-step = "{2 * np.pi / OMEGA / 256} s"
-"""
+# over a whole period the mean width is in proportion to the sum of the widths of q0 and of v0 / ω
+CASE = one_floor(
+    fuzzy='["v0", "q0"]',
+    duration=2 * np.pi / OMEGA,
+    step=2 * np.pi / OMEGA / 256,
+    moved="[8, 10, 12] mm",
+    pushed=f"[{9e-3 * OMEGA}, {10e-3 * OMEGA}, {11e-3 * OMEGA}] m/s",
+)
 
 
 @pytest.fixture

@@ -142,7 +142,7 @@ def test_a_folder_without_results_is_named(tmp_path, capfd):
 
 
 def test_a_certificate_is_told_with_its_gap_and_what_it_rests_on():
-    from alphacut.report.sections import methods
+    from alphacut.report.methods import methods
 
     study = {
         "method": "modal",
@@ -193,7 +193,7 @@ def test_only_what_the_run_drew_is_shown_and_what_the_command_line_changed_is_to
 
 
 def test_the_array_s_shear_ratio_is_told_where_it_is_known():
-    from alphacut.report.sections import isotropy
+    from alphacut.report.material import isotropy
 
     assert "1.340 (1 in an isotropic plane); E of eq. 16" in isotropy({"shear_ratio": 1.34})
     assert isotropy({"shear_ratio": None}) == isotropy({}) == ""
@@ -210,7 +210,8 @@ def test_the_error_of_a_certified_envelope_is_said_to_be_within_its_bounds():
 
 
 def test_text_is_escaped_wherever_it_stands():
-    from alphacut.report.sections import case_text, given
+    from alphacut.report.material import given
+    from alphacut.report.sections import case_text
     from alphacut.report.tables import section, table
 
     wicked = "<script>alert('&')</script>"

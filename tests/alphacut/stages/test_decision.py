@@ -9,30 +9,20 @@ import numpy as np
 import pytest
 
 from alphacut.entry import main
+from tests.alphacut.one_floor import RIGIDITY, one_floor
 
-# one floor without damping: |q| = v0 / ω with ω² = 24 E I / (l³ m), base shear v0 ω m
-CASE = """
-schema = 1
-title = "One floor"
-about = "A mass that is pushed"
-stages = ["envelope"]
-[frame]
-masses = ["[800, 1000, 1200] kg"]
-lengths = ["3 m"]
-modulus = "25 GPa"
-second_moment = "1e-6 m^4"
-rayleigh_mass = "0 1/s"
-displacements = ["0 m"]
-velocities = ["0.5 m/s"]
-outputs = ["q1", "drift1"]
-[envelope]
-fuzzy = ["m1"]
-duration = "2 s"
-step = "1 ms"
-[decision]
-limits = LIMITS
-"""
-RIGIDITY = 24 * 2.5e10 * 1e-6 / 27
+# |q| = v0 / ω, base shear v0 ω m
+CASE = (
+    one_floor(
+        fuzzy='["m1"]',
+        duration=2,
+        step=1e-3,
+        outputs='["q1", "drift1"]',
+        mass="[800, 1000, 1200] kg",
+        pushed="0.5 m/s",
+    )
+    + "[decision]\nlimits = LIMITS\n"
+)
 
 
 def written(folder: Path, limits: object, more: str = "") -> Path:

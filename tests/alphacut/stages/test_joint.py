@@ -9,30 +9,19 @@ import numpy as np
 import pytest
 
 from alphacut.entry import main
+from tests.alphacut.one_floor import OMEGA, one_floor
 
-# q = q0 cos ωt + v0 / ω sin ωt, without damping: linear in both starts, ω² = 24 E I / (l³ m)
-OMEGA = float(np.sqrt(24 * 2.5e10 * 1e-6 / 27 / 1e3))
 STEP = 2 * np.pi / OMEGA / 64
-CASE = f"""
-schema = 1
-title = "One floor"
-about = "A mass that is moved and pushed"
-stages = ["envelope"]
-[frame]
-masses = ["1000 kg"]
-lengths = ["3 m"]
-modulus = "25 GPa"
-second_moment = "1e-6 m^4"
-rayleigh_mass = "0 1/s"
-displacements = ["[9, 10, 11] mm"]
-velocities = ["[{9e-3 * OMEGA}, {10e-3 * OMEGA}, {11e-3 * OMEGA}] m/s"]
-outputs = ["q1", "v1"]
-[envelope]
-fuzzy = ["q0", "v0"]
-duration = "{2 * np.pi / OMEGA} s"
-step = "{STEP} s"
-[joint]
-"""
+CASE = (
+    one_floor(
+        fuzzy='["q0", "v0"]',
+        duration=2 * np.pi / OMEGA,
+        step=STEP,
+        moved="[9, 10, 11] mm",
+        pushed=f"[{9e-3 * OMEGA}, {10e-3 * OMEGA}, {11e-3 * OMEGA}] m/s",
+    )
+    + "[joint]\n"
+)
 
 
 def run(folder: Path, joint: str, *, page: bool = False) -> dict[str, object]:

@@ -1,0 +1,176 @@
+"""Sections of the report on the material: particles, modulus, image, stress."""
+
+from __future__ import annotations
+
+from markupsafe import Markup
+
+from alphacut.figures.captions import core, in_words
+from alphacut.io.files import Document
+from alphacut.report.tables import code, paragraphs, section, sentence, table
+from alphacut.stages.material import response
+
+
+def microstructure(found: Document) -> Markup:
+    """Particles, cells, and the fuzzy radius map."""
+    low, high = found["limits"]
+    words = paragraphs(
+        f"{found['discs']} discs in {found['packings']} sections, area fraction"
+        f" {found['area_fraction']:.4f}{of_map(found)}. The limits {low:.4g} and {high:.4g} of r/a"
+        f" keep {found['share_kept']:.3%} of the area."
+    )
+    rows = [("a1", f"{found['a1']:.5g}")]
+    rows += [
+        (name, "[" + ", ".join(f"{end:.5g}" for end in found[name]) + "]") for name in ("a2", "a4")
+    ]
+    rows.insert(2, ("a3", f"{found['a3']:.5g}"))
+    return section(
+        "Microstructure", words, table(("parameter of the radius map", "fuzzy value"), rows)
+    )
+
+
+def of_map(found: Document) -> str:
+    """The area fraction that the modulus gets, where it is known."""
+    name = "mean_area_fraction_of_map"
+    return (
+        f"; {found[name]:.4f} by the fitted map at its modal values, which is what the modulus uses"
+        if name in found
+        else ""
+    )
+
+
+MEANING = {
+    "cylinders": "E is the modulus of eq. 16, the paper's convention: a square array is not"
+    " isotropic.",
+    "spheres": "E is Hill's isotropic average of spheres in a simple cubic array.",
+}
+
+
+def modulus(found: Document, drawn: Markup) -> Markup:
+    """The fuzzy modulus with its α-cuts, error budget and certificate."""
+    cuts = zip(found["alpha"], found["E_GPa"]["lower"], found["E_GPa"]["upper"], strict=True)
+    rows = [(f"{alpha:g}", f"{low:.4f}", f"{high:.4f}") for alpha, low, high in cuts]
+    words = Markup(
+        "<p>{} <strong>{}</strong>, support [{:.4f}, {:.4f}] GPa; Poisson's ratio {:.4f}. {} {}"
+        " samples, {} linear systems, {:.1f} s. {} {} {}</p>"
+    ).format(
+        "Core" if "[" in core(found) else "Modal value",
+        core(found),
+        *(found[name] for name in ("lower_GPa", "upper_GPa", "nu")),
+        MEANING[found.get("particles", "cylinders")],
+        *(found[name] for name in ("samples", "solves", "seconds")),
+        sentence(found.get("reason", "")),
+        isotropy(found),
+        sentence(found.get("shape", "")),
+    )
+    budget = [(in_words(name), f"{value:.2g}") for name, value in found.get("error", {}).items()]
+    checks = [(in_words(name), f"{value:.2g}") for name, value in found.get("checks", {}).items()]
+    return section(
+        "Fuzzy modulus",
+        words,
+        drawn,
+        table(("α", "lower E, GPa", "upper E, GPa"), rows),
+        (
+            Markup("<h3>Error budget</h3>")
+            + table(("source", "estimated relative error of E"), budget)
+            if budget
+            else Markup("")
+        ),
+        (
+            Markup("<h3>Certificate</h3>")
+            + table(("property", "measured violation, largest of all samples"), checks)
+            if checks
+            else Markup("")
+        ),
+    )
+
+
+def given(found: Document) -> Markup:
+    """The modulus that the case gives instead of having it computed."""
+    cuts = zip(found["alpha"], found["E_GPa"]["lower"], found["E_GPa"]["upper"], strict=True)
+    rows = [(f"{alpha:g}", f"{low:.4f}", f"{high:.4f}") for alpha, low, high in cuts]
+    words = paragraphs(Markup("Given by the case: {}.").format(code(found["of"])))
+    return section("Fuzzy modulus", words, table(("α", "lower E, GPa", "upper E, GPa"), rows))
+
+
+def image(found: Document, drawn: Markup) -> Markup:
+    """The bounds of an image's modulus, what they are worth, and what widens them."""
+    cuts = found["cuts"]
+    ends = zip(
+        cuts["alpha"], cuts["E_GPa"]["lower"], cuts["E_GPa"]["upper"], cuts["nature"], strict=True
+    )
+    rows = [(f"{a:g}", f"{low:.4f}", f"{high:.4f}", nature) for a, low, high, nature in ends]
+    grains, least, greatest = (
+        f"[{pair['lower']:.3f}, {pair['upper']:.3f}] GPa"
+        for pair in (
+            found["grains_E_GPa"],
+            found["directions_E_GPa"]["least"],
+            found["directions_E_GPa"]["greatest"],
+        )
+    )
+    apparent = found.get("apparent_E_GPa")
+    own = (
+        f" The window as it is has E in [{apparent['lower']:.3f}, {apparent['upper']:.3f}] GPa;"
+        " that is proved, and bounds its apparent stiffness only."
+        if apparent
+        else ""
+    )
+    words = paragraphs(
+        "Plane strain: every section of the material is the image, as with fibres. If the"
+        f" particles are grains, the Hashin–Shtrikman interval of E is {grains}. The plane-strain"
+        f" Young's modulus of the softest direction lies in {least}, of the stiffest in"
+        f" {greatest}.{own}"
+    )
+    widths = [
+        (row["source"], f"{row['width_GPa']:.3g}", f"{row['share']:.1%}", row["cure"])
+        for row in found["error_table"]
+    ]
+    return section(
+        "Stiffness of the image",
+        words,
+        drawn,
+        table(("α", "lower E, GPa", "upper E, GPa", "nature"), rows),
+        random_threshold(found),
+        Markup("<h3>What widens E, the source to improve first on top</h3>")
+        + table(("source", "width of E, GPa", "share", "to narrow it"), widths),
+    )
+
+
+def random_threshold(found: Document) -> Markup:
+    """Quantiles of E over a random threshold at the lowest and the highest level, or nothing."""
+    random = found.get("random_threshold")
+    if not random:
+        return Markup("")
+    levels = found["cuts"]["alpha"]
+    rows = [
+        (f"{row['share']:g}", *(f"[{e['lower']:.4f}, {e['upper']:.4f}]" for e in ends))
+        for row in random["quantiles"]
+        for ends in [(row["E_GPa"][-1], row["E_GPa"][0])]
+    ]
+    head = ("probability", f"E, GPa, at α = {levels[-1]:g}", f"E, GPa, at α = {levels[0]:g}")
+    return Markup("<h3>Quantiles of E over the random threshold, proved</h3>") + table(head, rows)
+
+
+def isotropy(found: Document) -> str:
+    """Sentence on the array's anisotropy; empty where it was not computed."""
+    from alphacut.rve.anisotropy import shear_ratio_in_words
+
+    return (
+        sentence(
+            shear_ratio_in_words(
+                float(found["shear_ratio"]), spheres=found.get("particles") == "spheres"
+            )
+        )
+        if found.get("shear_ratio") is not None
+        else ""
+    )
+
+
+def stress(found: Document, drawn: Markup) -> Markup:
+    """The random and fuzzy stress of the cell."""
+    words = paragraphs(
+        f"Homogenised stress {found['quantity']}, random with θ at every fuzzy sample: intervals"
+        " of its mean, its quantiles and of the probability of exceeding a limit. Bounds are"
+        f" {found['nature']}; {found['note']}."
+    )
+    head = ("quantity", f"cut at α = {found['alpha'][0]:g}", f"cut at α = {found['alpha'][-1]:g}")
+    return section("Random and fuzzy stress", words, drawn, table(head, response.table(found)))
