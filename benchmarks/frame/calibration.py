@@ -24,8 +24,8 @@ from alphacut.fuzzy import FuzzyNumber, Triangular
 from benchmarks.frame.envelopes import FRAME, INPUTS
 from benchmarks.frame.exact_modes import inner_bounds
 from benchmarks.frame.pendulum import inputs as pendulum_inputs
-from benchmarks.frame.pendulum_reference import Swing
-from benchmarks.frame.reference import PolishedSearch
+from benchmarks.frame.pendulum import missed_and_declared
+from benchmarks.frame.pendulum_reference import Swing, exact_bounds
 from benchmarks.frame.wide import sixteen
 from benchmarks.rows import write
 
@@ -120,11 +120,11 @@ def named_cases(step: float) -> list[Case]:
     return cases
 
 
-def references(case: Case, *, samples: int, starts: int, seed: int) -> list[Array]:
+def references(case: Case, *, samples: int, starts: int, seed: int, nodes: int = 16) -> list[Array]:
     """Inner bounds of every level, each (T, m, 2), of (−output, output)."""
     flow = unit_flow(case)
     return [
-        inner_bounds(flow, level, samples=samples, starts=starts, seed=seed)
+        inner_bounds(flow, level, samples=samples, starts=starts, seed=seed, nodes=nodes)
         for level in range(len(case.alpha))
     ]
 
@@ -142,6 +142,7 @@ def judged(
     samples: int,
     starts: int,
     seed: int,
+    nodes: int = 16,
     known: list[Array] | None = None,
     **options: Any,
 ) -> dict[str, Any]:
@@ -155,7 +156,7 @@ def judged(
     seconds = time.process_time() - begun
     flow = unit_flow(case)
     if known is None:
-        known = references(case, samples=samples, starts=starts, seed=seed)
+        known = references(case, samples=samples, starts=starts, seed=seed, nodes=nodes)
     assert found.error is not None
     ratio, wrong, outside = [], 0.0, 0
     least = SMALL * float(options.get("tolerance", 1e-3))
@@ -205,61 +206,43 @@ def measured(cases: list[Case], tolerances: list[float], **effort: int) -> Itera
 def swung(
     tolerances: list[float], *, step: float, samples: int, seed: int
 ) -> Iterator[dict[str, Any]]:
-    """One row per tolerance for the pendulum, judged by motions at polished points.
-
-    They are extrapolated from the midpoint rule at a quarter and an eighth of the step.
-    """
-    numbers = pendulum_inputs("narrow")
-    low, high = np.array([number.cut(0) for number in numbers.values()]).T
-    count = round(SWUNG / step) + 1
-    guide = PolishedSearch(Swing(low, high, step, count), len(low), count)
-    guide.run(samples, 8, seed=seed, promising=1.0)
-    points = np.unique(np.round(guide.at.reshape(-1, len(low)), 6), axis=0)
-    rough, fine = (
-        Swing(low, high, step / n, n * (count - 1) + 1).values(points)[:, ::n] for n in (4, 8)
-    )
-    truth = (4 * fine - rough) / 3
-    peak = float(np.abs(guide.response.values(np.zeros((1, len(low))))).max())
-    inner = np.stack([(-truth).max(0), truth.max(0)], -1)
+    """One row per tolerance for the pendulum, judged by attained bounds of its exact motion."""
+    low, high = np.array([number.cut(0) for number in pendulum_inputs("narrow").values()]).T
+    inner = exact_bounds(low, high, SWUNG, step, samples=samples, seed=seed)
+    modal = Swing(low, high, step, len(inner)).values(np.zeros((1, len(low))))
     for tolerance in tolerances:
-        row: dict[str, Any] = {"case": "pendulum", "tolerance": tolerance}
-        begun = time.process_time()
-        common: dict[str, Any] = {"duration": SWUNG, "step": step, "alpha": (0.0,)}
-        try:
-            found = envelope(
-                pendulum(),
-                numbers,
-                method="auto",
-                integrator="composition4",
-                relative=True,
-                tolerance=tolerance,
-                **common,
-            )
-        except ToleranceError as refusal:
-            print(f"pendulum; auto at {tolerance:g}: refused: {refusal}", flush=True)
-            yield row | {"method": f"refused: {refusal}", "kept": ""}
-            continue
-        assert found.error is not None
-        force = found.outputs.index("force")
-        bounds = np.stack([-found.lower[0, :, force], found.upper[0, :, force]], -1)
-        missed, error = (inner - bounds) / peak, found.error[0, :, force][:, None] / peak
-        above = int((missed > error + ROUNDING).sum())
-        kept = bool(missed.max() <= tolerance and not above)
-        print(
-            f"pendulum; auto at {tolerance:g}: error {missed.max():.1e}, declared"
-            f" {error.max():.1e} by {found.method}, {above} of {missed.size} above it"
-            f"{'' if kept else '  BROKEN'}",
-            flush=True,
-        )
-        yield row | {
-            "method": found.method,
-            "error": float(missed.max()),
-            "declared": float(error.max()),
-            "values": missed.size,
-            "above_declared": above,
-            "seconds": time.process_time() - begun,
-            "kept": kept,
-        }
+        yield _swing(inner, float(np.abs(modal).max()), tolerance, step)
+
+
+def _swing(inner: Array, peak: float, tolerance: float, step: float) -> dict[str, Any]:
+    """The pendulum's row of a tolerance, printed too."""
+    row: dict[str, Any] = {"case": "pendulum", "tolerance": tolerance}
+    begun = time.process_time()
+    how: dict[str, Any] = {"method": "auto", "integrator": "composition4", "relative": True}
+    over: dict[str, Any] = {"duration": SWUNG, "step": step, "alpha": (0.0,)}
+    try:
+        found = envelope(pendulum(), pendulum_inputs("narrow"), tolerance=tolerance, **how, **over)
+    except ToleranceError as refusal:
+        print(f"pendulum; auto at {tolerance:g}: refused: {refusal}", flush=True)
+        return row | {"method": f"refused: {refusal}", "kept": ""}
+    missed, error = (share / peak for share in missed_and_declared(found, inner))
+    above = int((missed > error + ROUNDING).sum())
+    kept = bool(missed.max() <= tolerance and not above)
+    print(
+        f"pendulum; auto at {tolerance:g}: error {missed.max():.1e}, declared"
+        f" {error.max():.1e} by {found.method}, {above} of {missed.size} above it"
+        f"{'' if kept else '  BROKEN'}",
+        flush=True,
+    )
+    return row | {
+        "method": found.method,
+        "error": float(missed.max()),
+        "declared": float(error.max()),
+        "values": missed.size,
+        "above_declared": above,
+        "seconds": time.process_time() - begun,
+        "kept": kept,
+    }
 
 
 def main() -> None:
@@ -276,12 +259,15 @@ def main() -> None:
     parser.add_argument("--step", type=float, default=0.05, help="nodes of the named, s (0.05)")
     parser.add_argument("--samples", type=int, default=3000, help="of each reference (3000)")
     parser.add_argument("--starts", type=int, default=8, help="polished per bound (8)")
+    parser.add_argument("--nodes", type=int, default=16, help="polished nodes of each (16)")
+    parser.add_argument("--only", default="", help="named cases whose name holds this")
     o = parser.parse_args()
     seeds = range(o.first, o.first + o.frames)
     cases = named_cases(o.step) if o.named else [random_case(seed) for seed in seeds]
+    cases = [case for case in cases if o.only in case.name]
     effort = {"samples": o.samples, "seed": o.first + 1}
-    rows = list(measured(cases, o.tolerance, starts=o.starts, **effort))
-    if o.named:
+    rows = list(measured(cases, o.tolerance, starts=o.starts, nodes=o.nodes, **effort))
+    if o.named and o.only in "pendulum":
         rows += swung(o.tolerance, step=o.step, **effort)
     told = [row for row in rows if row["kept"] != ""]
     print(
