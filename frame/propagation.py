@@ -143,10 +143,7 @@ def _prepared(
 ) -> tuple[str, Method, UnitFlow, str]:
     """The method's name, the method, the trajectories, and the name of the time stepping."""
     if not isinstance(model, LagrangianSystem) and not hasattr(model, "matrices"):
-        raise ValueError(
-            f"model: {model!r} is no structure; take a StoreyFrame, a MatrixStructure or a"
-            " LagrangianSystem"
-        )
+        raise ValueError(f"model: {_no_structure(model)}")
     if method is None:
         method = _default(isinstance(model, LagrangianSystem), options)
     way = named(method, options)
@@ -161,6 +158,22 @@ def _prepared(
     require_admissible(model, cuts)
     require_stable(flow, cuts)
     return method, way, UnitFlow(flow, cuts, relative), scheme
+
+
+def _no_structure(model: object) -> str:
+    """Why a model has no trajectories, and what to take in its place."""
+    kind = type(model).__name__
+    if hasattr(model, "reduced"):
+        return (
+            f"{kind} is reduced to few shapes first: take model.reduced(box), with the lower and"
+            " upper end of each uncertain parameter by name"
+        )
+    if hasattr(model, "structure"):
+        return (
+            f"{kind} describes a structure: take model.structure().reduced(box), with the lower and"
+            " upper end of each uncertain parameter by name"
+        )
+    return f"{model!r} is no structure; take a StoreyFrame, a MatrixStructure or a LagrangianSystem"
 
 
 def _default(nonlinear: bool, options: Mapping[str, object]) -> str:

@@ -13,8 +13,8 @@ from alphacut.case.checks_image import image
 from alphacut.case.checks_material import particles, radius, sphere_model
 from alphacut.case.checks_structure import incomplete
 from alphacut.case.idle import idle_envelope
-from alphacut.case.limits import limit_of, storey_height
-from alphacut.case.names import OUTPUTS, floors, others, structures
+from alphacut.case.limits import limit_of
+from alphacut.case.names import OUTPUTS, floors, frame_outputs, others, structures
 from alphacut.case.schema import NEEDED
 from alphacut.case.sections.top import STAGES
 from alphacut.case.sections.vibration import ENVELOPE_METHODS, INTEGRATORS, NONLINEAR
@@ -278,7 +278,7 @@ def exceedance(case: Case) -> Iterator[Problem]:
                 nearest(name, outputs),
             )
     try:
-        if not (name.startswith("drift") and storey_height(case, name) is None):
+        if not case.sections.frame or name in frame_outputs(len(case.frame.masses)):
             limit_of(case)  # of a storey that is not there nothing can be said
     except BadInput as error:
         yield from error.problems

@@ -14,6 +14,7 @@ DAMPING = 'damping_ratio = "5 %", rayleigh_mass and rayleigh_stiffness'
 def incomplete(case: Case) -> Iterator[Problem]:
     """Every key that a frame or tower lacks."""
     if case.sections.frame:
+        yield from frame_stiffness(case)
         yield from frame_damping(case)
         yield from frame_motion(case)
     if case.sections.tower:
@@ -23,6 +24,37 @@ def incomplete(case: Case) -> Iterator[Problem]:
 def given(case: Case, section: str, *names: str) -> bool:
     """True if the file holds any of the keys."""
     return any(case.asked(f"{section}.{name}") for name in names)
+
+
+def frame_stiffness(case: Case) -> Iterator[Problem]:
+    """Stiffnesses, or all that makes them; heights where weights press."""
+    stiff = given(case, "frame", "stiffness")
+    for name in ("modulus", "second_moment", "columns") if stiff else ():
+        if given(case, "frame", name):
+            yield Problem(
+                f"frame.{name}",
+                "there is a stiffness besides",
+                str(case.written[f"frame.{name}"]),
+                f"one of stiffness and {name}",
+            )
+    for name, what in MAKES.items():
+        needed = not stiff or (name == "lengths" and case.frame.p_delta)
+        if needed and not given(case, "frame", name):
+            cure = "one for each floor, or for all" + ("" if stiff else "; or stiffness in N/m")
+            yield Problem(f"frame.{name}", f"missing: {what}", allowed=cure)
+    if stiff and (makers := [*({"modulus", "image"} & set(case.stages)), *case.stand_ins]):
+        yield Problem(
+            "frame.stiffness",
+            f"the frame makes no use of the modulus that {', '.join(sorted(makers))} gives",
+            str(case.written["frame.stiffness"]),
+            'one of them; with stiffness, stages = ["envelope"]',
+        )
+
+
+MAKES = {
+    "lengths": "height of the columns below each floor",
+    "second_moment": "second moment of area of one column",
+}
 
 
 def frame_damping(case: Case) -> Iterator[Problem]:

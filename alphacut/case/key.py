@@ -69,6 +69,7 @@ class Key:
         allowed: Range of every number in it.
         alone: Whether an array's one entry may stand without brackets, for all of its places.
         file: Whether it names a file.
+        of_inputs: Whether it names inputs of a structure, which their keys may stand for.
         kind: ``fuzzy`` a crisp or fuzzy quantity, ``number`` a crisp one, ``fuzzy list`` and
             ``numbers`` arrays of them, ``integer``, ``text``, ``choice``, ``choices`` (an array of
             names), ``flag``.
@@ -82,6 +83,7 @@ class Key:
     allowed: Range | None = None
     alone: bool = False
     file: bool = False
+    of_inputs: bool = False
     kind: str = ""
     choices: tuple[str, ...] = ()
     required: bool = False

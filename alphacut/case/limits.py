@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from alphacut.case.case import Case
 from alphacut.case.names import OUTPUTS, frame_outputs, structures
 from alphacut.case.values import nearest
-from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.io import quantity
 from alphacut.io.problem import BadInput, Problem
 
@@ -61,6 +61,8 @@ def limit_in(case: Case, key: str, name: str, text: str) -> float:
         kind = f"a quantity in {unit}, as the output is" + (
             ", or a share of the storey's height such as 0.5 %" if height else ""
         )
+        if height is None and name.startswith("drift") and text.rstrip().endswith("%"):
+            kind += "; a share of the storey's height needs frame.lengths"
         raise case.refuse(key, str(error), kind) from None
     if not limit > 0:
         raise case.refuse(key, "out of range", "greater than 0")
@@ -74,7 +76,7 @@ def storey_height(case: Case, output: str) -> float | None:
         return None
     if case.sections.tower:
         return case.tower.height
-    lengths = case.sections.frame.lengths if case.sections.frame else ()
+    lengths = (case.sections.frame.lengths or ()) if case.sections.frame else ()
     index = 0 if len(lengths) == 1 else int(floor or 1) - 1
     return lengths[index].modal if 0 <= index < len(lengths) else None
 
@@ -127,8 +129,8 @@ def field(case: Case) -> Iterator[Problem]:
     if case.sections.frame is None:
         yield Problem("field", "storeys are those of a storey frame", "", "[frame]")
         return
-    key = {"c": "columns", "m": "masses"}[case.field.of]
-    values = getattr(case.frame, key)
+    key = {"c": "columns", "k": "stiffness", "m": "masses"}[case.field.of]
+    values = getattr(case.frame, key) or (Crisp(0.0),)
     allowed = "one value for all storeys, with as much below its middle as above"
     if len(set(values)) > 1 or values[0].support.width == 0:
         what = "a field needs one fuzzy value, the same for all"
@@ -195,6 +197,9 @@ def update(case: Case) -> Iterator[Problem]:
             yield Problem(f"update.{key}", "this is of measured modes", allowed="beside measured")
     if case.sections.frame is None:
         yield Problem("update", "natural modes are learned from for a storey frame", "", "[frame]")
+    elif case.frame.p_delta and given.measured is not None:
+        what = "measured modes are learned from without p_delta"
+        yield Problem("update.measured", what, given.measured, "a recorded motion, or no p_delta")
     if alpha[0] <= 0:
         yield Problem(
             "update.alpha",

@@ -10,7 +10,17 @@ from alphacut.case.checks_structure import RAYLEIGH
 from alphacut.case.values import nearest
 from alphacut.io.problem import Problem
 
-GROUPS = ("E", "I", "m", "l", "c", "d", "q0", "v0", "zeta", *RAYLEIGH)
+GROUPS = ("E", "I", "m", "l", "c", "k", "d", "q0", "v0", "zeta", *RAYLEIGH)
+LISTS = (
+    "lengths",
+    "dampers",
+    "displacements",
+    "velocities",
+    "second_moment",
+    "columns",
+    "stiffness",
+)
+"""Keys of a frame with one value for each floor, or one for all."""
 OTHERS = {  # structures beside the storey frame, and their inputs
     "pendulum": ("m", "l", "d", "g", "phi_0", "omega_0"),
     "tower": ("E_columns", "E_columns_top", "E_beams", "mass", "zeta", *RAYLEIGH),
@@ -25,8 +35,8 @@ OUTPUTS = {
 def floors(case: Case) -> Iterator[Problem]:
     """One entry for each floor in every array of the frame, or one for all floors."""
     frame, count = case.frame, len(case.frame.masses)
-    for name in ("lengths", "dampers", "displacements", "velocities", "second_moment", "columns"):
-        found = len(getattr(frame, name))
+    for name in LISTS:
+        found = len(getattr(frame, name) or (None,))
         if found not in (1, count):
             few = f"{count} value{'s' if count > 1 else ''}"
             words = (
@@ -45,22 +55,10 @@ def floors(case: Case) -> Iterator[Problem]:
             what,
             allowed=f"one for all modes, or {count}: one for each, by rising frequency",
         )
-    moments = frame.second_moment
-    if len(moments) > 1 and any(moment.support.width > 0 for moment in moments):
-        allowed = (
-            "one fuzzy value for all storeys, or crisp ones; what makes a storey uncertain by"
-            " itself may be its length"
-        )
-        yield Problem(
-            "frame.second_moment",
-            "one of several values is fuzzy",
-            str(case.written["frame.second_moment"]),
-            allowed,
-        )
     yield from known_output(case, count)
     for key, names in named_inputs(case):
         for name in names:
-            yield from known_input(key, name, count)
+            yield from known_input(case, key, name, count)
 
 
 def structures(case: Case) -> list[str]:
@@ -148,9 +146,10 @@ def known_output(case: Case, floors: int) -> Iterator[Problem]:
         )
 
 
-def known_input(key: str, name: str, count: int) -> Iterator[Problem]:
+def known_input(case: Case, key: str, name: str, count: int) -> Iterator[Problem]:
     """A fuzzy input of the frame: a group or one floor's member of it."""
-    members = [f"{group}{floor + 1}" for group in ("m", "l", "c", "d") for floor in range(count)]
+    kinds = ("m", "l", "c", "k", "d", "I")
+    members = [f"{group}{floor + 1}" for group in kinds for floor in range(count)]
     members += [f"{group}{floor + 1}_0" for group in ("q", "v") for floor in range(count)]
     members += [f"zeta{mode + 1}" for mode in range(count)]
     if name not in GROUPS and name not in members:
@@ -161,5 +160,23 @@ def known_input(key: str, name: str, count: int) -> Iterator[Problem]:
             f"the frame has no input {name}",
             name,
             allowed,
-            nearest(name, members) if re.match("[mldqvz]", name) else "",
+            nearest(name, members) if re.match("[mlckdqvz]", name) else "",
         )
+    elif without := no_such_part(case, name):
+        yield Problem(key, f"the frame has no input {name}: {without}", name)
+
+
+def no_such_part(case: Case, name: str) -> str:
+    """Why a frame lacks an input that others have; empty where it has it."""
+    given = case.frame
+    if given.stiffness is None:
+        if name[0] == "k":
+            return "no stiffness is given"
+        if re.fullmatch(r"I\d+", name) and len(given.second_moment or ()) < 2:
+            return "one second_moment stands for all storeys, I"
+        return ""
+    if name[0] in "EIc":
+        return "its stiffness is given, k or k1 …"
+    if name[0] == "l" and not given.p_delta:
+        return "beside stiffness a height acts by p_delta = true alone"
+    return ""

@@ -129,7 +129,9 @@ def toml_or_text(value: str, key: Key) -> object:
     ):
         return found  # one for all
     if key.kind in ARRAYS and not isinstance(found, list):
-        items = [item.strip() for item in value.strip("[] ").split(",") if item.strip()]
+        inner = value.strip()
+        inner = inner[1:-1] if inner.startswith("[") and inner.endswith("]") else inner
+        items = [item.strip() for item in inner.split(",") if item.strip()]
         plain = key.kind == "numbers" and not key.unit
         return [float(item) if plain and re.fullmatch(NUMBER, item) else item for item in items]
     return str(found) if key.kind == "text" else found

@@ -132,11 +132,36 @@ def read_names(value: object, key: Key) -> tuple[str, ...]:
         str(entry(read_name, item, number, key))
         for number, item in enumerate(array(value, key), start=1)
     )
+    if key.of_inputs:
+        names = tuple(map(input_name, names))
     if len(set(names)) < len(names):
         raise Unfit("a name stands there twice", allowed(key))
     if key.required and not names:
         raise Unfit("the array is empty", f"{allowed(key)}, one name or more")
     return names
+
+
+INPUTS = {  # keys of a frame, and what its inputs are called
+    "modulus": "E",
+    "second_moment": "I",
+    "masses": "m",
+    "lengths": "l",
+    "columns": "c",
+    "stiffness": "k",
+    "dampers": "d",
+    "displacements": "q0",
+    "velocities": "v0",
+    "damping_ratio": "zeta",
+}
+
+
+def input_name(text: str) -> str:
+    """Name of an input that may stand there as its key: ``stiffness[2]`` is k2."""
+    found = re.fullmatch(r"(?:frame\.)?(\w+)(?:\[([1-9]\d*)\])?", text)
+    if not found or found[1] not in INPUTS:
+        return text
+    name, entry_of = INPUTS[found[1]], found[2] or ""
+    return f"{name[0]}{entry_of}_0" if entry_of and name in ("q0", "v0") else name + entry_of
 
 
 def read_flag(value: object, key: Key) -> bool:

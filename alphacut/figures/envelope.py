@@ -39,6 +39,7 @@ WORDS |= {
     "rayleigh_mass": "mass damping",
     "rayleigh_stiffness": "stiffness damping",
     "I": "second moment",
+    "k": "stiffnesses",
     "zeta": "damping ratio",
 }
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from alphacut.case.case import Case
 from alphacut.figures.style import BLUE, GREY, INK, ORANGE, PURPLE, figure
+from alphacut.fuzzy import Crisp
 from alphacut.stages.vibration.structure import per_floor
 from alphacut.stages.vibration.structure_words import spread_damping
 
@@ -20,7 +21,8 @@ if TYPE_CHECKING:
 
 def frame(case: Case) -> Figure:
     """Fig. 26: floors, columns with their lengths, displacements."""
-    lengths = [length.modal for length in per_floor(case.frame, case.frame.lengths)]
+    known = case.frame.lengths or (Crisp(3.0),)  # not to scale where only stiffnesses are given
+    lengths = [length.modal for length in per_floor(case.frame, known)]
     masses = [mass.modal for mass in per_floor(case.frame, case.frame.masses)]
     height = sum(lengths)
     span, level = 0.45 * max(height, 6.0) if len(lengths) < 5 else 0.3 * height, 0.0
@@ -28,7 +30,9 @@ def frame(case: Case) -> Figure:
     drawn, axes = figure(high * 2.15 * span / (1.13 * height), high)
     ground(axes, 0.0, span)
     for floor, (length, mass) in enumerate(zip(lengths, masses, strict=True), start=1):
-        columns(axes, floor, level, length, span)
+        given = case.frame.stiffness
+        stiff = None if given is None else per_floor(case.frame, given)[floor - 1].modal
+        columns(axes, floor, level, length, span, stiff)
         level += length
         beam(axes, floor, level, mass, span)
     axes.set_xlim(-0.6 * span, 1.55 * span)
@@ -38,12 +42,17 @@ def frame(case: Case) -> Figure:
     return drawn
 
 
-def columns(axes: Axes, floor: int, foot: float, length: float, span: float) -> None:
-    """Both columns of a storey with their length."""
+def columns(
+    axes: Axes, floor: int, foot: float, length: float, span: float, stiff: float | None = None
+) -> None:
+    """Both columns of a storey with their length, or its stiffness in N/m where that is given."""
     for x in (0.0, span):
         axes.plot([x, x], [foot, foot + length], color=INK, lw=1.4)
     spot = (-0.06 * span, foot + length / 2)
-    axes.annotate(f"$l_{{{floor}}}$ = {length:.2f} m", spot, ha="right", va="center", fontsize=8)
+    words = f"$l_{{{floor}}}$ = {length:.2f} m"
+    if stiff is not None:
+        words = f"$k_{{{floor}}}$ = {stiff / 1e6:.4g} MN/m"
+    axes.annotate(words, spot, ha="right", va="center", fontsize=8)
 
 
 def beam(axes: Axes, floor: int, level: float, mass: float, span: float) -> None:
@@ -195,7 +204,8 @@ def field(given: FuzzyField) -> Figure:
     for k, (name, style) in enumerate(zip(given.names, LINES * len(given.names), strict=False)):
         values = given.centre + given.half_width * given.free_shapes[:, k]
         axes.plot(values, places, style, color=INK, marker="o", ms=4, label=f"{name} = 1 alone")
-    axes.set_xlabel("columns c of a storey" if given.name == "c" else "mass of a floor, kg")
+    words = {"c": "columns c of a storey", "k": "stiffness of a storey, N/m"}
+    axes.set_xlabel(words.get(given.name, "mass of a floor, kg"))
     axes.set_ylabel("height, m")
     axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return drawn

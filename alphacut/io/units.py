@@ -33,6 +33,9 @@ QUANTITIES = {  # SI unit: (name of the quantity, a value as a user would write 
     "rad/s": ("angular velocity", "0.1 rad/s"),
 }
 
+STANDARD_GRAVITY = Decimal("9.80665")
+"""In m/s², by the third General Conference on Weights and Measures, 1901."""
+
 # Units that the page on the case format lists; Pint's others of the same dimension are taken too.
 ACCEPTED = {
     "Pa": ("Pa", "kPa", "MPa", "GPa", "N/mm^2", "N/m^2", "kN/cm^2", "psi", "ksi"),
@@ -44,7 +47,7 @@ ACCEPTED = {
     "kg/m^3": ("kg/m^3", "t/m^3", "g/cm^3"),
     "s": ("s", "ms", "min"),
     "m/s": ("m/s", "mm/s", "cm/s", "km/h"),
-    "m/s^2": ("m/s^2", "cm/s^2", "mm/s^2", "g_0"),
+    "m/s^2": ("m/s^2", "cm/s^2", "mm/s^2", "g"),
     "N*s/m": ("N s/m", "kN s/m", "kg/s"),
     "N*m*s": ("N m s", "kN m s"),
     "N/m": ("N/m", "kN/m", "N/mm"),
@@ -76,7 +79,7 @@ EVERYDAY = {
 
 # units that are others than were meant
 MEANT = {
-    ("m/s^2", "g"): "g_0",
+    ("m/s^2", "G"): "g",
     ("s", "m"): "min",
     ("kg", "T"): "t",
     ("Pa", "g"): "GPa",
@@ -106,6 +109,8 @@ def factor(unit: str, si: str) -> Decimal:
         raise ValueError(f'the unit "{unit}" is wrong')
     if not unit:
         raise ValueError("the unit is missing")
+    if (si, unit) == ("m/s^2", "g"):  # standard gravity, no gram
+        return STANDARD_GRAVITY
     if unit in EVERYDAY.get(si, {}):
         return Decimal(EVERYDAY[si][unit])
     import pint

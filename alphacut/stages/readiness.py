@@ -164,7 +164,9 @@ def lacking(case: Case) -> Iterator[Problem]:
     """A frame needs a modulus from somewhere."""
     given = case.sections.frame
     computed = {"modulus", "image"} & set(case.stages)
-    if given and given.modulus is None and not computed and not case.stand_ins:
+    if given is None or given.stiffness is not None:
+        return
+    if given.modulus is None and not computed and not case.stand_ins:
         what = (
             "missing; stage envelope needs a modulus: give frame.modulus, modulus.value or"
             ' modulus.measured, or compute one with stages = ["modulus", "envelope"]'

@@ -165,8 +165,8 @@ def counted(model: LinearSystem) -> int:
 
     left_out: set[str] = set()
     if isinstance(model, StoreyFrame):
-        columns = (f"c{floor + 1}" for floor in range(model.floors))
-        left_out = {"I", "rayleigh_mass", "rayleigh_stiffness", *columns}
+        each = (f"{name}{floor + 1}" for name in "cI" for floor in range(model.floors))
+        left_out = {"I", "rayleigh_mass", "rayleigh_stiffness", *each}
     return len(set(model.parameters) - left_out)
 
 

@@ -20,7 +20,7 @@ POSITIVE, NOT_NEGATIVE, RATIO = (
     "0 or greater and below 1, the critical damping",
 )
 OF_FRAME = {
-    r"E|I|[mlc]\d+": POSITIVE,
+    r"E|I\d*|[mlck]\d+": POSITIVE,
     r"d\d+|rayleigh_(mass|stiffness)": NOT_NEGATIVE,
     r"zeta\d*": RATIO,
 }
@@ -53,7 +53,7 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
     Raises:
         ValueError: A support is not finite or reaches what its parameter must not be, or the mass
             matrix of a linear structure is not positive definite at the modal parameters or a
-            corner.
+            corner, or the weight may buckle a storey.
     """
     for name, low, high in zip(cuts.names, cuts.lower.min(0), cuts.upper.max(0), strict=True):
         rule = wanted(system, name)
@@ -67,6 +67,9 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
                 f"uncertain parameter {name}: its support [{low:g}, {high:g}] must be"
                 f" {rule or 'finite'}; narrow it"
             )
+    if isinstance(system, StoreyFrame):
+        ends = zip(cuts.lower.min(0).tolist(), cuts.upper.max(0).tolist(), strict=True)
+        system.require_standing(dict(zip(cuts.names, ends, strict=True)))
     if not isinstance(system, LagrangianSystem):
         _require_mass(system, cuts)
 

@@ -10,42 +10,37 @@ from typing import Literal, cast
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, stack
-from alphacut.frame.calculus.numbers import require_number, require_numbers
 from alphacut.frame.structures.damping import modal_damping
 from alphacut.frame.structures.linear import Accelerogram, Matrices
-
-Entry = Jet | float
-UNITS = {
-    "masses": "kg",
-    "lengths": "m",
-    "modulus": "Pa",
-    "second_moment": "m⁴",
-    "dampers": "N s/m",
-    "q0": "m",
-    "v0": "m/s",
-}
-UNITS |= {
-    "rayleigh": "1/s and s",
-    "damping_ratio": "shares of the critical damping",
-    "columns": "columns of each storey",
-}
+from alphacut.frame.structures.storey_checks import check_numbers, check_springs, check_values
+from alphacut.frame.structures.storey_springs import (
+    Ends,
+    Entry,
+    chain,
+    require_standing,
+    softening,
+    springs,
+)
 
 
 @dataclass(frozen=True)
 class StoreyFrame:
     """Chain of n floors with k_z = 12 c_z E I / l_z³ for c_z clamped columns (2 by default).
 
-    Parameters that can be uncertain: "E", "I", "m1" … "mn", "l1" …, "c1" … (columns of a storey),
-    "d1" …, "q1_0" … (initial displacements), "v1_0" … (initial velocities), "rayleigh_mass",
-    "rayleigh_stiffness", and "zeta", or "zeta1" … where each mode has its own ratio.
+    Parameters that can be uncertain: "E", "I" or "I1" …, "m1" … "mn", "l1" …, "c1" … (columns of a
+    storey), or "k1" … where stiffnesses are given (and "l1" … with gravity alone); "d1" …, "q1_0" …
+    (initial displacements), "v1_0" … (initial velocities), "rayleigh_mass", "rayleigh_stiffness",
+    and "zeta", or "zeta1" … where each mode has its own ratio.
     Outputs: "q1" … (displacement, m), "v1" … (velocity, m/s), "a1" … (absolute acceleration,
     m/s²), "drift1" … (q_z − q_(z−1), m), "shear1" … (k_z drift_z, N); "base_shear" is "shear1".
 
     Args:
         masses: Floors from below, in kg.
-        lengths: Column lengths per storey, in m.
+        lengths: Column lengths per storey, in m; beside stiffness the storeys' heights, which
+            gravity alone needs.
         modulus: Young's modulus E, in Pa.
-        second_moment: Second moment of area I of one column, in m⁴.
+        second_moment: Second moment of area I of one column, in m⁴: one for all storeys, or one
+            for each.
         dampers: Damping constants, in N s/m.
         damper_placement: From each floor to the ground, or between neighbouring floors ("storey").
         q0: Initial displacements, in m; zero when empty.
@@ -58,16 +53,22 @@ class StoreyFrame:
             damping; it follows the parameters through the modes (`frame.damping`).
         columns: Columns in each storey, each with the second moment I; where a storey's are
             stiffer, their number times that ratio. Two in each when empty.
+        stiffness: Stiffness k_z of each storey, in N/m, in place of modulus, second moment and
+            columns.
+        gravity: Acceleration of gravity, in m/s², of the weights that reduce the stiffness of each
+            storey to k_z − P_z / l_z, P_z that of all floors above it (P-Delta); 0 leaves them out.
+            Rayleigh's damping and shears keep k_z.
 
     Raises:
-        ValueError: A length of the lists differs, a mass, length, modulus, moment or number of
-            columns is not positive, a damper is negative, or a ratio is outside [0, 1).
+        ValueError: A length of the lists differs, a mass, length, modulus, moment, stiffness or
+            number of columns is not positive, a damper or gravity is negative, a ratio is outside
+            [0, 1), the weight buckles a storey, or a stiffness stands beside what makes one.
     """
 
     masses: Sequence[float]
-    lengths: Sequence[float]
-    modulus: float
-    second_moment: float
+    lengths: Sequence[float] = ()
+    modulus: float | None = None
+    second_moment: float | Sequence[float] | None = None
     dampers: Sequence[float] = ()
     damper_placement: Literal["ground", "storey"] = "ground"
     q0: Sequence[float] = ()
@@ -77,10 +78,14 @@ class StoreyFrame:
     ground: Accelerogram | None = None
     damping_ratio: float | Sequence[float] = ()
     columns: Sequence[float] = ()
+    stiffness: Sequence[float] = ()
+    gravity: float = 0.0
 
     def __post_init__(self) -> None:
-        self._check_numbers()
+        check_numbers(self)
         n = len(self.masses)
+        object.__setattr__(self, "stiffness", tuple(self.stiffness))
+        check_springs(self)
         single = np.ndim(self.damping_ratio) == 0
         object.__setattr__(
             self,
@@ -89,65 +94,44 @@ class StoreyFrame:
         )
         for name in ("dampers", "q0", "v0"):
             object.__setattr__(self, name, tuple(getattr(self, name)) or (0.0,) * n)
-        object.__setattr__(self, "columns", tuple(self.columns) or (2.0,) * n)
+        if not self.stiffness:
+            object.__setattr__(self, "columns", tuple(self.columns) or (2.0,) * n)
         object.__setattr__(
             self, "outputs", tuple(self.outputs) or tuple(f"q{z + 1}" for z in range(n))
         )
-        self._check()
-
-    def _check_numbers(self) -> None:
-        for name, unit in UNITS.items():
-            value = getattr(self, name)
-            single = name in ("modulus", "second_moment") or (
-                name == "damping_ratio" and np.ndim(value) == 0
-            )
-            (require_number if single else require_numbers)(name, value, unit)
-
-    def _check(self) -> None:
-        n = len(self.masses)
-        for name in ("lengths", "dampers", "q0", "v0", "columns"):
-            if len(getattr(self, name)) != n:
-                raise ValueError(
-                    f"{name}: {len(getattr(self, name))} values for {n} floors; give one per floor,"
-                    " from below"
-                )
-        positive = {
-            "masses": self.masses,
-            "lengths": self.lengths,
-            "modulus": [self.modulus],
-            "second_moment": [self.second_moment],
-        }
-        positive["columns"] = self.columns
-        for name, values in positive.items():
-            for value in values:
-                if not (value > 0 and np.isfinite(value)):
-                    raise ValueError(
-                        f"{name}: {value:g} is not allowed; it must be positive and finite"
-                    )
-        for name, values in {"dampers": self.dampers, "rayleigh": self.rayleigh}.items():
-            for value in values:
-                if not (value >= 0 and np.isfinite(value)):
-                    raise ValueError(
-                        f"{name}: {value:g} is not allowed; damping must not be negative"
-                    )
-        for value in self.ratios.values():
-            if not 0 <= value < 1:
-                raise ValueError(
-                    f"damping_ratio: {value:g} is not allowed; it must be 0 or greater and below 1,"
-                    " the critical damping"
-                )
-        if len(self.ratios) not in (0, 1, n):
-            raise ValueError(
-                f"damping_ratio: {len(self.ratios)} values for {n} modes; give one for all modes,"
-                f" or {n}, by rising frequency"
-            )
-        if self.damper_placement not in ("ground", "storey"):
-            raise ValueError(
-                f"damper_placement: '{self.damper_placement}' is unknown; allowed are 'ground' and"
-                " 'storey'"
-            )
+        check_values(self)
         for output in self.outputs:
             self._output(output)
+        self.require_standing({})
+
+    def require_standing(self, ends: Ends) -> None:
+        """Refuse weights that buckle a storey somewhere in a box.
+
+        Args:
+            ends: Lower and upper end of parameters, in SI units; others keep their modal values.
+
+        Raises:
+            ValueError: One does.
+        """
+        if self.gravity:
+            at = {name: self._worst(name, *both) for name, both in self.ranges(ends).items()}
+            require_standing(springs(self, at), softening(self, at))
+
+    @staticmethod
+    def _worst(name: str, low: float, high: float) -> Jet:
+        """The end at which k_z l_z / P_z is least: it falls with masses and heights alone."""
+        return Jet.constant(np.array([high if name[0] in "ml" else low]), 0)
+
+    def ranges(self, ends: Ends) -> dict[str, tuple[float, float]]:
+        """Lower and upper end of the values of floors and storeys over a box of parameters."""
+        return {name: ends.get(name, (x, x)) for name, x in self.parameters.items()}
+
+    @property
+    def moments(self) -> tuple[float, ...]:
+        """Second moments of area: one for all storeys, one for each, or none beside stiffness."""
+        if self.second_moment is None:
+            return ()
+        return tuple(float(x) for x in np.atleast_1d(self.second_moment))
 
     @property
     def floors(self) -> int:
@@ -164,10 +148,17 @@ class StoreyFrame:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """All parameters with their modal values, in SI units."""
+        """All parameters with their modal values, in SI units; of lists, one for each floor."""
+        first: dict[str, float] = {} if self.modulus is None else {"E": self.modulus}
+        if len(self.moments) == 1:
+            first["I"] = self.moments[0]
+        several = self.moments if len(self.moments) > 1 else ()
+        pressed = not self.stiffness or self.gravity
         lists = {
+            "I{}": several,
+            "k{}": self.stiffness,
             "m{}": self.masses,
-            "l{}": self.lengths,
+            "l{}": self.lengths if pressed else (),
             "c{}": self.columns,
             "d{}": self.dampers,
             "q{}_0": self.q0,
@@ -179,7 +170,7 @@ class StoreyFrame:
             for z, x in enumerate(values)
         }
         damping = {"rayleigh_mass": self.rayleigh[0], "rayleigh_stiffness": self.rayleigh[1]}
-        return {"E": self.modulus, "I": self.second_moment, **named, **damping, **self.ratios}
+        return {**first, **named, **damping, **self.ratios}
 
     def group(self, name: str) -> tuple[str, ...]:
         """Parameters of a short name: "m" is m1 … mn; any other name is itself.
@@ -187,7 +178,8 @@ class StoreyFrame:
         Raises:
             ValueError: The name is neither a group nor a parameter.
         """
-        patterns = {"m": "m{}", "l": "l{}", "c": "c{}", "d": "d{}", "q0": "q{}_0", "v0": "v{}_0"}
+        patterns = {"m": "m{}", "d": "d{}", "q0": "q{}_0", "v0": "v{}_0"}
+        patterns |= {x: x + "{}" for x in "klcI" if f"{x}1" in self.parameters}
         if name in patterns:
             return tuple(patterns[name].format(z + 1) for z in range(self.floors))
         if name == "zeta" and self.ratios:
@@ -204,9 +196,10 @@ class StoreyFrame:
         n = self.floors
         mass = stack([[p[f"m{i + 1}"] if i == j else 0.0 for j in range(n)] for i in range(n)], p)
         dampers: list[Entry] = [p[f"d{z + 1}"] for z in range(n)]
-        chain = stack(_chain(self._columns(p)), p)
+        links = springs(self, p)
+        elastic = stack(chain(links), p)
         if self.damper_placement == "storey":
-            damping = stack(_chain(dampers), p)
+            damping = stack(chain(dampers), p)
         else:
             damping = stack(
                 [[dampers[i] if i == j else 0.0 for j in range(n)] for i in range(n)], p
@@ -218,16 +211,21 @@ class StoreyFrame:
             damping = (
                 damping
                 + p["rayleigh_mass"][:, None, None] * mass
-                + p["rayleigh_stiffness"][:, None, None] * chain
+                + p["rayleigh_stiffness"][:, None, None] * elastic
             )
+        stiffness = elastic
+        if self.gravity:
+            taken = softening(self, p)
+            require_standing(links, taken)
+            stiffness = elastic - stack(chain(taken), p)
         if self.ratios:
-            damping = damping + modal_damping(mass, chain, [p[name] for name in self.ratios])
+            damping = damping + modal_damping(mass, stiffness, [p[name] for name in self.ratios])
         q0, v0 = (stack([[p[f"{x}{z + 1}_0"]] for z in range(n)], p) for x in "qv")
-        return Matrices(mass, damping, chain, q0, v0)
+        return Matrices(mass, damping, stiffness, q0, v0)
 
     def observation(self, p: Mapping[str, Jet]) -> Jet:
         """Rows C(p) with output = C(p) [q; v], shape (S, outputs, 2n)."""
-        columns = self._columns(p)
+        links = springs(self, p)
         rows: list[list[Entry]] = []
         for output in self.outputs:
             kind, z = self._output(output)
@@ -235,7 +233,7 @@ class StoreyFrame:
                 rows.append(self._acceleration(p, z))
                 continue
             row: list[Entry] = [0.0] * (2 * self.floors)
-            factor: Entry = columns[z] if kind == "shear" else 1.0
+            factor: Entry = links[z] if kind == "shear" else 1.0
             row[z + self.floors * (kind == "v")] = factor
             if kind in ("drift", "shear") and z > 0:
                 row[z - 1] = -factor
@@ -248,11 +246,6 @@ class StoreyFrame:
         forces = (at.stiffness, at.damping)
         return [inertia * force[:, z, j] for force in forces for j in range(self.floors)]
 
-    def _columns(self, p: Mapping[str, Jet]) -> list[Entry]:
-        # k_z; 24 E I / l³ in section 6.1
-        rigidity = 12 * p["E"] * p["I"]
-        return [rigidity * p[f"c{z + 1}"] * p[f"l{z + 1}"] ** -3 for z in range(self.floors)]
-
     def _output(self, name: str) -> tuple[str, int]:
         found = re.fullmatch(
             r"(q|v|a|drift|shear)([1-9]\d*)", "shear1" if name == "base_shear" else name
@@ -263,14 +256,3 @@ class StoreyFrame:
                 f" from 1 to {self.floors}, base_shear"
             )
         return found[1], int(found[2]) - 1
-
-
-def _chain(links: Sequence[Entry]) -> list[list[Entry]]:
-    """Matrix of a chain fixed at its lower end from the coefficients of its links."""
-    n = len(links)
-    rows: list[list[Entry]] = [[0.0] * n for _ in range(n)]
-    for i in range(n):
-        rows[i][i] = links[i] + links[i + 1] if i + 1 < n else links[i]
-        if i + 1 < n:
-            rows[i][i + 1] = rows[i + 1][i] = -1.0 * links[i + 1]
-    return rows

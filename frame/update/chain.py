@@ -1,6 +1,7 @@
 """Storey frame as a chain whose stiffnesses and masses are products of powers of parameters.
 
-Logarithms of stiffnesses and masses are linear in those of the parameters: k_z = 12 c_z E I / l_z³.
+Logarithms of stiffnesses and masses are linear in those of the parameters: k_z = 12 c_z E I / l_z³,
+or k_z itself is one.
 Natural frequencies rise with every stiffness and fall with every mass (Courant and Fischer), so
 their ranges over a box are exact.
 """
@@ -13,8 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.structures.storey import StoreyFrame
+from alphacut.frame.structures.storey_springs import springs
 
 ROUND_OFF = 1e-13
 """Share of the largest eigenvalue by which a computed one may be wrong, at most."""
@@ -25,7 +27,7 @@ class Chain:
     """Chain of n masses on springs that depends on d parameters.
 
     Args:
-        names: The parameters, of "E", "I", "c1" …, "l1" …, "m1" ….
+        names: The parameters, of "E", "I" or "I1" …, "c1" …, "l1" …, "k1" …, "m1" ….
         nominal: Their nominal values, shape (d,).
         stiffness: Nominal stiffnesses, shape (n,), in N/m.
         mass: Nominal masses, shape (n,), in kg.
@@ -45,24 +47,30 @@ class Chain:
         """The chain of a frame with some parameters uncertain.
 
         Raises:
-            ValueError: A name is no parameter of stiffness or mass.
+            ValueError: A name is no parameter of stiffness or mass, or weights soften the storeys:
+                stiffnesses are no products then.
         """
         n, values = frame.floors, frame.parameters
+        if frame.gravity:
+            raise ValueError(
+                "gravity: natural modes are learned from without P-Delta, whose stiffness is no"
+                " product of powers; learn from a recorded motion, or leave it out"
+            )
         powers = np.zeros((2, n, len(names)))
         for column, name in enumerate(names):
-            part = re.fullmatch(r"([clm])(\d+)", name)
-            if name in ("E", "I"):
+            part = re.fullmatch(r"([clmkI])(\d+)", name)
+            if name in ("E", "I") and name in values:
                 powers[0, :, column] = 1
-            elif part and 1 <= int(part[2]) <= n:
+            elif part and name in values:
                 row = int(part[2]) - 1
                 powers[int(part[1] == "m"), row, column] = -3 if part[1] == "l" else 1
             else:
                 raise ValueError(
                     f"'{name}' cannot be learned from natural modes; E, I, c1 … c{n} (columns of a"
-                    f" storey), l1 …, m1 … can"
+                    f" storey), l1 …, m1 … can, or k1 … k{n} where stiffnesses are given"
                 )
-        k = 12 * frame.modulus * frame.second_moment * np.asarray(frame.columns)
-        k = k / np.asarray(frame.lengths, float) ** 3
+        modal = {name: Jet.constant([value], 0) for name, value in values.items()}
+        k = np.array([at.value for at in springs(frame, modal)])[:, 0]
         nominal = np.array([values[name] for name in names])
         mass = np.asarray(frame.masses, float)
         return cls(tuple(names), nominal, k, mass, powers[0], powers[1])

@@ -45,8 +45,11 @@ class Field(Section):
     """
 
     of: Annotated[
-        Literal["c", "m"],
-        Key("what varies: c, the columns of a storey, or m, masses of the floors"),
+        Literal["c", "k", "m"],
+        Key(
+            "what varies: c, the columns of a storey, k, its stiffness where that is given, or m,"
+            " masses of the floors"
+        ),
     ]
     length: Annotated[
         float, Key("height over which the correlation falls to 1/e", "m", allowed=POSITIVE)
@@ -83,7 +86,11 @@ class Update(Section):
     ] = None
     learn: Annotated[
         tuple[str, ...],
-        Key("fuzzy inputs that are learned: E, I, c (columns), l, m, or single ones as c1"),
+        Key(
+            "fuzzy inputs that are learned: E, I, c (columns), k (stiffness), l, m, or single ones"
+            " as c1",
+            of_inputs=True,
+        ),
     ]
     held_out: Annotated[
         tuple[float, ...],

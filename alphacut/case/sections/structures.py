@@ -17,21 +17,27 @@ class Frame(Section):
 
     masses: Annotated[tuple[FuzzyNumber, ...], Key("mass of each floor", "kg", allowed=POSITIVE)]
     lengths: Annotated[
-        tuple[FuzzyNumber, ...],
-        Key("length of the columns below each floor", "m", allowed=POSITIVE, alone=True),
-    ]
+        tuple[FuzzyNumber, ...] | None,
+        Key(
+            "length of the columns below each floor; beside stiffness the height of each storey,"
+            " for p_delta and for limits in % of it",
+            "m",
+            allowed=POSITIVE,
+            alone=True,
+        ),
+    ] = None
     modulus: Annotated[
         FuzzyNumber | None, Key("Young's modulus where none is handed on", "Pa", allowed=POSITIVE)
     ] = None
     second_moment: Annotated[
-        tuple[FuzzyNumber, ...],
+        tuple[FuzzyNumber, ...] | None,
         Key(
-            "second moment of area of one column; where storeys differ a crisp one for each",
+            "second moment of area of one column, one for all storeys or one for each",
             "m^4",
             allowed=POSITIVE,
             alone=True,
         ),
-    ]
+    ] = None
     columns: Annotated[
         tuple[FuzzyNumber, ...],
         Key(
@@ -40,6 +46,22 @@ class Frame(Section):
             alone=True,
         ),
     ] = (TWO,)
+    stiffness: Annotated[
+        tuple[FuzzyNumber, ...] | None,
+        Key(
+            "stiffness of each storey, in place of lengths, modulus, second_moment and columns",
+            "N/m",
+            allowed=POSITIVE,
+            alone=True,
+        ),
+    ] = None
+    p_delta: Annotated[
+        bool,
+        Key(
+            "whether the weight P of the floors above reduces each storey's stiffness by P over"
+            " its height"
+        ),
+    ] = False
     damping_ratio: Annotated[
         tuple[FuzzyNumber, ...] | None,
         Key(

@@ -46,7 +46,8 @@ class Study(Section):
         str, Key("name of the study and of its file envelope_NAME.nc: letters, digits and . _ + -")
     ]
     fuzzy: Annotated[
-        tuple[str, ...], Key("inputs that are fuzzy; all others take their modal value")
+        tuple[str, ...],
+        Key("inputs that are fuzzy; all others take their modal value", of_inputs=True),
     ]
     duration: Annotated[float, Key("length of the simulation", "s", allowed=POSITIVE)]
     figures: Annotated[tuple[str, ...], Key("figure of the paper for each output, or for one")] = ()
@@ -60,8 +61,9 @@ class Envelope(Section):
     fuzzy: Annotated[
         tuple[str, ...],
         Key(
-            "inputs that are fuzzy, of a frame: E, I, m or m1 …, l, c (columns), d, q0, v0, zeta"
-            " (damping ratio) …"
+            "inputs that are fuzzy, of a frame: E, I, m or m1 …, l, c (columns), k (stiffness), d,"
+            " q0, v0, zeta (damping ratio) …; also by their keys: masses, masses[1] …",
+            of_inputs=True,
         ),
     ]
     alpha: Annotated[tuple[float, ...], Key("α-levels", allowed=MEMBERSHIP)] = ALPHA
@@ -128,7 +130,10 @@ class Exceedance(Section):
     ]
     random: Annotated[
         tuple[str, ...],
-        Key("inputs that are random, with a density of the shape of their membership"),
+        Key(
+            "inputs that are random, with a density of the shape of their membership",
+            of_inputs=True,
+        ),
     ] = ()
     samples: Annotated[int, Key("random draws at each fuzzy point", allowed=COUNT)] = 200
     seed: Annotated[int, Key("seed of the draws", allowed=NATURAL)] = 0

@@ -12,6 +12,7 @@ from alphacut.case.case import Case
 from alphacut.case.sections.structures import Frame, Pendulum, Tower
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.problem import BadInput, Problem
+from alphacut.io.units import STANDARD_GRAVITY
 from alphacut.stages.vibration.accelerogram import accelerogram
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ class Structure:
 
     def with_modulus(self, number: FuzzyNumber | None) -> Structure:
         """The structure with another Young's modulus in Pa, if it is a storey frame."""
-        if number is None or self.frame is None:
+        if number is None or self.frame is None or self.frame.stiffness:
             return self
         return Structure(replace(self.frame, modulus=number.modal), {**self.numbers, "E": number})
 
@@ -183,20 +184,21 @@ def tower_parameters(given: Tower) -> dict[str, FuzzyNumber]:
     return found if given.damping_ratio is None else found | {"zeta": given.damping_ratio}
 
 
-def storey_frame(case: Case, modulus: FuzzyNumber) -> Structure:
+def storey_frame(case: Case, modulus: FuzzyNumber | None) -> Structure:
     """A storey frame."""
     from alphacut.frame import StoreyFrame
 
     given = case.frame
 
-    def modal(values: tuple[FuzzyNumber, ...]) -> tuple[float, ...]:
-        return tuple(x.modal for x in per_floor(given, values))
+    def modal(values: tuple[FuzzyNumber, ...] | None) -> tuple[float, ...]:
+        return tuple(x.modal for x in per_floor(given, values or ()))
 
+    moments = tuple(x.modal for x in given.second_moment or ())
     model = StoreyFrame(
         modal(given.masses),
         modal(given.lengths),
-        modulus.modal,
-        given.second_moment[0].modal,
+        None if modulus is None else modulus.modal,
+        moments[0] if len(moments) == 1 else moments or None,
         dampers=modal(given.dampers),
         damper_placement=given.damper_placement or "ground",
         q0=modal(given.displacements),
@@ -207,9 +209,15 @@ def storey_frame(case: Case, modulus: FuzzyNumber) -> Structure:
             None if given.accelerogram is None else accelerogram(case.beside(given.accelerogram))
         ),
         damping_ratio=tuple(ratio.modal for ratio in given.damping_ratio or ()),
-        columns=tuple(number.modal for number in columns(given)),
+        columns=() if given.stiffness else modal(given.columns),
+        stiffness=modal(given.stiffness),
+        gravity=float(STANDARD_GRAVITY) if given.p_delta else 0.0,
     )
-    numbers = parameters(given, modulus)
+    every = parameters(given, modulus)
+    numbers = {name: every[name] for name in model.parameters}
+    computed = {"modulus", "image"} & set(case.stages)  # no E is known yet, or its support only
+    ends = {x: (n.support.lower, n.support.upper) for x, n in numbers.items()}
+    model.require_standing({x: both for x, both in ends.items() if x != "E" or not computed})
     return (
         Structure(model, numbers)
         if case.sections.field is None
@@ -224,6 +232,8 @@ def with_field(case: Case, model: StoreyFrame, numbers: Mapping[str, FuzzyNumber
     from alphacut.frame.structures.field_frame import FieldFrame
     from alphacut.fuzzy.field import FuzzyField
 
+    if not model.lengths:
+        raise ValueError("a field needs the height of each storey: frame.lengths")
     given, heights = case.field, np.cumsum(model.lengths)
     places = heights if given.of == "m" else heights - np.array(model.lengths) / 2
     value = numbers[f"{given.of}1"]
@@ -237,24 +247,27 @@ def with_field(case: Case, model: StoreyFrame, numbers: Mapping[str, FuzzyNumber
     return Structure(framed, {**kept, **dict.fromkeys(field.names, unit)})
 
 
-def parameters(given: Frame, modulus: FuzzyNumber) -> dict[str, FuzzyNumber]:
-    """Every parameter of the frame by the name that `frame` gives it, in SI."""
+def parameters(given: Frame, modulus: FuzzyNumber | None) -> dict[str, FuzzyNumber]:
+    """Every value of the frame by the name that `frame` gives it as a parameter, in SI."""
     found = {
-        "E": modulus,
-        "I": given.second_moment[0],
         "rayleigh_mass": given.rayleigh_mass,
         "rayleigh_stiffness": given.rayleigh_stiffness,
     }
+    moments = given.second_moment or ()
+    found |= {} if modulus is None else {"E": modulus}
+    found |= {"I": moments[0]} if len(moments) == 1 else {}
     ratios = given.damping_ratio or ()
     found |= {
         "zeta" if len(ratios) == 1 else f"zeta{mode}": ratio
         for mode, ratio in enumerate(ratios, start=1)
     }
     for name, values in (
+        ("I{}", moments),
+        ("k{}", given.stiffness or ()),
         ("m{}", given.masses),
-        ("l{}", given.lengths),
+        ("l{}", given.lengths or ()),
         ("d{}", given.dampers),
-        ("c{}", columns(given)),
+        ("c{}", given.columns),
         ("q{}_0", given.displacements),
         ("v{}_0", given.velocities),
     ):
@@ -263,26 +276,22 @@ def parameters(given: Frame, modulus: FuzzyNumber) -> dict[str, FuzzyNumber]:
     return found
 
 
-def columns(given: Frame) -> tuple[FuzzyNumber, ...]:
-    """Columns of each storey; differing second moments become numbers of columns."""
-    moments = [moment.modal for moment in per_floor(given, given.second_moment)]
-    return tuple(
-        c if moment == moments[0] else c * (moment / moments[0])
-        for c, moment in zip(per_floor(given, given.columns), moments, strict=True)
-    )
-
-
 def per_floor(given: Frame, values: tuple[FuzzyNumber, ...]) -> tuple[FuzzyNumber, ...]:
     """One value for each floor; a single one holds for all of them."""
     return values * len(given.masses) if len(values) == 1 else values
 
 
-def modulus_of(case: Case, given: FuzzyNumber | None) -> FuzzyNumber:
-    """The modulus handed on, else the frame's own.
+def modulus_of(case: Case, given: FuzzyNumber | None) -> FuzzyNumber | None:
+    """The modulus handed on, else the frame's own; None beside stiffnesses.
 
     Raises:
-        BadInput: There is none.
+        BadInput: There is none, or a frame of given stiffnesses is handed one.
     """
+    if case.frame.stiffness is not None:
+        if given is not None:
+            what = "the frame makes no use of the modulus that is handed on: its stiffness is given"
+            raise case.refuse("frame.stiffness", what, "one of stiffness and a modulus")
+        return None
     if given is not None:
         return given
     if case.frame.modulus is None:

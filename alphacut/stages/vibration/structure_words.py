@@ -14,7 +14,6 @@ from alphacut.fuzzy import FuzzyNumber, PiecewiseLinear
 from alphacut.io.files import Document
 from alphacut.io.units import MINUS, shown
 from alphacut.stages.vibration.structure import Structure, per_floor
-from alphacut.stages.vibration.structure import columns as count_columns
 
 if TYPE_CHECKING:
     from alphacut.frame.structures.linear import Accelerogram
@@ -88,21 +87,12 @@ def frame_sentences(given: Frame, wanted: Structure) -> Iterator[str]:
     from alphacut.frame.structures.field_frame import FieldFrame
 
     assert wanted.frame is not None
-    modulus, moment = wanted.numbers["E"], wanted.numbers["I"]
-    counts = set(given.columns)
-    alone = next(iter(counts)) if len(counts) == 1 else None
-    crisp = alone is not None and alone.support.width == 0
-    number = f"{in_unit(alone, '', '')} in each storey" if alone else "c in a storey"
-    formula = f"{12 * alone.modal:g} E I / l³" if alone and crisp else "12 c E I / l³"
-    alike = len(given.second_moment) == 1
-    section = f"I = {in_unit(moment, 'm^4', 'm^4')} of one column; " if alike else ""
-    rigidity = f"E I = {modulus.modal * moment.modal / 1e6:.4g} MN m² at the modal values" + (
-        "" if alike else ", in the ground storey"
-    )
-    yield (
-        f"{len(wanted.frame.masses)} rigid floors on columns clamped at both ends, {number}:"
-        f" stiffness {formula}. E = {in_unit(modulus, 'GPa', 'Pa')}, {section}{rigidity}."
-    )
+    yield stiffness_words(given, wanted)
+    if wanted.frame.gravity:
+        yield (
+            "P-Delta: the weight P of the floors above reduces the stiffness of each storey by P"
+            f" over its height, at the modal values by up to {softened(wanted):.2g} %."
+        )
     if isinstance(wanted.frame, FieldFrame):
         yield field_words(wanted.frame.field)
     yield f"Damping: {'; '.join(damping(given)) or 'none'}."
@@ -112,15 +102,58 @@ def frame_sentences(given: Frame, wanted: Structure) -> Iterator[str]:
         yield "The frame starts from the displacements and velocities of the table."
 
 
+def stiffness_words(given: Frame, wanted: Structure) -> str:
+    """Where the stiffness of the storeys comes from."""
+    count = len(given.masses)
+    floors_of = f"{count} rigid floor{'s' if count > 1 else ''}"
+    if given.stiffness is not None:
+        return f"{floors_of} on storeys whose stiffness is given."
+    counts = set(given.columns)
+    alone = next(iter(counts)) if len(counts) == 1 else None
+    crisp = alone is not None and alone.support.width == 0
+    number = f"{in_unit(alone, '', '')} in each storey" if alone else "c in a storey"
+    formula = f"{12 * alone.modal:g} E I / l³" if alone and crisp else "12 c E I / l³"
+    modulus, moment = wanted.numbers["E"], (given.second_moment or ())[0]
+    alike = len(given.second_moment or ()) == 1
+    section = f"I = {in_unit(moment, 'm^4', 'm^4')} of one column; " if alike else ""
+    rigidity = f"E I = {modulus.modal * moment.modal / 1e6:.4g} MN m² at the modal values" + (
+        "" if alike else ", in the ground storey"
+    )
+    return (
+        f"{floors_of} on columns clamped at both ends, {number}:"
+        f" stiffness {formula}. E = {in_unit(modulus, 'GPa', 'Pa')}, {section}{rigidity}."
+    )
+
+
+def springs_at_modal(wanted: Structure) -> tuple[list[float], list[float]]:
+    """Stiffness of each storey at the modal values, and what weights take of it, in N/m."""
+    from alphacut.frame.calculus.jet import Jet
+    from alphacut.frame.structures.storey_springs import softening, springs
+
+    frame = wanted.frame
+    assert frame is not None
+    at = {name: Jet.constant([low], 0) for name, (low, _) in frame.ranges({}).items()}
+    soft = [float(x.value[0]) for x in softening(frame, at)] if frame.gravity else []
+    return [float(k.value[0]) for k in springs(frame, at)], soft or [0.0] * frame.floors
+
+
+def softened(wanted: Structure) -> float:
+    """Largest share of a storey's stiffness that weights take, in percent."""
+    return 100 * max(taken / k for k, taken in zip(*springs_at_modal(wanted), strict=True))
+
+
 def field_words(field: FuzzyField) -> str:
     """A field of columns or masses in words."""
-    what, unit = ("columns", "") if field.name == "c" else ("masses", " kg")
+    what, unit = FIELDS[field.name]
     low, high = field.centre - field.half_width, field.centre + field.half_width
     return (
         f"The {what} of the storeys are alike but not equal, each in [{low:.5g}, {high:.5g}]{unit},"
         f" correlated over {field.length:g} m: {', '.join(field.names)} move them together, and"
         f" neighbours differ by {field.apart:.3g}{unit} at most."
     )
+
+
+FIELDS = {"c": ("columns", ""), "k": ("stiffnesses", " N/m"), "m": ("masses", " kg")}
 
 
 def damping(given: Frame) -> Iterator[str]:
@@ -171,7 +204,7 @@ def floors(given: Frame, wanted: Structure) -> Document:
     """Row for each floor, from the ground up: mass, height and what is not zero."""
     kinds: Sequence[str] = [
         "masses",
-        "lengths",
+        *(["lengths"] if given.lengths else []),
         *(["dampers"] if given.damped else []),
         *moves(given),
     ]
@@ -182,12 +215,17 @@ def floors(given: Frame, wanted: Structure) -> Document:
     head = ["floor", *(COLUMNS[kind] for kind in kinds)]
     for name, unit, entries in (
         ("columns c", "", given.columns),
-        ("second moment", "m^4", given.second_moment),
+        ("second moment", "m^4", given.second_moment or ()),
     ):
         if len(entries) > 1:
             told = [in_unit(x, unit, unit) for x in entries]
             head, columns = [*head, name], [*columns, told]
     head, columns = [*head, "stiffness"], [*columns, stiffnesses(given, wanted)]
+    if wanted.frame is not None and wanted.frame.gravity:
+        taken = [
+            f"{-soft / 1e6:.4g} MN/m".replace("-", MINUS) for soft in springs_at_modal(wanted)[1]
+        ]
+        head, columns = [*head, "P-Delta"], [*columns, taken]
     return {
         "head": head,
         "rows": [
@@ -197,10 +235,7 @@ def floors(given: Frame, wanted: Structure) -> Document:
 
 
 def stiffnesses(given: Frame, wanted: Structure) -> list[str]:
-    """Stiffness of each storey at the modal values, 12 c E I / l³, in MN/m."""
-    rigidity = wanted.numbers["E"].modal * wanted.numbers["I"].modal
-    lengths = [length.modal for length in per_floor(given, given.lengths)]
-    return [
-        f"{12e-6 * c.modal * rigidity / length**3:.4g} MN/m"
-        for c, length in zip(count_columns(given), lengths, strict=True)
-    ]
+    """Stiffness of each storey in MN/m, as given or 12 c E I / l³ at the modal values."""
+    if given.stiffness is not None:
+        return [in_unit(k, "MN/m", "N/m") for k in per_floor(given, given.stiffness)]
+    return [f"{k / 1e6:.4g} MN/m" for k in springs_at_modal(wanted)[0]]

@@ -124,10 +124,11 @@ def tolerances(
     from alphacut.frame.decisions.safe_scale import safe_scale
 
     output, limit, over = case.exceedance.output, limit_of(case), case.envelope
-    cell = None if handed is not None or case.frame.modulus is not None else campaign(case)
+    given = handed is not None or case.frame.modulus is not None or case.frame.stiffness is not None
+    cell = None if given else campaign(case)
     modulus_range = None if cell is None else _cell_range(cell, most)
-    given = handed if cell is None or modulus_range is None else _triangle(modulus_range)
-    wanted = structure(case, given)
+    modulus = handed if cell is None or modulus_range is None else _triangle(modulus_range)
+    wanted = structure(case, modulus)
     if wanted.frame is None:
         raise BadInput(Problem("frame", "missing: safe tolerances are those of a storey frame"))
     inputs = wanted.inputs(over.fuzzy)
