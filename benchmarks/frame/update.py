@@ -17,7 +17,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -120,57 +120,66 @@ def _noise_free(truth: Array) -> Array:
     return np.concatenate([np.log(values[0, :MODES]) / 2, scaled.ravel()])
 
 
+@dataclass
+class Tally:
+    """What repetitions gave, one entry each; of refuted ones only the first two lists."""
+
+    degrees: list[float] = field(default_factory=list)
+    inside: list[bool] = field(default_factory=list)
+    widths: list[list[float]] = field(default_factory=list)
+    common: list[float] = field(default_factory=list)
+    told: list[bool] = field(default_factory=list)
+    tried: list[float] = field(default_factory=list)
+
+    def take(self, found: Posterior, truth: Array, ends: Array) -> None:
+        """One posterior of a frame with the parameters `truth` (d,), its priors at `ends`."""
+        lower, upper = found.lower[0], found.upper[0]
+        self.degrees.append(float(found.agreement.possibility(truth[None])[0]))
+        self.inside.append(bool(((lower <= truth) & (truth <= upper)).all()))
+        assert (lower >= ends[:, 0]).all()
+        assert (upper <= ends[:, 1]).all()
+        self.widths.append([found.narrowed[name] for name in names_of(False)])
+        lost = ("common factor" in x.words and not x.learned for x in found.directions)
+        self.told.append(any(lost))
+        factors = np.linspace(0.75, 1.25, 1001)
+        held = found.agreement.possibility(factors[:, None] * truth) >= 0.05
+        if held.any():
+            self.common.append(float(np.ptp(factors[held]) / (2 * SPREAD)))
+        tried = (found.tried_upper - found.tried_lower)[0] / (upper - lower)
+        self.tried.append(float(np.nanmean(tried)))
+
+    def worst(self) -> float:
+        """Least (share − (1 − α)) / standard error over the levels."""
+        count = len(self.degrees)
+        shares = (np.array(self.degrees)[:, None] >= LEVELS).mean(0)
+        error = np.maximum(np.sqrt(LEVELS * (1 - LEVELS) / count), 1 / count)
+        return float(((shares - (1 - LEVELS)) / error).min())
+
+
 def repeat(masses: bool, records: int, repetitions: int, rng: np.random.Generator) -> Row:
     """Coverage and widths over repetitions."""
-    prior = priors(masses)
+    prior, start, tally = priors(masses), time.perf_counter(), Tally()
     ends = np.array([x.support for x in prior.values()])
-    start, degrees, inside, widths, common, told, tried = (
-        time.perf_counter(),
-        [],
-        [],
-        [],
-        [],
-        [],
-        [],
-    )
     for _ in range(repetitions):
         truth = ends.mean(1) * rng.uniform(*(0.95, 1.05) if masses else (0.8, 1.2), len(ends))
         try:
             found = update(FRAME, prior, measure(truth, records, masses, rng), alpha=(0.05,))
         except RefutedError:  # of a true frame, with P <= 0.05
-            degrees.append(0.0)
-            inside.append(False)
+            tally.degrees.append(0.0)
+            tally.inside.append(False)
             continue
-        degrees.append(float(found.agreement.possibility(truth[None])[0]))
-        inside.append(bool(((found.lower[0] <= truth) & (truth <= found.upper[0])).all()))
-        assert (found.lower[0] >= ends[:, 0]).all()
-        assert (found.upper[0] <= ends[:, 1]).all()
-        widths.append([found.narrowed[name] for name in names_of(False)])
-        told.append(any("common factor" in x.words and not x.learned for x in found.directions))
-        factors = np.linspace(0.75, 1.25, 1001)
-        held = found.agreement.possibility(factors[:, None] * truth) >= 0.05
-        if held.any():
-            common.append(float(np.ptp(factors[held]) / (2 * SPREAD)))
-        tried.append(
-            float(
-                np.nanmean(
-                    (found.tried_upper - found.tried_lower)[0] / (found.upper - found.lower)[0]
-                )
-            )
-        )
-    shares = (np.array(degrees)[:, None] >= LEVELS).mean(0)
-    error = np.maximum(np.sqrt(LEVELS * (1 - LEVELS) / repetitions), 1 / repetitions)
+        tally.take(found, truth, ends)
     return Row(
         "unknown" if masses else "known",
         records,
         repetitions,
-        float(((shares - (1 - LEVELS)) / error).min()),
-        float(np.mean(inside)),
-        float(np.mean(widths)),
-        float(np.max(widths)),
-        float(np.min(common or [np.nan])),
-        float(np.mean(told)),
-        float(np.mean(tried)),
+        tally.worst(),
+        float(np.mean(tally.inside)),
+        float(np.mean(tally.widths)),
+        float(np.max(tally.widths)),
+        float(np.min(tally.common or [np.nan])),
+        float(np.mean(tally.told)),
+        float(np.mean(tally.tried)),
         (time.perf_counter() - start) / repetitions,
     )
 

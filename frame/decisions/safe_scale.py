@@ -103,26 +103,53 @@ def safe_scale(
         ValueError: A limit is not positive, or the largest box reaches values without a meaning.
         ModalError: The structure has no smooth oscillating modes over the box.
     """
-    if not limits or not all(np.isfinite(x) and x > 0 for x in limits.values()):
-        raise ValueError(f"limits: {dict(limits)}; each must be positive and finite, one at least")
-    if not most > 0:
-        raise ValueError(f"most: {most:g} is not allowed; the largest scale must be positive")
+    _require(limits, most)
     begun, names = time.perf_counter(), tuple(nominal)
     search = limit_search(frame, nominal, reach, limits, duration, step)
-    flow, centre = search.flow, search.nominal
+    centre = search.nominal
     if (nominal_share := search.share(centre)) >= 1:
         seconds = time.perf_counter() - begun
         box, shares = (centre, centre), (nominal_share, nominal_share)
         worth = ("guaranteed", "")
         return SafeScale(names, centre, None, *box, 0.0, centre, *shares, *worth, 0, seconds)
     search.gap = min(GAP, FINE * (1 - nominal_share))
+    refuted = _refuted(search, most, precision)
+    safe, unsafe, witness, boxes = _proved(search, refuted, most, budget, workers, progress)
+    share = 0.0 if witness is None else search.share(witness)
+    worth = ("verified by sampling" if search.reason else "guaranteed", search.reason)
+    seconds = time.perf_counter() - begun
+    box, shares = reach(safe), (share, nominal_share)
+    return SafeScale(names, centre, safe, *box, unsafe, witness, *shares, *worth, boxes, seconds)
+
+
+def _require(limits: Mapping[str, float], most: float) -> None:
+    if not limits or not all(np.isfinite(x) and x > 0 for x in limits.values()):
+        raise ValueError(f"limits: {dict(limits)}; each must be positive and finite, one at least")
+    if not most > 0:
+        raise ValueError(f"most: {most:g} is not allowed; the largest scale must be positive")
+
+
+def _refuted(search: LimitSearch, most: float, precision: float) -> tuple[float, Array | None]:
+    """Least scale that is refuted, and its witness, with a model fitted to about that scale."""
     search.fit(most)
     unsafe, witness = search.refuted(precision)
     if LEAST * most < unsafe < 0.9 * most:
         search.fit(unsafe)
-    pending: Array = np.arange(2 * len(flow.time) * len(limits))
-    boxes, safe = 0, 0.0
-    shrinks = (0.0, *SHRINK) if witness is None else SHRINK
+    return unsafe, witness
+
+
+def _proved(
+    search: LimitSearch,
+    refuted: tuple[float, Array | None],
+    most: float,
+    budget: float,
+    workers: int,
+    progress: Progress | None,
+) -> tuple[float, float, Array | None, int]:
+    """Scale proved safe, the refuted scale and its witness, smaller where met, and boxes."""
+    unsafe, witness = refuted
+    pending: Array = np.arange(2 * len(search.flow.time) * len(search.flow.outputs))
+    shrinks, boxes = (0.0, *SHRINK) if witness is None else SHRINK, 0
     for done, shrink in enumerate(shrinks if unsafe > LEAST * most else ()):
         size = (1 - shrink) * min(unsafe, most)
         pending, beyond, looked = unproved(search, size, pending, budget, workers)
@@ -132,27 +159,8 @@ def safe_scale(
         if beyond is not None and (found := search.size_of(beyond)) < unsafe:
             unsafe, witness = found, beyond
         if not len(pending):
-            safe = size
-            break
-    share = 0.0 if witness is None else search.share(witness)
-    nature = "verified by sampling" if search.reason else "guaranteed"
-    seconds = time.perf_counter() - begun
-    lower, upper = reach(safe)
-    return SafeScale(
-        names,
-        centre,
-        safe,
-        lower,
-        upper,
-        unsafe,
-        witness,
-        share,
-        nominal_share,
-        nature,
-        search.reason,
-        boxes,
-        seconds,
-    )
+            return size, unsafe, witness, boxes
+    return 0.0, unsafe, witness, boxes
 
 
 def limit_search(
