@@ -41,7 +41,7 @@ def search_levels(
     def level(index: int, inner: Array | None) -> tuple[Array, Array, Array]:
         del inner
         bounds, at, left, gained = search.run(scaled, *cuts.unit(index))
-        return bounds, at, left + gained[:, None]
+        return bounds, at, left + UNSEEN * np.maximum(gained, search.quiet)[:, None]
 
     return _nested(cuts, flow, level, progress)
 

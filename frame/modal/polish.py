@@ -93,7 +93,8 @@ class Polish:
         graphs = int(np.clip(VALUES / (len(nodes) * len(exact.outputs)), 256, self.graphs))
         known = np.unique(np.round(found.point[moved], 3), axis=0)
         known = np.clip(rng.permutation(known)[:graphs], lower, upper)
-        _take(found, best_of_pool(known, trajectories(exact, known), nodes, 1)[0])
+        if len(known):
+            _take(found, best_of_pool(known, trajectories(exact, known), nodes, 1)[0])
         fresh = fresh_points(rng, lower, upper, graphs)
         some = rng.permutation(len(before))[:anew]
         for rival in best_of_pool(fresh, trajectories(exact, fresh), nodes, RIVALS):

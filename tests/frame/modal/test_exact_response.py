@@ -17,6 +17,7 @@ from alphacut.frame.modal import fitting
 from alphacut.frame.modal.exact_response import ExactResponse
 from alphacut.frame.modal.fitting import fit_modes, fit_points, hopeless
 from alphacut.frame.modal.levels import ENDS, UNSEEN
+from alphacut.frame.modal.search import QUIET
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy import Interval
@@ -128,6 +129,13 @@ def test_what_the_last_passes_would_not_follow_is_declared() -> None:
     assert "bounds" in found.facts
     assert found.error is not None
     assert found.error.min() >= UNSEEN * ENDS * 1e-9 >= 1e-9
+
+
+def test_what_the_search_of_polynomials_would_not_follow_is_declared() -> None:
+    flow = unit_flow(replace(FRAME, outputs=("q3",)), ("E", "m1"), 0.02, 2.0)
+    found = Modal(tolerance=1e-4).run(flow)
+    assert "bounds" not in found.facts
+    assert float(found.facts["search_error"]) >= 0.999 * UNSEEN * QUIET * 1e-4
 
 
 def test_polynomials_are_judged_where_the_optima_lie(monkeypatch: pytest.MonkeyPatch) -> None:

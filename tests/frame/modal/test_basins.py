@@ -1,0 +1,116 @@
+"""Searches follow basins whose samples stand behind: what is found on hills that are known."""
+
+from typing import ClassVar, cast
+
+import numpy as np
+import pytest
+
+from alphacut.frame.calculus.jet import Array
+from alphacut.frame.modal.contest import contest
+from alphacut.frame.modal.exact_response import ExactResponse
+from alphacut.frame.modal.optima import Optima, problems
+from alphacut.frame.modal.polish import Polish
+from alphacut.frame.modal.search import ModalSearch, second_pass
+
+CENTRES = np.array([[-0.7, -0.7], [0.7, -0.7], [-0.7, 0.7], [0.6, 0.6]])
+BROAD, THIN = 0.45, 0.12
+HEIGHTS = np.array([1.0, 0.99, 0.98, 1.06])
+"""Three broad hills and a thin one, the highest: few samples meet it, and none near its top."""
+ENDS = np.ones(2)
+
+
+class Hills:
+    """The same sum of bells of two parameters at every node, or of heights that change."""
+
+    secant: ClassVar[bool] = False
+    fastest = 1.0
+    outputs = ("q1",)
+
+    def __init__(self, nodes: int, thin: float = THIN, slopes: Array | None = None) -> None:
+        self.time = 0.1 * np.arange(nodes)
+        self.width = np.array([BROAD, BROAD, BROAD, thin])
+        self.slopes = np.zeros(4) if slopes is None else slopes
+
+    def at(self, unit: Array, node: Array, output: Array) -> tuple[Array, Array, Array]:
+        del output
+        heights = HEIGHTS + self.slopes * node[:, None]
+        away = (unit[:, None] - CENTRES) / self.width[:, None]
+        bell = heights * np.exp(-(away**2).sum(-1))
+        pull = -2 * away / self.width[:, None]
+        g = (bell[..., None] * pull).sum(1)
+        bend = pull[..., :, None] * pull[..., None, :]
+        bend = bend - (2 / self.width**2)[:, None, None] * np.eye(2)
+        return bell.sum(-1), g, (bell[..., None, None] * bend).sum(1)
+
+    def value_at(self, unit: Array, node: Array, output: Array) -> Array:
+        return self.at(unit, node, output)[0]
+
+    def values(self, unit: Array) -> Array:
+        node = np.arange(len(self.time))
+        rows = [self.at(unit, np.full(len(unit), k), node)[0] for k in node]
+        return np.stack(rows, 1)[..., None]
+
+
+def on(hills: Hills) -> ExactResponse:
+    return cast(ExactResponse, hills)
+
+
+def top(nodes: int, point: Array, value: float) -> Optima:
+    """All problems at one point so far."""
+    found = problems(np.arange(nodes), 1, 2)
+    found.point[:], found.value[:] = point, np.where(found.side > 0, value, 1.0)
+    return found
+
+
+def broad_top(hills: Hills) -> Optima:
+    node = np.zeros(1, int)
+    return top(len(hills.time), CENTRES[0], float(hills.value_at(CENTRES[:1], node, node)[0]))
+
+
+def test_a_polish_solves_anew_from_basins_that_stand_behind() -> None:
+    hills = Hills(3)
+    starts = [np.broadcast_to(CENTRES[0], (3, 1, 2, 2))]
+    reached = Polish(1e-9, 1e-9, graphs=256, seed=4).run(on(hills), starts, -ENDS, ENDS)
+    assert (reached[0][:, 0, 1] > 1.05).all()
+    assert np.abs(reached[1][:, 0, 1] - CENTRES[3]).max() < 0.01
+
+
+def test_a_second_calm_pass_is_asked_for() -> None:
+    hills = Hills(3)
+    starts = [np.broadcast_to(CENTRES[0], (3, 1, 2, 2))]
+    once = Polish(1e-9, 1e-9, passes=1, graphs=256, seed=9).run(on(hills), starts, -ENDS, ENDS)
+    assert once[3].max() <= 1e-9  # a pass that meets nothing
+    found = Polish(1e-9, 1e-9, graphs=256, seed=9).run(on(hills), starts, -ENDS, ENDS)
+    assert (found[0][:, 0, 1] > 1.05).all()
+
+
+def test_an_independent_pass_follows_basins_that_stand_behind() -> None:
+    hills = Hills(3)
+    found = broad_top(hills)
+    search = ModalSearch(samples=128, starts=1, seed=8)
+    improved = second_pass(on(hills), found, -ENDS, ENDS, search, 1)
+    assert improved[found.side > 0].all()
+    assert (found.value[found.side > 0] > 1.05).all()
+
+
+def test_either_side_of_a_jump_is_tried_on_the_other() -> None:
+    hills = Hills(9, slopes=np.array([0.0, 0.2, 0.0, 0.0]))
+    found, upper = top(9, CENTRES[0], 1.0), 2 * np.arange(9) + 1
+    found.point[upper[-1]] = CENTRES[1]
+    found.value[:] = found.side * hills.value_at(found.point, found.node, found.output)
+    contest(on(hills), found, -ENDS, ENDS, 1e-9)
+    assert np.abs(found.point[upper[1:]] - CENTRES[1]).max() < 0.05
+
+
+@pytest.mark.parametrize("passes", [1, 8])
+def test_what_the_last_pass_gained_is_told(passes: int) -> None:
+    hills = Hills(3)
+    starts = [np.broadcast_to(CENTRES[0], (3, 1, 2, 2))]
+    polish = Polish(1e-9, 1e-9, passes=passes, graphs=256, seed=4)
+    value, _, _, gained = polish.run(on(hills), starts, -ENDS, ENDS)
+    before = Polish(1e-9, 1e-9, passes=0, graphs=256, seed=4).run(on(hills), starts, -ENDS, ENDS)
+    if passes == 1:
+        assert gained[0] == pytest.approx((value - before[0]).max())
+        assert gained[0] > 0.04
+    else:
+        assert gained[0] <= 1e-9
