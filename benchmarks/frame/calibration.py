@@ -167,7 +167,9 @@ def judged(
         error = (found.error[level] / flow.scale)[..., None]
         wrong = max(wrong, float(missed.max()))
         outside += int((missed > error + ROUNDING).sum())
-        ratio.append((np.maximum(error, least) / np.maximum(np.abs(missed), least)).ravel())
+        told = np.abs(missed) <= np.maximum(error, least)  # a reference further short says nothing
+        shares = np.maximum(error, least) / np.maximum(np.abs(missed), least)
+        ratio.append(shares[told])
     return {
         "case": case.name,
         "method": found.method,
@@ -176,6 +178,7 @@ def judged(
         "values": found.lower.size * 2,
         "above_declared": outside,
         "median_declared_over_true": float(np.median(np.concatenate(ratio))),
+        "share_with_reference": sum(map(len, ratio)) / (found.lower.size * 2),
         "seconds": seconds,
         "reference_seconds": time.process_time() - begun - seconds,
     }
@@ -196,7 +199,8 @@ def measured(cases: list[Case], tolerances: list[float], **effort: int) -> Itera
                 f"{case.name}; auto at {tolerance:g}: error {row['error']:.1e}, declared"
                 f" {row['declared']:.1e} by {row['method']}, {row['above_declared']} of"
                 f" {row['values']} above it, median ratio"
-                f" {row['median_declared_over_true']:.2g}, {row['seconds']:.1f} +"
+                f" {row['median_declared_over_true']:.2g} of"
+                f" {row['share_with_reference']:.0%}, {row['seconds']:.1f} +"
                 f" {row['reference_seconds']:.1f} s{'' if kept else '  BROKEN'}",
                 flush=True,
             )
