@@ -19,6 +19,7 @@ from alphacut.commands import modulus as command_modulus
 from alphacut.commands import repair as command_repair
 from alphacut.commands import report as command_report
 from alphacut.commands import run as command_run
+from alphacut.commands import spectrum as command_spectrum
 from alphacut.commands import tolerances as command_tolerances
 from alphacut.commands import update as command_update
 from alphacut.commands.parser import Parser, refuse_petsc, split_petsc
@@ -41,6 +42,7 @@ COMMANDS: dict[str, ModuleType] = {
     "tolerances": command_tolerances,
     "update": command_update,
     "measure-next": command_measure_next,
+    "spectrum": command_spectrum,
     "report": command_report,
     "repair": command_repair,
 }

@@ -15,16 +15,17 @@ from alphacut.case.idle import changed_moduli, require_read
 from alphacut.case.load import load
 from alphacut.case.sections.vibration import ENVELOPE_METHODS
 from alphacut.case.values import nearest
-from alphacut.commands.given_modulus import add_modulus, given_modulus
 from alphacut.commands.options import (
     KeyOption,
     add_common,
     add_exclude,
     add_keys,
+    add_modulus,
     add_workers,
     answer,
     changes,
     check_workers,
+    given_modulus,
     refuse_beside,
 )
 from alphacut.io.files import Document
@@ -43,7 +44,7 @@ from alphacut.stochastic.theta.truncated_normal import Array
 if TYPE_CHECKING:
     from alphacut.frame import Envelope
 
-ABOUT = "lower and upper envelopes of the structure's vibration on every α-cut"
+ABOUT = "envelopes of the structure's vibration on every α-cut"
 KEYS = {
     "--fuzzy": KeyOption("envelope.fuzzy", "inputs that are fuzzy, as E,m", "NAMES"),
     "--duration": KeyOption("envelope.duration", "length of the simulation", bare="s"),

@@ -9,8 +9,15 @@ from typing import TextIO
 
 from alphacut.case.idle import require_read
 from alphacut.case.load import load
-from alphacut.commands.given_modulus import add_modulus, given_modulus
-from alphacut.commands.options import KeyOption, add_common, add_keys, answer, changes
+from alphacut.commands.options import (
+    KeyOption,
+    add_common,
+    add_keys,
+    add_modulus,
+    answer,
+    changes,
+    given_modulus,
+)
 from alphacut.io.files import as_json, write_text
 from alphacut.io.output_paths import unwritable
 from alphacut.io.problem import BadInput

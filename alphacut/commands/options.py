@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from typing import TextIO
 
 from alphacut.case.sections.material import CELL_METHODS
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.io import quantity
 from alphacut.io.files import as_json, write_text
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.quantity import NUMBER
@@ -175,3 +177,36 @@ def check_workers(count: int) -> None:
     """At least one worker."""
     if count < 1:
         raise BadInput(Problem("--workers", "out of range", str(count), "a whole number 1 or more"))
+
+
+def add_modulus(parser: argparse.ArgumentParser) -> None:
+    """``--modulus``."""
+    parser.add_argument(
+        "--modulus",
+        metavar="QUANTITY|FILE.nc",
+        help="Young's modulus in place of the case's: '[22, 24, 26] GPa', or α-cuts",
+    )
+
+
+def given_modulus(text: str | None) -> FuzzyNumber | None:
+    """The modulus of ``--modulus`` in Pa: a quantity, or the α-cuts of a file."""
+    if text is None:
+        return None
+    if text.endswith(".nc"):
+        from alphacut.stages.material.modulus import read_number
+
+        return read_number(text)
+    try:
+        number = quantity.fuzzy(text, "Pa")
+    except ValueError as error:
+        raise BadInput(
+            Problem(
+                "--modulus",
+                str(error),
+                text,
+                "a stress such as '[22.8, 24.8, 25.8] GPa', or FILE.nc",
+            )
+        ) from None
+    if not number.support.lower > 0:
+        raise BadInput(Problem("--modulus", "out of range", text, "greater than 0"))
+    return number

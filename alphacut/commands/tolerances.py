@@ -8,15 +8,16 @@ from typing import TextIO
 
 from alphacut.case.idle import require_read
 from alphacut.case.load import load
-from alphacut.commands.given_modulus import add_modulus, given_modulus
 from alphacut.commands.options import (
     KeyOption,
     add_common,
     add_keys,
+    add_modulus,
     add_workers,
     answer,
     changes,
     check_workers,
+    given_modulus,
 )
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import progress

@@ -1,15 +1,25 @@
-"""Envelopes over time on every α-cut (Figs. 28 to 35), exceedance of a limit, the record."""
+"""Envelopes over time (Figs. 28 to 35), exceedance of a limit, the record and its spectrum."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.figures.style import INK, ORANGE, alpha_legend, colours, figure, prefix_axis
+from alphacut.figures.style import (
+    BLUE,
+    GREY,
+    INK,
+    ORANGE,
+    PURPLE,
+    alpha_legend,
+    colours,
+    figure,
+    prefix_axis,
+)
 from alphacut.io.units import MINUS, axis_prefix, engineering
 from alphacut.stages.pipeline import Study
 
@@ -17,6 +27,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
+    from alphacut.frame.dynamics.response_spectrum import ResponseSpectrum
     from alphacut.frame.structures.linear import Accelerogram
 
 
@@ -120,3 +131,36 @@ def record(ground: Accelerogram) -> Figure:
     axes.set_ylabel("ground acceleration, m/s²")
     axes.set_xlim(time[0], time[-1])
     return drawn
+
+
+SPECTRUM_LINES = [
+    (colour, dash) for dash in ("-", "--", ":") for colour in (INK, BLUE, ORANGE, PURPLE, GREY)
+]
+
+
+def spectrum(found: Sequence[ResponseSpectrum]) -> Figure:
+    """Both quantities, one below the other, a line for each damping ratio."""
+    import matplotlib.pyplot as plt
+
+    drawn, (above, below) = plt.subplots(2, 1, figsize=(6.4, 5.6), sharex=True)
+    for one, (colour, dash) in zip(found, SPECTRUM_LINES * len(found), strict=False):
+        name = f"ζ = {100 * one.damping:.3g} %"
+        above.plot(one.periods, one.pseudo_acceleration, dash, color=colour, label=name)
+        below.plot(one.periods, one.displacement, dash, color=colour, label=name)
+    for axes, label, si in (
+        (above, "pseudo-acceleration", "m/s^2"),
+        (below, "displacement", "m"),
+    ):
+        axes.set_xscale("log")
+        axes.set_ylim(bottom=0)
+        axes.grid(visible=True, which="both", alpha=0.3)
+        prefix_axis(axes, label, si)
+    ticks = [t for t in TICKS if found[0].periods[0] <= t <= found[0].periods[-1]]
+    below.set_xticks(ticks, [f"{t:g}" for t in ticks])
+    below.minorticks_off()
+    below.set_xlabel("natural period, s")
+    above.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return drawn
+
+
+TICKS = [digit * 10.0**power for power in range(-3, 4) for digit in (1, 2, 5)]

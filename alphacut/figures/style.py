@@ -88,7 +88,7 @@ def alpha_legend(
 def prefix_axis(axes: Axes, label: str, si: str) -> None:
     """Label the vertical axis, with a prefix to its unit; the data stay in SI."""
     factor, unit = axis_prefix(max(map(abs, axes.get_ylim())), si)
-    axes.set_ylabel(f"{label}, {unit}")
+    axes.set_ylabel(f"{label}, {unit}".replace("^2", "²"))
     if factor != 1.0:
         axes.yaxis.set_major_formatter(
             lambda value, _: f"{value * factor:.10g}".replace("-", MINUS)

@@ -3,7 +3,8 @@
 A claim is a record lock on one byte of a file beside the store, at an offset that the sample's key
 hashes to. The system drops it when its process ends, however it ends; nothing has to be cleaned up
 and nothing times out. A claim on a stored sample is pointless, so the
-order is: claim, then look it up, then run; and save, then release.
+order is: claim, then look it up, then run; and save, then release. On a network file system a write
+of one machine is not at once seen by others, so that such a folder is told apart.
 """
 
 from __future__ import annotations
@@ -102,3 +103,25 @@ class Claims:
         self._held[key] = offset
         self._file.held.add(offset)
         return True
+
+
+_MOUNTS = Path("/proc/self/mountinfo")
+_NETWORK = (
+    *("9p", "acfs", "afs", "beegfs", "ceph", "cifs", "cvmfs", "fuse", "gfs2", "glusterfs", "gpfs"),
+    *("lustre", "ncpfs", "nfs", "ocfs2", "orangefs", "panfs", "pvfs2", "smb2", "smb3", "wekafs"),
+)
+
+
+def network_kind(path: Path) -> str:
+    """Type of the network file system that holds a path; empty if it is of this machine.
+
+    Systems in user space count, since most of them hold files of other machines.
+    """
+    try:
+        mounts = [line.split(" - ") for line in _MOUNTS.read_text("utf-8").splitlines()]
+    except OSError:  # not Linux: nothing is known
+        return ""
+    kinds = {Path(left.split()[4]): right.split()[0] for left, right in mounts}
+    place = path.resolve()
+    kind = next((kinds[folder] for folder in (place, *place.parents) if folder in kinds), "")
+    return kind if kind.rstrip("4").split(".")[0] in _NETWORK else ""

@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from alphacut.fuzzy.campaign.call import Failure, Outcome, Sample
-from alphacut.fuzzy.campaign.network_folder import network_kind
-from alphacut.fuzzy.campaign.sample_locks import Claims
+from alphacut.fuzzy.campaign.sample_locks import Claims, network_kind
 from alphacut.fuzzy.campaign.store import (
     Identity,
     Store,

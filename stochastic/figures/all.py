@@ -8,8 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.stochastic.figures.cells import draw_cells, draw_neighbours, draw_two_point
-from alphacut.stochastic.figures.overlay import draw_overlay
+from alphacut.stochastic.figures.cells import (
+    draw_cells,
+    draw_neighbours,
+    draw_overlay,
+    draw_two_point,
+)
 from alphacut.stochastic.figures.statistics import (
     draw_areas,
     draw_correlation,

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from alphacut.stochastic.figures.overlay import draw_overlay
+from alphacut.stochastic.figures.cells import draw_overlay
 from alphacut.stochastic.particles.image import SectionImage
 from alphacut.stochastic.particles.touching import pushed_apart, roundness, split
 

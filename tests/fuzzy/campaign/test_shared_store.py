@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from alphacut.fuzzy import General, Reduced, Triangular
-from alphacut.fuzzy.campaign import network_folder, sample_locks, sample_store
+from alphacut.fuzzy.campaign import sample_locks, sample_store
 from alphacut.fuzzy.campaign.store import StoreError
 from tests.fuzzy.general import propagate
 
@@ -38,8 +38,8 @@ MOUNTS = """\
 )
 def test_network_file_systems_are_seen(tmp_path, monkeypatch, path, kind):
     (tmp_path / "mounts").write_text(MOUNTS)
-    monkeypatch.setattr(network_folder, "_MOUNTS", tmp_path / "mounts")
-    assert network_folder.network_kind(Path(path)) == kind
+    monkeypatch.setattr(sample_locks, "_MOUNTS", tmp_path / "mounts")
+    assert sample_locks.network_kind(Path(path)) == kind
 
 
 def test_one_campaign_at_a_time_on_a_network_file_system(tmp_path, monkeypatch):

@@ -1,0 +1,78 @@
+"""Command spectrum: table, JSON, files, and records and options that make no sense."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from alphacut.entry import main
+
+
+def record(folder: Path, unit: str = "g") -> Path:
+    path = folder / "r.csv"
+    # a push of 0.1 g that stays: an undamped oscillator reaches twice the static displacement
+    rows = "".join(f"{0.1 * k:.1f},0.1\n" for k in range(101))
+    path.write_text(f"time [s],acceleration [{unit}]\n{rows}", encoding="utf-8")
+    return path
+
+
+def test_a_push_doubles_what_it_does_slowly(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    words = ["--damping", "0 %,5 %", "--shortest", "0.5 s", "--longest", "2", "--count", "5"]
+    assert main(["spectrum", str(record(tmp_path)), *words, "--out", str(out), "--json", "-"]) == 0
+    found = json.loads(capfd.readouterr().out)
+    assert found["period_s"] == pytest.approx(np.geomspace(0.5, 2, 5))
+    plain, damped = found["spectra"]
+    assert plain["pseudo_acceleration_m_per_s2"] == pytest.approx([2 * 0.980665] * 5, rel=1e-6)
+    assert max(damped["displacement_m"]) < max(plain["displacement_m"])
+    table = np.genfromtxt(out / "spectrum.csv", delimiter=",", skip_header=1)
+    assert table.shape == (10, 6)
+    np.testing.assert_array_equal(table[:5, 2], plain["displacement_m"])
+    assert {path.name for path in out.iterdir()} == {f"spectrum.{x}" for x in ("csv", "png", "svg")}
+
+
+def test_the_table_names_units_and_the_error(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["spectrum", str(record(tmp_path))]) == 0
+    out = capfd.readouterr().out
+    assert "m/s^2" in out
+    assert "may be wrong by up to" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "pattern"),
+    [
+        (["--damping", "100 %"], "--damping = 100 %: out of range"),
+        (["--damping", "5 %,5 %"], "twice"),
+        (["--damping", "5 Pa"], '--damping = 5 Pa: the unit "Pa" is wrong'),
+        (["--damping", ""], "--damping"),
+        (["--shortest", "3 s", "--longest", "1 s"], "0 < shortest < longest"),
+        (["--shortest", "1e-9 s"], "steps, above"),
+        (["--longest", "4 m"], '--longest = 4 m: the unit "m" is wrong'),
+        (["--count", "1"], "--count = 1: out of range"),
+        (["--count", "few"], "--count"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(
+    words: list[str], pattern: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert main(["spectrum", str(record(tmp_path)), *words, "--out", str(out)]) == 2
+    err = capfd.readouterr().err
+    assert pattern in err
+    assert "Traceback" not in err
+    assert not out.exists()
+
+
+def test_a_record_that_is_none_is_refused(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["spectrum", str(tmp_path / "none.csv")]) == 2
+    assert main(["spectrum", str(record(tmp_path, "m"))]) == 2
+    assert capfd.readouterr().err.count("alphacut: ") == 2
