@@ -11,7 +11,7 @@ import re
 from decimal import Decimal
 
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
-from alphacut.io.units import factor
+from alphacut.io.units import factor, size_problem
 
 NUMBER = r"[-+\u2212]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 LIST = re.compile(r"\[(.*)\]\s*(.*)", re.DOTALL)
@@ -75,7 +75,7 @@ def numbers(value: object, si: str) -> tuple[float, ...]:
         si: SI unit; empty for a number without a unit.
 
     Raises:
-        ValueError: Not a quantity, or its unit is missing or wrong.
+        ValueError: Not a quantity, its unit is missing or wrong, or it is too large or small.
     """
     if isinstance(value, bool) or not isinstance(value, str | int | float | list):
         raise ValueError("this is not a quantity")
@@ -92,6 +92,9 @@ def numbers(value: object, si: str) -> tuple[float, ...]:
         found = (one(text, si),)
     if not all(math.isfinite(float(x)) for x in found):
         raise ValueError("the number is too large")
+    for x in found:
+        if problem := size_problem(float(x), si):
+            raise ValueError(problem)
     return tuple(float(x) for x in found)
 
 

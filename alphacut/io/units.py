@@ -36,6 +36,13 @@ QUANTITIES = {  # SI unit: (name of the quantity, a value as a user would write 
 STANDARD_GRAVITY = Decimal("9.80665")
 """In m/s², by the third General Conference on Weights and Measures, 1901."""
 
+SIZES = {"Pa": (1e-6, 1e18), "m^2": (1e-24, 1e15), "m^4": (1e-36, 1e12)}
+"""Least and greatest magnitude of a quantity other than 0, in SI; what lies beyond is a slip."""
+ORDINARY = (1e-15, 1e15)
+"""The same of all other quantities with a unit."""
+COUNTED = (0.0, 1e18)
+"""The same of numbers without a unit."""
+
 # Units that the page on the case format lists; Pint's others of the same dimension are taken too.
 ACCEPTED = {
     "Pa": ("Pa", "kPa", "MPa", "GPa", "N/mm^2", "N/m^2", "kN/cm^2", "psi", "ksi"),
@@ -56,6 +63,18 @@ ACCEPTED = {
     "rad": ("rad", "mrad", "deg"),
     "rad/s": ("rad/s", "deg/s"),
 }
+
+
+def size_problem(value: float, si: str) -> str:
+    """Why a quantity is smaller or larger than anything that is built; empty if it is not."""
+    least, greatest = SIZES.get(si, ORDINARY if si else COUNTED)
+    if value == 0 or least <= abs(value) <= greatest:
+        return ""
+    unit = f" {si}" if si else ""
+    return (
+        f"{value:.3g}{unit} is too {'large' if abs(value) > greatest else 'small'}: magnitudes go"
+        f" from {least:g} to {greatest:g}{unit}, or are 0; check the unit"
+    )
 
 
 # Sizes of everyday units in SI, so that a case of these starts without Pint's registry.
@@ -113,6 +132,8 @@ def factor(unit: str, si: str) -> Decimal:
         return STANDARD_GRAVITY
     if unit in EVERYDAY.get(si, {}):
         return Decimal(EVERYDAY[si][unit])
+    if si == "rad" and not re.search("rad|deg|turn|rev|arc", unit):  # pint: % is an angle
+        raise ValueError(f'the unit "{unit}" is wrong')
     import pint
 
     if re.search(r"\btons?\b", unit):

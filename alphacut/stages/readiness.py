@@ -17,6 +17,7 @@ from alphacut.stages.image.reading import expected_modulus, study_of
 from alphacut.stages.material import modulus, spheres
 from alphacut.stages.material.cell import modal_values, parts
 from alphacut.stages.pipeline import studies
+from alphacut.stages.vibration import update
 from alphacut.stages.vibration.resolution_checks import rough
 from alphacut.stages.vibration.structure import Structure, structure
 
@@ -82,6 +83,7 @@ def ready(case: Case) -> Readiness:
     wanted = structure(case, stand_in or expected(case))
     if problems := [*crisp_names(case, wanted)] or [*unlearned(case, wanted)]:
         raise BadInput(problems)
+    update.require_readable(case, wanted.frame)
     found = dict.fromkeys(
         problem for study in studies(case) for problem in rough(wanted, study.task)
     )
@@ -144,6 +146,13 @@ def unlikely_material(case: Case) -> Iterator[str]:
             if not MODULI[0] <= modulus.modal <= MODULI[1]:
                 shown = engineering(modulus.modal, "Pa")
                 yield f"cell.{name}_modulus: {shown} is unusual for a solid; check its unit"
+        for name, poisson in (
+            ("matrix", phases.matrix_poisson),
+            ("inclusion", phases.inclusion_poisson),
+        ):
+            if poisson.modal < 0:
+                shown = f"{poisson.modal:g} is unusual for a solid"
+                yield f"cell.{name}_poisson: {shown}; check its sign"
         ratio = phases.inclusion_modulus.modal / phases.matrix_modulus.modal
         meant = re.search(r"(?i)\b(pore|void|hole|rigid)", case.text_of_file)
         if not 1 / CONTRAST <= ratio <= CONTRAST and not meant:

@@ -88,15 +88,14 @@ def limits(bounds: Bounds | None) -> tuple[float, float]:
     Raises:
         ValueError: They are not two numbers in order.
     """
-    given = (None, None) if bounds is None else tuple(bounds)
-    if len(given) != 2:
+    try:
+        lower, upper = (None, None) if bounds is None else bounds
+        low = -np.inf if lower is None else float(lower)
+        high = np.inf if upper is None else float(upper)
+    except (TypeError, ValueError):
         raise ValueError(
             f"the bounds are {bounds!r}; they must be (lower, upper), None where there is none"
-        )
-    low, high = (
-        float(end if end is not None else np.inf * sign)
-        for end, sign in zip(given, (-1, 1), strict=True)
-    )
+        ) from None
     if not low < high:
         raise ValueError(
             f"the bounds are [{low:g}, {high:g}]; the lower one must be less than the upper one"
@@ -129,6 +128,8 @@ def _pairs(values: Values) -> Array:
 
 def _numbers(values: Values) -> Array:
     """Numbers as pairs of equal ends, pairs as they are, shape (n, 2)."""
+    if np.ma.is_masked(values) or (isinstance(values, np.ndarray) and np.iscomplexobj(values)):
+        raise TypeError("masked and complex values are no measured numbers")
     try:
         table = np.asarray(values, float)
     except ValueError:  # numbers and pairs, mixed

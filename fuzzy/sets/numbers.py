@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
@@ -165,13 +166,22 @@ def _highest_level(x: Array, levels: Array, lower: Array) -> Array:
     return np.where(right == 0, 0.0, np.where(right == len(lower), 1.0, level))
 
 
+WHOLE = 2**63
+"""Largest whole number taken; larger ones are written as decimals."""
+
+
 def _require_order(kind: str, values: Sequence[float], order: str) -> None:
-    wrong = [value for value in values if not isinstance(value, Real)]
+    wrong = [
+        value
+        for value in values
+        if not isinstance(value, Real) or (isinstance(value, int) and abs(value) > WHOLE)
+    ]
     if wrong:
         raise ValueError(
-            f"the {kind} holds {wrong[0]!r}; it needs plain numbers: convert units before"
+            f"the {kind} holds {wrong[0]!r}; it needs plain numbers: convert units before, and"
+            " write large whole ones as 1e30"
         )
-    if not (np.isfinite(values).all() and all(a <= b for a, b in itertools.pairwise(values))):
+    if not (all(map(math.isfinite, values)) and all(a <= b for a, b in itertools.pairwise(values))):
         shown = ", ".join(f"{value:g}" for value in values)
         raise ValueError(f"the {kind} is [{shown}]; it needs {order}, all finite")
 

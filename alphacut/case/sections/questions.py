@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from alphacut.case.key import MEMBERSHIP, NOT_NEGATIVE, POSITIVE, Key, Range, Section
+from alphacut.case.key import MEMBERSHIP, NOT_NEGATIVE, POSITIVE, UNIT, Key, Range, Section
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -101,12 +101,12 @@ class Update(Section):
         Key(
             "standard deviation of one measured frequency as a share of it, where it is known from"
             " elsewhere; from the rows' scatter if left out",
-            allowed=POSITIVE,
+            allowed=UNIT,
         ),
     ] = None
     shape_deviation: Annotated[
         float | None,
-        Key("the same of an amplitude, as a share of the largest of its mode", allowed=POSITIVE),
+        Key("the same of an amplitude, as a share of the largest of its mode", allowed=UNIT),
     ] = None
     independent: Annotated[
         bool,

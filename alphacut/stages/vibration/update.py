@@ -16,7 +16,7 @@ from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
 from alphacut.stages.vibration import envelope
 from alphacut.stages.vibration.envelope_task import task_of
-from alphacut.stages.vibration.modes_csv import ModeRows, mode_rows, motion_rows
+from alphacut.stages.vibration.modes_csv import ModeRows, MotionRows, mode_rows, motion_rows
 from alphacut.stages.vibration.structure import Structure
 
 if TYPE_CHECKING:
@@ -158,8 +158,7 @@ def learned(case: Case, wanted: Structure) -> Learned:
     given = case.update
     if given.recorded is not None:
         return _from_motion(case, wanted, wanted.frame)
-    rows = mode_rows(case.beside(str(given.measured)))
-    held = {round(number) for number in given.held_out}
+    rows, held = measured_modes(case), {round(number) for number in given.held_out}
     used = [row for row in rows if row.mode not in held]
     prior = inputs(case, wanted)
     try:
@@ -183,13 +182,55 @@ def learned(case: Case, wanted: Structure) -> Learned:
     return Learned(found, "", prior, predicted, after)
 
 
+def measured_modes(case: Case) -> tuple[ModeRows, ...]:
+    """The rows of the measured modes.
+
+    Raises:
+        BadInput: The file is wrong, or a mode that is held out is not in it, or the only one.
+    """
+    rows = mode_rows(case.beside(str(case.update.measured)))
+    held, modes = case.update.held_out, [float(row.mode) for row in rows]
+    missing = [number for number in held if number not in modes]
+    if missing or set(modes) <= set(held):
+        what = (
+            "no such mode was measured"
+            if missing
+            else "no mode is left to learn from, all are held out"
+        )
+        allowed = f"some of {', '.join(f'{mode:g}' for mode in modes)}, not all"
+        raise case.refuse("update.held_out", what, allowed)
+    return rows
+
+
+def recorded_motion(case: Case, frame: StoreyFrame) -> MotionRows:
+    """The recorded motion.
+
+    Raises:
+        BadInput: The file is wrong.
+    """
+    return motion_rows(case.beside(str(case.update.recorded)), frame_outputs(frame.floors))
+
+
+def require_readable(case: Case, frame: StoreyFrame | None) -> None:
+    """Refuse a case whose measurement cannot be read, before anything is computed.
+
+    Raises:
+        BadInput: As of `measured_modes` and `recorded_motion`.
+    """
+    if case.sections.update is None or frame is None:
+        return
+    if case.update.recorded is None:
+        measured_modes(case)
+    else:
+        recorded_motion(case, frame)
+
+
 def _from_motion(case: Case, wanted: Structure, frame: StoreyFrame) -> Learned:
     """The inputs after a recorded motion."""
     from alphacut.frame import Exact, LinearFlow
     from alphacut.frame.update.motion import RecordedMotion, learn_from_motion
 
-    known, prior = frame_outputs(frame.floors), inputs(case, wanted)
-    rows = motion_rows(case.beside(str(case.update.recorded)), known)
+    rows, prior = recorded_motion(case, frame), inputs(case, wanted)
     duration, recorded = (len(rows.values) - 1) * rows.step, replace(frame, outputs=rows.outputs)
     flow = LinearFlow(recorded, tuple(prior), duration, rows.step, Exact())
     try:

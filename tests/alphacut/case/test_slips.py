@@ -12,7 +12,8 @@ CASES = Path(__file__).parents[3] / "cases"
 @pytest.mark.parametrize(
     ("change", "remark"),
     [
-        ("cell.matrix_modulus=1e-300 Pa", "cell.matrix_modulus: 1e−300 Pa is unusual"),
+        ("cell.matrix_modulus=0.01 Pa", "cell.matrix_modulus: 10.00 mPa is unusual"),
+        ("cell.matrix_poisson=-0.3", "cell.matrix_poisson: -0.3 is unusual"),
         ("cell.matrix_modulus=20 MPa", "the particle's modulus is 4e+03 times the matrix's"),
         ("cell.inclusion_modulus=[7, 8, 9] Pa", "cell.inclusion_modulus: 8.000 Pa is unusual"),
         ("radius.a1=0.9", "a1 is greater than a3"),

@@ -90,7 +90,7 @@ def test_figures_and_envelopes_before_and_after(
 def test_files_of_modes_that_make_no_sense(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, pattern: str
 ) -> None:
-    path = copied(tmp_path)
+    path = copied(tmp_path, without="held_out")
     (tmp_path / "laboratory-frame.modes.csv").write_text(text, encoding="utf-8")
     assert main(["update", str(path)]) == 2
     told = capsys.readouterr().err.strip()
@@ -105,7 +105,9 @@ def test_files_of_modes_that_make_no_sense(
         ("update.learn=['k']", "the frame has no input|unknown"),
         ("update.learn=['rayleigh_mass']", "crisp|cannot be learned"),
         ("update.measured=none.csv", "there is no such file"),
-        ("update.frequency_deviation=-1", "greater than 0"),
+        ("update.frequency_deviation=-1", "inside .0, 1."),
+        ("update.held_out=[2.5]", "no such mode was measured.*some of 1, 2, 3, 4"),
+        ("update.held_out=[1, 2, 3, 4]", "no mode is left to learn from"),
         ("envelope.method=none", "envelope.method"),
     ],
 )
