@@ -72,18 +72,20 @@ class LoadTable:
 
     def values(self, unit: Array, rate: Array) -> Array:
         """Response of the outputs at points (S, d) with eigenvalues (S, n), shape (S, T, m)."""
-        share = self.share(unit).reshape(*rate.shape, -1)
-        powers = self._powers(rate)
+        share = self.share(unit).reshape(*rate.shape, -1)  # (S, n, m)
+        powers, h = self._powers(rate), self.time[1] - self.time[0]
+        series = np.ascontiguousarray(powers.swapaxes(0, 1))  # (n, S, order)
         out = np.zeros((len(unit), len(self.time), share.shape[-1]))
         left = np.zeros_like(rate)  # what is left of earlier windows at the start of this one
         ends = np.append(self.starts[1:], len(self.time) - 1)
         for start, end in zip(self.starts, ends, strict=True):
-            rows = slice(start + 1, end + 1)
-            own = np.einsum("jki,ski->sjk", self.moment[rows], powers, optimize=True)
-            wave = np.exp(rate[:, None, :] * (self.time[rows] - self.time[start])[None, :, None])
-            response = own + wave * left[:, None, :]
-            left = response[:, -1]
-            out[:, rows] = 2 * (response @ share).real
+            rows, count = slice(start + 1, end + 1), end - start
+            own = (series @ self.moment[rows].transpose(1, 2, 0)).transpose(1, 2, 0)  # (S, J, n)
+            out[:, rows] = 2 * (own.real @ share.real - own.imag @ share.imag)
+            if start:
+                first = np.exp(rate * h) * left
+                out[:, rows] += decaying(rate, first[..., None] * share, h, count)
+            left = np.exp(rate * (count * h)) * left + own[:, -1]
         return out
 
     def response(self, rate: Array, node: Array) -> Waves:
@@ -213,6 +215,28 @@ class LoadTables:
         for table, own in zip(self.tables, self.members, strict=True):
             R[:, own] = table.response_alone(rate[:, own], node)
         return R
+
+
+def decaying(rate: Array, share: Array, step: float, count: int) -> Array:
+    """2 Re Σ_k share_k exp(λ_k j step), j = 0 … count − 1, by fewer exponentials than nodes.
+
+    Args:
+        rate: λ, shape (S, n).
+        share: Shape (S, n, m).
+        step: Of the nodes, in s.
+        count: Number of nodes.
+
+    Returns:
+        Shape (S, count, m).
+    """
+    size = ceil(count**0.5)
+    blocks, (points, n, m) = ceil(count / size), share.shape
+    fast = np.exp(rate[:, None, :] * (np.arange(size) * step)[None, :, None])
+    slow = np.exp(rate[:, None, :] * (np.arange(blocks) * size * step)[None, :, None])
+    right = (fast[:, :, :, None] * share[:, None]).transpose(0, 2, 1, 3).reshape(points, n, -1)
+    out = 2 * (slow.real @ right.real - slow.imag @ right.imag)
+    values: Array = out.reshape(points, blocks * size, m)[:, :count]
+    return values
 
 
 def left_out(phase: float, order: int) -> float:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import ceil
 from typing import ClassVar
 
 import numpy as np
@@ -18,7 +17,7 @@ from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.modal.ground_response import LoadTables
+from alphacut.frame.modal.ground_response import LoadTables, decaying
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,19 +107,7 @@ class ModalModel:
             self.eigenvalue(unit),
             self.coefficient(unit).reshape(len(unit), self.count, -1),
         )
-        m = share.shape[-1]
-        step, total = self.flow.step, len(self.time)
-        size = ceil(total**0.5)
-        blocks = ceil(total / size)
-        fast = np.exp(rate[:, None, :] * (np.arange(size) * step)[None, :, None])
-        slow = np.exp(rate[:, None, :] * (np.arange(blocks) * size * step)[None, :, None])
-        right = (
-            (fast[:, :, :, None] * share[:, None])
-            .transpose(0, 2, 1, 3)
-            .reshape(len(unit), self.count, size * m)
-        )
-        out = 2 * (slow.real @ right.real - slow.imag @ right.imag)
-        values: Array = out.reshape(len(unit), blocks * size, m)[:, :total]
+        values = decaying(rate, share, self.flow.step, len(self.time))
         return values if self.load is None else values + self.load.values(unit, rate)
 
     def at(self, unit: Array, node: Array, output: Array) -> tuple[Array, Array, Array]:

@@ -18,7 +18,7 @@ FLOOR = 0.1
 """Least deviation at a node, as a share of the output's largest."""
 FRESH = 256
 """Random points that judge beside the optima and the corners."""
-NUMBERS = 8e6
+NUMBERS = 4e6
 """Most numbers of the trajectories at optima; of more optima some are drawn."""
 PIECE = 256
 """Trajectories computed together."""
