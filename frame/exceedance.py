@@ -163,12 +163,63 @@ def exceedance(
     Raises:
         ValueError: A parameter is both fuzzy and random, or the limit is not positive.
     """
-    both = set(inputs) & set(random)
-    if both or not limit > 0:
-        raise ValueError(
-            f"exceedance: limit {limit:g} must be positive, and {sorted(both) or 'no input'} cannot"
-            " be both fuzzy and random"
-        )
+    name = system.outputs[output]
+    return exceedances(
+        system,
+        inputs,
+        random,
+        limits={name: limit},
+        duration=duration,
+        step=step,
+        alpha=alpha,
+        samples=samples,
+        spread=spread,
+        rng=rng,
+        progress=progress,
+    )[name]
+
+
+ANY = "any of them"
+"""Name of the event that any of several limits is exceeded."""
+
+
+def exceedances(
+    system: LinearSystem | LagrangianSystem,
+    inputs: Mapping[str, FuzzyNumber],
+    random: Mapping[str, Callable[[np.random.Generator, int], Array]],
+    *,
+    limits: Mapping[str, float],
+    duration: float,
+    step: float,
+    alpha: Sequence[float] = ALPHA,
+    samples: int = 200,
+    spread: int = 64,
+    rng: np.random.Generator | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> dict[str, FuzzyProbability]:
+    """Fuzzy probabilities of exceeding several limits, from the same trajectories, as `exceedance`.
+
+    Args:
+        system: The structure.
+        inputs: Fuzzy parameters.
+        random: Samplers of random parameters by name.
+        limits: Magnitude that each output must not exceed, in its unit, by output.
+        duration: Length of the simulation, in s.
+        step: Distance of nodes, in s.
+        alpha: Levels.
+        samples: Random draws.
+        spread: Points of the box besides its corners, per level.
+        rng: Source of the draws; seeded with 0 unless given.
+        progress: Called with the fraction done.
+
+    Returns:
+        One for each output, and beside several `ANY`: that any limit is exceeded, over shares of
+        all limits.
+
+    Raises:
+        ValueError: A parameter is both fuzzy and random, or a limit is not positive.
+    """
+    sizes, columns = _limits_of(system, limits, set(inputs) & set(random))
     rng = rng or np.random.default_rng(0)
     cuts = boxes(inputs, alpha)
     draws = (
@@ -178,36 +229,76 @@ def exceedance(
     )
     flow = _flow(system, (*cuts.names, *random), duration, step)
     tried = [_tried(cuts, level, spread) for level in range(len(cuts.alpha))]
-    total, found, higher = sum(map(len, tried)), [], []
+    total = sum(map(len, tried))
+    found: list[Array] = []
+    higher: list[Array] = []
     spaced = tried[0][:: -(-len(tried[0]) // LOOKED_AT)]
     few = np.array([[*point, *draw] for point in spaced for draw in draws[:LOOKED_AT]])
     between = stray(flow, few)
     for point in np.concatenate(tried):
         size = np.abs(flow.values(np.hstack([np.tile(point, (len(draws), 1)), draws])))
-        found.append(size[:, :, output].max(1))
-        higher.append(within_steps(size, between)[:, :, output].max(1))
+        found.append(size.max(1)[:, columns] / sizes)
+        higher.append(within_steps(size, between).max(1)[:, columns] / sizes)
         if progress:
             progress(len(found) / total)
-    peak = np.sort(found, axis=1)
-    limits = np.linspace(0.95 * peak.min(), 1.05 * peak.max(), LIMITS)
     of = np.repeat(np.arange(len(tried)), [len(points) for points in tried])
-    low, high = _bounds(peak, of, np.append(limits, limit))
-    more = _bounds(np.sort(higher, axis=1), of, np.array([limit]))
-    deviation = (
-        max(_deviation(share, len(draws)) for share in (*low[:, -1], *high[:, -1]))
-        if random
-        else 0.0
-    )
+    peak, more = np.array(found), np.array(higher)  # (points, draws, limits)
+    told = [
+        _probability(peak[..., k], more[..., k], of, size, random=bool(random), alpha=cuts.alpha)
+        for k, size in enumerate(sizes)
+    ]
+    if len(told) > 1:
+        parts = peak.max(-1), more.max(-1)
+        told.append(_probability(*parts, of, 1.0, random=bool(random), alpha=cuts.alpha))
+    return dict(zip((*limits, ANY), told, strict=False))
+
+
+def _limits_of(
+    system: LinearSystem | LagrangianSystem, limits: Mapping[str, float], both: set[str]
+) -> tuple[Array, list[int]]:
+    """The limits, shape (L,), and the columns of their outputs."""
+    for name, limit in limits.items():
+        if name not in system.outputs:
+            known = ", ".join(system.outputs)
+            raise ValueError(f"exceedance: there is no output '{name}'; known are {known}")
+        if both or not limit > 0:
+            raise ValueError(
+                f"exceedance: limit {limit:g} must be positive, and {sorted(both) or 'no input'}"
+                " cannot be both fuzzy and random"
+            )
+    if not limits:
+        raise ValueError("exceedance: there must be one limit at least")
+    return np.array([*limits.values()], float), [system.outputs.index(name) for name in limits]
+
+
+def _probability(
+    peak: Array, more: Array, of: Array, size: float, *, random: bool, alpha: Array
+) -> FuzzyProbability:
+    """Probability that peaks pass 1, from those at each fuzzy point and draw, (S, D).
+
+    Args:
+        peak: Peaks at nodes over their limit.
+        more: Those within steps, likewise.
+        of: Level of each point, shape (S,).
+        size: The limit, which the curve's limits are in units of.
+        random: Whether there are draws.
+        alpha: Levels.
+    """
+    limits = np.linspace(0.95 * peak.min(), 1.05 * peak.max(), LIMITS)
+    low, high = _bounds(np.sort(peak, axis=1), of, np.append(limits, 1.0))
+    above = _bounds(np.sort(more, axis=1), of, np.array([1.0]))
+    draws = peak.shape[1]
+    shares = (*low[:, -1], *high[:, -1])
     return FuzzyProbability(
-        cuts.alpha,
+        alpha,
         low[:, -1],
         high[:, -1],
-        deviation,
-        total * len(draws),
-        limits,
+        max(_deviation(share, draws) for share in shares) if random else 0.0,
+        peak.size,
+        limits * size,
         low[:, :-1],
         high[:, :-1],
-        np.maximum(more[0][:, 0] - low[:, -1], more[1][:, 0] - high[:, -1]),
+        np.maximum(above[0][:, 0] - low[:, -1], above[1][:, 0] - high[:, -1]),
     )
 
 

@@ -13,14 +13,12 @@ from alphacut.case.checks_image import image
 from alphacut.case.checks_material import particles, radius, sphere_model
 from alphacut.case.checks_structure import incomplete
 from alphacut.case.idle import idle_envelope
-from alphacut.case.limits import limit_of
-from alphacut.case.names import OUTPUTS, floors, frame_outputs, others, structures
+from alphacut.case.names import floors, others, structures
 from alphacut.case.schema import NEEDED
 from alphacut.case.sections.top import STAGES
 from alphacut.case.sections.vibration import ENVELOPE_METHODS, INTEGRATORS, NONLINEAR
-from alphacut.case.values import nearest
 from alphacut.io.output_paths import hint
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import Problem
 
 Check = Callable[[Case], Iterator[Problem]]
 
@@ -51,7 +49,7 @@ def checks(*, modal: bool = False) -> Iterator[Check]:
     yield where("envelope", certificate)
     yield where("envelope", integrators)
     yield where("envelope", idle_envelope)
-    yield where("exceedance", exceedance)
+    yield where("exceedance", questions.exceedance)
     yield where("update", lambda case: levels("update.alpha", case.update.alpha))
     yield where("update", questions.update)
     yield where("field", questions.field)
@@ -261,27 +259,6 @@ def integrators(case: Case) -> Iterator[Problem]:
     if scheme is not None and scheme not in known:
         what = f"this is for {'linear structures' if pendulum else 'a pendulum'}"
         yield Problem("envelope.integrator", what, scheme, ", ".join(known))
-
-
-def exceedance(case: Case) -> Iterator[Problem]:
-    """A limit is for an output of the structure in vibration, and in its unit."""
-    if case.sections.envelope is None:
-        yield Problem("exceedance", "a probability needs the section [envelope]")
-    name = case.exceedance.output
-    for structure in structures(case):
-        if name not in (outputs := OUTPUTS.get(structure, (name,))):
-            yield Problem(
-                "exceedance.output",
-                f"there is no output {name}",
-                name,
-                ", ".join(outputs),
-                nearest(name, outputs),
-            )
-    try:
-        if not case.sections.frame or name in frame_outputs(len(case.frame.masses)):
-            limit_of(case)  # of a storey that is not there nothing can be said
-    except BadInput as error:
-        yield from error.problems
 
 
 def times(case: Case) -> Iterator[Problem]:

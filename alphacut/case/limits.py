@@ -14,19 +14,27 @@ from alphacut.io import quantity
 from alphacut.io.problem import BadInput, Problem
 
 
-def limit_of(case: Case) -> float:
-    """The limit of [exceedance] in the SI unit of its output, as `limit_in`."""
-    return limit_in(case, "exceedance.limit", case.exceedance.output, case.exceedance.limit)
+def exceeded_limits(case: Case) -> dict[str, float]:
+    """The limits of [exceedance] by output in SI, as `limit_in`: of output and limit, or limits."""
+    given = case.exceedance
+    if given.limits:
+        return limits_in(case, "exceedance.limits", given.limits)
+    return {given.output: limit_in(case, "exceedance.limit", given.output, given.limit)}
 
 
 def limits_of(case: Case) -> dict[str, float]:
-    """The limits of [decision] by output, as `limit_in`.
+    """The limits of [decision] by output, as `limits_in`."""
+    return limits_in(case, "decision.limits", case.decision.limits)
+
+
+def limits_in(case: Case, key: str, texts: Sequence[str]) -> dict[str, float]:
+    """Limits by output, as `limit_in`.
 
     Raises:
         BadInput: One is no sentence such as "drift1 <= 40 mm", or an output has two.
     """
-    key, found = "decision.limits", {}
-    for text in case.decision.limits:
+    found: dict[str, float] = {}
+    for text in texts:
         name, bound, limit = (part.strip() for part in text.partition("<="))
         if not bound or not re.fullmatch(r"\w+", name):
             what = f"'{text}' is no limit"
@@ -184,6 +192,45 @@ def joint(case: Case) -> Iterator[Problem]:
             yield Problem("joint.times", what, f"{time:g} s", allowed)
     if len(times) == 2 and times[0] == times[1]:
         yield Problem("joint.times", "both times are the same", f"{times[0]:g} s")
+
+
+def exceedance(case: Case) -> Iterator[Problem]:
+    """Limits are for outputs of the structure in vibration, and in their units."""
+    given = case.exceedance
+    if case.sections.envelope is None:
+        yield Problem("exceedance", "a probability needs the section [envelope]")
+    alone = {"output": given.output, "limit": given.limit}
+    for name, value in alone.items():
+        if given.limits and value:
+            what, allowed = "there are limits besides", "output and limit, or limits"
+            yield Problem(f"exceedance.{name}", what, value, allowed)
+        if not given.limits and not value:
+            what = "missing: the output" if name == "output" else "missing: what it must not exceed"
+            yield Problem(f"exceedance.{name}", what, allowed=f"a text for {name}; or limits")
+    if (given.limits and any(alone.values())) or (not given.limits and not all(alone.values())):
+        return
+    parts = [text.partition("<=") for text in given.limits]
+    names = [name.strip() for name, bound, _ in parts if bound] or [given.output] * (not parts)
+    key, known = f"exceedance.{'limits' if given.limits else 'output'}", possible_outputs(case)
+    kinds = "q, v, a, drift, shear with a floor, base_shear" if case.sections.frame else ""
+    strangers = [
+        Problem(key, f"there is no output {x}", x, kinds or ", ".join(known), nearest(x, known))
+        for x in (names if known else ())
+        if x not in known
+    ]
+    yield from strangers
+    try:
+        if not strangers:
+            exceeded_limits(case)  # of a storey that is not there nothing can be said
+    except BadInput as error:
+        yield from error.problems
+
+
+def possible_outputs(case: Case) -> tuple[str, ...]:
+    """Outputs that the case's structure may have; none where there is no structure."""
+    if case.sections.frame is not None:
+        return tuple(frame_outputs(len(case.frame.masses)))
+    return observed(case)
 
 
 def update(case: Case) -> Iterator[Problem]:

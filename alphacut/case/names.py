@@ -132,18 +132,6 @@ def known_output(case: Case, floors: int) -> Iterator[Problem]:
             yield Problem(
                 f"study[{index}].output", f"there is no output {drawn}", drawn, ", ".join(outputs)
             )
-    limited = case.exceedance.output if case.sections.exceedance else possible[0]
-    if limited not in possible:
-        allowed = (
-            f"q, v, a, drift, shear with a floor, base_shear: {', '.join(possible[:floors])} …"
-        )
-        yield Problem(
-            "exceedance.output",
-            f"there is no output {limited}",
-            limited,
-            allowed,
-            nearest(limited, possible),
-        )
 
 
 def known_input(case: Case, key: str, name: str, count: int) -> Iterator[Problem]:

@@ -121,7 +121,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         "tolerance": contract,
         **({"exceedance": limit} if limit else {}),
     }
-    text = summary(found, tried[0]) + (outcomes.sentence(limit) if limit else "")
+    text = summary(found, tried[0]) + (outcomes.sentences(limit) if limit else "")
     answer(options, document, out, text)
     return 0
 
@@ -131,7 +131,7 @@ def exceeded(options: argparse.Namespace, case: Case, wanted: Structure) -> Docu
     if case.sections.exceedance is None:
         return None
     with progress("Exceedance", quiet=options.quiet) as tick:
-        return outcomes.exceedance_document(outcomes.exceedance(case, wanted, tick))
+        return outcomes.exceedances_document(outcomes.exceedance(case, wanted, tick))
 
 
 def replaced(options: argparse.Namespace) -> tuple[str, ...]:

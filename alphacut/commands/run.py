@@ -194,7 +194,7 @@ def main_numbers(found: Document) -> str:
     lines += update.sentences(found["update"]) if "update" in found else []
     lines += decision.sentences(found["decision"]) if "decision" in found else []
     lines += [joint.sentence(found["joint"])] if "joint" in found else []
-    limit = outcomes.sentence(found["exceedance"]) if "exceedance" in found else ""
+    limit = outcomes.sentences(found["exceedance"]) if "exceedance" in found else ""
     return "".join(f"{line}\n" for line in lines) + limit
 
 

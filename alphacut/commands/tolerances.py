@@ -63,11 +63,15 @@ def text(found: Tolerances) -> str:
     """The safe scale, the safe intervals and the witness, in SI, a line each."""
     from alphacut.frame.outputs import output_unit
 
-    scale, limit = found.found, engineering(found.limit, output_unit(found.output))
+    scale = found.found
+    kept = [
+        f"|{name}| <= {engineering(limit, output_unit(name))}"
+        for name, limit in found.limits.items()
+    ]
     if scale.safe is None:
-        return f"|{found.output}| passes {limit} at the nominal values: no tolerance is safe\n"
+        return f"{' and '.join(kept)} does not hold at the nominal values: no tolerance is safe\n"
     lines = [
-        f"|{found.output}| <= {limit} at all nodes for supports scaled by up to {scale.safe:.4g}"
+        f"{' and '.join(kept)} at all nodes for supports scaled by up to {scale.safe:.4g}"
         f" ({scale.nature}{f': {scale.reason}' if scale.reason else ''})"
     ]
     lines += [f"  {name}: {low:.6g} … {high:.6g}" for name, (low, high) in found.intervals.items()]
@@ -77,4 +81,5 @@ def text(found: Tolerances) -> str:
         f"{name} = {x:.6g}" for name, x in zip(scale.names, scale.witness, strict=True)
     )
     lines.append(f"unsafe at {scale.unsafe:.4g} ({100 * scale.gap:.2g} % more): {point}")
-    return "\n".join([*lines, f"  there |{found.output}| is {scale.share:.6g} of the limit", ""])
+    what = f"|{next(iter(found.limits))}|" if len(kept) == 1 else "the worst of them"
+    return "\n".join([*lines, f"  there {what} is {scale.share:.6g} of the limit", ""])

@@ -22,6 +22,7 @@ from alphacut.figures import update as figure_update
 from alphacut.figures.style import save, style
 from alphacut.io.progress import progress
 from alphacut.stages.pipeline import Results
+from alphacut.stages.vibration.exceedance import events
 
 if TYPE_CHECKING:
     import xarray
@@ -71,8 +72,11 @@ def drawings(results: Results) -> Iterator[Drawing]:
         richest = max(results.studies, key=lambda study: len(study.task.fuzzy))
         yield "fig21-25-graph-follower", lambda: figure_follower.follower(results, richest)
     yield from update_drawings(results)
-    if (limited := results.exceedance) is not None:
-        yield "exceedance", lambda: figure_envelope.exceedance(limited)
+    if results.exceedance is not None:
+        for limited in events(results.exceedance):
+            several = "event" in results.exceedance.dims
+            stem = f"exceedance-{str(limited.attrs['output']).replace(' ', '-')}"
+            yield stem if several else "exceedance", partial(figure_envelope.exceedance, limited)
     if (decided := results.decision) is not None:
         yield "decision", lambda: figure_questions.decision(decided)
     if (hull := results.joint) is not None:

@@ -103,6 +103,9 @@ def figure_words(name: str) -> str:
     """Words for a figure without its number."""
     if match := re.fullmatch(r"envelope-(.+)-([^-]+)", name):
         return f"Envelope of {match[2]}" + ("" if match[1] == "all" else f", study {match[1]}")
+    if name.startswith("exceedance-"):
+        of = name.removeprefix("exceedance-").replace("-", " ")
+        return f"Fuzzy probability that {of} exceeds a limit, over the limit"
     if name not in FIGURES and name.startswith("update-"):
         return f"Envelope of {name.removeprefix('update-')} before and after the measurement"
     return FIGURES.get(name, name.replace("-", " "))

@@ -22,6 +22,7 @@ from alphacut.figures.style import (
 )
 from alphacut.io.units import MINUS, axis_prefix, engineering
 from alphacut.stages.pipeline import Study
+from alphacut.stages.vibration.exceedance import event_unit, event_words
 
 if TYPE_CHECKING:
     import xarray
@@ -89,15 +90,14 @@ def envelope(dataset: xarray.Dataset, output: str, study: Study) -> Figure:
 
 def exceedance(found: xarray.Dataset) -> Figure:
     """The probability between its bounds on each level, and the case's limit."""
-    from alphacut.frame.outputs import output_unit
-
     drawn, axes = figure(7.2, 3.6)
     alpha, limits = found["alpha"].values, found["limit"].values
     curves = found["curve"].transpose("alpha", "bound", "limit").values
     for (lower, upper), shade in zip(curves[:-1], colours(alpha), strict=False):
         axes.fill_between(limits, lower, upper, color=shade, lw=0)
     axes.plot(limits, curves[-1].T, color=INK, lw=1)
-    limit, unit = float(found.attrs["limit"]), output_unit(found.attrs["output"])
+    output = str(found.attrs["output"])
+    limit, unit = float(found.attrs["limit"]), event_unit(output)
     if limit <= 2 * limits[-1]:
         axes.axvline(limit, color=ORANGE, lw=1.2, ls="--")
     axes.set_title(
@@ -111,7 +111,8 @@ def exceedance(found: xarray.Dataset) -> Figure:
     )
     factor, prefixed = axis_prefix(max(limits[-1], limit if limit <= 2 * limits[-1] else 0.0), unit)
     axes.xaxis.set_major_formatter(lambda value, _: f"{value * factor:.10g}".replace("-", MINUS))
-    axes.set_xlabel(f"limit of |{found.attrs['output']}|, {prefixed}")
+    words = f"limit of {event_words(output)}, {prefixed}" if unit else "all limits, over the case's"
+    axes.set_xlabel(words.replace("^2", "²"))
     axes.set_ylabel("probability of exceeding it")
     axes.set_ylim(0, 1.02)
     alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))

@@ -10,6 +10,7 @@ from alphacut.figures.captions import core
 from alphacut.io.files import Document
 from alphacut.io.units import engineering, largest_by_unit
 from alphacut.report.tables import section, table
+from alphacut.stages.vibration import exceedance as outcomes
 
 Line = tuple[str, str, str, str]
 HEAD = ("quantity", "most plausible", "whole range", "nature of the range")
@@ -69,13 +70,15 @@ def peaks(summary: Document) -> Iterator[Line]:
 
 def exceeded(summary: Document) -> Iterator[Line]:
     """Probability that an output exceeds its limit."""
-    if found := summary.get("exceedance"):
+    for found in outcomes.each_event(summary["exceedance"]) if "exceedance" in summary else ():
         ends = [
-            " … ".join(dict.fromkeys(f"{found[side][k]:.2g}" for side in ("lower", "upper")))
+            "undecided"
+            if (found["lower"][k], found["upper"][k]) == (0, 1)
+            else " … ".join(dict.fromkeys(f"{found[side][k]:.2g}" for side in ("lower", "upper")))
             for k in (-1, 0)
         ]
-        limit = engineering(found["limit"], found["unit"])
-        name = f"Probability that |{found['output']}| exceeds {limit}"
+        limit = f" exceeds {engineering(found['limit'], found['unit'])}"
+        name = f"Probability of {outcomes.event_words(found['output'], limit)}"
         yield name, *ends, found["nature"].split(":")[0]
 
 

@@ -71,7 +71,7 @@ def summary(results: Results) -> Document:
     if results.learned is not None:
         found["update"] = learned_numbers(results)
     if results.exceedance is not None:
-        found["exceedance"] = outcomes.exceedance_document(results.exceedance)
+        found["exceedance"] = outcomes.exceedances_document(results.exceedance)
     if results.decision is not None:
         found["decision"] = decision_document(results.decision)
     if results.joint is not None:

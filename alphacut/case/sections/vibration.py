@@ -114,20 +114,27 @@ class Envelope(Section):
 class Exceedance(Section):
     """Fuzzy probability that an output exceeds a limit within [envelope]'s duration.
 
-    Inputs that are not random stay fuzzy.
+    Inputs that are not random stay fuzzy. It takes output and limit, or limits.
     """
 
     output: Annotated[
         str,
         Key("the output: q3, drift1, base_shear …; of a tower roof or drift, of a pendulum force"),
-    ]
+    ] = ""
     limit: Annotated[
         str,
         Key(
             "magnitude it must not exceed, with the output's unit; of a drift also a"
             " share of the storey's modal height: 0.5 %"
         ),
-    ]
+    ] = ""
+    limits: Annotated[
+        tuple[str, ...],
+        Key(
+            "limits on several outputs at once, 'drift1 <= 0.5 %', 'a3 <= 2 m/s^2'; that any of"
+            " them is exceeded is judged too"
+        ),
+    ] = ()
     random: Annotated[
         tuple[str, ...],
         Key(

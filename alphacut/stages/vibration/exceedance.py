@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from alphacut.case.case import Case
-from alphacut.case.limits import limit_of
+from alphacut.case.limits import exceeded_limits
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import Document
 from alphacut.io.problem import BadInput, Problem
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import xarray
 
     from alphacut.frame import Envelope
+    from alphacut.frame.exceedance import FuzzyProbability
     from alphacut.stages.vibration.envelope_task import EnvelopeTask
 
 Sampler = Callable[[np.random.Generator, int], Array]
@@ -167,79 +168,166 @@ def split_inputs(
 
 
 def exceedance(case: Case, wanted: Structure, progress: Tick | None = None) -> xarray.Dataset:
-    """Fuzzy probability that an output exceeds the case's limit in the duration.
+    """Fuzzy probabilities that outputs exceed the case's limits in the duration.
 
     Args:
         case: With the sections exceedance, envelope and a structure.
         wanted: The structure.
         progress: Told the share done.
 
+    Returns:
+        Of one limit ``exceedance`` (alpha, bound) and ``curve`` (alpha, bound, limit); of several
+        the same with an axis ``event`` in front, see `events`.
+
     Raises:
         BadInput: The structure has no such output.
     """
-    import xarray
-
     from alphacut.frame import exceedance as probabilities
-    from alphacut.frame.outputs import output_unit
 
-    limited, over = case.exceedance, case.envelope
-    output = limited.output
-    model = wanted.model if wanted.frame is None else replace(wanted.frame, outputs=(output,))
-    if output not in model.outputs:
-        raise case.refuse(
-            "exceedance.output", "the structure has no such output", ", ".join(wanted.outputs)
-        )
+    limited, over, limits = case.exceedance, case.envelope, exceeded_limits(case)
+    model = wanted.model
+    if wanted.frame is not None:
+        model = replace(wanted.frame, outputs=tuple(limits))
+    if not set(limits) <= set(model.outputs):
+        key = "exceedance.limits" if limited.limits else "exceedance.output"
+        raise case.refuse(key, "the structure has no such output", ", ".join(wanted.outputs))
     fuzzy, random = split_inputs(case, wanted)
-    found = probabilities.exceedance(
+    found = probabilities.exceedances(
         model,
         fuzzy,
         random,
-        limit=limit_of(case),
+        limits=limits,
         duration=over.duration,
         step=over.step,
-        output=model.outputs.index(output),
         alpha=over.alpha,
         samples=limited.samples,
         rng=np.random.default_rng(limited.seed),
         progress=progress,
     )
-    about = {"long_name": f"probability that |{output}| exceeds the limit", "units": "1"}
-    ends = (("alpha", "bound"), np.column_stack([found.lower, found.upper]), about)
-    drawn = {
+    facts = {
+        "fuzzy": ", ".join(fuzzy),
+        "random": ", ".join(random),
         "samples": limited.samples,
         "step": over.step,
-        "trajectories": found.trajectories,
-    }
-    facts = {
-        "output": output,
-        "limit": limit_of(case),
-        "deviation": found.deviation,
-        "between_nodes": float(found.error.max()),
         "nature": NATURE,
-        **drawn,
     }
-    names = {"fuzzy": ", ".join(fuzzy), "random": ", ".join(random)}
-    curve = (
-        ("alpha", "bound", "limit"),
-        np.stack([found.curve_lower, found.curve_upper], axis=1),
-        about,
+    each = {name: _dataset(name, of, limits.get(name, 1.0), facts) for name, of in found.items()}
+    return next(iter(each.values())) if len(each) == 1 else _joined(each)
+
+
+def _dataset(
+    output: str, found: FuzzyProbability, limit: float, facts: Mapping[str, object]
+) -> xarray.Dataset:
+    """One probability."""
+    import xarray
+
+    about = {"long_name": f"probability that {event_words(output)} exceeds the limit", "units": "1"}
+    curve = np.stack([found.curve_lower, found.curve_upper], axis=1)
+    return xarray.Dataset(
+        {
+            "exceedance": (("alpha", "bound"), np.column_stack([found.lower, found.upper]), about),
+            "curve": (("alpha", "bound", "limit"), curve, about),
+        },
+        {
+            "alpha": found.alpha,
+            "bound": ["lower", "upper"],
+            "limit": ("limit", found.limits, {"units": event_unit(output)}),
+        },
+        {
+            **facts,
+            "output": output,
+            "limit": limit,
+            "deviation": found.deviation,
+            "between_nodes": float(found.error.max()),
+            "trajectories": found.trajectories,
+        },
     )
-    axes = {
-        "alpha": found.alpha,
-        "bound": ["lower", "upper"],
-        "limit": ("limit", found.limits, {"units": output_unit(output)}),
+
+
+OWN = ("output", "limit", "deviation", "between_nodes")
+"""Facts of each event."""
+
+
+def _joined(each: Mapping[str, xarray.Dataset]) -> xarray.Dataset:
+    """Several probabilities as one dataset, each with an axis of limits of its own."""
+    import xarray
+
+    parts = list(each.values())
+    variables = {
+        name: (
+            ("event", *axes),
+            np.stack([part[name].values for part in parts]),
+            parts[0][name].attrs,
+        )
+        for name, axes in (
+            ("exceedance", ("alpha", "bound")),
+            ("curve", ("alpha", "bound", "place")),
+        )
     }
-    return xarray.Dataset({"exceedance": ends, "curve": curve}, axes, {**facts, **names})
+    limits = np.stack([part["limit"].values for part in parts])
+    own = {f"of_{name}": ("event", [part.attrs[name] for part in parts]) for name in OWN}
+    common = {name: x for name, x in parts[0].attrs.items() if name not in OWN}
+    axes = {name: parts[0][name].values for name in ("alpha", "bound")}
+    words = {"units": "SI, by output", "long_name": "limits of the curve"}
+    return xarray.Dataset(
+        {**variables, "limits": (("event", "place"), limits, words), **own},
+        {**axes, "event": list(each)},
+        common,
+    )
+
+
+def events(found: xarray.Dataset) -> Iterator[xarray.Dataset]:
+    """The probability of each limit, and of any, as a dataset of its own."""
+    if "event" not in found.dims:
+        yield found
+        return
+    for index in range(found.sizes["event"]):
+        one = found.isel(event=index)
+        own = {name: one[f"of_{name}"].values.item() for name in OWN}
+        kept = one[["exceedance", "curve"]].drop_vars("event").rename(place="limit")
+        units = {"units": event_unit(str(own["output"]))}
+        limits = ("limit", one["limits"].values, units)
+        yield kept.assign_coords(limit=limits).assign_attrs({**found.attrs, **own})
+
+
+def event_unit(output: str) -> str:
+    """SI unit of an output's limit; shares of their limits where any of several is meant."""
+    from alphacut.frame.exceedance import ANY
+    from alphacut.frame.outputs import output_unit
+
+    return "" if output == ANY else output_unit(output)
+
+
+def event_words(output: str, of: str = "") -> str:
+    """What exceeds a limit, ``|drift1|``, or any of several; then `of`, its limit."""
+    from alphacut.frame.exceedance import ANY
+
+    return "any of them" if output == ANY else f"|{output}|{of}"
+
+
+def exceedances_document(found: xarray.Dataset) -> Document:
+    """The probability as printed with ``--json``; of several limits a list, ``events``."""
+    each = [exceedance_document(one) for one in events(found)]
+    return each[0] if len(each) == 1 else {"events": each}
+
+
+def each_event(found: Document) -> list[Document]:
+    """The documents of all events from that of `exceedances_document`."""
+    several: list[Document] = found.get("events", [found])
+    return several
+
+
+def sentences(found: Document) -> str:
+    """A line for each event."""
+    return "".join(map(sentence, each_event(found)))
 
 
 def exceedance_document(found: xarray.Dataset) -> Document:
-    """The probability as it is printed with ``--json``; the limit in SI."""
-    from alphacut.frame.outputs import output_unit
-
+    """One probability as it is printed with ``--json``; the limit in SI."""
     sides = {str(side): found["exceedance"].sel(bound=side).values for side in ("lower", "upper")}
     return {
         **{name: found.attrs[name] for name in FACTS if name in found.attrs},
-        "unit": output_unit(found.attrs["output"]),
+        "unit": event_unit(str(found.attrs["output"])),
         "alpha": found["alpha"].values,
         **sides,
     }
@@ -248,10 +336,7 @@ def exceedance_document(found: xarray.Dataset) -> Document:
 def sentence(found: Document) -> str:
     """The probability in words, at the lowest and the highest level."""
     levels = dict.fromkeys((0, len(found["alpha"]) - 1))
-    cuts = (
-        f"[{found['lower'][k]:.3g}, {found['upper'][k]:.3g}] at α = {found['alpha'][k]:g}"
-        for k in levels
-    )
+    cuts = (f"{cut(found, k)} at α = {found['alpha'][k]:g}" for k in levels)
     random = f" with random {found['random']}" if found["random"] else ""
     nodes = f", at nodes every {found['step']:g} s" if "step" in found else ""
     if "between_nodes" in found:
@@ -265,7 +350,13 @@ def sentence(found: Document) -> str:
         f": {drawn}; standard deviation up to {found['deviation']:.2g}" if found["random"] else ""
     )
     worth = f" (inner bounds{nodes}{scatter})"
+    limit = f" > {engineering(found['limit'], found['unit'])}"
     return (
-        f"probability of |{found['output']}| >"
-        f" {engineering(found['limit'], found['unit'])}{random}: {', '.join(cuts)}{worth}\n"
+        f"probability of {event_words(found['output'], limit)}{random}: {', '.join(cuts)}{worth}\n"
     )
+
+
+def cut(found: Document, level: int) -> str:
+    """Bounds of a probability on a level; those that say nothing are called undecided."""
+    low, high = found["lower"][level], found["upper"][level]
+    return "undecided, [0, 1]" if (low, high) == (0, 1) else f"[{low:.3g}, {high:.3g}]"

@@ -6,14 +6,14 @@ are scaled with the others, and the frame gets the range of E over them.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from alphacut.case.case import Case
-from alphacut.case.limits import limit_of
+from alphacut.case.limits import exceeded_limits
 from alphacut.fuzzy import FuzzyNumber, Interval, Signed, propagate
 from alphacut.io.files import Document
 from alphacut.io.problem import BadInput, Problem
@@ -57,15 +57,13 @@ class Tolerances:
 
     Args:
         found: Scale, box and witness of the frame's parameters.
-        output: The output that is limited.
-        limit: Its largest magnitude, in SI.
+        limits: Largest magnitude of each limited output, in SI.
         frame: Supports of the frame's parameters; without E where the cell gives it.
         cell: Supports of the cell's inputs; empty where the modulus is given.
     """
 
     found: SafeScale
-    output: str
-    limit: float
+    limits: Mapping[str, float]
     frame: Supports
     cell: Supports
 
@@ -83,10 +81,12 @@ class Tolerances:
         witness = (
             None if found.witness is None else dict(zip(found.names, found.witness, strict=True))
         )
+        limits: list[Document] = [
+            {"output": name, "limit": limit, "unit": output_unit(name)}
+            for name, limit in self.limits.items()
+        ]
         return {
-            "output": self.output,
-            "limit": self.limit,
-            "unit": output_unit(self.output),
+            **(limits[0] if len(limits) == 1 else {"limits": limits}),
             "safe_scale": found.safe,
             "unsafe_scale": None if np.isinf(found.unsafe) else found.unsafe,
             "gap": None if np.isinf(found.gap) else found.gap,
@@ -123,7 +123,7 @@ def tolerances(
     """
     from alphacut.frame.decisions.safe_scale import safe_scale
 
-    output, limit, over = case.exceedance.output, limit_of(case), case.envelope
+    limits, over = exceeded_limits(case), case.envelope
     given = handed is not None or case.frame.modulus is not None or case.frame.stiffness is not None
     cell = None if given else campaign(case)
     modulus_range = None if cell is None else _cell_range(cell, most)
@@ -143,10 +143,10 @@ def tolerances(
         return both[:, 0], both[:, 1]
 
     found = safe_scale(
-        _limited(wanted, output, case),
+        _limited(wanted, tuple(limits), case),
         {name: number.modal for name, number in inputs.items()},
         reach,
-        {output: limit},
+        limits,
         duration=over.duration,
         step=over.step,
         most=most,
@@ -155,14 +155,14 @@ def tolerances(
     )
     if cell is not None and found.safe and "E" in inputs:
         found = _within_cell(found, cell, list(inputs).index("E"))
-    return Tolerances(found, output, limit, frame, Supports(dict(cell.inputs) if cell else {}))
+    return Tolerances(found, limits, frame, Supports(dict(cell.inputs) if cell else {}))
 
 
-def _limited(wanted: Structure, output: str, case: Case) -> StoreyFrame:
-    """The frame with the limited output alone."""
+def _limited(wanted: Structure, outputs: tuple[str, ...], case: Case) -> StoreyFrame:
+    """The frame with the limited outputs alone."""
     assert wanted.frame is not None
     try:
-        return replace(wanted.frame, outputs=(output,))
+        return replace(wanted.frame, outputs=outputs)
     except ValueError as error:
         raise case.refuse("exceedance.output", str(error)) from None
 

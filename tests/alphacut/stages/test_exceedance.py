@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray
 
-from alphacut.case.limits import limit_of
+from alphacut.case.limits import exceeded_limits
 from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.fuzzy import Interval, Trapezoidal, Triangular
@@ -173,6 +173,12 @@ def test_a_pendulum_may_exceed_a_force():
     assert found.attrs["random"] == "phi_0"
 
 
+def limit_of(case):
+    """The one limit."""
+    (limit,) = exceeded_limits(case).values()
+    return limit
+
+
 @pytest.mark.parametrize(("limit", "meters"), [("1 %", 0.04), ("0.5 %", 0.02), ("20 mm", 0.02)])
 def test_a_drift_may_be_limited_by_a_share_of_the_storey_height(limit, meters):
     case = load(CASES / "building.toml", ["exceedance.output=drift1", f"exceedance.limit={limit}"])
@@ -216,3 +222,83 @@ def test_the_probability_over_the_limit_falls_from_one_to_zero_and_meets_the_lim
             "exceedance"
         ].transpose("alpha", "bound")
         assert there.values == pytest.approx(curve[:, :, index])
+
+
+SIX = """
+schema = 1
+title = "Three storeys"
+about = "Several limits at once"
+stages = ["envelope"]
+[frame]
+masses = ["20 t", "20 t", "15 t"]
+stiffness = ["[28, 30, 32] MN/m", "25 MN/m ± 5 %", "18 MN/m"]
+lengths = "3 m"
+damping_ratio = "3 %"
+displacements = ["5 mm", "8 mm", "10 mm"]
+velocities = "0 m/s"
+outputs = ["q3"]
+[envelope]
+fuzzy = ["k"]
+alpha = [0, 1]
+duration = "0.2 s"
+step = "0.02 s"
+[exceedance]
+samples = 20
+limits = LIMITS
+"""
+
+
+def test_several_limits_in_one_run_are_what_each_is_alone(tmp_path, capfd):
+    path = tmp_path / "six.toml"
+    limits = {"drift1": "0.2 %", "drift2": "4 mm", "a3": "0.4 g", "base_shear": "1 kN"}
+    told = [f"{name} <= {limit}" for name, limit in limits.items()]
+    path.write_text(SIX.replace("LIMITS", json.dumps(told)), encoding="utf-8")
+    out = tmp_path / "out"
+    arguments = ["run", str(path), "--quiet", "--out", str(out)]
+    assert main([*arguments, "--set", "exceedance.random=k1", "--no-figures"]) == 0, (
+        capfd.readouterr().err
+    )
+    events = json.loads((out / "summary.json").read_text(encoding="utf-8"))["exceedance"]["events"]
+    assert [event["output"] for event in events] == [*limits, "any of them"]
+    wanted = structure(load(path), None)
+    for event, (name, limit) in zip(events, limits.items(), strict=False):
+        keys = [f'{x}="{y}"' for x, y in (("output", name), ("limit", limit))]
+        alone = path.with_name("alone.toml")
+        rest = "\n".join([*keys, 'random = ["k1"]'])
+        alone.write_text(SIX.replace("limits = LIMITS", rest), encoding="utf-8")
+        found = outcomes.exceedance(load(alone), wanted)["exceedance"].transpose("alpha", "bound")
+        assert np.array([event["lower"], event["upper"]]).T.tolist() == found.values.tolist()
+    top = np.array([[event["lower"], event["upper"]] for event in events])
+    assert (top[-1] >= top[:-1].max(0) - 1e-12).all()
+    assert (top[-1] <= top[:-1].sum(0) + 1e-12).all()
+    assert main(["report", str(out), "--quiet", "--csv", str(out / "csv")]) == 0
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "Probability of any of them" in page
+    assert "event,alpha" in (out / "csv" / "exceedance.csv").read_text(encoding="utf-8")
+    assert main(["tolerances", str(path), "--set", 'exceedance.limits=["drift1 <= 0.2 %"]']) == 0
+
+
+def test_a_probability_between_zero_and_one_is_called_undecided():
+    words = {"output": "q1", "limit": 0.1, "unit": "m", "random": "", "alpha": [0.0, 1.0]}
+    told = outcomes.sentence({**words, "lower": [0.0, 0.0], "upper": [1.0, 0.4]})
+    assert "undecided, [0, 1] at α = 0, [0, 0.4] at α = 1" in told
+
+
+@pytest.mark.parametrize(
+    ("limits", "pattern"),
+    [
+        ('["drift1 40 mm"]', "is no limit"),
+        ('["drift4 <= 40 mm"]', "there is no output drift4"),
+        ('["drift1 <= 40 mm", "drift1 <= 50 mm"]', "drift1 has two limits"),
+        ('["a1 <= 40 mm"]', "unit"),
+        ('["a1 <= 1 g"]\noutput = "a1"', "there are limits besides"),
+        ("[]", "exceedance.output: missing: the output"),
+    ],
+)
+def test_limits_that_make_no_sense_are_refused(limits, pattern, tmp_path, capfd):
+    path = tmp_path / "six.toml"
+    path.write_text(SIX.replace("LIMITS", limits), encoding="utf-8")
+    assert main(["check", str(path)]) == 2
+    err = capfd.readouterr().err
+    assert pattern in err
+    assert "Traceback" not in err
