@@ -48,6 +48,34 @@ def hashin_shtrikman_bulk(fraction: Array, matrix: Phase, inclusion: Phase) -> t
     return np.minimum(*ends), np.maximum(*ends)
 
 
+def harmonic_about(share: Array, moduli: tuple[float, float], around: float) -> Array:
+    """Harmonic mean of matrix's and particle's moduli, each with `around` added, less that."""
+    first, second = moduli
+    return np.asarray(1 / ((1 - share) / (first + around) + share / (second + around)) - around)
+
+
+def hashin_shtrikman(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
+    """Bounds of K and G of parallel fibres that are isotropic across, in plane strain, in Pa.
+
+    Hill (J. Mech. Phys. Solids 12, 199, 1964) and Hashin (ibid. 13, 119, 1965); with the extreme
+    moduli of either phase Walpole (ibid. 17, 235, 1969).
+
+    Returns:
+        Shape (2 moduli, 2 ends, …) for area fractions of shape (…).
+    """
+    share = np.asarray(fraction, float)
+    phases = (matrix.stiffness, inclusion.stiffness)
+    first, second = (float(bulk_modulus(stiffness)) for stiffness in phases)
+    bulks, shears = (first, second), (float(phases[0][2, 2]), float(phases[1][2, 2]))
+    found = []
+    for end in (min, max):
+        bulk, shear = end(bulks), end(shears)
+        around = (shear, shear * bulk / (bulk + 2 * shear))
+        pairs = zip((bulks, shears), around, strict=True)
+        found.append([harmonic_about(share, pair, x) for pair, x in pairs])
+    return np.swapaxes(np.array(found), 0, 1)
+
+
 def mori_tanaka(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
     """Moduli of round aligned fibres by Mori and Tanaka (1973), exact where particles are few.
 

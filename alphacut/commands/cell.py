@@ -34,6 +34,7 @@ from alphacut.rve.spheres.result import HomogenisedSpheres
 from alphacut.stages.contract import contract, keep_modulus, require_choice
 from alphacut.stages.material import cell, spheres
 from alphacut.stages.material.cell_models import cell_model
+from alphacut.stages.material.references import beside, text_of
 
 ABOUT = "homogenise the cell at crisp values; a fuzzy input takes its modal value"
 
@@ -145,11 +146,12 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     found = {**cell.document(result), **({} if difference is None else {"difference": difference})}
     found["model"] = choice.words
     found["tolerance"] = contract(case, sum(result.error.values()) if result.error else None)
+    particles = case.cell.particles
+    ratio = cell.anisotropy(*cell.parts(cell.modal_values(case), case.radius.theta), particles)
+    found |= beside(case, result.modulus, result.poisson, ratio and ratio[0])
     if answer(options, found, out, summary(result)):
         out.write(agreement(pair, difference, allowed_difference(case)))
-        modal = cell.parts(cell.modal_values(case), case.radius.theta)
-        particles = case.cell.particles
-        out.write(remark(cell.anisotropy(*modal, particles), particles))
+        out.write(remark(ratio, particles) + text_of(case, found))
     return 0
 
 

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TextIO
 
+import numpy as np
+
 from alphacut.case.case import Case
 from alphacut.case.idle import idle_mesh, require_read
 from alphacut.case.load import load
@@ -34,6 +36,7 @@ from alphacut.stages.contract import contract, keep_modulus, require_choice
 from alphacut.stages.material import modulus, response
 from alphacut.stages.material.campaign import campaign
 from alphacut.stages.material.cell import GPA
+from alphacut.stages.material.references import beside, text_of
 
 ABOUT = "fuzzy effective modulus by the transformation method over all fuzzy inputs of the cell"
 KEYS = {
@@ -99,13 +102,17 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         else None
     )
     reached = sum(found.error.values()) if found.error else None
+    modal = [float(np.mean([ends[-1] for ends in found.result.bounds(x)])) for x in ("E", "nu")]
+    others = beside(case, modal[0], modal[1], found.shear_ratio and found.shear_ratio[0])
     document = {
         **found.document(),
+        **others,
         "model": wanted.task.choice.words,
         "tolerance": contract(case, reached),
         **({"response": stress} if stress else {}),
     }
-    text = summary(found) + (f"\n{response.text(stress)}" if stress else "")
+    text = summary(found) + text_of(case, others)
+    text += f"\n{response.text(stress)}" if stress else ""
     if answer(options, document, out, text) and not options.out:
         say(
             "to keep this and hand it on: the same command with --out modulus.nc, then alphacut"
@@ -137,9 +144,10 @@ def store_of(options: argparse.Namespace, case: Case) -> Path | None:
 def summary(found: modulus.FuzzyModulus) -> str:
     """The α-cuts as a small table."""
     lower, upper = (ends / GPA for ends in found.result.bounds("E"))
+    cuts = zip(found.result.alpha, lower, upper, *found.result.bounds("nu"), strict=True)
     rows = "".join(
-        f"{a:5.2f}  {low:10.5f}  {high:10.5f}\n"
-        for a, low, high in zip(found.result.alpha, lower, upper, strict=True)
+        f"{a:5.2f}  {low:10.5f}  {high:10.5f}  {least:8.5f}  {most:8.5f}\n"
+        for a, low, high, least, most in cuts
     )
     cost = (
         f"{found.result.runs} samples, {found.solves} linear systems, {found.result.seconds:.1f} s,"
@@ -147,6 +155,8 @@ def summary(found: modulus.FuzzyModulus) -> str:
     )
     particles = found.choice.particles
     return (
-        f"alpha  lower GPa   upper GPa   (E of {modulus.AVERAGE[particles]})\n{rows}{cost}\n"
+        "alpha  lower GPa   upper GPa   lower nu  upper nu  (E and nu of"
+        f" {modulus.AVERAGE[particles]})\n"
+        f"{rows}{cost}\n"
         f"{found.worth}\n{remark(found.shear_ratio, particles)}"
     )

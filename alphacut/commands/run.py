@@ -31,6 +31,7 @@ from alphacut.io.units import engineering, largest_by_unit
 from alphacut.stages import summary
 from alphacut.stages import width_shares as shares
 from alphacut.stages.contract import require_choice
+from alphacut.stages.material.references import line
 from alphacut.stages.pipeline import Chain, Results
 from alphacut.stages.readiness import ready
 from alphacut.stages.vibration import decision, joint, update
@@ -174,8 +175,11 @@ def main_numbers(found: Document) -> str:
     lines = []
     if cell := found.get("modulus"):
         lines.append(
-            f"E = {core(cell)}, support [{cell['lower_GPa']:.4f}, {cell['upper_GPa']:.4f}] GPa"
+            f"E = {core(cell)}, support [{cell['lower_GPa']:.4f}, {cell['upper_GPa']:.4f}] GPa;"
+            f" nu = {cell['nu']:.4f}"
         )
+        lines.append(line(cell["beside"], cell["particles"]))
+        lines += [f"warning: {cell['outside']}"] if cell["outside"] else []
     if picture := found.get("image"):
         cuts = picture["cuts"]["E_GPa"]
         lines.append(

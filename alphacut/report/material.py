@@ -8,6 +8,7 @@ from alphacut.figures.captions import core, in_words
 from alphacut.io.files import Document
 from alphacut.report.tables import code, paragraphs, section, sentence, table
 from alphacut.stages.material import response
+from alphacut.stages.material.references import line
 
 
 def microstructure(found: Document) -> Markup:
@@ -47,8 +48,17 @@ MEANING = {
 
 def modulus(found: Document, drawn: Markup) -> Markup:
     """The fuzzy modulus with its α-cuts, error budget and certificate."""
-    cuts = zip(found["alpha"], found["E_GPa"]["lower"], found["E_GPa"]["upper"], strict=True)
-    rows = [(f"{alpha:g}", f"{low:.4f}", f"{high:.4f}") for alpha, low, high in cuts]
+    poisson = found.get("nu_cuts", {"lower": [], "upper": []})
+    columns = [found["E_GPa"], *([poisson] if len(poisson["lower"]) else [])]
+    ends = [one[side] for one in columns for side in ("lower", "upper")]
+    rows = [
+        (f"{alpha:g}", *(f"{end[level]:.4f}" for end in ends))
+        for level, alpha in enumerate(found["alpha"])
+    ]
+    head = ("α", "lower E, GPa", "upper E, GPa", "lower ν", "upper ν")[: 1 + len(ends)]
+    beside = found.get("beside")
+    told = [f"{line(beside, found['particles'])}."] if beside else []
+    told += [found["outside"]] if found.get("outside") else []
     words = Markup(
         "<p>{} <strong>{}</strong>, support [{:.4f}, {:.4f}] GPa; Poisson's ratio {:.4f}. {} {}"
         " samples, {} linear systems, {:.1f} s. {} {} {}</p>"
@@ -66,9 +76,9 @@ def modulus(found: Document, drawn: Markup) -> Markup:
     checks = [(in_words(name), f"{value:.2g}") for name, value in found.get("checks", {}).items()]
     return section(
         "Fuzzy modulus",
-        words,
+        words + paragraphs(*told),
         drawn,
-        table(("α", "lower E, GPa", "upper E, GPa"), rows),
+        table(head, rows),
         (
             Markup("<h3>Error budget</h3>")
             + table(("source", "estimated relative error of E"), budget)

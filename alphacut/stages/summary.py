@@ -16,6 +16,7 @@ from alphacut.rve.cell import Phase
 from alphacut.rve.spheres.result import volume_fraction
 from alphacut.stages.material import modulus, response, spheres
 from alphacut.stages.material.cell import GPA, modal_values, parts
+from alphacut.stages.material.references import beside
 from alphacut.stages.pipeline import Results
 from alphacut.stages.vibration import exceedance as outcomes
 from alphacut.stages.vibration.decision import decision_document
@@ -55,6 +56,9 @@ def summary(results: Results) -> Document:
     if results.modulus is not None:
         of_shape = spheres.remark(case, *_cell(results)) or ""
         found["modulus"] = {**modulus_numbers(results.modulus), "shape": of_shape}
+        numbers = found["modulus"]
+        modal = float(numbers["modal_GPa"]) * GPA, float(numbers["nu"])
+        numbers |= beside(case, *modal, numbers.get("shear_ratio"))
     elif results.image is not None:
         found["image"] = json.loads(results.image.attrs["document"])
     elif results.handed is not None:
@@ -115,6 +119,8 @@ def modulus_numbers(dataset: xarray.Dataset) -> Document:
         "upper_GPa": ends[0, 1],
         "nu": dataset["nu"].values[-1].mean(),
     }
+    of_poisson = dataset["nu"].transpose("alpha", "bound").values
+    support["nu_cuts"] = {"lower": of_poisson[:, 0], "upper": of_poisson[:, 1]}
     cost = {
         name: dataset.attrs[name]
         for name in ("samples", "solves", "seconds", "method", "plan", "nature")

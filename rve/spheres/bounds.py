@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from alphacut.rve.bounds import harmonic_about
 from alphacut.rve.cell import Phase
 from alphacut.rve.spheres.cubic import cubic_voigt
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -51,7 +52,10 @@ def hashin_shtrikman(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
         bulk, shear = end(bulks), end(shears)
         around = _around(bulk, shear)
         found.append(
-            [_mean(share, pair, x) for pair, x in zip((bulks, shears), around, strict=True)]
+            [
+                harmonic_about(share, pair, x)
+                for pair, x in zip((bulks, shears), around, strict=True)
+            ]
         )
     return np.swapaxes(np.array(found), 0, 1)
 
@@ -63,18 +67,12 @@ def mori_tanaka(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
     """
     share, around = np.asarray(fraction, float), _around(*bulk_and_shear(matrix))
     pairs = zip(bulk_and_shear(matrix), bulk_and_shear(inclusion), strict=True)
-    return np.array([_mean(share, pair, x) for pair, x in zip(pairs, around, strict=True)])
+    return np.array([harmonic_about(share, pair, x) for pair, x in zip(pairs, around, strict=True)])
 
 
 def _around(bulk: float, shear: float) -> tuple[float, float]:
     """What Hashin and Shtrikman add to bulk and shear moduli in a reference material."""
     return 4 / 3 * shear, shear / 6 * (9 * bulk + 8 * shear) / (bulk + 2 * shear)
-
-
-def _mean(share: Array, moduli: tuple[float, float], around: float) -> Array:
-    """Harmonic mean of the moduli, each with `around` added, less that."""
-    first, second = moduli
-    return np.asarray(1 / ((1 - share) / (first + around) + share / (second + around)) - around)
 
 
 def are_ordered(matrix: Phase, inclusion: Phase) -> bool:
