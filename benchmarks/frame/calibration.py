@@ -22,10 +22,10 @@ from alphacut.frame.calculus.jet import Array
 from alphacut.frame.methods.auto import ToleranceError
 from alphacut.fuzzy import FuzzyNumber, Triangular
 from benchmarks.frame.envelopes import FRAME, INPUTS
-from benchmarks.frame.exact_modes import inner_bounds
 from benchmarks.frame.pendulum import inputs as pendulum_inputs
 from benchmarks.frame.pendulum import missed_and_declared
-from benchmarks.frame.pendulum_reference import Swing, exact_bounds
+from benchmarks.frame.references.exact_modes import inner_bounds
+from benchmarks.frame.references.swing import Swing, exact_bounds
 from benchmarks.frame.wide import sixteen
 from benchmarks.rows import write
 

@@ -22,7 +22,7 @@ from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.jet import Array
 from alphacut.fuzzy import Triangular
 from benchmarks.frame.envelopes import FRAME
-from benchmarks.frame.reference import true_envelope
+from benchmarks.frame.references.polished_search import true_envelope
 
 RESULTS = Path(__file__).parents[1] / "results"
 THIRD = replace(FRAME, outputs=("q3",))

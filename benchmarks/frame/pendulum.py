@@ -17,8 +17,8 @@ import numpy as np
 from alphacut.frame import Envelope, envelope, pendulum
 from alphacut.frame.calculus.jet import Array
 from alphacut.fuzzy import Triangular
-from benchmarks.frame.pendulum_reference import PARAMETERS, Swing, exact_bounds
-from benchmarks.frame.reference import PolishedSearch
+from benchmarks.frame.references.polished_search import PolishedSearch
+from benchmarks.frame.references.swing import PARAMETERS, Swing, exact_bounds
 from benchmarks.rows import write
 
 RESULTS = Path(__file__).parents[1] / "results"

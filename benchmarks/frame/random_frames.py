@@ -17,7 +17,7 @@ from alphacut.frame import Accelerogram, Envelope, Exact, LinearFlow, StoreyFram
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.methods.auto import ToleranceError
 from alphacut.fuzzy import FuzzyNumber, Triangular
-from benchmarks.frame.reference import true_envelope
+from benchmarks.frame.references.polished_search import true_envelope
 from benchmarks.rows import write
 
 RESULTS = Path(__file__).parents[1] / "results"

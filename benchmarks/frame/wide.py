@@ -17,7 +17,7 @@ from alphacut.frame import Envelope, Exact, LinearFlow, StoreyFrame, envelope
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.fuzzy import FuzzyNumber, Triangular
 from benchmarks.frame.envelopes import FRAME, INPUTS
-from benchmarks.frame.reference import TrueEnvelope, true_envelope
+from benchmarks.frame.references.polished_search import TrueEnvelope, true_envelope
 from benchmarks.rows import write
 
 RESULTS = Path(__file__).parents[1] / "results"

@@ -14,7 +14,7 @@ from alphacut.io.problem import BadInput
 from alphacut.stages.material.measured_modulus import measured_values
 from alphacut.stages.material.modulus import stand_in
 from alphacut.stages.vibration.accelerogram import accelerogram
-from benchmarks.frame.synthetic_record import SyntheticRecord, text
+from benchmarks.synthetic_record import SyntheticRecord, text
 
 CASES = Path(__file__).parents[3] / "cases"
 PAPER = (CASES / "paper.toml").read_text(encoding="utf-8")

@@ -8,7 +8,7 @@ import pytest
 from alphacut.frame import LagrangianFlow, pendulum
 from alphacut.frame.methods.auto import ToleranceError
 from benchmarks.frame import pendulum as frame_pendulum
-from benchmarks.frame.pendulum_reference import PARAMETERS, Swing
+from benchmarks.frame.references.swing import PARAMETERS, Swing
 
 LOW, HIGH = np.array([number.cut(0) for number in frame_pendulum.inputs("wide").values()]).T
 

@@ -1,6 +1,6 @@
 """Synthetic earthquake record: noise in the spectrum of Kanai and Tajimi.
 
-    python -m benchmarks.frame.synthetic_record > cases/building.record.csv
+    python -m benchmarks.synthetic_record > cases/building.record.csv
 
 The spectrum is that of Kanai and Tajimi with the high-pass of Clough and Penzien (Dynamics of
 Structures, 1975), the amplitude rises, stays and fades like a moderate earthquake. The seed is
@@ -73,7 +73,7 @@ def text(record: SyntheticRecord) -> str:
         f"{t:.2f},{a:.5f}\n" for t, a in zip(record.time, record.acceleration(), strict=True)
     )
     return (
-        f"# synthetic: made by python -m alphacut.synthetic_record, seed {record.seed}\ntime"
+        f"# synthetic: made by python -m benchmarks.synthetic_record, seed {record.seed}\ntime"
         f" [s],acceleration [m/s^2]\n{rows}"
     )
 

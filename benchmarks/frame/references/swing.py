@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet
-from benchmarks.frame.reference import PolishedSearch
+from benchmarks.frame.references.polished_search import PolishedSearch
 
 PARAMETERS = ("m", "l", "d", "g", "phi_0", "omega_0")
 CHUNK = 2000
