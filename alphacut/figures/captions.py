@@ -20,6 +20,8 @@ FIGURES = {
     "modulus": "Fuzzy effective modulus",
     "image": "The image, the error of its two fields pixel by pixel, and the bounds of E",
     "membership": "Membership function of a fuzzy parameter and one of its α-cuts",
+    "fuzzy-sets": "Crisp, interval, triangular, trapezoidal and non-convex fuzzy sets",
+    "cuts": "A triangular fuzzy number, decomposed into α-cuts",
     "mapping": "Fuzzy mapping: trajectories inside an α-cut, and the envelope that encloses them",
     "graph-follower": "The Graph Follower, step by step",
     "record": "Acceleration of the ground",

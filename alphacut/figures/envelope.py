@@ -66,7 +66,7 @@ def drawings(study: Study, dataset: xarray.Dataset) -> Iterator[tuple[str, Calla
 
 def envelope(dataset: xarray.Dataset, output: str, study: Study) -> Figure:
     """Nested bands between lower and upper envelope, and the modal trajectory."""
-    from alphacut.frame.outputs import output_unit
+    from alphacut.frame.outputs import output_unit, output_words
 
     drawn, axes = figure(7.2, 3.6)
     shown = dataset.sel(output=output)
@@ -83,7 +83,8 @@ def envelope(dataset: xarray.Dataset, output: str, study: Study) -> Figure:
     # letters mean something else in a pendulum
     known = WORDS if output.startswith(("q", "v", "a", "drift", "shear", "base", "roof")) else {}
     words = ", ".join(known.get(name, name) for name in study.task.fuzzy)
-    axes.set_title(fill(f"{output}, fuzzy {words}", 84), loc="left", fontsize=10)
+    title = f"{output_words(output)}; fuzzy: {words}"
+    axes.set_title(fill(title, 84), loc="left", fontsize=10)
     alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return drawn
 

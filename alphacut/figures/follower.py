@@ -30,9 +30,8 @@ def follower(results: Results, study: Study) -> Figure:
     from alphacut.frame.outputs import output_unit
 
     found, output = recorded(results, study)
-    drawn, grid = plt.subplots(3, 2, figsize=(9.6, 9.0), sharex=True, sharey=True)
-    panels = list(grid.ravel())
-    panels[-1].axis("off")
+    drawn, named = plt.subplot_mosaic("12;34;55", figsize=(8.4, 8.4), sharex=True, sharey=True)
+    panels = [named[letter] for letter in "12345"]
     new = [step for step in found.steps if step.found >= 0]
     first = [step for step in new if step.node == new[0].node]
     later = next(
@@ -59,11 +58,9 @@ def follower(results: Results, study: Study) -> Figure:
             loc="left",
             fontsize=9,
         )
-    for panel in (panels[4], panels[3]):
-        panel.set_xlabel("time t, s")
-        panel.tick_params(labelbottom=True)
-    for row in range(3):
-        prefix_axis(grid[row, 0], output, output_unit(output))
+    panels[4].set_xlabel("time t, s")
+    for panel in panels[::2]:
+        prefix_axis(panel, output, output_unit(output))
     return drawn
 
 

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from alphacut.stochastic.tessellation.apollonius import Apollonius
     from alphacut.stochastic.tessellation.delaunay import Neighbours
 
+REDUCED = "reduced radius $r_n$ = r/a"
+"""Name of the axis."""
+
 
 def draw_radii(radii: Array, law: RadiusLaw | None) -> Figure:
     """Distribution function of the radii, and their law if there is one (Fig. 11)."""
@@ -85,7 +88,7 @@ def draw_correlation(found: Microstructure, equal: Apollonius) -> Figure:
             [neighbouring_values(one, one.reduced_radii) for one in shown], axis=1
         )
         axes.hist2d(*pairs, bins=80, cmap="Blues", range=[np.quantile(pairs, (0.0005, 0.9995))] * 2)
-        axes.set(xlabel="r_n of a cell", ylabel="r_n of a neighbour", aspect="equal")
+        axes.set(xlabel="reduced radius of a cell", ylabel="that of a neighbour", aspect="equal")
         axes.set_title(f"{title}: correlation {np.corrcoef(pairs)[0, 1]:+.3f}")
         axes.grid(visible=False)
     return drawn
@@ -109,11 +112,10 @@ def draw_areas(found: Microstructure) -> Figure:
     axes.text(
         bound, axes.get_ylim()[1], "disc larger\nthan its cell ", ha="right", va="top", color=GREY
     )
-    axes.set(xlabel="r_n = r/a", ylabel="area of the cell [mm²]", xlim=(0, bound + 0.07))
-    axes.set_title(
-        f"limits {found.limits[0]:.4g} and {found.limits[1]:.4g} keep {found.share_kept:.2%} of the"
-        " area"
-    )
+    axes.set(xlabel=REDUCED, ylabel="area of the cell [mm²]", xlim=(0, bound + 0.07))
+    low, high = found.limits
+    kept = f"{100 * found.share_kept:.2f} % of the area"
+    axes.set_title(f"limits {low:.4g} and {high:.4g} keep {kept}")
     return drawn
 
 
@@ -142,7 +144,7 @@ def draw_pbox(found: Microstructure) -> Figure:
         panel.plot(radius, scale * (table["pbox_upper"] - base), color=INK, lw=1, label="p-box")
         panel.plot(radius, scale * (table["pbox_lower"] - base), color=INK, lw=1)
     axes.set(ylabel="area-weighted share", ylim=(0, 1.02))
-    apart.set(xlabel="r_n = r/a", ylabel="less the fit [%]")
+    apart.set(xlabel=REDUCED, ylabel="less the fit [%]")
     axes.legend(loc="upper left")
     return drawn
 
@@ -163,6 +165,6 @@ def draw_map(found: Microstructure) -> Figure:
         label=f"a2 = {box.a2[1]:.4f}, a4 = {box.a4[1]:.4f}",
     )
     axes.fill_between(theta, *box.bounds(theta), color=GREY, alpha=0.4, lw=0, label="fuzzy a2, a4")
-    axes.set(xlabel="θ [1]", ylabel="r_n = r/a", ylim=(0, 1))
+    axes.set(xlabel="θ, standard deviations", ylabel=REDUCED, ylim=(0, 1))
     axes.legend()
     return drawn

@@ -188,3 +188,13 @@ def test_generated_pages_are_up_to_date():
     ]
     assert len(names) > 10
     assert all(f"| `{name}()` |" in text for name in names)
+
+
+def test_the_gallery_shows_every_figure_of_the_paper_that_holds_data():
+    page = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    shown = re.findall(r"^## Figs?\. (\d+)(?: to (\d+))?: ", page, flags=re.MULTILINE)
+    numbers = [n for first, last in shown for n in range(int(first), int(last or first) + 1)]
+    assert set(numbers) == set(range(3, 38))
+    pictures = re.findall(r"\]\((pictures/gallery/[^)]+)\)", page)
+    assert len(pictures) == len(shown)
+    assert all((ROOT / "docs" / name).is_file() for name in pictures)
