@@ -10,7 +10,13 @@ from alphacut.rve.mesh.planar import TouchingError
 from alphacut.rve.settings import require_mesh_size, require_radius
 
 _CLOSEST = 0.97
+_FINER = (1.0, 0.8, 0.65, 0.5)
+_SOUND = 0.1  # least scaled Jacobian of an element
 MATRIX, SPHERE = 1, 2
+
+
+class CurvedMeshError(RuntimeError):
+    """Curved elements that overlap themselves."""
 
 
 def octant(radius: float, *, size: float, comm: MPI.Comm = MPI.COMM_SELF) -> gmshio.MeshData:
@@ -24,6 +30,7 @@ def octant(radius: float, *, size: float, comm: MPI.Comm = MPI.COMM_SELF) -> gms
     Raises:
         ValueError: A value out of range.
         TouchingError: Spheres nearly touch.
+        CurvedMeshError: Curved elements stay folded however fine the mesh is.
     """
     require_radius(radius)
     require_mesh_size(size)
@@ -35,11 +42,26 @@ def octant(radius: float, *, size: float, comm: MPI.Comm = MPI.COMM_SELF) -> gms
     gmsh.initialize(["", "-v", "1"], readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.setNumber("General.NumThreads", 1)
+        gmsh.option.setNumber("General.Terminal", 0)  # errors are raised, the rest is not for here
         if comm.rank == 0:
-            _generate(radius, size)
+            _generate_sound(radius, size)
         return gmshio.model_to_mesh(gmsh.model, comm, 0, gdim=3)
     finally:
         gmsh.finalize()
+
+
+def _generate_sound(radius: float, size: float) -> None:
+    """The mesh, finer than asked for where curved elements would fold."""
+    for finer in _FINER:
+        gmsh.clear()
+        _generate(radius, finer * size)
+        elements = gmsh.model.mesh.getElements(3)[1][0]
+        if min(gmsh.model.mesh.getElementQualities(elements, "minSJ")) > _SOUND:
+            return
+    raise CurvedMeshError(
+        f"curved elements fold at radius {radius:.6g} and mesh size {size:.3g}: take another mesh"
+        " size"
+    )
 
 
 def _generate(radius: float, size: float) -> None:

@@ -1,14 +1,14 @@
 """Cubic stiffness of the cell of a sphere by finite elements on one eighth of it.
 
-Reflections turn the periodic cell into Dirichlet problems on [0, 1]³: under axial strains the
-normal displacement of each face is given, under ε12 what the reflection leaves. The energy of the
-solution is the modulus, from above, up to the geometry: curved tetrahedra of second order.
+Reflections turn the periodic cell into Dirichlet problems on [0, 1]³, see `faces`. The energy of
+the solution is the modulus, from above, up to the geometry: curved tetrahedra of second order.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from time import perf_counter
 
 import alphacut.rve.petsc  # noqa: F401
 
@@ -22,18 +22,14 @@ from petsc4py import PETSc
 
 from alphacut.rve.cell import Phase
 from alphacut.rve.spheres.bounds import bulk_and_shear
+from alphacut.rve.spheres.fem.faces import LOADS, Faces, Load, on_faces
+from alphacut.rve.spheres.fem.multigrid import TwoSpaces
 from alphacut.rve.spheres.fem.octant import MATRIX, SPHERE, octant
 from alphacut.stochastic.theta.truncated_normal import Array
 
 COARSER = 1.5  # edge length of the second mesh over the first
 _SAFETY = 1.5
-# faces (axis, side) → displacement components given there, and their value at unit strain
-AXIAL = {(axis, side): {axis: float(side)} for axis in range(3) for side in (0, 1)}
-SHEAR = {
-    **{(0, side): {1: side / 2, 2: 0.0} for side in (0, 1)},
-    **{(1, side): {0: side / 2, 2: 0.0} for side in (0, 1)},
-    **{(2, side): {2: 0.0} for side in (0, 1)},
-}
+RTOL = 1e-8  # of the residual; what is left of the energy is of the order of its square
 
 
 @dataclass(frozen=True)
@@ -44,11 +40,138 @@ class OctantSolution:
         moduli: K, (C11 − C12)/2 and C44 in Pa, shape (3,).
         unknowns: Displacements of the mesh.
         iterations: Of conjugate gradients, one number a load.
+        seconds: Wall time by stage: assemble, setup, solve.
     """
 
     moduli: Array
     unknowns: int
     iterations: tuple[int, ...]
+    seconds: dict[str, float] = field(default_factory=dict)
+
+
+class OctantCell:
+    """One mesh with its quadratic and linear elements, for any materials.
+
+    Args:
+        radius: Radius over half the cell's side, in (0, 0.97].
+        size: Edge length in halves of the cell's side, in (0, 1].
+        comm: Ranks that share the mesh.
+
+    Raises:
+        ValueError: A value out of range.
+        TouchingError: Spheres nearly touch.
+    """
+
+    def __init__(self, radius: float, *, size: float, comm: MPI.Comm = MPI.COMM_SELF) -> None:
+        self.mesh, self._tags = octant(radius, size=size, comm=comm)[:2]
+        self.fine, self.coarse = (
+            fem.functionspace(self.mesh, ("Lagrange", degree, (3,))) for degree in (2, 1)
+        )
+        constant = fem.functionspace(self.mesh, ("DG", 0))
+        self._lame, self._shear = fem.Function(constant), fem.Function(constant)
+        self._displacement = fem.Function(self.fine)
+        self._energy = fem.form(self._form(self._displacement, self._displacement))
+        self._forms = [
+            fem.form(self._form(ufl.TrialFunction(space), ufl.TestFunction(space)))
+            for space in (self.fine, self.coarse)
+        ]
+        self._prolongation = petsc.interpolation_matrix(self.coarse, self.fine)
+        self._prolongation.assemble()
+
+    @property
+    def unknowns(self) -> int:
+        """Displacements of the quadratic elements, on all ranks."""
+        return int(3 * self.fine.dofmap.index_map.size_global)
+
+    def _form(self, u: ufl.core.expr.Expr, v: ufl.core.expr.Expr) -> ufl.Form:
+        """Twice the energy, of stiffness over that of the matrix."""
+        dx = ufl.Measure("dx", self.mesh, metadata={"quadrature_degree": 4})
+        strain, other = ufl.sym(ufl.grad(u)), ufl.sym(ufl.grad(v))
+        stretch = self._lame * ufl.div(u) * ufl.div(v)
+        return (2 * self._shear * ufl.inner(strain, other) + stretch) * dx
+
+    def solve(self, matrix: Phase, inclusion: Phase, *, rtol: float = RTOL) -> OctantSolution:
+        """The three moduli for one pair of materials.
+
+        Raises:
+            ConvergenceError: An iteration does not converge.
+        """
+        self._set(matrix, inclusion)
+        started = perf_counter()
+        stiffness = [petsc.assemble_matrix(form) for form in self._forms]
+        for one in stiffness:
+            one.assemble()
+        seconds = {"assemble": perf_counter() - started, "setup": 0.0, "solve": 0.0}
+        moduli, iterations = [], []
+        for faces, loads in LOADS:
+            for value, steps in self._under(faces, loads, stiffness, rtol, seconds):
+                moduli.append(matrix.modulus * value)
+                iterations.append(steps)
+        for one in stiffness:
+            one.destroy()
+        return OctantSolution(np.array(moduli), self.unknowns, tuple(iterations), seconds)
+
+    def _set(self, matrix: Phase, inclusion: Phase) -> None:
+        """Lamé's constants of the cells, over Young's modulus of the matrix."""
+        for tag, phase in ((MATRIX, matrix), (SPHERE, inclusion)):
+            bulk, shear = (value / matrix.modulus for value in bulk_and_shear(phase))
+            cells = self._tags.find(tag)
+            self._lame.x.array[cells], self._shear.x.array[cells] = bulk - 2 / 3 * shear, shear
+
+    def _under(
+        self,
+        faces: Faces,
+        loads: Sequence[Load],
+        stiffness: Sequence[PETSc.Mat],
+        rtol: float,
+        seconds: dict[str, float],
+    ) -> list[tuple[float, int]]:
+        """Modulus over that of the matrix and iterations of each load on the same faces."""
+        started = perf_counter()
+        fine, coarse = (matrix.copy() for matrix in stiffness)
+        between = self._prolongation.copy()
+        fixed = [on_faces(space, faces)[0] for space in (self.fine, self.coarse)]
+        free = [_without(matrix, dofs) for matrix, dofs in zip((fine, coarse), fixed, strict=True)]
+        between.diagonalScale(*free)
+        nodes = self.coarse.tabulate_dof_coordinates()[: self.coarse.dofmap.index_map.size_local]
+        solver = TwoSpaces(fine, coarse, prolongation=between, nodes=nodes, rtol=rtol)
+        seconds["setup"] += perf_counter() - started
+        started = perf_counter()
+        found = [self._solved(load, faces, stiffness[0], free[0], solver) for load in loads]
+        seconds["solve"] += perf_counter() - started
+        for item in (solver, fine, coarse, between, *free):
+            item.destroy()
+        return found
+
+    def _solved(
+        self, load: Load, faces: Faces, stiffness: PETSc.Mat, free: PETSc.Vec, solver: TwoSpaces
+    ) -> tuple[float, int]:
+        """Modulus and iterations of one load."""
+        given = fem.Function(self.fine)
+        dofs, values = on_faces(self.fine, faces, load.strain)
+        given.x.array[dofs] = values
+        right, whole = stiffness.createVecLeft(), self._displacement.x.petsc_vec
+        stiffness.mult(given.x.petsc_vec, right)
+        right.pointwiseMult(right, free)
+        right.scale(-1)
+        whole.set(0.0)
+        steps = solver.solve(right, whole)
+        whole.axpy(1.0, given.x.petsc_vec)
+        self._displacement.x.scatter_forward()
+        right.destroy()
+        energy = self.mesh.comm.allreduce(fem.assemble_scalar(self._energy))
+        return float(energy / load.unit), steps
+
+
+def _without(matrix: PETSc.Mat, dofs: Array) -> PETSc.Vec:
+    """Rows and columns of given displacements made those of the identity; 1 at the free ones."""
+    first, last = matrix.getOwnershipRange()
+    own = dofs[dofs < last - first]
+    matrix.zeroRowsColumns((first + own).astype(np.int32))
+    free = matrix.createVecLeft()
+    free.set(1.0)
+    free.array[own] = 0.0
+    return free
 
 
 def octant_stiffness(
@@ -58,7 +181,7 @@ def octant_stiffness(
     *,
     size: float = 0.2,
     comm: MPI.Comm = MPI.COMM_SELF,
-    rtol: float = 1e-10,
+    rtol: float = RTOL,
 ) -> OctantSolution:
     """The three moduli of one cell on one mesh.
 
@@ -71,96 +194,22 @@ def octant_stiffness(
         rtol: Relative residual at which the iteration ends.
 
     Raises:
-        RuntimeError: The iteration does not converge.
+        ConvergenceError: The iteration does not converge.
     """
-    mesh, tags = octant(radius, size=size, comm=comm)[:2]
-    space = fem.functionspace(mesh, ("Lagrange", 2, (3,)))
-    trial, test = ufl.TrialFunction(space), ufl.TestFunction(space)
-    dx = ufl.Measure("dx", mesh, subdomain_data=tags, metadata={"quadrature_degree": 4})
-
-    def energy(u: ufl.core.expr.Expr, v: ufl.core.expr.Expr) -> ufl.Form:
-        total = 0
-        for tag, phase in ((MATRIX, matrix), (SPHERE, inclusion)):
-            bulk, shear = bulk_and_shear(phase)
-            strain, other = ufl.sym(ufl.grad(u)), ufl.sym(ufl.grad(v))
-            stress = 2 * shear * strain + (bulk - 2 / 3 * shear) * ufl.tr(strain) * ufl.Identity(3)
-            total += ufl.inner(stress, other) * dx(tag)
-        return total
-
-    form = fem.form(energy(trial, test))
-    found, iterations = [], []
-    loads = ((AXIAL, (1, 1, 1), 9.0), (AXIAL, (-1, -1, 2), 12.0), (SHEAR, (1, 1, 1), 1.0))
-    for faces, strain, unit in loads:
-        given = [
-            _given(space, axis, side, component, value * strain[component])
-            for (axis, side), values in faces.items()
-            for component, value in values.items()
-        ]
-        solution, steps = _solved(form, space, given, rtol)
-        value = fem.assemble_scalar(fem.form(energy(solution, solution)))
-        found.append(comm.allreduce(value) / unit)
-        iterations.append(steps)
-    unknowns = space.dofmap.index_map.size_global * 3
-    return OctantSolution(np.array(found), unknowns, tuple(iterations))
+    return OctantCell(radius, size=size, comm=comm).solve(matrix, inclusion, rtol=rtol)
 
 
 def cubic_stiffness_by_elements(
-    radius: float, matrix: Phase, inclusion: Phase, *, size: float = 0.2
+    radius: float, matrix: Phase, inclusions: Sequence[Phase], *, size: float = 0.2
 ) -> tuple[Array, Array]:
-    """The moduli on the finer of two meshes, and their declared relative errors, shape (3,) each.
+    """The moduli on the finer of two meshes, and their declared relative errors, (m, 3) each.
 
     The meshes' edge lengths differ by a factor of 1.5; the largest distance of any modulus, times
     1.5, is the error of each, for one alone may be near by chance.
     """
     fine, coarse = (
-        octant_stiffness(radius, matrix, inclusion, size=h).moduli for h in (size, COARSER * size)
+        np.array([cell.solve(matrix, phase).moduli for phase in inclusions])
+        for cell in (OctantCell(radius, size=h) for h in (size, min(1.0, COARSER * size)))
     )
-    return fine, np.full(3, _SAFETY * np.abs(coarse / fine - 1).max())
-
-
-def _given(
-    space: fem.FunctionSpace, axis: int, side: int, component: int, value: float
-) -> fem.DirichletBC:
-    """One displacement component on one face of the cube."""
-    part, _ = space.sub(component).collapse()
-    dofs = fem.locate_dofs_geometrical(
-        (space.sub(component), part), lambda x: np.isclose(x[axis], side, atol=1e-9)
-    )
-    constant = fem.Function(part)
-    constant.x.array[:] = value
-    return fem.dirichletbc(constant, dofs, space.sub(component))
-
-
-def _solved(
-    form: fem.Form, space: fem.FunctionSpace, given: Sequence[fem.DirichletBC], rtol: float
-) -> tuple[fem.Function, int]:
-    """Displacement under given faces, by conjugate gradients with algebraic multigrid."""
-    matrix = petsc.assemble_matrix(form, bcs=list(given))
-    matrix.assemble()
-    zero = fem.Function(space)
-    right = petsc.create_vector(fem.form(ufl.inner(zero, ufl.TestFunction(space)) * ufl.dx))
-    petsc.apply_lifting(right, [form], bcs=[list(given)])
-    right.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-    petsc.set_bc(right, list(given))
-    coordinates = space.tabulate_dof_coordinates()[: space.dofmap.index_map.size_local]
-    solver = PETSc.KSP().create(matrix.comm)
-    solver.setOperators(matrix)
-    solver.setType("cg")
-    solver.getPC().setType("gamg")
-    solver.getPC().setCoordinates(coordinates)
-    solver.setTolerances(rtol=rtol, max_it=2000)
-    solver.setErrorIfNotConverged(True)
-    solver.setFromOptions()
-    solution = fem.Function(space)
-    try:
-        solver.solve(right, solution.x.petsc_vec)
-    except PETSc.Error:
-        raise RuntimeError(
-            f"conjugate gradients end after {solver.getIterationNumber()} iterations with reason"
-            f" {solver.getConvergedReason()}: take a coarser mesh or a lower contrast"
-        ) from None
-    solution.x.scatter_forward()
-    steps = solver.getIterationNumber()
-    for item in (solver, matrix, right):
-        item.destroy()
-    return solution, steps
+    gap = np.abs(coarse / fine - 1).max(axis=1, keepdims=True)
+    return fine, np.broadcast_to(_SAFETY * gap, fine.shape)
