@@ -105,41 +105,29 @@ class Modal:
             ModalError: The structure has no smooth oscillating modes over the box.
             ValueError: The flow is not that of a linear structure.
         """
-        linear, begun = flow.flow, time.perf_counter()
-        if not isinstance(linear, LinearFlow):
-            raise ValueError("method: 'modal' needs a linear structure; take graph-follower")
-        if self.certify is not None and not isinstance(linear.integrator, Exact):
-            raise ValueError(
-                f"certify: with the integrator '{linear.integrator.name}' nothing is proved, since"
-                " a proof is of the exact motion; take the integrator exact"
-            )
+        linear, begun = self._linear(flow), time.perf_counter()
         if self.certify is not None:
             return _certified(flow, self, self.certify, begun, progress)
         model = fit_modes(
             linear, flow.boxes, tolerance=self.tolerance, budget=self.budget, scale=flow.scale
         )
-        exact = self._exact(model, flow)
+        exact, points = self._exact(model, flow), 0
         guided = progress and (lambda share: progress(GUIDED * share if exact else share))
         bounds, at, left = search_levels(
             flow, model, self.seed, self.tolerance, guided, guide=exact is not None
         )
-        points = 0
         if exact is None:
             model, points = judged_at_optima(model, at, self.seed)
             exact = self._exact(model, flow)
-        error = polynomial_error(model) + left.max(-1)
-        facts: dict[str, float | str] = {"degree": model.degree}
         if exact is not None:
             polished = progress and (lambda share: progress(GUIDED + (1 - GUIDED) * share))
             bounds, at, left = polished_levels(flow, exact, at, self.seed, self.tolerance, polished)
             error = left.max(-1)
-            facts["bounds"] = EXACT
+            facts: dict[str, float | str] = {"degree": model.degree, "bounds": EXACT}
         else:
-            facts["model_error"] = float(model.error.max())
-            facts["judged_by"] = f"trajectories at {points} optima, corners and random points"
+            error = polynomial_error(model) + left.max(-1)
+            facts = _judged(model, points, self.tolerance, flow.scale)
         facts["search_error"] = float((left.max(-1) / flow.scale).max())
-        if exact is None and (short := _short_of(model, self.tolerance, flow.scale)) is not None:
-            facts["reason"] = short
         return signed_envelope(
             flow,
             bounds,
@@ -151,6 +139,18 @@ class Modal:
             trajectories=model.analyses,
             seconds=time.perf_counter() - begun,
         )
+
+    def _linear(self, flow: UnitFlow) -> LinearFlow:
+        """The flow of a linear structure whose integrator allows what is asked for."""
+        linear = flow.flow
+        if not isinstance(linear, LinearFlow):
+            raise ValueError("method: 'modal' needs a linear structure; take graph-follower")
+        if self.certify is not None and not isinstance(linear.integrator, Exact):
+            raise ValueError(
+                f"certify: with the integrator '{linear.integrator.name}' nothing is proved, since"
+                " a proof is of the exact motion; take the integrator exact"
+            )
+        return linear
 
     def _exact(self, model: ModalModel, flow: UnitFlow) -> ExactResponse | None:
         """What polishes the bounds; None where the polynomials do, or nothing can."""
@@ -168,6 +168,19 @@ def _nature(flow: UnitFlow, exact: ExactResponse | None) -> str:
     """Worth of the error: that of a search without a guide, or in many dimensions, is less."""
     led = len(flow.boxes.names) <= MANY and (exact is None or exact.bent)
     return "estimated" if led else "searched"
+
+
+def _judged(
+    model: ModalModel, points: int, tolerance: float, scale: Array
+) -> dict[str, float | str]:
+    """Facts of bounds that polynomials give, judged at a number of points."""
+    facts: dict[str, float | str] = {
+        "degree": model.degree,
+        "model_error": float(model.error.max()),
+        "judged_by": f"trajectories at {points} optima, corners and random points",
+    }
+    short = _short_of(model, tolerance, scale)
+    return facts if short is None else facts | {"reason": short}
 
 
 def _short_of(model: ModalModel, tolerance: float, scale: Array) -> str | None:
