@@ -87,11 +87,11 @@ class Envelope:
       order: Degree of its Taylor models. recomputed: Derivatives computed again.
       corners: Trajectories at corners, beside `trajectories`.
     - degree: Of the polynomials of the modes. model_error: What trajectories of theirs are wrong by
-      at most at held-out parameters, over all outputs; of a certified envelope the bound that went
-      into it, in the unit.
+      at most at held-out parameters, the optima found and the corners of the box, over all outputs;
+      of a certified envelope the bound that went into it, in the unit.
     - search_error: What the search may have missed, at most, in the unit: what Newton's method
-      still promises and what the last independent pass gained; the rest of `error` is that of the
-      polynomials and of time stepping.
+      still promises and three times what the last independent pass gained; the rest of `error` is
+      that of the polynomials and of time stepping.
     - estimated_error: Largest error, in the unit. second_pass: By how much the bounds
       of two passes that share no starting points differ, in the unit.
     - gap: Largest distance of attained and proved bounds, in the unit, which is that of gap_output.
