@@ -24,7 +24,12 @@ from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.modal.fitting import fit_states
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.structures.linear import evaluate
-from alphacut.frame.structures.polynomial_dependence import UnprovedError, degrees, without_ratio
+from alphacut.frame.structures.polynomial_dependence import (
+    UnprovedError,
+    accelerations,
+    degrees,
+    without_ratio,
+)
 
 MOST_NUMBERS = 120_000_000
 """Values of the defects on their grid, at most: 1 GB."""
@@ -59,7 +64,9 @@ def proved_error(model: ModalModel) -> Array:
         for k in range(model.count):
             force = mass.sup_dual(defect["dynamic"][:, k])
             if ratio is not None:
-                force += ratio.missed(defect, k, stiffness, mass)
+                damped = ratio.missed(defect, k, stiffness, mass)
+                force += damped
+                own += 2 * part.waves[0][:, k : k + 1] * damped / ratio.root_masses
             missed = np.hypot(stiffness.sup(defect["kinematic"][:, k]), force)
             deviation += 2 * missed * part.elapsed[:, k]
         largest = suprema(part.share, reach)[0].reshape(model.count, m)
@@ -70,9 +77,11 @@ def proved_error(model: ModalModel) -> Array:
         )
     size = len(stiffness.factor)
     rows = np.moveaxis(structure["rows"], 1, 0)  # (m, J, 2N)
-    reading = np.array(
-        [np.hypot(stiffness.sup_dual(row[:, :size]), mass.sup_dual(row[:, size:])) for row in rows]
-    )
+    moved = np.array([stiffness.sup_dual(row[:, :size]) for row in rows])
+    speeding = np.array([mass.sup_dual(row[:, size:]) for row in rows])
+    if ratio is not None:
+        speeding = speeding + ratio.read(stiffness, mass)
+    reading = np.hypot(moved, speeding)
     bound: Array = deviation[:, None] * reading + own
     return bound
 
@@ -110,9 +119,9 @@ def _expanded(grid: ChebyshevGrid, sample: Callable[[Array], dict[str, Array]]) 
 
 def _structure(model: ModalModel, unit: Array) -> dict[str, Array]:
     """The matrices that measure what the motion misses."""
-    matrices, rows = evaluate(
-        model.flow.system, model.flow.names, model.boxes.to_physical(unit), derivatives=False
-    )
+    system = without_ratio(model.flow.system)  # whose damping is a polynomial
+    points = model.boxes.to_physical(unit)
+    matrices, rows = evaluate(system, model.flow.names, points, derivatives=False)
     return {"mass": matrices.mass.value, "stiffness": matrices.stiffness.value, "rows": rows.value}
 
 
@@ -142,4 +151,6 @@ def _defects(
     if ratio is not None:
         more, own = ratio.defects(unit, points, speed, M, K)
         defects |= {**own, "dynamic": defects["dynamic"] + more}
+        for place, floor in accelerations(system).items():
+            defects["outputs"][..., place] += more[..., floor] / M[:, None, floor, floor]
     return defects

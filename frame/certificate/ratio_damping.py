@@ -4,11 +4,16 @@ For any number μ > 0 and vector w, in the norm of M⁻¹,
 ‖2 ζ M √(M⁻¹K) w − 2 ζ √μ M w‖ ≤ 2 ζ / (√λ + √μ) ‖(K − μ M) w‖ with λ the least eigenvalue of K
 against M. With polynomials μ and σ ≈ √μ the motion is measured with 2 ζ σ M w in place of the
 damping; the rest is bounded by this and by |√μ − σ| ≤ |μ − σ²| / (√μ + σ).
+
+The acceleration of a floor of mass m holds the damping force f on it over m, at most ‖f‖ / √m in
+the norm of M⁻¹. Of a velocity v it is at most 2 ζ ω ‖v‖ / √m, in the norm of M, with the largest
+frequency ω.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -18,7 +23,11 @@ from alphacut.frame.calculus.polynomial import Polynomial, fit
 from alphacut.frame.modal.analyses import analyse
 from alphacut.frame.modal.fitting import fit_points
 from alphacut.frame.modal.model import ModalModel
-from alphacut.frame.structures.polynomial_dependence import UnprovedError, common_ratio
+from alphacut.frame.structures.polynomial_dependence import (
+    UnprovedError,
+    accelerations,
+    common_ratio,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +75,11 @@ class Comparison:
             )[0]
         )
         return self.lowest / other.highest * middle
+
+    def most(self, other: Comparison) -> float:
+        """Upper bound over the box of the eigenvalues of A against another matrix B."""
+        between = np.linalg.solve(other.factor, self.factor)
+        return self.highest / other.lowest * float(np.linalg.norm(between, 2)) ** 2
 
     def sup(self, coefficients: Array) -> float:
         """Bound of √(x* A x) over the box from the coefficients of x, shape (J, N)."""
@@ -139,6 +153,27 @@ class RatioDamping:
         force = 2 * (zeta[:, None] * frequency)[..., None] * (speed @ M)
         own = speed @ K - squared[..., None] * (speed @ M)
         return force, {"own": own, "root": squared - frequency**2, "speed": speed}
+
+    def read(self, stiffness: Comparison, mass: Comparison) -> Array:
+        """Bound of the damping force over a floor's mass, over ‖v‖ in the norm of M, (m,)."""
+        fastest = np.sqrt(stiffness.most(mass))
+        bound: Array = 2 * self.largest * fastest / self.root_masses
+        return bound
+
+    @cached_property
+    def root_masses(self) -> Array:
+        """√m of the floor whose acceleration an output is, least over the box; else ∞, (m,)."""
+        system, boxes = self.model.flow.system, self.model.boxes
+        roots = np.full(len(self.model.outputs), np.inf)
+        for place, floor in accelerations(system).items():
+            name = f"m{floor + 1}"
+            least = system.parameters.get(name, np.nan)
+            if name in boxes.names:
+                least = float(boxes.lower[0, boxes.names.index(name)])
+            roots[place] = np.sqrt(least)
+        if not (roots > 0).all():
+            raise UnprovedError("the masses of accelerated floors are not known one by one")
+        return roots
 
     def missed(
         self, defect: dict[str, Array], mode: int, stiffness: Comparison, mass: Comparison

@@ -48,16 +48,27 @@ def degrees(system: LinearSystem, box: Box) -> dict[str, int]:
 
 @degrees.register
 def _(system: StoreyFrame, box: Box) -> dict[str, int]:
-    ratio, masses = common_ratio(system), [name for name in box if name[0] == "m"]
-    if any(name[0] == "a" for name in system.outputs) and (masses or ratio is not None):
-        of = ", ".join(masses) or "the damping ratio"
-        raise UnprovedError(f"an acceleration is a force over a mass, no polynomial in {of}")
+    common_ratio(system)  # raises where modes have their own
     for name, (lower, _) in box.items():
         if (name[0] == "d" or name.startswith(("rayleigh", "zeta"))) and lower < 0:
             raise UnprovedError(
                 f"{name} reaches {lower:g}: a negative damper feeds energy into the structure"
             )
-    return {name: inverse_cube_degree(*ends) if name[0] == "l" else 1 for name, ends in box.items()}
+    found = dict.fromkeys(box, 1)
+    found |= {name: inverse_cube_degree(*ends) for name, ends in box.items() if name[0] == "l"}
+    if accelerations(system):  # forces over masses; forces hold the masses too where weights press
+        own = 1 if system.gravity else 0
+        masses = {name: ends for name, ends in box.items() if name[0] == "m"}
+        if any(name[1] == "_" for name in masses):
+            raise UnprovedError("an acceleration is a force over masses that a field gives")
+        found |= {name: own + inverse_cube_degree(*ends) for name, ends in masses.items()}
+    return found
+
+
+def accelerations(system: LinearSystem) -> dict[int, int]:
+    """Outputs that are accelerations of a storey frame's floors, with the floors, from 0."""
+    named = enumerate(system.outputs) if isinstance(system, StoreyFrame) else ()
+    return {place: int(name[1:]) - 1 for place, name in named if name[0] == "a"}
 
 
 @degrees.register
@@ -119,7 +130,7 @@ def _require_dissipation(
 
 
 def inverse_cube_degree(lower: float, upper: float) -> int:
-    """Degree at which the Chebyshev series of x⁻³ on an interval is round-off.
+    """Degree at which the Chebyshev series of x⁻³ on an interval is round-off, of x⁻¹ too.
 
     Inside the Bernstein ellipse with semi-axes sum ρ > 1 the function stays below M, and what
     follows after degree N is at most 2 M ρ^−N / (ρ − 1) (Trefethen, Approximation Theory and
@@ -128,7 +139,7 @@ def inverse_cube_degree(lower: float, upper: float) -> int:
     share = (upper - lower) / (upper + lower)
     if not 0 <= share < 1:
         raise UnprovedError(
-            f"a length between {lower:g} and {upper:g} m is not positive throughout"
+            f"a length or mass between {lower:g} and {upper:g} is not positive throughout"
         )
     if share == 0:
         return 0
