@@ -107,7 +107,7 @@ def sources() -> set[str]:
         prefix + path.relative_to(ROOT).as_posix()
         for name, prefix in folders.items()
         for path in (ROOT / name).rglob("*")
-        if path.suffix in {".py", ".html", ".css", ".js", ".typed"} or path.name == "py.typed"
+        if path.suffix in {".c", ".py", ".html", ".css", ".js", ".typed"} or path.name == "py.typed"
     }
 
 
