@@ -52,6 +52,8 @@ class Polish:
     ) -> tuple[Array, Array, Array, Array]:
         """Upper bounds of (−output, output) over a box, as `ModalSearch.run` returns them.
 
+        The gain is the larger one of the last two passes.
+
         Args:
             exact: The outputs.
             starts: Unit coordinates to start from, each of shape (T, m, 2, d).
@@ -60,7 +62,7 @@ class Polish:
         """
         *shape, d = starts[0].shape
         found = problems(np.arange(shape[0]), shape[1], d)
-        every, gained = np.arange(len(found.value)), np.zeros(shape[1])
+        every, gains = np.arange(len(found.value)), [np.zeros(shape[1])]
         for points in starts:
             found.offer(exact, np.clip(points.reshape(-1, d), lower, upper), every)
         if (upper > lower).any():
@@ -69,12 +71,13 @@ class Polish:
             for count in range(1, self.passes + 1):
                 before = found.value.copy()
                 moved = self._pass(exact, found, moved, lower, upper, (count, anew))
-                gained = (found.value - before).reshape(shape).max((0, 2))
-                calm = calm + 1 if gained.max() <= self.quiet else 0
+                gains.append((found.value - before).reshape(shape).max((0, 2)))
+                calm = calm + 1 if gains[-1].max() <= self.quiet else 0
                 if calm == CALM_PASSES:
                     break
                 anew = min(4 * anew, len(before))
         value, left = found.value.reshape(shape), found.left.reshape(shape)
+        gained = np.max(gains[-CALM_PASSES:], axis=0)  # one calm pass alone may be luck
         return value, found.point.reshape(*shape, d), left, gained
 
     def _pass(

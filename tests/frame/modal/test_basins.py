@@ -82,6 +82,9 @@ def test_a_second_calm_pass_is_asked_for() -> None:
     assert once[3].max() <= 1e-9  # a pass that meets nothing
     found = Polish(1e-9, 1e-9, graphs=256, seed=9).run(on(hills), starts, -ENDS, ENDS)
     assert (found[0][:, 0, 1] > 1.05).all()
+    for passes in (2, 3):  # the second gains, the third does not: one calm pass says little
+        short = Polish(1e-9, 1e-9, passes=passes, graphs=256, seed=9)
+        assert short.run(on(hills), starts, -ENDS, ENDS)[3].max() > 0.04
 
 
 def test_an_independent_pass_follows_basins_that_stand_behind() -> None:
