@@ -9,6 +9,7 @@ def output_unit(name: str) -> str:
         "drift": "m",
         "v": "m/s",
         "a": "m/s^2",
+        "ar": "m/s^2",
         "shear": "N",
         "base_shear": "N",
         "roof": "m",
@@ -24,6 +25,7 @@ def output_words(name: str) -> str:
         "q": "displacement of floor",
         "v": "velocity of floor",
         "a": "acceleration of floor",
+        "ar": "acceleration relative to the ground of floor",
         "drift": "drift of storey",
         "shear": "shear force of storey",
     }.get(kind)

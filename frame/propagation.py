@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -9,8 +10,9 @@ from dataclasses import replace
 import numpy as np
 
 from alphacut.frame.boxes import ALPHA, UnitFlow, boxes
+from alphacut.frame.calculus.jet import Array
 from alphacut.frame.checks.admissible import require_admissible
-from alphacut.frame.checks.between_nodes import with_stray
+from alphacut.frame.checks.between_nodes import ground_stray, with_stray
 from alphacut.frame.checks.step_error import require_stable, step_error, with_step_error
 from alphacut.frame.checks.tolerance import LIMIT
 from alphacut.frame.dynamics.flow import LinearFlow
@@ -21,7 +23,8 @@ from alphacut.frame.methods.judged import judged
 from alphacut.frame.methods.named import Method, named, options_of
 from alphacut.frame.methods.plan import Candidate, planned
 from alphacut.frame.structures.lagrangian import LagrangianSystem
-from alphacut.frame.structures.linear import LinearSystem
+from alphacut.frame.structures.linear import LinearSystem, relative_to_ground
+from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arguments import fuzzy_inputs
 from alphacut.fuzzy.knowledge.joint import JointClaim
@@ -90,6 +93,11 @@ def envelope(
         UserWarning: The error of time stepping passes a hundredth of a peak; or the method is
             modal, and its error passes that and the tolerance.
     """
+    if isinstance(model, StoreyFrame) and (moved := relative_to_ground(model)):
+        arguments = {"duration": duration, "step": step, "alpha": alpha, "method": method}
+        arguments |= {"integrator": integrator, "relative": relative, "progress": progress}
+        still = envelope(absolute(model), inputs, **arguments, **options)  # type: ignore[arg-type]
+        return shifted(still, model, moved)
     method, way, over, scheme = _prepared(
         model, inputs, duration, step, alpha, method, integrator, relative, options
     )
@@ -124,6 +132,8 @@ def plan(
     Raises:
         ValueError: As `envelope`.
     """
+    if isinstance(model, StoreyFrame):
+        model = absolute(model)
     method, way, over, _ = _prepared(
         model, inputs, duration, step, alpha, method, integrator, relative, options
     )
@@ -158,6 +168,36 @@ def _prepared(
     require_admissible(model, cuts)
     require_stable(flow, cuts)
     return method, way, UnitFlow(flow, cuts, relative), scheme
+
+
+def absolute(model: StoreyFrame) -> StoreyFrame:
+    """The frame with absolute accelerations in place of those relative to the ground."""
+    names = tuple(re.sub(r"^ar(?=\d)", "a", name) for name in model.outputs)
+    return replace(model, outputs=names)
+
+
+def shifted(found: Envelope, model: LinearSystem, moved: Sequence[int]) -> Envelope:
+    """An envelope whose absolute accelerations become relative to the ground.
+
+    The ground's acceleration is known, so that all bounds move alike and stay as proved.
+
+    Args:
+        found: The envelope with absolute accelerations.
+        model: The structure with its outputs.
+        moved: Which outputs are relative.
+    """
+    assert model.ground is not None
+    taken, own = model.ground.at(found.time), ground_stray(model.ground, found.time)
+    names = ("lower", "upper", "inner_lower", "inner_upper", "proved_lower", "proved_upper")
+    changed: dict[str, Array] = {}
+    for name in names:
+        if (band := getattr(found, name)) is not None:
+            changed[name] = band.copy()
+            changed[name][:, :, moved] -= taken[None, :, None]
+    if found.between is not None:
+        changed["between"] = found.between.copy()
+        changed["between"][:, moved] += own[:, None]
+    return replace(found, outputs=model.outputs, **changed)  # type: ignore[arg-type]
 
 
 def _no_structure(model: object) -> str:

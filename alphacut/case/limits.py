@@ -167,7 +167,12 @@ def decision(case: Case) -> Iterator[Problem]:
         return
     try:
         known = frame_outputs(len(case.frame.masses))
-        yield from unknown("decision.limits", limits_of(case), known)
+        limits = limits_of(case)
+        yield from unknown("decision.limits", limits, known)
+        for name in limits if case.frame.accelerogram else ():
+            if name.startswith("ar"):
+                what = f"{name} is relative to the ground, and decisions are on absolute values"
+                yield Problem("decision.limits", what, name, f"a{name[2:]}, or [exceedance]")
     except BadInput as error:
         yield from error.problems
 
@@ -212,7 +217,7 @@ def exceedance(case: Case) -> Iterator[Problem]:
     parts = [text.partition("<=") for text in given.limits]
     names = [name.strip() for name, bound, _ in parts if bound] or [given.output] * (not parts)
     key, known = f"exceedance.{'limits' if given.limits else 'output'}", possible_outputs(case)
-    kinds = "q, v, a, drift, shear with a floor, base_shear" if case.sections.frame else ""
+    kinds = "q, v, a, ar, drift, shear with a floor, base_shear" if case.sections.frame else ""
     strangers = [
         Problem(key, f"there is no output {x}", x, kinds or ", ".join(known), nearest(x, known))
         for x in (names if known else ())

@@ -109,7 +109,7 @@ def named_inputs(case: Case) -> Iterator[tuple[str, tuple[str, ...]]]:
 
 def frame_outputs(floors: int) -> list[str]:
     """Outputs that a storey frame may have."""
-    kinds = ("q", "v", "a", "drift", "shear")
+    kinds = ("q", "v", "a", "ar", "drift", "shear")
     return [f"{kind}{floor + 1}" for kind in kinds for floor in range(floors)] + ["base_shear"]
 
 
@@ -122,7 +122,8 @@ def known_output(case: Case, floors: int) -> Iterator[Problem]:
                 "frame.outputs",
                 f"there is no output {name}",
                 name,
-                f"q, v, a, drift, shear with a floor, base_shear: {', '.join(possible[:floors])} …",
+                "q, v, a, ar, drift, shear with a floor, base_shear:"
+                f" {', '.join(possible[:floors])} …",
                 nearest(name, possible),
             )
     outputs = case.frame.outputs or tuple(possible[:floors])

@@ -14,6 +14,7 @@ from alphacut.frame.dynamics.flow import Flow, LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Envelope
+from alphacut.frame.structures.linear import Accelerogram
 
 PARTS = 4
 """Parts of a step that are looked at in a linear structure; a general one is looked at halfway."""
@@ -55,6 +56,23 @@ def stray(flow: Flow, points: Array) -> Array:
         np.broadcast_to(FLOOR * off.max(0), off.shape),
     ]
     found: Array = np.concatenate([np.zeros((1, off.shape[1])), SAFETY * np.max(spread, 0)])
+    return found
+
+
+def ground_stray(ground: Accelerogram, time: Array) -> Array:
+    """How far the ground's acceleration strays from straight lines between nodes, shape (T,).
+
+    Row j is that of the step that ends at node j; the jump where the record ends counts.
+    """
+    samples = np.arange(len(ground.acceleration)) * ground.step
+    found = np.zeros(len(time))
+    values = ground.at(time)
+    ends = (samples, np.asarray(ground.acceleration)), (samples[-1:], np.zeros(1))
+    for places, accelerations in ends:
+        step = np.searchsorted(time, places * (1 + 1e-12))
+        inside = (step > 0) & (step < len(time))
+        off = np.abs(accelerations - np.interp(places, time, values))[inside]
+        np.maximum.at(found, step[inside], off)
     return found
 
 

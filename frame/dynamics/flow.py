@@ -15,7 +15,12 @@ from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint
 from alphacut.frame.dynamics.record_load import linear_load
 from alphacut.frame.dynamics.spectral import LARGE, NearlyCriticalError, spectral_trajectory
 from alphacut.frame.dynamics.transfer_powers import exact_response, trajectory
-from alphacut.frame.structures.linear import LinearSystem, check_names, evaluate
+from alphacut.frame.structures.linear import (
+    LinearSystem,
+    check_names,
+    evaluate,
+    relative_to_ground,
+)
 
 
 class Flow(Protocol):
@@ -163,6 +168,13 @@ class LinearFlow(March):
         return self.system.outputs
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
+        found = self._absolute(points, derivatives=derivatives)
+        if relative := relative_to_ground(self.system):
+            assert self.system.ground is not None
+            found.value[..., relative] -= self.system.ground.at(self.time)[:, None]
+        return found
+
+    def _absolute(self, points: Array, *, derivatives: bool) -> Jet:
         matrices, rows = evaluate(self.system, self.names, points, derivatives=derivatives)
         exact, ground = isinstance(self.integrator, Exact), self.system.ground
         h, steps = self.step, len(self.time) - 1

@@ -7,7 +7,7 @@ import numpy as np
 from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.structures.linear import evaluate
+from alphacut.frame.structures.linear import evaluate, relative_to_ground
 from alphacut.frame.structures.modes import (
     ModalError,
     Modes,
@@ -37,6 +37,11 @@ def analyse(
     Raises:
         ModalError: The structure has no such modes, or the integrator mixes them.
     """
+    if relative_to_ground(flow.system):
+        raise ModalError(
+            "modal: accelerations relative to the ground, ar1 …, are followed by `envelope` alone;"
+            " take the absolute ones, a1 …"
+        )
     matrices, rows = evaluate(flow.system, flow.names, boxes.to_physical(unit), derivatives=True)
     if states:
         rows = Jet.constant(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -76,6 +77,14 @@ class Accelerogram:
             abs(float(a[-1])),
         )
 
+    def at(self, time: Array) -> Array:
+        """Acceleration at times (T,) in m/s²; where it jumps at the end, what it ends on."""
+        samples = np.arange(len(self.acceleration)) * self.step
+        close = np.minimum(time, samples[-1] * (1 + 1e-12))
+        ended = time > samples[-1] * (1 + 1e-12)
+        found: Array = np.where(ended, 0.0, np.interp(close, samples, self.acceleration))
+        return found
+
     def band(self, share: float = 0.999) -> float:
         """Angular frequency below which `share` of the record's power lies, in rad/s."""
         power = np.cumsum(np.abs(np.fft.rfft(self.acceleration)) ** 2)
@@ -103,6 +112,13 @@ class LinearSystem(Protocol):
 
     def observation(self, p: Mapping[str, Jet]) -> Jet:
         """Rows C(p) with output = C(p) [q; v], shape (S, outputs, 2n)."""
+
+
+def relative_to_ground(system: LinearSystem) -> list[int]:
+    """Outputs that the ground's acceleration must be taken off from: ar1 …, where it moves."""
+    if system.ground is None:
+        return []
+    return [place for place, name in enumerate(system.outputs) if re.fullmatch(r"ar\d+", name)]
 
 
 def evaluate(

@@ -68,7 +68,7 @@ def _(system: StoreyFrame, box: Box) -> dict[str, int]:
 def accelerations(system: LinearSystem) -> dict[int, int]:
     """Outputs that are accelerations of a storey frame's floors, with the floors, from 0."""
     named = enumerate(system.outputs) if isinstance(system, StoreyFrame) else ()
-    return {place: int(name[1:]) - 1 for place, name in named if name[0] == "a"}
+    return {place: int(name.lstrip("ar")) - 1 for place, name in named if name[0] == "a"}
 
 
 @degrees.register

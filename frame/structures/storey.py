@@ -32,7 +32,8 @@ class StoreyFrame:
     (initial displacements), "v1_0" … (initial velocities), "rayleigh_mass", "rayleigh_stiffness",
     and "zeta", or "zeta1" … where each mode has its own ratio.
     Outputs: "q1" … (displacement, m), "v1" … (velocity, m/s), "a1" … (absolute acceleration,
-    m/s²), "drift1" … (q_z − q_(z−1), m), "shear1" … (k_z drift_z, N); "base_shear" is "shear1".
+    m/s²), "ar1" … (acceleration relative to the ground, of trajectories and envelopes alone),
+    "drift1" … (q_z − q_(z−1), m), "shear1" … (k_z drift_z, N); "base_shear" is "shear1".
 
     Args:
         masses: Floors from below, in kg.
@@ -229,7 +230,7 @@ class StoreyFrame:
         rows: list[list[Entry]] = []
         for output in self.outputs:
             kind, z = self._output(output)
-            if kind == "a":
+            if kind in ("a", "ar"):
                 rows.append(self._acceleration(p, z))
                 continue
             row: list[Entry] = [0.0] * (2 * self.floors)
@@ -248,11 +249,11 @@ class StoreyFrame:
 
     def _output(self, name: str) -> tuple[str, int]:
         found = re.fullmatch(
-            r"(q|v|a|drift|shear)([1-9]\d*)", "shear1" if name == "base_shear" else name
+            r"(q|v|ar|a|drift|shear)([1-9]\d*)", "shear1" if name == "base_shear" else name
         )
         if not found or int(found[2]) > self.floors:
             raise ValueError(
-                f"output '{name}' is unknown; allowed are q, v, a, drift or shear with a floor"
+                f"output '{name}' is unknown; allowed are q, v, a, ar, drift or shear with a floor"
                 f" from 1 to {self.floors}, base_shear"
             )
         return found[1], int(found[2]) - 1

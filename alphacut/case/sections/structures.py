@@ -114,7 +114,8 @@ class Frame(Section):
     outputs: Annotated[
         tuple[str, ...],
         Key(
-            "observed quantities: q1, v1 (m/s), a1 (absolute, m/s²), drift1, shear1 … (in the"
+            "observed quantities: q1, v1 (m/s), a1 (absolute, m/s²), ar1 (relative to the ground,"
+            " m/s²), drift1, shear1 … (in the"
             " columns of a storey; dampers excluded), base_shear (that of the lowest storey); all"
             " displacements if left out"
         ),

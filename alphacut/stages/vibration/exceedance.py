@@ -89,9 +89,12 @@ def with_peaks(found: Envelope, wanted: Structure, task: EnvelopeTask) -> xarray
 def reached(found: Envelope, wanted: Structure, task: EnvelopeTask) -> float | None:
     """Largest declared error in the tolerance's measure; None where no error is declared."""
     from alphacut.frame.boxes import UnitFlow, boxes
+    from alphacut.frame.propagation import absolute
 
     if found.error is None:
         return None
+    if wanted.frame is not None:  # bounds of accelerations are found as absolute ones
+        wanted = replace(wanted, model=absolute(wanted.frame))
     cuts = boxes(wanted.inputs(task.fuzzy), task.alpha)
     scheme = task.scheme if wanted.linear is not None else task.integrator
     flow = wanted.flow(cuts.names, task.duration, task.step, scheme)

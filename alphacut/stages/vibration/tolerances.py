@@ -161,6 +161,10 @@ def tolerances(
 def _limited(wanted: Structure, outputs: tuple[str, ...], case: Case) -> StoreyFrame:
     """The frame with the limited outputs alone."""
     assert wanted.frame is not None
+    relative = [name for name in outputs if name.startswith("ar")]
+    if relative and wanted.frame.ground is not None:
+        what = f"{relative[0]} is relative to the ground, and tolerances are for absolute values"
+        raise case.refuse("exceedance.output", what, f"a{relative[0][2:]}")
     try:
         return replace(wanted.frame, outputs=outputs)
     except ValueError as error:

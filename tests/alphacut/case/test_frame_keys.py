@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
+import xarray
 
 from alphacut.case.load import load
 from alphacut.entry import main
@@ -151,6 +153,25 @@ def test_a_modulus_is_not_handed_to_given_stiffnesses(
     path = str(written(tmp_path, CASE))
     assert main(["envelope", path, "--modulus", "25 GPa", "--json", "-"]) == 2
     assert "makes no use of the modulus" in capfd.readouterr().err
+
+
+def test_accelerations_relative_to_the_ground_are_outputs_but_no_decision(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    record = "time [s],acceleration [g]\n0,0\n0.1,0.2\n0.2,-0.1\n"
+    (tmp_path / "r.csv").write_text(record, encoding="utf-8")
+    text = more('accelerogram = "r.csv"').replace('"q3", "drift1"', '"a3", "ar3"')
+    path = written(tmp_path, text)
+    assert main(["envelope", str(path), "--quiet", "--out", str(tmp_path / "e.nc")]) == 0
+    with xarray.open_dataset(tmp_path / "e.nc") as found:
+        assert found.attrs["nature"] == "guaranteed"
+        ground = np.interp(found["time"], [0, 0.1, 0.2], [0, 1.96133, -0.980665])
+        upper = found["upper"].isel(alpha=0)
+        apart = (upper.sel(output="a3") - upper.sel(output="ar3")).values
+    np.testing.assert_allclose(apart, ground, atol=1e-9)
+    path.write_text(text + '[decision]\nlimits = ["ar3 <= 1 g"]\n', encoding="utf-8")
+    assert main(["check", str(path)]) == 2
+    assert "relative to the ground, and decisions are on absolute values" in capfd.readouterr().err
 
 
 def test_a_run_with_weights_and_a_record_in_g_is_proved(
