@@ -38,6 +38,13 @@ def test_elements_and_series_agree_within_the_declared_error(inclusion):
     assert true.max() < 2e-3
 
 
+def test_a_mesh_is_not_judged_by_one_as_fine():
+    """Asked for 1.5 times the edges, Gmsh folds elements and has to take nearly the same."""
+    inclusion = Phase(6e8)
+    (moduli,), (error,) = cubic_stiffness_by_elements(0.76, MATRIX, [inclusion], size=0.27)
+    assert (abs(moduli / exact(0.76, MATRIX, inclusion) - 1) <= error).all()
+
+
 @pytest.mark.slow
 def test_elements_and_series_agree_to_1e_4_in_fourth_order():
     inclusion = Phase(80e9, 0.2)
@@ -52,11 +59,11 @@ def test_elements_and_series_agree_to_1e_4_in_fourth_order():
 @pytest.mark.slow
 def test_declared_error_holds_over_radii_and_materials():
     generator = np.random.default_rng(8)
-    for _ in range(8):
-        radius = generator.uniform(0.2, 0.9)
+    for _ in range(12):
+        radius, size = generator.uniform(0.2, 0.95), generator.uniform(0.15, 0.3)
         matrix = Phase(20e9, generator.uniform(0, 0.4))
         inclusion = Phase(20e9 * 10 ** generator.uniform(-2, 2), generator.uniform(0, 0.4))
-        (moduli,), (error,) = cubic_stiffness_by_elements(radius, matrix, [inclusion], size=0.2)
+        (moduli,), (error,) = cubic_stiffness_by_elements(radius, matrix, [inclusion], size=size)
         true = abs(moduli / exact(radius, matrix, inclusion) - 1)
         assert (true <= error + 1e-7).all(), (radius, matrix, inclusion)
 
