@@ -213,7 +213,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         rows.append(repeat(masses, records, count, rng))
         print(rows[-1], flush=True)
     write([asdict(row) for row in rows], options.out / "frame_update.csv")
-    least = least_widths(options.repetitions, rng)
+    least = least_widths(options.repetitions, np.random.default_rng([seed, 1]))
     print(f"one record, least widths of 95 %: mean {least.mean():.3f}, most {least.max():.3f}")
     prior = priors(False)
     truth = np.array([FRAME.parameters[name] for name in prior])
