@@ -173,58 +173,27 @@ def test_every_offered_method_runs_and_gets_the_tolerance(method, capfd):
         assert method_options(task)["tolerance"] == pytest.approx(2e-3 * share)
 
 
+E_SHORT = ["envelope", PAPER, "--fuzzy", "E", "--duration", "0.5"]
+
+
 def test_a_certificate_encloses_the_bounds(capfd):
-    found = answer(
-        [
-            "envelope",
-            PAPER,
-            "--method",
-            "modal",
-            "--fuzzy",
-            "E",
-            "--duration",
-            "0.5",
-            "--certify",
-            "1e-5",
-        ],
-        capfd,
-    )
+    found = answer([*E_SHORT, "--method", "modal", "--certify", "1e-5"], capfd)
     assert found["nature"] in ("guaranteed", "verified by sampling")
-    assert (
-        main(
-            [
-                "envelope",
-                PAPER,
-                "--fuzzy",
-                "E",
-                "--duration",
-                "0.5",
-                "--certify",
-                "1e-5",
-                "--workers",
-                "2",
-                "--alpha",
-                "0",
-            ]
-        )
-        == 0
-    )
+    assert main([*E_SHORT, "--certify", "1e-5", "--workers", "2", "--alpha", "0"]) == 0
     told = capfd.readouterr().out
     assert "eigen-analyses" in told
     assert "enclosed to within 10.00 µm of q1" in told
-    asked = [
-        "--set",
-        "envelope.certify=20 um",
-        "--set",
-        "envelope.method=auto",
-        "--duration",
-        "0.5",
-        "--fuzzy",
-        "m1",
-    ]
-    found = answer(["envelope", PAPER, *asked], capfd)
+
+
+def test_a_gap_in_the_case_is_that_of_the_proof(capfd):
+    keys = ["--set", "envelope.certify=20 um", "--set", "envelope.method=auto"]
+    asked = ["envelope", PAPER, *keys, "--duration", "0.5", "--fuzzy", "m1"]
+    found = answer(asked, capfd)
     assert found["nature"] == "guaranteed"
     assert found["facts"]["gap"] == pytest.approx(2e-5, rel=1e-3)
+
+
+def test_what_cannot_be_certified_is_refused(capfd):
     assert main(["envelope", "cases/pendulum.toml", "--set", "envelope.certify=1 um"]) == 2
     assert "a pendulum cannot be certified" in capfd.readouterr().err
     assert main(["envelope", PAPER, "--method", "vertex", "--certify", "1e-5"]) == 2

@@ -5,17 +5,14 @@ The pairs are those of the parsers themselves: an option that is new has to be g
 
 import hashlib
 import itertools
-import json
-import re
 import shutil
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 
 import numpy as np
 import pytest
 
 from alphacut.entry import COMMANDS, main, parsers
 from alphacut.fuzzy import Store
+from tests.alphacut.commands.watch import told, watch
 
 CASE = """
 schema = 1
@@ -235,7 +232,7 @@ class Watched:
             capfd,
         )
         self.events, self.known, self.base = [], {}, list(BASE.get(command, []))
-        self.watch()
+        watch(command_modules=COMMANDS.values(), events=self.events, monkeypatch=monkeypatch)
         self.results = folder / "results"
         self.results.mkdir()
         self.prepare(self.results)
@@ -273,71 +270,6 @@ class Watched:
         np.save(place / "a.npy", np.pad(np.ones((4, 4), int), 4))
         (place / "case.toml").write_text(text, encoding="utf-8")
 
-    def watch(self):
-        """Remember what is computed, whatever is then told; draw no figures."""
-        from alphacut import frame
-        from alphacut.commands import options
-        from alphacut.figures import all as figures
-        from alphacut.frame.decisions import safe_scale as decisions
-        from alphacut.fuzzy.campaign import workers
-        from alphacut.io import progress
-        from alphacut.stages.material import modulus
-
-        real_scale = decisions.safe_scale
-
-        def safe_scale(*given, workers=1, **named):
-            self.events.append(("safe scale", workers))
-            return real_scale(*given, **named)
-
-        self.monkeypatch.setattr(decisions, "safe_scale", safe_scale)
-        real_answer, real_envelope, real_propagate = (
-            options.answer,
-            frame.envelope,
-            modulus.propagate,
-        )
-
-        def answer(given, document, out, text=""):
-            self.events.append(("answer", told(json.dumps(document, default=str))))
-            return real_answer(given, document, out, text)
-
-        @contextmanager
-        def pool(count):
-            self.events.append(("pool", count))
-            with ThreadPoolExecutor(1) as executor:
-                yield executor
-
-        @contextmanager
-        def bar(title, *, quiet=False):
-            self.events.append((title, quiet))
-            yield None
-
-        def envelope(*given, workers=1, **named):
-            self.events.append(("envelope", workers))
-            return real_envelope(*given, **named)
-
-        def propagate(*given, workers=1, **named):
-            self.events.append(("propagate", workers))
-            return real_propagate(*given, **named)
-
-        self.monkeypatch.setattr(progress, "progress", bar)
-        self.monkeypatch.setattr(workers, "pool", pool)
-        self.monkeypatch.setattr(frame, "envelope", envelope)
-        self.monkeypatch.setattr(modulus, "propagate", propagate)
-        self.monkeypatch.setattr(
-            figures, "draw", lambda *_, **__: self.events.append("figures") or ["a.png"]
-        )
-        self.monkeypatch.setattr(
-            "alphacut.stochastic.figures.all.draw", lambda *_: self.events.append("figures") or {}
-        )
-        for module in COMMANDS.values():
-            if hasattr(module, "answer"):
-                self.monkeypatch.setattr(module, "answer", answer)
-            if hasattr(module, "progress"):
-                self.monkeypatch.setattr(module, "progress", bar)
-        from alphacut.stages import pipeline
-
-        self.monkeypatch.setattr(pipeline, "progress", bar)
-
     def run(self, *words, results=False):
         """Exit status, output, files and computations of one run."""
         key = (*self.base, *words, results)
@@ -374,15 +306,6 @@ def content(path):
     if path.suffix in (".json", ".db", ".nc", ".html"):
         return told(path.read_text(encoding="utf-8")) if path.suffix == ".json" else ""
     return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-def told(text):
-    """A text without the time that a run took and the command line that it tells."""
-    text = re.sub(r'"command": "[^"]*"', "", text)
-    text = re.sub(r'"[a-z_]*seconds[a-z_]*": ([^,{}\[\]]+|\{[^}]*\})', "", text)
-    text = re.sub(r"seconds: .*", "", text)
-    text = re.sub(r"CASE --modulus .*", "", text)
-    return re.sub(r"\d+(\.\d+)? s\b", "", text)
 
 
 def explained(parser, option, other):
