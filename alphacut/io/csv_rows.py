@@ -10,6 +10,7 @@ from pathlib import Path
 from alphacut.io.output_paths import hint
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.units import factor
+from alphacut.stochastic.particles.csv_columns import with_points
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,8 @@ class CsvFile:
 
     def rows(self, least: int = 1) -> list[tuple[int, list[str]]]:
         """Line and entries of the header and of each row; empty lines and comments are left out.
+
+        Commas separate them, or semicolons or tabs, beside which numbers may have decimal commas.
 
         Args:
             least: Rows that there must be below the header.
@@ -54,7 +57,15 @@ class CsvFile:
             count = {1: "a row", 2: "two rows"}.get(least, f"{least} rows")
             what = f"the {self.what} needs a header and {count} or more"
             raise self.unreadable(what, self.allowed)
-        return [(number, next(csv.reader([line]))) for number, line in kept]
+        header = kept[0][1]
+        separator = ";" if ";" in header else "\t" if "\t" in header else ","
+        rows = [(number, next(csv.reader([line], delimiter=separator))) for number, line in kept]
+        if separator == ",":
+            return rows
+        try:
+            return [rows[0], *with_points(rows[1:], self.path)]
+        except ValueError as error:
+            raise self.unreadable(str(error), "points, or commas throughout") from None
 
     def unreadable(self, what: str, allowed: str) -> BadInput:
         """The error of the file as a whole."""

@@ -46,7 +46,8 @@ def length_columns(path: Path, columns: Sequence[str], unit: str = "") -> Length
 
     Raises:
         ValueError: The file cannot be read, a column or its unit is missing, two give the same, a
-            row has more fields than the header, or a number is written with a decimal comma.
+            row has more fields than the header, or a number is written with a decimal comma where
+            commas separate fields or other numbers have points.
     """
     header, rows = _fields(path, columns)
     places = _places(header, columns, unit, path)
@@ -78,7 +79,36 @@ def _fields(path: Path, columns: Sequence[str]) -> tuple[list[str], list[tuple[i
         split = [(number, next(csv.reader([line], delimiter=separator))) for number, line in lines]
     except csv.Error as error:
         raise ValueError(f"{path} cannot be read as rows of numbers: {error}") from error
-    return split[0][1], split[1:]
+    rows = split[1:]
+    return split[0][1], rows if separator == "," else with_points(rows, path)
+
+
+COMMA, POINT = (rf"\s*[-+]?\d*{mark}\d+([eE][-+]?\d+)?\s*" for mark in (",", r"\."))
+"""Numbers with a decimal comma, and with a point."""
+
+
+def with_points(rows: list[tuple[int, list[str]]], path: Path) -> list[tuple[int, list[str]]]:
+    """Numbered rows with points in place of decimal commas, for files that commas do not separate.
+
+    Raises:
+        ValueError: Some numbers have commas and others points.
+    """
+    first: dict[str, tuple[int, str]] = {}
+    for number, fields in rows:
+        for field in fields:
+            for pattern in (COMMA, POINT):
+                if re.fullmatch(pattern, field):
+                    first.setdefault(pattern, (number, field.strip()))
+    if len(first) == 2:
+        (row, comma), (other, point) = first[COMMA], first[POINT]
+        raise ValueError(
+            f"{path}: row {row} holds {comma!r}, a decimal comma, and row {other} {point!r}, a"
+            " point; write all numbers with a point"
+        )
+    return [
+        (number, [x.replace(",", ".") if re.fullmatch(COMMA, x) else x for x in fields])
+        for number, fields in rows
+    ]
 
 
 def _lines(path: Path, columns: Sequence[str]) -> list[tuple[int, str]]:
@@ -173,7 +203,7 @@ def _units() -> Callable[[str], object]:
 
 def _number(text: str, path: Path, row: int) -> float:
     """The number in a field; NaN where there is none."""
-    if re.fullmatch(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*", text):
+    if re.fullmatch(COMMA, text):
         point = text.strip().replace(",", ".")
         raise ValueError(
             f"{path}: row {row} holds {text.strip()!r}, a decimal comma; write decimals with a"

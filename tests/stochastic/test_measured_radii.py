@@ -100,8 +100,10 @@ def test_diameters_and_radii_are_read_with_their_unit(header, factor, tmp_path):
         ("d [1/0]\n1\n", "unit '1/0', which is not a length"),
         ("d [mm]\n" + "1" * 200_000 + "\n", "cannot be read as rows of numbers"),
         ("d [mm],\n1,25\n", "row 2 holds '1,25'.*decimal comma"),
-        ("d [m];n\n1,25e-3;1\n", r"row 2 holds '1,25e-3', a decimal comma; .*1\.25e-3"),
-        ("name;d [mm]\na;1.5\nb;1,25\n", r"row 3 holds '1,25', a decimal comma; .*1\.25"),
+        (
+            "name;d [mm]\na;1.5\nb;1,25\n",
+            r"row 3 holds '1,25', a decimal comma, and row 2 '1\.5', a point",
+        ),
         ("d [mm],r [mm]\n2,1\n", "'d .mm.' and 'r .mm.' both give r"),
     ],
 )
@@ -119,6 +121,14 @@ def test_a_trailing_comma_and_a_stray_quote_are_no_decimal_comma(tmp_path):
     path = tmp_path / "sizes.csv"
     path.write_text('name,d [mm]\na",1,\nb,3,\n', encoding="utf-8")
     assert MeasuredRadii.read(path).values == pytest.approx((0.5e-3, 1.5e-3))
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_decimal_commas_are_read_where_no_comma_separates(separator, tmp_path):
+    path = tmp_path / "sizes.csv"
+    rows = [("name", "d [mm]"), ("a", "1,25"), ("b", "3"), ("c", "2,5e-1")]
+    path.write_text("\n".join(map(separator.join, rows)), encoding="utf-8")
+    assert MeasuredRadii.read(path).values == pytest.approx((0.125e-3, 0.625e-3, 1.5e-3))
 
 
 @pytest.mark.parametrize("seed", range(8))

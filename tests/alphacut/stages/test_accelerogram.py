@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from alphacut.io.problem import BadInput
 from alphacut.stages.vibration.accelerogram import accelerogram
 
 
@@ -16,3 +17,14 @@ def test_rounded_times_do_not_shift_the_end_of_a_record(tmp_path: Path) -> None:
     found = accelerogram(file)
     assert found.step * 900 == pytest.approx(30, abs=1e-9)
     assert len(found.acceleration) == 901
+
+
+def test_a_record_may_have_semicolons_and_decimal_commas(tmp_path: Path) -> None:
+    file = tmp_path / "record.csv"
+    file.write_text("time [s];acceleration [g]\n0,0;0\n0,02;1,5\n0,04;-,5\n", encoding="utf-8")
+    found = accelerogram(file)
+    assert found.step == pytest.approx(0.02)
+    assert found.acceleration / 9.80665 == pytest.approx([0, 1.5, -0.5])
+    file.write_text("time [s];acceleration [g]\n0,0;0\n0.02;1\n0,04;2\n", encoding="utf-8")
+    with pytest.raises(BadInput, match=r"row 2 holds '0,0', a decimal comma, and row 3 '0.02'"):
+        accelerogram(file)
