@@ -103,7 +103,7 @@ def sphere_model(case: Case) -> Iterator[Problem]:
             "modulus.method",
             "this model is one of cylinders, and cell.particles is spheres",
             method,
-            " or ".join(SPHERE_METHODS),
+            ", ".join(SPHERE_METHODS),
         )
 
 

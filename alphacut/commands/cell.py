@@ -10,7 +10,7 @@ from typing import TextIO
 from alphacut.case.case import Case
 from alphacut.case.idle import idle_mesh, require_read
 from alphacut.case.load import load
-from alphacut.case.sections.material import CELL_METHODS
+from alphacut.case.sections.material import CELL_METHODS, SPHERE_METHODS
 from alphacut.commands.options import (
     MESH,
     MODEL,
@@ -165,9 +165,9 @@ def require_effect(options: argparse.Namespace, case: Case, models: Sequence[str
     if options.cross_check and "modulus.method" in case.changed:
         what = "this has no effect beside --cross-check, which names both models"
         problems.append(Problem("modulus.method", what, case.modulus.method))
-    if options.cross_check and case.cell.particles == "spheres":
-        what = "spheres have one model, the series"
-        problems.append(Problem("--cross-check", what, options.cross_check))
+    if case.cell.particles == "spheres" and not set(models) <= set(SPHERE_METHODS):
+        what, allowed = "one of these models is of cylinders alone", ", ".join(SPHERE_METHODS)
+        problems.append(Problem("--cross-check", what, options.cross_check, allowed))
     if options.exclude and "auto" not in models:
         what = f"the method is {' and '.join(models)}, and only method auto leaves a choice"
         problems.append(Problem("--exclude", what, options.exclude, "beside --method auto"))

@@ -149,6 +149,7 @@ def build_table(
     *,
     accuracy: float,
     source: str = "planar",
+    make: Callable[[TableRange, float], Source] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Table:
     """Table of relative error `accuracy` in every modulus, by its own estimate.
@@ -156,14 +157,15 @@ def build_table(
     Args:
         span: What to cover.
         accuracy: Relative error allowed, mesh and interpolation together.
-        source: "planar" or "series".
+        source: "planar" or "series"; another name beside `make`.
+        make: Maker of the source from range and accuracy, in place of that of its name.
         progress: Called with the fraction done of the present degree.
 
     Raises:
         TableError: The accuracy is not reached.
     """
     started = perf_counter()
-    supply = SOURCES[source](span, accuracy * _SPACE_SHARE)
+    supply = (make or SOURCES[source])(span, accuracy * _SPACE_SHARE)
     allowed = accuracy * (1 - _SPACE_SHARE)
     counts = (
         _LEAST if span.radii[1] > span.radii[0] * (1 + 1e-12) else 1,

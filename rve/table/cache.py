@@ -15,7 +15,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from alphacut.rve.table.build import build_table
+from alphacut.rve.table.build import Source, build_table
 from alphacut.rve.table.interpolant import Table, TableRange
 
 # The code a table comes from.
@@ -27,6 +27,8 @@ _PROGRAMS = (
     "planar/*.py",
     "series/*.py",
     "slices/*.py",
+    "solver/*.py",
+    "spheres/**/*.py",
     "table/*.py",
 )
 _PACKAGES = ("numpy", "scipy", "fenics-dolfinx", "fenics-basix", "fenics-ffcx", "petsc4py", "gmsh")
@@ -61,6 +63,7 @@ def stored_table(
     *,
     accuracy: float,
     source: str = "planar",
+    make: Callable[[TableRange, float], Source] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[Table, bool]:
     """The table from `folder`, or made and put there; and the truth of "it was there".
@@ -70,7 +73,9 @@ def stored_table(
     """
     key = table_key(span, accuracy=accuracy, source=source)
     found = _in_process.get(key) or (_read(folder / f"table-{key}.npz", span) if folder else None)
-    fresh = found or build_table(span, accuracy=accuracy, source=source, progress=progress)
+    fresh = found or build_table(
+        span, accuracy=accuracy, source=source, make=make, progress=progress
+    )
     if folder and not found:
         _write(fresh, folder / f"table-{key}.npz")
     _in_process[key] = fresh

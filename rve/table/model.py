@@ -87,8 +87,8 @@ class TableModel:
         self, radius_map: RadiusMap, matrix: Phase, poisson: float, moduli: Array
     ) -> TableRange:
         low, high = (float(r) for r in extreme_radii(radius_map))
-        radii = self.radii or ((low, high) if high - low < 1e-12 else _rounded_radii(low, high))
-        between = self.moduli or _rounded_moduli(float(moduli.min()), float(moduli.max()))
+        radii = self.radii or ((low, high) if high - low < 1e-12 else rounded_radii(low, high))
+        between = self.moduli or rounded_moduli(float(moduli.min()), float(moduli.max()))
         return TableRange(matrix, poisson, radii, between)
 
     def _evaluate(
@@ -107,7 +107,7 @@ class TableModel:
             "solve": perf_counter() - started,
             "total": built + perf_counter() - started,
         }
-        origin = _origin(table, found=found)
+        origin = table_in_words(table, found=found)
         results = []
         for curve, gap in zip(curves, gaps, strict=True):
             space = table.space_error(radius_map(curve.theta))
@@ -130,7 +130,7 @@ class TableModel:
         return results
 
 
-def _origin(table: Table, *, found: bool) -> str:
+def table_in_words(table: Table, *, found: bool) -> str:
     """The table in words, and whether it was kept from before."""
     radii, moduli = table.coefficients.shape[:2]
     made = f"built in {table.seconds:.2f} s from {table.systems} linear solves"
@@ -140,14 +140,14 @@ def _origin(table: Table, *, found: bool) -> str:
     )
 
 
-def _rounded_radii(low: float, high: float) -> tuple[float, float]:
+def rounded_radii(low: float, high: float) -> tuple[float, float]:
     """Outwards to fortieths; below 1/40, and of the gap 1 − r below 1/40, to powers of 2."""
     least = np.floor(low * 40 + 1e-9) / 40 or 2.0 ** np.floor(np.log2(low))
     gap = np.floor((1 - high) * 40 + 1e-9) / 40 or 2.0 ** np.floor(np.log2(1 - high))
     return float(least), float(1 - gap)
 
 
-def _rounded_moduli(low: float, high: float) -> tuple[float, float]:
+def rounded_moduli(low: float, high: float) -> tuple[float, float]:
     """Outwards to eighths of an octave; a single modulus stays as it is."""
     if low == high:
         return low, high

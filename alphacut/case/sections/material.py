@@ -25,7 +25,7 @@ from alphacut.stochastic import TruncatedNormal
 CellMethod = Literal["prism", "slices", "table", "series", "image", "auto"]
 PlanName = Literal["general", "reduced", "extended", "signed"]
 Particles = Literal["cylinders", "spheres"]
-SPHERE_METHODS = ("series", "auto")
+SPHERE_METHODS = ("series", "table", "auto")
 CELL_METHODS: tuple[str, ...] = get_args(CellMethod)
 PLANS: tuple[str, ...] = get_args(PlanName)
 

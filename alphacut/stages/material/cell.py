@@ -125,7 +125,7 @@ def cell_choice(
         what = f"the method is {method}, and only method auto leaves a choice"
         raise BadInput(Problem("--exclude", what, ", ".join(exclude), "beside --method auto"))
     if exclude and case.cell.particles == "spheres":
-        what = "spheres have one model, the series"
+        what = "method auto takes spheres by series"
         raise BadInput(Problem("--exclude", what, ", ".join(exclude)))
     return CellChoice(
         method,

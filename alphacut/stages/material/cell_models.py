@@ -12,9 +12,12 @@ from alphacut.rve.auto.refined import RefinedModel
 from alphacut.rve.image.round_particle import RasterModel
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres.series.model import SphereSeriesModel
+from alphacut.rve.spheres.table.model import SphereTableModel
 from alphacut.rve.table.model import TableModel
 from alphacut.stages.material.cell import CellChoice, CellModel
 
+TABLED = 0.9
+"""Of the tolerance on E, for the moduli that a table of spheres holds; the rest is for θ."""
 SHARE = 0.4
 """Of the tolerance, for the series at each θ and again for its rule in θ."""
 
@@ -50,6 +53,8 @@ def cell_model(choice: CellChoice) -> CellModel:
         ):
             # DOLFINx is loaded before the clock starts: times are those of computing
             import_module("alphacut.rve.planar.problem")
+        if choice.particles == "spheres" and choice.method == "table":
+            import_module("alphacut.rve.spheres.fem.stiffness")
         return made(choice)
     except ImportError as error:
         raise BadInput(
@@ -74,6 +79,9 @@ def made(choice: CellChoice) -> CellModel:
     if choice.particles == "spheres":
         if tolerance is None and choice.method == "auto":
             tolerance = AutoModel.tolerance
+        if choice.method == "table":
+            accuracy = SphereTableModel.accuracy if tolerance is None else TABLED * tolerance
+            return SphereTableModel(accuracy, table_folder(), choice.moduli)
         own = SphereSeriesModel.accuracy if tolerance is None else max(SHARE * tolerance, 1e-11)
         return SphereSeriesModel(accuracy=own)
     if choice.method == "auto":

@@ -77,11 +77,12 @@ def test_text_says_what_e_is(capfd):
     ("arguments", "words"),
     [
         (["--method", "prism"], "this model is one of cylinders"),
-        (["--method", "table"], "this model is one of cylinders"),
+        (["--method", "slices"], "this model is one of cylinders"),
+        (["--method", "table", "--tolerance", "1e-7"], "accuracy of the table of spheres"),
         (["--method", "series", "--radius", "1.2"], "--radius = 1.2: out of range"),
         (["--method", "series", "--radius", "nan"], "--radius = nan: out of range"),
         (["--method", "series", "--radius", "0.5", "--a2", "0.2"], "no effect beside --radius"),
-        (["--method", "auto", "--exclude", "series"], "spheres have one model"),
+        (["--method", "auto", "--exclude", "series"], "method auto takes spheres by series"),
         (["--method", "series", "--set", 'cell.particles="cubes"'], "cylinders, spheres"),
     ],
 )
@@ -94,11 +95,28 @@ def test_what_spheres_cannot_have_is_one_line(arguments, words, capfd):
     assert err.count("\n") == 1
 
 
-def test_spheres_have_no_second_model(capfd):
+def test_a_table_of_elements_and_the_series_agree(capfd):
+    case = str(Path(PAPER).with_name("paper-3d.toml"))
+    one = ["--radius", "0.6", "--tolerance", "1e-2"]
+    table = answer(capfd, "cell", case, "--method", "table", *one)
+    exact = answer(capfd, "cell", case, "--method", "series", *one)
+    off = abs(table["E_GPa"] - exact["E_GPa"])
+    assert 1e-5 < off <= table["declared_error"]["E_GPa"] <= 1e-2 * exact["E_GPa"]
+    assert table["method"] == "table"
+    assert set(table["checks"]) == set(exact["checks"])
+
+
+def test_two_models_of_spheres_are_compared(capfd):
     case = str(Path(PAPER).with_name("paper-3d.toml"))
     assert main(["cell", case, "--cross-check", "series,auto"]) == 2
+    assert "method auto takes series here" in capfd.readouterr().err
+
+
+def test_models_of_cylinders_are_no_second_model_of_spheres(capfd):
+    case = str(Path(PAPER).with_name("paper-3d.toml"))
+    assert main(["cell", case, "--cross-check", "series,prism"]) == 2
     (line,) = capfd.readouterr().err.splitlines()
-    assert "--cross-check = series,auto: spheres have one model, the series" in line
+    assert "--cross-check = series,prism: one of these models is of cylinders alone" in line
 
 
 def test_the_shipped_spheres_fill_what_the_papers_circles_cover(capfd):

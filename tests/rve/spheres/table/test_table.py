@@ -1,0 +1,61 @@
+"""Tables of spheres against the exact series."""
+
+import numpy as np
+import pytest
+
+from alphacut.rve import Phase
+from alphacut.rve.spheres.bounds import mori_tanaka
+from alphacut.rve.spheres.series.model import SphereSeriesModel
+from alphacut.rve.spheres.table.model import SphereTableModel
+from alphacut.rve.spheres.table.source import SphereRange
+from alphacut.rve.table.build import TableError
+from alphacut.stochastic import HermiteMap
+
+MATRIX, MODULI, MAP = Phase(20e9), (75e9, 85e9), HermiteMap(0.47, 0.1, 0.9, 0.0)
+
+
+def against_series(model, radius_map=MAP, moduli=(75e9, 79e9)):
+    phases = [Phase(e) for e in moduli]
+    results = model.solve(radius_map, MATRIX, phases)
+    for own, exact in zip(
+        results, SphereSeriesModel().solve(radius_map, MATRIX, phases), strict=True
+    ):
+        true = np.append(own.moduli / exact.moduli, own.modulus / exact.modulus) - 1
+        declared = np.append(own.modulus_errors, own.estimated_error)
+        assert (abs(true) <= declared).all()
+    return results
+
+
+def test_interpolation_keeps_what_it_declares():
+    model = SphereTableModel(3e-4, moduli=MODULI, source="sphere series")
+    for result in against_series(model):
+        assert result.largest_error <= 4e-4
+
+
+def test_elements_in_a_table_keep_what_they_declare():
+    result = against_series(SphereTableModel(1e-2), HermiteMap(0.5, 0.0, 0.5, 0.0), (80e9,))[0]
+    assert 0 < result.errors["space"].max() <= 6e-3
+    assert result.unknowns > 1000
+
+
+@pytest.mark.slow
+def test_a_whole_table_of_elements_keeps_what_it_declares():
+    for result in against_series(SphereTableModel(2e-3, moduli=MODULI)):
+        assert result.estimated_error <= 2.1e-3
+
+
+def test_what_is_tabled_is_over_mori_and_tanaka():
+    span = SphereRange(MATRIX, 0.2, (0.3, 0.9), MODULI)
+    bulk, shear = mori_tanaka(np.array(np.pi / 6 * 0.6**3), MATRIX, Phase(80e9, 0.2))
+    found = span.dilute(np.array([0.6]), np.array([80e9]))
+    np.testing.assert_allclose(found[0, 0], [bulk, shear, shear])
+
+
+def test_an_accuracy_out_of_reach_is_refused(monkeypatch):
+    with pytest.raises(ValueError, match=r"accuracy of the table of spheres is 1e-06"):
+        SphereTableModel(1e-6)
+    with pytest.raises(ValueError, match="must be octant or sphere series"):
+        SphereTableModel(source="planar")
+    monkeypatch.setattr("alphacut.rve.spheres.table.source._FINEST", 0.5)
+    with pytest.raises(TableError, match="on the finest mesh"):
+        SphereTableModel(1e-4).solve(HermiteMap(0.5, 0.0, 0.5, 0.0), MATRIX, [Phase(80e9)])
