@@ -96,7 +96,7 @@ def radius(case: Case, alpha: float) -> Iterator[Problem]:
 
 
 def sphere_model(case: Case) -> Iterator[Problem]:
-    """Spheres have models of their own."""
+    """Spheres have models of their own, and no stage that makes their radii yet."""
     method = case.modulus.method if case.sections.modulus else "prism"
     if case.cell.particles == "spheres" and method not in SPHERE_METHODS:
         yield Problem(
@@ -104,6 +104,15 @@ def sphere_model(case: Case) -> Iterator[Problem]:
             "this model is one of cylinders, and cell.particles is spheres",
             method,
             ", ".join(SPHERE_METHODS),
+        )
+    if case.cell.particles == "spheres" and "microstructure" in case.stages:
+        yield Problem(
+            "cell.particles",
+            "stage microstructure measures discs in their planar cells, whose radii are not those"
+            " of spheres",
+            "spheres",
+            '"cylinders", or section radius from benchmarks.stochastic.sphere_map in place of the'
+            " stage, as cases/paper-3d.toml",
         )
 
 

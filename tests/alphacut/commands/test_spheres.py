@@ -164,3 +164,12 @@ def test_a_material_card_of_spheres_is_cubic(ending, tmp_path):
     assert "Hill's average" in text
     assert "2.31753751" in text.replace("23175375191", "2.3175375191")  # E along the axes
     assert "plane" not in text.lower()
+
+
+def test_discs_make_no_radii_of_spheres(capfd):
+    case = str(Path(PAPER).with_name("concrete.toml"))
+    changes = [*SPHERES[:2], "--set", 'modulus.method="series"']
+    assert main(["check", case, *changes]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert "cell.particles = spheres: stage microstructure measures discs" in line
+    assert "sphere_map" in line
