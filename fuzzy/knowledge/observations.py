@@ -128,7 +128,8 @@ def _pairs(values: Values) -> Array:
 
 def _numbers(values: Values) -> Array:
     """Numbers as pairs of equal ends, pairs as they are, shape (n, 2)."""
-    if np.ma.is_masked(values) or (isinstance(values, np.ndarray) and np.iscomplexobj(values)):
+    masked = bool(np.ma.is_masked(values))  # type: ignore[no-untyped-call]
+    if masked or (isinstance(values, np.ndarray) and np.iscomplexobj(values)):
         raise TypeError("masked and complex values are no measured numbers")
     try:
         table = np.asarray(values, float)
