@@ -152,10 +152,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--spheres", type=int, nargs=2, default=(30, 100), help="in a cell of each size (30 100)"
     )
     parser.add_argument(
-        "--cells", type=int, nargs=2, default=(200, 90), help="cells of each size (200 90)"
+        "--cells", type=int, nargs=2, default=(120, 60), help="cells of each size (120 60)"
     )
     parser.add_argument("--refined", type=int, default=8, help="of them on three grids (8)")
-    parser.add_argument("--resolution", type=float, default=10, help="voxels along a spacing (10)")
+    parser.add_argument("--resolution", type=float, default=8, help="voxels along a spacing (8)")
     parser.add_argument("--fraction", type=float, default=0.2092, help="volume fraction (0.2092)")
     parser.add_argument("--contrast", type=float, default=4, help="modulus over the matrix's (4)")
     parser.add_argument(
