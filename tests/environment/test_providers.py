@@ -52,7 +52,10 @@ INDIRECT = {  # imported by others on this project's behalf
     "xdist": "python3-pytest-xdist",  # pytest, for make test
     "sphinx": "python3-sphinx",
 }
-FROM_PYPI = {"pyuncertainnumber": "benchmarks/fuzzy/requirements.txt"}  # one comparison needs it
+FROM_PYPI = {  # each is needed by one comparison
+    "openseespylinux": "benchmarks/frame/opensees.py",
+    "pyuncertainnumber": "benchmarks/fuzzy/requirements.txt",
+}
 
 
 def imports_of(source: str) -> set[str]:
