@@ -10,7 +10,7 @@ from alphacut.rve.mesh.planar import TouchingError
 from alphacut.rve.settings import require_mesh_size, require_radius
 
 _CLOSEST = 0.97
-_FINER = (1.0, 0.8, 0.65, 0.5)
+_FINER = (1.0, 0.8, 0.65, 0.5, 0.4, 0.3, 0.2)
 _SOUND = 0.1  # least scaled Jacobian of an element
 MATRIX, SPHERE = 1, 2
 

@@ -204,7 +204,16 @@ def octant_stiffness(
 def cubic_stiffness_by_elements(
     radius: float, matrix: Phase, inclusions: Sequence[Phase], *, size: float = 0.2
 ) -> tuple[Array, Array]:
-    """The moduli on the finer of two meshes, and their declared relative errors, (m, 3) each.
+    """The first two of `on_two_meshes`."""
+    return on_two_meshes(radius, matrix, inclusions, size=size)[:2]
+
+
+def on_two_meshes(
+    radius: float, matrix: Phase, inclusions: Sequence[Phase], *, size: float
+) -> tuple[Array, Array, int]:
+    """The moduli on the finer of two meshes, their declared relative errors, and its unknowns.
+
+    Moduli and errors have shape (m, 3).
 
     The meshes' edge lengths, as their unknowns tell them, differ by a factor of 1.25 or more: where
     Gmsh had to refine the coarser one, a third mesh is made. What order 2.7 leaves of the largest
@@ -218,7 +227,7 @@ def cubic_stiffness_by_elements(
     )
     gap = np.abs(coarse / fine - 1).max(axis=1, keepdims=True)
     error = _SAFETY * gap / (_edges(*cells) ** _LEAST_ORDER - 1)
-    return fine, np.broadcast_to(error, fine.shape)
+    return fine, np.broadcast_to(error, fine.shape), cells[0].unknowns
 
 
 def _edges(fine: OctantCell, coarse: OctantCell) -> float:

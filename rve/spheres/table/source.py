@@ -42,33 +42,49 @@ class OctantSource:
     systems: int = 0
 
     def __post_init__(self) -> None:
-        low, high = self.span.radii
-        radii = np.unique([low, (low + 2 * high) / 3, high])
+        self._known: dict[tuple[float, float, float], Array] = {}
+        self._judged: dict[tuple[float, float], Array] = {}
+        radii = np.unique(self.span.nodes((3, 1))[0])  # of the table too: solved once
         size, errors = _ROUGH, self._errors(radii, _ROUGH)
-        while errors.max() > self.accuracy:
-            if size <= _FINEST:
-                raise TableError(
-                    f"elements about spheres leave a relative error of {errors.max():.1e} on the"
-                    f" finest mesh ({_FINEST:g}) and {self.accuracy:.1e} is wanted: allow a larger"
-                    " error, or take the series"
-                )
-            finer = (0.8 * self.accuracy / errors.max()) ** (1 / _RATE)
-            size = max(_FINEST, size * min(0.9, finer))
+        while errors.max() > self.accuracy:  # a finer mesh gains more at one than at another
+            worst = int(errors.max(axis=1).argmax())
+            size = self._fine_enough(radii[[worst]], size, float(errors[worst].max()))
             errors = self._errors(radii, size)
         self.mesh_size = size
         self.space = np.vstack([radii, with_ratio_errors(errors).T])
 
+    def _fine_enough(self, radius: Array, size: float, error: float) -> float:
+        """Mesh size at which one radius keeps the accuracy, from a rougher one and its error."""
+        while error > self.accuracy:
+            if size <= _FINEST:
+                raise TableError(
+                    f"elements about spheres leave a relative error of {error:.1e} on the finest"
+                    f" mesh ({_FINEST:g}) and {self.accuracy:.1e} is wanted: allow a larger error,"
+                    " or take the series"
+                )
+            finer = (0.8 * self.accuracy / error) ** (1 / _RATE)
+            size = max(_FINEST, size * min(0.9, max(0.5, finer)))
+            error = float(self._errors(radius, size).max())
+        return size
+
     def _errors(self, radii: Array, size: float) -> Array:
         """Declared relative errors at radii, the larger of both extreme moduli, shape (n, 3)."""
-        from alphacut.rve.spheres.fem.stiffness import cubic_stiffness_by_elements
+        return np.array([self._error(float(radius), size) for radius in radii])
 
-        phases = self._phases(np.unique(self.span.moduli))
-        found = []
-        for radius in radii:
-            _, error = cubic_stiffness_by_elements(radius, self.span.matrix, phases, size=size)
-            found.append(error.max(axis=0))
+    def _error(self, radius: float, size: float) -> Array:
+        """At one radius, shape (3,); the solutions are kept."""
+        from alphacut.rve.spheres.fem.stiffness import on_two_meshes
+
+        ends = np.unique(self.span.moduli)
+        key = (round(radius, 9), size)
+        if key not in self._judged:
+            phases = self._phases(ends)
+            solved, error, unknowns = on_two_meshes(radius, self.span.matrix, phases, size=size)
+            self.unknowns = max(self.unknowns, unknowns)
             self.systems += 6 * len(phases)
-        return np.array(found)
+            self._known |= {(*key, round(e, 3)): row for e, row in zip(ends, solved, strict=True)}
+            self._judged[key] = error.max(axis=0)
+        return self._judged[key]
 
     def _phases(self, modulus: Array) -> list[Phase]:
         return [Phase(float(e), self.span.poisson) for e in modulus]
@@ -84,11 +100,16 @@ class OctantSource:
     def _solve(self, radius: float, modulus: Array, size: float) -> Array:
         from alphacut.rve.spheres.fem.stiffness import OctantCell
 
-        cell = OctantCell(radius, size=size)
-        self.systems += 3 * len(modulus)
-        self.unknowns = max(self.unknowns, cell.unknowns)
-        matrix = self.span.matrix
-        return np.array([cell.solve(matrix, phase).moduli for phase in self._phases(modulus)])
+        keys = [(round(radius, 9), size, round(float(e), 3)) for e in modulus]
+        left = [(k, e) for k, e in zip(keys, modulus, strict=True) if k not in self._known]
+        if left:
+            cell = OctantCell(radius, size=size)
+            self.unknowns = max(self.unknowns, cell.unknowns)
+            self.systems += 3 * len(left)
+            phases = self._phases(np.array([e for _, e in left]))
+            solved = [cell.solve(self.span.matrix, phase).moduli for phase in phases]
+            self._known |= {k: one for (k, _), one in zip(left, solved, strict=True)}
+        return np.array([self._known[k] for k in keys])
 
 
 @dataclass
