@@ -205,7 +205,7 @@ def test_a_run_hands_the_modulus_on_to_the_frame_and_keeps_it(folder, capfd):
         ({"modulus": None}, "cell.modulus: missing beside cell.poisson"),
         ({"bulk": '["1 GPa", "2 GPa"]'}, "both E, ν and K, G are given"),
         ({"poisson": "[0.3, 0.3, 0.3]"}, "got 3 values for 2 phases"),
-        ({"modulus": '["1 GPa", "1e300 Pa"]'}, "it must lie inside (1e-60, 1e+60) Pa"),
+        ({"modulus": '["1 GPa", "1e300 Pa"]'}, "1e+300 Pa is too large"),
         ({"size": '["64 µm", "70 µm"]'}, "cell.size says 7e-05 m"),
         ({"pixel": '"-1 µm"'}, "greater than 0"),
         ({"threshold": None, "labels": "[60, 200]"}, "which is none of cell.labels"),

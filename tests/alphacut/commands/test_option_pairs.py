@@ -137,6 +137,7 @@ VALUES = {
     "--csv": ("tables",),
 }
 """Values of every option, none for a flag."""
+RECORDED = "time [s],acceleration [m/s^2]\n0,0\n0.1,1\n0.2,-1\n0.3,0.5\n0.4,0\n"
 OWN = {
     ("cell", "--set"): ("cell.matrix_poisson=0.25",),
     ("cell", "--method"): ("prism",),
@@ -167,6 +168,11 @@ OWN = {
     ("update", "--set"): ("update.frequency_deviation=0.02",),
     ("update", "--modulus"): ("[21, 25, 29] GPa",),
     ("update", "--out"): ("learned",),
+    ("spectrum", "--damping"): ("2 %",),
+    ("spectrum", "--shortest"): ("0.1 s",),
+    ("spectrum", "--longest"): ("2 s",),
+    ("spectrum", "--count"): ("9",),
+    ("spectrum", "--out"): ("spectrum",),
     ("measure-next", "--set"): ("frame.dampers=60 N s/m",),
     ("measure-next", "--output"): ("v1",),
     ("measure-next", "--out"): ("advice",),
@@ -265,7 +271,8 @@ class Watched:
             text = CASE.format(stages=stages, modulus='modulus = "[20, 25.5, 30] GPa"\n') + MEASURED
             text = text.replace('fuzzy = ["m"]', 'fuzzy = ["m", "E"]')
             (place / "modes.csv").write_text(MODES, encoding="utf-8")
-        text = {"microstructure": PACKED, "image": IMAGED}.get(self.command, text)
+        own = {"microstructure": PACKED, "image": IMAGED, "spectrum": RECORDED}
+        text = own.get(self.command, text)
         Store(place / "a.db").close()
         np.save(place / "a.npy", np.pad(np.ones((4, 4), int), 4))
         (place / "case.toml").write_text(text, encoding="utf-8")
