@@ -41,6 +41,12 @@ def test_a_constant_push_doubles_the_static_displacement_and_damping_takes_its_s
         )
 
 
+def test_a_short_pulse_moves_a_soft_oscillator_after_the_record() -> None:
+    pulse = Accelerogram(0.01, np.array([0.0, 100.0, 0.0]))  # 1 m/s
+    found = response_spectrum(pulse, [np.pi], 0.0)
+    np.testing.assert_allclose(found.displacement, 0.5, rtol=1e-4)
+
+
 def test_records_of_any_kind_agree_with_dense_integration_within_the_error() -> None:
     rng = np.random.default_rng()
     step = float(rng.uniform(0.01, 0.05))

@@ -1,5 +1,7 @@
 """Finite elements on one eighth of the cell against the exact series."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -43,6 +45,26 @@ def test_a_mesh_is_not_judged_by_one_as_fine():
     inclusion = Phase(6e8)
     (moduli,), (error,) = cubic_stiffness_by_elements(0.76, MATRIX, [inclusion], size=0.27)
     assert (abs(moduli / exact(0.76, MATRIX, inclusion) - 1) <= error).all()
+
+
+def test_a_third_mesh_is_made_where_the_second_is_as_fine(monkeypatch):
+    from alphacut.rve.spheres.fem import stiffness
+
+    made = []
+
+    class Cell:
+        def __init__(self, radius, *, size):
+            made.append(size)
+            self.unknowns = 1000 if size > 0.2 else 4000
+
+        def solve(self, matrix, phase):
+            return SimpleNamespace(moduli=np.full(3, 1 + 1 / self.unknowns))
+
+    monkeypatch.setattr(stiffness, "OctantCell", Cell)
+    _, error, unknowns = stiffness.on_two_meshes(0.6, MATRIX, [Phase(80e9)], size=0.27)
+    assert made == pytest.approx([0.27, 0.405, 0.18])
+    assert unknowns == 4000
+    assert (error > 2.5e-4).all()  # twice what order 2.7 leaves of the two meshes' distance, 7.5e-4
 
 
 @pytest.mark.slow
