@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -67,9 +67,7 @@ class TableModel:
             ValueError: The map or a modulus leaves the range that was given.
         """
         results: dict[int, Homogenised] = {}
-        for poisson in dict.fromkeys(p.poisson for p in inclusions):
-            places = [k for k, p in enumerate(inclusions) if p.poisson == poisson]
-            moduli = np.array([inclusions[k].modulus for k in places])
+        for poisson, places, moduli in by_poisson(inclusions):
             started = perf_counter()
             span = self._span(radius_map, matrix, poisson, moduli)
             table, found = stored_table(
@@ -138,6 +136,13 @@ def table_in_words(table: Table, *, found: bool) -> str:
         f"table of {radii} radii by {moduli} moduli, mesh size {table.mesh_size:.3g},"
         f" {'kept' if found else made}"
     )
+
+
+def by_poisson(inclusions: Sequence[Phase]) -> Iterator[tuple[float, list[int], Array]]:
+    """Each Poisson's ratio, the places of the phases that have it, and their moduli in Pa."""
+    for poisson in dict.fromkeys(p.poisson for p in inclusions):
+        places = [k for k, p in enumerate(inclusions) if p.poisson == poisson]
+        yield poisson, places, np.array([inclusions[k].modulus for k in places])
 
 
 def rounded_radii(low: float, high: float) -> tuple[float, float]:

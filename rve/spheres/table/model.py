@@ -22,7 +22,7 @@ from alphacut.rve.spheres.table.source import (
 )
 from alphacut.rve.table.cache import stored_table
 from alphacut.rve.table.interpolant import Table
-from alphacut.rve.table.model import rounded_moduli, rounded_radii, table_in_words
+from alphacut.rve.table.model import by_poisson, rounded_moduli, rounded_radii, table_in_words
 from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -69,9 +69,7 @@ class SphereTableModel:
             ValueError: A modulus leaves the range that was given.
         """
         results: dict[int, HomogenisedSpheres] = {}
-        for poisson in dict.fromkeys(p.poisson for p in inclusions):
-            places = [k for k, p in enumerate(inclusions) if p.poisson == poisson]
-            moduli = np.array([inclusions[k].modulus for k in places])
+        for poisson, places, moduli in by_poisson(inclusions):
             started = perf_counter()
             table, found = stored_table(
                 self._span(radius_map, matrix, poisson, moduli),
