@@ -27,10 +27,6 @@ from alphacut.rve.spheres.fem.multigrid import TwoSpaces
 from alphacut.rve.spheres.fem.octant import MATRIX, SPHERE, octant
 from alphacut.stochastic.theta.truncated_normal import Array
 
-COARSER = 1.5  # edge length of the second mesh over the first
-_APART = 1.25  # least ratio of the edge lengths that their unknowns tell
-_LEAST_ORDER = 2.7  # of the moduli in the edge length
-_SAFETY = 2.0
 RTOL = 1e-7  # of the residual; what is left of the energy is of the order of its square
 
 
@@ -199,37 +195,3 @@ def octant_stiffness(
         ConvergenceError: The iteration does not converge.
     """
     return OctantCell(radius, size=size, comm=comm).solve(matrix, inclusion, rtol=rtol)
-
-
-def cubic_stiffness_by_elements(
-    radius: float, matrix: Phase, inclusions: Sequence[Phase], *, size: float = 0.2
-) -> tuple[Array, Array]:
-    """The first two of `on_two_meshes`."""
-    return on_two_meshes(radius, matrix, inclusions, size=size)[:2]
-
-
-def on_two_meshes(
-    radius: float, matrix: Phase, inclusions: Sequence[Phase], *, size: float
-) -> tuple[Array, Array, int]:
-    """The moduli on the finer of two meshes, their declared relative errors, and its unknowns.
-
-    Moduli and errors have shape (m, 3).
-
-    The meshes' edge lengths, as their unknowns tell them, differ by a factor of 1.25 or more: where
-    Gmsh had to refine the coarser one, a third mesh is made. What order 2.7 leaves of the largest
-    distance of any modulus, times 2, is the error of each, for one alone may be near by chance.
-    """
-    cells = [OctantCell(radius, size=h) for h in (size, min(1.0, COARSER * size))]
-    if _edges(*cells) < _APART:
-        cells = [OctantCell(radius, size=size / COARSER), cells[0]]
-    fine, coarse = (
-        np.array([cell.solve(matrix, phase).moduli for phase in inclusions]) for cell in cells
-    )
-    gap = np.abs(coarse / fine - 1).max(axis=1, keepdims=True)
-    error = _SAFETY * gap / (_edges(*cells) ** _LEAST_ORDER - 1)
-    return fine, np.broadcast_to(error, fine.shape), cells[0].unknowns
-
-
-def _edges(fine: OctantCell, coarse: OctantCell) -> float:
-    """Mean edge length of the coarser mesh over that of the finer."""
-    return float((fine.unknowns / coarse.unknowns) ** (1 / 3))
