@@ -11,6 +11,8 @@ from alphacut.frame.modal.exact_response import ExactResponse
 from alphacut.frame.modal.model import ModalModel
 
 Response = ModalModel | ExactResponse
+FEW = (1, 4, 32)
+"""Points out of which the best are starts of an independent pass, beside the best of all."""
 
 
 @dataclass(eq=False)
@@ -86,3 +88,28 @@ def best_of_pool(pool: Array, values: Array, nodes: Array, starts: int) -> list[
                 near = np.stack([np.abs(pool - pool[k]).max(1) < reach for k in unique], 1)
                 left = np.where(near[:, index], -sign * np.inf, left)
     return out
+
+
+def best_of_few(
+    pool: Array, values: Array, nodes: Array, few: int, rng: np.random.Generator
+) -> Optima:
+    """Best of a few points of the pool (P, d), drawn anew for every problem.
+
+    The best of many points has a bias: corners are met exactly, an optimum inside is not, so one
+    that lies little above a corner is never begun from. Few points give each basin a chance.
+
+    Args:
+        pool: Points, shape (P, d).
+        values: Their trajectories, shape (P, T, m), or at `nodes` alone.
+        nodes: Time nodes of the problems.
+        few: Points drawn for a problem.
+        rng: Draws them.
+    """
+    optima = problems(nodes, values.shape[-1], pool.shape[1])
+    chosen = (values if len(nodes) == values.shape[1] else values[:, nodes]).reshape(len(pool), -1)
+    every = np.arange(len(optima.node))
+    drawn = rng.integers(len(pool), size=(few, len(every)))
+    found = optima.side * chosen[drawn, every // 2]
+    best = found.argmax(0)
+    optima.point[:], optima.value[:] = pool[drawn[best, every]], found[best, every]
+    return optima

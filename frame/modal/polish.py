@@ -11,7 +11,8 @@ from alphacut.frame.calculus.jet import Array
 from alphacut.frame.modal.contest import contest
 from alphacut.frame.modal.exact_response import ExactResponse
 from alphacut.frame.modal.newton import refine
-from alphacut.frame.modal.optima import Optima, best_of_pool, problems
+from alphacut.frame.modal.optima import FEW, Optima, best_of_few, best_of_pool, problems
+from alphacut.frame.modal.probes import probe
 from alphacut.frame.modal.starting_points import fresh_points, trajectories
 
 CALM_PASSES = 2
@@ -20,8 +21,10 @@ VALUES = 16e6
 """Most numbers of the trajectories of a pass that are kept at a time: 128 MB."""
 ROUNDS = 3
 """Rounds of a contest of optima on either side of a jump, in a pass."""
-RIVALS = 4
-"""Basins from which a problem is solved anew."""
+BEHIND = 0.1
+"""Share of the largest bound by which an optimum carried from the next node may lie behind."""
+APART = 0.1
+"""Share of the box's width from which on two points may lie in different basins."""
 
 
 @dataclass(frozen=True)
@@ -99,15 +102,40 @@ class Polish:
         if len(known):
             _take(found, best_of_pool(known, trajectories(exact, known), nodes, 1)[0])
         fresh = fresh_points(rng, lower, upper, graphs)
-        some = rng.permutation(len(before))[:anew]
-        for rival in best_of_pool(fresh, trajectories(exact, fresh), nodes, RIVALS):
-            if count:
+        values = trajectories(exact, fresh)
+        _take(found, best_of_pool(fresh, values, nodes, 1)[0])
+        if count:
+            some = rng.permutation(len(before))[:anew]
+            rivals = [best_of_pool(fresh, values, nodes, 1)[0]]
+            rivals += [best_of_few(fresh, values, nodes, few, rng) for few in FEW]
+            for rival in rivals:
                 refine(exact, rival, some, lower, upper, self.small)
-            _take(found, rival)
+                _take(found, rival)
+            for rival in rivals:
+                self._carried(exact, found, rival, lower, upper)
         open_ = np.arange(len(before)) if not count else np.flatnonzero(found.value > before)
         refine(exact, found, open_, lower, upper, self.small)
         contest(exact, found, lower, upper, self.small, ROUNDS)
+        if count and exact.bent:
+            probe(exact, exact.model, found, lower, upper, self.small, rng)
         return np.flatnonzero(found.value > before)
+
+    def _carried(
+        self, exact: ExactResponse, found: Optima, rival: Optima, lower: Array, upper: Array
+    ) -> None:
+        """Solve problems anew from the optima of other basins at the nodes beside."""
+        grid = np.arange(len(found.value)).reshape(len(exact.time), -1)
+        least = found.value - BEHIND * np.abs(found.value).max()
+        for here, there in ((grid[1:], grid[:-1]), (grid[:-1], grid[1:])):
+            onto, from_ = here.ravel(), there.ravel()
+            apart = np.abs(rival.point[from_] - found.point[onto]).max(1)
+            new = (apart > APART * (upper - lower).max()) & (rival.value[from_] > least[onto])
+            carried = found.take(onto[new])
+            carried.value[:] = -np.inf
+            carried.offer(exact, rival.point[from_[new]], np.arange(len(carried.value)))
+            open_ = np.flatnonzero(carried.value > least[onto[new]])
+            refine(exact, carried, open_, lower, upper, self.small)
+            found.offer(exact, carried.point, onto[new])
 
 
 def _take(found: Optima, rival: Optima) -> None:

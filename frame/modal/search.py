@@ -17,7 +17,8 @@ from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.modal.contest import contest
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.newton import refine
-from alphacut.frame.modal.optima import Optima, Response, best_of_pool, problems
+from alphacut.frame.modal.optima import FEW, Optima, Response, best_of_few, best_of_pool, problems
+from alphacut.frame.modal.probes import probe
 from alphacut.frame.modal.starting_points import fresh_points, tensor_points, trajectories
 
 RIVAL = 0.05
@@ -66,7 +67,9 @@ class ModalSearch:
         more = int(np.clip(np.log2(max(model.turned, 1.0) / CALM), 0, 2))
         return cls(512 * 2**more, 2 + more, SMALL * wanted, QUIET * wanted, seed=seed)
 
-    def run(self, model: Response, lower: Array, upper: Array) -> tuple[Array, Array, Array, Array]:
+    def run(
+        self, model: ModalModel, lower: Array, upper: Array
+    ) -> tuple[Array, Array, Array, Array]:
         """Upper bounds of (−output, output), their unit coordinates, and what may be missing.
 
         Args:
@@ -99,12 +102,14 @@ class ModalSearch:
         """Nodes from one that is searched anew to the next."""
         return max(1, int(self.resolution / (model.fastest * (model.time[1] - model.time[0]))))
 
-    def _second_passes(self, model: Response, found: Optima, lower: Array, upper: Array) -> Array:
+    def _second_passes(self, model: ModalModel, found: Optima, lower: Array, upper: Array) -> Array:
         """Independent passes over `found` until one gains nothing; the last one's gain, (m,)."""
         gained = np.zeros(len(model.outputs))
         for count in range(1, self.passes + 1):
             before = found.value.copy()
             improved = second_pass(model, found, lower, upper, self, count)
+            rng = np.random.default_rng((self.seed, 13, count))
+            improved[probe(model, model, found, lower, upper, self.quiet / 4, rng)] = True
             if improved.any():
                 self._follow(model, found, len(model.time), lower, upper, improved)
                 contest(model, found, lower, upper, self.small)
@@ -234,9 +239,10 @@ def second_pass(
         open_ = np.flatnonzero(rival.value > found.value - behind)
         refine(model, rival, open_, lower, upper, search.quiet / 4)
         improved[found.offer(model, rival.point, every.ravel())] = True
-    for k in range(search.starts):
-        pool = fresh_points(rng, lower, upper, search.samples // 4**k)
-        rival = best_of_pool(pool, trajectories(model, pool, nodes), nodes, 1)[0]
+    pool = fresh_points(rng, lower, upper, search.samples)
+    values = trajectories(model, pool, nodes)
+    for few in FEW:
+        rival = best_of_few(pool, values, nodes, few, rng)
         refine(model, rival, np.arange(len(rival.value)), lower, upper, search.quiet / 4)
         improved[found.offer(model, rival.point, every[nodes].ravel())] = True
     return improved
