@@ -8,8 +8,10 @@ import pytest
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.modal.contest import contest
 from alphacut.frame.modal.exact_response import ExactResponse
-from alphacut.frame.modal.optima import Optima, problems
+from alphacut.frame.modal.model import ModalModel
+from alphacut.frame.modal.optima import Optima, best_of_few, problems
 from alphacut.frame.modal.polish import Polish
+from alphacut.frame.modal.probes import probe
 from alphacut.frame.modal.search import ModalSearch, second_pass
 
 CENTRES = np.array([[-0.7, -0.7], [0.7, -0.7], [-0.7, 0.7], [0.6, 0.6]])
@@ -23,6 +25,7 @@ class Hills:
     """The same sum of bells of two parameters at every node, or of heights that change."""
 
     secant: ClassVar[bool] = False
+    bent: ClassVar[bool] = False
     fastest = 1.0
     outputs = ("q1",)
 
@@ -76,15 +79,49 @@ def test_a_polish_solves_anew_from_basins_that_stand_behind() -> None:
 
 
 def test_a_second_calm_pass_is_asked_for() -> None:
-    hills = Hills(3)
+    hills = Hills(3, 0.045)
     starts = [np.broadcast_to(CENTRES[0], (3, 1, 2, 2))]
-    once = Polish(1e-9, 1e-9, passes=1, graphs=256, seed=9).run(on(hills), starts, -ENDS, ENDS)
+    once = Polish(1e-9, 1e-9, passes=1, graphs=256, seed=31).run(on(hills), starts, -ENDS, ENDS)
     assert once[3].max() <= 1e-9  # a pass that meets nothing
-    found = Polish(1e-9, 1e-9, graphs=256, seed=9).run(on(hills), starts, -ENDS, ENDS)
+    found = Polish(1e-9, 1e-9, graphs=256, seed=31).run(on(hills), starts, -ENDS, ENDS)
     assert (found[0][:, 0, 1] > 1.05).all()
     for passes in (2, 3):  # the second gains, the third does not: one calm pass says little
-        short = Polish(1e-9, 1e-9, passes=passes, graphs=256, seed=9)
+        short = Polish(1e-9, 1e-9, passes=passes, graphs=256, seed=31)
         assert short.run(on(hills), starts, -ENDS, ENDS)[3].max() > 0.04
+
+
+def test_starts_out_of_few_points_reach_a_hill_that_hides_below_a_corner() -> None:
+    hills = Hills(1)
+    pool = np.vstack([np.tile(CENTRES[0], (60, 1)), np.tile(CENTRES[3] + 0.05, (40, 1))])
+    values, nodes = hills.values(pool), np.zeros(200, int)
+    assert values[0] > values[-1]  # the lower hill's top before the higher one's side
+    many = np.broadcast_to(values, (100, 200, 1))
+    rng = np.random.default_rng(3)
+    for few, least, most in ((1, 0.3, 0.5), (4, 0.01, 0.08), (64, 0.0, 0.0)):
+        found = best_of_few(pool, many, nodes, few, rng)
+        on_top = found.value[found.side > 0] < values[0, 0, 0]
+        assert least <= on_top.mean() <= most
+
+
+def test_optima_of_other_basins_are_carried_to_the_next_node() -> None:
+    hills = Hills(3)
+    found, rival = broad_top(hills), broad_top(hills)
+    upper = 2 * np.arange(3) + 1
+    rival.point[upper[1]], rival.value[upper[1]] = CENTRES[3], 1.06
+    Polish(1e-9, 1e-9)._carried(on(hills), found, rival, -ENDS, ENDS)
+    assert (found.value[upper[[0, 2]]] > 1.05).all()
+    assert found.value[upper[1]] < 1.01  # only the nodes beside
+
+
+def test_lines_through_an_optimum_meet_the_hill_beside_it() -> None:
+    hills = Hills(2)
+    node = np.zeros(1, int)
+    found = top(2, CENTRES[1], float(hills.value_at(CENTRES[1:2], node, node)[0]))
+    guide = cast(ModalModel, hills)
+    rng = np.random.default_rng(0)
+    improved = probe(on(hills), guide, found, -ENDS, ENDS, 1e-9, rng)
+    assert set(improved) == set(np.flatnonzero(found.side > 0))
+    assert np.abs(found.point[improved] - CENTRES[0]).max() < 0.05
 
 
 def test_an_independent_pass_follows_basins_that_stand_behind() -> None:
