@@ -23,7 +23,7 @@ from alphacut.frame.structures.linear import Accelerogram, evaluate
 from alphacut.frame.structures.modes import ModalError
 
 MOST = 3000
-"""Polished points whose exact trajectories are computed."""
+"""Polished points whose exact trajectories are computed beside the best of each bound."""
 
 
 def trajectories(flow: LinearFlow, physical: Array) -> Array:
@@ -92,15 +92,17 @@ def inner_bounds(
 ) -> Array:
     """Attained upper bounds of (−output, output) over a level's box, shape (T, m, 2).
 
-    All nodes are sampled, and get what is found for the others; some are polished.
+    All nodes are sampled, and get what is found for the others; some, or all, are polished: from
+    the best of many points, which lie on hills that are high before they are climbed, and from
+    points drawn blindly, which meet the others.
 
     Args:
         flow: Time nodes, boxes and structure; its integrator is not used.
         level: Index of the α-cut.
         samples: Random points of the box.
-        starts: Points from which every bound of a polished node begins.
+        starts: Points of either kind from which every bound of a polished node begins.
         seed: Of the points and nodes.
-        nodes: Number of nodes that are polished.
+        nodes: Number of nodes that are polished; all if there are no more.
     """
     assert isinstance(flow.flow, LinearFlow)
     rng, (lower, upper) = np.random.default_rng((seed, level)), flow.boxes.unit(level)
@@ -108,8 +110,14 @@ def inner_bounds(
     ends = [_offer(flow, best, chunk) for chunk in _parts(rng, lower, upper, samples, starts)]
     if not (upper > lower).any():
         return best
-    chosen = np.unique([*rng.integers(len(flow.time), size=nodes), best.max((1, 2)).argmax()])
-    polished = _polished(flow, np.array(ends)[:, chosen], chosen, lower, upper, rng)
+    count = len(flow.time)
+    drawn = rng.permutation(count)[:nodes]
+    chosen = np.unique([*drawn, best.max((1, 2)).argmax()])
+    begun = [end[chosen] for end in ends]
+    begun += [
+        _drawn(rng, lower, upper, begun[0][..., 0].size).reshape(begun[0].shape) for _ in ends
+    ]
+    polished = _polished(flow, begun, chosen, lower, upper, rng)
     for spread in (0.0, 0.02):
         near = polished + spread * (upper - lower) * rng.normal(size=polished.shape)
         _offer(flow, best, np.clip(near, lower, upper))
@@ -145,21 +153,28 @@ def _offer(flow: UnitFlow, best: Array, points: Array) -> Array:
 
 
 def _polished(
-    flow: UnitFlow, ends: Array, nodes: Array, lower: Array, upper: Array, rng: np.random.Generator
+    flow: UnitFlow,
+    begun: list[Array],
+    nodes: Array,
+    lower: Array,
+    upper: Array,
+    rng: np.random.Generator,
 ) -> Array:
-    """Where Newton's method leads from `ends` (starts, nodes, m, 2, d), thinned, shape (S, d)."""
+    """Where Newton's method leads from each of `begun` (nodes, m, 2, d), thinned, shape (S, d)."""
+    assert isinstance(flow.flow, LinearFlow)
     try:
-        guide = ExactResponse.of(
-            fit_modes(flow.flow, flow.boxes, tolerance=1e-4, budget=120), flow.scale
-        )  # type: ignore[arg-type]
+        model = fit_modes(flow.flow, flow.boxes, tolerance=1e-4, budget=120)
+        guide = ExactResponse.of(model, flow.scale)
     except ModalError:
-        return np.unique(ends.reshape(-1, ends.shape[-1]), axis=0)
-    found = []
-    for start in ends:
+        return np.unique(np.reshape(begun, (-1, begun[0].shape[-1])), axis=0)
+    best, found = problems(nodes, len(flow.outputs), len(lower)), []
+    every = np.arange(len(best.value))
+    for start in begun:
         optima = problems(nodes, len(flow.outputs), len(lower))
-        optima.offer(guide, start.reshape(optima.point.shape), np.arange(len(optima.value)))
-        refine(guide, optima, np.arange(len(optima.value)), lower, upper, 1e-7)
+        optima.offer(guide, start.reshape(optima.point.shape), every)
+        refine(guide, optima, every, lower, upper, 1e-7)
         found.append(optima.point)
+        best.offer(guide, optima.point, every)
     unique = np.unique(np.round(np.concatenate(found), 4), axis=0)
-    exact: Array = rng.permutation(unique)[:MOST]
-    return exact
+    tops = np.unique(np.round(best.point, 8), axis=0)
+    return np.concatenate([tops, rng.permutation(unique)[:MOST]])
