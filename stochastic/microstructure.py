@@ -9,25 +9,25 @@ a3 are the limits themselves, not the middles of the outer two of 100 bins betwe
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from alphacut.stochastic.errors import RefusedError
-from alphacut.stochastic.fit.area_weighted import AreaWeighted
+from alphacut.stochastic.fit.area_weighted import DISCS, SPHERES, AreaWeighted, Shape
 from alphacut.stochastic.fit.bootstrap import SlopeBand, slope_band
 from alphacut.stochastic.fit.hermite_fit import HermiteFit
 from alphacut.stochastic.fit.pbox import PBox, least_pbox
 from alphacut.stochastic.sections import Measured, Section, Simulated, reduced_radii
+from alphacut.stochastic.spheres.packing import SpherePackings
 from alphacut.stochastic.tessellation.delaunay import Neighbours, cell_correlation, neighbours
+from alphacut.stochastic.theta.quadrature import gauss_rule
 from alphacut.stochastic.theta.truncated_normal import TruncatedNormal
 
-if TYPE_CHECKING:
-    pass
+WIDEST = 0.95  # band, in probability, to which one is widened for several samples
 
 
 @dataclass(frozen=True)
@@ -35,9 +35,10 @@ class Study:
     """Settings of the way from a microstructure to a radius map.
 
     Args:
-        source: Where the discs come from.
+        source: Where the discs or spheres come from.
         limits: Lower and upper limit of r_n; None for those that keep `share`.
         share: Share of area to keep, with equal shares cut off at both ends; used without `limits`.
+            Of spheres the upper limit goes no further than their `Shape.reach`.
         seed: Seed of everything that is left to chance.
         confidence: Level of the simultaneous bootstrap band, in (0, 1).
         bootstrap: Number of resamples, at least 100.
@@ -51,7 +52,7 @@ class Study:
         ValueError: A value lies outside its range.
     """
 
-    source: Simulated | Measured
+    source: Simulated | Measured | SpherePackings
     limits: tuple[float, float] | None = None
     share: float = 0.9927
     seed: int = 0
@@ -80,14 +81,34 @@ class Study:
         if self.seed < 0:
             raise ValueError(f"the seed is {self.seed}; it must be a whole number, 0 or greater")
 
+    @property
+    def shape(self) -> Shape:
+        """The kind of the particles."""
+        return SPHERES if isinstance(self.source, SpherePackings) else DISCS
+
+    def limits_of(self, sample: AreaWeighted) -> tuple[float, float]:
+        """Limits of r_n of a sample.
+
+        Raises:
+            RefusedError: The share to keep reaches up to 1.
+        """
+        lower, upper = self.limits or sample.limits(self.share)
+        if self.limits is None and self.shape.reach is not None:
+            upper = min(upper, self.shape.reach)
+        if not upper < 1:
+            raise RefusedError(
+                f"a share of {self.share:g} of the area reaches up to r_n = {upper:.4g}; the square"
+                " cell takes less than 1"
+            )
+        return lower, upper
+
 
 @dataclass(frozen=True, eq=False)
-class Microstructure:
-    """Radius map of a microstructure, with the statistics that it rests on.
+class FittedMap:
+    """Fuzzy radius map of reduced radii, with the statistics that it rests on.
 
     Args:
         study: How it was found.
-        sections: Discs and cells.
         sample: Area-weighted r_n of all whole cells.
         kept: The part of it within the limits.
         pbox: Fuzzy radius map.
@@ -96,20 +117,15 @@ class Microstructure:
             probability.
         allowed: Half width by which the distribution may leave the p-box: that band, or the one
             asked for.
-        direct: Delaunay neighbours of each section.
-        seconds: Wall time by stage: pack, fit, neighbours, total.
     """
 
     study: Study
-    sections: list[Section]
     sample: AreaWeighted
     kept: AreaWeighted
     pbox: PBox
     slopes: SlopeBand
     band: float
     allowed: float
-    direct: list[Neighbours]
-    seconds: dict[str, float]
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -121,6 +137,33 @@ class Microstructure:
         """Share of area within the limits."""
         return self.sample.share_within(*self.limits)
 
+    @property
+    def fraction_of_map(self) -> float:
+        """Mean share of the cell that the particle takes, for the modal map."""
+        slopes = (self.pbox.a2[1], self.pbox.a4[1])
+        return fraction_of(self.study.shape, self.pbox.fit, slopes)
+
+
+def fraction_of(shape: Shape, fit: HermiteFit, slopes: tuple[float, float]) -> float:
+    """Mean share of the cell that the particle takes, for the map with these slopes."""
+    rule = gauss_rule(fit.distribution, points=8)
+    return float(rule.mean(shape.shares(fit.map(slopes)(rule.nodes))))
+
+
+@dataclass(frozen=True, eq=False)
+class Microstructure(FittedMap):
+    """Radius map of discs.
+
+    Args:
+        sections: Discs and cells.
+        direct: Delaunay neighbours of each section.
+        seconds: Wall time by stage: pack, fit, neighbours, total.
+    """
+
+    sections: list[Section]
+    direct: list[Neighbours]
+    seconds: dict[str, float]
+
 
 def study(
     case: Study,
@@ -128,7 +171,7 @@ def study(
     executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Microstructure:
-    """Do all of it: discs, cells, distribution, limits, fit, p-box, neighbours.
+    """Do all of it for discs: cells, distribution, limits, fit, p-box, neighbours.
 
     Args:
         case: What to do.
@@ -136,35 +179,18 @@ def study(
         progress: Told the share done, 0 to 1.
 
     Raises:
-        ValueError: Measured data make no sense.
+        ValueError: Measured data make no sense, or the source is one of spheres.
         RefusedError: A packing fails its test, or no p-box contains the sample.
     """
+    if isinstance(case.source, SpherePackings):
+        raise ValueError("this source packs spheres; sphere_study takes it")
     begin = perf_counter()
     tell = progress or (lambda share: None)
-    streams = np.random.SeedSequence(case.seed, spawn_key=(1,)).spawn(2)
     sections = case.source.sections(
         case.seed, executor=executor, progress=lambda share: tell(0.7 * share)
     )
     packed = perf_counter()
-    sample = reduced_radii(sections)
-    lower, upper = case.limits or sample.limits(case.share)
-    if not upper < 1:
-        raise RefusedError(
-            f"a share of {case.share:g} of the area reaches up to r_n = {upper:.4g}; the square"
-            " cell takes less than 1"
-        )
-    kept, fit = sample.truncated(lower, upper), HermiteFit(lower, upper, case.distribution)
-    band = kept.band(case.confidence, case.bootstrap, np.random.default_rng(streams[0]))
-    tell(0.8)
-    allowed = band if case.band is None else case.band
-    slopes = slope_band(
-        fit,
-        kept,
-        level=case.confidence,
-        resamples=case.bootstrap,
-        generator=np.random.default_rng(streams[1]),
-    )
-    pbox = least_pbox(fit, kept, allowed, hold=slopes if case.sampling else None)
+    found = fitted_map(case, reduced_radii(sections))
     tell(0.9)
     fitted = perf_counter()
     direct = [neighbours(section.discs) for section in sections]
@@ -176,9 +202,47 @@ def study(
         "neighbours": end - fitted,
         "total": end - begin,
     }
-    return Microstructure(
-        case, sections, sample, kept, pbox, slopes, band, allowed, direct, seconds
+    return Microstructure(**vars(found), sections=sections, direct=direct, seconds=seconds)
+
+
+def fitted_map(case: Study, sample: AreaWeighted, others: Sequence[AreaWeighted] = ()) -> FittedMap:
+    """Limits, fit and p-box of reduced radii.
+
+    Args:
+        case: The settings.
+        sample: r_n of all whole cells.
+        others: r_n that are possible besides. The limits and the p-box then take all in, the modal
+            map is that of `sample`; a band too narrow for any map of these limits is widened by
+            halves until one holds them, and told in `allowed`.
+
+    Raises:
+        RefusedError: No p-box contains the samples.
+    """
+    streams = np.random.SeedSequence(case.seed, spawn_key=(1,)).spawn(2)
+    every = [case.limits_of(one) for one in (sample, *others)]
+    lower, upper = min(low for low, _ in every), max(high for _, high in every)
+    kept, fit = sample.truncated(lower, upper), HermiteFit(lower, upper, case.distribution)
+    band = kept.band(case.confidence, case.bootstrap, np.random.default_rng(streams[0]))
+    slopes = slope_band(
+        fit,
+        kept,
+        level=case.confidence,
+        resamples=case.bootstrap,
+        generator=np.random.default_rng(streams[1]),
     )
+    allowed = band if case.band is None else case.band
+    more = [one.truncated(lower, upper) for one in others]
+    while True:
+        try:
+            pbox = least_pbox(
+                fit, kept, allowed, hold=slopes if case.sampling else None, others=more
+            )
+            break
+        except RefusedError:
+            if not more or allowed >= WIDEST:
+                raise
+            allowed = min(max(1.5 * allowed, 1e-3), WIDEST)
+    return FittedMap(case, sample, kept, pbox, slopes, band, allowed)
 
 
 def mean_correlation(sections: list[Section]) -> float:

@@ -6,27 +6,32 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from alphacut.stochastic.microstructure import Microstructure, mean_correlation
+from alphacut.stochastic.microstructure import FittedMap, Microstructure, mean_correlation
+from alphacut.stochastic.spheres.microstructure import SphereMicrostructure, map_fraction
+from alphacut.stochastic.spheres.power_cells import volume_fraction
 
 if TYPE_CHECKING:
     import xarray
 
 
+PERIODIC = "none: the boxes are periodic"
 EDGE = (
     "only cells that no disc beyond the window's edge can change; each stands for 1/p, p the share"
     " of places where its like is whole"
 )
 
 
-def summary(found: Microstructure) -> dict[str, object]:
+def summary(found: Microstructure | SphereMicrostructure) -> dict[str, object]:
     """Every number found, lengths in m."""
-    box, sample, discs = found.pbox, found.sample, [section.discs for section in found.sections]
+    if isinstance(found, SphereMicrostructure):
+        return {**_of_spheres(found), **_of_map(found), "seconds": found.seconds}
+    discs = [section.discs for section in found.sections]
     radii = np.concatenate([one.radii for one in discs])
     return {
+        "particles": found.study.shape.particles,
         "packings": len(discs),
         "discs": len(radii),
-        "cells": len(sample.values),
-        "edge": "none: the boxes are periodic" if all(one.periodic for one in discs) else EDGE,
+        "edge": PERIODIC if all(one.periodic for one in discs) else EDGE,
         "hidden": int(sum(section.diagram.hidden.sum() for section in found.sections)),
         "rejected": {
             str(row): reason
@@ -34,13 +39,26 @@ def summary(found: Microstructure) -> dict[str, object]:
             for row, reason in section.rejected.items()
         },
         "area_fraction": float(np.mean([one.area_fraction for one in discs])),
-        "area_fraction_of_cells": sample.area_fraction,
+        "area_fraction_of_cells": found.sample.area_fraction,
         "area_fraction_of_image": found.sections[0].phase_fraction,
         "smallest_radius": float(radii.min()),
         "largest_radius": float(radii.max()),
         "cell_areas_sum_error": max(
             abs(section.diagram.areas.sum() / section.discs.area - 1) for section in found.sections
         ),
+        **_of_map(found),
+        "mean_area_fraction_of_map": found.fraction_of_map,
+        "neighbours": _neighbours(found),
+        "correlation": mean_correlation(found.sections),
+        "seconds": found.seconds,
+    }
+
+
+def _of_map(found: FittedMap) -> dict[str, object]:
+    """Numbers of the reduced radii and their map."""
+    box, sample = found.pbox, found.sample
+    return {
+        "cells": len(sample.values),
         "mean_r_n": sample.mean,
         "largest_r_n": float(sample.values[-1]),
         "limits": list(found.limits),
@@ -60,11 +78,52 @@ def summary(found: Microstructure) -> dict[str, object]:
         "pbox_area": box.area,
         "pbox_breach": box.excess(found.kept),
         "misfit": box.fit.misfit(found.kept, (box.a2[1], box.a4[1])),
-        "mean_area_fraction_of_map": _mean_area_fraction(found),
-        "neighbours": _neighbours(found),
-        "correlation": mean_correlation(found.sections),
         "seed": found.study.seed,
-        "seconds": found.seconds,
+    }
+
+
+def _of_spheres(found: SphereMicrostructure) -> dict[str, object]:
+    """Numbers of the spheres, of their law and of those that are possible besides."""
+    packed, section = found.packed[0], found.source.section
+    radii = np.concatenate([one.radii for one in packed.packings])
+    cubes = zip(packed.packings, packed.volumes, strict=True)
+    return {
+        "particles": found.study.shape.particles,
+        "packings": len(packed.packings),
+        "spheres": len(radii),
+        "edge": PERIODIC,
+        "law": found.source.packing.radii.label,
+        "volume_fraction": found.source.packing.volume_fraction,
+        "volume_fraction_packed": packed.fraction,
+        "volume_fraction_of_cells": volume_fraction(found.sample),
+        "mean_volume_fraction_of_map": found.fraction_of_map,
+        "share_beyond_limit": found.share_beyond,
+        "smallest_radius": float(radii.min()),
+        "largest_radius": float(radii.max()),
+        "cell_volumes_sum_error": max(
+            abs(float(volumes.sum()) / one.side**3 - 1) for one, volumes in cubes
+        ),
+        "possible_laws": [
+            {
+                "law": one.name,
+                "spheres": sum(len(part.radii) for part in one.packings),
+                "volume_fraction_packed": one.fraction,
+                "mean_r_n": one.sample.mean,
+                "mean_volume_fraction_of_its_map": map_fraction(found.study, one.sample),
+            }
+            for one in found.packed[1:]
+        ],
+        "radii_pbox": None
+        if section is None
+        else {
+            "weight": section.weight,
+            "level": section.level,
+            "radius": section.edges.tolist(),
+            "lower": section.lower.tolist(),
+            "upper": section.upper.tolist(),
+        },
+        "unknown": None if section is None else section.unknown,
+        "remarks": list(found.remarks),
     }
 
 
@@ -88,36 +147,30 @@ def _neighbours(found: Microstructure) -> dict[str, Any]:
     }
 
 
-def _mean_area_fraction(found: Microstructure) -> float:
-    """Mean of π/4 r² under the law of θ, for the modal map."""
-    from alphacut.stochastic.theta.quadrature import gauss_rule
-
-    fit = found.pbox.fit
-    rule = gauss_rule(fit.distribution, points=8)
-    return float(
-        rule.mean(np.pi / 4 * fit.map((found.pbox.a2[1], found.pbox.a4[1]))(rule.nodes) ** 2)
-    )
-
-
-def fragment(found: Microstructure) -> str:
+def fragment(found: Microstructure | SphereMicrostructure) -> str:
     """The section [radius] of a case file, with as many digits as the fit has."""
-    law, box = found.pbox.fit.distribution, found.pbox
+    law, box, shape = found.pbox.fit.distribution, found.pbox, found.study.shape
 
     def triangle(ends: tuple[float, float, float]) -> str:
         return "[" + ", ".join(f"{end:.8g}" for end in ends) + "]"
 
-    discs = float(np.mean([section.discs.area_fraction for section in found.sections]))
+    if isinstance(found, SphereMicrostructure):
+        particles, cells = found.packed[0].fraction, volume_fraction(found.sample)
+    else:
+        particles = float(np.mean([section.discs.area_fraction for section in found.sections]))
+        cells = found.sample.area_fraction
     return (
         f"[radius]  # from {len(found.sample.values)} cells; the limits keep {found.share_kept:.4%}"
-        f" of their area\n# area fraction of the discs {discs:.4f}, of the cells"
-        f" {found.sample.area_fraction:.4f}, of this map at its modal values, which the modulus"
-        f" uses, {_mean_area_fraction(found):.4f}\ntheta = [{law.lower:g}, {law.upper:g}]\na1 ="
+        f" of their {shape.cells}\n# {shape.cells} fraction of the {shape.particles}"
+        f" {particles:.4f}, of the cells"
+        f" {cells:.4f}, of this map at its modal values, which the modulus"
+        f" uses, {found.fraction_of_map:.4f}\ntheta = [{law.lower:g}, {law.upper:g}]\na1 ="
         f" {box.fit.a1:.10g}\na2 = {triangle(box.a2)}\na3 = {box.fit.a3:.10g}\na4 ="
         f" {triangle(box.a4)}\n"
     )
 
 
-def to_dataset(found: Microstructure) -> xarray.Dataset:
+def to_dataset(found: FittedMap) -> xarray.Dataset:
     """Distribution function of r_n with its band and p-box, over a grid of radii."""
     import xarray
 
@@ -141,6 +194,8 @@ def to_dataset(found: Microstructure) -> xarray.Dataset:
     )
     dataset["r_n"].attrs = {
         "units": "1",
-        "long_name": "reduced radius r/a, a half the side of a square of the cell's area",
+        "long_name": "reduced radius r/a, a half the side of a"
+        f" {'cube' if found.study.shape.power == 3 else 'square'} of the cell's"
+        f" {found.study.shape.cells}",
     }
     return dataset

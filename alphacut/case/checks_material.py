@@ -7,20 +7,25 @@ from collections.abc import Iterator
 
 from alphacut.case.case import Case
 from alphacut.case.sections.material import SPHERE_METHODS
-from alphacut.case.sections.particles import Packing
+from alphacut.case.sections.particles import PackedSpheres, Packing
 from alphacut.io.problem import Problem
 from alphacut.stochastic import HermiteMap, TruncatedNormal
+
+WIDEST = 20  # ratio of radii behind circles
 
 
 def particles(case: Case) -> Iterator[Problem]:
     """Exactly one source of particles, and numbers in it that fit together."""
     study = case.microstructure
-    every = {"packing": study.packing, "circles": study.circles, "image": study.image}
+    every = {
+        "packing": study.packing,
+        "circles": study.circles,
+        "image": study.image,
+        "spheres": study.spheres,
+    }
     sources = [name for name, source in every.items() if source]
     if len(sources) != 1:
-        allowed = (
-            "one of [microstructure.packing], [microstructure.circles], [microstructure.image]"
-        )
+        allowed = "one of " + ", ".join(f"[microstructure.{name}]" for name in every)
         yield Problem(
             "microstructure",
             f"got {len(sources)} sources of particles",
@@ -36,7 +41,9 @@ def particles(case: Case) -> Iterator[Problem]:
             "for example [0.13, 0.87]",
         )
     if study.packing:
-        yield from sizes(case, study.packing)
+        yield from sizes(case, "packing", study.packing)
+    if study.spheres:
+        yield from sphere_sizes(case, study.spheres)
     if study.circles:
         for name, pair in (("size", study.circles.size), ("origin", study.circles.origin)):
             if len(pair) != 2:
@@ -44,9 +51,55 @@ def particles(case: Case) -> Iterator[Problem]:
                 yield Problem(key, f"got {len(pair)} values", allowed="two: across and up")
 
 
-def sizes(case: Case, packing: Packing) -> Iterator[Problem]:
-    """The radii of packed discs: a file of them, or both ends of their law in order."""
-    key = "microstructure.packing"
+def sphere_sizes(case: Case, spheres: PackedSpheres) -> Iterator[Problem]:
+    """The radii of packed spheres: measured, or two ends of a law or of what circles are of."""
+    key = "microstructure.spheres"
+    if spheres.file and spheres.circles:
+        yield Problem(
+            f"{key}.circles",
+            "the radii come from measured spheres besides",
+            spheres.circles,
+            f"one of {key}.file and {key}.circles",
+        )
+        return
+    yield from sizes(case, "spheres", spheres)
+    for name in ("visible", "level"):
+        if case.asked(f"{key}.{name}") and not spheres.circles:
+            yield Problem(
+                f"{key}.{name}",
+                "this has an effect on the circles of a section alone",
+                str(case.written[f"{key}.{name}"]),
+                f"beside {key}.circles",
+            )
+    small, large, seen = spheres.smallest_radius, spheres.largest_radius, spheres.visible
+    if spheres.circles and small is not None and large is not None:
+        if large > WIDEST * small:
+            yield Problem(
+                f"{key}.largest_radius",
+                f"this is {large / small:.3g} times the smallest, and cubes that hold both kinds"
+                " of spheres would take too many",
+                str(case.written[f"{key}.largest_radius"]),
+                f"at most {WIDEST} times the smallest radius",
+            )
+        if small == large:
+            yield Problem(
+                f"{key}.largest_radius",
+                "circles are of spheres between two radii, and these are the same",
+                str(case.written[f"{key}.largest_radius"]),
+                f"more than {key}.smallest_radius",
+            )
+        if seen is not None and seen >= small:
+            yield Problem(
+                f"{key}.visible",
+                "circles must be seen from below the smallest sphere's radius on",
+                str(case.written[f"{key}.visible"]),
+                f"less than {key}.smallest_radius",
+            )
+
+
+def sizes(case: Case, source: str, packing: Packing | PackedSpheres) -> Iterator[Problem]:
+    """The radii of packed particles: a file of them, or both ends of their law in order."""
+    key = f"microstructure.{source}"
     low, high = (f"{key}.{end}_radius" for end in ("smallest", "largest"))
     ends = [name for name in (low, high) if case.asked(name)]
     if packing.file and ends:
@@ -96,7 +149,7 @@ def radius(case: Case, alpha: float) -> Iterator[Problem]:
 
 
 def sphere_model(case: Case) -> Iterator[Problem]:
-    """Spheres have models of their own, and no stage that makes their radii yet."""
+    """Spheres have models of their own, and a source of radii of their own."""
     method = case.modulus.method if case.sections.modulus else "prism"
     if case.cell.particles == "spheres" and method not in SPHERE_METHODS:
         yield Problem(
@@ -105,14 +158,28 @@ def sphere_model(case: Case) -> Iterator[Problem]:
             method,
             ", ".join(SPHERE_METHODS),
         )
-    if case.cell.particles == "spheres" and "microstructure" in case.stages:
+    if "microstructure" in case.stages and case.sections.microstructure:
+        yield from one_shape(case)
+
+
+def one_shape(case: Case) -> Iterator[Problem]:
+    """The stage makes the radii of the particles that the cell has."""
+    packed = case.microstructure.spheres is not None
+    if case.cell.particles == "spheres" and not packed:
         yield Problem(
             "cell.particles",
-            "stage microstructure measures discs in their planar cells, whose radii are not those"
-            " of spheres",
+            "stage microstructure measures discs in their planar cells here, whose radii are not"
+            " those of spheres",
             "spheres",
-            '"cylinders", or section radius from benchmarks.stochastic.sphere_map in place of the'
-            " stage, as cases/paper-3d.toml",
+            '"cylinders", or section [microstructure.spheres] with its volume fraction in place of'
+            " the discs",
+        )
+    if case.cell.particles == "cylinders" and packed:
+        yield Problem(
+            "cell.particles",
+            "stage microstructure packs spheres, and the cell is one of cylinders",
+            "cylinders",
+            '"spheres"',
         )
 
 

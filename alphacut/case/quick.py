@@ -16,6 +16,8 @@ COARSE = {
         "microstructure.bootstrap",
         "microstructure.packing.packings",
         "microstructure.packing.discs",
+        "microstructure.spheres.packings",
+        "microstructure.spheres.spheres",
     ),
     "modulus": (
         "mesh.layers",
@@ -103,4 +105,7 @@ def quick(case: Case) -> Case:
 def few_particles(wanted: Microstructure) -> Microstructure:
     """The microstructure from few particles and resamples."""
     packing = wanted.packing and replace(wanted.packing, packings=5, discs=500)
-    return replace(wanted, bootstrap=100, packing=packing)
+    spheres = wanted.spheres and replace(
+        wanted.spheres, packings=5, spheres=min(wanted.spheres.spheres, 200)
+    )
+    return replace(wanted, bootstrap=100, packing=packing, spheres=spheres)

@@ -6,7 +6,13 @@ from functools import cache
 
 from alphacut.case.key import Key, Section, keys_of
 from alphacut.case.sections.material import CellTable, Mesh, Modulus, Radius, Response
-from alphacut.case.sections.particles import Circles, Microstructure, Packing, Photograph
+from alphacut.case.sections.particles import (
+    Circles,
+    Microstructure,
+    PackedSpheres,
+    Packing,
+    Photograph,
+)
 from alphacut.case.sections.questions import Decision, Field, Joint, Update
 from alphacut.case.sections.structures import Frame, Pendulum, Tower
 from alphacut.case.sections.top import Top
@@ -18,6 +24,7 @@ SECTIONS: dict[str, type[Section]] = {
     "microstructure.packing": Packing,
     "microstructure.circles": Circles,
     "microstructure.image": Photograph,
+    "microstructure.spheres": PackedSpheres,
     "radius": Radius,
     "cell": CellTable,
     "mesh": Mesh,

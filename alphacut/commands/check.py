@@ -13,6 +13,7 @@ from alphacut.case.readings import readings
 from alphacut.commands.options import add_common, answer
 from alphacut.io.files import say
 from alphacut.io.problem import BadInput
+from alphacut.stages.material.microstructure import plan
 from alphacut.stages.readiness import ready
 
 ABOUT = (
@@ -35,7 +36,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         problems = [asdict(problem) for problem in error.problems]
         answer(options, {"case": options.case, "ok": False, "problems": problems}, out)
         raise
-    inputs = list(readings(case))
+    inputs, plans = list(readings(case)), list(plan(case))
     warnings = [f"warning: {remark}" for remark in (*found.warnings, *found.rough)]
     document = {
         "case": options.case,
@@ -45,12 +46,15 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         "stages": list(case.stages),
         "period_s": found.period,
         "inputs": [asdict(reading) for reading in inputs],
+        "plan": plans,
     }
     answer(options, document, out)
     for warning in warnings:
         say(warning)
     if options.json != "-" and not options.quiet:
-        out.writelines(f"{line}\n" for line in (*inputs, verdict(options.case, case, found.period)))
+        out.writelines(
+            f"{line}\n" for line in (*inputs, *plans, verdict(options.case, case, found.period))
+        )
     return 0
 
 

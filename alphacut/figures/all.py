@@ -128,7 +128,7 @@ def particle_pictures(folder: Path, results: Results) -> list[str]:
     """Figures of the microstructure stage: 03-04_two_point … 13_pbox, radius_map."""
     if "microstructure" not in results.case.stages:
         return []
-    found = [path for path in sorted(folder.iterdir()) if re.match(r"\d|radius_map", path.name)]
+    found = [path for path in sorted(folder.iterdir()) if re.match(r"\d|radi", path.name)]
     return [str(path.relative_to(results.folder)) for path in found]
 
 

@@ -54,8 +54,12 @@ FIGURES = {
         "Reduced radius of a cell against that of its neighbours, with their correlation"
     ),
     "cells": "Cells of the particles",
-    "areas": "Area of each cell over its reduced radius, and the limits that are kept",
+    "areas": "Size of each cell over its reduced radius, and the limits that are kept",
     "pbox": "Measured distribution of the reduced radius, and the p-box of its fuzzy map",
+    "radii-bounds": (
+        "Bounds of the spheres' radii, by volume, that the circles of a section leave, with those"
+        " of the packings"
+    ),
     "radius-map": "Fuzzy map from θ to the reduced radius",
 }
 WORDS = {

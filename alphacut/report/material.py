@@ -14,10 +14,12 @@ from alphacut.stages.material.references import line
 def microstructure(found: Document) -> Markup:
     """Particles, cells, and the fuzzy radius map."""
     low, high = found["limits"]
+    cells = CELLS[found.get("particles", "discs")]
+    told = spheres(found) if cells == "volume" else discs(found)
     words = paragraphs(
-        f"{found['discs']} discs in {found['packings']} sections, area fraction"
-        f" {found['area_fraction']:.4f}{of_map(found)}. The limits {low:.4g} and {high:.4g} of r/a"
-        f" keep {found['share_kept']:.3%} of the area."
+        f"{told}. The limits {low:.4g} and {high:.4g} of r/a keep {found['share_kept']:.3%} of the"
+        f" {cells}.",
+        *map(sentence, found.get("remarks", ())),
     )
     rows = [("a1", f"{found['a1']:.5g}")]
     rows += [
@@ -26,6 +28,31 @@ def microstructure(found: Document) -> Markup:
     rows.insert(2, ("a3", f"{found['a3']:.5g}"))
     return section(
         "Microstructure", words, table(("parameter of the radius map", "fuzzy value"), rows)
+    )
+
+
+CELLS = {"discs": "area", "spheres": "volume"}
+
+
+def discs(found: Document) -> str:
+    """Discs and their area fractions."""
+    return (
+        f"{found['discs']} discs in {found['packings']} sections, area fraction"
+        f" {found['area_fraction']:.4f}{of_map(found)}"
+    )
+
+
+def spheres(found: Document) -> str:
+    """Spheres and their volume fractions."""
+    others = len(found["possible_laws"])
+    besides = f", and {others} more laws of radii that are possible" if others else ""
+    return (
+        f"{found['spheres']} spheres in {found['packings']} periodic cubes, divided into Laguerre"
+        f" cells{besides}. Volume fraction {found['volume_fraction']:.4f}, packed as"
+        f" {found['volume_fraction_packed']:.4f} because {found['share_beyond_limit']:.1%} of the"
+        " volume lies in cells tighter than a cubic one may be;"
+        f" {found['mean_volume_fraction_of_map']:.4f} by the fitted map at its modal values, which"
+        " is what the modulus uses"
     )
 
 

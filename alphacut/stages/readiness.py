@@ -58,9 +58,7 @@ def ready(case: Case) -> Readiness:
     """
     if "microstructure" in case.stages:
         from alphacut.stages.material.microstructure import require_readable
-        from alphacut.stages.material.microstructure import study_of as particles_of
 
-        particles_of(case)
         require_readable(case)
     if "image" in case.stages:
         study_of(case)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +15,7 @@ from alphacut.stochastic.theta.truncated_normal import Array
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from alphacut.stochastic.microstructure import Microstructure
+    from alphacut.stochastic.microstructure import FittedMap, Microstructure
     from alphacut.stochastic.particles.radius_laws import RadiusLaw
     from alphacut.stochastic.tessellation.apollonius import Apollonius
     from alphacut.stochastic.tessellation.delaunay import Neighbours
@@ -23,7 +24,7 @@ REDUCED = "reduced radius $r_n$ = r/a"
 """Name of the axis."""
 
 
-def draw_radii(radii: Array, law: RadiusLaw | None) -> Figure:
+def draw_radii(radii: Array, law: RadiusLaw | None, particles: str = "discs") -> Figure:
     """Distribution function of the radii, and their law if there is one (Fig. 11)."""
     import matplotlib.pyplot as plt
 
@@ -34,12 +35,12 @@ def draw_radii(radii: Array, law: RadiusLaw | None) -> Figure:
         np.arange(1, len(values) + 1) / len(values),
         color=BLUE,
         where="post",
-        label=f"{len(values)} discs",
+        label=f"{len(values)} {particles}",
     )
     if law is not None and law.smallest < law.largest:
         grid = np.linspace(law.smallest, law.largest, 400)
         axes.plot(1e3 * grid, law.cdf(grid), color=ORANGE, ls="--", label=law.label)
-    axes.set(xlabel="radius [mm]", ylabel="share of discs", ylim=(0, 1.02))
+    axes.set(xlabel="radius [mm]", ylabel=f"share of {particles}", ylim=(0, 1.02))
     axes.legend()
     return drawn
 
@@ -94,32 +95,50 @@ def draw_correlation(found: Microstructure, equal: Apollonius) -> Figure:
     return drawn
 
 
-def draw_areas(found: Microstructure) -> Figure:
-    """Area of the cells over r_n, with the limits and what no disc can reach (Fig. 12)."""
+def draw_areas(found: FittedMap, cells: Iterable[tuple[Array, Array]]) -> Figure:
+    """Measure of the cells over r_n, with the limits and what no particle can reach (Fig. 12).
+
+    Args:
+        found: Limits and kind of the particles.
+        cells: Reduced radii and areas in m², or volumes in m³, of each section or packing.
+    """
     import matplotlib.pyplot as plt
 
     drawn, axes = plt.subplots(figsize=(6.4, 3.8))
-    for section in found.sections:
-        disc = section.whole.disc
-        radius, area = section.diagram.reduced_radii[disc], 1e6 * section.diagram.areas[disc]
+    shape = found.study.shape
+    for radius, measure in cells:
         inside = (radius >= found.limits[0]) & (radius <= found.limits[1])
-        axes.plot(radius[inside], area[inside], ".", ms=1.5, color=GREY, rasterized=True)
-        axes.plot(radius[~inside], area[~inside], ".", ms=4, color=BLUE, rasterized=True)
+        for part, size, colour in ((inside, 1.5, GREY), (~inside, 4, BLUE)):
+            axes.plot(
+                radius[part],
+                1e3**shape.power * measure[part],
+                ".",
+                ms=size,
+                color=colour,
+                rasterized=True,
+            )
     for limit in found.limits:
         axes.axvline(limit, color=BLUE, lw=1)
-    bound = float(np.sqrt(4 / np.pi))
+    bound = shape.largest
     axes.axvspan(bound, bound + 0.07, facecolor="none", edgecolor=GREY, hatch="///", lw=0)
     axes.text(
-        bound, axes.get_ylim()[1], "disc larger\nthan its cell ", ha="right", va="top", color=GREY
+        bound,
+        axes.get_ylim()[1],
+        f"{shape.particles[:-1]} larger\nthan its cell ",
+        ha="right",
+        va="top",
+        color=GREY,
     )
-    axes.set(xlabel=REDUCED, ylabel="area of the cell [mm²]", xlim=(0, bound + 0.07))
+    axes.set(
+        xlabel=REDUCED, ylabel=f"{shape.cells} of the cell [{shape.unit}]", xlim=(0, bound + 0.07)
+    )
     low, high = found.limits
-    kept = f"{100 * found.share_kept:.2f} % of the area"
+    kept = f"{100 * found.share_kept:.2f} % of the {shape.cells}"
     axes.set_title(f"limits {low:.4g} and {high:.4g} keep {kept}")
     return drawn
 
 
-def draw_pbox(found: Microstructure) -> Figure:
+def draw_pbox(found: FittedMap) -> Figure:
     """Distribution of r_n with its bootstrap band, and the p-box around it (Fig. 13)."""
     import matplotlib.pyplot as plt
 
@@ -143,13 +162,13 @@ def draw_pbox(found: Microstructure) -> Figure:
         )
         panel.plot(radius, scale * (table["pbox_upper"] - base), color=INK, lw=1, label="p-box")
         panel.plot(radius, scale * (table["pbox_lower"] - base), color=INK, lw=1)
-    axes.set(ylabel="area-weighted share", ylim=(0, 1.02))
+    axes.set(ylabel=f"{found.study.shape.cells}-weighted share", ylim=(0, 1.02))
     apart.set(xlabel=REDUCED, ylabel="less the fit [%]")
     axes.legend(loc="upper left")
     return drawn
 
 
-def draw_map(found: Microstructure) -> Figure:
+def draw_map(found: FittedMap) -> Figure:
     """The map θ ↦ r_n: the sample's own, the fitted cubic and its fuzzy bounds (eq. 12)."""
     import matplotlib.pyplot as plt
 

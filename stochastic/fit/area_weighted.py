@@ -13,9 +13,47 @@ from alphacut.stochastic.errors import RefusedError
 from alphacut.stochastic.theta.truncated_normal import Array
 
 
+@dataclass(frozen=True)
+class Shape:
+    """Particles of one kind in their cells, of two or three dimensions.
+
+    Args:
+        particles: discs or spheres.
+        cells: Measure of a cell: area or volume.
+        unit: Unit of that measure, for lengths in mm.
+        power: Dimensions.
+        factor: Share of a cell of side 2 that a particle of radius 1 takes.
+        reach: Greatest r_n that the limits may keep where none are given; None where more is
+            refused.
+    """
+
+    particles: str
+    cells: str
+    unit: str
+    power: int
+    factor: float
+    reach: float | None = None
+
+    @property
+    def largest(self) -> float:
+        """r_n of a particle that fills its cell."""
+        return float(self.factor ** (-1 / self.power))
+
+    def shares(self, radii: ArrayLike) -> Array:
+        """Share of a cell that particles take, of reduced radii of any shape."""
+        return np.asarray(self.factor * np.asarray(radii, float) ** self.power)
+
+
+DISCS = Shape("discs", "area", "mm²", 2, np.pi / 4)
+# a sphere of r_n near 1 stands nearly against its images; beyond, no cubic cell holds it
+SPHERES = Shape("spheres", "volume", "mm³", 3, np.pi / 6, 0.97)
+
+
 @dataclass(frozen=True, eq=False)
 class AreaWeighted:
     """Weighted sample of r_n: the weight of a value is the share of area of its cell (eq. 9).
+
+    Of spheres the share of volume takes the place of the share of area.
 
     Args:
         values: r_n, shape (n,); sorted when built by `of`.

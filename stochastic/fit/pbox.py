@@ -9,6 +9,7 @@ programme. Rows are added for the values that a solution leaves outside until no
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,7 +69,12 @@ class PBox:
 
 
 def least_pbox(
-    fit: HermiteFit, sample: AreaWeighted, band: float, *, hold: SlopeBand | None = None
+    fit: HermiteFit,
+    sample: AreaWeighted,
+    band: float,
+    *,
+    hold: SlopeBand | None = None,
+    others: Sequence[AreaWeighted] = (),
 ) -> PBox:
     """Least p-box around the fitted map that contains `sample`, within a band of `band`.
 
@@ -80,13 +86,14 @@ def least_pbox(
         sample: r_n within the ends.
         band: In probability, in [0, 1).
         hold: Slopes that the supports must hold as well, such as their own bootstrap band.
+        others: Further samples within the ends, each to be contained as well.
 
     Raises:
         RefusedError: No p-box of monotone cubics with these ends contains the sample.
     """
     modal = fit.slopes(sample)
     core = _core(modal, hold)
-    wish = _Containment(fit, sample, band)
+    wish = _Containment(fit, (sample, *others), band)
     chosen = np.unique(np.linspace(0, len(wish) - 1, min(len(wish), 400)).astype(int))
     for _ in range(50):
         ends = _solve(fit, core, wish, chosen)
@@ -112,24 +119,16 @@ def _core(modal: tuple[float, float], hold: SlopeBand | None) -> list[tuple[floa
 class _Containment:
     """Rows of greatest radius ≥ x where the band ends below, and least ≤ x where it ends above."""
 
-    def __init__(self, fit: HermiteFit, sample: AreaWeighted, band: float) -> None:
-        step = np.append(np.diff(sample.values) > 0, True)
-        values, after = sample.values[step], sample.cumulated[step]
-        before = np.concatenate([[0.0], after[:-1]])
-        up, down = before + band < 1, after - band > 0
-        self.share = np.concatenate([(before + band)[up], (after - band)[down]])
+    def __init__(self, fit: HermiteFit, samples: Sequence[AreaWeighted], band: float) -> None:
+        rows = [_steps(sample, band) for sample in samples]
+        self.share, self.values, self.up = (
+            np.concatenate(part) for part in zip(*rows, strict=True)
+        )
         law = fit.distribution
         xi = (law.quantile(self.share) - law.lower) / (law.upper - law.lower)
         shape = np.array([polynomial.polyval(xi, h) for h in SHAPES])
-        self.excess = (
-            np.concatenate([values[up], values[down]]) - fit.a1 * shape[0] - fit.a3 * shape[2]
-        )
-        self.values, self.h2, self.h4 = (
-            np.concatenate([values[up], values[down]]),
-            shape[1],
-            -shape[3],
-        )
-        self.up = np.arange(len(self.share)) < up.sum()
+        self.excess = self.values - fit.a1 * shape[0] - fit.a3 * shape[2]
+        self.h2, self.h4 = shape[1], -shape[3]
 
     def __len__(self) -> int:
         return len(self.share)
@@ -148,6 +147,19 @@ class _Containment:
         """By how much (in r_n) each row is broken."""
         matrix, right = self.rows(np.arange(len(self)))
         return np.asarray(matrix @ ends - right)
+
+
+def _steps(sample: AreaWeighted, band: float) -> tuple[Array, Array, Array]:
+    """Ends of a sample's band: share, value, and whether a greatest radius must reach it."""
+    step = np.append(np.diff(sample.values) > 0, True)
+    values, after = sample.values[step], sample.cumulated[step]
+    before = np.concatenate([[0.0], after[:-1]])
+    up, down = before + band < 1, after - band > 0
+    return (
+        np.concatenate([(before + band)[up], (after - band)[down]]),
+        np.concatenate([values[up], values[down]]),
+        np.arange(up.sum() + down.sum()) < up.sum(),
+    )
 
 
 def _solve(

@@ -106,6 +106,60 @@ class LogNormalRadii:
 
 
 @dataclass(frozen=True)
+class TabulatedRadii:
+    """Distribution function of radii at rising radii, linear between them.
+
+    Args:
+        radii: In m, positive and rising, at least two.
+        shares: The function there, by number, from 0 to 1, nowhere falling.
+        label: The law in words.
+
+    Raises:
+        ValueError: The table is none of a distribution function.
+    """
+
+    radii: tuple[float, ...]
+    shares: tuple[float, ...]
+    label: str = "a table"
+
+    def __post_init__(self) -> None:
+        radii, shares = np.array(self.radii), np.array(self.shares)
+        if len(radii) != len(shares) or len(radii) < 2 or not 0 < radii[0] < radii[-1] < np.inf:
+            raise ValueError(
+                f"a table of {len(radii)} radii and {len(shares)} shares makes no law; it needs as"
+                " many of both, at least two, and positive radii"
+            )
+        ends = abs(shares[0]) < 1e-12 and abs(shares[-1] - 1) < 1e-12
+        if not (ends and (np.diff(shares) >= 0).all() and (np.diff(radii) > 0).all()):
+            raise ValueError("radii must rise, and shares must rise from 0 to 1")
+
+    @property
+    def smallest(self) -> float:
+        """Least radius, in m."""
+        return self.radii[0]
+
+    @property
+    def largest(self) -> float:
+        """Greatest radius, in m."""
+        return self.radii[-1]
+
+    @property
+    def mean_cube(self) -> float:
+        """Mean of r³, in m³."""
+        radii, weights = np.array(self.radii), np.diff(self.shares)
+        cubes = (radii[1:] ** 2 + radii[:-1] ** 2) * (radii[1:] + radii[:-1]) / 4
+        return float(weights @ cubes)
+
+    def cdf(self, radius: ArrayLike) -> Array:
+        """P(r ≤ radius), any shape, `radius` in m."""
+        return np.asarray(np.interp(np.asarray(radius, float), self.radii, self.shares))
+
+    def sample(self, number: int, generator: np.random.Generator) -> Array:
+        """`number` independent radii, shape (number,), in m."""
+        return np.asarray(np.interp(generator.random(number), self.shares, self.radii))
+
+
+@dataclass(frozen=True)
 class MeasuredRadii:
     """Radii of a list; the distribution function is linear between neighbouring values.
 

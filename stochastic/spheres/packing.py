@@ -6,16 +6,21 @@ whose overlaps are pushed apart. Either is measured before it is handed out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from alphacut.stochastic.errors import RefusedError
 from alphacut.stochastic.particles.radius_laws import RadiusLaw
 from alphacut.stochastic.spheres.spheres import Spheres, close_pairs
+from alphacut.stochastic.spheres.wicksell import RadiiPBox, possible_laws
 from alphacut.stochastic.theta.truncated_normal import Array
 
 SEQUENTIAL_LIMIT = 0.25
+MOST_VOLUME = 0.5
+FEWEST = 5  # packings
+MOST_SPHERES = 20_000  # in a packing of a law that is only possible
+_ROOM = 30  # twice the mean number of spheres of one size in a cube four radii wide, over fraction
 _ATTEMPTS = 20_000  # places tried for one sphere
 _ROUNDS = 4000
 _MARGIN = 1e-3  # by which radii are enlarged while overlaps are pushed apart
@@ -44,7 +49,7 @@ class SpherePacking:
                 f"a packing of {self.spheres} spheres was asked for; it needs a whole number, at"
                 " least 1"
             )
-        if not 0 < self.volume_fraction <= 0.5:
+        if not 0 < self.volume_fraction <= MOST_VOLUME:
             raise ValueError(
                 f"the volume fraction is {self.volume_fraction:g}; it must lie in (0, 0.5]"
             )
@@ -70,6 +75,45 @@ class SpherePacking:
                 f" {self.volume_fraction:g}: ask for less"
             )
         return packing
+
+
+@dataclass(frozen=True)
+class SpherePackings:
+    """Independent packings of spheres of one law of radii, or of several that are possible.
+
+    Args:
+        packing: What each one is to be.
+        packings: How many, at least 5 (the bootstrap draws them as wholes).
+        section: Bounds of the law that the circles of a section leave; None where the law is given.
+
+    Raises:
+        ValueError: Fewer than five packings.
+    """
+
+    packing: SpherePacking
+    packings: int = 20
+    section: RadiiPBox | None = None
+
+    def __post_init__(self) -> None:
+        if self.packings < FEWEST:
+            raise ValueError(
+                f"{self.packings} packings were asked for; the bootstrap draws whole packings and"
+                " needs 5 or more"
+            )
+
+    def possible(self) -> dict[str, SpherePacking]:
+        """Packings of the laws at the ends of the section's bounds, by name; none without.
+
+        Their number of spheres is raised to what a cube that holds the largest needs.
+        """
+        if self.section is None:
+            return {}
+        found = {}
+        for name, law in possible_laws(self.section).items():
+            least = _ROOM * self.packing.volume_fraction * law.largest**3 / law.mean_cube
+            count = int(min(max(self.packing.spheres, least), MOST_SPHERES))
+            found[name] = replace(self.packing, radii=law, spheres=count)
+        return found
 
 
 def _added(radii: Array, side: float, generator: np.random.Generator) -> Array:

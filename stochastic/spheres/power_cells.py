@@ -14,9 +14,21 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from alphacut.stochastic.errors import RefusedError
-from alphacut.stochastic.fit.area_weighted import AreaWeighted
+from alphacut.stochastic.fit.area_weighted import SPHERES, AreaWeighted
 from alphacut.stochastic.spheres.spheres import Spheres
 from alphacut.stochastic.theta.truncated_normal import Array
+
+
+def voro() -> str:
+    """Path of the program Voro++.
+
+    Raises:
+        RefusedError: It is not installed.
+    """
+    program = shutil.which("voro++")
+    if program is None:
+        raise RefusedError("cells of spheres need Voro++: install Debian's package voro++")
+    return program
 
 
 def cell_volumes(spheres: Spheres) -> Array:
@@ -25,9 +37,7 @@ def cell_volumes(spheres: Spheres) -> Array:
     Raises:
         RefusedError: Voro++ is not installed or fails, or a sphere has no cell.
     """
-    program = shutil.which("voro++")
-    if program is None:
-        raise RefusedError("cells of spheres need Voro++: install Debian's package voro++")
+    program = voro()
     count = len(spheres.radii)
     table = np.column_stack([np.arange(count), spheres.centres / spheres.side])
     table = np.column_stack([table, spheres.radii / spheres.side])
@@ -50,15 +60,21 @@ def cell_volumes(spheres: Spheres) -> Array:
     return volumes * spheres.side**3
 
 
-def reduced_radii(packings: Sequence[Spheres]) -> AreaWeighted:
+def reduced_radii(
+    packings: Sequence[Spheres], cells: Sequence[Array] | None = None
+) -> AreaWeighted:
     """Volume-weighted r_n = r / (V^⅓/2) of all cells, one group a packing.
 
     The cube of the cell's volume has the side 2 in its own units, so that π/6 Σ w r_n³ is the
     volume fraction.
+
+    Args:
+        packings: Spheres in their cubes.
+        cells: Volumes of the power cells of each; found if None.
     """
     values, weights, groups = [], [], []
-    for number, packing in enumerate(packings):
-        volumes = cell_volumes(packing)
+    cells = [cell_volumes(packing) for packing in packings] if cells is None else cells
+    for number, (packing, volumes) in enumerate(zip(packings, cells, strict=True)):
         values.append(2 * packing.radii / np.cbrt(volumes))
         weights.append(volumes)
         groups.append(np.full(len(volumes), number))
@@ -67,4 +83,4 @@ def reduced_radii(packings: Sequence[Spheres]) -> AreaWeighted:
 
 def volume_fraction(sample: AreaWeighted) -> float:
     """Σ w π/6 r_n³ of a volume-weighted sample."""
-    return float(np.pi / 6 * sample.weights @ sample.values**3)
+    return float(sample.weights @ SPHERES.shares(sample.values))

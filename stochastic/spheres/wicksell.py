@@ -12,13 +12,14 @@ hold much of the volume: the largest radius is stated too.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.stochastic.errors import RefusedError
-from alphacut.stochastic.particles.radius_laws import MeasuredRadii
+from alphacut.stochastic.particles.radius_laws import MeasuredRadii, TabulatedRadii
 from alphacut.stochastic.theta.truncated_normal import Array
 
 # power of R from the law of spheres hit to the law by number or by volume
@@ -59,6 +60,51 @@ class RadiiPBox:
         """True if a distribution function, given at rising radii, lies inside at all edges."""
         truth = np.interp(self.edges, np.asarray(radius), np.asarray(share))
         return bool((truth >= self.lower - 1e-9).all() and (truth <= self.upper + 1e-9).all())
+
+
+def possible_laws(box: RadiiPBox) -> dict[str, TabulatedRadii]:
+    """Four laws at the ends of a p-box by volume: of small, large, like and unlike spheres.
+
+    The least and the greatest distribution function; the one that rises at the median from the
+    least to the greatest, and the one that goes from the greatest to the least and is level at one
+    half between: no law of the p-box is narrower or wider about that.
+
+    Raises:
+        ValueError: The p-box is not one by volume.
+    """
+    if box.weight != "volume":
+        raise ValueError(f"the p-box is one by {box.weight}; laws are made of one by volume")
+    middle = box.lower + box.upper >= 1
+    ends = {
+        "smallest spheres": box.upper,
+        "largest spheres": box.lower,
+        "most alike": np.where(middle, box.upper, box.lower),
+        "least alike": np.clip(0.5, box.lower, box.upper),
+    }
+    return {name: by_number(box.edges, share, name) for name, share in ends.items()}
+
+
+def middle_law(circles: ArrayLike, box: RadiiPBox, *, visible: float) -> TabulatedRadii:
+    """The law `unfolded` from circles, as far as a p-box of theirs by volume allows it.
+
+    Args:
+        circles: Radii of circles greater than `visible`, shape (n,), in m.
+        box: Their p-box by volume.
+        visible: Radius from which on every circle is seen, in m.
+    """
+    radii = np.array(unfolded(circles, visible=visible, largest=float(box.edges[-1])).values)
+    radii = np.maximum(radii[radii >= box.edges[0]], box.edges[0] * (1 + 1e-12))
+    volume = np.concatenate([[0.0], np.cumsum(radii**3)])
+    at = volume[np.searchsorted(radii, box.edges, side="right")] / max(volume[-1], 1e-300)
+    return by_number(box.edges, np.clip(at, box.lower, box.upper), "unfolded circles")
+
+
+def by_number(radii: Array, volume: Array, label: str) -> TabulatedRadii:
+    """Law by number of a distribution function by volume that is linear between rising radii."""
+    fine = np.unique(np.concatenate([np.linspace(*pair, 9) for pair in itertools.pairwise(radii)]))
+    number = np.diff(np.interp(fine, radii, volume)) / ((fine[1:] + fine[:-1]) / 2) ** 3
+    share = np.concatenate([[0.0], np.cumsum(number)])
+    return TabulatedRadii(tuple(fine), tuple(share / share[-1]), label)
 
 
 def radii_pbox(

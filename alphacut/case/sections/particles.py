@@ -12,7 +12,7 @@ from alphacut.case.key import MEMBERSHIP, NATURAL, NOT_NEGATIVE, POSITIVE, UNIT,
 class Microstructure(Section):
     """From particles to the random radius.
 
-    Exactly one of the sections packing, circles, image stands below it.
+    Exactly one of the sections packing, circles, image and, for spheres, spheres stands below it.
     """
 
     seed: Annotated[int, Key("seed of everything left to chance", allowed=NATURAL)]
@@ -44,6 +44,7 @@ class Microstructure(Section):
     packing: Packing | None = None
     circles: Circles | None = None
     image: Photograph | None = None
+    spheres: PackedSpheres | None = None
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -121,3 +122,67 @@ class Photograph(Section):
         Literal["auto", "bright", "dark"], Key("bright or dark against the matrix")
     ] = "auto"
     drop: Annotated[bool, Key("go on without the pieces that are no round particles")] = False
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class PackedSpheres(Section):
+    """Spheres packed at random in a periodic cube and divided into Laguerre cells.
+
+    Equal, truncated log-normal (eq. 11), of measured radii, or of the radii that the circles of a
+    plane section leave possible.
+    """
+
+    packings: Annotated[
+        int, Key("independent packings", allowed=Range("from 5 to 10,000", 5.0, 1e4, closed=True))
+    ] = 20
+    spheres: Annotated[
+        int, Key("spheres in each packing", allowed=Range("from 50 to 1e5", 50.0, 1e5, closed=True))
+    ]
+    volume_fraction: Annotated[
+        float,
+        Key(
+            "share of the volume that spheres fill, on average that of area in plane sections",
+            allowed=Range("inside (0, 0.45)", 0.0, 0.45),
+        ),
+    ]
+    smallest_radius: Annotated[
+        float | None,
+        Key(
+            "smallest radius of the log-normal law, or of the spheres that circles are of;"
+            " needed without measured radii",
+            "m",
+            allowed=POSITIVE,
+        ),
+    ] = None
+    largest_radius: Annotated[
+        float | None,
+        Key(
+            "largest radius of the log-normal law, or the one that no sphere exceeds; needed"
+            " without measured radii",
+            "m",
+            allowed=POSITIVE,
+        ),
+    ] = None
+    file: Annotated[
+        str | None,
+        Key("CSV file of measured radii or diameters, a column r [mm] or d [mm]", file=True),
+    ] = None
+    circles: Annotated[
+        str | None,
+        Key(
+            "CSV file of the circles of a plane section, a column r [mm] or d [mm]; the spheres'"
+            " radii are unfolded from them",
+            file=True,
+        ),
+    ] = None
+    visible: Annotated[
+        float | None,
+        Key(
+            "radius from which on every circle is seen; the smallest circle's if left out",
+            "m",
+            allowed=POSITIVE,
+        ),
+    ] = None
+    level: Annotated[
+        float, Key("chance with which the bounds of unfolded radii hold", allowed=UNIT)
+    ] = 0.95

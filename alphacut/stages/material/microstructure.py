@@ -10,33 +10,42 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from alphacut.case.case import Case
 from alphacut.case.load import section_from
 from alphacut.case.sections.material import Radius
+from alphacut.case.sections.particles import PackedSpheres
 from alphacut.case.sections.particles import Packing as PackingSection
 from alphacut.io.files import as_json, say, whole_file, write_text
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
+from alphacut.io.units import engineering
 
 if TYPE_CHECKING:
     from alphacut.stochastic.microstructure import Microstructure, Study
     from alphacut.stochastic.particles.radius_laws import RadiusLaw
     from alphacut.stochastic.sections import Measured, Simulated
+    from alphacut.stochastic.spheres.microstructure import SphereMicrostructure
+    from alphacut.stochastic.spheres.packing import SpherePackings
+    from alphacut.stochastic.spheres.wicksell import RadiiPBox
 
 
-def source(case: Case) -> Simulated | Measured:
-    """Source of the discs."""
+def source(case: Case) -> Simulated | Measured | SpherePackings:
+    """Source of the discs or spheres."""
     from alphacut.stochastic.particles.circles_csv import CircleFile
     from alphacut.stochastic.particles.image import SectionImage
     from alphacut.stochastic.particles.packing import Packing
     from alphacut.stochastic.sections import Measured, Simulated
 
     given = case.microstructure
+    if given.spheres:
+        return packed_spheres(case, given.spheres)
     if wanted := given.packing:
         packing = Packing(
             wanted.discs,
             wanted.area_fraction,
-            radii_of(case, wanted),
+            radii_of(case, "packing", wanted),
             gap=wanted.gap,
             method=wanted.method,
         )
@@ -67,7 +76,50 @@ def source(case: Case) -> Simulated | Measured:
     )
 
 
-def radii_of(case: Case, packing: PackingSection) -> RadiusLaw:
+def packed_spheres(case: Case, given: PackedSpheres) -> SpherePackings:
+    """Packings of spheres: of a law, of measured radii, or of what the circles of a section leave.
+
+    Raises:
+        BadInput: A file cannot be read, or no spheres have these circles.
+    """
+    from alphacut.stochastic.spheres.packing import SpherePacking, SpherePackings
+
+    count, fraction = given.spheres, given.volume_fraction
+    if given.circles is None:
+        law = radii_of(case, "spheres", given)
+        return SpherePackings(SpherePacking(count, fraction, law), given.packings)
+    middle, box = unfolded_radii(case, given)
+    return SpherePackings(SpherePacking(count, fraction, middle), given.packings, box)
+
+
+def unfolded_radii(case: Case, given: PackedSpheres) -> tuple[RadiusLaw, RadiiPBox]:
+    """Law of the spheres behind the circles of a section, and the bounds of it that they leave.
+
+    Where no key says from which radius on circles are seen, it is the smallest circle's, and that
+    one tells no more.
+
+    Raises:
+        BadInput: The file cannot be read, or no spheres have these circles.
+    """
+    from alphacut.stochastic.errors import RefusedError
+    from alphacut.stochastic.particles.radius_laws import MeasuredRadii
+    from alphacut.stochastic.spheres.wicksell import middle_law, radii_pbox
+
+    small, large, key = given.smallest_radius, given.largest_radius, "microstructure.spheres"
+    assert given.circles is not None
+    assert small is not None  # with circles both are there, or the case is refused
+    assert large is not None
+    try:
+        radii = np.array(MeasuredRadii.read(case.beside(given.circles)).values)
+        visible = float(radii[0]) if given.visible is None else given.visible
+        seen = radii[radii > visible]
+        box = radii_pbox(seen, visible=visible, smallest=small, largest=large, level=given.level)
+        return middle_law(seen, box, visible=visible), box
+    except (ValueError, RefusedError) as error:
+        raise case.refuse(f"{key}.circles", str(error)) from None
+
+
+def radii_of(case: Case, of: str, packing: PackingSection | PackedSpheres) -> RadiusLaw:
     """The law of the radii of a packing: log-normal between two ends, or that of a list."""
     from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
 
@@ -79,7 +131,7 @@ def radii_of(case: Case, packing: PackingSection) -> RadiusLaw:
     try:
         return MeasuredRadii.read(case.beside(packing.file))
     except ValueError as error:
-        raise case.refuse("microstructure.packing.file", str(error)) from None
+        raise case.refuse(f"microstructure.{of}.file", str(error)) from None
 
 
 def study_of(case: Case) -> Study:
@@ -107,28 +159,59 @@ def study_of(case: Case) -> Study:
         raise BadInput(Problem("microstructure", str(error), file=str(case.path))) from None
 
 
-def require_readable(case: Case) -> None:
-    """Read the file of circles that a case names, if it does.
+def require_readable(case: Case) -> Study:
+    """Study of a case whose files of circles and radii can be read, and whose programs are there.
 
     Raises:
-        BadInput: It cannot be read, or holds what makes no sense.
+        BadInput: A file cannot be read, or holds what makes no sense.
     """
+    from alphacut.stochastic.errors import RefusedError
     from alphacut.stochastic.sections import Measured
+    from alphacut.stochastic.spheres.packing import SpherePackings
+    from alphacut.stochastic.spheres.power_cells import voro
 
-    given = source(case)
-    if not (isinstance(given, Measured) and case.microstructure.circles):
+    wanted = study_of(case)
+    if isinstance(wanted.source, SpherePackings):
+        try:
+            voro()
+        except RefusedError as error:
+            raise case.refuse("microstructure.spheres", str(error)) from None
+    elif isinstance(wanted.source, Measured) and case.microstructure.circles:
+        try:
+            wanted.source.file.read()
+        except ValueError as error:
+            raise BadInput(
+                Problem("microstructure.circles.file", str(error), file=str(case.path))
+            ) from None
+    return wanted
+
+
+def plan(case: Case) -> Iterator[str]:
+    """Lines on what the stage will do with spheres."""
+    from alphacut.stochastic.spheres.packing import SpherePackings
+
+    if "microstructure" not in case.stages:
         return
-    try:
-        given.file.read()
-    except ValueError as error:
-        raise BadInput(
-            Problem("microstructure.circles.file", str(error), file=str(case.path))
-        ) from None
+    wanted = source(case)
+    if not isinstance(wanted, SpherePackings):
+        return
+    packing, law = wanted.packing, wanted.packing.radii
+    yield (
+        f"microstructure: {wanted.packings} packings of {packing.spheres} spheres, volume fraction"
+        f" {packing.volume_fraction:g}, radii {engineering(law.smallest, 'm')} …"
+        f" {engineering(law.largest, 'm')} ({law.label}); r_n = r/a of their Laguerre cells,"
+        " weighted by volume"
+    )
+    if wanted.section is not None:
+        yield (
+            f"microstructure: the map also holds {len(wanted.possible())} other laws that the"
+            f" circles leave possible; {wanted.section.unknown}"
+        )
 
 
 def compute(
     case: Case, *, workers: int = 1, progress: Tick | None = None, quiet: bool = False
-) -> Microstructure:
+) -> Microstructure | SphereMicrostructure:
     """From particles to the fuzzy radius map; the same for any number of workers.
 
     Args:
@@ -143,11 +226,13 @@ def compute(
     from alphacut.fuzzy.campaign.workers import pool
     from alphacut.stochastic.microstructure import study
     from alphacut.stochastic.microstructure_summary import fragment
+    from alphacut.stochastic.spheres.microstructure import sphere_study
 
     wanted = study_of(case)
+    work = sphere_study if case.microstructure.spheres else study
     with pool(workers) as executor:
         try:
-            found = study(wanted, executor=executor, progress=progress)
+            found = work(wanted, executor=executor, progress=progress)
         except ValueError as error:
             raise BadInput(Problem("microstructure", str(error), file=str(case.path))) from None
     for remark in () if quiet else (*left_out(found), *crisp_slopes(fragment(found))):
@@ -155,8 +240,13 @@ def compute(
     return found
 
 
-def left_out(found: Microstructure) -> Iterator[str]:
-    """Lines on the measured particles that were not taken, and on the image's area fraction."""
+def left_out(found: Microstructure | SphereMicrostructure) -> Iterator[str]:
+    """Lines on what is not known of spheres, on measured particles not taken, on the image."""
+    from alphacut.stochastic.spheres.microstructure import SphereMicrostructure
+
+    if isinstance(found, SphereMicrostructure):
+        yield from (f"warning: {remark}" for remark in found.remarks)
+        return
     reasons = [reason for section in found.sections for reason in section.rejected.values()]
     if reasons:
         told = ", ".join(
@@ -204,7 +294,11 @@ def read_fragment(path: Path) -> str:
 
 
 def write(
-    found: Microstructure, folder: Path, said: Mapping[str, str | int], *, figures: bool = True
+    found: Microstructure | SphereMicrostructure,
+    folder: Path,
+    said: Mapping[str, str | int],
+    *,
+    figures: bool = True,
 ) -> list[str]:
     """Write numbers, figures, fragment and dataset; returns the paths from `folder`."""
     from alphacut.stochastic.figures.all import draw

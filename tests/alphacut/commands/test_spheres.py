@@ -172,4 +172,4 @@ def test_discs_make_no_radii_of_spheres(capfd):
     assert main(["check", case, *changes]) == 2
     (line,) = capfd.readouterr().err.splitlines()
     assert "cell.particles = spheres: stage microstructure measures discs" in line
-    assert "sphere_map" in line
+    assert "section [microstructure.spheres] with its volume fraction" in line

@@ -1,0 +1,114 @@
+"""Stage microstructure of spheres from the command line: check, run, report, bad input."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from alphacut.entry import main
+
+CASE = Path(__file__).parents[3] / "cases" / "spheres.toml"
+FEW = (
+    "microstructure.spheres.spheres=50",
+    "microstructure.spheres.packings=5",
+    "microstructure.bootstrap=100",
+    'microstructure.spheres.largest_radius="9.7 mm"',
+)
+SMALL = [word for key in FEW for word in ("--set", key)]
+
+
+def test_check_says_what_spheres_are_packed(capfd):
+    assert main(["check", str(CASE)]) == 0
+    out = capfd.readouterr().out
+    assert "6 packings of 200 spheres, volume fraction 0.2, radii 2.000 mm … 11.00 mm" in out
+    assert "the map also holds 4 other laws that the circles leave possible" in out
+    assert "what smaller ones there are the section does not tell" in out
+
+
+def test_a_section_of_spheres_becomes_a_modulus_and_a_report(tmp_path, capfd):
+    folder = tmp_path / "run"
+    changes = [
+        *SMALL,
+        "--set",
+        'stages=["microstructure", "modulus"]',
+        "--set",
+        "modulus.alpha=[0, 1]",
+    ]
+    assert main(["run", str(CASE), *changes, "--out", str(folder), "--quiet", "--no-figures"]) == 0
+    found = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    own = found["microstructure"]
+    assert own["particles"] == "spheres"
+    assert found["area_fraction"] == pytest.approx(own["mean_volume_fraction_of_map"], rel=1e-6)
+    assert found["area_fraction"] == pytest.approx(0.2, rel=0.03)
+    low, high = found["modulus"]["lower_GPa"], found["modulus"]["upper_GPa"]
+    assert low < found["modulus"]["modal_GPa"] < high
+    assert (folder / "figures" / "radii_bounds.png").stat().st_size > 1000
+    assert (folder / "figures" / "10_cells.png").stat().st_size > 1000
+    assert "does not tell" in capfd.readouterr().err
+    assert main(["report", str(folder)]) == 0
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "250 spheres in 5 periodic cubes, divided into Laguerre cells, and 4 more laws" in page
+    assert "what smaller ones there are the section does not tell" in page
+
+
+def test_measured_diameters_are_packed(tmp_path, capfd):
+    own = tmp_path / "own.toml"
+    text = CASE.read_text(encoding="utf-8")
+    keys = ("circles", "visible", "smallest_radius", "largest_radius")
+    lines = [line for line in text.splitlines() if not line.startswith(keys)]
+    at = lines.index("[microstructure.spheres]") + 1
+    own.write_text("\n".join([*lines[:at], 'file = "d.csv"', *lines[at:]]), encoding="utf-8")
+    (tmp_path / "d.csv").write_text("d [mm]\n" + "\n".join("345678"), encoding="utf-8")
+    assert main(["microstructure", str(own), *SMALL[:-2], "--json", "-"]) == 0
+    found = json.loads(capfd.readouterr().out)
+    assert found["law"] == "6 values of d.csv"
+    assert found["smallest_radius"] >= 1.5e-3
+    assert found["unknown"] is None
+
+
+SPHERES = "microstructure.spheres"
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ([f"{SPHERES}.volume_fraction=0.5"], "inside (0, 0.45)"),
+        ([f'{SPHERES}.visible="3 mm"'], "less than microstructure.spheres.smallest_radius"),
+        ([f'{SPHERES}.visible="0.6 mm"', f'{SPHERES}.largest_radius="9 mm"'], "the largest 0.009 m"),
+        ([f'{SPHERES}.largest_radius="60 mm"'], "at most 20 times the smallest"),
+        ([f'{SPHERES}.file="spheres.circles.csv"'], "the radii come from measured spheres besides"),
+        ([f'{SPHERES}.circles="paper.toml"'], "paper.toml"),
+        ([f'{SPHERES}.circles="none.csv"'], "there is no such file"),
+        ([f"{SPHERES}.packings=3"], "from 5 to 10,000"),
+        ([f"{SPHERES}.level=1"], "inside (0, 1)"),
+        (['cell.particles="cylinders"', 'modulus.method="series"'], "stage microstructure packs"),
+    ],
+)  # fmt: skip
+def test_what_spheres_cannot_be_is_one_line(changes, words, tmp_path, capfd):
+    chosen = [word for change in changes for word in ("--set", change)]
+    folder = tmp_path / "run"
+    assert main(["run", str(CASE), *chosen, "--out", str(folder)]) == 2
+    out, err = capfd.readouterr()
+    assert not out
+    assert words in err
+    assert err.count("\n") == 1
+    assert not folder.exists()
+
+
+def test_keys_of_circles_need_circles(tmp_path, capfd):
+    own = tmp_path / "own.toml"
+    text = CASE.read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines() if not line.startswith("circles")]
+    own.write_text("\n".join(lines), encoding="utf-8")
+    assert main(["check", str(own)]) == 2
+    assert "this has an effect on the circles of a section alone" in capfd.readouterr().err
+
+
+def test_a_machine_without_voro_is_told_before_anything_runs(monkeypatch, tmp_path, capfd):
+    from alphacut.stochastic.spheres import power_cells
+
+    monkeypatch.setattr(power_cells.shutil, "which", lambda name: None)
+    assert main(["run", str(CASE), "--out", str(tmp_path / "run")]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert "install Debian's package voro++" in line
+    assert not (tmp_path / "run").exists()
