@@ -24,7 +24,7 @@ from alphacut.stochastic.spheres.spheres import Spheres
 from alphacut.stochastic.theta.truncated_normal import Array
 
 Quantity = Callable[[Array], Array]  # of moduli (…, 3), K, (C11 − C12)/2 and C44: shape (…)
-REFINEMENTS = (1.0, 1.5, 2.15)
+REFINEMENTS = (1.0, 1.7, 2.9)
 SOLVER = 1e-6  # relative error of the energies that the solver may leave
 _AMPLIFIED = 3  # what extrapolation makes of it, at most
 LEVEL = 0.95
