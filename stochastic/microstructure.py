@@ -18,8 +18,7 @@ import numpy as np
 
 from alphacut.stochastic.errors import RefusedError
 from alphacut.stochastic.fit.area_weighted import DISCS, SPHERES, AreaWeighted, Shape
-from alphacut.stochastic.fit.bootstrap import SlopeBand, slope_band
-from alphacut.stochastic.fit.hermite_fit import HermiteFit
+from alphacut.stochastic.fit.hermite_fit import HermiteFit, SlopeBand, slope_band
 from alphacut.stochastic.fit.pbox import PBox, least_pbox
 from alphacut.stochastic.sections import Measured, Section, Simulated, reduced_radii
 from alphacut.stochastic.spheres.packing import SpherePackings

@@ -12,9 +12,9 @@ from alphacut.stochastic.figures.cells import (
     draw_cells,
     draw_neighbours,
     draw_overlay,
+    draw_section,
     draw_two_point,
 )
-from alphacut.stochastic.figures.spheres import draw_radii_bounds, draw_section
 from alphacut.stochastic.figures.statistics import (
     draw_areas,
     draw_correlation,
@@ -22,6 +22,7 @@ from alphacut.stochastic.figures.statistics import (
     draw_neighbour_statistics,
     draw_pbox,
     draw_radii,
+    draw_radii_bounds,
 )
 from alphacut.stochastic.figures.style import save, style
 from alphacut.stochastic.particles.discs import Discs

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from alphacut.stochastic.microstructure import FittedMap, Microstructure
     from alphacut.stochastic.particles.radius_laws import RadiusLaw
+    from alphacut.stochastic.spheres.microstructure import SphereMicrostructure
     from alphacut.stochastic.tessellation.apollonius import Apollonius
     from alphacut.stochastic.tessellation.delaunay import Neighbours
 
@@ -186,4 +187,34 @@ def draw_map(found: FittedMap) -> Figure:
     axes.fill_between(theta, *box.bounds(theta), color=GREY, alpha=0.4, lw=0, label="fuzzy a2, a4")
     axes.set(xlabel="θ, standard deviations", ylabel=REDUCED, ylim=(0, 1))
     axes.legend()
+    return drawn
+
+
+def draw_radii_bounds(found: SphereMicrostructure) -> Figure:
+    """Bounds of the spheres' radii by volume that the section leaves, and the packings' own."""
+    import matplotlib.pyplot as plt
+
+    box = found.source.section
+    assert box is not None
+    drawn, axes = plt.subplots(figsize=(6.4, 3.8))
+    axes.fill_between(
+        1e3 * box.edges,
+        box.lower,
+        box.upper,
+        color=GREY,
+        alpha=0.4,
+        lw=0,
+        label=f"bounds at {100 * box.level:g} %",
+    )
+    for number, packed in enumerate(found.packed):
+        radii = np.sort(np.concatenate([one.radii for one in packed.packings]))
+        share = np.cumsum(radii**3) / (radii**3).sum()
+        colour, wide = (BLUE, 1.6) if number == 0 else (ORANGE, 0.8)
+        label = ("packed", "possible laws")[number] if number < 2 else None
+        axes.step(1e3 * radii, share, color=colour, lw=wide, where="post", label=label)
+    axes.set(xlabel="radius of the spheres [mm]", ylabel="share of their volume", ylim=(0, 1.02))
+    axes.set_title(
+        f"spheres below {1e3 * box.edges[0]:.3g} mm: the section does not tell", fontsize=10
+    )
+    axes.legend(loc="upper left")
     return drawn

@@ -17,8 +17,7 @@ from numpy.polynomial import polynomial
 
 from alphacut.stochastic.errors import RefusedError
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
-from alphacut.stochastic.fit.bootstrap import SlopeBand
-from alphacut.stochastic.fit.hermite_fit import SHAPES, SLOPES, HermiteFit
+from alphacut.stochastic.fit.hermite_fit import SHAPES, SLOPES, HermiteFit, SlopeBand
 from alphacut.stochastic.theta.truncated_normal import Array
 
 

@@ -9,8 +9,7 @@ from scipy import integrate
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 from alphacut.stochastic.errors import RefusedError
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
-from alphacut.stochastic.fit.bootstrap import slope_band
-from alphacut.stochastic.fit.hermite_fit import HermiteFit
+from alphacut.stochastic.fit.hermite_fit import HermiteFit, slope_band
 from alphacut.stochastic.fit.pbox import PBox, least_pbox
 
 LAW = TruncatedNormal()
