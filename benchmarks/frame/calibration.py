@@ -136,6 +136,39 @@ def unit_flow(case: Case) -> UnitFlow:
     return UnitFlow(exact, cuts, relative=True)
 
 
+@dataclass(frozen=True, eq=False)
+class Certified:
+    """Where a certificate says that the upper bounds of (−output, output) lie.
+
+    Args:
+        attained: Values of exact motions, shape (A, T, m, 2).
+        proved: What no motion exceeds, same shape.
+    """
+
+    attained: Array
+    proved: Array
+
+    @classmethod
+    def of(cls, case: Case, gap: float) -> Certified | None:
+        """By a proof of its own to a relative gap; None where it is not guaranteed."""
+        common: dict[str, Any] = {"duration": case.duration, "step": case.step, "relative": True}
+        how = {"method": "modal", "certify": gap, "alpha": case.alpha}
+        found = envelope(case.frame, case.inputs, **common, **how)
+        if found.nature != "guaranteed":
+            return None
+        assert found.inner_lower is not None
+        assert found.inner_upper is not None
+        print(f"{case.name}: certificate to {gap:g} in {found.seconds:.0f} s", flush=True)
+        attained = np.stack([-found.inner_lower, found.inner_upper], -1)
+        return cls(attained, np.stack([-found.lower, found.upper], -1))
+
+    def refuted(self, level: int, given: Array, error: Array) -> int:
+        """Number of bounds (T, m, 2) that lie farther from the truth than their error."""
+        missed = self.attained[level] > given + error
+        too_far = self.proved[level] < given - error
+        return int((missed | too_far).sum())
+
+
 def judged(
     case: Case,
     *,
@@ -144,6 +177,7 @@ def judged(
     seed: int,
     nodes: int = 16,
     known: list[Array] | None = None,
+    proof: Certified | None = None,
     **options: Any,
 ) -> dict[str, Any]:
     """Compare one envelope with inner bounds: errors in shares of the outputs' modal peaks."""
@@ -158,7 +192,7 @@ def judged(
     if known is None:
         known = references(case, samples=samples, starts=starts, seed=seed, nodes=nodes)
     assert found.error is not None
-    ratio, wrong, outside = [], 0.0, 0
+    ratio, wrong, outside, refuted = [], 0.0, 0, 0
     least = SMALL * float(options.get("tolerance", 1e-3))
     for level in range(len(case.alpha)):
         inner = known[level]
@@ -167,6 +201,9 @@ def judged(
         error = (found.error[level] / flow.scale)[..., None]
         wrong = max(wrong, float(missed.max()))
         outside += int((missed > error + ROUNDING).sum())
+        if proof is not None:
+            own = (error + ROUNDING) * flow.scale[:, None]
+            refuted += proof.refuted(level, given, own)
         told = np.abs(missed) <= np.maximum(error, least)  # a reference further short says nothing
         shares = np.maximum(error, least) / np.maximum(np.abs(missed), least)
         ratio.append(shares[told])
@@ -176,7 +213,8 @@ def judged(
         "error": wrong,
         "declared": float((found.error / flow.scale).max()),
         "values": found.lower.size * 2,
-        "above_declared": outside,
+        "above_declared": outside + refuted,
+        "certified": proof is not None,
         "median_declared_over_true": float(np.median(np.concatenate(ratio))),
         "share_with_reference": sum(map(len, ratio)) / (found.lower.size * 2),
         "seconds": seconds,
@@ -184,12 +222,19 @@ def judged(
     }
 
 
-def measured(cases: list[Case], tolerances: list[float], **effort: int) -> Iterator[dict[str, Any]]:
-    """One row per case and tolerance of `auto`; a tolerance that is refused is no broken one."""
+def measured(
+    cases: list[Case], tolerances: list[float], gap: float, **effort: Any
+) -> Iterator[dict[str, Any]]:
+    """One row per case and tolerance of `auto`; a tolerance that is refused is no broken one.
+
+    Where a certificate to a positive gap can be had, its proof judges the bounds as well.
+    """
     for case in cases:
         known = references(case, **effort)
+        proof = Certified.of(case, gap) if gap > 0 else None
         for tolerance in tolerances:
-            row = judged(case, known=known, method="auto", tolerance=tolerance, **effort)
+            own: dict[str, Any] = {"known": known, "proof": proof, "tolerance": tolerance}
+            row = judged(case, method="auto", **own, **effort)
             if "error" not in row:
                 print(f"{case.name}; auto at {tolerance:g}: {row['method']}", flush=True)
                 yield {"tolerance": tolerance, **row, "kept": ""}
@@ -265,12 +310,15 @@ def main() -> None:
     parser.add_argument("--starts", type=int, default=8, help="polished per bound (8)")
     parser.add_argument("--nodes", type=int, default=16, help="polished nodes of each (16)")
     parser.add_argument("--only", default="", help="named cases whose name holds this")
+    parser.add_argument(
+        "--certify", type=float, default=0.0, help="relative gap of certificates that judge too"
+    )
     o = parser.parse_args()
     seeds = range(o.first, o.first + o.frames)
     cases = named_cases(o.step) if o.named else [random_case(seed) for seed in seeds]
     cases = [case for case in cases if o.only in case.name]
     effort = {"samples": o.samples, "seed": o.first + 1}
-    rows = list(measured(cases, o.tolerance, starts=o.starts, nodes=o.nodes, **effort))
+    rows = list(measured(cases, o.tolerance, o.certify, starts=o.starts, nodes=o.nodes, **effort))
     if o.named and o.only in "pendulum":
         rows += swung(o.tolerance, step=o.step, **effort)
     told = [row for row in rows if row["kept"] != ""]
