@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
+from typing import TypeVar
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from alphacut.rve.table.interpolant import Table, TableRange
 from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.truncated_normal import Array
 
+R = TypeVar("R", bound=Homogenised)
 _POINTWISE = 1.5  # safety of a single θ, where errors do not average
 _THETA_SHARE = 0.05  # of the accuracy; nodes in θ cost nothing here
 
@@ -66,20 +68,18 @@ class TableModel:
             RuleError: No rule in θ settles (a map that is not smooth).
             ValueError: The map or a modulus leaves the range that was given.
         """
-        results: dict[int, Homogenised] = {}
-        for poisson, places, moduli in by_poisson(inclusions):
+
+        def made(poisson: float, moduli: Array) -> list[Homogenised]:
             started = perf_counter()
             span = self._span(radius_map, matrix, poisson, moduli)
             table, found = stored_table(
                 span, self.cache, accuracy=self.accuracy, source=self.source, progress=self.progress
             )
             built = perf_counter() - started
-            evaluated = self._evaluate(table, radius_map, moduli, built=built, found=found)
-            results |= {
-                k: certified(r, radius_map, matrix, inclusions[k])
-                for k, r in zip(places, evaluated, strict=True)
-            }
-        return [results[k] for k in range(len(inclusions))]
+            return self._evaluate(table, radius_map, moduli, built=built, found=found)
+
+        pairs = zip(each_poisson(inclusions, made), inclusions, strict=True)
+        return [certified(result, radius_map, matrix, phase) for result, phase in pairs]
 
     def _span(
         self, radius_map: RadiusMap, matrix: Phase, poisson: float, moduli: Array
@@ -138,11 +138,14 @@ def table_in_words(table: Table, *, found: bool) -> str:
     )
 
 
-def by_poisson(inclusions: Sequence[Phase]) -> Iterator[tuple[float, list[int], Array]]:
-    """Each Poisson's ratio, the places of the phases that have it, and their moduli in Pa."""
+def each_poisson(inclusions: Sequence[Phase], solve: Callable[[float, Array], list[R]]) -> list[R]:
+    """Results in the order of `inclusions`, from a call for each Poisson's ratio and its moduli."""
+    results: dict[int, R] = {}
     for poisson in dict.fromkeys(p.poisson for p in inclusions):
         places = [k for k, p in enumerate(inclusions) if p.poisson == poisson]
-        yield poisson, places, np.array([inclusions[k].modulus for k in places])
+        moduli = np.array([inclusions[k].modulus for k in places])
+        results |= dict(zip(places, solve(poisson, moduli), strict=True))
+    return [results[k] for k in range(len(inclusions))]
 
 
 def rounded_radii(low: float, high: float) -> tuple[float, float]:

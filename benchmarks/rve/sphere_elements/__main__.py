@@ -2,7 +2,8 @@
 
     ./enter python -m benchmarks.rve.sphere_elements
 
-Judged against the exact series: the order of the error of E on meshes ever finer; iterations of
+Judged against the exact series: declared errors of 100 random cells, and of the fuzzy modulus of
+cases/paper-3d.toml by a table; the order of the error of E on meshes ever finer; iterations of
 conjugate gradients over mesh size and contrast; a mesh of a million unknowns, all three loads, on
 two ranks; equal moduli on one rank and on two; dolfinx_mpc on the whole periodic cell, whose mesh
 is the eighth's with its mirror images. Prints a line each, writes sphere_elements.csv to
@@ -35,6 +36,7 @@ RADIUS, MATRIX, SPHERE = 0.6, Phase(20e9), Phase(80e9, 0.2)
 ORDER, FACTOR, SECONDS, SAME, AS_PEER = 2.7, 2.0, 180.0, 1e-10, 1e-9
 SIZES = (0.2, 0.14, 0.1, 0.07)
 CONTRASTS = (1e-2, 1e-1, 1, 10, 1e2)
+DRAWS, TOLERANCE, MINUTES = 100, 1e-4, 5.0
 MILLION, LARGE, OF_RANKS, OF_PEER = 1_000_000, 0.0268, 0.1, 0.15
 
 
@@ -68,10 +70,10 @@ def exact(matrix: Phase, sphere: Phase) -> float:
 
 def order(sizes: Sequence[float] = SIZES) -> Line:
     """Slope of the error of E over the edge length that the unknowns tell, by least squares."""
-    from alphacut.rve.spheres.fem.stiffness import octant_stiffness
+    from alphacut.rve.spheres.fem.stiffness import OctantCell
 
     reference = exact(MATRIX, SPHERE)
-    solved = [octant_stiffness(RADIUS, MATRIX, SPHERE, size=h) for h in sizes]
+    solved = [OctantCell(RADIUS, size=h).solve(MATRIX, SPHERE) for h in sizes]
     errors = [abs(young(one.moduli) / reference - 1) for one in solved]
     edges = [one.unknowns ** (-1 / 3) for one in solved]
     slope = float(np.polyfit(np.log(edges), np.log(errors), 1)[0])
@@ -169,8 +171,38 @@ def beside_peer(size: float = OF_PEER) -> Line:
     return Line(words, f"{gap:.1e}", f"<= {AS_PEER:g}", gap <= AS_PEER)
 
 
-def lines() -> Iterator[Line]:
+def declared(count: int = DRAWS, seed: int = 1) -> Line:
+    """Random cells whose declared error covers the true one."""
+    from benchmarks.rve.sphere_elements.declared import random_cells
+
+    draws = random_cells(count, seed)
+    ratio = draws.true / draws.declared
+    words = (
+        f"declared errors of {count} random cells (seed {seed}), {draws.declared.min():.0e} to"
+        f" {draws.declared.max():.0e}, true over declared {np.median(ratio):.2f} in the median and"
+        f" {ratio.max():.2f} at most: covered"
+    )
+    return Line(words, f"{draws.covered}", f"{count}", draws.covered == count)
+
+
+def fuzzy(tolerance: float = TOLERANCE, workers: int = 2) -> Line:
+    """Wall time of the fuzzy modulus by a table of elements, and its errors."""
+    from benchmarks.rve.sphere_elements.declared import fuzzy_modulus
+
+    found = fuzzy_modulus(tolerance, workers)
+    words = (
+        f"fuzzy modulus of paper-3d by a table, five levels, {workers} workers, declared error"
+        f" {found.declared:.1e}, true {found.true:.1e}: minutes"
+    )
+    minutes = found.seconds / 60
+    kept = found.true <= found.declared <= tolerance and minutes <= MINUTES
+    return Line(words, f"{minutes:.2f}", f"<= {MINUTES:g}, error <= {tolerance:g}", kept)
+
+
+def lines(seed: int = 1) -> Iterator[Line]:
     """All of them, one after the other."""
+    yield declared(seed=seed)
+    yield fuzzy()
     yield order()
     yield iterations()
     yield same_on_ranks()
@@ -184,13 +216,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--mesh", type=float, help="solve this mesh size on all ranks, no more")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the random cells")
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder for the results")
     options = parser.parse_args(arguments)
     if options.mesh is not None:
         one_mesh(options.mesh)
         return 0
     found = []
-    for line in lines():
+    for line in lines(options.seed):
         found.append(line)
         sign = "" if line.kept else "  BROKEN"
         print(f"{line.what} {line.value} (bound {line.bound}){sign}", flush=True)

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from alphacut.rve.cell import Phase
+from alphacut.rve.spheres.fem.modulus_basis import ModulusBasis
 from alphacut.rve.spheres.fem.stiffness import RTOL, OctantCell
 
 # isort: split
@@ -50,6 +51,8 @@ class Meshes:
         matrix: Material outside the sphere.
         size: Edge length of the first in halves of the cell's side, in (0, 1]; two coarser ones
             stand before it.
+        basis: Spheres of one Poisson's ratio that are solved for in place of those asked for, which
+            are combined from them; none: each is solved for.
         comm: Ranks that share each mesh.
 
     Attributes:
@@ -62,13 +65,20 @@ class Meshes:
     """
 
     def __init__(
-        self, radius: float, matrix: Phase, *, size: float, comm: MPI.Comm = MPI.COMM_SELF
+        self,
+        radius: float,
+        matrix: Phase,
+        *,
+        size: float,
+        basis: Sequence[Phase] = (),
+        comm: MPI.Comm = MPI.COMM_SELF,
     ) -> None:
-        self._radius, self._matrix, self._comm = radius, matrix, comm
+        self._radius, self._matrix, self._basis, self._comm = radius, matrix, basis, comm
         self._cells = [OctantCell(radius, size=size, comm=comm)]
         for coarser in (COARSER, COARSER**2):
             self._cells.insert(0, OctantCell(radius, size=min(1.0, coarser * size), comm=comm))
         self._known: dict[tuple[int, Phase], tuple[Array, tuple[int, ...]]] = {}
+        self._bases: dict[int, ModulusBasis] = {}
         self.size, self.systems = size, 0
 
     @property
@@ -114,26 +124,17 @@ class Meshes:
 
     def _solved(self, mesh: int, inclusion: Phase) -> tuple[Array, tuple[int, ...]]:
         """Moduli and iterations on one mesh; solved once."""
+        if self._basis:
+            return self._based(mesh).moduli(inclusion.modulus), self._based(mesh).iterations
         if (mesh, inclusion) not in self._known:
             found = self._cells[mesh].solve(self._matrix, inclusion)
             self._known[mesh, inclusion] = found.moduli, found.iterations
             self.systems += len(found.iterations)
         return self._known[mesh, inclusion]
 
-
-def cubic_stiffness_by_elements(
-    radius: float, matrix: Phase, inclusions: Sequence[Phase], *, size: float = 0.2
-) -> tuple[Array, Array]:
-    """The moduli from three meshes, and their declared relative errors, both of shape (m, 3).
-
-    Args:
-        radius: Radius over half the cell's side, in (0, 0.97].
-        matrix: Material outside the sphere.
-        inclusions: Materials of the sphere.
-        size: Edge length of the finest mesh in halves of the cell's side, in (0, 1].
-
-    Raises:
-        ConvergenceError: An iteration does not converge.
-    """
-    found = Meshes(radius, matrix, size=size).judged(inclusions)
-    return found.moduli, found.errors
+    def _based(self, mesh: int) -> ModulusBasis:
+        """Solutions on one mesh that the others are combined from."""
+        if mesh not in self._bases:
+            self._bases[mesh] = ModulusBasis(self._cells[mesh], self._matrix, self._basis)
+            self.systems += len(self._bases[mesh].iterations)
+        return self._bases[mesh]

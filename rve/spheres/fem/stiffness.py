@@ -39,12 +39,14 @@ class OctantSolution:
         unknowns: Displacements of the mesh.
         iterations: Of conjugate gradients, one number a load.
         seconds: Wall time by stage: assemble, setup, solve.
+        displacements: This rank's part of the solutions, one a load; empty unless asked for.
     """
 
     moduli: Array
     unknowns: int
     iterations: tuple[int, ...]
     seconds: dict[str, float] = field(default_factory=dict)
+    displacements: tuple[Array, ...] = ()
 
 
 class OctantCell:
@@ -88,8 +90,16 @@ class OctantCell:
         stretch = self._lame * ufl.div(u) * ufl.div(v)
         return (2 * self._shear * ufl.inner(strain, other) + stretch) * dx
 
-    def solve(self, matrix: Phase, inclusion: Phase, *, rtol: float = RTOL) -> OctantSolution:
+    def solve(
+        self, matrix: Phase, inclusion: Phase, *, rtol: float = RTOL, keep: bool = False
+    ) -> OctantSolution:
         """The three moduli for one pair of materials.
+
+        Args:
+            matrix: Material outside the sphere.
+            inclusion: Material of the sphere.
+            rtol: Relative residual at which the iteration ends.
+            keep: Whether the displacements are part of the answer.
 
         Raises:
             ConvergenceError: An iteration does not converge.
@@ -100,14 +110,41 @@ class OctantCell:
         for one in stiffness:
             one.assemble()
         seconds = {"assemble": perf_counter() - started, "setup": 0.0, "solve": 0.0}
-        moduli, iterations = [], []
+        moduli, iterations, fields = [], [], []
         for faces, loads in LOADS:
-            for value, steps in self._under(faces, loads, stiffness, rtol, seconds):
+            for value, steps, field_of in self._under(faces, loads, stiffness, rtol, seconds):
                 moduli.append(matrix.modulus * value)
                 iterations.append(steps)
+                fields += [field_of] if keep else []
         for one in stiffness:
             one.destroy()
-        return OctantSolution(np.array(moduli), self.unknowns, tuple(iterations), seconds)
+        return OctantSolution(
+            np.array(moduli), self.unknowns, tuple(iterations), seconds, tuple(fields)
+        )
+
+    def energies(self, matrix: Phase, inclusion: Phase, fields: Array) -> Array:
+        """Twice the energy of displacements with one another, over Young's modulus of the matrix.
+
+        Args:
+            matrix: Material outside the sphere.
+            inclusion: Material of the sphere.
+            fields: This rank's displacements, shape (loads, k, n).
+
+        Returns:
+            Shape (loads, k, k).
+        """
+        self._set(matrix, inclusion)
+        stiffness = petsc.assemble_matrix(self._forms[0])
+        stiffness.assemble()
+        vector, image = stiffness.createVecs()
+        found = np.empty((*fields.shape[:2], fields.shape[1]))
+        for load, k in np.ndindex(fields.shape[:2]):
+            vector.array[:] = fields[load, k]
+            stiffness.mult(vector, image)
+            found[load, k] = fields[load] @ image.array
+        for item in (stiffness, vector, image):
+            item.destroy()
+        return np.asarray(self.mesh.comm.allreduce(found))
 
     def _set(self, matrix: Phase, inclusion: Phase) -> None:
         """Lamé's constants of the cells, over Young's modulus of the matrix."""
@@ -123,8 +160,8 @@ class OctantCell:
         stiffness: Sequence[PETSc.Mat],
         rtol: float,
         seconds: dict[str, float],
-    ) -> list[tuple[float, int]]:
-        """Modulus over that of the matrix and iterations of each load on the same faces."""
+    ) -> list[tuple[float, int, Array]]:
+        """Modulus over that of the matrix, iterations, and displacements of each load on faces."""
         started = perf_counter()
         fine, coarse = (matrix.copy() for matrix in stiffness)
         between = self._prolongation.copy()
@@ -143,8 +180,8 @@ class OctantCell:
 
     def _solved(
         self, load: Load, faces: Faces, stiffness: PETSc.Mat, free: PETSc.Vec, solver: TwoSpaces
-    ) -> tuple[float, int]:
-        """Modulus and iterations of one load."""
+    ) -> tuple[float, int, Array]:
+        """Modulus, iterations and displacements of one load."""
         given = fem.Function(self.fine)
         dofs, values = on_faces(self.fine, faces, load.strain)
         given.x.array[dofs] = values
@@ -158,7 +195,7 @@ class OctantCell:
         self._displacement.x.scatter_forward()
         right.destroy()
         energy = self.mesh.comm.allreduce(fem.assemble_scalar(self._energy))
-        return float(energy / load.unit), steps
+        return float(energy / load.unit), steps, whole.array.copy()
 
 
 def _without(matrix: PETSc.Mat, dofs: Array) -> PETSc.Vec:
@@ -170,28 +207,3 @@ def _without(matrix: PETSc.Mat, dofs: Array) -> PETSc.Vec:
     free.set(1.0)
     free.array[own] = 0.0
     return free
-
-
-def octant_stiffness(
-    radius: float,
-    matrix: Phase,
-    inclusion: Phase,
-    *,
-    size: float = 0.2,
-    comm: MPI.Comm = MPI.COMM_SELF,
-    rtol: float = RTOL,
-) -> OctantSolution:
-    """The three moduli of one cell on one mesh.
-
-    Args:
-        radius: Radius over half the cell's side, in (0, 0.97].
-        matrix: Material outside the sphere.
-        inclusion: Material of the sphere.
-        size: Edge length in halves of the cell's side.
-        comm: Ranks that share the mesh.
-        rtol: Relative residual at which the iteration ends.
-
-    Raises:
-        ConvergenceError: The iteration does not converge.
-    """
-    return OctantCell(radius, size=size, comm=comm).solve(matrix, inclusion, rtol=rtol)

@@ -3,31 +3,124 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.rve.cell import Phase
+from alphacut.rve.cell import Phase, with_ratio_errors
 from alphacut.rve.settings import require_accuracy
 from alphacut.rve.slices.theta_rule import extreme_radii, settle_rule
+from alphacut.rve.spheres.bounds import mori_tanaka
 from alphacut.rve.spheres.cubic import cubic_moduli, cubic_voigt
-from alphacut.rve.spheres.result import HomogenisedSpheres, certified_spheres
-from alphacut.rve.spheres.table.source import (
-    LARGEST_RADIUS,
-    OctantSource,
-    SphereRange,
-    SphereSeriesSource,
-)
+from alphacut.rve.spheres.result import HomogenisedSpheres, certified_spheres, volume_fraction
+from alphacut.rve.table.build import TableError
 from alphacut.rve.table.cache import stored_table
-from alphacut.rve.table.interpolant import Table
-from alphacut.rve.table.model import by_poisson, rounded_moduli, rounded_radii, table_in_words
+from alphacut.rve.table.interpolant import Table, TableRange
+from alphacut.rve.table.model import (
+    each_poisson,
+    rounded_moduli,
+    rounded_radii,
+    table_in_words,
+)
 from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.truncated_normal import Array
 
+if TYPE_CHECKING:
+    from alphacut.rve.spheres.fem.extrapolation import Meshes
+    from alphacut.rve.spheres.fem.modulus_basis import ModulusBasis
+
 _THETA_SHARE = 0.05  # of the accuracy; nodes in θ cost nothing here
-_SOURCES = {"octant": OctantSource, "sphere series": SphereSeriesSource}
+LARGEST_RADIUS = 0.97  # meshes of spheres end there
+_COARSE, _ROUGH, _FINEST = 0.4, 0.25, 0.035  # mesh sizes
+_BASIS_SHARE = 0.02  # of the accuracy, for what a few solutions miss of others
+
+
+@dataclass(frozen=True)
+class SphereRange(TableRange):
+    """Range of a table of spheres, see `TableRange`; K, (C11 − C12)/2 and C44 are tabled."""
+
+    def dilute(self, radius: Array, modulus: Array) -> Array:
+        """The three moduli by Mori and Tanaka in Pa, shape (n, m, 3)."""
+        share, phases = volume_fraction(radius), [Phase(float(e), self.poisson) for e in modulus]
+        pairs = [mori_tanaka(share, self.matrix, phase) for phase in phases]
+        return np.stack([np.stack([k, g, g], axis=-1) for k, g in pairs], axis=1)
+
+
+@dataclass
+class OctantSource:
+    """Moduli by curved quadratic tetrahedra, at each radius on meshes as fine as it needs."""
+
+    span: TableRange
+    accuracy: float
+    mesh_size: float = _ROUGH
+    space: Array = field(init=False)
+    unknowns: int = 0
+    systems: int = 0
+
+    def __post_init__(self) -> None:
+        from alphacut.rve.spheres.fem.modulus_basis import basis_between
+        from alphacut.rve.spheres.fem.stiffness import OctantCell
+
+        self._errors: dict[float, Array] = {}
+        self._rough: dict[float, ModulusBasis] = {}
+        least, greatest = self._phases(np.array(self.span.moduli))
+        self._basis, self._missed = basis_between(
+            OctantCell(self.span.radii[1], size=_COARSE),
+            self.span.matrix,
+            (least, greatest),
+            error=_BASIS_SHARE * self.accuracy,
+        )
+
+    def moduli(self, radius: float, modulus: Array) -> Array:
+        """K, (C11 − C12)/2 and C44 in Pa, shape (m, 3).
+
+        Raises:
+            TableError: The finest mesh is not fine enough.
+        """
+        from alphacut.rve.spheres.fem.extrapolation import Meshes
+
+        meshes = Meshes(radius, self.span.matrix, size=_ROUGH, basis=self._basis)
+        self._refine(meshes)
+        found = meshes.judged(self._phases(modulus))
+        self._errors[radius] = found.errors.max(axis=0) + self._missed
+        radii = sorted(self._errors)
+        errors = np.array([self._errors[r] for r in radii])
+        self.space = np.vstack([radii, with_ratio_errors(errors).T])
+        self.mesh_size = min(self.mesh_size, meshes.size)
+        self.unknowns = max(self.unknowns, meshes.unknowns)
+        self.systems += meshes.systems
+        return found.moduli
+
+    def _refine(self, meshes: Meshes) -> None:
+        """Finer meshes until the extreme moduli keep the accuracy."""
+        from alphacut.rve.spheres.fem.extrapolation import ORDER
+
+        ends, allowed = self._phases(np.array(self.span.moduli)), self.accuracy - self._missed
+        while (error := float(meshes.judged(ends).errors.max())) > allowed:
+            if meshes.size <= _FINEST:
+                raise TableError(
+                    f"elements about spheres leave a relative error of {error:.1e} on the finest"
+                    f" mesh ({_FINEST:g}) and {self.accuracy:.1e} is wanted: allow a larger error,"
+                    " or take the series"
+                )
+            finer = (0.8 * allowed / error) ** (1 / ORDER)
+            meshes.refine(max(_FINEST, meshes.size * min(0.75, max(0.25, finer))))
+
+    def _phases(self, modulus: Array) -> list[Phase]:
+        return [Phase(float(e), self.span.poisson) for e in modulus]
+
+    def rough(self, radius: float, modulus: Array) -> Array:
+        """The same on one coarse mesh."""
+        from alphacut.rve.spheres.fem.modulus_basis import ModulusBasis
+        from alphacut.rve.spheres.fem.stiffness import OctantCell
+
+        if radius not in self._rough:
+            cell = OctantCell(radius, size=_COARSE)
+            self._rough[radius] = ModulusBasis(cell, self.span.matrix, self._basis)
+        return np.array([self._rough[radius].moduli(float(e)) for e in modulus])
 
 
 @dataclass(frozen=True)
@@ -39,7 +132,6 @@ class SphereTableModel:
         cache: Folder where tables are kept from run to run; None keeps them in the process.
         moduli: Moduli of the particle that the table covers, in Pa; None: those asked for, rounded
             outwards if they are several.
-        source: "octant", or "sphere series" to test the table itself.
 
     Raises:
         ValueError: A value lies outside its range.
@@ -48,14 +140,10 @@ class SphereTableModel:
     accuracy: float = 1e-4
     cache: Path | None = None
     moduli: tuple[float, float] | None = None
-    source: str = "octant"
     name = "table"
 
     def __post_init__(self) -> None:
         require_accuracy(self.accuracy, 1e-5, "accuracy of the table of spheres")
-        if self.source not in _SOURCES:
-            allowed = " or ".join(_SOURCES)
-            raise ValueError(f"the source of the table is {self.source!r}; it must be {allowed}")
 
     def solve(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
@@ -68,23 +156,21 @@ class SphereTableModel:
             TouchingError: Spheres nearly touch.
             ValueError: A modulus leaves the range that was given.
         """
-        results: dict[int, HomogenisedSpheres] = {}
-        for poisson, places, moduli in by_poisson(inclusions):
+
+        def made(poisson: float, moduli: Array) -> list[HomogenisedSpheres]:
             started = perf_counter()
             table, found = stored_table(
                 self._span(radius_map, matrix, poisson, moduli),
                 self.cache,
                 accuracy=self.accuracy,
-                source=self.source,
-                make=_SOURCES[self.source],
+                source="octant",
+                make=OctantSource,
             )
             built = perf_counter() - started
-            evaluated = self._evaluate(table, radius_map, moduli, built=built, found=found)
-            results |= {
-                k: certified_spheres(r, radius_map, matrix, inclusions[k])
-                for k, r in zip(places, evaluated, strict=True)
-            }
-        return [results[k] for k in range(len(inclusions))]
+            return self._evaluate(table, radius_map, moduli, built=built, found=found)
+
+        pairs = zip(each_poisson(inclusions, made), inclusions, strict=True)
+        return [certified_spheres(result, radius_map, matrix, phase) for result, phase in pairs]
 
     def _span(
         self, radius_map: RadiusMap, matrix: Phase, poisson: float, moduli: Array

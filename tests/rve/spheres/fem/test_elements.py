@@ -9,7 +9,7 @@ from alphacut.rve.solver.krylov import ConvergenceError
 from alphacut.rve.spheres.bounds import bulk_and_shear
 from alphacut.rve.spheres.fem import multigrid
 from alphacut.rve.spheres.fem.octant import octant
-from alphacut.rve.spheres.fem.stiffness import OctantCell, octant_stiffness
+from alphacut.rve.spheres.fem.stiffness import OctantCell
 from alphacut.rve.spheres.series.stiffness import cubic_stiffness
 
 MATRIX = Phase(20e9)
@@ -22,7 +22,7 @@ def exact(radius, matrix, inclusion):
 
 def test_homogeneous_cell_is_the_matrix():
     bulk, shear = bulk_and_shear(MATRIX)
-    found = octant_stiffness(0.5, MATRIX, MATRIX, size=0.6)
+    found = OctantCell(0.5, size=0.6).solve(MATRIX, MATRIX)
     np.testing.assert_allclose(found.moduli, [bulk, shear, shear], rtol=1e-9)
 
 
@@ -30,7 +30,7 @@ def test_homogeneous_cell_is_the_matrix():
 def test_elements_and_series_agree_to_1e_4_in_fourth_order():
     inclusion = Phase(80e9, 0.2)
     reference = exact(0.6, MATRIX, inclusion)
-    coarse, fine = (octant_stiffness(0.6, MATRIX, inclusion, size=h) for h in (0.16, 0.11))
+    coarse, fine = (OctantCell(0.6, size=h).solve(MATRIX, inclusion) for h in (0.16, 0.11))
     errors = [abs(found.moduli / reference - 1).max() for found in (coarse, fine)]
     assert errors[1] < 1e-4
     edge = (fine.unknowns / coarse.unknowns) ** (1 / 3)
@@ -48,13 +48,13 @@ def test_iterations_hardly_depend_on_mesh_and_contrast(size):
 
 @pytest.mark.parametrize("radius", [0.1, 0.95])
 def test_iterations_are_few_at_small_and_nearly_touching_spheres(radius):
-    assert max(octant_stiffness(radius, MATRIX, Phase(2e12), size=0.4).iterations) <= 20
+    assert max(OctantCell(radius, size=0.4).solve(MATRIX, Phase(2e12)).iterations) <= 20
 
 
 def test_no_curved_element_is_folded_on_a_coarse_mesh():
     """At this size Gmsh folds three elements unless the mesh is made finer."""
     reference = exact(0.6, MATRIX, Phase(2e8))
-    found = octant_stiffness(0.6, MATRIX, Phase(2e8), size=0.4)
+    found = OctantCell(0.6, size=0.4).solve(MATRIX, Phase(2e8))
     assert max(found.iterations) <= 16
     assert (abs(found.moduli / reference - 1) < 4e-3).all()
 
@@ -62,7 +62,7 @@ def test_no_curved_element_is_folded_on_a_coarse_mesh():
 def test_an_iteration_that_does_not_converge_is_an_error(monkeypatch):
     monkeypatch.setattr(multigrid, "_MOST", 3)
     with pytest.raises(ConvergenceError, match="end after 3 iterations"):
-        octant_stiffness(0.6, MATRIX, Phase(80e9), size=0.6)
+        OctantCell(0.6, size=0.6).solve(MATRIX, Phase(80e9))
 
 
 def test_meshes_out_of_range_are_refused():
