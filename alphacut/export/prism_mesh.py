@@ -19,37 +19,12 @@ if TYPE_CHECKING:
 # upper triangle, vertical edges.
 ORDER = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11]
 # from there to VTK's: the lower triangle seen from outside
-MIRRORED = [
-    0,
-    2,
-    1,
-    3,
-    5,
-    4,
-    8,
-    7,
-    6,
-    11,
-    10,
-    9,
-    12,
-    14,
-    13,
-]
+MIRRORED = [0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13]
 # names of the element sets, where a format has sets in place of data
-PHASES = (
-    "MATRIX",
-    "PARTICLE",
-)
+PHASES = ("MATRIX", "PARTICLE")
 VTK_ORDER = {".vtu", ".vtk", ".xdmf"}
 # read back, they give points, cells and phase
-FORMATS = {
-    ".vtu": "vtu",
-    ".vtk": "vtk",
-    ".xdmf": "xdmf",
-    ".msh": "gmsh",
-    ".inp": "abaqus",
-}
+FORMATS = {".vtu": "vtu", ".vtk": "vtk", ".xdmf": "xdmf", ".msh": "gmsh", ".inp": "abaqus"}
 FIELDLESS = {".inp"}
 
 

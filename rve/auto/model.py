@@ -12,9 +12,14 @@ from pathlib import Path
 
 from alphacut.rve.cell import Phase
 from alphacut.rve.result import Homogenised
+from alphacut.rve.spheres.series.model import SphereSeriesModel
+from alphacut.rve.spheres.table.model import LEAST_ACCURACY, SphereTableModel
 from alphacut.stochastic import RadiusMap
 
 ORDER = ("series", "table", "slices", "prism")  # cheapest first
+OF_SPHERES = ("series", "table")
+TABLED = 0.9
+"""Of the tolerance on E, for the moduli that a table of spheres holds; the rest is for θ."""
 _MARGIN = 0.4  # of the tolerance, for the series at each θ and again for its rule in θ
 _WHY = {
     "series": "exact for circles, a few small systems for each θ",
@@ -40,6 +45,7 @@ class AutoModel:
         moduli: Moduli of the particle that a table is to cover, in Pa, where further ones will be
             asked for; None: those of each call.
         progress: Called with the fraction done by models that take long.
+        particles: "cylinders", or "spheres": series and table alone.
 
     Raises:
         ValueError: A value lies outside its range, or nothing is left to choose from.
@@ -50,20 +56,22 @@ class AutoModel:
     cache: Path | None = None
     moduli: tuple[float, float] | None = None
     progress: Callable[[float], None] | None = None
+    particles: str = "cylinders"
     name = "auto"
 
     def __post_init__(self) -> None:
         if not 1e-10 <= self.tolerance <= 0.1:
             raise ValueError(f"the tolerance is {self.tolerance:g}; it must lie in [1e-10, 0.1]")
-        unknown = [name for name in self.exclude if name not in ORDER]
+        known = ", ".join(self._order)
+        unknown = [name for name in self.exclude if name not in self._order]
         if unknown:
-            raise ValueError(
-                f"auto is told to exclude {unknown[0]!r}; known models are {', '.join(ORDER)}"
-            )
-        if not set(ORDER) - set(self.exclude):
-            raise ValueError(
-                "auto is told to exclude every model; leave one of series, table, slices, prism"
-            )
+            raise ValueError(f"auto is told to exclude {unknown[0]!r}; known models are {known}")
+        if not set(self._order) - set(self.exclude):
+            raise ValueError(f"auto is told to exclude every model; leave one of {known}")
+
+    @property
+    def _order(self) -> tuple[str, ...]:
+        return OF_SPHERES if self.particles == "spheres" else ORDER
 
     def solve(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
@@ -76,7 +84,7 @@ class AutoModel:
         if not inclusions:
             return []
         refusals: list[str] = []
-        for name in ORDER:
+        for name in self._order:
             if name in self.exclude:
                 refusals.append(f"{name} excluded")
                 continue
@@ -94,7 +102,10 @@ class AutoModel:
         self, name: str, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
     ) -> list[Homogenised]:
         """Results of one model at the resolution that the tolerance asks for."""
-        if name == "series":
+        results: Sequence[Homogenised]
+        if self.particles == "spheres":
+            results = self._of_spheres(name).solve(radius_map, matrix, inclusions)
+        elif name == "series":
             from alphacut.rve.series.model import SeriesModel
 
             results = SeriesModel(accuracy=max(_MARGIN * self.tolerance, 1e-12)).solve(
@@ -120,7 +131,15 @@ class AutoModel:
         worst = max(r.largest_error for r in results)
         if not worst <= self.tolerance:
             raise ChoiceError(f"its declared error is {worst:.1e}")
-        return results
+        return list(results)
+
+    def _of_spheres(self, name: str) -> SphereSeriesModel | SphereTableModel:
+        """Model of spheres for the tolerance."""
+        if name == "series":
+            return SphereSeriesModel(accuracy=max(_MARGIN * self.tolerance, 1e-11))
+        if (accuracy := TABLED * self.tolerance) < LEAST_ACCURACY:
+            raise ChoiceError(f"tables of spheres end at an accuracy of {LEAST_ACCURACY:g}")
+        return SphereTableModel(accuracy, self.cache, self.moduli)
 
     def _reason(self, result: Homogenised, refusals: list[str]) -> str:
         before = f" ({'; '.join(refusals)})" if refusals else ""

@@ -124,9 +124,6 @@ def cell_choice(
     if exclude and method != "auto":
         what = f"the method is {method}, and only method auto leaves a choice"
         raise BadInput(Problem("--exclude", what, ", ".join(exclude), "beside --method auto"))
-    if exclude and case.cell.particles == "spheres":
-        what = "method auto takes spheres by series"
-        raise BadInput(Problem("--exclude", what, ", ".join(exclude)))
     return CellChoice(
         method,
         mesh.layers,

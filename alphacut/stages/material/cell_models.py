@@ -7,7 +7,7 @@ from importlib import import_module
 from pathlib import Path
 
 from alphacut.io.problem import BadInput, Problem, missing
-from alphacut.rve.auto.model import AutoModel
+from alphacut.rve.auto.model import TABLED, AutoModel
 from alphacut.rve.auto.refined import RefinedModel
 from alphacut.rve.image.round_particle import RasterModel
 from alphacut.rve.series.model import SeriesModel
@@ -16,8 +16,6 @@ from alphacut.rve.spheres.table.model import SphereTableModel
 from alphacut.rve.table.model import TableModel
 from alphacut.stages.material.cell import CellChoice, CellModel
 
-TABLED = 0.9
-"""Of the tolerance on E, for the moduli that a table of spheres holds; the rest is for θ."""
 SHARE = 0.4
 """Of the tolerance, for the series at each θ and again for its rule in θ."""
 
@@ -48,12 +46,11 @@ def cell_model(choice: CellChoice) -> CellModel:
             [Problem(f"-rve_{name}", what, allowed="--method prism") for name in choice.petsc]
         )
     try:
-        if choice.method in ("slices", "prism") or (
-            choice.method == "auto" and "series" in choice.exclude
-        ):
+        meshed = choice.method == "auto" and "series" in choice.exclude
+        if choice.method in ("slices", "prism") or (meshed and choice.particles == "cylinders"):
             # DOLFINx is loaded before the clock starts: times are those of computing
             import_module("alphacut.rve.planar.problem")
-        if choice.particles == "spheres" and choice.method == "table":
+        if choice.particles == "spheres" and (meshed or choice.method == "table"):
             import_module("alphacut.rve.spheres.fem.stiffness")
         return made(choice)
     except ImportError as error:
@@ -76,12 +73,10 @@ def made(choice: CellChoice) -> CellModel:
         ImportError: It needs what is not installed.
     """
     tolerance = choice.tolerance
-    if choice.particles == "spheres":
-        if tolerance is None and choice.method == "auto":
-            tolerance = AutoModel.tolerance
+    if choice.particles == "spheres" and choice.method != "auto":
         if choice.method == "table":
             accuracy = SphereTableModel.accuracy if tolerance is None else TABLED * tolerance
-            return SphereTableModel(accuracy, table_folder(), choice.moduli)
+            return SphereTableModel(accuracy, table_folder(), choice.moduli, choice.parallel)
         own = SphereSeriesModel.accuracy if tolerance is None else max(SHARE * tolerance, 1e-11)
         return SphereSeriesModel(accuracy=own)
     if choice.method == "auto":
@@ -90,6 +85,7 @@ def made(choice: CellChoice) -> CellModel:
             choice.exclude,
             table_folder(),
             choice.moduli,
+            particles=choice.particles,
         )
     if choice.method == "series":
         own = SeriesModel.accuracy if tolerance is None else max(SHARE * tolerance, 1e-12)

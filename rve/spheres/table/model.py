@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from alphacut.rve.spheres.fem.modulus_basis import ModulusBasis
 
 _THETA_SHARE = 0.05  # of the accuracy; nodes in θ cost nothing here
+LEAST_ACCURACY = 1e-5
 LARGEST_RADIUS = 0.97  # meshes of spheres end there
 _COARSE, _ROUGH, _FINEST = 0.4, 0.25, 0.035  # mesh sizes
 _BASIS_SHARE = 0.02  # of the accuracy, for what a few solutions miss of others
@@ -59,16 +61,21 @@ class OctantSource:
     space: Array = field(init=False)
     unknowns: int = 0
     systems: int = 0
+    parallel: bool = False
 
     def __post_init__(self) -> None:
         from alphacut.rve.spheres.fem.modulus_basis import basis_between
         from alphacut.rve.spheres.fem.stiffness import OctantCell
 
+        # isort: split
+        from mpi4py import MPI
+
+        self._comm = MPI.COMM_WORLD if self.parallel else MPI.COMM_SELF
         self._errors: dict[float, Array] = {}
         self._rough: dict[float, ModulusBasis] = {}
         least, greatest = self._phases(np.array(self.span.moduli))
         self._basis, self._missed = basis_between(
-            OctantCell(self.span.radii[1], size=_COARSE),
+            OctantCell(self.span.radii[1], size=_COARSE, comm=self._comm),
             self.span.matrix,
             (least, greatest),
             error=_BASIS_SHARE * self.accuracy,
@@ -82,7 +89,7 @@ class OctantSource:
         """
         from alphacut.rve.spheres.fem.extrapolation import Meshes
 
-        meshes = Meshes(radius, self.span.matrix, size=_ROUGH, basis=self._basis)
+        meshes = Meshes(radius, self.span.matrix, size=_ROUGH, basis=self._basis, comm=self._comm)
         self._refine(meshes)
         found = meshes.judged(self._phases(modulus))
         self._errors[radius] = found.errors.max(axis=0) + self._missed
@@ -118,7 +125,7 @@ class OctantSource:
         from alphacut.rve.spheres.fem.stiffness import OctantCell
 
         if radius not in self._rough:
-            cell = OctantCell(radius, size=_COARSE)
+            cell = OctantCell(radius, size=_COARSE, comm=self._comm)
             self._rough[radius] = ModulusBasis(cell, self.span.matrix, self._basis)
         return np.array([self._rough[radius].moduli(float(e)) for e in modulus])
 
@@ -132,6 +139,7 @@ class SphereTableModel:
         cache: Folder where tables are kept from run to run; None keeps them in the process.
         moduli: Moduli of the particle that the table covers, in Pa; None: those asked for, rounded
             outwards if they are several.
+        parallel: Whether all MPI ranks share each mesh; a cache is then none.
 
     Raises:
         ValueError: A value lies outside its range.
@@ -140,10 +148,11 @@ class SphereTableModel:
     accuracy: float = 1e-4
     cache: Path | None = None
     moduli: tuple[float, float] | None = None
+    parallel: bool = False
     name = "table"
 
     def __post_init__(self) -> None:
-        require_accuracy(self.accuracy, 1e-5, "accuracy of the table of spheres")
+        require_accuracy(self.accuracy, LEAST_ACCURACY, "accuracy of the table of spheres")
 
     def solve(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
@@ -161,10 +170,10 @@ class SphereTableModel:
             started = perf_counter()
             table, found = stored_table(
                 self._span(radius_map, matrix, poisson, moduli),
-                self.cache,
+                None if self.parallel else self.cache,  # ranks might not all find it
                 accuracy=self.accuracy,
                 source="octant",
-                make=OctantSource,
+                make=partial(OctantSource, parallel=self.parallel),
             )
             built = perf_counter() - started
             return self._evaluate(table, radius_map, moduli, built=built, found=found)

@@ -82,7 +82,8 @@ def test_text_says_what_e_is(capfd):
         (["--method", "series", "--radius", "1.2"], "--radius = 1.2: out of range"),
         (["--method", "series", "--radius", "nan"], "--radius = nan: out of range"),
         (["--method", "series", "--radius", "0.5", "--a2", "0.2"], "no effect beside --radius"),
-        (["--method", "auto", "--exclude", "series"], "method auto takes spheres by series"),
+        (["--method", "auto", "--exclude", "slices"], "known models are series, table"),
+        (["--method", "auto", "--exclude", "series,table"], "leave one of series, table"),
         (["--method", "series", "--set", 'cell.particles="cubes"'], "cylinders, spheres"),
     ],
 )
@@ -104,6 +105,24 @@ def test_a_table_of_elements_and_the_series_agree(capfd):
     assert 1e-5 < off <= table["declared_error"]["E_GPa"] <= 1e-2 * exact["E_GPa"]
     assert table["method"] == "table"
     assert set(table["checks"]) == set(exact["checks"])
+
+
+def test_two_models_of_spheres_keep_the_tolerance_that_is_asked_for(capfd):
+    case = str(Path(PAPER).with_name("paper-3d.toml"))
+    arguments = ["--cross-check", "table,series", "--radius", "0.6", "--tolerance", "1e-2"]
+    found = answer(capfd, "cell", case, *arguments)
+    assert found["method"] == "table"
+    assert 1e-5 < found["difference"] <= 1e-2
+    assert found["declared_error"]["E_GPa"] > 1e-4 * found["E_GPa"]  # no needless digits
+
+
+def test_auto_takes_elements_where_there_is_no_series(capfd):
+    case = str(Path(PAPER).with_name("paper-3d.toml"))
+    one = ["--radius", "0.6", "--tolerance", "1e-2"]
+    found = answer(capfd, "cell", case, "--method", "auto", "--exclude", "series", *one)
+    exact = answer(capfd, "cell", case, "--method", "auto", *one)
+    assert (found["method"], exact["method"]) == ("table", "series")
+    assert abs(found["E_GPa"] - exact["E_GPa"]) <= found["declared_error"]["E_GPa"]
 
 
 def test_two_models_of_spheres_are_compared(capfd):

@@ -1,5 +1,10 @@
 """Tables of spheres against the exact series."""
 
+import json
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -33,7 +38,7 @@ class SeriesSource:
     mesh_size, unknowns, systems = 0.0, 0, 0
     space = np.array([[0.5], *4 * [[1e-10]]])
 
-    def __init__(self, span, accuracy):
+    def __init__(self, span, accuracy, parallel):
         self.span = span
 
     def moduli(self, radius, modulus):
@@ -76,3 +81,28 @@ def test_an_accuracy_out_of_reach_is_refused(monkeypatch):
     monkeypatch.setattr("alphacut.rve.spheres.table.model._FINEST", 0.5)
     with pytest.raises(TableError, match="on the finest mesh"):
         SphereTableModel(1e-4).solve(HermiteMap(0.5, 0.0, 0.5, 0.0), MATRIX, [Phase(80e9)])
+
+
+def test_ranks_that_share_a_mesh_build_the_table_by_themselves(tmp_path, monkeypatch):
+    """A file that one of them finds and another does not would leave them waiting."""
+    radii, found = HermiteMap(0.5, 0.0, 0.5, 0.0), []
+    for parallel in (False, True):
+        monkeypatch.setattr("alphacut.rve.table.cache._in_process", {})
+        model = SphereTableModel(1e-2, tmp_path / str(parallel), parallel=parallel)
+        found.append(model.solve(radii, MATRIX, [Phase(80e9)])[0])
+    np.testing.assert_allclose(found[1].moduli, found[0].moduli, rtol=1e-10)
+    assert list((tmp_path / "False").iterdir())
+    assert not (tmp_path / "True").exists()
+
+
+@pytest.mark.slow
+def test_two_ranks_give_what_one_gives():
+    case = Path(__file__).parents[4] / "cases" / "paper-3d.toml"
+    command = [sys.executable, "-m", "rve", "solve", str(case), "--method", "table", "--json", "-"]
+    command += ["--radius", "0.6", "--tolerance", "1e-2"]
+    one, two = (
+        json.loads(subprocess.run([*start, *command], capture_output=True, check=True).stdout)
+        for start in ((), ("mpirun", "-n", "2"))
+    )
+    for name in ("E_GPa", "K_GPa", "G_GPa"):
+        np.testing.assert_allclose(two[name], one[name], rtol=1e-10)
