@@ -35,12 +35,15 @@ class FuzzyPeaks:
         upper: What it is at most at the nodes, shape (A, m).
         error: What the peak may lie outside these by: between nodes and, where the envelope is not
             guaranteed, by its own error; shape (A, m). None where the envelope has no estimate.
+        below: The part of it that the lower ends may lie too high by: a peak over time is no less
+            than one at the nodes, so steps between them have none; shape (A, m), or None.
     """
 
     alpha: Array
     lower: Array
     upper: Array
     error: Array | None = None
+    below: Array | None = None
 
 
 def peaks(envelope: Envelope) -> FuzzyPeaks:
@@ -55,11 +58,9 @@ def peaks(envelope: Envelope) -> FuzzyPeaks:
     if envelope.between is None:
         return FuzzyPeaks(envelope.alpha, lower, upper)
     own = 0.0 if envelope.inner_lower is not None or envelope.error is None else envelope.error
-    error = np.maximum(
-        within_steps(size + own, envelope.between).max(1) - upper,
-        lower - np.maximum(least - own, 0.0).max(1),
-    )
-    return FuzzyPeaks(envelope.alpha, lower, upper, error)
+    above = within_steps(size + own, envelope.between).max(1) - upper
+    below = lower - np.maximum(least - own, 0.0).max(1)
+    return FuzzyPeaks(envelope.alpha, lower, upper, np.maximum(above, below), below)
 
 
 def within_steps(size: Array, between: Array) -> Array:

@@ -107,8 +107,11 @@ def _dataset(
     nowhere = np.full(len(names), np.nan)
     witness = [nowhere if x.scale.witness is None else x.scale.witness for x in found.values()]
     of = peaks["peak"].sel(output=list(limits)).transpose("alpha", "bound", "output").values
-    beyond = peaks["peak_error"].sel(output=list(limits)).values if "peak_error" in peaks else 0.0
-    ends = np.stack([of[:, 1] + beyond, np.maximum(of[:, 0] - beyond, 0.0)], axis=1)
+    above, below = (
+        peaks[name].sel(output=list(limits)).values if name in peaks else 0.0
+        for name in ("peak_error", "peak_below")
+    )
+    ends = np.stack([of[:, 1] + above, np.maximum(of[:, 0] - below, 0.0)], axis=1)
     margin = np.array([*limits.values()]) - ends
     words = {"units": "SI, by output", "long_name": "limit less the peak of the magnitude"}
     return xarray.Dataset(

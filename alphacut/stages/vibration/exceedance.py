@@ -72,17 +72,18 @@ def with_peaks(found: Envelope, wanted: Structure, task: EnvelopeTask) -> xarray
             " bound and this"
         ),
     }
-    if of.error is not None:
-        beyond = {
-            "units": "SI, by output",
-            "long_name": "what a peak may lie outside its bounds by",
-        }
-        dataset = dataset.assign(peak_error=(("alpha", "output"), of.error, beyond))
-    error = reached(found, wanted, task)
+    for name, error, side in (("error", of.error, "outside"), ("below", of.below, "below")):
+        if error is not None:
+            beyond = {
+                "units": "SI, by output",
+                "long_name": f"what a peak may lie {side} its bounds by",
+            }
+            dataset = dataset.assign({f"peak_{name}": (("alpha", "output"), error, beyond)})
+    worst = reached(found, wanted, task)
     return (
         dataset.assign(peak_tried=(("alpha", "output"), tried, least))
         .assign_coords(bound=["lower", "upper"])
-        .assign_attrs({} if error is None else {"reached": error})
+        .assign_attrs({} if worst is None else {"reached": worst})
     )
 
 

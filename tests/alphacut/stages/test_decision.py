@@ -74,6 +74,17 @@ def test_a_safe_limit_and_a_sure_failure(
     assert "possible to 1 … 1, necessary to 1 … 1: unsafe" in capsys.readouterr().out
 
 
+def test_motion_between_nodes_takes_from_one_end_of_a_margin_alone(tmp_path: Path) -> None:
+    out, limit = tmp_path / "out", peak(1000)
+    asked = ["--out", str(out), "--no-figures", "--quiet", "--set", "envelope.step=50 ms"]
+    assert main(["run", str(written(tmp_path, [f"q1 <= {limit} m"])), *asked]) == 0
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    ends, margin = summary["envelopes"]["all"]["peak"]["q1"], summary["decision"]["margins"]["q1"]
+    assert ends["error"][0] > 0.005 * limit
+    assert margin["upper"][0] == pytest.approx(limit - ends["lower"][0], abs=1e-12)
+    assert margin["lower"][0] == pytest.approx(limit - ends["upper"][0] - ends["error"][0])
+
+
 @pytest.mark.parametrize(
     ("limits", "pattern"),
     [
