@@ -22,10 +22,21 @@ from alphacut.stochastic.fit.hermite_fit import HermiteFit, SlopeBand, slope_ban
 from alphacut.stochastic.fit.pbox import PBox, least_pbox
 from alphacut.stochastic.sections import Measured, Section, Simulated, reduced_radii
 from alphacut.stochastic.spheres.packing import SpherePackings
-from alphacut.stochastic.tessellation.delaunay import Neighbours, cell_correlation, neighbours
+from alphacut.stochastic.tessellation.delaunay import (
+    Neighbours,
+    cell_correlation,
+    hexagonal_order,
+    neighbours,
+)
 from alphacut.stochastic.theta.quadrature import gauss_rule
 from alphacut.stochastic.theta.truncated_normal import TruncatedNormal
 
+TIGHTEST = 0.99
+"""r_n of the tightest square cell: a disc touches its sides at 1. Cells tighter than this, as
+between particles that touch, count as cells of this one where no limits are given."""
+
+MOST_CAPPED = 0.15  # share of the area that may lie in cells tighter than that
+ORDERED = 0.1  # |⟨e^{6iφ}⟩| above which particles are said to lie in rows
 WIDEST = 0.95  # band, in probability, to which one is widened for several samples
 
 
@@ -35,7 +46,7 @@ class Study:
 
     Args:
         source: Where the discs or spheres come from.
-        limits: Lower and upper limit of r_n; None for those that keep `share`.
+        limits: Lower and upper limit of r_n; None for those that keep `share`, up to `TIGHTEST`.
         share: Share of area to keep, with equal shares cut off at both ends; used without `limits`.
             Of spheres the upper limit goes no further than their `Shape.reach`.
         seed: Seed of everything that is left to chance.
@@ -44,7 +55,8 @@ class Study:
         band: Half width, in probability, by which the distribution may leave the p-box; None for
             that bootstrap band.
         sampling: Whether the supports of a2 and a4 shall also hold the slopes' own bootstrap band,
-            so that fewer data make a fuzzier map.
+            so that fewer data make a fuzzier map; of that band the part whose maps are monotone.
+            None: of measured particles, not of simulated ones, whose number is a matter of choice.
         distribution: Law of θ.
 
     Raises:
@@ -58,7 +70,7 @@ class Study:
     confidence: float = 0.99
     bootstrap: int = 500
     band: float | None = None
-    sampling: bool = False
+    sampling: bool | None = None
     distribution: TruncatedNormal = field(default_factory=TruncatedNormal)
 
     def __post_init__(self) -> None:
@@ -81,25 +93,39 @@ class Study:
             raise ValueError(f"the seed is {self.seed}; it must be a whole number, 0 or greater")
 
     @property
+    def holds_slopes(self) -> bool:
+        """True if the supports of a2 and a4 hold the slopes' own band."""
+        return isinstance(self.source, Measured) if self.sampling is None else self.sampling
+
+    @property
     def shape(self) -> Shape:
         """The kind of the particles."""
         return SPHERES if isinstance(self.source, SpherePackings) else DISCS
 
     def limits_of(self, sample: AreaWeighted) -> tuple[float, float]:
-        """Limits of r_n of a sample.
-
-        Raises:
-            RefusedError: The share to keep reaches up to 1.
-        """
+        """Limits of r_n of a sample."""
         lower, upper = self.limits or sample.limits(self.share)
         if self.limits is None and self.shape.reach is not None:
             upper = min(upper, self.shape.reach)
-        if not upper < 1:
-            raise RefusedError(
-                f"a share of {self.share:g} of the area reaches up to r_n = {upper:.4g}; the square"
-                " cell takes less than 1"
-            )
         return lower, upper
+
+    def used(self, sample: AreaWeighted) -> AreaWeighted:
+        """The sample with cells of discs no tighter than `TIGHTEST`, unless limits are given.
+
+        Raises:
+            RefusedError: More than `MOST_CAPPED` of the area lies in cells tighter than that.
+        """
+        if self.limits or self.shape is SPHERES:
+            return sample
+        share = 1 - float(sample.cdf(TIGHTEST))
+        if share > MOST_CAPPED:
+            raise RefusedError(
+                f"{share:.1%} of the area lies in cells tighter than r_n = {TIGHTEST:g}, and a disc"
+                f" fills its square cell at 1; at area fraction {sample.area_fraction:.4f} no"
+                " square cell stands for these particles: take an image of them as the cell"
+                " ([cell] image), or give limits"
+            )
+        return sample.capped(TIGHTEST)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +189,27 @@ class Microstructure(FittedMap):
     direct: list[Neighbours]
     seconds: dict[str, float]
 
+    @property
+    def share_kept(self) -> float:
+        """Share of area within the limits, cells of `share_capped` among it."""
+        return self.study.used(self.sample).share_within(*self.limits)
+
+    @property
+    def hexagonal_order(self) -> float:
+        """Root mean square over the sections of |⟨e^{6iφ}⟩| of the bonds between neighbours."""
+        return float(np.sqrt(np.mean([hexagonal_order(near) ** 2 for near in self.direct])))
+
+    @property
+    def is_crystalline(self) -> bool:
+        """True if that order is above `ORDERED` and what chance gives to so few bonds."""
+        bonds = float(np.mean([len(near.first) / 2 for near in self.direct]))
+        return bool(self.hexagonal_order > max(ORDERED, 3 / np.sqrt(max(bonds, 1.0))))
+
+    @property
+    def share_capped(self) -> float:
+        """Share of area in cells tighter than `TIGHTEST`, taken as that tight; 0 with limits."""
+        return 0.0 if self.study.limits else 1 - float(self.sample.cdf(TIGHTEST))
+
 
 def study(
     case: Study,
@@ -179,7 +226,8 @@ def study(
 
     Raises:
         ValueError: Measured data make no sense, or the source is one of spheres.
-        RefusedError: A packing fails its test, or no p-box contains the sample.
+        RefusedError: A packing fails its test, more than `MOST_CAPPED` of the area lies in cells
+            too tight, or no p-box contains the sample.
     """
     if isinstance(case.source, SpherePackings):
         raise ValueError("this source packs spheres; sphere_study takes it")
@@ -218,9 +266,10 @@ def fitted_map(case: Study, sample: AreaWeighted, others: Sequence[AreaWeighted]
         RefusedError: No p-box contains the samples.
     """
     streams = np.random.SeedSequence(case.seed, spawn_key=(1,)).spawn(2)
-    every = [case.limits_of(one) for one in (sample, *others)]
+    used = case.used(sample)
+    every = [case.limits_of(one) for one in (used, *others)]
     lower, upper = min(low for low, _ in every), max(high for _, high in every)
-    kept, fit = sample.truncated(lower, upper), HermiteFit(lower, upper, case.distribution)
+    kept, fit = used.truncated(lower, upper), HermiteFit(lower, upper, case.distribution)
     band = kept.band(case.confidence, case.bootstrap, np.random.default_rng(streams[0]))
     slopes = slope_band(
         fit,
@@ -234,7 +283,7 @@ def fitted_map(case: Study, sample: AreaWeighted, others: Sequence[AreaWeighted]
     while True:
         try:
             pbox = least_pbox(
-                fit, kept, allowed, hold=slopes if case.sampling else None, others=more
+                fit, kept, allowed, hold=slopes if case.holds_slopes else None, others=more
             )
             break
         except RefusedError:

@@ -49,6 +49,9 @@ def summary(found: Microstructure | SphereMicrostructure) -> dict[str, object]:
         **_of_map(found),
         "mean_area_fraction_of_map": found.fraction_of_map,
         "neighbours": _neighbours(found),
+        "share_capped": found.share_capped,
+        "hexagonal_order": found.hexagonal_order,
+        "crystalline": found.is_crystalline,
         "correlation": mean_correlation(found.sections),
         "seconds": found.seconds,
     }

@@ -56,10 +56,12 @@ def ready(case: Case) -> Readiness:
         BadInput: It cannot: a stage lacks what it needs, a file is broken, an input named as fuzzy
             is crisp.
     """
+    dense: tuple[str, ...] = ()
     if "microstructure" in case.stages:
-        from alphacut.stages.material.microstructure import require_readable
+        from alphacut.stages.material.microstructure import dense_remark, require_readable
 
         require_readable(case)
+        dense = tuple(dense_remark(case))
     if "image" in case.stages:
         study_of(case)
     stand_in = modulus.stand_in(case) if "modulus" in case.stages or case.stand_ins else None
@@ -75,7 +77,7 @@ def ready(case: Case) -> Readiness:
                     'stages = ["modulus", "envelope"], with a structure',
                 )
             )
-        return Readiness((*shape(case), *unlikely_material(case)))
+        return Readiness((*shape(case), *dense, *unlikely_material(case)))
     if problems := list(lacking(case)):
         raise BadInput(problems)
     wanted = structure(case, stand_in or expected(case))
@@ -89,6 +91,7 @@ def ready(case: Case) -> Readiness:
     ground = None if wanted.linear is None else wanted.linear.ground
     remarks = (
         *shape(case),
+        *dense,
         *unlikely_material(case),
         *outlasted(case, ground),
         *unlikely(case, ground, period),

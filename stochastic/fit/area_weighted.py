@@ -154,6 +154,10 @@ class AreaWeighted:
             )
         return AreaWeighted.of(self.values[inside], self.weights[inside], self.groups[inside])
 
+    def capped(self, most: float) -> AreaWeighted:
+        """The same sample, its values above `most` taken as `most`."""
+        return AreaWeighted(np.minimum(self.values, most), self.weights, self.groups)
+
     def resampled(self, number: int, generator: np.random.Generator) -> Iterator[Array]:
         """Weights of `number` bootstrap samples of whole groups, each of shape (n,), sum 1."""
         count = int(self.groups.max()) + 1

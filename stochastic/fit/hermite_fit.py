@@ -24,6 +24,7 @@ SHAPES = np.array([[1.0, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]]
 XI = np.linspace(0, 1, 401)
 # least slope asked for at the points XI, in units of a3 − a1: keeps it positive between them
 MARGIN = 2e-5
+STEEPEST = 3.0  # times the chord's slope, up to which both slopes make a monotone cubic
 # their slopes, shape (4, 201)
 SLOPES = np.array([polynomial.polyval(XI, polynomial.polyder(h)) for h in SHAPES])
 
@@ -131,6 +132,30 @@ class HermiteFit:
         return np.asarray(self.a1 * SLOPES[0] + self.a3 * SLOPES[2] - MARGIN * (self.a3 - self.a1))
 
     @property
+    def monotone_square(self) -> tuple[float, float]:
+        """Ends between which a2 and a4, each by itself, may lie anywhere in a monotone cubic.
+
+        Fritsch and Carlson 1980: slopes up to three times that of the chord. A cubic whose a2 is
+        steeper takes a4 from a shorter interval only (`slopes_beside`).
+        """
+        rise = self.a3 - self.a1
+        return MARGIN * rise, (STEEPEST - 4 * MARGIN) * rise
+
+    def slopes_beside(self, steep: float) -> tuple[float, float]:
+        """Ends of the slope with which a steeper one makes a monotone cubic.
+
+        Their ellipse α² + αβ + β² − 6α − 6β + 9 = 0 in slopes over the chord's, solved for β.
+
+        Args:
+            steep: The other slope, from three to four times that of the chord.
+        """
+        rise = self.a3 - self.a1
+        steepest, room = steep / rise, MARGIN**0.5
+        middle = (6 - steepest) / 2
+        half = max(0.0, np.sqrt(max(0.0, 3 * steepest * (4 - steepest))) / 2 - room)
+        return (middle - half) * rise, (middle + half) * rise
+
+    @property
     def mean_shapes(self) -> tuple[float, float]:
         """Means ∫ h2 f_Θ dθ and ∫ |h4| f_Θ dθ."""
         weights, shape = self._shapes_at_nodes
@@ -184,6 +209,33 @@ class SlopeBand:
     def holds(self, a2: float, a4: float) -> bool:
         """True if both slopes lie in the band."""
         return self.a2[0] <= a2 <= self.a2[2] and self.a4[0] <= a4 <= self.a4[2]
+
+    def monotone(self, fit: HermiteFit) -> SlopeBand:
+        """The part of the band whose four corners are monotone maps.
+
+        The quantile function of a sample rises, so slopes beyond are those of no radius map. All
+        monotone maps of the band are kept, but for those in which one slope is steeper than three
+        times the chord's and the fitted one is not: such pairs fill no rectangle.
+
+        Args:
+            fit: Ends of the map and law of θ.
+        """
+        (_, first, _), (_, second, _) = self.a2, self.a4
+        low, high = fit.monotone_square
+        a2, a4 = _within(self.a2, low, high), _within(self.a4, low, high)
+        if first > high:
+            a4 = _within(a4, *fit.slopes_beside(first))
+        if second > high:
+            a2 = _within(a2, *fit.slopes_beside(second))
+        return SlopeBand(a2, a4, self.level)
+
+
+def _within(
+    ends: tuple[float, float, float], low: float, high: float
+) -> tuple[float, float, float]:
+    """Ends of a band moved between two values, or as near to them as the fitted value lies."""
+    lower, fitted, upper = ends
+    return min(max(lower, low), fitted), fitted, max(min(upper, high), fitted)
 
 
 def slope_band(

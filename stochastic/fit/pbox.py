@@ -84,14 +84,15 @@ def least_pbox(
         fit: Ends of the map and law of θ.
         sample: r_n within the ends.
         band: In probability, in [0, 1).
-        hold: Slopes that the supports must hold as well, such as their own bootstrap band.
+        hold: Slopes that the supports must hold as well, such as their own bootstrap band, as far
+            as its maps are monotone.
         others: Further samples within the ends, each to be contained as well.
 
     Raises:
         RefusedError: No p-box of monotone cubics with these ends contains the sample.
     """
     modal = fit.slopes(sample)
-    core = _core(modal, hold)
+    core = _core(modal, None if hold is None else hold.monotone(fit))
     wish = _Containment(fit, (sample, *others), band)
     chosen = np.unique(np.linspace(0, len(wish) - 1, min(len(wish), 400)).astype(int))
     for _ in range(50):
@@ -107,10 +108,7 @@ def _core(modal: tuple[float, float], hold: SlopeBand | None) -> list[tuple[floa
     """Ranges of the four ends (a2L, a2U, a4L, a4U) around the modal slopes, in the supports."""
     low, high = list(modal), list(modal)
     if hold is not None:
-        low = [
-            max(0.0, min(value, ends[0]))
-            for value, ends in zip(modal, (hold.a2, hold.a4), strict=True)
-        ]
+        low = [min(value, ends[0]) for value, ends in zip(modal, (hold.a2, hold.a4), strict=True)]
         high = [max(value, ends[2]) for value, ends in zip(modal, (hold.a2, hold.a4), strict=True)]
     return [(0, low[0]), (high[0], None), (0, low[1]), (high[1], None)]
 
@@ -211,9 +209,8 @@ def _least_breach(
         bounds=[*core, (0, None)],
     )
     if result.status != 0:
-        cure = "use more particles, or leave that uncertainty out (sampling = false)"
         raise RefusedError(
-            "the slopes' own bootstrap band, which the supports must hold, reaches maps that are"
-            f" not monotone: {cure}"
+            "the slopes that the supports must hold make maps that are not monotone; take those of"
+            " a fit with these ends"
         )
     return int(np.argmax(matrix @ result.x[:4] - right)), float(result.x[4])

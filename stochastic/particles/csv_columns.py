@@ -13,6 +13,8 @@ import numpy as np
 
 from alphacut.stochastic.theta.truncated_normal import Array
 
+DIAMETERS = ("d", "size")  # columns of diameters, which may stand in for radii
+
 
 @dataclass(frozen=True, eq=False)
 class LengthColumns:
@@ -41,7 +43,7 @@ def length_columns(path: Path, columns: Sequence[str], unit: str = "") -> Length
     Args:
         path: The file; separated by commas, semicolons or tabs; empty lines and those behind # are
             passed over.
-        columns: Names of the columns; a column "d" (diameter) may stand in for "r".
+        columns: Names of the columns; one of `DIAMETERS` may stand in for "r".
         unit: Unit of columns whose header names none; empty if each does.
 
     Raises:
@@ -69,6 +71,40 @@ def length_columns(path: Path, columns: Sequence[str], unit: str = "") -> Length
         first,
         _metres(first, columns[0], path),
     )
+
+
+def share_column(path: Path, name: str) -> Array | None:
+    """Shares in the column `name`, in [0, 1], shape (n,); None without such a column.
+
+    Its header names % or 1 as the unit; without one the numbers are taken as % if one is above 1.
+    Fields without a number give NaN.
+
+    Args:
+        path: The file, as `length_columns` takes it.
+        name: Name of the column.
+
+    Raises:
+        ValueError: The file cannot be read, the column has another unit, or a share lies outside.
+    """
+    header, rows = _fields(path, (name,))
+    cells = [re.fullmatch(HEADER, cell) for cell in header]
+    places = [k for k, cell in enumerate(cells) if cell and cell[1].lower() == name]
+    if not places:
+        return None
+    place, unit = places[0], cells[places[0]][2]  # type: ignore[index]
+    if unit not in (None, "%", "1", "-"):
+        raise ValueError(f"{path}: column {name!r} has the unit {unit!r}; it takes % or 1")
+    values = np.array([_number(f[place] if place < len(f) else "", path, n) for n, f in rows])
+    percent = unit == "%" or (unit is None and bool((values > 1).any()))
+    shares = values / 100 if percent else values
+    if ((shares < 0) | (shares > 1)).any():
+        row = rows[int(np.argmax((shares < 0) | (shares > 1)))][0]
+        raise ValueError(f"{path}: row {row} has a share outside 0 to {'100 %' if percent else 1}")
+    return np.asarray(shares)
+
+
+HEADER = r"\s*(\w+)\s*(?:[\[(]\s*([^\])]+?)\s*[\])])?\s*"
+"""Name of a column, and its unit in brackets."""
 
 
 def _fields(path: Path, columns: Sequence[str]) -> tuple[list[str], list[tuple[int, list[str]]]]:
@@ -148,9 +184,9 @@ def _places(
         _metres(unit, "unit for all columns", path)
     named: dict[str, tuple[int, float, str]] = {}
     for place, cell in enumerate(header):
-        match = re.fullmatch(r"\s*(\w+)\s*(?:[\[(]\s*([^\])]+?)\s*[\])])?\s*", cell)
+        match = re.fullmatch(HEADER, cell)
         name = match[1].lower() if match else ""
-        radius = "r" if name == "d" else name
+        radius = "r" if name in DIAMETERS else name
         if match and radius in columns:
             if radius in named:
                 first = header[named[radius][0]].strip()
@@ -161,7 +197,7 @@ def _places(
             own = match[2] or unit
             named[radius] = (
                 place,
-                _metres(own, cell.strip(), path) * (0.5 if name == "d" else 1.0),
+                _metres(own, cell.strip(), path) * (0.5 if name in DIAMETERS else 1.0),
                 own,
             )
     missing = [name for name in columns if name not in named]

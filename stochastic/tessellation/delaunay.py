@@ -31,6 +31,15 @@ class Neighbours:
         return np.asarray(np.hypot(self.apart[:, 0], self.apart[:, 1]))
 
 
+def hexagonal_order(found: Neighbours) -> float:
+    """Order of the bonds between neighbours as in a triangular lattice, |⟨e^{6iφ}⟩|, 0 … 1.
+
+    1 in one crystal; about 1/√m of m bonds at random directions (Nelson and Halperin 1979).
+    """
+    angle = np.arctan2(found.apart[:, 1], found.apart[:, 0])
+    return float(abs(np.exp(6j * angle).mean())) if len(angle) else 0.0
+
+
 def neighbours(discs: Discs) -> Neighbours:
     """Delaunay neighbours, on a torus or of centres in a window that are sure of theirs.
 

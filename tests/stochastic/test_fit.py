@@ -9,7 +9,7 @@ from scipy import integrate
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 from alphacut.stochastic.errors import RefusedError
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
-from alphacut.stochastic.fit.hermite_fit import HermiteFit, slope_band
+from alphacut.stochastic.fit.hermite_fit import HermiteFit, SlopeBand, slope_band
 from alphacut.stochastic.fit.pbox import PBox, least_pbox
 
 LAW = TruncatedNormal()
@@ -100,6 +100,47 @@ def test_band_misses_a_wrong_map():
         generator=np.random.default_rng(0),
     )
     assert not band.holds(0.3, 0.5)
+
+
+@pytest.mark.parametrize("slopes", [(0.01, 0.5), (2.15, 0.3), (0.3, 2.1)])
+def test_supports_hold_the_true_slopes_and_only_monotone_maps(slopes):
+    """Near the edge of what is monotone, where a band around the fitted slopes leaves it."""
+    true, held, cut = HermiteMap(0.13, slopes[0], 0.87, slopes[1]), 0, 0
+    for seed in range(40):
+        sample = drawn(true, 150, seed)
+        generator = np.random.default_rng(seed)
+        band = slope_band(FIT, sample, level=0.95, resamples=60, generator=generator)
+        box = least_pbox(FIT, sample, sample.band(0.95, 60, generator), hold=band)
+        assert all(FIT.map((a2, a4)).is_monotone for a2 in box.a2 for a4 in box.a4), seed
+        held += all(
+            low - 1e-9 <= slope <= high + 1e-9
+            for slope, (low, _, high) in zip(slopes, (box.a2, box.a4), strict=True)
+        )
+        cut += band.monotone(FIT) != band
+    assert held >= 0.95 * 40 - 3 * np.sqrt(40 * 0.95 * 0.05)
+    assert cut > 15
+
+
+@pytest.mark.parametrize("steep", [3.2, 3.6, 3.99])
+def test_a_slope_steeper_than_three_chords_goes_with_few_others(steep):
+    chord = FIT.a3 - FIT.a1
+    low, high = (slope / chord for slope in FIT.slopes_beside(steep * chord))
+    for turned in (False, True):
+        for other, monotone in ((low, True), (high, True), (low - 0.01, False)):
+            pair = (other * chord, steep * chord) if turned else (steep * chord, other * chord)
+            assert FIT.map(pair).is_monotone is monotone
+        middle = (low + high) / 2 * chord
+        ends = (0.0, steep * chord, 9.0), (-1.0, middle, 9.0)
+        first, second = ends[::-1] if turned else ends
+        kept = SlopeBand(first, second, 0.99).monotone(FIT)
+        assert kept.holds(*((middle, steep * chord) if turned else (steep * chord, middle)))
+        assert all(FIT.map((a2, a4)).is_monotone for a2 in kept.a2 for a4 in kept.a4)
+
+
+def test_slopes_of_no_monotone_map_cannot_be_held():
+    band = SlopeBand((9.0, 9.5, 9.9), (9.0, 9.5, 9.9), 0.99)
+    with pytest.raises(RefusedError, match="make maps that are not monotone"):
+        least_pbox(FIT, drawn(TRUE, 100, 1), 0.1, hold=band)
 
 
 def test_band_narrows_with_the_root_of_the_sample():

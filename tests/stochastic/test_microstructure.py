@@ -9,10 +9,11 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
+from alphacut.stages.material.microstructure import left_out
 from alphacut.stochastic.errors import RefusedError
 from alphacut.stochastic.figures.all import draw
 from alphacut.stochastic.fit.pbox import PBox, least_pbox
-from alphacut.stochastic.microstructure import Study, study
+from alphacut.stochastic.microstructure import TIGHTEST, Study, study
 from alphacut.stochastic.microstructure_summary import fragment, summary
 from alphacut.stochastic.particles.circles_csv import CircleFile
 from alphacut.stochastic.particles.discs import Discs
@@ -367,6 +368,26 @@ def test_study_of_measured_circles(tmp_path):
             if periodic
             else 500 < len(measured.sample.values) < 900
         )
+
+
+def test_measured_circles_have_fuzzy_slopes_unless_told_otherwise(tmp_path):
+    packing = Packing(300, 0.55, LogNormalRadii(1e-3, 2e-3)).make(np.random.default_rng(5))
+    rows = "".join(
+        f"{x!r},{y!r},{r!r}\n"
+        for (x, y), r in zip(packing.centres.tolist(), packing.radii.tolist(), strict=True)
+    )
+    file = circle_file(tmp_path, "x [m],y [m],r [m]\n" + rows, size=tuple(packing.size))
+    own, crisp = (
+        study(Study(Measured(file), bootstrap=100, sampling=sampling)) for sampling in (None, False)
+    )
+    assert own.study.holds_slopes
+    assert not Study(SMALL).holds_slopes
+    assert own.pbox.area > crisp.pbox.area
+    assert own.limits[1] == TIGHTEST < own.sample.values[-1]
+    assert 0 < own.share_capped < 0.05
+    assert own.share_kept > 0.99
+    (said,) = (line for line in left_out(own) if "r_n" in line)
+    assert f"{own.share_capped:.2%} of the area lies in cells tighter than r_n = 0.99" in said
 
 
 def test_figures_are_drawn(found, tmp_path):

@@ -36,11 +36,13 @@ class Microstructure(Section):
         ),
     ] = None
     sampling: Annotated[
-        bool,
+        bool | None,
         Key(
-            "whether a2 and a4 also hold the slopes' own bootstrap band: fewer data, a fuzzier map"
+            "whether a2 and a4 also hold the slopes' own bootstrap band, as far as its maps are"
+            " monotone: fewer data, a fuzzier map; true for circles and image, false for packing if"
+            " left out"
         ),
-    ] = False
+    ] = None
     packing: Packing | None = None
     circles: Circles | None = None
     image: Photograph | None = None
@@ -75,7 +77,8 @@ class Packing(Section):
     file: Annotated[
         str | None,
         Key(
-            "CSV file of measured radii or diameters, a column r [mm] or d [mm], in place of both",
+            "CSV file of measured radii or diameters, a column r [mm] or d [mm], in place of both;"
+            " or a sieve curve, columns size [mm] and passing [%]",
             file=True,
         ),
     ] = None
@@ -165,7 +168,11 @@ class PackedSpheres(Section):
     ] = None
     file: Annotated[
         str | None,
-        Key("CSV file of measured radii or diameters, a column r [mm] or d [mm]", file=True),
+        Key(
+            "CSV file of measured radii or diameters, a column r [mm] or d [mm]; or a sieve curve,"
+            " columns size [mm] and passing [%]",
+            file=True,
+        ),
     ] = None
     circles: Annotated[
         str | None,

@@ -31,6 +31,10 @@ if TYPE_CHECKING:
     from alphacut.stochastic.spheres.wicksell import RadiiPBox
 
 
+CRYSTALLISE = 0.8
+"""Area fraction from which packings of equal discs were measured to be crystals in part."""
+
+
 def source(case: Case) -> Simulated | Measured | SpherePackings:
     """Source of the discs or spheres."""
     from alphacut.stochastic.particles.circles_csv import CircleFile
@@ -120,8 +124,9 @@ def unfolded_radii(case: Case, given: PackedSpheres) -> tuple[RadiusLaw, RadiiPB
 
 
 def radii_of(case: Case, of: str, packing: PackingSection | PackedSpheres) -> RadiusLaw:
-    """The law of the radii of a packing: log-normal between two ends, or that of a list."""
-    from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
+    """The law of the radii of a packing: log-normal, or that of a list or a sieve curve."""
+    from alphacut.stochastic.particles.radius_laws import LogNormalRadii
+    from alphacut.stochastic.particles.sieve import read_radii
 
     if packing.file is None:
         smallest, largest = packing.smallest_radius, packing.largest_radius
@@ -129,7 +134,7 @@ def radii_of(case: Case, of: str, packing: PackingSection | PackedSpheres) -> Ra
         assert largest is not None
         return LogNormalRadii(smallest, largest)
     try:
-        return MeasuredRadii.read(case.beside(packing.file))
+        return read_radii(case.beside(packing.file), 2 if of == "packing" else 3)
     except ValueError as error:
         raise case.refuse(f"microstructure.{of}.file", str(error)) from None
 
@@ -241,7 +246,8 @@ def compute(
 
 
 def left_out(found: Microstructure | SphereMicrostructure) -> Iterator[str]:
-    """Lines on what is not known of spheres, on measured particles not taken, on the image."""
+    """Lines on what is not known of spheres, on what was not taken as measured, on the image."""
+    from alphacut.stochastic.microstructure import TIGHTEST
     from alphacut.stochastic.spheres.microstructure import SphereMicrostructure
 
     if isinstance(found, SphereMicrostructure):
@@ -255,9 +261,39 @@ def left_out(found: Microstructure | SphereMicrostructure) -> Iterator[str]:
         )
         taken = sum(len(section.discs) for section in found.sections)
         yield f"warning: {len(reasons)} of {taken + len(reasons)} particles were left out: {told}"
+    if found.share_capped > 0:
+        yield (
+            f"{found.share_capped:.2%} of the area lies in cells tighter than r_n = {TIGHTEST:g},"
+            " as between particles that touch, and is taken as that tight; no square cell is"
+            " tighter"
+        )
+    if found.is_crystalline:
+        yield f"warning: {crystalline(found.hexagonal_order)}"
     if (fraction := found.sections[0].phase_fraction) is not None:
         cells = found.sample.area_fraction
         yield f"area fraction: {fraction:.4f} in the image, {cells:.4f} in the circles' whole cells"
+
+
+def crystalline(order: float) -> str:
+    """What a bond order means."""
+    return (
+        f"the particles lie in rows as in a crystal: |⟨e^{{6iφ}}⟩| of the bonds between neighbours"
+        f" is {order:.3f}, 1 in a triangular lattice and near 0 at random; take a smaller area"
+        " fraction or unequal particles if the material has no such order"
+    )
+
+
+def dense_remark(case: Case) -> Iterator[str]:
+    """A remark where equal discs are to be packed so densely that they crystallise."""
+    packing = case.microstructure.packing
+    if packing is None or packing.area_fraction < CRYSTALLISE:
+        return
+    law = radii_of(case, "packing", packing)
+    if law.smallest == law.largest:
+        yield (
+            f"microstructure.packing: equal discs on {packing.area_fraction:g} of the area"
+            " crystallise in part; the run measures how far (hexagonal_order) and says so"
+        )
 
 
 def without_numbers(reason: str) -> str:
