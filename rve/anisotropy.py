@@ -52,13 +52,18 @@ def shear_ratio(stiffness: Array) -> float:
     return float((stiffness[0, 0] - stiffness[0, 1]) / (2 * stiffness[-1, -1]))
 
 
-def shear_ratio_in_words(ratio: float, *, spheres: bool = False) -> str:
-    """One line on what the shear ratio means for E of eq. 16, or of Hill's average of spheres."""
+def shear_ratio_in_words(ratio: float, meaning: str = "cylinders") -> str:
+    """One line on what the shear ratio means for E.
+
+    Args:
+        ratio: See `shear_ratio`.
+        meaning: What E is of: "cylinders", eq. 16; "isotropic" or "spheres", an isotropic average.
+    """
     told = (
         f"shear modulus along the diagonals over that along the axes: {ratio:.3f} (1 in an"
-        f" isotropic {'material' if spheres else 'plane'})"
+        f" isotropic {'material' if meaning == 'spheres' else 'plane'})"
     )
-    if spheres or abs(ratio - 1) <= ISOTROPIC_ENOUGH:
+    if meaning != "cylinders" or abs(ratio - 1) <= ISOTROPIC_ENOUGH:
         return told
     side = "below" if ratio > 1 else "above"
     return (

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from html import escape
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -89,9 +89,10 @@ class Homogenised:
     reason: str = ""
     checks: Mapping[str, float] = field(default_factory=dict)
     cell: Cell | None = None
+    convention: ClassVar[str] = "eq. 16"
 
     def __repr__(self) -> str:
-        """E and ν of eq. 16 with the declared error, the model and its cost."""
+        """E and ν with the declared error, the model and its cost."""
         cost = self.seconds.get("total", 0.0)
         return (
             f"Homogenised(E = {self.modulus:.7g} Pa, ν = {self.poisson:.5g}, relative error of E"
@@ -101,8 +102,8 @@ class Homogenised:
     def _repr_html_(self) -> str:
         """The same as a table, for notebooks."""
         rows = {
-            "E of eq. 16": f"{self.modulus:.7g} Pa",
-            "ν of eq. 16": f"{self.poisson:.5g}",
+            f"E of {self.convention}": f"{self.modulus:.7g} Pa",
+            f"ν of {self.convention}": f"{self.poisson:.5g}",
             "declared relative error of E": f"{self.estimated_error:.2g}",
             "model": self.method,
             "why": self.reason,
@@ -191,9 +192,13 @@ class Homogenised:
         """
         if not self.errors:
             return float("nan")
-        means, errors = np.array(self.curve.mean), self.modulus_errors
-        nu = spread(lambda s: effective_modulus(*s)[1], means, errors[[0, 2]])
-        return float(np.nanmax([*errors, self.estimated_error, nu]))
+        return float(np.nanmax([*self.modulus_errors, self.estimated_error, self.poisson_error]))
+
+    @property
+    def poisson_error(self) -> float:
+        """Declared absolute error of ν; nan where none was made."""
+        means, errors = np.array(self.curve.mean), self.modulus_errors[[0, 2]]
+        return float(spread(lambda s: effective_modulus(*s)[1], means, errors))
 
     def _error_of_modulus(self, errors: Array) -> float:
         """Relative error of E from those of the moduli."""
@@ -238,14 +243,8 @@ def error_of_means(result: Homogenised) -> Array:
 
     They are nan where none were made.
     """
-    means = np.array(result.curve.mean)
-
-    def printed(stresses: Array) -> Array:
-        return np.array([*effective_modulus(*stresses), *stresses])
-
-    found = spread(printed, means, result.modulus_errors[[0, 2]])
-    found[0] = result.estimated_error * result.modulus
-    return found
+    stresses = spread(np.asarray, np.array(result.curve.mean), result.modulus_errors[[0, 2]])
+    return np.array([result.estimated_error * result.modulus, result.poisson_error, *stresses])
 
 
 def error_of_stiffness(result: Homogenised, function: Callable[[Array], Array | float]) -> Array:

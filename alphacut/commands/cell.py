@@ -40,7 +40,7 @@ ABOUT = "homogenise the cell at crisp values; a fuzzy input takes its modal valu
 
 
 KEYS = {**SAMPLE, **MESH, **MODEL}
-READ = ("radius", "cell", "mesh", "modulus.method", "modulus.tolerance")
+READ = ("radius", "cell", "mesh", "modulus.method", "modulus.tolerance", "modulus.average")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -134,7 +134,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         parallel=ranks() > 1,
         named=choice.named or full or ranks() > 1,
         estimate=True,
-        stiffness=full,
+        stiffness=full or choice.averages,
     )
     if pair:
         result, difference = compared(case, choice, pair)
@@ -151,7 +151,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     found |= beside(case, result.modulus, result.poisson, ratio and ratio[0])
     if answer(options, found, out, summary(result)):
         out.write(agreement(pair, difference, allowed_difference(case)))
-        out.write(remark(ratio, particles) + text_of(case, found))
+        out.write(remark(ratio, choice.meaning) + text_of(case, found))
     return 0
 
 
@@ -225,12 +225,12 @@ def agreement(pair: Sequence[str], difference: float | None, allowed: float) -> 
     return f"{' and '.join(pair)} differ by {difference:.1e} of E; {allowed:.1e} is allowed\n"
 
 
-def remark(ratio: tuple[float, float] | None, particles: str = "cylinders") -> str:
+def remark(ratio: tuple[float, float] | None, meaning: str = "cylinders") -> str:
     """The array's shear ratio as a line; where it matters to E of eq. 16, a warning besides."""
     if ratio is None:
         return ""
     value, error = ratio
-    if particles == "cylinders" and abs(value - 1) > ISOTROPIC_ENOUGH:
+    if meaning == "cylinders" and abs(value - 1) > ISOTROPIC_ENOUGH:
         say(
             f"warning: {shear_ratio_in_words(value)}; --export and --stiffness give the whole"
             " plane-strain stiffness"
@@ -257,8 +257,8 @@ def summary(result: Homogenised) -> str:
     iterations = ", ".join(map(str, result.iterations)) or "none"
     return (
         f"E = {result.modulus / cell.GPA:.6f}{off[0]} GPa, nu = {result.poisson:.6f}{off[1]}"
-        f" (eq. 16)\n{error}mean s11 = {s11:.9f}{off[2]} GPa under ε11 = ε22 = {STRAIN:g}, mean"
-        f" s12 = {s12:.9f}{off[3]} GPa under ε12 = {STRAIN:g}\n{result.method},"
-        f" {result.unknowns} unknowns, {result.solver}, iterations {iterations}\nseconds:"
-        f" {seconds}\n"
+        f" ({result.convention})\n{error}mean s11 = {s11:.9f}{off[2]} GPa under"
+        f" ε11 = ε22 = {STRAIN:g}, mean s12 = {s12:.9f}{off[3]} GPa under ε12 = {STRAIN:g}\n"
+        f"{result.method}, {result.unknowns} unknowns, {result.solver}, iterations {iterations}\n"
+        f"seconds: {seconds}\n"
     )

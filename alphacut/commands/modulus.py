@@ -153,10 +153,9 @@ def summary(found: modulus.FuzzyModulus) -> str:
         f"{found.result.runs} samples, {found.solves} linear systems, {found.result.seconds:.1f} s,"
         f" {found.choice.method}"
     )
-    particles = found.choice.particles
     return (
         "alpha  lower GPa   upper GPa   lower nu  upper nu  (E and nu of"
-        f" {modulus.AVERAGE[particles]})\n"
+        f" {modulus.AVERAGE[found.choice.meaning]})\n"
         f"{rows}{cost}\n"
-        f"{found.worth}\n{remark(found.shear_ratio, particles)}"
+        f"{found.worth}\n{remark(found.shear_ratio, found.choice.meaning)}"
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from alphacut.io.files import as_json, write_text
 from alphacut.io.problem import BadInput, Problem
 from alphacut.rve.anisotropy import shear_ratio, shear_ratio_in_words
 from alphacut.rve.fibre_constants import CONSTANTS, FibreConstants, fibre_constants
+from alphacut.rve.plane_average import AveragedPlane
 from alphacut.rve.result import error_of_means, error_of_ratio, error_of_stiffness
 from alphacut.rve.spheres.cubic import cubic_constants, cubic_voigt, hill_average
 from alphacut.rve.spheres.result import HomogenisedSpheres
@@ -32,6 +33,7 @@ class _Shape:
         name: End of the orthotropic material's name, upper case, and key of the stiffness.
         kind: Kind of stiffness.
         order: Voigt order.
+        meaning: What E is of: cylinders (eq. 16), isotropic or spheres.
     """
 
     convention: str
@@ -39,6 +41,7 @@ class _Shape:
     name: str
     kind: str
     order: tuple[str, ...]
+    meaning: str
 
 
 CYLINDERS = _Shape(
@@ -48,6 +51,12 @@ CYLINDERS = _Shape(
     "plane",
     "plane-strain stiffness",
     ("11", "22", "12"),
+    "cylinders",
+)
+AVERAGED = replace(
+    CYLINDERS,
+    convention="isotropic constants of the average of the plane stiffness over all directions",
+    meaning="isotropic",
 )
 SPHERES = _Shape(
     "isotropic constants by Hill's average; a cubic array of spheres is not isotropic",
@@ -55,6 +64,7 @@ SPHERES = _Shape(
     "cubic",
     "stiffness",
     ("11", "22", "33", "23", "13", "12"),
+    "spheres",
 )
 
 
@@ -142,7 +152,7 @@ def comments(result: Homogenised, mark: str) -> str:
     if result.stiffness is not None:
         error, ratio = errors_of_stiffness(result)
         of_array = shear_ratio(result.stiffness)
-        lines.append(shear_ratio_in_words(of_array, spheres=words is SPHERES))
+        lines.append(shear_ratio_in_words(of_array, words.meaning))
         lines.append(f"absolute error of this ratio: {ratio:.1e}")
         lines.append(
             f"{words.kind} in Pa, Voigt order {', '.join(words.order)} with engineering shear"
@@ -155,6 +165,8 @@ def comments(result: Homogenised, mark: str) -> str:
 
 def shape(result: Homogenised) -> _Shape:
     """Words for the result's particle."""
+    if isinstance(result, AveragedPlane):
+        return AVERAGED
     return SPHERES if isinstance(result, HomogenisedSpheres) else CYLINDERS
 
 

@@ -96,6 +96,6 @@ def fuzzy_modulus(dataset: xarray.Dataset, case: Case) -> Figure:
         x = np.array([*left, *right[::-1]]) / GPA
         axes.plot(x, [0, 1, 1, 0], color=BLUE, lw=1.2, ls="--", label="quoted in the case")
     axes.legend(loc="upper left")
-    particles = dataset.attrs.get("particles", "cylinders")
-    membership_axes(axes, f"effective Young's modulus E ({AVERAGE[particles]}), GPa")
+    meaning = dataset.attrs.get("average", dataset.attrs.get("particles", "cylinders"))
+    membership_axes(axes, f"effective Young's modulus E ({AVERAGE[meaning]}), GPa")
     return drawn

@@ -8,6 +8,7 @@ from alphacut.figures.captions import core, in_words
 from alphacut.io.files import Document
 from alphacut.report.tables import code, paragraphs, section, sentence, table
 from alphacut.stages.material import response
+from alphacut.stages.material.microstructure import crystalline
 from alphacut.stages.material.references import line
 
 
@@ -21,6 +22,8 @@ def microstructure(found: Document) -> Markup:
         f" {cells}.",
         *map(sentence, found.get("remarks", ())),
     )
+    if found.get("crystalline"):
+        words += paragraphs(f"Warning: {crystalline(found['hexagonal_order'])}.")
     rows = [("a1", f"{found['a1']:.5g}")]
     rows += [
         (name, "[" + ", ".join(f"{end:.5g}" for end in found[name]) + "]") for name in ("a2", "a4")
@@ -69,8 +72,14 @@ def of_map(found: Document) -> str:
 MEANING = {
     "cylinders": "E is the modulus of eq. 16, the paper's convention: a square array is not"
     " isotropic.",
+    "isotropic": "E is that of the isotropic average of the square array's plane stiffness.",
     "spheres": "E is Hill's isotropic average of spheres in a simple cubic array.",
 }
+
+
+def meaning(found: Document) -> str:
+    """What E is of: cylinders (eq. 16), isotropic or spheres; older results name the particles."""
+    return str(found.get("average", found.get("particles", "cylinders")))
 
 
 def modulus(found: Document, drawn: Markup) -> Markup:
@@ -93,7 +102,7 @@ def modulus(found: Document, drawn: Markup) -> Markup:
         "Core" if "[" in core(found) else "Modal value",
         core(found),
         *(found[name] for name in ("lower_GPa", "upper_GPa", "nu")),
-        MEANING[found.get("particles", "cylinders")],
+        MEANING[meaning(found)],
         *(found[name] for name in ("samples", "solves", "seconds")),
         sentence(found.get("reason", "")),
         isotropy(found),
@@ -192,11 +201,7 @@ def isotropy(found: Document) -> str:
     from alphacut.rve.anisotropy import shear_ratio_in_words
 
     return (
-        sentence(
-            shear_ratio_in_words(
-                float(found["shear_ratio"]), spheres=found.get("particles") == "spheres"
-            )
-        )
+        sentence(shear_ratio_in_words(float(found["shear_ratio"]), meaning(found)))
         if found.get("shear_ratio") is not None
         else ""
     )

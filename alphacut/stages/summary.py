@@ -127,6 +127,7 @@ def modulus_numbers(dataset: xarray.Dataset) -> Document:
     }
     cost |= {"reason": dataset.attrs.get("reason", "")}
     cost |= {"particles": dataset.attrs.get("particles", "cylinders")}
+    cost |= {"average": dataset.attrs.get("average", cost["particles"])}
     cost |= {name: dataset.attrs[name] for name in ("shear_ratio",) if name in dataset.attrs}
     budget = {"error": modulus.listed(dataset, "error"), "checks": modulus.listed(dataset, "check")}
     return {**cuts, **support, **cost, **budget}

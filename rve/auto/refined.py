@@ -21,6 +21,7 @@ class RefinedModel:
     Args:
         name: prism or slices.
         tolerance: Relative error of E allowed, in [1e-10, 0.1].
+        stiffness: Whether prisms are to make the whole plane stiffness; slices always do.
 
     Raises:
         ValueError: A value lies outside its range.
@@ -28,6 +29,7 @@ class RefinedModel:
 
     name: str
     tolerance: float
+    stiffness: bool = False
 
     def __post_init__(self) -> None:
         if self.name not in STEERED:
@@ -44,8 +46,12 @@ class RefinedModel:
         """
         from alphacut.rve.auto.refinement import refined_prism, refined_slices
 
-        refined = refined_prism if self.name == "prism" else refined_slices
-        results = refined(radius_map, matrix, inclusions, tolerance=self.tolerance)
+        asked = (radius_map, matrix, inclusions)
+        results = (
+            refined_prism(*asked, tolerance=self.tolerance, stiffness=self.stiffness)
+            if self.name == "prism"
+            else refined_slices(*asked, tolerance=self.tolerance)
+        )
         worst = max(result.estimated_error for result in results)
         if not worst <= self.tolerance:
             raise ChoiceError(

@@ -80,7 +80,12 @@ _FINER_MESH, _MORE_LAYERS = 2**0.5, 1.5
 
 
 def refined_prism(
-    radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase], *, tolerance: float
+    radius_map: RadiusMap,
+    matrix: Phase,
+    inclusions: Sequence[Phase],
+    *,
+    tolerance: float,
+    stiffness: bool = False,
 ) -> list[Homogenised]:
     """Results at the coarsest mesh and layers whose estimated error is below `tolerance`.
 
@@ -93,9 +98,8 @@ def refined_prism(
     size, layers = _COARSEST, 6
     while True:
         try:
-            results = PrismModel(mesh_size=size, layers=layers, estimate=True).solve(
-                radius_map, matrix, inclusions
-            )
+            model = PrismModel(size, layers, stiffness=stiffness, estimate=True)
+            results = model.solve(radius_map, matrix, inclusions)
         except FoldedMeshError:
             if layers >= _MOST_LAYERS:
                 raise

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -34,6 +35,8 @@ class HomogenisedSpheres(Homogenised):
     As `Homogenised`, but `curve.stiffness` has shape (n, 6, 6), and `errors` are those of K, (C11 −
     C12)/2 and C44.
     """
+
+    convention: ClassVar[str] = "Hill's isotropic average"
 
     @property
     def moduli(self) -> Array:

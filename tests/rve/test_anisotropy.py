@@ -1,9 +1,16 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from alphacut.export import material_card
 from alphacut.rve import Phase
 from alphacut.rve.anisotropy import directional_shear, directional_young, rotated, shear_ratio
+from alphacut.rve.cell import square_moduli
+from alphacut.rve.plane_average import averaged, plane_average
+from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
+from alphacut.stochastic import HermiteMap
 from benchmarks.rve import sweep as cell_sweep
 
 MATRIX = Phase(20e9)
@@ -48,6 +55,37 @@ def test_diagonal_shear_exceeds_axial_shear_as_the_method_says():
     """4 % at r = 0.5 and 19 % at 0.87 for the paper's phases."""
     cells = square_stiffness(np.array([0.5, 0.87]), MATRIX, [Phase(80e9)]).matrix[:, 0]
     assert [round(100 * (shear_ratio(cell) - 1)) for cell in cells] == [4, 19]
+
+
+def test_isotropic_average_lies_between_those_of_equal_strain_and_stress():
+    """Shear over all directions by quadrature: of strains from above, of stresses from below."""
+    angles = np.linspace(0, np.pi, 360, endpoint=False)
+    turned = rotated(CELL, angles)
+    equal_strain = turned[:, 2, 2].mean()
+    equal_stress = 1 / np.linalg.inv(turned)[:, 2, 2].mean()
+    whole = CELL[0, 0] + CELL[0, 1]
+    young, poisson = plane_average(square_moduli(CELL))
+    assert whole == pytest.approx(young / (1 + poisson) / (1 - 2 * poisson), rel=1e-12)
+    assert young / 2 / (1 + poisson) == pytest.approx((equal_strain + equal_stress) / 2, rel=1e-12)
+    assert plane_average(square_moduli(MATRIX.stiffness)) == pytest.approx((20e9, 0.3), rel=1e-12)
+
+
+def test_averaged_cell_has_its_own_e_errors_and_words():
+    radius, phase = HermiteMap(0.3, 0.1, 0.9, 0.2), Phase(80e9, 0.2)
+    result = SeriesModel(accuracy=1e-6).solve(radius, MATRIX, [phase])[0]
+    fine = averaged(SeriesModel().solve(radius, MATRIX, [phase])[0])
+    mean = averaged(result)
+    assert mean.modulus == plane_average(square_moduli(result.stiffness))[0] > 1.03 * result.modulus
+    assert mean.poisson < result.poisson
+    assert abs(mean.modulus / fine.modulus - 1) <= mean.estimated_error <= 1e-5
+    assert abs(mean.poisson - fine.poisson) <= mean.poisson_error <= 1e-5
+    assert sum(mean.error.values()) == pytest.approx(mean.estimated_error)
+    assert mean.convention in mean._repr_html_()
+    assert "average of the plane stiffness over all directions" in material_card.ansys(mean)
+    assert "eq. 16" not in material_card.ansys(mean) + mean._repr_html_()
+    bare = replace(result, curve=replace(result.curve, stiffness=None))
+    with pytest.raises(ValueError, match="method series made no whole plane stiffness"):
+        averaged(bare)
 
 
 def test_sweep_of_area_fractions_stays_within_hashin_shtrikman(tmp_path):

@@ -122,6 +122,13 @@ class Modulus(Section):
             allowed=Range("from 1e-10 to 0.1", 1e-10, 0.1, closed=True),
         ),
     ] = 0.0001
+    average: Annotated[
+        Literal["axes", "isotropic"],
+        Key(
+            "what E of cylinders is of: axes, the paper's eq. 16 with the shear along the axes of"
+            " the square array, or the isotropic average of the whole plane stiffness"
+        ),
+    ] = "axes"
     value: Annotated[
         FuzzyNumber | None, Key("a known modulus instead of a computed one", "Pa", allowed=POSITIVE)
     ] = None

@@ -81,6 +81,7 @@ class CellChoice:
         estimate: Whether a model that can is to estimate its error at an extra cost.
         stiffness: Whether a model that can leave it out is to make the whole planar stiffness.
         particles: cylinders or spheres.
+        average: What E of cylinders is of: "axes", eq. 16, or "isotropic", all directions.
     """
 
     method: str = "prism"
@@ -96,6 +97,17 @@ class CellChoice:
     estimate: bool = False
     stiffness: bool = False
     particles: str = "cylinders"
+    average: str = "axes"
+
+    @property
+    def meaning(self) -> str:
+        """What E and ν are of: cylinders (eq. 16), isotropic or spheres."""
+        return "isotropic" if self.averages else self.particles
+
+    @property
+    def averages(self) -> bool:
+        """True if E and ν are those of the isotropic average of a plane stiffness."""
+        return self.average == "isotropic" and self.particles == "cylinders"
 
     @property
     def words(self) -> str:
@@ -107,6 +119,7 @@ class CellChoice:
         refined = self.tolerance is not None and not self.named
         without = f", without {', '.join(self.exclude)}" if self.exclude else ""
         shape = ", spheres" if self.particles == "spheres" else ""
+        shape = ", isotropic average" if self.averages else shape
         return (
             f"each sample by method {self.method}{shape}{'' if refined else mesh}{asked}{without}"
         )
@@ -134,6 +147,8 @@ def cell_choice(
         exclude,
         petsc or {},
         particles=case.cell.particles,
+        average=case.modulus.average,
+        stiffness=case.modulus.average == "isotropic",
     )
 
 

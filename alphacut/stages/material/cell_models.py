@@ -3,21 +3,47 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 
 from alphacut.io.problem import BadInput, Problem, missing
 from alphacut.rve.auto.model import TABLED, AutoModel
 from alphacut.rve.auto.refined import RefinedModel
+from alphacut.rve.cell import Phase
 from alphacut.rve.image.round_particle import RasterModel
+from alphacut.rve.plane_average import AveragedPlane, averaged
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres.series.model import SphereSeriesModel
 from alphacut.rve.spheres.table.model import SphereTableModel
 from alphacut.rve.table.model import TableModel
 from alphacut.stages.material.cell import CellChoice, CellModel
+from alphacut.stochastic import RadiusMap
 
 SHARE = 0.4
 """Of the tolerance, for the series at each θ and again for its rule in θ."""
+
+
+@dataclass(frozen=True)
+class AveragedModel:
+    """A model whose results have E and ν of the isotropic average of the plane stiffness.
+
+    Args:
+        model: Makes the whole plane stiffness.
+    """
+
+    model: CellModel
+
+    def solve(
+        self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
+    ) -> list[AveragedPlane]:
+        """One result for each inclusion material.
+
+        Raises:
+            ValueError: The model makes no whole plane stiffness.
+        """
+        return [averaged(one) for one in self.model.solve(radius_map, matrix, inclusions)]
 
 
 def table_folder() -> Path | None:
@@ -46,6 +72,8 @@ def cell_model(choice: CellChoice) -> CellModel:
             [Problem(f"-rve_{name}", what, allowed="--method prism") for name in choice.petsc]
         )
     try:
+        if choice.averages:
+            return AveragedModel(cell_model(replace(choice, average="axes")))
         meshed = choice.method == "auto" and "series" in choice.exclude
         if choice.method in ("slices", "prism") or (meshed and choice.particles == "cylinders"):
             # DOLFINx is loaded before the clock starts: times are those of computing
@@ -96,7 +124,7 @@ def made(choice: CellChoice) -> CellModel:
     if choice.method == "image":
         return RasterModel()
     if tolerance is not None and not choice.named:
-        return RefinedModel(choice.method, tolerance)
+        return RefinedModel(choice.method, tolerance, choice.stiffness)
     return meshed(choice)
 
 

@@ -43,8 +43,12 @@ CURVES = {
     "s12": ("curve12", "stress 12 under ε12 = 0.01"),
 }
 """Variables with the stress over θ of each mean stress, and their words."""
-AVERAGE = {"cylinders": "eq. 16", "spheres": "Hill's isotropic average"}
-"""What E and ν mean, by the shape of the particle."""
+AVERAGE = {
+    "cylinders": "eq. 16",
+    "isotropic": "the isotropic average of the plane stiffness",
+    "spheres": "Hill's isotropic average",
+}
+"""What E and ν mean, see `CellChoice.meaning`."""
 
 
 @dataclass(frozen=True)
@@ -156,6 +160,7 @@ class FuzzyModulus:
             "plan": self.result.plan,
             "method": self.choice.method,
             "particles": self.choice.particles,
+            "average": self.choice.meaning,
             "reason": self.reason,
             "error": self.error,
             "shear_ratio": self.shear_ratio and self.shear_ratio[0],
@@ -171,7 +176,7 @@ class FuzzyModulus:
         result, checks = self.result, self.largest("check")
         variables: dict[str, Any] = {}
         for name, (unit, about) in BOUNDS.items():
-            average = f", {AVERAGE[self.choice.particles]}" if name in QUANTITIES else ""
+            average = f", {AVERAGE[self.choice.meaning]}" if name in QUANTITIES else ""
             variables |= self._cuts(name, unit, about + average)
         point = {"long_name": "inputs of each sample, in SI"}
         variables["point"] = (("sample", "parameter"), result.points, point)
@@ -224,6 +229,7 @@ class FuzzyModulus:
             "seconds": self.result.seconds,
             "nature": self.nature,
             "particles": self.choice.particles,
+            "average": self.choice.meaning,
         }
         if self.shear_ratio is not None:
             names = ("shear_ratio", "shear_ratio_error")

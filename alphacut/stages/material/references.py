@@ -10,6 +10,7 @@ from alphacut.case.case import Case
 from alphacut.io.files import Document, say
 from alphacut.rve import bounds as plane
 from alphacut.rve.cell import STRAIN, Phase
+from alphacut.rve.plane_average import plane_average
 from alphacut.rve.result import effective_modulus
 from alphacut.rve.spheres import bounds as space
 from alphacut.rve.spheres.cubic import hill_average
@@ -115,9 +116,8 @@ def _young(moduli: Array) -> float:
 def _average(modulus: float, poisson: float, ratio: float) -> float:
     """E of the isotropic average of an array whose shear modulus along its axes eq. 16 took."""
     axes = modulus / (2 * (1 + poisson))
-    bulk, diagonals = axes / (1 - 2 * poisson), ratio * axes
-    shear = ((axes + diagonals) / 2 + 2 / (1 / axes + 1 / diagonals)) / 2
-    return _across(np.array([bulk, shear]))
+    whole, diagonals = 2 * axes / (1 - 2 * poisson), ratio * axes
+    return float(plane_average(np.array([whole, 2 * diagonals, axes]))[0])
 
 
 def beside(case: Case, modulus: float, poisson: float, ratio: float | None) -> Document:
@@ -131,6 +131,7 @@ def beside(case: Case, modulus: float, poisson: float, ratio: float | None) -> D
     """
     radius, matrix, inclusion = parts(modal_values(case), case.radius.theta)
     particles, moduli = case.cell.particles, (modulus, poisson)
+    ratio = None if case.modulus.average == "isotropic" else ratio  # E is that average itself
     found = references(radius, (matrix, inclusion), moduli, ratio, particles).document()
     return {"beside": found, "outside": outside(case, found, modulus / GPA)}
 
