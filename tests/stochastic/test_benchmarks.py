@@ -2,6 +2,7 @@
 
 import importlib.util
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -36,6 +37,20 @@ def test_readings_of_the_papers_data(tmp_path, capsys):
     benchmark.main(["--discs", "200", "--packings", "5", "--out", str(tmp_path)])
     assert capsys.readouterr().out.count("within") >= 6
     assert (tmp_path / "paper_data.svg").stat().st_size > 1000
+
+
+def test_a_micrograph_is_judged_by_its_very_discs(monkeypatch):
+    benchmark = program("micrographs")
+    for name, value in (("COUNTS", (120, 120)), ("RADII", (9.0, 9.0))):
+        monkeypatch.setattr(benchmark, name, value)
+    row = benchmark.judged(4, 8, 1, 128)
+    assert row.right_fraction
+    assert row.holds
+    assert 0.4 < row.fraction < 0.5
+    assert row.true_low <= row.true_high < 1.02 * row.true_low
+    assert not replace(row, fraction_found=1.03 * row.fraction).right_fraction
+    assert not replace(row, chain_low=1.01 * row.true_high).holds
+    assert "MISSED" in benchmark.told(replace(row, chain_low=1.01 * row.true_high))
 
 
 @pytest.mark.slow
