@@ -22,11 +22,12 @@ from pathlib import Path
 import numpy as np
 
 from alphacut.case.load import load
-from alphacut.io.problem import BadInput
 from alphacut.rve.image.solve import solve_image
 from alphacut.stages.material import microstructure, modulus
 from alphacut.stages.material.campaign import campaign
 from alphacut.stochastic.errors import RefusedError
+from alphacut.stochastic.microstructure import study
+from alphacut.stochastic.microstructure_summary import fragment
 from benchmarks.rows import write
 from benchmarks.rve.image_cases import moduli_of, phases_of
 from benchmarks.stochastic.synthetic_section import Section, micrograph, overlapping_discs
@@ -114,9 +115,7 @@ def drawn(generator: np.random.Generator, fraction: float, folder: Path) -> tupl
 def chain(folder: Path) -> tuple[float, dict[str, tuple[float, float]]]:
     """Area fraction of the image, and supports of E in GPa by each average."""
     case = load(folder / "case.toml")
-    found = microstructure.compute(case, quiet=True)
-    from alphacut.stochastic.microstructure_summary import fragment
-
+    found = study(microstructure.study_of(case))
     supports = {}
     for average in ("isotropic", "axes"):
         own = load(folder / "case.toml", [f"modulus.average={average}"])
@@ -135,7 +134,7 @@ def judged(number: int, of: int, seed: int, fine: int) -> Row:
         refused, none = "", (np.nan, np.nan)
         try:
             found, supports = chain(Path(name))
-        except (BadInput, RefusedError) as error:
+        except (ValueError, RefusedError) as error:
             refused, found, supports = str(error), np.nan, {"isotropic": none, "axes": none}
     true = solve_image(*moduli_of(section.mask(fine), phases_of(4.0))).bounds.modulus
     share = float(section.share(size).mean())
