@@ -11,9 +11,8 @@ import numpy as np
 
 from alphacut.io.files import as_json, write_text
 from alphacut.io.problem import BadInput, Problem
-from alphacut.rve.anisotropy import shear_ratio, shear_ratio_in_words
+from alphacut.rve.anisotropy import AveragedPlane, shear_ratio, shear_ratio_in_words
 from alphacut.rve.fibre_constants import CONSTANTS, FibreConstants, fibre_constants
-from alphacut.rve.plane_average import AveragedPlane
 from alphacut.rve.result import error_of_means, error_of_ratio, error_of_stiffness
 from alphacut.rve.spheres.cubic import cubic_constants, cubic_voigt, hill_average
 from alphacut.rve.spheres.result import HomogenisedSpheres

@@ -12,12 +12,14 @@ from pathlib import Path
 
 from alphacut.rve.cell import Phase
 from alphacut.rve.result import Homogenised
+from alphacut.rve.settings import require_accuracy
 from alphacut.rve.spheres.series.model import SphereSeriesModel
 from alphacut.rve.spheres.table.model import LEAST_ACCURACY, SphereTableModel
 from alphacut.stochastic import RadiusMap
 
 ORDER = ("series", "table", "slices", "prism")  # cheapest first
 OF_SPHERES = ("series", "table")
+STEERED = ("prism", "slices")  # models that a tolerance refines
 TABLED = 0.9
 """Of the tolerance on E, for the moduli that a table of spheres holds; the rest is for θ."""
 _MARGIN = 0.4  # of the tolerance, for the series at each θ and again for its rule in θ
@@ -148,3 +150,50 @@ class AutoModel:
             f" stiffness{before}:"
             f" {_WHY[result.method]}; {result.reason}"
         )
+
+
+@dataclass(frozen=True)
+class RefinedModel:
+    """The model `name`, refined until the estimated error of E is below `tolerance`.
+
+    Args:
+        name: prism or slices.
+        tolerance: Relative error of E allowed, in [1e-10, 0.1].
+        stiffness: Whether prisms are to make the whole plane stiffness; slices always do.
+
+    Raises:
+        ValueError: A value lies outside its range.
+    """
+
+    name: str
+    tolerance: float
+    stiffness: bool = False
+
+    def __post_init__(self) -> None:
+        if self.name not in STEERED:
+            raise ValueError(f"model {self.name!r} cannot be refined; allowed: prism, slices")
+        require_accuracy(self.tolerance, 1e-10, "tolerance on E")
+
+    def solve(
+        self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
+    ) -> list[Homogenised]:
+        """One result for each of `inclusions`, in their order, all within the tolerance.
+
+        Raises:
+            ChoiceError: The finest resolution leaves more.
+        """
+        from alphacut.rve.auto.refinement import refined_prism, refined_slices
+
+        asked = (radius_map, matrix, inclusions)
+        results = (
+            refined_prism(*asked, tolerance=self.tolerance, stiffness=self.stiffness)
+            if self.name == "prism"
+            else refined_slices(*asked, tolerance=self.tolerance)
+        )
+        worst = max(result.estimated_error for result in results)
+        if not worst <= self.tolerance:
+            raise ChoiceError(
+                f"method {self.name} reaches a relative error of {worst:.1e} in E,"
+                f" {self.tolerance:.1e} is asked for; allow more, or take method auto"
+            )
+        return results

@@ -5,9 +5,15 @@ import pytest
 
 from alphacut.export import material_card
 from alphacut.rve import Phase
-from alphacut.rve.anisotropy import directional_shear, directional_young, rotated, shear_ratio
+from alphacut.rve.anisotropy import (
+    averaged,
+    directional_shear,
+    directional_young,
+    plane_average,
+    rotated,
+    shear_ratio,
+)
 from alphacut.rve.cell import square_moduli
-from alphacut.rve.plane_average import averaged, plane_average
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.stochastic import HermiteMap

@@ -9,11 +9,10 @@ from importlib import import_module
 from pathlib import Path
 
 from alphacut.io.problem import BadInput, Problem, missing
-from alphacut.rve.auto.model import TABLED, AutoModel
-from alphacut.rve.auto.refined import RefinedModel
+from alphacut.rve.anisotropy import AveragedPlane, averaged
+from alphacut.rve.auto.model import TABLED, AutoModel, RefinedModel
 from alphacut.rve.cell import Phase
 from alphacut.rve.image.round_particle import RasterModel
-from alphacut.rve.plane_average import AveragedPlane, averaged
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres.series.model import SphereSeriesModel
 from alphacut.rve.spheres.table.model import SphereTableModel

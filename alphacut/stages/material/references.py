@@ -9,8 +9,8 @@ import numpy as np
 from alphacut.case.case import Case
 from alphacut.io.files import Document, say
 from alphacut.rve import bounds as plane
+from alphacut.rve.anisotropy import plane_average
 from alphacut.rve.cell import STRAIN, Phase
-from alphacut.rve.plane_average import plane_average
 from alphacut.rve.result import effective_modulus
 from alphacut.rve.spheres import bounds as space
 from alphacut.rve.spheres.cubic import hill_average
