@@ -14,7 +14,7 @@ from alphacut.commands.options import add_common, answer
 from alphacut.io.files import say
 from alphacut.io.problem import BadInput
 from alphacut.stages.material.microstructure import plan
-from alphacut.stages.readiness import ready
+from alphacut.stages.readiness import motion, ready
 
 ABOUT = (
     "check a case without computing anything: a line for each problem, with its key and what is"
@@ -37,6 +37,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         answer(options, {"case": options.case, "ok": False, "problems": problems}, out)
         raise
     inputs, plans = list(readings(case)), list(plan(case))
+    plans += [] if found.structure is None else motion(case, found.structure)
     warnings = [f"warning: {remark}" for remark in (*found.warnings, *found.rough)]
     document = {
         "case": options.case,

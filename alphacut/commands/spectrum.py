@@ -34,8 +34,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--damping",
         metavar="RATIOS",
-        default="5 %",
-        help="share of the critical damping, one or several, as '2 %%,5 %%' (default 5 %%)",
+        action="append",
+        help="share of the critical damping, as '2 %%,5 %%' or once for each (default 5 %%)",
     )
     parser.add_argument(
         "--shortest", metavar="PERIOD", default="0.05 s", help="shortest period (default 0.05 s)"
@@ -56,7 +56,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     """Compute, write and report."""
     from alphacut.frame.dynamics.response_spectrum import response_spectrum
 
-    periods, ratios = wanted_periods(options), wanted_ratios(options.damping)
+    periods, ratios = wanted_periods(options), wanted_ratios(",".join(options.damping or ["5 %"]))
     ground = accelerogram(Path(options.record), "RECORD.csv")
     try:
         found = [response_spectrum(ground, periods, ratio) for ratio in ratios]

@@ -58,9 +58,7 @@ def decided(summary: Document, folder: Path) -> Markup:
                 )
                 for level in (0, -1)
             ]
-        degrees = (
-            f"{low:.4g} … {high:.4g}" for low, high in (one["possibility"], one["necessity"])
-        )
+        degrees = (decision.degree(*one[kind]) for kind in ("possibility", "necessity"))
         rows.append((name, allowed, *degrees, one["verdict"], *margins))
     levels = (f"margin at α = {found['alpha'][level]:g}" for level in (0, -1))
     head = ("magnitude of", "limit", "possibly exceeded", "necessarily", "verdict", *levels)

@@ -11,6 +11,7 @@ from alphacut.io.files import Document
 from alphacut.io.units import engineering, largest_by_unit
 from alphacut.report.tables import section, table
 from alphacut.stages.vibration import exceedance as outcomes
+from alphacut.stages.vibration.decision import degree
 
 Line = tuple[str, str, str, str]
 HEAD = ("quantity", "most plausible", "whole range", "nature of the range")
@@ -85,6 +86,5 @@ def exceeded(summary: Document) -> Iterator[Line]:
 def decisions(summary: Document) -> Iterator[Line]:
     """Whether limits are exceeded, and how possible that is."""
     for name, one in summary.get("decision", {}).get("limits", {}).items():
-        low, high = one["possibility"]
-        possible = f"possibility {low:.3g} … {high:.3g}"
+        possible = f"possibility {degree(*one['possibility'])}"
         yield f"|{name}| beyond its limit", one["verdict"], possible, one["nature"]

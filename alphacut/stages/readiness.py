@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 from alphacut.case.case import Case
 from alphacut.case.names import named_inputs
-from alphacut.fuzzy import FuzzyNumber, Triangular
+from alphacut.fuzzy import FuzzyNumber, Interval, Triangular
 from alphacut.io.problem import BadInput, Problem
-from alphacut.io.units import engineering
+from alphacut.io.units import STANDARD_GRAVITY, engineering
 from alphacut.stages.image.reading import expected_modulus, study_of
 from alphacut.stages.material import modulus, spheres
 from alphacut.stages.material.cell import modal_values, parts
@@ -231,4 +231,28 @@ def outlasted(case: Case, record: Accelerogram | None) -> Iterator[str]:
         yield (
             f"{record_key(case)}: the record ends at {end:g} s and the simulation at {longest:g} s;"
             " afterwards the ground is at rest"
+        )
+
+
+def motion(case: Case, wanted: Structure) -> Iterator[str]:
+    """Lines on the inputs that the motion takes, on its levels, and on its record."""
+    tasks = [study.task for study in studies(case)]
+    named = {name: number for task in tasks for name, number in wanted.inputs(task.fuzzy).items()}
+    fuzzy = (name for name, number in wanted.numbers.items() if number.support.width > 0)
+    if fixed := [name for name in fuzzy if name not in named]:
+        yield f"fixed at the middle of the top cut, since no study names them: {', '.join(fixed)}"
+    levels = max(len(task.alpha) for task in tasks)
+    alike = named and all(isinstance(one, Interval) for one in named.values())
+    if levels > 1 and alike and case.sections.update is None:  # what is learned has levels
+        yield (
+            f"all inputs are intervals, so all {levels} levels are alike: envelope.alpha = [0] is"
+            " enough, and faster"
+        )
+    if (ground := None if wanted.linear is None else wanted.linear.ground) is not None:
+        values, peak = ground.acceleration, float(abs(ground.acceleration).max())
+        end = "" if values[-1] == 0 else f"; ends on {values[-1]:.3g} m/s², then the ground rests"
+        yield (
+            f"{record_key(case)}: {len(values)} values every {ground.step:g} s, to"
+            f" {(len(values) - 1) * ground.step:g} s, peak {peak:.3g} m/s²"
+            f" ({peak / float(STANDARD_GRAVITY):.3g} g){end}"
         )

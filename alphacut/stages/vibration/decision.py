@@ -116,8 +116,8 @@ def _dataset(
     words = {"units": "SI, by output", "long_name": "limit less the peak of the magnitude"}
     return xarray.Dataset(
         {
-            "possibility": (("limit", "bound"), [x.possibility for x in found.values()]),
-            "necessity": (("limit", "bound"), [x.necessity for x in found.values()]),
+            "possibility": (("limit", "bound"), [outward(x.possibility) for x in found.values()]),
+            "necessity": (("limit", "bound"), [outward(x.necessity) for x in found.values()]),
             "witness": (("limit", "parameter"), witness, {"units": "SI, by input"}),
             "margin": (("alpha", "bound", "output"), margin, words),
         },
@@ -167,6 +167,19 @@ def decision_document(found: xarray.Dataset) -> Document:
 
 
 SIDES = ("lower", "upper")
+DIGITS = 6  # of a degree; the search that proves it goes little further
+
+
+def outward(ends: tuple[float, float]) -> tuple[float, float]:
+    """Bounds of a degree, moved out to `DIGITS` decimals."""
+    low, high = (end * 10**DIGITS for end in ends)
+    return float(np.floor(low)) / 10**DIGITS, float(np.ceil(high)) / 10**DIGITS
+
+
+def degree(low: float, high: float) -> str:
+    """A degree between two bounds in words, one number where four decimals tell them alike."""
+    ends = [f"{round(float(end), 4):g}" for end in (low, high)]
+    return " … ".join(dict.fromkeys(ends))
 
 
 def sentences(found: Document) -> Iterator[str]:
@@ -177,7 +190,7 @@ def sentences(found: Document) -> Iterator[str]:
             margin = found["margins"][name]
             of = f"|{name}| > {engineering(margin['limit'], margin['unit'])}"
         (a, b), (c, d) = one["possibility"], one["necessity"]
-        degrees = f"possible to {a:.4g} … {b:.4g}, necessary to {c:.4g} … {d:.4g}"
+        degrees = f"possible to {degree(a, b)}, necessary to {degree(c, d)}"
         worth = f"{one['nature']}, at nodes every {found['step']:g} s"
         yield f"{of}: {degrees}: {one['verdict']} ({worth})"
     for name, margin in found["margins"].items():

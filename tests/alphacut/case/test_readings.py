@@ -8,6 +8,7 @@ import pytest
 from alphacut.entry import main
 from alphacut.fuzzy import Interval
 from alphacut.io import quantity
+from tests.alphacut.one_floor import one_floor
 
 PAPER = Path(__file__).parents[3] / "cases" / "paper.toml"
 
@@ -37,3 +38,19 @@ def test_check_hands_the_inputs_on_as_data(capfd):
     assert masses[0]["shape"] == "triangle"
     assert masses[0]["values"] == [19e3, 20e3, 21e3]
     assert masses[0]["unit"] == "kg"
+
+
+def test_check_says_what_is_fixed_which_levels_are_alike_and_what_the_record_is(tmp_path, capfd):
+    text = one_floor(fuzzy='["m1"]', duration=1, step=0.01, mass="1 t ± 5 %", moved="10 mm ± 1 mm")
+    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
+    assert main(["check", str(tmp_path / "case.toml")]) == 0
+    told = capfd.readouterr().out
+    assert "fixed at the middle of the top cut, since no study names them: q1_0\n" in told
+    assert "all inputs are intervals, so all 5 levels are alike: envelope.alpha = [0]" in told
+    assert main(["check", str(PAPER.parent / "laboratory-frame.toml")]) == 0  # learned: they differ
+    assert "levels are alike" not in capfd.readouterr().out
+    assert main(["check", str(PAPER.parent / "building.toml")]) == 0
+    told = capfd.readouterr().out
+    assert "frame.accelerogram: 2001 values every 0.01 s, to 20 s, peak 2.5 m/s² (0.255 g)" in told
+    assert "ends on -0.0089 m/s², then the ground rests" in told
+    assert "fixed at" not in told

@@ -23,7 +23,18 @@ def test_a_push_doubles_what_it_does_slowly(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    words = ["--damping", "0 %,5 %", "--shortest", "0.5 s", "--longest", "2", "--count", "5"]
+    words = [
+        "--damping",
+        "0 %",
+        "--damping",
+        "5 %",
+        "--shortest",
+        "0.5 s",
+        "--longest",
+        "2",
+        "--count",
+        "5",
+    ]
     assert main(["spectrum", str(record(tmp_path)), *words, "--out", str(out), "--json", "-"]) == 0
     found = json.loads(capfd.readouterr().out)
     assert found["period_s"] == pytest.approx(np.geomspace(0.5, 2, 5))
@@ -50,6 +61,7 @@ def test_the_table_names_units_and_the_error(
     [
         (["--damping", "100 %"], "--damping = 100 %: out of range"),
         (["--damping", "5 %,5 %"], "twice"),
+        (["--damping", "5 %", "--damping", "5 %"], "twice"),
         (["--damping", "5 Pa"], '--damping = 5 Pa: the unit "Pa" is wrong'),
         (["--damping", ""], "--damping"),
         (["--shortest", "3 s", "--longest", "1 s"], "0 < shortest < longest"),

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from alphacut.entry import main
+from alphacut.stages.vibration.decision import degree, outward
 from tests.alphacut.one_floor import RIGIDITY, one_floor
 
 # |q| = v0 / ω, base shear v0 ω m
@@ -69,9 +70,9 @@ def test_a_safe_limit_and_a_sure_failure(
     path = written(tmp_path, ["q1 <= 1 m"])
     asked = ["--out", str(tmp_path / "out"), "--no-figures"]
     assert main(["run", str(path), *asked]) == 0
-    assert "|q1| > 1.000 m: possible to 0 … 0, necessary to 0 … 0: safe" in capsys.readouterr().out
+    assert "|q1| > 1.000 m: possible to 0, necessary to 0: safe" in capsys.readouterr().out
     assert main(["run", str(path), *asked, "--set", "decision.limits=['q1 <= 1 mm']"]) == 0
-    assert "possible to 1 … 1, necessary to 1 … 1: unsafe" in capsys.readouterr().out
+    assert "possible to 1, necessary to 1: unsafe" in capsys.readouterr().out
 
 
 def test_motion_between_nodes_takes_from_one_end_of_a_margin_alone(tmp_path: Path) -> None:
@@ -108,3 +109,18 @@ def test_limits_that_make_no_sense(
     assert pattern in told
     assert len(told.splitlines()) == 1
     assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("ends", "kept", "told"),
+    [
+        ((0.0, 9.095e-13), (0.0, 1e-6), "0"),
+        ((0.9999999996880433, 1.0), (0.999999, 1.0), "1"),
+        ((0.25, 0.75), (0.25, 0.75), "0.25 … 0.75"),
+        ((0.1234567, 0.1234568), (0.123456, 0.123457), "0.1235"),
+    ],
+)
+def test_degrees_carry_no_digits_of_the_search(ends, kept, told):
+    assert outward(ends) == pytest.approx(kept, abs=1e-15)
+    assert outward(ends)[0] <= ends[0] <= ends[1] <= outward(ends)[1]
+    assert degree(*ends) == told
