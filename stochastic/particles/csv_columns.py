@@ -13,7 +13,7 @@ import numpy as np
 
 from alphacut.stochastic.theta.truncated_normal import Array
 
-DIAMETERS = ("d", "size")  # columns of diameters, which may stand in for radii
+DIAMETERS = ("d", "diameter", "size", "sieve")  # columns of diameters, which may stand in for radii
 
 
 @dataclass(frozen=True, eq=False)

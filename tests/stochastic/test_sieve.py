@@ -148,3 +148,29 @@ def test_check_says_that_equal_discs_will_crystallise(fraction, largest, said, t
     assert main(["check", str(tmp_path / "case.toml")]) == 0
     out, err = capfd.readouterr()
     assert (out + err).count("crystallise") == said
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (CURVE, "sieve curve of sieve.csv, diameters from 1.000 mm to 16.00 mm"),
+        ("Diameter (µm)\n300\n100\n120\n", "diameters from 100.0 µm to 300.0 µm, median 120.0 µm"),
+        ("Sieve [mm],passing [%]\n1,0\n3,100\n", "diameters from 1.000 mm to 3.000 mm"),
+    ],
+)
+def test_check_tells_the_sizes_that_it_read(text, told, tmp_path, capfd):
+    written(tmp_path, text)
+    (tmp_path / "case.toml").write_text(CASE, encoding="utf-8")
+    assert main(["check", str(tmp_path / "case.toml")]) == 0
+    assert told in capfd.readouterr().out
+
+
+def test_check_tells_the_circles_that_it_read(tmp_path, capfd):
+    written(tmp_path, "x [mm],y [mm],r [mm]\n10,10,2\n30,10,3\n20,30,4\n")
+    head, _, _ = CASE.partition("[microstructure.packing]")
+    text = head + '[microstructure.circles]\nfile = "sieve.csv"\nsize = ["40 mm", "40 mm"]\n'
+    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
+    assert main(["check", str(tmp_path / "case.toml")]) == 0
+    assert (
+        "3 circles, diameters from 4.000 mm to 8.000 mm, median 6.000 mm" in capfd.readouterr().out
+    )

@@ -21,6 +21,7 @@ from alphacut.io.files import as_json, say, whole_file, write_text
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
 from alphacut.io.units import engineering
+from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     from alphacut.stochastic.microstructure import Microstructure, Study
@@ -192,12 +193,24 @@ def require_readable(case: Case) -> Study:
 
 
 def plan(case: Case) -> Iterator[str]:
-    """Lines on what the stage will do with spheres."""
+    """Lines on the sizes that were read, and on what the stage will do with spheres."""
+    from alphacut.stochastic.particles.radius_laws import MeasuredRadii
+    from alphacut.stochastic.sections import Measured
     from alphacut.stochastic.spheres.packing import SpherePackings
 
     if "microstructure" not in case.stages:
         return
     wanted = source(case)
+    given = case.microstructure
+    if isinstance(wanted, Measured):
+        if given.circles:
+            radii = wanted.file.read().discs.radii
+            yield f"microstructure.circles.file: {len(radii)} circles, {diameters(radii)}"
+        return
+    law, packed = wanted.packing.radii, given.packing or given.spheres
+    if packed is not None and packed.file:
+        read = law.values if isinstance(law, MeasuredRadii) else (law.smallest, law.largest)
+        yield f"microstructure: {law.label}, {diameters(np.array(read))}"
     if not isinstance(wanted, SpherePackings):
         return
     packing, law = wanted.packing, wanted.packing.radii
@@ -212,6 +225,13 @@ def plan(case: Case) -> Iterator[str]:
             f"microstructure: the map also holds {len(wanted.possible())} other laws that the"
             f" circles leave possible; {wanted.section.unknown}"
         )
+
+
+def diameters(radii: Array) -> str:
+    """Least, middle and greatest diameter of radii in m."""
+    ends = [engineering(2 * float(np.quantile(radii, share)), "m") for share in (0, 0.5, 1)]
+    middle = f", median {ends[1]}" if len(radii) > 2 else ""
+    return f"diameters from {ends[0]} to {ends[2]}{middle}"
 
 
 def compute(
