@@ -15,7 +15,7 @@ from alphacut.io.problem import BadInput, Problem
 from alphacut.io.units import STANDARD_GRAVITY, engineering
 from alphacut.stages.image.reading import expected_modulus, study_of
 from alphacut.stages.material import modulus, spheres
-from alphacut.stages.material.cell import modal_values, parts
+from alphacut.stages.material.cell import cell_phases, modal_values, parts, phases_of
 from alphacut.stages.pipeline import studies
 from alphacut.stages.vibration import update
 from alphacut.stages.vibration.resolution_checks import rough
@@ -102,9 +102,19 @@ def ready(case: Case) -> Readiness:
 
 def shape(case: Case) -> Iterator[str]:
     """A remark where cylinders are computed and the case speaks of spheres."""
-    if "modulus" not in case.stages or not case.sections.radius or case.stand_ins:
+    if "modulus" not in case.stages or not case.sections.cell or case.stand_ins:
         return
-    if told := spheres.remark(case, *parts(modal_values(case), case.radius.theta)):
+    given = case.sections.microstructure
+    if "microstructure" in case.stages:
+        if not (given and given.packing):
+            return  # the fraction is not known before the section is read
+        share = given.packing.area_fraction
+        values = {name: number.modal for name, number in cell_phases(case).items()}
+        phases = phases_of(values)
+    else:
+        radius, *both = parts(modal_values(case), case.radius.theta)
+        share, phases = spheres.area_share(radius), (both[0], both[1])
+    if told := spheres.remark(case, share, *phases):
         yield told
 
 

@@ -54,7 +54,8 @@ def summary(results: Results) -> Document:
     if case.sections.radius:
         found["area_fraction"] = area_fraction(results)
     if results.modulus is not None:
-        of_shape = spheres.remark(case, *_cell(results)) or ""
+        radius, *phases = _cell(results)
+        of_shape = spheres.remark(case, spheres.area_share(radius), *phases) or ""
         found["modulus"] = {**modulus_numbers(results.modulus), "shape": of_shape}
         numbers = found["modulus"]
         modal = float(numbers["modal_GPa"]) * GPA, float(numbers["nu"])

@@ -42,7 +42,7 @@ from alphacut.stochastic.theta.truncated_normal import Array
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "benchmarks" / "results"
 GPA = 1e9
-GRIDS = (9, 15, 27)  # of the cells of one sphere
+GRIDS = (9, 13, 19)  # of the cells of one sphere
 CELLS = 4  # as few as are ever refined
 WIDEST = 0.97
 
@@ -152,10 +152,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--spheres", type=int, nargs=2, default=(30, 100), help="in a cell of each size (30 100)"
     )
     parser.add_argument(
-        "--cells", type=int, nargs=2, default=(200, 110), help="cells of each size (200 110)"
+        "--cells", type=int, nargs=2, default=(400, 110), help="cells of each size (400 110)"
     )
-    parser.add_argument("--refined", type=int, default=8, help="of them on three grids (8)")
-    parser.add_argument("--resolution", type=float, default=10, help="voxels along a spacing (10)")
+    parser.add_argument("--refined", type=int, default=8, help="of them on four grids (8)")
+    parser.add_argument("--resolution", type=float, default=8, help="voxels along a spacing (8)")
     parser.add_argument("--fraction", type=float, default=0.2092, help="volume fraction (0.2092)")
     parser.add_argument("--contrast", type=float, default=4, help="modulus over the matrix's (4)")
     parser.add_argument(

@@ -53,6 +53,16 @@ def test_a_micrograph_is_judged_by_its_very_discs(monkeypatch):
     assert "MISSED" in benchmark.told(replace(row, chain_low=1.01 * row.true_high))
 
 
+def test_statistics_of_spheres(tmp_path, capsys):
+    few = ["--spheres", "150", "--sections", "6", "--specimens", "1", "--out", str(tmp_path)]
+    assert program("sphere_statistics").main([*few, "--seed", "3"]) in (0, 1)
+    out = capsys.readouterr().out
+    assert "150 spheres packed and tessellated in" in out
+    assert "standard errors from the volume fraction 0.2092" in out
+    assert "p-box of 300 circles" in out
+    assert len((tmp_path / "sphere_statistics.csv").read_text().splitlines()) == 2
+
+
 @pytest.mark.slow
 def test_hundred_thousand_discs_tile_their_box():
     timing = program("packing").measure("log-normal, 0.2", 100_000)

@@ -42,9 +42,13 @@ SHARED = tuple(name for name in INPUTS if name != "inclusion_modulus")
 
 def cell_inputs(case: Case) -> dict[str, FuzzyNumber]:
     """The values of `INPUTS`, crisp or fuzzy, in SI."""
-    slopes = dict(zip(INPUTS, case.radius.slopes, strict=False))
+    return dict(zip(INPUTS, case.radius.slopes, strict=False)) | cell_phases(case)
+
+
+def cell_phases(case: Case) -> dict[str, FuzzyNumber]:
+    """The elastic constants among them."""
     cell = case.cell
-    return slopes | {
+    return {
         "matrix_modulus": cell.matrix_modulus,
         "matrix_poisson": cell.matrix_poisson,
         "inclusion_modulus": cell.inclusion_modulus,
@@ -156,8 +160,13 @@ def parts(values: Mapping[str, float], theta: tuple[float, ...]) -> tuple[Hermit
     """Radius map, matrix and inclusion from the values of `INPUTS`, in SI."""
     law = TruncatedNormal(theta[0], theta[1])
     radius = HermiteMap(values["a1"], values["a2"], values["a3"], values["a4"], law)
+    return radius, *phases_of(values)
+
+
+def phases_of(values: Mapping[str, float]) -> tuple[Phase, Phase]:
+    """Matrix and inclusion from the values of `INPUTS`, in SI."""
     matrix = Phase(values["matrix_modulus"], values["matrix_poisson"])
-    return radius, matrix, Phase(values["inclusion_modulus"], values["inclusion_poisson"])
+    return matrix, Phase(values["inclusion_modulus"], values["inclusion_poisson"])
 
 
 def modal_values(case: Case) -> dict[str, float]:

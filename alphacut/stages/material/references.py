@@ -16,7 +16,7 @@ from alphacut.rve.spheres import bounds as space
 from alphacut.rve.spheres.cubic import hill_average
 from alphacut.rve.spheres.result import volume_fraction
 from alphacut.stages.material.cell import modal_values, parts
-from alphacut.stages.material.spheres import WORDS
+from alphacut.stages.material.spheres import says_spheres
 from alphacut.stochastic import HermiteMap, gauss_rule
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -163,8 +163,8 @@ def line(found: Document, particles: str) -> str:
 
 def outside(case: Case, found: Document, modulus: float) -> str:
     """Warning where E in GPa leaves the bounds in space and the case's words say spheres, or ''."""
-    word = WORDS.search(case.words)
-    if case.names_particles or word is None:
+    told = says_spheres(case)
+    if told is None:
         return ""
     low, high = found["spheres"]["hashin_shtrikman_E_GPa"]
     if low * (1 - SLACK) <= modulus <= high * (1 + SLACK):
@@ -172,6 +172,6 @@ def outside(case: Case, found: Document, modulus: float) -> str:
     side, bound = ("below", low) if modulus < low else ("above", high)
     return (
         f"E = {modulus:.3f} GPa lies {side} the Hashin–Shtrikman bound {bound:.3f} GPa of spheres,"
-        f" and the case says {word.group(0)!r}: its discs are long fibres;"
+        f" and {told}: its discs are long fibres;"
         ' cell.particles = "spheres" takes spheres, "cylinders" ends this warning'
     )

@@ -18,7 +18,20 @@ from alphacut.stochastic import HermiteMap, gauss_rule
 from alphacut.stochastic.theta.truncated_normal import Array
 
 GPA = 1e9
-WORDS = re.compile(r"\b(spher\w*|aggregates?|grains?|gravel|sand|beads?|balls?)\b", re.IGNORECASE)
+WORDS = re.compile(
+    r"\b((micro)?spher\w*|aggregates?|(cenosphere|grain|bead|ball|pebble|granule)s?|gravel|sand"
+    r"|siev(e\w*|ing)|diameters? of (the )?particles?|particle (size|diameter)s?"
+    r"|\w*kugel\w*|\w*(körner|körnung)\w*|korn(größe|durchmesser)\w*|zuschl[aä]g\w*|kies|splitt"
+    r"|sieb(linie|durchgang|weite)?\w*)\b",
+    re.IGNORECASE,
+)
+"""Words for particles that are round in every section."""
+LONG = re.compile(
+    r"\b(\w*(fibre|fiber|faser)\w*|(wire|rod|rebar|tube|cylinder|whisker)s?|\w*zylinder\w*"
+    r"|stäben?|drähten?)\b",
+    re.IGNORECASE,
+)
+"""Words for particles that are long."""
 
 
 def moduli(result: HomogenisedSpheres) -> Document:
@@ -86,26 +99,52 @@ def lines(result: HomogenisedSpheres) -> str:
     )
 
 
-def remark(case: Case, radius: HermiteMap, matrix: Phase, inclusion: Phase) -> str | None:
-    """Warning to a user of cylinders whose words say spheres, with the size of the difference.
+def remark(case: Case, share: float, matrix: Phase, inclusion: Phase) -> str | None:
+    """Warning to a user of cylinders whose words or data say spheres, with the difference's size.
 
     None where nothing says so, or where the case names cylinders itself. The difference is that of
     the bounds of Hashin and Shtrikman that the matrix gives, in the plane and in space, at one
     fraction.
+
+    Args:
+        case: The case.
+        share: Area fraction of the particles, in (0, 1).
+        matrix: Material between them.
+        inclusion: Their material.
     """
-    word = WORDS.search(case.words)
-    if case.names_particles or word is None:
+    told = says_spheres(case)
+    if told is None:
         return None
-    rule = gauss_rule(radius.distribution, points=40)
-    share = float(rule.weights @ (np.pi / 4 * radius(rule.nodes) ** 2))
     bulk, _, shear = of_cylinders(np.asarray(share), matrix, inclusion)
     plane, _ = effective_modulus(STRAIN * bulk, 2 * STRAIN * shear)
     k, mu = of_spheres(np.asarray(share), matrix, inclusion)
     space = float(hill_average(np.array([k, mu, mu]))[0])
     return (
-        f"cell.particles: the case says {word.group(0)!r}, and the particles are cylinders; of"
+        f"cell.particles: {told}, and the particles are cylinders; of"
         f" spheres at the same fraction {share:.4f} the Hashin–Shtrikman bound of E is"
         f" {space / GPA:.2f} GPa, of cylinders {plane / GPA:.2f} GPa"
         f' ({100 * (space / plane - 1):+.1f} %); cell.particles = "spheres" takes'
         ' spheres, "cylinders" ends this warning'
     )
+
+
+def says_spheres(case: Case) -> str | None:
+    """What of a case says that its particles are round in space; None where nothing does.
+
+    A word does, and so do sizes without places, which are of particles out of their matrix; neither
+    where another word says that they are long, or the case names their kind.
+    """
+    if case.names_particles or LONG.search(case.words):
+        return None
+    if word := WORDS.search(case.words):
+        return f"the case says {word.group(0)!r}"
+    given = case.sections.microstructure
+    if given and given.packing and given.packing.file:
+        return f"{given.packing.file} has sizes without places, as of particles that were sieved"
+    return None
+
+
+def area_share(radius: HermiteMap) -> float:
+    """Mean area fraction of a cylinder over θ, E[π r²/4]."""
+    rule = gauss_rule(radius.distribution, points=40)
+    return float(rule.mean(np.pi / 4 * radius(rule.nodes) ** 2))

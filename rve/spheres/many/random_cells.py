@@ -1,8 +1,9 @@
-"""Periodic cubes of random spheres of one size, on three grids, and what their mean may be off by.
+"""Periodic cubes of random spheres of one size, on four grids, and what their mean may be off by.
 
-All cells are solved on the coarsest of three grids, the first few on all three. The mean of the
+All cells are solved on the coarsest of four grids, the first few on all four. The mean of the
 many is corrected by the mean difference of the few between their coarsest grid and the limit of an
-endlessly fine one: the moduli of laminate voxels converge as the square of the voxel's width.
+endlessly fine one, from the three finer grids: the moduli of laminate voxels converge as the square
+of the voxel's width.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from alphacut.stochastic.spheres.spheres import Spheres
 from alphacut.stochastic.theta.truncated_normal import Array
 
 Quantity = Callable[[Array], Array]  # of moduli (…, 3), K, (C11 − C12)/2 and C44: shape (…)
-REFINEMENTS = (1.0, 1.7, 2.9)
+REFINEMENTS = (1.0, 1.75, 2.6, 3.75)  # the last three make the limit
 SOLVER = 1e-6  # relative error of the energies that the solver may leave
 _AMPLIFIED = 3  # what extrapolation makes of it, at most
 LEVEL = 0.95
@@ -39,7 +40,7 @@ class RandomCells:
     Args:
         packing: Number of spheres in each, volume fraction and law of the radii.
         cells: How many, at least 8.
-        refined: How many of them on all three grids, from 4 to `cells`.
+        refined: How many of them on all four grids, from 4 to `cells`.
         resolution: Voxels along the mean spacing of the spheres on the coarsest grid, from 4 on.
 
     Raises:
@@ -63,13 +64,13 @@ class RandomCells:
             )
 
     @property
-    def grids(self) -> tuple[int, int, int]:
-        """Voxels along an edge, three odd numbers that rise."""
-        first, second, third = (
+    def grids(self) -> tuple[int, int, int, int]:
+        """Voxels along an edge, four odd numbers that rise."""
+        coarse, first, second, third = (
             smooth_odd(self.resolution * factor * np.cbrt(self.packing.spheres))
             for factor in REFINEMENTS
         )
-        return first, second, third
+        return coarse, first, second, third
 
     def cell(self, number: int, seed: int) -> Spheres:
         """Packing `number`, the same in whatever order and number of processes.
@@ -126,7 +127,7 @@ class CellSample:
     Args:
         cells: What was asked for.
         coarse: K, (C11 − C12)/2 and C44 of each cell on the coarsest grid, shape (cells, 3), in Pa.
-        refined: The same of the first cells on all grids, shape (refined, 3 grids, 3), in Pa.
+        refined: The same of the first cells on all grids, shape (refined, 4 grids, 3), in Pa.
     """
 
     cells: RandomCells
@@ -135,10 +136,10 @@ class CellSample:
 
     def mean(self, quantity: Quantity) -> SampleMean:
         """Mean of a quantity over the cells, for an endlessly fine grid."""
-        coarse, few, grids = quantity(self.coarse), quantity(self.refined), self.cells.grids
-        corrections = limit_of_grids(few.T, grids)[0] - few[:, 0]
+        coarse, few, grids = quantity(self.coarse), quantity(self.refined), self.cells.grids[1:]
+        corrections = limit_of_grids(few[:, 1:].T, grids)[0] - few[:, 0]
         value = float(coarse.mean() + corrections.mean())
-        _, error = limit_of_grids(self.refined.mean(axis=0), grids)
+        _, error = limit_of_grids(self.refined[:, 1:].mean(axis=0), grids)
         half = half_width(coarse) + half_width(corrections)
         return SampleMean(value, half, error * value, _AMPLIFIED * SOLVER * value)
 

@@ -1,6 +1,7 @@
 """A case of spheres from the command line: choice, one radius, fuzzy modulus, words."""
 
 import json
+import re
 from pathlib import Path
 from time import process_time
 
@@ -173,6 +174,74 @@ def test_check_warns_of_cylinders_where_the_words_say_spheres(tmp_path, capfd):
         chosen = [f'cell.particles="{particles}"', "modulus.method=series"]
         assert main(["check", str(path), "--set", chosen[0], "--set", chosen[1]]) == 0
         assert "aggregates" not in capfd.readouterr().err
+
+
+def remarks_of(words, tmp_path, capfd):
+    """What check warns of, of a planar case with these words."""
+    lines = (Path(PAPER).parent / "porous.toml").read_text(encoding="utf-8").splitlines()
+    kept = [line for line in lines if not line.startswith("particles")]
+    text = (
+        "\n".join(kept)
+        .replace("aggregates", "particles")
+        .replace("Porous matrix: soft inclusions", words)
+    )
+    path = tmp_path / "own.toml"
+    path.write_text(text, encoding="utf-8")
+    assert main(["check", str(path)]) == 0
+    return [line for line in capfd.readouterr().err.splitlines() if "cell.particles" in line]
+
+
+@pytest.mark.parametrize(
+    ("words", "word"),
+    [
+        ("Epoxy with glass spheres", "spheres"),
+        ("Harz mit Glaskugeln", "Glaskugeln"),
+        ("Kugeln in einer Matrix", "Kugeln"),
+        ("Mortar with aggregates", "aggregates"),
+        ("Concrete by its sieve curve", "sieve"),
+        ("Beton nach Sieblinie", "Sieblinie"),
+        ("From the diameters of particles", "diameters of particles"),
+        ("Gesteinskörnung 0/16", "Gesteinskörnung"),
+    ],
+)
+def test_words_for_spheres_are_told_the_difference_in_one_line(words, word, tmp_path, capfd):
+    (line,) = remarks_of(words, tmp_path, capfd)
+    assert f"the case says {word!r}" in line
+    bound = re.search(r"bound of E is (\S+) GPa, of cylinders (\S+) GPa \((\S+) %\)", line)
+    space, plane, apart = (float(value) for value in bound.groups())
+    assert apart == pytest.approx(100 * (space / plane - 1), abs=0.1)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "Glass fibres in epoxy",
+        "Carbon fiber, sand-blasted: sand",
+        "Glasfasern mit Kugeln aus Luft",
+        "Steel wires and gravel",
+        "Bars of one diameter in a sandwich",
+        "Round pores",
+    ],
+)
+def test_fibres_raise_no_alarm(words, tmp_path, capfd):
+    assert not remarks_of(words, tmp_path, capfd)
+
+
+@pytest.mark.parametrize(("words", "told"), [("Particles", True), ("Fibres", False)])
+def test_sizes_without_places_say_spheres_before_they_are_packed(words, told, tmp_path, capfd):
+    lines = (Path(PAPER).parent / "concrete.toml").read_text(encoding="utf-8").splitlines()
+    ends = ("particles", "smallest_radius", "largest_radius", "title", "about", "Twenty", "of the")
+    kept = [line for line in lines if not line.startswith((*ends, "vibration of"))]
+    at = kept.index("[microstructure.packing]") + 1
+    text = "\n".join(
+        [f'title = "{words}"', 'about = "-"', *kept[:at], 'file = "d.csv"', *kept[at:]]
+    )
+    (tmp_path / "own.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "d.csv").write_text("d [mm]\n3\n4\n5\n", encoding="utf-8")
+    assert main(["check", str(tmp_path / "own.toml")]) == 0
+    err = capfd.readouterr().err
+    assert ("d.csv has sizes without places" in err) == told
+    assert ("of spheres at the same fraction 0.2000" in err) == told
 
 
 @pytest.mark.parametrize("ending", [".inp", ".comm", ".mac", ".json"])

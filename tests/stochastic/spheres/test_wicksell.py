@@ -2,42 +2,10 @@ import numpy as np
 import pytest
 
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii
-from alphacut.stochastic.spheres.wicksell import WEIGHTS, radii_pbox, unfolded
+from alphacut.stochastic.spheres.wicksell import radii_pbox, unfolded
+from benchmarks.stochastic.sphere_statistics import circles_of, covered
 
 LIMITS = {"visible": 5e-4, "smallest": 1e-3, "largest": 1.2e-2}
-
-
-def circles_of(law, number, generator, visible):
-    """Circles of a random plane: spheres are hit in proportion to R, at heights even in R."""
-    found = np.empty(0)
-    while found.size < number:
-        radii = law.sample(8 * number, generator)
-        radii = radii[generator.uniform(0, law.largest, radii.size) < radii]
-        circles = radii * np.sqrt(1 - generator.uniform(0, 1, radii.size) ** 2)
-        found = np.concatenate([found, circles[circles > visible]])
-    return found[:number]
-
-
-def truth(law, weight, smallest):
-    """Radii and the distribution function above `smallest`."""
-    radii = np.linspace(smallest, law.largest, 4001)
-    mass = np.diff(law.cdf(radii)) * ((radii[1:] + radii[:-1]) / 2) ** (WEIGHTS[weight] + 1)
-    return radii, np.concatenate([[0.0], np.cumsum(mass) / mass.sum()])
-
-
-def covered(count, seed, *, bins):
-    """Shares of specimens of 300 circles whose p-box covers the truth, by weight, and a width."""
-    generator = np.random.default_rng(seed)
-    inside, width = dict.fromkeys(WEIGHTS, 0), 0.0
-    for _ in range(count):
-        low = 10 ** generator.uniform(-3.3, -2.6)
-        law = LogNormalRadii(low, min(low * generator.uniform(1.5, 12), 1.1e-2))
-        circles = circles_of(law, 300, generator, LIMITS["visible"])
-        for weight in WEIGHTS:
-            found = radii_pbox(circles, **LIMITS, weight=weight, bins=bins)
-            inside[weight] += found.holds(*truth(law, weight, LIMITS["smallest"]))
-            width += (found.upper - found.lower).mean() / (3 * count)
-    return {weight: number / count for weight, number in inside.items()}, width
 
 
 def test_the_pbox_covers_the_truth_and_says_something():

@@ -52,7 +52,19 @@ def test_grids_are_extrapolated_and_what_they_leave_is_declared():
     mean = sample.mean(isotropic_bulk)
     truth = sample.coarse[:, 0].mean() / (1 + 5 / sample.cells.grids[0] ** 2)
     assert mean.value == pytest.approx(truth, rel=1e-4)
-    assert mean.discretisation >= 0.5 * 5 / sample.cells.grids[2] ** 2 * truth * 0.99
+    assert mean.discretisation >= 0.5 * 5 / sample.cells.grids[3] ** 2 * truth * 0.99
+
+
+def test_the_coarsest_grid_takes_no_part_in_the_limit():
+    """All cells stand on it: what it is off by is taken off, whatever its law."""
+    wish = made_up(30, 8, np.random.default_rng(1), grid=5.0)
+    off = np.full(3, 1e8)
+    refined = wish.refined.copy()
+    refined[:, 0] += off
+    other = CellSample(wish.cells, wish.coarse + off, refined)
+    first, second = (sample.mean(isotropic_bulk) for sample in (wish, other))
+    assert second.value == pytest.approx(first.value, rel=1e-9)
+    assert second.discretisation == pytest.approx(first.discretisation, rel=1e-9)
 
 
 def test_the_interval_over_cells_covers():
