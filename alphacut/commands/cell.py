@@ -18,8 +18,10 @@ from alphacut.commands.options import (
     add_common,
     add_exclude,
     add_keys,
+    add_radius,
     answer,
     changes,
+    one_radius,
     refuse_beside,
 )
 from alphacut.export.material_card import check_format, export
@@ -48,11 +50,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
     add_keys(parser, KEYS)
     add_exclude(parser, ", ".join(ORDER))
-    parser.add_argument(
-        "--radius",
-        metavar="NUMBER",
-        help="one radius over half the cell's side in place of the map, inside (0, 1)",
-    )
+    add_radius(parser)
     parser.add_argument(
         "--stiffness",
         action="store_true",
@@ -69,26 +67,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         default="",
         help="run two models; fail if E differs by more than --tolerance (1e-4)",
     )
-
-
-def one_radius(options: argparse.Namespace) -> list[str]:
-    """Changes of the case that make its map constant; none without ``--radius``.
-
-    Raises:
-        BadInput: The radius lies outside (0, 1), or a parameter of the map is given besides.
-    """
-    if options.radius is None:
-        return []
-    refuse_beside(options, "--radius", dict.fromkeys(("--a2", "--a4"), ""))
-    try:
-        inside = 0 < float(options.radius) < 1
-    except ValueError:
-        inside = False
-    if not inside:
-        allowed = "a number inside (0, 1), in halves of the cell's side"
-        raise BadInput(Problem("--radius", "out of range", options.radius, allowed))
-    r = options.radius
-    return [f"radius.a1={r}", "radius.a2=0", f"radius.a3={r}", "radius.a4=0"]
 
 
 def named_models(option: str, text: str) -> tuple[str, ...]:

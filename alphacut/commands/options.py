@@ -179,6 +179,39 @@ def check_workers(count: int) -> None:
         raise BadInput(Problem("--workers", "out of range", str(count), "a whole number 1 or more"))
 
 
+def add_radius(parser: argparse.ArgumentParser) -> None:
+    """``--radius``."""
+    parser.add_argument(
+        "--radius",
+        metavar="NUMBER",
+        help="one radius over half the cell's side in place of the map, inside (0, 1)",
+    )
+
+
+def one_radius(options: argparse.Namespace) -> list[str]:
+    """Changes of the case that make its map constant; none without ``--radius``.
+
+    Raises:
+        BadInput: The radius lies outside (0, 1), or a parameter of the map is given besides.
+    """
+    if options.radius is None:
+        return []
+    slopes = [name for name in ("a2", "a4") if hasattr(options, name)]
+    refuse_beside(options, "--radius", {f"--{name}": "" for name in slopes})
+    for change in options.set:
+        if re.match(r"\s*(radius\.)?a[1-4]\s*=", change):
+            raise BadInput(Problem("--set", "this has no effect beside --radius", change))
+    try:
+        inside = 0 < float(options.radius) < 1
+    except ValueError:
+        inside = False
+    if not inside:
+        allowed = "a number inside (0, 1), in halves of the cell's side"
+        raise BadInput(Problem("--radius", "out of range", options.radius, allowed))
+    r = options.radius
+    return [f"radius.a1={r}", "radius.a2=0", f"radius.a3={r}", "radius.a4=0"]
+
+
 def add_modulus(parser: argparse.ArgumentParser) -> None:
     """``--modulus``."""
     parser.add_argument(

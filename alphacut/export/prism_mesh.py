@@ -1,4 +1,4 @@
-"""The prism mesh of a case as a meshio mesh, written for ParaView, Gmsh, Abaqus and CalculiX."""
+"""Prisms or sphere's cell of a case as a meshio mesh, for ParaView, Gmsh, Abaqus and CalculiX."""
 
 from __future__ import annotations
 
@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 ORDER = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11]
 # from there to VTK's: the lower triangle seen from outside
 MIRRORED = [0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13]
+# from Basix's order of a quadratic tetrahedron to meshio's, VTK's and Abaqus's
+TETRAHEDRON = [0, 1, 2, 3, 9, 6, 8, 7, 5, 4]
+FINEST = 0.02  # mesh size of a sphere's cell: some millions of tetrahedra
 # names of the element sets, where a format has sets in place of data
 PHASES = ("MATRIX", "PARTICLE")
 VTK_ORDER = {".vtu", ".vtk", ".xdmf"}
@@ -48,11 +51,37 @@ def prism_mesh(case: Case) -> meshio.Mesh:
     )
 
 
+def sphere_mesh(case: Case, radius: float) -> meshio.Mesh:
+    """Curved quadratic tetrahedra of the periodic cell with its sphere, phases as of `prism_mesh`.
+
+    Args:
+        case: Gives the mesh size.
+        radius: Over half the cell's side.
+
+    Raises:
+        BadInput: Spheres nearly touch, or the mesh size is below 0.02.
+    """
+    import meshio
+
+    from alphacut.rve.mesh.planar import TouchingError
+    from alphacut.rve.spheres.fem.octant import whole_cell
+
+    if case.mesh.size < FINEST:
+        what = "a cell of a sphere would have tens of millions of elements"
+        raise case.refuse("mesh.size", what, f"{FINEST:g} or more")
+    try:
+        points, cells, inside = whole_cell(radius, size=case.mesh.size)
+    except TouchingError as error:
+        raise BadInput(Problem("radius", str(error))) from None
+    phase = inside.astype(np.int64)
+    return meshio.Mesh(points, [("tetra10", cells[:, TETRAHEDRON])], cell_data={"phase": [phase]})
+
+
 def check_ending(path: Path, *, fields: bool = False) -> None:
     """Refuse an ending whose format cannot hold what is to be written, before anything is computed.
 
     Raises:
-        BadInput: The ending names no format that keeps quadratic wedges and their phase, or one
+        BadInput: The ending names no format that keeps quadratic elements and their phase, or one
             without `fields` where they are wanted.
     """
     allowed = [ending for ending in FORMATS if not (fields and ending in FIELDLESS)]
@@ -61,7 +90,7 @@ def check_ending(path: Path, *, fields: bool = False) -> None:
     lacks = (
         "this format cannot hold fields"
         if path.suffix in FORMATS
-        else "this ending names no format that holds quadratic wedges and phases"
+        else "this ending names no format that holds quadratic elements and phases"
     )
     raise BadInput(Problem("--out", lacks, str(path), ", ".join(allowed)))
 
@@ -77,14 +106,14 @@ def write_mesh(mesh: meshio.Mesh, path: Path) -> None:
     import meshio
 
     check_ending(path, fields=bool(mesh.point_data))
-    wedges, phase = mesh.cells[0].data, mesh.cell_data["phase"]
-    if path.suffix in VTK_ORDER:
+    kind, elements, phase = mesh.cells[0].type, mesh.cells[0].data, mesh.cell_data["phase"]
+    if path.suffix in VTK_ORDER and kind == "wedge15":
         mesh = meshio.Mesh(
-            mesh.points, [("wedge15", wedges[:, MIRRORED])], mesh.point_data, mesh.cell_data
+            mesh.points, [(kind, elements[:, MIRRORED])], mesh.point_data, mesh.cell_data
         )
     if path.suffix in FIELDLESS:
         sets = {name: [np.flatnonzero(phase[0] == number)] for number, name in enumerate(PHASES)}
-        mesh = meshio.Mesh(mesh.points, [("wedge15", wedges)], cell_sets=sets)
+        mesh = meshio.Mesh(mesh.points, [(kind, elements)], cell_sets=sets)
     # else its numbers are in a second file, by the partial one's name
     own = {"data_format": "XML"} if path.suffix == ".xdmf" else {}
     with whole_file(path) as partial:

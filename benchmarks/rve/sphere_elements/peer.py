@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 from time import perf_counter
 from typing import Any
 
@@ -43,25 +42,18 @@ class Peer:
     seconds: dict[str, float]
 
 
-def whole_cell(radius: float, *, size: float) -> tuple[Any, Array]:
-    """The octant's mesh with its seven images, and whether each of its tetrahedra is the sphere."""
+def whole_mesh(radius: float, *, size: float) -> tuple[Any, Array]:
+    """The whole cell as a mesh of dolfinx, and whether each of its tetrahedra is the sphere."""
+    from basix.ufl import element
     from dolfinx.mesh import create_mesh
     from mpi4py import MPI
 
-    from alphacut.rve.spheres.fem.octant import SPHERE, octant
+    from alphacut.rve.spheres.fem.octant import whole_cell
 
-    mesh, tags = octant(radius, size=size)[:2]
-    cells = mesh.geometry.dofmap
-    inside = np.zeros(len(cells), bool)
-    inside[tags.find(SPHERE)] = True
-    images = [mesh.geometry.x * sign for sign in product((1.0, -1.0), repeat=3)]
-    keys = np.round(np.concatenate(images), 9) + 0.0
-    _, first, places = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    places = places.reshape(len(images), -1)
-    every = np.concatenate([numbers[cells] for numbers in places]).astype(np.int64)
-    points = np.concatenate(images)[first]
-    whole = create_mesh(MPI.COMM_SELF, every, points, mesh.ufl_domain())
-    return whole, np.tile(inside, len(images))[whole.topology.original_cell_index]
+    points, cells, inside = whole_cell(radius, size=size)
+    curved = element("Lagrange", "tetrahedron", 2, shape=(3,))
+    whole = create_mesh(MPI.COMM_SELF, cells.astype(np.int64), points, curved)
+    return whole, inside[whole.topology.original_cell_index]
 
 
 def mpc_stiffness(radius: float, phases: Sequence[Phase], *, size: float, rtol: float) -> Peer:
@@ -69,7 +61,7 @@ def mpc_stiffness(radius: float, phases: Sequence[Phase], *, size: float, rtol: 
     import dolfinx_mpc
     from dolfinx import fem
 
-    mesh, inside = whole_cell(radius, size=size)
+    mesh, inside = whole_mesh(radius, size=size)
     space = fem.functionspace(mesh, ("Lagrange", 2, (3,)))
     forms = _forms(mesh, inside, space, phases)
     started = perf_counter()

@@ -1,18 +1,23 @@
-"""One eighth of the cell of a sphere as curved tetrahedra of second order, by Gmsh."""
+"""A sphere's cell and one eighth of it as curved tetrahedra of second order, by Gmsh."""
 
 from __future__ import annotations
 
+from itertools import product
+
 import gmsh
+import numpy as np
 from dolfinx.io import gmshio
 from mpi4py import MPI
 
 from alphacut.rve.mesh.planar import TouchingError
 from alphacut.rve.settings import require_mesh_size, require_radius
+from alphacut.stochastic.theta.truncated_normal import Array
 
 _CLOSEST = 0.97
 _FINER = (1.0, 0.8, 0.65, 0.5, 0.4, 0.3, 0.2)
 _SOUND = 0.1  # least scaled Jacobian of an element
 MATRIX, SPHERE = 1, 2
+_REFLECTED = [0, 1, 3, 2, 4, 6, 5, 8, 7, 9]  # nodes of a tetrahedron, third vertex for fourth
 
 
 class CurvedMeshError(RuntimeError):
@@ -48,6 +53,37 @@ def octant(radius: float, *, size: float, comm: MPI.Comm = MPI.COMM_SELF) -> gms
         return gmshio.model_to_mesh(gmsh.model, comm, 0, gdim=3)
     finally:
         gmsh.finalize()
+
+
+def whole_cell(radius: float, *, size: float) -> tuple[Array, Array, Array]:
+    """The octant with its seven images: the periodic cell [-1, 1]³, the sphere about the origin.
+
+    Args:
+        radius: As of `octant`.
+        size: As of `octant`.
+
+    Returns:
+        Points, shape (n, 3), in halves of the cell's side; their numbers for each tetrahedron,
+        shape (m, 10), in Basix's order and of positive volume; whether it is the sphere, shape
+        (m,). Opposite faces have the same nodes, exactly.
+
+    Raises:
+        ValueError: As by `octant`.
+        TouchingError: As by `octant`.
+        CurvedMeshError: As by `octant`.
+    """
+    mesh, tags = octant(radius, size=size)[:2]
+    cells = mesh.geometry.dofmap
+    inside = np.isin(np.arange(len(cells)), tags.find(SPHERE))
+    eighth = np.where(abs(mesh.geometry.x) < 1e-9, 0.0, mesh.geometry.x)  # Gmsh's 1e-14
+    signs = np.array(list(product((1.0, -1.0), repeat=3)))
+    images = (signs[:, None] * eighth + 0.0).reshape(-1, 3)
+    points, places = np.unique(images, axis=0, return_inverse=True)
+    whole = [
+        numbers[cells if sign.prod() > 0 else cells[:, _REFLECTED]]
+        for sign, numbers in zip(signs, places.reshape(len(signs), -1), strict=True)
+    ]
+    return points, np.concatenate(whole), np.tile(inside, len(signs))
 
 
 def _generate_sound(radius: float, size: float) -> None:

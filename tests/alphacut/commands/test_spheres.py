@@ -13,7 +13,7 @@ from alphacut.entry import main
 from alphacut.rve import Phase
 from alphacut.rve.spheres.cubic import cubic_moduli, hill_average, young_along
 from alphacut.rve.spheres.series.stiffness import cubic_stiffness
-from alphacut.stochastic import HermiteMap
+from alphacut.stochastic import HermiteMap, TruncatedNormal
 
 PAPER = str(Path(__file__).parents[3] / "cases" / "paper.toml")
 SPHERES = ["--set", 'cell.particles="spheres"', "--method", "series"]
@@ -151,14 +151,99 @@ def test_the_shipped_spheres_fill_what_the_papers_circles_cover(capfd):
     assert shares[1] == pytest.approx(shares[0], rel=5e-3)
 
 
-def test_a_mesh_of_spheres_is_refused(tmp_path, capfd):
+SPACE = str(Path(PAPER).with_name("paper-3d.toml"))
+EDGES = [
+    (0, 1),
+    (1, 2),
+    (0, 2),
+    (0, 3),
+    (1, 3),
+    (2, 3),
+]  # of a quadratic tetrahedron in VTK's order
+
+
+def jacobians(points, cells):
+    """Determinants at the centroid and four more points of a rule of degree 3, shape (m, 5)."""
+    spots = np.vstack([np.full(4, 1 / 4), np.full((4, 4), 1 / 6) + np.eye(4) / 3])
+    slopes = np.zeros((5, 10, 4))  # of the shape functions by the barycentric coordinates
+    for vertex in range(4):
+        slopes[:, vertex, vertex] = 4 * spots[:, vertex] - 1
+    for number, (a, b) in enumerate(EDGES, start=4):
+        slopes[:, number, a], slopes[:, number, b] = 4 * spots[:, b], 4 * spots[:, a]
+    slopes = slopes[..., 1:] - slopes[..., :1]
+    return np.linalg.det(np.einsum("qna,mni->mqai", slopes, points[cells]))
+
+
+def test_a_mesh_of_a_sphere_fills_the_periodic_cell(tmp_path, capfd):
+    pytest.importorskip("dolfinx")
+    meshio = pytest.importorskip("meshio")
+    from alphacut.export.prism_mesh import write_mesh
+
     path = tmp_path / "cell.vtu"
-    assert (
-        main(["mesh", PAPER, *SPHERES[:2], "--set", "modulus.method=series", "--out", str(path)])
-        == 2
-    )
-    assert "cell.particles" in capfd.readouterr().err
-    assert not path.exists()
+    words = ("--radius", "0.6", "--mesh-size", "0.5", "--out", str(path))
+    told = answer(capfd, "mesh", SPACE, *words)
+    found = meshio.read(path)
+    counts = {"nodes": len(found.points), "tetrahedra": len(found.cells_dict["tetra10"])}
+    assert told == {"radius": 0.6, "radius_from": "--radius", **counts, "file": str(path)}
+    inside = found.cell_data["phase"][0] == 1
+    judge_sphere(found.points, found.cells[0].data, inside)
+    for ending in (".vtk", ".xdmf", ".msh", ".inp"):
+        write_mesh(found, tmp_path / f"cell{ending}")
+        again = meshio.read(tmp_path / f"cell{ending}")
+        assert again.points == pytest.approx(found.points, abs=1e-14)
+        assert (again.cells_dict["tetra10"] == found.cells[0].data).all()
+        if ending != ".inp":
+            assert (again.cell_data["phase"][0] == inside).all()
+            continue
+        for name, wanted in (("MATRIX", ~inside), ("PARTICLE", inside)):
+            assert (np.concatenate(again.cell_sets[name]) == np.flatnonzero(wanted)).all()
+
+
+def judge_sphere(points, cells, inside):
+    """No fold, volumes of both materials, the interface on the sphere, and opposite faces alike."""
+    determinants = jacobians(points, cells)
+    assert determinants.min() > 0
+    volumes = determinants @ np.array([-4 / 5, *[9 / 20] * 4]) / 6
+    assert volumes.sum() == pytest.approx(8, rel=1e-12)
+    assert volumes[inside].sum() / 8 == pytest.approx(np.pi * 0.6**3 / 6, rel=1e-3)
+    assert np.linalg.norm(points[cells[inside]], axis=-1).max() == pytest.approx(0.6, rel=1e-9)
+    assert np.linalg.norm(points[cells[~inside]], axis=-1).min() == pytest.approx(0.6, rel=1e-9)
+    for axis in range(3):
+        faces = [points[points[:, axis] == end] for end in (-1, 1)]
+        low, high = ({tuple(row) for row in np.delete(face, axis, 1)} for face in faces)
+        assert len(low) > 50
+        assert low == high
+
+
+def test_a_mesh_of_a_sphere_has_the_radius_at_the_median(tmp_path, capfd):
+    pytest.importorskip("dolfinx")
+    words = ["--mesh-size", "0.9", "--set", "radius.theta=[-3, 1]"]
+    words += ["--out", str(tmp_path / "cell.msh")]
+    found = answer(capfd, "mesh", SPACE, *words)
+    radius = HermiteMap(0.46988, 0.10171, 0.95, 0.00001, TruncatedNormal(-3, 1))
+    draws = radius(radius.distribution.sample(100_000, np.random.default_rng()))
+    assert found["radius"] == pytest.approx(np.median(draws), abs=5e-3)
+    assert found["radius_from"].startswith("the map at the median θ = -0.1984")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--radius", "0.99"], "meshes of spheres end at 0.97"),
+        (["--radius", "1.2"], "--radius = 1.2: out of range"),
+        (["--radius", "0.5", "--set", "a1=0.4"], "a1=0.4: this has no effect beside --radius"),
+        (["--layers", "3"], "mesh of spheres does not read this key"),
+        (["--fields"], "fields are those of cylinders"),
+        (["--mesh-size", "0.01"], "mesh.size = 0.01: a cell of a sphere"),
+        (["--set", "modulus.method=table"], "modulus.method = table: command mesh of spheres"),
+    ],
+)
+def test_what_a_mesh_of_a_sphere_cannot_be_is_one_line(arguments, words, tmp_path, capfd):
+    pytest.importorskip("dolfinx")
+    assert main(["mesh", SPACE, *arguments, "--out", str(tmp_path / "cell.vtu")]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert words in line
+    assert not list(tmp_path.iterdir())
 
 
 def test_check_warns_of_cylinders_where_the_words_say_spheres(tmp_path, capfd):
