@@ -157,7 +157,10 @@ class FuzzyResult:
     def __str__(self) -> str:
         """Bounds of the first 50 outputs, a line for each level, with nature and cost."""
         given = condition(self._rests_on)
-        lines = [f"{self.nature} bounds{given} by the plan {self.plan}, {self.runs} runs"]
+        runs = f"{self.runs} runs"
+        if self.verification_runs:
+            runs += f" and {self.verification_runs} more that looked for what they missed"
+        lines = [f"{self.nature} bounds{given} by the plan {self.plan}, {runs}"]
         for column, name in enumerate(self.outputs[:_PRINTED]):
             cuts = zip(self.domain.alpha, self.lower[:, column], self.upper[:, column], strict=True)
             lines += [

@@ -147,3 +147,16 @@ def test_what_cannot_be_covered_is_said():
 def test_wrong_numbers_are_refused():
     with pytest.raises(ValueError, match="tolerance, budget, look and looks are 0, 400, 6 and 4"):
         Automatic(tolerance=0)
+
+
+def test_what_is_printed_counts_every_call():
+    calls = []
+
+    def function(a, b):
+        calls.append((a, b))
+        return a * b + np.sin(3 * a)
+
+    result = propagate(function, {"a": Triangular(0, 1, 2), "b": Triangular(1, 2, 3)}, alpha=[0])
+    assert result.verification_runs > 0
+    assert f"{result.runs} runs and {result.verification_runs} more" in str(result)
+    assert len(set(calls)) == result.runs + result.verification_runs
