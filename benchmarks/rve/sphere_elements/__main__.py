@@ -2,12 +2,13 @@
 
     ./enter python -m benchmarks.rve.sphere_elements
 
-Judged against the exact series: declared errors of 100 random cells, and of the fuzzy modulus of
-cases/paper-3d.toml by a table; the order of the error of E on meshes ever finer; iterations of
-conjugate gradients over mesh size and contrast; a mesh of a million unknowns, all three loads, on
-two ranks; equal moduli on one rank and on two; dolfinx_mpc on the whole periodic cell, whose mesh
-is the eighth's with its mirror images. Prints a line each, writes sphere_elements.csv to
-benchmarks/results/; exit status 1 where a line is broken.
+Judged against the exact series: all moduli at extreme contrasts up to near touching; declared
+errors of 100 random cells, and of the fuzzy modulus of cases/paper-3d.toml by a table; the order
+of the error of E on meshes ever finer; iterations of conjugate gradients over mesh size and
+contrast; a mesh of a million unknowns, all three loads, on two ranks; equal moduli on one rank and
+on two; dolfinx_mpc on the whole periodic cell, whose mesh is the eighth's with its mirror images.
+Prints a line each, writes sphere_elements.csv to benchmarks/results/; exit status 1 where a line
+is broken.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ ORDER, FACTOR, SECONDS, SAME, AS_PEER = 2.7, 2.0, 180.0, 1e-10, 1e-9
 SIZES = (0.2, 0.14, 0.1, 0.07)
 CONTRASTS = (1e-2, 1e-1, 1, 10, 1e2)
 DRAWS, TOLERANCE, MINUTES = 100, 1e-4, 5.0
+RADII, EXTREMES, FINE = (0.1, 0.5, 0.8, 0.95), (1e-3, 1e3), 0.07
 MILLION, LARGE, OF_RANKS, OF_PEER = 1_000_000, 0.0268, 0.1, 0.15
 
 
@@ -171,6 +173,18 @@ def beside_peer(size: float = OF_PEER) -> Line:
     return Line(words, f"{gap:.1e}", f"<= {AS_PEER:g}", gap <= AS_PEER)
 
 
+def extremes(size: float = FINE) -> Line:
+    """Farthest modulus of extrapolated elements from the series."""
+    from benchmarks.rve.sphere_elements.declared import from_series
+
+    far = max(from_series(r, MATRIX, contrast, size)[0] for r in RADII for contrast in EXTREMES)
+    words = (
+        f"moduli by elements, r {RADII[0]} … {RADII[-1]}, contrasts {EXTREMES[0]:g} and"
+        f" {EXTREMES[1]:g}, from the series"
+    )
+    return Line(words, f"{far:.1e}", f"<= {TOLERANCE:g}", far <= TOLERANCE)
+
+
 def declared(count: int = DRAWS, seed: int = 1) -> Line:
     """Random cells whose declared error covers the true one."""
     from benchmarks.rve.sphere_elements.declared import random_cells
@@ -201,6 +215,7 @@ def fuzzy(tolerance: float = TOLERANCE, workers: int = 2) -> Line:
 
 def lines(seed: int = 1) -> Iterator[Line]:
     """All of them, one after the other."""
+    yield extremes()
     yield declared(seed=seed)
     yield fuzzy()
     yield order()
