@@ -280,10 +280,11 @@ def fitted_map(case: Study, sample: AreaWeighted, others: Sequence[AreaWeighted]
     )
     allowed = band if case.band is None else case.band
     more = [one.truncated(lower, upper) for one in others]
-    hold = slopes if case.holds_slopes else None
     while True:
         try:
-            pbox = least_pbox(fit, kept, allowed, hold=hold, others=more)
+            pbox = least_pbox(
+                fit, kept, allowed, hold=slopes if case.holds_slopes else None, others=more
+            )
             break
         except RefusedError:
             if not more or allowed >= WIDEST:

@@ -197,15 +197,21 @@ def draw_radii_bounds(found: SphereMicrostructure) -> Figure:
     box = found.source.section
     assert box is not None
     drawn, axes = plt.subplots(figsize=(6.4, 3.8))
-    label = f"bounds at {100 * box.level:g} %"
-    look = {"color": GREY, "alpha": 0.4, "lw": 0, "label": label}
-    axes.fill_between(1e3 * box.edges, box.lower, box.upper, **look)
+    axes.fill_between(
+        1e3 * box.edges,
+        box.lower,
+        box.upper,
+        color=GREY,
+        alpha=0.4,
+        lw=0,
+        label=f"bounds at {100 * box.level:g} %",
+    )
     for number, packed in enumerate(found.packed):
         radii = np.sort(np.concatenate([one.radii for one in packed.packings]))
         share = np.cumsum(radii**3) / (radii**3).sum()
         colour, wide = (BLUE, 1.6) if number == 0 else (ORANGE, 0.8)
-        told = ("packed", "possible laws")[number] if number < 2 else None
-        axes.step(1e3 * radii, share, color=colour, lw=wide, where="post", label=told)
+        label = ("packed", "possible laws")[number] if number < 2 else None
+        axes.step(1e3 * radii, share, color=colour, lw=wide, where="post", label=label)
     axes.set(xlabel="radius of the spheres [mm]", ylabel="share of their volume", ylim=(0, 1.02))
     axes.set_title(
         f"spheres below {1e3 * box.edges[0]:.3g} mm: the section does not tell", fontsize=10

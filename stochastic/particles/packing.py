@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
@@ -119,9 +120,20 @@ class Packing:
             )
 
 
+def packings(
+    wish: Packing, number: int, *, seed: int, executor: Executor | None = None
+) -> Iterator[Discs]:
+    """`number` independent packings; the k-th depends on `seed` and k only."""
+    return (executor.map if executor else map)(_one, [wish] * number, packing_seeds(seed, number))
+
+
 def packing_seeds(seed: int, number: int) -> list[np.random.SeedSequence]:
     """Independent random streams; the k-th depends on `seed` and k only."""
     return np.random.SeedSequence(seed).spawn(number)
+
+
+def _one(wish: Packing, seed: np.random.SeedSequence) -> Discs:
+    return wish.make(np.random.default_rng(seed))
 
 
 def _law_test(radii: Array, law: RadiusLaw) -> tuple[float, float]:

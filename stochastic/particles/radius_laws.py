@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.stochastic.particles.csv_columns import length_columns
+from alphacut.stochastic.theta.quadrature import gauss_rule
 from alphacut.stochastic.theta.truncated_normal import Array, TruncatedNormal
 
 
@@ -93,6 +94,12 @@ class LogNormalRadii:
             theta = (np.log(np.maximum(radius, 0)) - self.mu) / self.sigma
         return self.distribution.cdf(theta)
 
+    @property
+    def mean_square(self) -> float:
+        """Mean of r², in m²."""
+        rule = gauss_rule(self.distribution, points=40)
+        return float(rule.mean(self(rule.nodes) ** 2))
+
     def sample(self, number: int, generator: np.random.Generator) -> Array:
         """`number` independent radii, shape (number,), in m."""
         return self(self.distribution.sample(number, generator))
@@ -104,8 +111,11 @@ class TabulatedRadii:
 
     Args:
         radii: In m, positive and rising, at least two.
-        shares: The function there, by number, from 0 to 1, nowhere falling; else a ValueError.
+        shares: The function there, by number, from 0 to 1, nowhere falling.
         label: The law in words.
+
+    Raises:
+        ValueError: The table is none of a distribution function.
     """
 
     radii: tuple[float, ...]
@@ -115,8 +125,11 @@ class TabulatedRadii:
     def __post_init__(self) -> None:
         radii, shares = np.array(self.radii), np.array(self.shares)
         if len(radii) != len(shares) or len(radii) < 2 or not 0 < radii[0] < radii[-1] < np.inf:
-            raise ValueError("the table makes no law; it needs two or more positive radii")
-        ends = shares[0] == 0 and abs(shares[-1] - 1) < 1e-12
+            raise ValueError(
+                f"a table of {len(radii)} radii and {len(shares)} shares makes no law; it needs as"
+                " many of both, at least two, and positive radii"
+            )
+        ends = abs(shares[0]) < 1e-12 and abs(shares[-1] - 1) < 1e-12
         if not (ends and (np.diff(shares) >= 0).all() and (np.diff(radii) > 0).all()):
             raise ValueError("radii must rise, and shares must rise from 0 to 1")
 

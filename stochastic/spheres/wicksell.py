@@ -74,10 +74,11 @@ def possible_laws(box: RadiiPBox) -> dict[str, TabulatedRadii]:
     """
     if box.weight != "volume":
         raise ValueError(f"the p-box is one by {box.weight}; laws are made of one by volume")
+    middle = box.lower + box.upper >= 1
     ends = {
         "smallest spheres": box.upper,
         "largest spheres": box.lower,
-        "most alike": np.where(box.lower + box.upper >= 1, box.upper, box.lower),
+        "most alike": np.where(middle, box.upper, box.lower),
         "least alike": np.clip(0.5, box.lower, box.upper),
     }
     return {name: by_number(box.edges, share, name) for name, share in ends.items()}
