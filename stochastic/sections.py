@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -42,15 +41,6 @@ class Section:
     def discs(self) -> Discs:
         """The discs."""
         return self.diagram.discs
-
-
-class Source(Protocol):
-    """A supply of sections."""
-
-    def sections(
-        self, seed: int, *, executor: Executor | None = None, progress: Progress | None = None
-    ) -> list[Section]:
-        """All sections, the same for one seed whatever the workers."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.stochastic.particles.csv_columns import length_columns
-from alphacut.stochastic.theta.quadrature import gauss_rule
 from alphacut.stochastic.theta.truncated_normal import Array, TruncatedNormal
 
 
@@ -93,12 +92,6 @@ class LogNormalRadii:
         with np.errstate(divide="ignore", invalid="ignore"):
             theta = (np.log(np.maximum(radius, 0)) - self.mu) / self.sigma
         return self.distribution.cdf(theta)
-
-    @property
-    def mean_square(self) -> float:
-        """Mean of r², in m²."""
-        rule = gauss_rule(self.distribution, points=40)
-        return float(rule.mean(self(rule.nodes) ** 2))
 
     def sample(self, number: int, generator: np.random.Generator) -> Array:
         """`number` independent radii, shape (number,), in m."""
