@@ -83,6 +83,8 @@ def test_laws_of_a_section_stay_inside_its_bounds_and_are_its_ends():
         assert (share <= WIDE.upper + 0.02).all()
     np.testing.assert_allclose(volumes["smallest spheres"], WIDE.upper, atol=0.02)
     np.testing.assert_allclose(volumes["largest spheres"], WIDE.lower, atol=0.02)
+    level = np.clip(0.5, WIDE.lower, WIDE.upper)
+    np.testing.assert_allclose(volumes["least alike"], level, atol=0.02)
     spread = {  # of log r by volume: no law of the p-box lies between other ends
         name: np.ptp(np.interp([0.25, 0.75], share, np.log(EDGES)))
         for name, share in volumes.items()
