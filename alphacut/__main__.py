@@ -1,8 +1,6 @@
 """``alphacut …`` and ``python -m alphacut …``."""
 
-import sys
-
-from alphacut.entry import main
+from alphacut.entry import leave, main
 
 if __name__ == "__main__":
-    sys.exit(main())
+    leave(main())

@@ -3,49 +3,56 @@
 from __future__ import annotations
 
 import argparse
+import atexit
 import os
 import sys
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from importlib import import_module
 from types import ModuleType
+from typing import NoReturn
 
-from alphacut.commands import cell as command_cell
-from alphacut.commands import check as command_check
-from alphacut.commands import envelope as command_envelope
-from alphacut.commands import image as command_image
-from alphacut.commands import measure_next as command_measure_next
-from alphacut.commands import mesh as command_mesh
-from alphacut.commands import microstructure as command_microstructure
-from alphacut.commands import modulus as command_modulus
-from alphacut.commands import repair as command_repair
-from alphacut.commands import report as command_report
-from alphacut.commands import run as command_run
-from alphacut.commands import spectrum as command_spectrum
-from alphacut.commands import tolerances as command_tolerances
-from alphacut.commands import update as command_update
 from alphacut.commands.parser import Parser, refuse_petsc, split_petsc
 from alphacut.fuzzy import CampaignError
 from alphacut.io.files import rank, ranks, say, standard_output
 from alphacut.io.output_paths import check_destinations
 from alphacut.io.problem import BadInput, missing
 from alphacut.io.provenance import own_version
+from alphacut.rve.prism.head_start import launched
 from alphacut.rve.solver.options import OptionError
 
-COMMANDS: dict[str, ModuleType] = {
-    "run": command_run,
-    "check": command_check,
-    "microstructure": command_microstructure,
-    "cell": command_cell,
-    "image": command_image,
-    "mesh": command_mesh,
-    "modulus": command_modulus,
-    "envelope": command_envelope,
-    "tolerances": command_tolerances,
-    "update": command_update,
-    "measure-next": command_measure_next,
-    "spectrum": command_spectrum,
-    "report": command_report,
-    "repair": command_repair,
-}
+NAMES = (
+    "run", "check", "microstructure", "cell", "image", "mesh", "modulus", "envelope", "tolerances",
+    "update", "measure-next", "spectrum", "report", "repair",
+)  # fmt: skip
+
+
+class Commands(Mapping[str, ModuleType]):
+    """Modules of `alphacut.commands`, each imported when it is looked up.
+
+    Args:
+        names: Names of the commands, as a user writes them, to their names in `NAMES`.
+    """
+
+    def __init__(self, names: Mapping[str, str]) -> None:
+        self._names = dict(names)
+
+    def __getitem__(self, name: str) -> ModuleType:
+        return import_module(f"alphacut.commands.{self._names[name].replace('-', '_')}")
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def meant(self, arguments: Sequence[str]) -> Commands:
+        """The one that a command line begins with; all where it begins with none."""
+        own = {name: self._names[name] for name in arguments[:1] if name in self._names}
+        return Commands(own) if own else self
+
+
+COMMANDS = Commands({name: name for name in NAMES})
 STATUSES = """\
 exit status:
   0    done
@@ -107,11 +114,10 @@ def main(
     Returns:
         Exit status, see `STATUSES`.
     """
-    commands = (
-        COMMANDS if names is None else {here: COMMANDS[there] for here, there in names.items()}
-    )
+    options = argparse.Namespace(command="")
     try:
         ours, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
+        commands = (COMMANDS if names is None else Commands(names)).meant(ours)
         top, made = parsers(program, commands)
         options, left = top.parse_known_args(ours)
         if left:
@@ -128,7 +134,7 @@ def main(
         say(str(error))
         return 2
     except KeyboardInterrupt:
-        say("interrupted; what was finished is kept, and the same command goes on from there")
+        say(f"interrupted; {interrupted(options)}")
         return 130
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
@@ -138,6 +144,26 @@ def main(
         return 3
     except (RuntimeError, ValueError, ArithmeticError, OSError, MemoryError, ImportError) as error:
         return failed(error)
+
+
+def leave(status: int) -> NoReturn:
+    """End the program; its memory is not taken apart first, 0.1 s once DOLFINx is loaded."""
+    if threading.active_count() > 1 or launched():  # waited for, or waiting for it
+        sys.exit(status)
+    try:
+        atexit._run_exitfuncs()  # as multiprocessing does
+        sys.stdout.flush()
+        sys.stderr.flush()
+    except OSError:
+        sys.exit(status)
+    os._exit(status)
+
+
+def interrupted(options: argparse.Namespace) -> str:
+    """What is left of the work of a command that was interrupted."""
+    if options.command == "envelope" and not options.out:
+        return "without --out nothing is kept"
+    return "what was finished is kept, and the same command goes on from there"
 
 
 def failed(error: Exception) -> int:

@@ -1,8 +1,6 @@
 """``python -m frame envelope CASE``: fuzzy forward dynamics; the same as ``alphacut envelope``."""
 
-import sys
-
-from alphacut.entry import main
+from alphacut.entry import leave, main
 
 if __name__ == "__main__":
-    sys.exit(main(program=f"python -m {__package__}", names={"envelope": "envelope"}))
+    leave(main(program=f"python -m {__package__}", names={"envelope": "envelope"}))

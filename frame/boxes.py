@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.calculus.numbers import require_numbers
 from alphacut.frame.dynamics.flow import Flow
+from alphacut.frame.modal.kept import Kept
 from alphacut.frame.outputs import output_unit
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arguments import fuzzy_inputs
@@ -51,6 +52,16 @@ class Boxes:
             or (np.diff(self.alpha) <= 0).any()
         ):
             raise ValueError(f"alpha: {[float(a) for a in self.alpha]} must rise within [0, 1]")
+
+    def distinct(self) -> tuple[Boxes, Array]:
+        """The boxes without those that repeat the one below, and which of them each level has.
+
+        Intervals have the same cut at every level, which need be searched once.
+        """
+        both = np.concatenate([self.lower, self.upper], 1)
+        new = np.append(True, (np.diff(both, axis=0) != 0).any(1))
+        kept = replace(self, alpha=self.alpha[new], lower=self.lower[new], upper=self.upper[new])
+        return kept, np.cumsum(new) - 1
 
     @property
     def centre(self) -> Array:
@@ -123,11 +134,13 @@ class UnitFlow:
         flow: The flow in physical parameters.
         boxes: The boxes; its names must be those of `flow`.
         relative: Whether tolerances are shares of each output's modal peak instead of lengths.
+        kept: Keeps parts of a search of modal intervening variables; None for nothing.
     """
 
     flow: Flow
     boxes: Boxes
     relative: bool = False
+    kept: Kept | None = None
 
     @property
     def time(self) -> Array:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.outputs import output_unit
+from alphacut.fuzzy.csv_table import write_csv
 from alphacut.fuzzy.drawing import draw_bands, new_axes
 from alphacut.fuzzy.html import html_table
 
@@ -182,6 +184,19 @@ class Envelope:
         axes.set_title(f"bounds {self.nature}", fontsize="medium")
         return axes
 
+    def on_levels(self, alpha: Array, which: Array) -> Envelope:
+        """The envelope on levels `alpha` (A,), each with the bounds of one of its own.
+
+        Args:
+            alpha: Levels, rising.
+            which: Place of each among the own levels, shape (A,).
+        """
+        by_level = ["lower", "upper", "lower_at", "upper_at", "error"]
+        by_level += ["inner_lower", "inner_upper", "proved_lower", "proved_upper"]
+        parts = {name: getattr(self, name) for name in by_level}
+        taken = {name: part[which] for name, part in parts.items() if part is not None}
+        return replace(self, alpha=alpha, **taken)
+
     @property
     def minimum(self) -> Array:
         """Least value over time, shape (A, m)."""
@@ -199,6 +214,31 @@ class Envelope:
         low = np.diff(self.lower, axis=0).min(initial=0.0)
         high = np.diff(self.upper, axis=0).max(initial=0.0)
         return float(max(-low, high, 0.0))
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write a CSV file with a row for each output, level and node.
+
+        Its columns are output, unit, alpha, time [s], lower, upper, error where there is one, then
+        for each parameter where the bounds are reached, in SI units: `NAME at lower`, `NAME at
+        upper`.
+
+        Args:
+            path: The file; one that is there is replaced.
+
+        Raises:
+            ValueError: It cannot be written there.
+        """
+        places = [f"{name} at {end}" for end in ("lower", "upper") for name in self.parameters]
+        bands = [self.lower, self.upper, *([] if self.error is None else [self.error])]
+        numbers = np.concatenate([np.stack(bands, axis=3), self.lower_at, self.upper_at], axis=3)
+        rows = (
+            (name, output_unit(name), float(alpha), float(time), *numbers[a, t, k].tolist())
+            for k, name in enumerate(self.outputs)
+            for a, alpha in enumerate(self.alpha)
+            for t, time in enumerate(self.time)
+        )
+        bounds = ("lower", "upper", "error")[: len(bands)]
+        write_csv(path, ("output", "unit", "alpha", "time [s]", *bounds, *places), rows)
 
     def to_dataset(self) -> xarray.Dataset:
         """The envelope as an xarray dataset with units; ready for NetCDF."""

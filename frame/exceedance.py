@@ -18,6 +18,7 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy.sets.given import positive
 
 LIMITS = 201
 """Limits for which the probability is computed besides."""
@@ -262,11 +263,9 @@ def _limits_of(
         if name not in system.outputs:
             known = ", ".join(system.outputs)
             raise ValueError(f"exceedance: there is no output '{name}'; known are {known}")
-        if both or not limit > 0:
-            raise ValueError(
-                f"exceedance: limit {limit:g} must be positive, and {sorted(both) or 'no input'}"
-                " cannot be both fuzzy and random"
-            )
+        positive(f"exceedance: the limit of {name}", limit)
+    if both:
+        raise ValueError(f"exceedance: {sorted(both)} cannot be both fuzzy and random")
     if not limits:
         raise ValueError("exceedance: there must be one limit at least")
     return np.array([*limits.values()], float), [system.outputs.index(name) for name in limits]

@@ -22,6 +22,7 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.judged import judged
 from alphacut.frame.methods.named import Method, named, options_of
 from alphacut.frame.methods.plan import Candidate, planned
+from alphacut.frame.modal.kept import Kept
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem, relative_to_ground
 from alphacut.frame.structures.storey import StoreyFrame
@@ -43,6 +44,7 @@ def envelope(
     integrator: str | Integrator | None = None,
     relative: bool = False,
     progress: Progress | None = None,
+    kept: Kept | None = None,
     **options: object,
 ) -> Envelope:
     """Lower and upper envelopes of the outputs of `model`.
@@ -62,6 +64,8 @@ def envelope(
         relative: Whether the method's tolerance is a share of each output's peak at the modal
             parameters, instead of a length in SI units.
         progress: Called with the fraction done.
+        kept: Keeps what a search of modal intervening variables has found so far, from which the
+            same call goes on; None for nothing.
         options: Options of the method, see below.
 
     Options, in SI units; a tolerance is in m, or in the unit of the first output where none is a
@@ -72,7 +76,8 @@ def envelope(
       3600).
     - modal: `tolerance` (of the polynomials of the modes, 1e-6), `budget` (most eigen-analyses,
       280), `seed`; `certify` (wanted gap between attained and proved bounds; none), then `boxes`
-      (most boxes for each bound, 4000) and `workers` (processes, 1).
+      (most boxes for each bound, 4000) and `workers` (processes, 1); `passes` (most independent
+      passes of the search, 8; 1 takes the least effort, for two digits).
     - improved-graph-follower: `tolerance` (promised gain worth a trajectory, 7e-5), `budget` (most
       trajectories, 5000), `spread` (first points on each level, 64), `batch` (computed together,
       32), `reach` (trust region, share of the box, 0.6), `order` (2), `contests`.
@@ -96,11 +101,14 @@ def envelope(
     if isinstance(model, StoreyFrame) and (moved := relative_to_ground(model)):
         arguments = {"duration": duration, "step": step, "alpha": alpha, "method": method}
         arguments |= {"integrator": integrator, "relative": relative, "progress": progress}
+        arguments |= {"kept": kept}
         still = envelope(absolute(model), inputs, **arguments, **options)  # type: ignore[arg-type]
         return shifted(still, model, moved)
-    method, way, over, scheme = _prepared(
+    method, way, asked, scheme = _prepared(
         model, inputs, duration, step, alpha, method, integrator, relative, options
     )
+    cuts, which = asked.boxes.distinct()
+    over = replace(asked, boxes=cuts, kept=kept)
     steps = step_error(over)
     found = with_step_error(way.run(over, progress), over, scheme, steps)
     if method.endswith("graph-follower"):
@@ -110,7 +118,7 @@ def envelope(
     found = replace(found, facts={**found.facts, "claim": claim}) if claim else found
     if method == "modal":
         warn_of_roughness(found)
-    return found
+    return found.on_levels(asked.boxes.alpha, which)
 
 
 def plan(
@@ -137,7 +145,7 @@ def plan(
     method, way, over, _ = _prepared(
         model, inputs, duration, step, alpha, method, integrator, relative, options
     )
-    return planned(method, way, over)
+    return planned(method, way, replace(over, boxes=over.boxes.distinct()[0]))
 
 
 def _prepared(

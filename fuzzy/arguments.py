@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterable, Mapping, Sequence
-from numbers import Real
 
 from alphacut.fuzzy.knowledge.joint import joined_once
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.fuzzy.sets.given import is_real
 from alphacut.fuzzy.sets.interaction import Interaction
 from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber
 
@@ -34,11 +34,12 @@ def fuzzy_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNu
 def _fuzzy(name: str, value: object) -> FuzzyNumber:
     if isinstance(value, FuzzyNumber):
         return value
-    if isinstance(value, Real):
-        return Crisp(float(value))
+    if is_real(value):
+        return Crisp(value)  # type: ignore[arg-type]
+    units = "; text with units is read by alphacut.io.quantity.fuzzy('[24, 25, 26] GPa', 'Pa')"
     raise ValueError(
         f"the input {name!r} is {value!r}; it must be a number or a fuzzy number such as"
-        " Triangular(24, 25, 26)"
+        f" Triangular(24, 25, 26){units if isinstance(value, str) else ''}"
     )
 
 

@@ -14,8 +14,14 @@ _BLUE = "#0072B2"
 
 
 def new_axes(axes: Axes | None) -> Axes:
-    """The given axes, or those of a new figure that a notebook shows."""
+    """The given axes, or those of a new figure that a notebook shows.
+
+    Raises:
+        ValueError: What is given is none.
+    """
     if axes is not None:
+        if not hasattr(axes, "fill_between"):
+            raise ValueError(f"the axes are {axes!r}; give Matplotlib's, or none for a new figure")
         return axes
     from matplotlib import pyplot
 
@@ -23,9 +29,15 @@ def new_axes(axes: Axes | None) -> Axes:
 
 
 def draw_membership(
-    axes: Axes, alpha: ArrayLike, lower: ArrayLike, upper: ArrayLike, *, name: str = ""
+    axes: Axes,
+    alpha: ArrayLike,
+    lower: ArrayLike,
+    upper: ArrayLike,
+    *,
+    name: str = "",
+    steps: bool = False,
 ) -> None:
-    """Draw the membership function through α-cuts, linear between them.
+    """Draw the membership function through α-cuts, from the lowest one up.
 
     Args:
         axes: Where to draw.
@@ -33,12 +45,14 @@ def draw_membership(
         lower: Lower ends of the cuts, shape (n,).
         upper: Upper ends of the cuts, shape (n,).
         name: Name in the legend; none if empty.
+        steps: Whether each cut is drawn up to the next level; else ends go straight between them.
     """
     grade, low, high = (np.asarray(ends, float) for ends in (alpha, lower, upper))
-    x = np.concatenate([low[:1], low, high[::-1], high[:1]])
-    y = np.concatenate([[0.0], grade, grade[::-1], [0.0]])
+    if steps:
+        grade, low, high = (np.repeat(grade, 2)[1:], *(np.repeat(x, 2)[:-1] for x in (low, high)))
+    x, y = np.concatenate([low, high[::-1]]), np.concatenate([grade, grade[::-1]])
     (line,) = axes.plot(x, y, linewidth=1.8, label=name or None)
-    axes.fill_between(x, y, color=line.get_color(), alpha=0.12, linewidth=0)
+    axes.fill(x, y, color=line.get_color(), alpha=0.12, linewidth=0)
     axes.set(ylabel="membership μ", ylim=(0, 1.08))
 
 

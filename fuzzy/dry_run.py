@@ -14,6 +14,7 @@ from alphacut.fuzzy.campaign.call import BATCH, Call, Function, named_point
 from alphacut.fuzzy.campaign.memory_check import needed
 from alphacut.fuzzy.campaign.sample_store import Shelf, shelf
 from alphacut.fuzzy.campaign.store import Identity, Store, Stored
+from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.plan import Plan
@@ -29,7 +30,7 @@ _SHOWN = 5
 _LISTED = 100_000  # samples that are listed at most where nothing is stored
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Explanation:
     """Samples that a campaign would run, with the reasons.
 
@@ -76,6 +77,15 @@ class Explanation:
                 *more,
             ]
         )
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        """The text with the first samples that would run as a table, for notebooks."""
+        names = [*self.missing[0]] if self.missing else []
+        rows = [[f"{x:.6g}" for x in point.values()] for point in self.missing[:_SHOWN]]
+        said = [line for line in str(self).splitlines() if not line.startswith("  would run ")]
+        return html_table(names, rows, below="\n".join(said))
 
 
 class _MissingError(Exception):
@@ -221,10 +231,8 @@ def _open_end(plan: Plan) -> str:
     """Remark on a plan that goes on from the values of its samples."""
     most = getattr(plan, "budget", None) or getattr(plan, "limit", None)
     kind = "budget" if hasattr(plan, "budget") else "limit"
-    return (
-        f"how many samples {type(plan).__name__} takes depends on the"
-        f" model{f' ({kind} {most:,})' if most else ''}; "
-    )
+    known = f"{kind} {most:,}" if most else "no budget: name one to bound them"
+    return f"how many samples {type(plan).__name__} takes depends on the model ({known}); "
 
 
 def _never(**_: float) -> float:

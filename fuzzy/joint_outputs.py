@@ -14,6 +14,7 @@ import numpy as np
 
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.plan import Plan
+from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.propagation import propagate
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.numbers import Array, FuzzyNumber
@@ -63,6 +64,7 @@ def joint_outputs(
     alpha: Sequence[float] | None = None,
     known: Known | None = None,
     vectorised: bool = False,
+    progress: Progress | bool | None = None,
 ) -> JointOutputs:
     """Hulls of a function's two outputs.
 
@@ -75,6 +77,7 @@ def joint_outputs(
         alpha: Levels, as for `propagate`.
         known: Facts about the function's combinations, as for `propagate`.
         vectorised: Whether the function takes arrays.
+        progress: As for `propagate`.
 
     Raises:
         ValueError: There are fewer than two directions.
@@ -82,7 +85,9 @@ def joint_outputs(
     if directions < 2:
         raise ValueError(f"there is {directions} direction; a hull needs two or more")
     turned = Turned(function, directions)
-    found = propagate(turned, inputs, plan, alpha=alpha, known=known, vectorised=vectorised)
+    found = propagate(
+        turned, inputs, plan, alpha=alpha, known=known, vectorised=vectorised, progress=progress
+    )
     unit = _directions(directions)
     outer, inner = [], []
     for level in range(len(found.domain.alpha)):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
@@ -18,7 +18,7 @@ from alphacut.fuzzy.arguments import (
     shared_numbers,
 )
 from alphacut.fuzzy.campaign.call import Call, Function
-from alphacut.fuzzy.campaign.campaign import Campaign, Progress
+from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.campaign.sample_store import shelf
 from alphacut.fuzzy.campaign.spot_check import SpotCheck
 from alphacut.fuzzy.campaign.store import Identity, Store
@@ -26,6 +26,7 @@ from alphacut.fuzzy.campaign.workers import pool, require_executor, require_work
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.plan import Plan
+from alphacut.fuzzy.progress_bar import Progress, told
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain, levels
 from alphacut.fuzzy.sets.interaction import Interaction
@@ -47,7 +48,7 @@ def propagate(
     store: Store | str | Path | None = None,
     identity: Identity | None = None,
     spot_check: float = 0.05,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> FuzzyResult:
     """Fuzzy outputs of a function of fuzzy inputs.
 
@@ -78,10 +79,13 @@ def propagate(
         spot_check: Time for running samples from the store again, as a share of the time that they
             took: the modal point (or another, if it is not stored) in any case, then random ones.
             The store is refused if one gives something else; 0 runs none.
-        progress: Called with the share done, 0 … 1.
+        progress: Called with the share done, 0 … 1; of a plan that goes on from its samples a
+            guess that never falls. If not given, a bar appears on a terminal or in a notebook after
+            a second; False shows none.
 
     Raises:
         ValueError: An argument is wrong.
+        KeyboardInterrupt: Interrupted; its message says what the store keeps.
         CampaignError: Samples failed; the others were run first.
         StoreError: The store cannot be written.
         RuntimeError: The workers cannot start.
@@ -98,17 +102,34 @@ def propagate(
     call = Call(function, domain.names, tuple(shared), vectorised)
     start = perf_counter()
     with (
+        told(progress) as tell,
         nullcontext(executor) if executor else pool(workers) as running,
         shelf(store, identity, domain.names) as samples,
     ):
         check = SpotCheck(spot_check, domain.modal)
         campaign = Campaign(
-            call, running, progress, known, samples, stepwise=plan.stepwise, spot_check=check
+            call, running, tell, known, samples, stepwise=plan.stepwise, spot_check=check
         )
-        result = plan.run(campaign, domain)
+        with kept_on_interrupt(campaign, store):
+            result = plan.run(campaign, domain)
         result = result.confronted(known.stated(domain.names, result.outputs))
         campaign.report(1.0)
     result = replace(result, notes=(*result.notes, *shared_numbers(domain)))
     return result.charged(
         calls=campaign.calls, reused=campaign.reused, seconds=perf_counter() - start
     )
+
+
+@contextmanager
+def kept_on_interrupt(campaign: Campaign, store: Store | str | Path | None) -> Iterator[None]:
+    """Say on Ctrl-C how many samples are kept, and how to go on."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        done = campaign.runs + campaign.reused
+        if store is None:
+            cure = f"{done} samples were done and none is kept: `propagate` keeps them in a store="
+        else:
+            path = store.path if isinstance(store, Store) else store
+            cure = f"{done} samples are kept in {path}: the same call goes on from there"
+        raise KeyboardInterrupt(f"interrupted; {cure}") from None

@@ -89,6 +89,8 @@ class RandomResponse:
     def _below(self, at: ArrayLike) -> Array:
         """Probability of a response up to `at` (m,) at every sample, shape (n, m)."""
         responses = np.atleast_1d(np.asarray(at, float))
+        if not np.isfinite(responses).all():
+            raise ValueError(f"the responses are {responses.tolist()}; all must be finite")
         return np.array([_share_below(row, responses) for row in self.ordered])
 
     def _bounds(self, name: str, table: Array) -> FuzzyResult:

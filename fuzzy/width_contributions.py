@@ -7,12 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alphacut.fuzzy.html import html_table
+from alphacut.fuzzy.progress_bar import Progress, told
 from alphacut.fuzzy.sets.numbers import Array, Crisp, FuzzyNumber
 
 Bounds = Callable[[Mapping[str, FuzzyNumber]], tuple[Array, Array]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Shares:
     """Effect of each input, or group of inputs, on the width of a fuzzy result.
 
@@ -35,12 +37,36 @@ class Shares:
         )
         return share
 
+    def __str__(self) -> str:
+        """A line for each input or group, the least and the greatest share over all widths."""
+        return "\n".join(
+            ["share of the width lost where one is fixed at its modal value:"]
+            + [f"  {name}: {words}" for name, words in self._told()]
+        )
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        """The shares as a table, for notebooks."""
+        return html_table(("input", "share of the width lost"), self._told())
+
+    def _told(self) -> list[tuple[str, str]]:
+        rows = 100 * self.share.reshape(len(self.names), -1)
+        ends = zip(
+            self.names, rows.min(1, initial=np.inf), rows.max(1, initial=-np.inf), strict=True
+        )
+        return [
+            (name, f"{low:.3g} %" if low == high else f"{low:.3g} … {high:.3g} %")
+            for name, low, high in ends
+        ]
+
 
 def width_shares(
     bounds: Bounds,
     inputs: Mapping[str, FuzzyNumber],
     *,
     groups: Mapping[str, Sequence[str]] | None = None,
+    progress: Progress | bool | None = None,
 ) -> Shares:
     """Run a propagation with all inputs fuzzy and again with each fixed.
 
@@ -50,9 +76,10 @@ def width_shares(
         inputs: The fuzzy inputs.
         groups: Names of inputs that are fixed together, by the name of their group; each input by
             itself if not given.
+        progress: As for `propagate`, after each propagation.
 
     Raises:
-        ValueError: A group names no input.
+        ValueError: A group names no input, or a propagation gives no two arrays.
     """
     chosen = (
         {name: tuple(members) for name, members in groups.items()}
@@ -66,13 +93,27 @@ def width_shares(
         )
 
     def width(fuzzy: Mapping[str, FuzzyNumber]) -> Array:
-        lower, upper = bounds(fuzzy)
-        difference: Array = np.asarray(upper, float) - np.asarray(lower, float)
+        found = bounds(fuzzy)
+        if not isinstance(found, Sequence | np.ndarray) or len(found) != 2:
+            raise ValueError(
+                f"the propagation returned {found!r}; it must return lower and upper ends, two"
+                " arrays, as result.bounds() does"
+            )
+        difference: Array = np.asarray(found[1], float) - np.asarray(found[0], float)
         return difference
 
-    whole = width(inputs)
-    fixed = [
-        {**inputs, **{member: Crisp(inputs[member].modal) for member in members}}
-        for members in chosen.values()
+    sets: list[dict[str, FuzzyNumber]] = [
+        dict(inputs),
+        *(
+            {**inputs, **{member: Crisp(inputs[member].modal) for member in members}}
+            for members in chosen.values()
+        ),
     ]
-    return Shares(tuple(chosen), whole, np.array([whole - width(kept) for kept in fixed]))
+    widths = []
+    with told(progress) as tell:
+        for kept in sets:
+            widths.append(width(kept))
+            if tell:
+                tell(len(widths) / len(sets))
+    whole, *narrower = widths
+    return Shares(tuple(chosen), whole, np.array([whole - one for one in narrower]))

@@ -1,9 +1,7 @@
 """``python -m rve solve CASE`` is ``alphacut cell``, ``python -m rve image CASE`` its ``image``."""
 
-import sys
-
-from alphacut.entry import main
+from alphacut.entry import leave, main
 
 if __name__ == "__main__":
     names = {"solve": "cell", "image": "image"}
-    sys.exit(main(program=f"python -m {__package__}", names=names))
+    leave(main(program=f"python -m {__package__}", names=names))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 
@@ -32,6 +33,12 @@ class Phase:
     poisson: float = 0.3
 
     def __post_init__(self) -> None:
+        for what, value in (("Young's modulus", self.modulus), ("Poisson's ratio", self.poisson)):
+            if not isinstance(value, Real) or isinstance(value, bool):
+                raise ValueError(
+                    f"{what} is {value!r}; a phase takes plain numbers, in Pa: a fuzzy one is an"
+                    " input of fuzzy.propagate, and each sample makes its own phase"
+                )
         if not (np.isfinite(self.modulus) and self.modulus > 0):
             raise ValueError(
                 f"Young's modulus is {self.modulus:g} Pa; it must be positive and finite"

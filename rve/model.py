@@ -19,6 +19,8 @@ MODELS = {  # name → module and class; imported when asked for, so that none i
     "auto": ("alphacut.rve.auto.model", "AutoModel"),
 }
 
+SPHERES = "alphacut.rve.spheres.series.model.SphereSeriesModel(), its solve takes the same"
+
 
 class Model(Protocol):
     """A way to homogenise the cell; a frozen dataclass of its resolution."""
@@ -45,7 +47,8 @@ def named(name: str, **options: object) -> Model:
         ValueError: No such model, no such option of it, or a value out of range.
     """
     if name not in MODELS:
-        raise ValueError(f"the model is {name!r}; known models are {', '.join(MODELS)}")
+        ball = f"; spheres are solved by {SPHERES}" if "sphere" in str(name) else ""
+        raise ValueError(f"the model is {name!r}; known models are {', '.join(MODELS)}{ball}")
     module, cls = MODELS[name]
     maker = getattr(import_module(module), cls)
     unknown = sorted(set(options) - set(maker.__dataclass_fields__))
@@ -53,6 +56,7 @@ def named(name: str, **options: object) -> Model:
         allowed = ", ".join(maker.__dataclass_fields__)
         raise ValueError(
             f"the model {name} has no option {unknown[0]!r}; its options are {allowed}"
+            + (f"; spheres are solved by {SPHERES}" if unknown[0] == "particles" else "")
         )
     model: Model = maker(**options)
     return model

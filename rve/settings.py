@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from alphacut.rve.cell import Phase
+
 HALVES = "in halves of the cell's side"
 
 
@@ -48,3 +52,21 @@ def require_accuracy(value: float, least: float, what: str) -> None:
     """
     if not least <= value <= 0.1:
         raise ValueError(f"the {what} is {value:g}; it must lie in [{least:g}, 0.1]")
+
+
+def require_parts(radius_map: object, matrix: object, inclusions: object) -> None:
+    """Refuse what a model cannot solve for: the parts in another order, or no row of inclusions.
+
+    Raises:
+        ValueError: The first is no radius map, the second no phase, or the third no row of phases,
+            one at least.
+    """
+    row = inclusions if isinstance(inclusions, Sequence) else ()
+    right = callable(radius_map) and hasattr(radius_map, "distribution")
+    if not (right and isinstance(matrix, Phase) and row and all(isinstance(x, Phase) for x in row)):
+        got = ", ".join(type(part).__name__ for part in (radius_map, matrix, inclusions))
+        raise ValueError(
+            f"solve got {got}{' (empty)' if inclusions in ([], ()) else ''}; it takes the radius"
+            " map, the matrix's phase, and a list of the inclusions' phases, as"
+            " solve(radius, Phase(3e9), [Phase(70e9)])"
+        )

@@ -1,4 +1,4 @@
-"""The map θ ↦ r(θ) of a truncated normal to the reduced particle radius (paper, eq. 12).
+"""The map θ ↦ r(θ) of the random variable θ to the reduced particle radius (paper, eq. 12).
 
 This differs from the paper in: 1. The Hermite functions take ξ = (θ − lower)/(upper − lower) ∈ [0,
 1] and not θ itself; the slopes a2, a4 are not rescaled. 2. The radius is bounded by the square
@@ -7,24 +7,61 @@ cell, r < 1, and not by √(π/4).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from numbers import Real
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from alphacut.stochastic.theta.truncated_normal import Array, TruncatedNormal
+from alphacut.stochastic.theta.law import Array, ThetaLaw, require_support
+from alphacut.stochastic.theta.truncated_normal import TruncatedNormal
+
+Kind = Literal["hermite", "linear", "exponential"]
+KINDS: tuple[str, ...] = get_args(Kind)
 
 
 class RadiusMap(Protocol):
-    """Random radius of the cell problem: its law and the map from θ."""
+    """Random radius of the cell problem: the law of θ and the map from θ.
+
+    Any object with these two will do; `require_map` is what every model of the cell asks of it.
+    """
 
     @property
-    def distribution(self) -> TruncatedNormal:
+    def distribution(self) -> ThetaLaw:
         """Law of θ."""
 
     def __call__(self, theta: ArrayLike) -> Array:
         """Radius over half the cell's side, in (0, 1), at `theta` (any shape)."""
+
+
+def require_map(radius_map: RadiusMap) -> None:
+    """Refuse a law without a support, and radii outside (0, 1) at any of 65 places over θ.
+
+    Raises:
+        ValueError: The map or its law is refused.
+    """
+    law = radius_map.distribution
+    require_support(law.lower, law.upper)
+    theta = np.linspace(law.lower, law.upper, 65)
+    radii = np.asarray(radius_map(theta), float)
+    if radii.shape != theta.shape:
+        raise ValueError(
+            f"the radius map returns the shape {radii.shape} for θ of the shape {theta.shape}; it"
+            " must return a radius for each θ"
+        )
+    if not ((radii > 0) & (radii < 1)).all():
+        place = int(np.argmin((radii > 0) & (radii < 1)))
+        raise ValueError(
+            f"the radius map gives r = {radii[place]:.4g} at θ = {theta[place]:.4g}; radii must"
+            " stay inside (0, 1), in halves of the cell's side"
+        )
+
+
+def _xi(law: ThetaLaw, theta: ArrayLike) -> Array:
+    """θ carried to [0, 1]."""
+    return np.asarray((np.asarray(theta, float) - law.lower) / (law.upper - law.lower))
 
 
 @dataclass(frozen=True)
@@ -46,10 +83,16 @@ class HermiteMap:
     a2: float
     a3: float
     a4: float
-    distribution: TruncatedNormal = field(default_factory=TruncatedNormal)
+    distribution: ThetaLaw = field(default_factory=TruncatedNormal)
 
     def __post_init__(self) -> None:
-        finite = bool(np.isfinite([self.a1, self.a2, self.a3, self.a4]).all())
+        given = (self.a1, self.a2, self.a3, self.a4)
+        if not all(isinstance(value, Real) for value in given):
+            raise ValueError(
+                f"the radius map has a1, a2, a3, a4 = {', '.join(map(repr, given))}; each must be a"
+                " plain number"
+            )
+        finite = bool(np.isfinite(given).all())
         low, high = self.extremes() if finite else (np.nan, np.nan)
         if not (low > 0 and high < 1):  # also catches nan
             raise ValueError(
@@ -66,8 +109,7 @@ class HermiteMap:
 
     def xi(self, theta: ArrayLike) -> Array:
         """θ carried to [0, 1]."""
-        law = self.distribution
-        return (np.asarray(theta, float) - law.lower) / (law.upper - law.lower)
+        return _xi(self.distribution, theta)
 
     def __call__(self, theta: ArrayLike) -> Array:
         """Reduced radius at `theta`, any shape."""
@@ -97,3 +139,73 @@ class HermiteMap:
             b + 2 * c * x + 3 * d * x * x for x in (0.0, 1.0, *(x for x in turning if 0 < x < 1))
         ]
         return bool(min(lowest) >= 0)
+
+
+@dataclass(frozen=True)
+class ExponentialMap:
+    """Map r(θ) = a1 (a3/a1)^ξ, ξ ∈ [0, 1]: eq. 11 between two radii.
+
+    Of the truncated normal θ the radius is log-normal, truncated.
+
+    Args:
+        a1: Radius at the lower end of θ, in (0, 1) (radius over half the side of the cell).
+        a3: Radius at the upper end, in (0, 1).
+        distribution: Law of θ.
+
+    Raises:
+        ValueError: A radius lies outside (0, 1).
+    """
+
+    a1: float
+    a3: float
+    distribution: ThetaLaw = field(default_factory=TruncatedNormal)
+
+    def __post_init__(self) -> None:
+        for name, radius in (("a1", self.a1), ("a3", self.a3)):
+            if not 0 < radius < 1:
+                raise ValueError(
+                    f"the radius {name} of the exponential map is {radius:g}; it must lie inside"
+                    " (0, 1), in halves of the cell's side"
+                )
+
+    def __call__(self, theta: ArrayLike) -> Array:
+        """Reduced radius at `theta`, any shape."""
+        xi = _xi(self.distribution, theta)
+        return np.asarray(self.a1 * (self.a3 / self.a1) ** xi)  # eq. 11
+
+    def extremes(self) -> tuple[float, float]:
+        """Least and greatest radius on the support."""
+        return min(self.a1, self.a3), max(self.a1, self.a3)
+
+
+CaseMap = HermiteMap | ExponentialMap
+
+
+@dataclass(frozen=True)
+class MapFamily:
+    """Radius maps of one kind under one law of θ.
+
+    Args:
+        kind: hermite (eq. 12), linear, its case of both slopes a3 − a1, or exponential.
+        law: Law of θ.
+    """
+
+    kind: Kind = "hermite"
+    law: ThetaLaw = field(default_factory=TruncatedNormal)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its parameters."""
+        return ("a1", "a2", "a3", "a4") if self.kind == "hermite" else ("a1", "a3")
+
+    def __call__(self, values: Mapping[str, float]) -> CaseMap:
+        """The map with the parameters `names` of some values, dimensionless.
+
+        Raises:
+            ValueError: Its radii leave (0, 1).
+        """
+        a1, a3 = values["a1"], values["a3"]
+        if self.kind == "exponential":
+            return ExponentialMap(a1, a3, self.law)
+        slopes = (a3 - a1, a3 - a1) if self.kind == "linear" else (values["a2"], values["a4"])
+        return HermiteMap(a1, slopes[0], a3, slopes[1], self.law)

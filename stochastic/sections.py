@@ -30,12 +30,14 @@ class Section:
         whole: Cells that count, and their weights.
         rejected: What was left out of measured data: row or label to reason.
         phase_fraction: Area fraction of the particles in the image that was read, if one was.
+        misfit: Share of the particles' pixels outside the circles that stand for them.
     """
 
     diagram: Apollonius
     whole: WholeCells
     rejected: dict[int, str] = field(default_factory=dict)
     phase_fraction: float | None = None
+    misfit: float = 0.0
 
     @property
     def discs(self) -> Discs:
@@ -96,7 +98,9 @@ class Measured:
         """The section with its cells; `seed` and `executor` do nothing here."""
         circles = self.file.read()
         section = replace(
-            _section(circles.discs, circles.rejected), phase_fraction=circles.phase_fraction
+            _section(circles.discs, circles.rejected),
+            phase_fraction=circles.phase_fraction,
+            misfit=circles.misfit,
         )
         if progress:
             progress(1.0)

@@ -29,6 +29,7 @@ HEAVY = {
     "sklearn",
     "skimage",
     "rich",
+    "scipy.stats",
 }
 SECONDS = 0.8  # of processor time in a fresh interpreter; most of it is that of NumPy and SciPy
 

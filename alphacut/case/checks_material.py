@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from alphacut.case.case import Case
 from alphacut.case.sections.material import SPHERE_METHODS
 from alphacut.case.sections.particles import PackedSpheres, Packing
 from alphacut.io.problem import Problem
-from alphacut.stochastic import HermiteMap, TruncatedNormal
+from alphacut.stochastic import HermiteMap
+from alphacut.stochastic.radius_map import MapFamily
 
 WIDEST = 20  # ratio of radii behind circles
 
@@ -125,7 +126,10 @@ def sizes(case: Case, source: str, packing: Packing | PackedSpheres) -> Iterator
 
 
 def radius(case: Case, alpha: float) -> Iterator[Problem]:
-    """r(θ) stays inside (0, 1) in every corner of the α-cuts; r is linear in a1 … a4."""
+    """r(θ) stays inside (0, 1) in every corner of the α-cuts.
+
+    The map is linear in a1 … a4, and the exponential one rises in both of its radii.
+    """
     theta = case.radius.theta
     if len(theta) != 2 or not theta[0] < theta[1]:
         yield Problem(
@@ -135,17 +139,53 @@ def radius(case: Case, alpha: float) -> Iterator[Problem]:
             "for example [-3, 3]",
         )
         return
-    law = TruncatedNormal(*theta)
+    if problems := [*radius_keys(case)]:
+        yield from problems
+        return
+    try:
+        family = case.radius.family
+    except ValueError as error:
+        yield Problem("radius.theta", str(error), str(list(theta)), "for example [-3, 3]")
+        return
+    numbers = case.radius.numbers
     for corner in itertools.product(
-        *(sorted(set(number.cut(alpha))) for number in case.radius.slopes)
+        *(sorted(set(number.cut(alpha))) for number in numbers.values())
     ):
-        a1, a2, a3, a4 = corner
+        values = dict(zip(numbers, corner, strict=True))
         try:
-            HermiteMap(a1, a2, a3, a4, law)
+            family(values)
         except ValueError as error:
-            key = guilty(corner)
+            key = guilty(family, values)
             yield Problem(f"radius.{key}", str(error), str(case.written.get(f"radius.{key}", "")))
             return
+
+
+def radius_keys(case: Case) -> Iterator[Problem]:
+    """The law and the map have the keys that they need, and no others."""
+    given = case.radius
+    for name in ("a2", "a4"):
+        if given.map != "hermite" and case.asked(f"radius.{name}"):
+            yield Problem(
+                f"radius.{name}",
+                f"map {given.map} has no such slope",
+                str(case.written[f"radius.{name}"]),
+                'radius.map = "hermite" beside it',
+            )
+    exponents = given.exponents
+    if given.law == "beta" and (exponents is None or len(exponents) != 2):
+        yield Problem(
+            "radius.exponents",
+            "law beta needs its two exponents",
+            "" if exponents is None else str(list(exponents)),
+            "for example [2, 5]",
+        )
+    elif given.law != "beta" and exponents is not None:
+        yield Problem(
+            "radius.exponents",
+            f"law {given.law} has no exponents",
+            str(list(exponents)),
+            'radius.law = "beta" beside them',
+        )
 
 
 def sphere_model(case: Case) -> Iterator[Problem]:
@@ -183,9 +223,15 @@ def one_shape(case: Case) -> Iterator[Problem]:
         )
 
 
-def guilty(corner: tuple[float, ...]) -> str:
-    """Slope to name when r(θ) leaves (0, 1): the one whose change cures it, else the steeper."""
-    a1, a2, a3, a4 = corner
+def guilty(family: MapFamily, values: Mapping[str, float]) -> str:
+    """Parameter to name when r(θ) leaves (0, 1).
+
+    The slope whose change cures it, else the steeper one; without slopes the first such radius.
+    """
+    a1, a3 = values["a1"], values["a3"]
+    if family.kind != "hermite":
+        return "a1" if not 0 < a1 < 1 else "a3"
+    a2, a4 = values["a2"], values["a4"]
     tame = a3 - a1
     for name, slope2, slope4 in (("a2", tame, a4), ("a4", a2, tame)):
         try:

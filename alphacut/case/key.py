@@ -69,6 +69,8 @@ class Key:
         allowed: Range of every number in it.
         alone: Whether an array's one entry may stand without brackets, for all of its places.
         file: Whether it names a file.
+        beside: Another key of the section and its value, with which the section cannot do without
+            this one.
         of_inputs: Whether it names inputs of a structure, which their keys may stand for.
         kind: ``fuzzy`` a crisp or fuzzy quantity, ``number`` a crisp one, ``fuzzy list`` and
             ``numbers`` arrays of them, ``integer``, ``text``, ``choice``, ``choices`` (an array of
@@ -83,6 +85,7 @@ class Key:
     allowed: Range | None = None
     alone: bool = False
     file: bool = False
+    beside: tuple[str, str] | None = None
     of_inputs: bool = False
     kind: str = ""
     choices: tuple[str, ...] = ()

@@ -22,9 +22,54 @@ def exceeded_limits(case: Case) -> dict[str, float]:
     return {given.output: limit_in(case, "exceedance.limit", given.output, given.limit)}
 
 
-def limits_of(case: Case) -> dict[str, float]:
-    """The limits of [decision] by output, as `limits_in`."""
-    return limits_in(case, "decision.limits", case.decision.limits)
+@dataclass(frozen=True)
+class Limit:
+    """Largest magnitude allowed of an output.
+
+    Args:
+        output: Of the structure.
+        value: In the SI unit of the output.
+        name: The output, or the limit as it is written where the output has several.
+    """
+
+    output: str
+    value: float
+    name: str
+
+
+def limits_of(case: Case) -> tuple[Limit, ...]:
+    """The limits of [decision], one or several for each output.
+
+    Raises:
+        BadInput: One is no sentence such as "drift1 <= 40 mm", or is there twice.
+    """
+    key = "decision.limits"
+    parts = [limit_parts(case, key, text) for text in case.decision.limits]
+    outputs = [output for output, _ in parts]
+    found = tuple(
+        Limit(
+            output,
+            limit_in(case, key, output, text),
+            output if outputs.count(output) == 1 else f"{output} <= {text}",
+        )
+        for output, text in parts
+    )
+    if len({(one.output, one.value) for one in found}) < len(found):
+        raise case.refuse(key, "a limit is there twice", "each once")
+    return found
+
+
+def limit_parts(case: Case, key: str, text: str) -> tuple[str, str]:
+    """Output and quantity of a limit.
+
+    Raises:
+        BadInput: It is no sentence such as "drift1 <= 40 mm".
+    """
+    name, bound, limit = (part.strip() for part in text.partition("<="))
+    if not bound or not re.fullmatch(r"\w+", name):
+        what = f"'{text}' is no limit"
+        raise case.refuse(key, what, "an output, <= and a quantity, as 'drift1 <= 40 mm'")
+    return name, limit
 
 
 def limits_in(case: Case, key: str, texts: Sequence[str]) -> dict[str, float]:
@@ -35,12 +80,10 @@ def limits_in(case: Case, key: str, texts: Sequence[str]) -> dict[str, float]:
     """
     found: dict[str, float] = {}
     for text in texts:
-        name, bound, limit = (part.strip() for part in text.partition("<="))
-        if not bound or not re.fullmatch(r"\w+", name):
-            what = f"'{text}' is no limit"
-            raise case.refuse(key, what, "an output, <= and a quantity, as 'drift1 <= 40 mm'")
+        name, limit = limit_parts(case, key, text)
         if name in found:
-            raise case.refuse(key, f"{name} has two limits", "one for each output")
+            allowed = "one for each output; [decision] takes several"
+            raise case.refuse(key, f"{name} has two limits", allowed)
         found[name] = limit_in(case, key, name, limit)
     return found
 
@@ -167,7 +210,7 @@ def decision(case: Case) -> Iterator[Problem]:
         return
     try:
         known = frame_outputs(len(case.frame.masses))
-        limits = limits_of(case)
+        limits = list(dict.fromkeys(one.output for one in limits_of(case)))
         yield from unknown("decision.limits", limits, known)
         for name in limits if case.frame.accelerogram else ():
             if name.startswith("ar"):

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from alphacut.case.case import Case, Sections
 from alphacut.case.checks import checks
-from alphacut.case.key import Section, UnknownValueError, keys_of
+from alphacut.case.key import Key, Section, UnknownValueError, keys_of
 from alphacut.case.overrides import Raw, apply_changes, table_of
 from alphacut.case.schema import IMPLIED, SECTIONS, dotted, every_key
 from alphacut.case.sections.material import Cell, Mesh, Modulus, Radius, Response
@@ -193,16 +193,12 @@ def checked_section(
     written: dict[str, object],
 ) -> Iterator[Problem]:
     """Check the keys of one table, and that none is missing."""
-    needed = not any(key in table for key in section.unless)
+    needed = required_keys(section, table)
     strangers = [
         unknown(key, name, value) for key, value in table.items() if key not in keys_of(section)
     ]
     if len(strangers) == 1 and not strangers[0].nearest:
-        missing = [
-            key
-            for key, entry in keys_of(section).items()
-            if entry.required and needed and key not in table
-        ]
+        missing = [key for key in needed if key not in table]
         strangers = [replace(strangers[0], nearest=missing[0])] if len(missing) == 1 else strangers
     yield from strangers
     # a misspelt key is one problem, not a missing one besides
@@ -211,7 +207,7 @@ def checked_section(
     for key, entry in keys_of(section).items():
         full = dotted(name, key)
         if key not in table:
-            if entry.required and needed and key not in meant:
+            if key in needed and key not in meant:
                 yield Problem(full, f"missing: {entry.about}", allowed=allowed(entry))
             if not entry.required:
                 values[key] = entry.default
@@ -227,6 +223,20 @@ def checked_section(
                 unfit.allowed or allowed(entry),
                 unfit.nearest,
             )
+
+
+def required_keys(section: type[Section], table: Mapping[str, object]) -> list[str]:
+    """Names of the keys that a section with these keys cannot do without."""
+    keys = keys_of(section)
+    lifted = any(key in table for key in section.unless)
+
+    def required(entry: Key) -> bool:
+        if entry.beside is None:
+            return entry.required and not lifted
+        other, value = entry.beside
+        return table.get(other, keys[other].default) == value
+
+    return [name for name, entry in keys.items() if required(entry)]
 
 
 def unknown(key: str, section: str, value: object) -> Problem:

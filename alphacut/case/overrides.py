@@ -129,7 +129,7 @@ def toml_or_text(value: str, key: Key) -> object:
     ):
         return found  # one for all
     if key.kind in ARRAYS and not isinstance(found, list):
-        inner = value.strip()
+        inner = found if isinstance(found, str) else value.strip()
         inner = inner[1:-1] if inner.startswith("[") and inner.endswith("]") else inner
         items = [item.strip() for item in inner.split(",") if item.strip()]
         plain = key.kind == "numbers" and not key.unit

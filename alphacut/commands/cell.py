@@ -35,7 +35,7 @@ from alphacut.rve.result import Homogenised, error_of_means
 from alphacut.rve.spheres.result import HomogenisedSpheres
 from alphacut.stages.contract import contract, keep_modulus, require_choice
 from alphacut.stages.material import cell, spheres
-from alphacut.stages.material.cell_models import cell_model
+from alphacut.stages.material.cell_models import cell_model, started
 from alphacut.stages.material.references import beside, text_of
 
 ABOUT = "homogenise the cell at crisp values; a fuzzy input takes its modal value"
@@ -117,7 +117,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     if pair:
         result, difference = compared(case, choice, pair)
     else:
-        result, difference = cell.solve(case, cell_model(choice)), None
+        with started(case, choice) as model:
+            result, difference = cell.solve(case, model), None
         keep_modulus(case, result.method, result.error, best_effort=options.best_effort)
     if options.export:
         export(result, options.export)
@@ -125,7 +126,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     found["model"] = choice.words
     found["tolerance"] = contract(case, sum(result.error.values()) if result.error else None)
     particles = case.cell.particles
-    ratio = cell.anisotropy(*cell.parts(cell.modal_values(case), case.radius.theta), particles)
+    ratio = cell.anisotropy(*cell.modal_parts(case), particles)
     found |= beside(case, result.modulus, result.poisson, ratio and ratio[0])
     if answer(options, found, out, summary(result)):
         out.write(agreement(pair, difference, allowed_difference(case)))

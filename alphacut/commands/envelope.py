@@ -6,6 +6,7 @@ import argparse
 import re
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
@@ -29,10 +30,12 @@ from alphacut.commands.options import (
     refuse_beside,
 )
 from alphacut.io.files import Document
+from alphacut.io.kept_arrays import KeptArrays
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import progress
 from alphacut.io.provenance import fingerprint
 from alphacut.io.units import engineering, largest_by_unit
+from alphacut.stages import width_shares
 from alphacut.stages.contract import require_choice
 from alphacut.stages.material.modulus import stand_in
 from alphacut.stages.vibration import envelope
@@ -94,8 +97,14 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     if options.explain:
         refuse_beside(options, "--explain", UNEXPLAINED)
         plan = envelope.explain(wanted, task)
+        plan += width_shares.explained(wanted, task) if case.envelope.shares else []
         answer(options, {"plan": plan}, out, "".join(f"{line}\n" for line in plan))
         return 0
+    content = {"case": case.sections, "task": task, "modulus": handed}
+    content["files"] = case.digests(*case.sections.files)
+    key = fingerprint(content, ("fuzzy", "frame"))
+    beside = options.out and Path(options.out).with_suffix(".partial.npz")
+    kept = KeptArrays(beside, key) if beside else None
     with progress("Envelopes", quiet=options.quiet) as tick:
         found = envelope.compute(
             wanted,
@@ -103,14 +112,13 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
             strict=options.strict,
             workers=options.workers,
             progress=tick,
+            kept=kept,
         )
     dataset = outcomes.with_peaks(found, wanted, task)
     envelope.keep_tolerance(case, dataset, best_effort=options.best_effort)
-    if options.out:
-        key = fingerprint(
-            {"case": case.sections, "task": task, "modulus": handed}, ("fuzzy", "frame")
-        )
+    if kept:
         envelope.write(dataset, options.out, case_text=case.text_of_file, key=key)
+        kept.done()
     limit = exceeded(options, case, wanted)
     tried = dataset["peak_tried"].values
     contract = {"asked": task.tolerance, "reached": dataset.attrs.get("reached")}
@@ -232,8 +240,8 @@ def summary(found: Envelope, tried: Array | None = None) -> str:
         f" {found.nature}{error_in_words(found)}"
     )
     head = (
-        "        output           min           max   peak: least tried … greatest   (α ="
-        f" {found.alpha[0]:g})\n"
+        "        output           min           max   peak at nodes: least tried … greatest   (α ="
+        f" {found.alpha[0]:g}, nodes every {found.time[1]:g} s)\n"
     )
     claim = f"{found.facts['claim']}\n" if "claim" in found.facts else ""
     return f"{head}{''.join(lines)}{cost}\n{proved(found)}{claim}"
@@ -243,7 +251,9 @@ def beyond(error: float | None, output: str) -> str:
     """Words on how far a peak may lie outside its bounds."""
     from alphacut.frame.outputs import output_unit
 
-    return "" if error is None else f", within {engineering(error, output_unit(output), digits=2)}"
+    if error is None:
+        return ""
+    return f", between nodes up to {engineering(error, output_unit(output), digits=2)} more"
 
 
 def error_in_words(found: Envelope) -> str:

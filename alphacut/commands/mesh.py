@@ -22,7 +22,7 @@ from alphacut.commands.options import (
 from alphacut.export.fields import cell_fields
 from alphacut.export.prism_mesh import check_ending, prism_mesh, sphere_mesh, write_mesh
 from alphacut.io.problem import BadInput, Problem
-from alphacut.stages.material.cell import modal_values, parts
+from alphacut.stages.material.cell import modal_parts
 
 ABOUT = (
     "write the mesh of the cell at modal values: VTU for ParaView, .msh for Gmsh, .inp for Abaqus"
@@ -97,7 +97,7 @@ def require_effect(options: argparse.Namespace, case: Case, *, spheres: bool) ->
 
 def sphere_radius(options: argparse.Namespace, case: Case) -> tuple[float, str]:
     """The radius of the sphere over half the cell's side, and what it is from, in words."""
-    radius = parts(modal_values(case), case.radius.theta)[0]
+    radius = modal_parts(case)[0]
     middle = round(float(radius.distribution.quantile(0.5)), 12) + 0.0
     if options.radius is not None:
         source = "--radius"

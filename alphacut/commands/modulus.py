@@ -7,8 +7,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TextIO
 
-import numpy as np
-
 from alphacut.case.case import Case
 from alphacut.case.idle import idle_mesh, require_read
 from alphacut.case.load import load
@@ -27,16 +25,16 @@ from alphacut.commands.options import (
     refuse_beside,
 )
 from alphacut.fuzzy import Store
-from alphacut.io.files import say
+from alphacut.io.files import Document, say
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import progress
 from alphacut.io.provenance import fingerprint
 from alphacut.rve.auto.model import ORDER
 from alphacut.stages.contract import contract, keep_modulus, require_choice
 from alphacut.stages.material import modulus, response
-from alphacut.stages.material.campaign import campaign
+from alphacut.stages.material.campaign import Campaign, campaign
 from alphacut.stages.material.cell import GPA
-from alphacut.stages.material.references import beside, text_of
+from alphacut.stages.material.references import of_modulus, text_of
 
 ABOUT = "fuzzy effective modulus by the transformation method over all fuzzy inputs of the cell"
 KEYS = {
@@ -74,6 +72,37 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Compute and report."""
+    case = asked(options)
+    exclude = named_models("--exclude", options.exclude)
+    wanted = campaign(case, petsc=petsc, exclude=exclude, store=store_of(options, case))
+    if options.explain:
+        words = explained(wanted)
+        answer(options, {"explanation": words}, out, f"{words}\n")
+        return 0
+    with progress("Fuzzy modulus", quiet=options.quiet) as tick:
+        found = modulus.compute(wanted, workers=options.workers, progress=tick)
+    keep_modulus(case, found.choice.method, found.error, best_effort=options.best_effort)
+    others = of_modulus(case, found)
+    document, text = told(case, wanted, found, others)
+    if options.out:
+        key = fingerprint({"case": case.sections}, ("stochastic", "rve", "fuzzy"))
+        modulus.write(
+            found, options.out, case_text=case.text_of_file, key=key, outside=others["outside"]
+        )
+    if answer(options, document, out, text) and not options.out:
+        say(
+            "to keep this and hand it on: the same command with --out modulus.nc, then alphacut"
+            " envelope CASE --modulus modulus.nc"
+        )
+    return 0
+
+
+def asked(options: argparse.Namespace) -> Case:
+    """The case, whose keys and the command's options go together.
+
+    Raises:
+        BadInput: They do not.
+    """
     check_workers(options.workers)
     case = load(options.case, changes(options, KEYS))
     require_read(case, READ, "modulus")
@@ -83,42 +112,31 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         refuse_beside(options, "--explain", UNEXPLAINED)
     elif options.best_effort:
         require_choice(case, modulus=True, envelope=False)
-    exclude = named_models("--exclude", options.exclude)
-    wanted = campaign(case, petsc=petsc, exclude=exclude, store=store_of(options, case))
-    if options.explain:
-        crisp = ", ".join(f"{name} {value:.6g}" for name, value in wanted.task.crisp.items())
-        words = f"{modulus.explain(wanted)}\n{wanted.task.choice.words}; crisp (SI): {crisp}"
-        answer(options, {"explanation": words}, out, f"{words}\n")
-        return 0
-    with progress("Fuzzy modulus", quiet=options.quiet) as tick:
-        found = modulus.compute(wanted, workers=options.workers, progress=tick)
-    keep_modulus(case, found.choice.method, found.error, best_effort=options.best_effort)
-    if options.out:
-        key = fingerprint({"case": case.sections}, ("stochastic", "rve", "fuzzy"))
-        modulus.write(found, options.out, case_text=case.text_of_file, key=key)
-    stress = (
-        response.document(response.dataset(case, found.dataset()))
-        if case.sections.response
-        else None
-    )
+    return case
+
+
+def explained(wanted: Campaign) -> str:
+    """Samples that would be run and why, and what they have in common."""
+    crisp = ", ".join(f"{name} {value:.6g}" for name, value in wanted.task.crisp.items())
+    return f"{modulus.explain(wanted)}\n{wanted.task.choice.words}; crisp (SI): {crisp}"
+
+
+def told(
+    case: Case, wanted: Campaign, found: modulus.FuzzyModulus, others: Document
+) -> tuple[Document, str]:
+    """The result for ``--json``, and in words."""
     reached = sum(found.error.values()) if found.error else None
-    modal = [float(np.mean([ends[-1] for ends in found.result.bounds(x)])) for x in ("E", "nu")]
-    others = beside(case, modal[0], modal[1], found.shear_ratio and found.shear_ratio[0])
     document = {
         **found.document(),
         **others,
         "model": wanted.task.choice.words,
         "tolerance": contract(case, reached),
-        **({"response": stress} if stress else {}),
     }
     text = summary(found) + text_of(case, others)
-    text += f"\n{response.text(stress)}" if stress else ""
-    if answer(options, document, out, text) and not options.out:
-        say(
-            "to keep this and hand it on: the same command with --out modulus.nc, then alphacut"
-            " envelope CASE --modulus modulus.nc"
-        )
-    return 0
+    if not case.sections.response:
+        return document, text
+    stress = response.document(response.dataset(case, found.dataset()))
+    return {**document, "response": stress}, f"{text}\n{response.text(stress)}"
 
 
 def store_of(options: argparse.Namespace, case: Case) -> Path | None:

@@ -209,7 +209,8 @@ def one_radius(options: argparse.Namespace) -> list[str]:
         allowed = "a number inside (0, 1), in halves of the cell's side"
         raise BadInput(Problem("--radius", "out of range", options.radius, allowed))
     r = options.radius
-    return [f"radius.a1={r}", "radius.a2=0", f"radius.a3={r}", "radius.a4=0"]
+    constant = [f"radius.a1={r}", "radius.a2=0", f"radius.a3={r}", "radius.a4=0"]
+    return ["radius.map=hermite", *constant]
 
 
 def add_modulus(parser: argparse.ArgumentParser) -> None:

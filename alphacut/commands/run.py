@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import shlex
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -21,18 +22,19 @@ from alphacut.commands.options import (
     check_workers,
     refuse_beside,
 )
-from alphacut.figures import all as figures
 from alphacut.figures.captions import core
-from alphacut.io.files import Document, as_json, say, whole_file, write_text
+from alphacut.figures.showing import Showing
+from alphacut.fuzzy.campaign.workers import pool
+from alphacut.io.files import Document, as_json, say, write_text
 from alphacut.io.output_paths import unwritable
 from alphacut.io.problem import BadInput
-from alphacut.io.provenance import attributes, door, fingerprint
+from alphacut.io.provenance import door
 from alphacut.io.units import engineering, largest_by_unit
 from alphacut.stages import summary
 from alphacut.stages import width_shares as shares
 from alphacut.stages.contract import require_choice
 from alphacut.stages.material.references import line
-from alphacut.stages.pipeline import Chain, Results
+from alphacut.stages.pipeline import Chain
 from alphacut.stages.readiness import ready
 from alphacut.stages.vibration import decision, joint, update
 from alphacut.stages.vibration import exceedance as outcomes
@@ -77,35 +79,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Compute, draw, compare."""
-    check_workers(options.workers)
-    case = load(options.case, options.set)
-    require_read(case, read_by(case), "run")
-    require_effect(options, case)
-    case = quick(case) if options.quick else case
-    folder = Path(options.out or f"results/{case.name}{'-quick' if options.quick else ''}")
-    if problems := list(unwritable("--out", folder, folder=True)):
-        raise BadInput(problems)
-    prepared = ready(case)
-    if prepared.rough and options.strict:
-        raise BadInput(prepared.rough)
-    # of what is rough the stage itself warns, with the modulus that it gets
-    for warning in prepared.warnings:
-        say(f"warning: {warning}")
+    chain = prepared(options, petsc)
     start = time.perf_counter()
-    chain = Chain(
-        case,
-        folder,
-        options.workers,
-        options.fresh,
-        options.quiet,
-        petsc,
-        options.strict,
-        options.best_effort or options.quick,
-        prepared.structure,
-    )
-    results = chain.run()
-    driving = chain.stored("shares.nc", *driven(chain, results))
-    drawn = [] if options.no_figures else figures.draw(results, driving, quiet=options.quiet)
+    with pool(chain.workers) as executor:
+        showing = Showing(chain, not options.no_figures, executor)
+        results = replace(chain, executor=executor, meanwhile=showing.begin).run()
+        drawn, driving = showing.drawn(results), showing.driving()
     found: dict[str, Any] = {
         **summary.summary(results),
         **({"quick": settings(results.case)} if options.quick else {}),
@@ -114,16 +93,62 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         "figures": drawn,
         "seconds": time.perf_counter() - start,
     }
-    write_text(folder / "summary.json", as_json(found, indent=2))
-    text = f"{banner(found['quick'])}\n" if options.quick else ""
-    text += summary.table(found["paper"]) if found["paper"] else ""
-    if answer(options, found, out, text + main_numbers(found)):
-        say(
-            f"results are in {folder}, {len(drawn)} figures among them, after"
-            f" {found['seconds']:.0f} s"
-        )
-        say(f"next: {door()} report {shlex.quote(str(folder))}")
+    write_text(chain.file("summary.json"), as_json(found, indent=2))
+    if answer(options, found, out, words(found)):
+        told = f"{len(drawn)} figures among them, after {found['seconds']:.0f} s"
+        say(f"results are in {chain.folder}, {told}")
+        say(f"next: {door()} report {shlex.quote(str(chain.folder))}")
     return 0
+
+
+def prepared(options: argparse.Namespace, petsc: Mapping[str, str]) -> Chain:
+    """The stages of the case, with every warning told.
+
+    Raises:
+        BadInput: The case or the options cannot be used.
+    """
+    case, folder = asked(options)
+    first = ready(case)
+    if first.rough and options.strict:
+        raise BadInput(first.rough)
+    # of what is rough the stage itself warns, with the modulus that it gets
+    for warning in first.warnings:
+        say(f"warning: {warning}")
+    return Chain(
+        case,
+        folder,
+        options.workers,
+        options.fresh,
+        options.quiet,
+        petsc,
+        options.strict,
+        options.best_effort or options.quick,
+        first.structure,
+    )
+
+
+def asked(options: argparse.Namespace) -> tuple[Case, Path]:
+    """The case, and the folder where its results go.
+
+    Raises:
+        BadInput: The case or the options cannot be used.
+    """
+    check_workers(options.workers)
+    case = load(options.case, options.set)
+    require_read(case, read_by(case), "run")
+    require_effect(options, case)
+    case = quick(case) if options.quick else case
+    folder = Path(options.out or f"results/{case.name}{'-quick' if options.quick else ''}")
+    if problems := list(unwritable("--out", folder, folder=True)):
+        raise BadInput(problems)
+    return case, folder
+
+
+def words(found: Document) -> str:
+    """A run in words: that it was quick, the paper's numbers beside its own, the main ones."""
+    text = f"{banner(found['quick'])}\n" if "quick" in found else ""
+    text += summary.table(found["paper"]) if found["paper"] else ""
+    return text + main_numbers(found)
 
 
 PARTS = {
@@ -170,31 +195,9 @@ def require_effect(options: argparse.Namespace, case: Case) -> None:
 
 def main_numbers(found: Document) -> str:
     """The fuzzy modulus and every study's extremes, a line each."""
-    from alphacut.frame.outputs import output_unit
-
-    lines = []
-    if cell := found.get("modulus"):
-        lines.append(
-            f"E = {core(cell)}, support [{cell['lower_GPa']:.4f}, {cell['upper_GPa']:.4f}] GPa;"
-            f" nu = {cell['nu']:.4f}"
-        )
-        lines.append(line(cell["beside"], cell["particles"]))
-        lines += [f"warning: {cell['outside']}"] if cell["outside"] else []
-    if picture := found.get("image"):
-        cuts = picture["cuts"]["E_GPa"]
-        lines.append(
-            f"E = [{cuts['lower'][-1]:.4f}, {cuts['upper'][-1]:.4f}] GPa, support"
-            f" [{cuts['lower'][0]:.4f}, {cuts['upper'][0]:.4f}] GPa, {picture['nature']}"
-        )
+    lines = [*modulus_lines(found), *image_lines(found)]
     for name, study in found.get("envelopes", {}).items():
-        ends = [
-            (output, output_unit(output), float(low), float(study["max"][output]))
-            for output, low in study["min"].items()
-        ]
-        largest = largest_by_unit((value, unit) for _, unit, *values in ends for value in values)
-        for output, unit, *values in ends:
-            low, high = (engineering(value, unit, beside=largest[unit]) for value in values)
-            lines.append(f"{output} from {low} to {high} at the lowest α (study {name})")
+        lines += envelope_lines(name, study)
     lines += update.sentences(found["update"]) if "update" in found else []
     lines += decision.sentences(found["decision"]) if "decision" in found else []
     lines += [joint.sentence(found["joint"])] if "joint" in found else []
@@ -202,17 +205,38 @@ def main_numbers(found: Document) -> str:
     return "".join(f"{line}\n" for line in lines) + limit
 
 
-def driven(chain: Chain, results: Results) -> tuple[str, Callable[[Path], None]]:
-    """Fingerprint and making of shares.nc, which says what drives the widths."""
-    given = results.case.sections
-    files = results.case.digests(*given.files)
-    content = {"case": given, "files": files, "modulus": results.handed}
-    key = fingerprint(content, ("stochastic", "rve", "fuzzy", "frame", "alphacut"))
+def modulus_lines(found: Document) -> Iterator[str]:
+    """The fuzzy modulus, if one was computed, and its references."""
+    if cell := found.get("modulus"):
+        yield (
+            f"E = {core(cell)}, support [{cell['lower_GPa']:.4f}, {cell['upper_GPa']:.4f}] GPa;"
+            f" nu = {cell['nu']:.4f}"
+        )
+        yield line(cell["beside"], cell["particles"])
+        if cell["outside"]:
+            yield f"warning: {cell['outside']}"
+        yield cell["publish"]
 
-    def compute(path: Path) -> None:
-        with whole_file(path) as partial:
-            shares.dataset(results).assign_attrs(
-                attributes(results.case.text_of_file, key)
-            ).to_netcdf(partial)
 
-    return key, compute
+def image_lines(found: Document) -> Iterator[str]:
+    """The bounds of an image's modulus, if there is one."""
+    if picture := found.get("image"):
+        cuts = picture["cuts"]["E_GPa"]
+        yield (
+            f"E = [{cuts['lower'][-1]:.4f}, {cuts['upper'][-1]:.4f}] GPa, support"
+            f" [{cuts['lower'][0]:.4f}, {cuts['upper'][0]:.4f}] GPa, {picture['nature']}"
+        )
+
+
+def envelope_lines(name: str, study: Document) -> Iterator[str]:
+    """Extremes of each output of a study; outputs of one unit have one prefix."""
+    from alphacut.frame.outputs import output_unit
+
+    ends = [
+        (output, output_unit(output), float(low), float(study["max"][output]))
+        for output, low in study["min"].items()
+    ]
+    largest = largest_by_unit((value, unit) for _, unit, *values in ends for value in values)
+    for output, unit, *values in ends:
+        low, high = (engineering(value, unit, beside=largest[unit]) for value in values)
+        yield f"{output} from {low} to {high} at the lowest α (study {name})"

@@ -29,7 +29,7 @@ TABLE = 12
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument(
-        "record", metavar="RECORD.csv", help="time [s],acceleration [m/s^2], or [g]"
+        "record", metavar="RECORD.csv", help="time [s],acceleration [m/s^2], [g] or [gal]"
     )
     parser.add_argument(
         "--damping",
@@ -57,7 +57,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     from alphacut.frame.dynamics.response_spectrum import response_spectrum
 
     periods, ratios = wanted_periods(options), wanted_ratios(",".join(options.damping or ["5 %"]))
-    ground = accelerogram(Path(options.record), "RECORD.csv")
+    ground = accelerogram(Path(options.record), "record")
     try:
         found = [response_spectrum(ground, periods, ratio) for ratio in ratios]
     except ValueError as error:

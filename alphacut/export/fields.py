@@ -10,7 +10,7 @@ from alphacut.case.case import Case
 from alphacut.export.prism_mesh import ORDER
 from alphacut.io.problem import BadInput, Problem
 from alphacut.rve.cell import LOADS, Phase
-from alphacut.stages.material.cell import modal_values, parts
+from alphacut.stages.material.cell import modal_parts
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
@@ -47,15 +47,14 @@ def cell_fields(case: Case) -> meshio.Mesh:
     from mpi4py import MPI
 
     from alphacut.rve.mesh.prism_grid import PrismGrid
-    from alphacut.rve.mesh.triangulation import triangulate
-    from alphacut.rve.prism.model import reference_radius
+    from alphacut.rve.mesh.triangulation import reference_radius, triangulate
     from alphacut.rve.prism.system import PrismSystem
     from alphacut.rve.prism.task import PrismTask
     from alphacut.rve.solver.options import SolverOptions
     from alphacut.rve.solver.stopwatch import Stopwatch
 
     require_conforming(case)
-    radius, matrix, inclusion = parts(modal_values(case), case.radius.theta)
+    radius, matrix, inclusion = modal_parts(case)
     plane = triangulate(size=case.mesh.size, radius=reference_radius(radius))
     system = PrismSystem(PrismGrid(plane, case.mesh.layers), MPI.COMM_SELF)
     system.move(radius)

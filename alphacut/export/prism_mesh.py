@@ -10,7 +10,7 @@ import numpy as np
 from alphacut.case.case import Case
 from alphacut.io.files import whole_file
 from alphacut.io.problem import BadInput, Problem
-from alphacut.stages.material.cell import modal_values, parts
+from alphacut.stages.material.cell import modal_parts
 
 if TYPE_CHECKING:
     import meshio
@@ -37,10 +37,9 @@ def prism_mesh(case: Case) -> meshio.Mesh:
     from meshio._mesh import topological_dimension
 
     from alphacut.rve.mesh.prism_grid import PrismGrid
-    from alphacut.rve.mesh.triangulation import triangulate
-    from alphacut.rve.prism.model import reference_radius
+    from alphacut.rve.mesh.triangulation import reference_radius, triangulate
 
-    radius, _, _ = parts(modal_values(case), case.radius.theta)
+    radius, _, _ = modal_parts(case)
     plane = triangulate(size=case.mesh.size, radius=reference_radius(radius))
     grid = PrismGrid(plane, case.mesh.layers, case.mesh.interface == "conforming")
     phase = np.tile(plane.inside.astype(np.int64), grid.layers)

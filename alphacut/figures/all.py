@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, Future
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,8 +21,11 @@ from alphacut.figures import radius as figure_radius
 from alphacut.figures import response as figure_response
 from alphacut.figures import shares as figure_shares
 from alphacut.figures import update as figure_update
+from alphacut.figures.mesh import draw_mesh
 from alphacut.figures.style import save, style
-from alphacut.io.progress import progress
+from alphacut.fuzzy.campaign.workers import submitted
+from alphacut.io.files import as_json, write_text
+from alphacut.io.progress import Tick, progress
 from alphacut.stages.pipeline import Results
 from alphacut.stages.vibration.exceedance import events
 
@@ -28,19 +33,38 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
+KEPT = "figures/.kept.json"
+PARTS = 6  # into which the figures are dealt out, so that no process waits long for the other
 Drawing = tuple[str, Callable[[], "Figure"]]
 
 
 def drawings(results: Results) -> Iterator[Drawing]:
     """Name and function of each figure that the results allow."""
-    from alphacut.frame.structures.field_frame import FieldFrame
-
     if results.case.sections.radius:
-        if "microstructure" not in results.case.stages:  # that stage draws both from its particles
-            if results.case.quoted:
-                yield "fig11-radii", lambda: figure_radius.radii(results.case)
-            yield "fig13-p-box", lambda: figure_radius.p_box(results.case)
-        yield "fig14-cone", lambda: figure_radius.cone(results.case)
+        yield from radius_drawings(results)
+    yield from material_drawings(results)
+    if results.envelopes:
+        yield "fig20-mapping", lambda: figure_fuzzy.mapping(results)
+    yield from structure_drawings(results)
+    if results.envelopes and results.case.sections.envelope:
+        yield from follower_drawings(results)
+    yield from update_drawings(results)
+    yield from question_drawings(results)
+    for study in results.studies:
+        yield from figure_envelope.drawings(study, results.envelopes[study.name])
+
+
+def radius_drawings(results: Results) -> Iterator[Drawing]:
+    """The map of radii; the stage microstructure draws the first two from its particles."""
+    if "microstructure" not in results.case.stages:
+        if results.case.quoted:
+            yield "fig11-radii", lambda: figure_radius.radii(results.case)
+        yield "fig13-p-box", lambda: figure_radius.p_box(results.case)
+    yield "fig14-cone", lambda: figure_radius.cone(results.case)
+
+
+def material_drawings(results: Results) -> Iterator[Drawing]:
+    """Fuzzy modulus, image, response of the stress."""
     if (modulus := results.modulus) is not None:
         yield "fig16-stress-curves", lambda: figure_modulus.stress_curves(modulus)
         yield "fig17-mean-stress", lambda: figure_modulus.mean_stress(modulus)
@@ -51,27 +75,34 @@ def drawings(results: Results) -> Iterator[Drawing]:
         yield "image", lambda: figure_image.image(picture)
     if (stress := results.response) is not None:
         yield "response", lambda: figure_response.response(stress)
-    if results.envelopes:
-        yield "fig20-mapping", lambda: figure_fuzzy.mapping(results)
+
+
+def structure_drawings(results: Results) -> Iterator[Drawing]:
+    """The structure whose envelopes were computed, and its record."""
+    from alphacut.frame.structures.field_frame import FieldFrame
+
+    structure = results.structure
     if results.envelopes and results.case.sections.frame:
         yield "fig26-frame", lambda: figure_frame.frame(results.case)
         yield "fig27-chain", lambda: figure_frame.chain(results.case)
-        built = None if results.structure is None else results.structure.frame
-        if isinstance(built, FieldFrame):
-            yield "field", partial(figure_frame.field, built.field)
+        if structure is not None and isinstance(structure.frame, FieldFrame):
+            yield "field", partial(figure_frame.field, structure.frame.field)
     if results.envelopes and results.case.sections.tower:
         yield "tower", lambda: figure_frame.tower(results.case)
-    model = None if results.structure is None else results.structure.linear
+    model = None if structure is None else structure.linear
     if model is not None and (shaken := model.ground) is not None:
         yield "record", lambda: figure_envelope.record(shaken)
-    if (
-        results.case.sections.envelope
-        and results.case.envelope.method == "graph-follower"
-        and results.envelopes
-    ):
+
+
+def follower_drawings(results: Results) -> Iterator[Drawing]:
+    """How the Graph Follower walks, for the study of most fuzzy inputs."""
+    if results.case.envelope.method == "graph-follower":
         richest = max(results.studies, key=lambda study: len(study.task.fuzzy))
         yield "fig21-25-graph-follower", lambda: figure_follower.follower(results, richest)
-    yield from update_drawings(results)
+
+
+def question_drawings(results: Results) -> Iterator[Drawing]:
+    """Exceedance of each limit, decisions, and the hull of several outputs."""
     if results.exceedance is not None:
         for limited in events(results.exceedance):
             several = "event" in results.exceedance.dims
@@ -81,8 +112,6 @@ def drawings(results: Results) -> Iterator[Drawing]:
         yield "decision", lambda: figure_questions.decision(decided)
     if (hull := results.joint) is not None:
         yield "joint", lambda: figure_questions.joint(hull)
-    for study in results.studies:
-        yield from figure_envelope.drawings(study, results.envelopes[study.name])
 
 
 def update_drawings(results: Results) -> Iterator[Drawing]:
@@ -103,25 +132,102 @@ def share_drawings(driving: xarray.Dataset) -> Iterator[Drawing]:
         yield "shares-over-time", lambda: figure_shares.over_time(driving)
 
 
+def draw_shares(driving: xarray.Dataset, results: Results) -> list[str]:
+    """Draw what drives the widths; names of the files."""
+    return drawn_now(share_drawings(driving), results)
+
+
 def file_stem(name: str, results: Results) -> str:
     """The figure's name; the paper's number leads it in the paper's case alone."""
     return name if results.case.quoted else re.sub(r"^fig[\d-]+-", "", name)
 
 
-def draw(results: Results, driving: xarray.Dataset, *, quiet: bool = False) -> list[str]:
-    """Draw every figure as SVG and PNG into figures/; returns the names of the files."""
-    folder = results.folder / "figures"
-    names: list[str] = []
-    todo = [*drawings(results), *share_drawings(driving)]
-    with progress("Figures", quiet=quiet) as tick, style():
-        for done, (name, make) in enumerate(todo, start=1):
-            names += [
-                str(path.relative_to(results.folder))
-                for path in save(make(), folder / file_stem(name, results))
-            ]
+def draw(
+    results: Results,
+    driving: Callable[[], xarray.Dataset],
+    meshes: Mapping[str, Future[bool]],
+    *,
+    executor: Executor | None = None,
+    quiet: bool = False,
+) -> list[str]:
+    """Draw every figure as SVG and PNG into figures/; returns the names of the files.
+
+    Args:
+        results: Of the run.
+        driving: Waits for what drives the widths, whose figures come last.
+        meshes: Pictures of the mesh under way, see `begin_meshes`.
+        executor: Processes that draw side by side; None: this one draws.
+        quiet: No progress.
+    """
+    names = drawn_in_parts(results, executor, quiet=quiet)
+    names += submitted(executor, draw_shares, driving(), results).result()
+    names += [name for name, made in meshes.items() if made.result()]
+    return [*particle_pictures(results.folder / "figures", results), *names]
+
+
+def begin_meshes(results: Results, executor: Executor | None) -> dict[str, Future[bool]]:
+    """Pictures of the mesh under way, by their files; False where there is no display."""
+    return {
+        name: submitted(executor, draw_mesh, results.case, results.folder / name, kind)
+        for name, kind in mesh_pictures(results).items()
+    }
+
+
+def keep(folder: Path, key: str, names: Sequence[str]) -> None:
+    """Write down which figures were drawn, and the fingerprint of what they show."""
+    write_text(folder / KEPT, as_json({"fingerprint": key, "figures": names}))
+
+
+def kept(folder: Path, key: str) -> list[str] | None:
+    """Names of an earlier run's figures, if all are there and show what has this fingerprint."""
+    try:
+        told = json.loads((folder / KEPT).read_text(encoding="utf-8"))
+        names = [str(name) for name in told["figures"]]
+        return names if told["fingerprint"] == key and all_there(folder, names) else None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def all_there(folder: Path, names: Iterable[str]) -> bool:
+    """Whether every file is there and holds something."""
+    files = [folder / name for name in names]
+    return all(file.is_file() and file.stat().st_size for file in files)
+
+
+def drawn_in_parts(results: Results, executor: Executor | None, *, quiet: bool) -> list[str]:
+    """Draw all figures of the results, in parts where processes share them."""
+    count = len(list(drawings(results)))
+    parts = count if executor is None else min(count, PARTS)
+    names: dict[int, list[str]] = {}
+    with progress("Figures", quiet=quiet) as tick:
+        own = tick if executor is None else None
+        drawn = [submitted(executor, draw_part, results, k, parts, own) for k in range(parts)]
+        for done, part in enumerate(drawn, start=1):
+            names |= part.result()
             if tick:
-                tick(done / len(todo))
-    return [*particle_pictures(folder, results), *names, *mesh_picture(results)]
+                tick(done / parts)
+    return [name for place in sorted(names) for name in names[place]]
+
+
+def draw_part(
+    results: Results, part: int, parts: int, tick: Tick | None = None
+) -> dict[int, list[str]]:
+    """Draw every figure whose place leaves the rest `part`; names of their files by place."""
+    todo = list(drawings(results))
+    places = range(part, len(todo), parts)
+    if tick:
+        tick((part + 1) / parts)
+    return {k: drawn_now([todo[k]], results) for k in places}
+
+
+def drawn_now(todo: Iterable[Drawing], results: Results) -> list[str]:
+    """Draw some figures; names of their files."""
+    with style():
+        return [
+            str(path.relative_to(results.folder))
+            for name, make in todo
+            for path in save(make(), results.folder / "figures" / file_stem(name, results))
+        ]
 
 
 def particle_pictures(folder: Path, results: Results) -> list[str]:
@@ -132,17 +238,11 @@ def particle_pictures(folder: Path, results: Results) -> list[str]:
     return [str(path.relative_to(results.folder)) for path in found]
 
 
-def mesh_picture(results: Results) -> list[str]:
-    """Fig. 15 and the stress on slices, where the modulus was computed on prisms."""
+def mesh_pictures(results: Results) -> dict[str, str]:
+    """Files and kinds of fig. 15 and of the stress on slices, where prisms gave the modulus."""
     if results.modulus is None or results.case.modulus.method != "prism":
-        return []
-    from alphacut.figures.mesh import draw_mesh
-
+        return {}
     pictures = {f"figures/{file_stem('fig15-prism-mesh', results)}.png": "mesh"}
     if results.case.mesh.interface == "conforming":
         pictures["figures/stress-on-slices.png"] = "stress"
-    return [
-        name
-        for name, kind in pictures.items()
-        if draw_mesh(results.case, results.folder / name, kind)
-    ]
+    return pictures

@@ -25,6 +25,7 @@ FIGURES = {
     "mapping": "Fuzzy mapping: trajectories inside an α-cut, and the envelope that encloses them",
     "graph-follower": "The Graph Follower, step by step",
     "record": "Acceleration of the ground",
+    "spectrum": "Response spectrum of the record: pseudo-acceleration and displacement",
     "frame": "The frame, to scale",
     "tower": "The tower, to scale",
     "chain": "The frame as masses, springs and dampers",

@@ -21,8 +21,8 @@ from alphacut.figures.style import (
     prefix_axis,
 )
 from alphacut.io.units import MINUS, axis_prefix, engineering
-from alphacut.stages.pipeline import Study
 from alphacut.stages.vibration.exceedance import event_unit, event_words
+from alphacut.stages.vibration.studies import Study
 
 if TYPE_CHECKING:
     import xarray

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from alphacut.figures.style import BLUE, GREY, INK, ORANGE, prefix_axis
-from alphacut.stages.pipeline import Results, Study
+from alphacut.stages.pipeline import Results
+from alphacut.stages.vibration.studies import Study
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

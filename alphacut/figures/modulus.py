@@ -9,8 +9,10 @@ import numpy as np
 from alphacut.case.case import Case
 from alphacut.figures.style import (
     BLUE,
+    HEIGHT,
     INK,
     ORANGE,
+    WIDTH,
     alpha_legend,
     colours,
     figure,
@@ -58,7 +60,7 @@ def stress_curves(dataset: xarray.Dataset) -> Figure:
             color=INK if top else shades[membership[sample]],
             lw=1.2 if top else 0.7,
         )
-    axes.set_xlabel("θ, standard deviations")
+    axes.set_xlabel("θ")
     axes.set_ylabel("homogenised σ$_{11}$(ε$^{(1)}$), GPa")
     axes.set_title(f"{len(curves)} samples", loc="left", fontsize=10)
     alpha_legend(axes, alpha, loc="upper left" if curves[0, -1] > curves[0, 0] else "lower left")
@@ -85,17 +87,23 @@ def mean_stress(dataset: xarray.Dataset) -> Figure:
 
 
 def fuzzy_modulus(dataset: xarray.Dataset, case: Case) -> Figure:
-    """Fig. 18: the fuzzy modulus, beside the modulus that the case quotes."""
-    drawn, axes = figure()
+    """Fig. 18: the fuzzy modulus, beside the modulus that the case quotes, and below it fuzzy ν."""
+    import matplotlib.pyplot as plt
+
+    drawn, (axes, below) = plt.subplots(
+        2, 1, figsize=(WIDTH, 1.75 * HEIGHT), height_ratios=(3, 2), layout="constrained"
+    )
     alpha, ends = dataset["alpha"].values, dataset["E"].values / GPA
     shaded_cuts(axes, alpha, ends[:, 0], ends[:, 1])
-    axes.plot([], [], color=INK, marker="o", ms=3.5, lw=1.2, label="computed here")
     quoted = case.frame.modulus if case.sections.frame else None
     if quoted is not None:
         left, right = zip(*(quoted.cut(level) for level in (0.0, 1.0)), strict=True)
         x = np.array([*left, *right[::-1]]) / GPA
         axes.plot(x, [0, 1, 1, 0], color=BLUE, lw=1.2, ls="--", label="quoted in the case")
-    axes.legend(loc="upper left")
+        axes.plot([], [], color=INK, marker="o", ms=3.5, lw=1.2, label="computed here")
+        axes.legend(loc="upper left")
     meaning = dataset.attrs.get("average", dataset.attrs.get("particles", "cylinders"))
     membership_axes(axes, f"effective Young's modulus E ({AVERAGE[meaning]}), GPa")
+    shaded_cuts(below, alpha, *dataset["nu"].transpose("bound", "alpha").values)
+    membership_axes(below, "effective Poisson's ratio ν of the same")
     return drawn

@@ -34,7 +34,8 @@ def decision(found: xarray.Dataset) -> Figure:
         axes.text(0.01, place + 0.38, words, fontsize=8, transform=across)
     axes.axvline(1.0, color=ORANGE, lw=1.4, ls="--")
     axes.set_ylim(-0.5, len(names) - 0.2)
-    left, right = axes.get_xlim()
+    least, right = float(share.min()), axes.get_xlim()[1]
+    left = max(0.0, least - 0.05 * (right - least))
     axes.set_xlim(left, max(right, 1 + 0.1 * (1 - left)))
     axes.set_yticks(places, names)
     axes.set_xlabel("peak over its limit (dashed), the darker the higher α")

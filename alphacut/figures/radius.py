@@ -9,7 +9,8 @@ import numpy as np
 
 from alphacut.case.case import Case
 from alphacut.figures.style import BLUE, GREY, INK, PURPLE, figure
-from alphacut.stochastic import HermiteMap, TruncatedNormal
+from alphacut.stochastic import ThetaLaw
+from alphacut.stochastic.radius_map import CaseMap
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
@@ -18,21 +19,21 @@ if TYPE_CHECKING:
 SIGMA = np.log(10) / 6  # eq. 11: the radius varies by a factor of ten over θ in [-3, 3]
 
 
-def law(case: Case) -> TruncatedNormal:
+def law(case: Case) -> ThetaLaw:
     """Law of θ."""
-    return case.radius.law
+    return case.radius.distribution
 
 
-def maps(case: Case, alpha: float) -> list[HermiteMap]:
+def maps(case: Case, alpha: float) -> list[CaseMap]:
     """The radius maps at the corners of an α-cut."""
-    corners = itertools.product(*(sorted(set(number.cut(alpha))) for number in case.radius.slopes))
-    return [HermiteMap(a1, a2, a3, a4, law(case)) for a1, a2, a3, a4 in corners]
+    numbers = case.radius.numbers
+    corners = itertools.product(*(sorted(set(one.cut(alpha))) for one in numbers.values()))
+    return [case.radius.family(dict(zip(numbers, corner, strict=True))) for corner in corners]
 
 
-def modal_map(case: Case) -> HermiteMap:
+def modal_map(case: Case) -> CaseMap:
     """The radius map at the modal values."""
-    a1, a2, a3, a4 = (number.modal for number in case.radius.slopes)
-    return HermiteMap(a1, a2, a3, a4, law(case))
+    return case.radius.family({name: one.modal for name, one in case.radius.numbers.items()})
 
 
 def radii(case: Case) -> Figure:
@@ -51,10 +52,14 @@ def radii(case: Case) -> Figure:
     return drawn
 
 
-def distribution(radius: HermiteMap, at: Array) -> Array:
-    """P(r ≤ at) under the law of θ, for maps that rise with θ."""
-    theta = np.linspace(radius.distribution.lower, radius.distribution.upper, 2001)
-    return radius.distribution.cdf(np.interp(at, np.maximum.accumulate(radius(theta)), theta))
+def distribution(radius: CaseMap, at: Array) -> Array:
+    """P(r ≤ at) under the law of θ."""
+    law = radius.distribution
+    theta = np.linspace(law.lower, law.upper, 4001)
+    radii, mass = radius((theta[1:] + theta[:-1]) / 2), np.diff(law.cdf(theta))
+    order = np.argsort(radii, kind="stable")
+    share = np.cumsum(mass[order]) - mass[order] / 2
+    return np.asarray(np.interp(at, radii[order], share, left=0.0, right=1.0))
 
 
 def p_box(case: Case) -> Figure:

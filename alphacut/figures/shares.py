@@ -8,7 +8,7 @@ import numpy as np
 
 from alphacut.figures.captions import in_words
 from alphacut.figures.envelope import WORDS
-from alphacut.figures.style import BLUE, GREY, ORANGE, PURPLE, figure, prefix_axis
+from alphacut.figures.style import BLUE, GREY, ORANGE, PURPLE, prefix_axis
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
@@ -92,23 +92,36 @@ def weighted(share: Array, width: Array) -> Array:
 
 
 def of_modulus(found: xarray.Dataset) -> Figure:
-    """Width of E lost when an input of the cell is fixed, over the width, by level."""
-    drawn, axes = figure(6.4, 3.2)
+    """Widths of E and ν lost when an input of the cell is fixed, over the width, by level."""
+    import matplotlib.pyplot as plt
+
+    kinds = [(name, one) for name, one in OF_CELL.items() if name in found]
+    drawn, grid = plt.subplots(
+        len(kinds), 1, figsize=(6.4, 0.8 + 2.2 * len(kinds)), squeeze=False, layout="constrained"
+    )
+    for axes, (name, quantity) in zip(grid[:, 0], kinds, strict=True):
+        cell_panel(axes, found[name], quantity)
+    names = grid[0, 0].get_legend_handles_labels()
+    drawn.legend(*names, fontsize=8, loc="outside lower center", ncols=min(3, len(names[0])))
+    return drawn
+
+
+OF_CELL = {"modulus_share": "E", "poisson_share": "ν"}
+"""Variables of shares, and what they are of."""
+
+
+def cell_panel(axes: Axes, found: xarray.DataArray, quantity: str) -> None:
+    """Shares of the cell's inputs in the width of one quantity, bars at each level."""
     names = [str(name) for name in found["cell_input"].values]
     levels = [level for level in found["alpha"].values if level < 1]
     thickness = 0.8 / len(names)
     for index, name in enumerate(names):
-        share = [
-            float(found["modulus_share"].sel(cell_input=name, alpha=level)) for level in levels
-        ]
-        places = [
-            place + (index - (len(names) - 1) / 2) * thickness for place in range(len(levels))
-        ]
+        share = [float(found.sel(cell_input=name, alpha=level)) for level in levels]
+        shift = (index - (len(names) - 1) / 2) * thickness
+        places = [place + shift for place in range(len(levels))]
         axes.bar(
             places, share, thickness, color=COLOURS[index % len(COLOURS)], label=in_words(name)
         )
     axes.set_xticks(range(len(levels)), [f"α = {level:g}" for level in levels])
-    axes.set_ylabel("share of the width of E")
+    axes.set_ylabel(f"share of the width of {quantity}")
     axes.set_ylim(0, 1)
-    axes.legend(fontsize=8)
-    return drawn

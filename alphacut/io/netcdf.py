@@ -133,3 +133,30 @@ def read_summary(folder: Path) -> Document:
     if missing := [name for name in NEEDED if name not in found]:
         raise damaged(path, f"it holds no {missing[0]}")
     return found
+
+
+def load_dataset(path: Path) -> xarray.Dataset:
+    """What a NetCDF file holds, in memory."""
+    import xarray
+
+    return xarray.load_dataset(path)
+
+
+def fingerprint_of(path: Path) -> str:
+    """The fingerprint in a NetCDF file; empty if it cannot be read.
+
+    Raises:
+        BadInput: A newer program wrote the file; its results are not overwritten unasked.
+    """
+    import xarray
+
+    try:
+        with xarray.open_dataset(path) as dataset:
+            told = dict(dataset.attrs)
+    except (OSError, ValueError):
+        return ""
+    if "format_version" in told:
+        require_known(
+            str(told["format_version"]), path, key="--out", maker=str(told.get("created_by", ""))
+        )
+    return str(told.get("fingerprint", ""))

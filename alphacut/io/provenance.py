@@ -42,16 +42,20 @@ def own_version() -> str:
         return str(tomllib.loads(project.read_text(encoding="utf-8"))["project"]["version"])
 
 
+def version_of(distribution: str) -> str:
+    """Version of an installed distribution; empty if it is not there."""
+    try:
+        return version(distribution)
+    except PackageNotFoundError:
+        return ""
+
+
 @cache
 def versions() -> dict[str, str]:
     """Versions of alphacut, Python and of the packages that are installed."""
     found = {"alphacut": own_version(), "python": platform.python_version()}
-    for name, distribution in PACKAGES.items():
-        try:
-            found[name] = version(distribution)
-        except PackageNotFoundError:
-            continue
-    return found
+    told = {name: version_of(distribution) for name, distribution in PACKAGES.items()}
+    return found | {name: known for name, known in told.items() if known}
 
 
 def sources(package: str) -> list[tuple[str, Path]]:

@@ -130,6 +130,8 @@ def factor(unit: str, si: str) -> Decimal:
         raise ValueError("the unit is missing")
     if (si, unit) == ("m/s^2", "g"):  # standard gravity, no gram
         return STANDARD_GRAVITY
+    if (si, unit.lower()) == ("m/s^2", "gal"):  # cm/s², no gallon
+        return Decimal("0.01")
     if unit in EVERYDAY.get(si, {}):
         return Decimal(EVERYDAY[si][unit])
     if si == "rad" and not re.search("rad|deg|turn|rev|arc", unit):  # pint: % is an angle
@@ -149,11 +151,25 @@ def factor(unit: str, si: str) -> Decimal:
             (name for name in ACCEPTED.get(si, ()) if name.lower() == unit.lower()),
             MEANT.get((si, unit), ""),
         )
-        raise ValueError(
-            f'the unit "{unit}" is wrong' + (f"; did you mean {close}?" if close else "")
-        ) from None
+        hint = f"; did you mean {close}?" if close else weight(unit, si)
+        raise ValueError(f'the unit "{unit}" is wrong{hint}') from None
     except Exception:
         raise ValueError(f'the unit "{unit}" cannot be read') from None
+
+
+def weight(unit: str, si: str) -> str:
+    """Hint where a mass is given as a force, or a force as a mass."""
+    other = {"kg": "N", "N": "kg"}.get(si)
+    try:
+        size = None if other is None else float(factor(unit, other))
+    except ValueError:
+        return ""
+    if size is None:
+        return ""
+    g = float(STANDARD_GRAVITY)
+    if si == "kg":
+        return f": it is a force; what weighs 1 {unit} has a mass of {size / g:.4g} kg"
+    return f": it is a mass, which weighs {size * g:.4g} N"
 
 
 PREFIXES = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}

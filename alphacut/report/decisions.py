@@ -47,10 +47,10 @@ def decided(summary: Document, folder: Path) -> Markup:
     words = [sentence(line) for line in decision.sentences(found)][len(found["limits"]) :]
     rows = []
     for name, one in found["limits"].items():
-        allowed, margins = "", ["", ""]
+        allowed, margins, of = "", ["", ""], name
         if (margin := found["margins"].get(name)) is not None:
             unit, largest = margin["unit"], float(margin["limit"])
-            allowed = engineering(largest, unit)
+            allowed, of = engineering(largest, unit), margin.get("output", name)
             margins = [
                 " … ".join(
                     engineering(margin[side][level], unit, beside=largest)
@@ -59,7 +59,7 @@ def decided(summary: Document, folder: Path) -> Markup:
                 for level in (0, -1)
             ]
         degrees = (decision.degree(*one[kind]) for kind in ("possibility", "necessity"))
-        rows.append((name, allowed, *degrees, one["verdict"], *margins))
+        rows.append((of, allowed, *degrees, one["verdict"], *margins))
     levels = (f"margin at α = {found['alpha'][level]:g}" for level in (0, -1))
     head = ("magnitude of", "limit", "possibly exceeded", "necessarily", "verdict", *levels)
     meaning = (

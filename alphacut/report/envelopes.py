@@ -100,8 +100,9 @@ def peaks(summary: Document) -> Markup:
     words = paragraphs(
         "The peak is the largest magnitude of an output over the motion. The least peak on the"
         " lowest level lies between two values: a bound, and the least one among some motions"
-        " tried. No motion peaks higher than the greatest. All are peaks at the nodes; the error"
-        " covers what lies between nodes."
+        f" tried. All are peaks at the nodes{each_step(summary)}: at these no motion peaks higher"
+        " than the greatest. A motion may peak between two nodes; what it adds there at most is the"
+        " last column but one, which falls with the square of the step."
     )
     limit = Markup("")
     if "exceedance" in summary:
@@ -114,12 +115,19 @@ def peaks(summary: Document) -> Markup:
         "output",
         f"least peak {low}",
         f"greatest {low}",
-        "error up to",
+        "between nodes and by error, up to",
         f"peak {high}",
     )
     told = claims(summary["envelopes"])
     shown = Markup("<h3>Peaks</h3>") + words + table(head, rows, numbers=2) + told
     return shown + limit if rows else limit
+
+
+def each_step(summary: Document) -> str:
+    """How far apart the nodes are, where all studies have the same."""
+    steps = {study.get("step") for study in summary["envelopes"].values()}
+    step = steps.pop() if len(steps) == 1 else None
+    return "" if step is None else f", {step:g} s apart"
 
 
 def claims(studies: Document) -> Markup:

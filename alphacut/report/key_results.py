@@ -26,8 +26,7 @@ def key_results(summary: Document) -> Markup:
 def moduli(summary: Document) -> Iterator[Line]:
     """Young's modulus: computed, from an image, or given."""
     if found := summary.get("modulus"):
-        ends = between(found["lower_GPa"], found["upper_GPa"])
-        yield "Young's modulus E", core(found), ends, found["nature"]
+        yield from of_cell(found)
     if found := summary.get("image"):
         cuts = found["cuts"]
         inner, outer = (
@@ -39,6 +38,34 @@ def moduli(summary: Document) -> Iterator[Line]:
             between(found["E_GPa"]["lower"][k], found["E_GPa"]["upper"][k]) for k in (-1, 0)
         )
         yield "Young's modulus E", inner, outer, "given by the case"
+
+
+def of_cell(found: Document) -> Iterator[Line]:
+    """E and ν of a computed cell with what they are of, and the bounds of E in space."""
+    mean = MEANS[str(found.get("average", found.get("particles", "cylinders")))]
+    flag = ": outside the bounds of spheres, see below" if found.get("outside") else ""
+    ends, nature = between(found["lower_GPa"], found["upper_GPa"]), f"{found['nature']}{flag}"
+    yield f"Young's modulus E {mean}", core(found), ends, nature
+    poisson = found.get("nu_cuts", {"lower": ()})
+    if len(poisson["lower"]):
+        inner, outer = (
+            " … ".join(dict.fromkeys(f"{poisson[side][k]:.4f}" for side in ("lower", "upper")))
+            for k in (-1, 0)
+        )
+        yield f"Poisson's ratio ν {mean}", inner, outer, nature
+    if cuts := found.get("beside", {}).get("cuts"):
+        kind = "spheres" if found.get("outside") or found["particles"] == "spheres" else "fibres"
+        inner, outer = (between(cuts[kind]["lower"][k], cuts[kind]["upper"][k]) for k in (-1, 0))
+        name = {"spheres": "spheres", "fibres": "long fibres"}[kind]
+        yield f"Hashin–Shtrikman bounds of E, {name}", inner, outer, "bounds at the inputs' corners"
+
+
+MEANS = {
+    "cylinders": "of the square array (eq. 16)",
+    "isotropic": "of the square array, isotropic average",
+    "spheres": "of spheres, isotropic average",
+}
+"""What E and ν are of, behind their names."""
 
 
 def between(lower: float, upper: float) -> str:
@@ -66,7 +93,21 @@ def peaks(summary: Document) -> Iterator[Line]:
             )
             for level in (-1, 0)
         )
-        yield f"Peak of |{name}|", " … ".join(likely), " … ".join(whole), study["nature"]
+        kind = f"Peak of |{name}| at the nodes{every(study)}"
+        yield kind, " … ".join(likely), " … ".join(whole), f"{study['nature']}{beyond(of, unit)}"
+
+
+def every(study: Document) -> str:
+    """Words on how far apart the nodes of a study are."""
+    return f", every {study['step']:g} s" if "step" in study else ""
+
+
+def beyond(of: Document, unit: str) -> str:
+    """Words on what bounds a peak that lies between two nodes; none where nothing does."""
+    if "error" not in of:
+        return ""
+    most = engineering(of["upper"][0] + of["error"][0], unit)
+    return f"; between nodes at most {most}"
 
 
 def exceeded(summary: Document) -> Iterator[Line]:
@@ -85,6 +126,10 @@ def exceeded(summary: Document) -> Iterator[Line]:
 
 def decisions(summary: Document) -> Iterator[Line]:
     """Whether limits are exceeded, and how possible that is."""
-    for name, one in summary.get("decision", {}).get("limits", {}).items():
-        possible = f"possibility {degree(*one['possibility'])}"
-        yield f"|{name}| beyond its limit", one["verdict"], possible, one["nature"]
+    found = summary.get("decision", {})
+    for name, one in found.get("limits", {}).items():
+        possible, of = f"possibility {degree(*one['possibility'])}", name
+        if (margin := found["margins"].get(name)) is not None:
+            limit = engineering(margin["limit"], margin["unit"])
+            of = f"|{margin.get('output', name)}| beyond {limit}"
+        yield of, one["verdict"], possible, one["nature"]

@@ -80,8 +80,9 @@ def proofs(summary: Document) -> Iterator[str]:
             )
             yield (
                 f"The bounds of envelope {name} are proved at every node, and no wider than {gap}"
-                f" of {of} beyond what is attained; between nodes the motion leaves a straight line"
-                f" by {between} at most. {sentence(study['proof'])}"
+                f" of {of} beyond what is attained. Within a step no motion leaves the bounds at"
+                f" both of its ends by more than {between} of {of}, the largest of all steps."
+                f" {sentence(study['proof'])}"
             )
 
 

@@ -17,6 +17,7 @@ from alphacut.report.figures import gallery, listed
 from alphacut.report.key_results import key_results
 from alphacut.report.material import given, image, microstructure, modulus, stress
 from alphacut.report.methods import methods
+from alphacut.report.spectrum import spectrum
 from alphacut.report.tables import (
     citation,
     code,
@@ -43,6 +44,8 @@ def sections(summary: Document, folder: Path) -> Iterator[Markup]:
         yield stress(summary["response"], listed(summary, folder, "response"))
     if words := summary.get("structure", {}).get("words"):
         yield built(words, natural(summary))
+    if (folder / "spectrum.csv").is_file():
+        yield spectrum(folder)
     if "update" in summary:
         yield learned(summary, folder)
     if summary.get("envelopes"):

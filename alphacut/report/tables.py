@@ -65,8 +65,11 @@ def code(text: str, tag: str = "code") -> Markup:
 
 
 def sentence(text: str) -> str:
-    """Text as a sentence: a capital at its head, a full stop at its end."""
-    return f"{text[0].upper()}{text[1:].rstrip('.')}." if text else ""
+    """Text as a sentence: a capital at its head, unless a key leads it, a full stop at its end."""
+    if not text:
+        return ""
+    head = text[0] if re.match(r"\w+\.\w", text) else text[0].upper()
+    return f"{head}{text[1:].rstrip('.')}."
 
 
 def citation() -> str:

@@ -76,7 +76,7 @@ def _expected(case: Case, cell: Campaign | None) -> FuzzyNumber | None:
 
 def _ends(cell: Campaign, inputs: Mapping[str, FuzzyNumber]) -> tuple[float, float]:
     lower, upper = cell_range(cell, inputs, (0.0,))
-    return float(lower[0]), float(upper[0])
+    return float(lower[0, 0]), float(upper[0, 0])  # of E
 
 
 def _moduli(cell: Campaign, inputs: Mapping[str, FuzzyNumber]) -> tuple[float, float]:

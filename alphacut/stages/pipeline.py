@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,39 +12,24 @@ from alphacut.case.case import Case
 from alphacut.case.key import Section
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import Document, say, whole_file
-from alphacut.io.netcdf import require_known
+from alphacut.io.kept_arrays import KeptArrays
+from alphacut.io.netcdf import fingerprint_of, load_dataset
 from alphacut.io.progress import Tick, progress
 from alphacut.io.provenance import attributes, fingerprint
 from alphacut.stages.contract import keep_modulus
 from alphacut.stages.image import bounds, document
 from alphacut.stages.image.reading import study_of
-from alphacut.stages.material import microstructure, modulus, response
+from alphacut.stages.material import microstructure, modulus, references, response
 from alphacut.stages.material.campaign import campaign
 from alphacut.stages.material.microstructure import write as write_microstructure
 from alphacut.stages.vibration import decision, envelope, joint, update
 from alphacut.stages.vibration import exceedance as outcomes
-from alphacut.stages.vibration.envelope_task import EnvelopeTask, task_of
+from alphacut.stages.vibration.envelope_task import task_of
 from alphacut.stages.vibration.structure import Structure, structure
+from alphacut.stages.vibration.studies import Study, envelope_of, side_by_side, studies
 
 if TYPE_CHECKING:
     import xarray
-
-
-@dataclass(frozen=True)
-class Study:
-    """One envelope of a run.
-
-    Args:
-        name: Its file is envelope_NAME.nc.
-        task: What is computed.
-        figures: Figure of the paper for each output drawn; empty for none.
-        output: The one output drawn; empty for all.
-    """
-
-    name: str
-    task: EnvelopeTask
-    figures: tuple[str, ...] = ()
-    output: str = ""
 
 
 @dataclass(frozen=True)
@@ -60,6 +46,8 @@ class Chain:
         strict: Refuse a time step that cannot resolve the fastest mode.
         best_effort: Take results whose error is above the tolerance.
         built: The structure, if it is built; its modulus may be another.
+        executor: Processes that compute envelopes side by side.
+        meanwhile: Told the findings before the envelopes, while those are under way there.
     """
 
     case: Case
@@ -71,6 +59,8 @@ class Chain:
     strict: bool = False
     best_effort: bool = False
     built: Structure | None = None
+    executor: Executor | None = None
+    meanwhile: Callable[[Results], None] | None = None
 
     def file(self, name: str) -> Path:
         """A file among the results."""
@@ -87,7 +77,9 @@ class Chain:
         """The stages from the radius map on."""
         handed = modulus.stand_in(self.case)
         cell = self.modulus() if "modulus" in self.case.stages and handed is None else None
-        handed = modulus.read_number(self.file("modulus.nc")) if cell is not None else handed
+        handed = (
+            modulus.read_number(self.file("modulus.nc"), warn=False) if cell is not None else handed
+        )
         picture = self.image() if "image" in self.case.stages else None
         handed = modulus.read_number(self.file("image.nc")) if picture is not None else handed
         found = Results(self.case, self.folder, cell, {}, handed, image=picture)
@@ -109,8 +101,8 @@ class Chain:
                 lambda tick: update.dataset(case, before, learned, tick),
             )
             found = replace(found, learned=learned, update=bands)
-        envelopes = {study.name: self.envelope(study, handed, wanted) for study in studies(case)}
-        found = replace(found, envelopes=envelopes, structure=wanted)
+        found = replace(found, structure=wanted)
+        found = replace(found, envelopes=self.envelopes(found, wanted))
         if asked.exceedance:
             told = self.asked(
                 "exceedance",
@@ -121,7 +113,7 @@ class Chain:
             found = replace(found, exceedance=told)
         if asked.decision:
             same = (x.name for x in studies(case) if x.task == task_of(case))
-            peaks = envelopes.get(next(same, ""))
+            peaks = found.envelopes.get(next(same, ""))
             told = self.asked(
                 "decision",
                 asked.decision,
@@ -168,7 +160,11 @@ class Chain:
             with progress("Fuzzy modulus", quiet=self.quiet) as tick:
                 wanted = campaign(self.case, petsc=self.petsc, store=store)
                 found = modulus.compute(wanted, workers=self.workers, progress=tick)
-            modulus.write(found, path, case_text=self.case.text_of_file, key=key)
+            text, warned = (
+                self.case.text_of_file,
+                references.of_modulus(self.case, found)["outside"],
+            )
+            modulus.write(found, path, case_text=text, key=key, outside=warned)
 
         found = self.stored("modulus.nc", key, compute)
         error = modulus.listed(found, "error")
@@ -205,29 +201,58 @@ class Chain:
 
         return self.stored("response.nc", key, compute)
 
-    def envelope(
-        self, study: Study, handed: FuzzyNumber | None, wanted: Structure
-    ) -> xarray.Dataset:
-        """One study's envelope, in envelope_NAME.nc."""
-        key = self.vibration(
+    def envelopes(self, found: Results, wanted: Structure) -> dict[str, xarray.Dataset]:
+        """Every study's envelope, in envelope_NAME.nc; several are computed side by side."""
+        keys = {study: self.key_of(study, found.handed) for study in studies(self.case)}
+        stale = [s for s, key in keys.items() if not self.current(s.file, key)]
+        if self.executor is not None and len(stale) > 1:
+            begun = {study: self.begun(study, keys[study]) for study in stale}
+            under_way = side_by_side(wanted, begun, self.executor, strict=self.strict)
+            if self.meanwhile is not None:
+                self.meanwhile(found)
+            with progress("Envelopes", quiet=self.quiet) as tick:
+                for done, future in enumerate(as_completed(under_way), start=1):
+                    study = under_way[future]
+                    self.write_envelope(study, keys[study], future.result())
+                    if tick:
+                        tick(done / len(stale))
+            stale = []
+        return {
+            study.name: self.envelope(study, key, wanted, stale=study in stale)
+            for study, key in keys.items()
+        }
+
+    def key_of(self, study: Study, handed: FuzzyNumber | None) -> str:
+        """Fingerprint of one study's envelope."""
+        return self.vibration(
             {"task": study.task, "holds": ("bounds", "peaks", "tried at nodes")}, handed
         )
 
-        def compute(path: Path) -> None:
+    def begun(self, study: Study, key: str) -> KeptArrays:
+        """What an interrupted run has left of a study's envelope."""
+        return KeptArrays(self.file(study.file).with_suffix(".partial.npz"), key, self.fresh)
+
+    def envelope(self, study: Study, key: str, wanted: Structure, *, stale: bool) -> xarray.Dataset:
+        """One study's envelope from its file, computed first where that is stale."""
+        if stale:
             with progress(f"Envelope {study.name}", quiet=self.quiet) as tick:
-                found = envelope.compute(
+                made = envelope_of(
                     wanted,
                     study.task,
+                    self.begun(study, key),
                     strict=self.strict,
                     workers=self.workers,
                     progress=tick,
                 )
-            dataset = outcomes.with_peaks(found, wanted, study.task)
-            envelope.write(dataset, path, case_text=self.case.text_of_file, key=key)
-
-        found = self.stored(f"envelope_{study.name}.nc", key, compute)
+            self.write_envelope(study, key, made)
+        found = load_dataset(self.file(study.file))
         envelope.keep_tolerance(self.case, found, best_effort=self.best_effort)
         return found
+
+    def write_envelope(self, study: Study, key: str, made: xarray.Dataset) -> None:
+        """Put a study's envelope into its file, in place of what was kept on the way."""
+        envelope.write(made, self.file(study.file), case_text=self.case.text_of_file, key=key)
+        self.begun(study, key).done()
 
     def asked(
         self,
@@ -237,7 +262,8 @@ class Chain:
         make: Callable[[Tick | None], xarray.Dataset],
     ) -> xarray.Dataset:
         """What a section asks of the motion of [envelope], in NAME.nc."""
-        key = self.vibration({"wanted": [section, self.case.envelope]}, handed)
+        motion = replace(self.case.envelope, shares=True)  # which changes nothing here
+        key = self.vibration({"wanted": [section, motion]}, handed)
 
         def compute(path: Path) -> None:
             with progress(name.capitalize(), quiet=self.quiet) as tick:
@@ -257,15 +283,18 @@ class Chain:
 
     def stored(self, name: str, key: str, compute: Callable[[Path], None]) -> xarray.Dataset:
         """The dataset in a file: as it is if it has the fingerprint `key`, else computed first."""
-        import xarray
+        if not self.current(name, key):
+            compute(self.file(name))
+        return load_dataset(self.file(name))
 
+    def current(self, name: str, key: str) -> bool:
+        """Whether a file has the fingerprint `key` and may be taken, which is then said."""
         path = self.file(name)
-        if not self.fresh and path.is_file() and fingerprint_of(path) == key:
-            if not self.quiet:
-                say(f"{path} is up to date")
-        else:
-            compute(path)
-        return xarray.load_dataset(path)
+        if self.fresh or not path.is_file() or fingerprint_of(path) != key:
+            return False
+        if not self.quiet:
+            say(f"{path} is up to date")
+        return True
 
 
 @dataclass(frozen=True)
@@ -304,40 +333,13 @@ class Results:
     joint: xarray.Dataset | None = None
 
     @property
+    def datasets(self) -> list[xarray.Dataset]:
+        """Every dataset among them."""
+        one = (self.modulus, self.image, self.response, self.exceedance)
+        more = (self.update, self.decision, self.joint, *self.envelopes.values())
+        return [data for data in (*one, *more) if data is not None]
+
+    @property
     def studies(self) -> tuple[Study, ...]:
         """The studies, in the case's order."""
         return studies(self.case) if self.envelopes else ()
-
-
-def fingerprint_of(path: Path) -> str:
-    """The fingerprint in a NetCDF file; empty if it cannot be read.
-
-    Raises:
-        BadInput: A newer program wrote the file; its results are not overwritten unasked.
-    """
-    import xarray
-
-    try:
-        with xarray.open_dataset(path) as dataset:
-            told = dict(dataset.attrs)
-    except (OSError, ValueError):
-        return ""
-    if "format_version" in told:
-        require_known(
-            str(told["format_version"]), path, key="--out", maker=str(told.get("created_by", ""))
-        )
-    return str(told.get("fingerprint", ""))
-
-
-def studies(case: Case) -> tuple[Study, ...]:
-    """The studies of a case: its [[study]] tables, or one made of [envelope]."""
-    given = case.sections.study
-    return tuple(
-        Study(
-            study.name,
-            task_of(case, fuzzy=study.fuzzy, duration=study.duration),
-            study.figures,
-            study.output,
-        )
-        for study in given
-    ) or (Study("all", task_of(case)),)

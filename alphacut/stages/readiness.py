@@ -15,11 +15,13 @@ from alphacut.io.problem import BadInput, Problem
 from alphacut.io.units import STANDARD_GRAVITY, engineering
 from alphacut.stages.image.reading import expected_modulus, study_of
 from alphacut.stages.material import modulus, spheres
-from alphacut.stages.material.cell import cell_phases, modal_values, parts, phases_of
-from alphacut.stages.pipeline import studies
+from alphacut.stages.material.cell import cell_phases, modal_parts, phases_of
 from alphacut.stages.vibration import update
+from alphacut.stages.vibration.envelope_task import task_of
+from alphacut.stages.vibration.provable import too_many, unproved_reason
 from alphacut.stages.vibration.resolution_checks import rough
 from alphacut.stages.vibration.structure import Structure, structure
+from alphacut.stages.vibration.studies import studies
 
 if TYPE_CHECKING:
     from alphacut.frame import Accelerogram
@@ -83,6 +85,8 @@ def ready(case: Case) -> Readiness:
     wanted = structure(case, stand_in or expected(case))
     if problems := [*crisp_names(case, wanted)] or [*unlearned(case, wanted)]:
         raise BadInput(problems)
+    if problems := [*unprovable(case, wanted)]:
+        raise BadInput(problems)
     update.require_readable(case, wanted.frame)
     found = dict.fromkeys(
         problem for study in studies(case) for problem in rough(wanted, study.task)
@@ -95,7 +99,7 @@ def ready(case: Case) -> Readiness:
         *unlikely_material(case),
         *outlasted(case, ground),
         *unlikely(case, ground, period),
-        *unproved(case),
+        *unproved(case, wanted),
     )
     return Readiness(remarks, tuple(found), period, wanted)
 
@@ -107,12 +111,13 @@ def shape(case: Case) -> Iterator[str]:
     given = case.sections.microstructure
     if "microstructure" in case.stages:
         if not (given and given.packing):
-            return  # the fraction is not known before the section is read
+            yield from spheres.unmeasured(case)  # the fraction is known when the section is read
+            return
         share = given.packing.area_fraction
         values = {name: number.modal for name, number in cell_phases(case).items()}
         phases = phases_of(values)
     else:
-        radius, *both = parts(modal_values(case), case.radius.theta)
+        radius, *both = modal_parts(case)
         share, phases = spheres.area_share(radius), (both[0], both[1])
     if told := spheres.remark(case, share, *phases):
         yield told
@@ -125,8 +130,23 @@ def first_period(wanted: Structure) -> float | None:
     return None if wanted.linear is None else 2 * math.pi / float(frequencies(wanted.linear)[0])
 
 
-def unproved(case: Case) -> Iterator[str]:
-    """A remark where a certificate is wanted that cannot become a guarantee."""
+def unprovable(case: Case, wanted: Structure) -> Iterator[Problem]:
+    """Proofs that are asked for with more inputs than they are affordable for."""
+    asked = [("envelope.certify", study.task) for study in studies(case) if study.task.certify]
+    if case.sections.decision and not case.sections.update:  # those learned may settle it
+        asked.append(("decision", task_of(case)))
+    for key, task in asked:
+        for problem in too_many(key, wanted, task):
+            yield case.located(problem)
+
+
+def unproved(case: Case, wanted: Structure) -> Iterator[str]:
+    """Remarks where a proof is wanted that cannot become a guarantee."""
+    asked = "decision" if case.sections.decision else "envelope.certify"
+    if wanted.frame is not None and (case.sections.decision or case.envelope.certify is not None):
+        reason = unproved_reason(wanted, task_of(case))
+        if reason:
+            yield f"{asked}: verified by sampling, not proved: {reason}"
     if case.envelope.certify is not None and case.sections.tower:
         yield (
             "envelope.certify: the error of the modal model of a tower, whose shapes are reduced,"

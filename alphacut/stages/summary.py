@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from alphacut.case.case import Case
 from alphacut.io.files import Document
 from alphacut.io.provenance import FORMAT, command, versions
 from alphacut.rve.cell import Phase
 from alphacut.rve.spheres.result import volume_fraction
 from alphacut.stages.material import modulus, response, spheres
-from alphacut.stages.material.cell import GPA, modal_values, parts
+from alphacut.stages.material.cell import GPA, modal_parts
 from alphacut.stages.material.references import beside
 from alphacut.stages.pipeline import Results
 from alphacut.stages.vibration import exceedance as outcomes
@@ -23,7 +24,8 @@ from alphacut.stages.vibration.decision import decision_document
 from alphacut.stages.vibration.joint import joint_document
 from alphacut.stages.vibration.structure_words import structure_words
 from alphacut.stages.vibration.update import narrower
-from alphacut.stochastic import HermiteMap
+from alphacut.stochastic import RadiusMap
+from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     import xarray
@@ -31,41 +33,78 @@ if TYPE_CHECKING:
     from alphacut.frame.structures.linear import LinearSystem
 
 Row = dict[str, Any]
+# attributes of an envelope
+COST = ("trajectories", "seconds", "method", "nature")
+GAP = ("gap", "gap_output", "between_nodes", "proof")
+CLAIM = ("claim", "unproved")
 
 
 def summary(results: Results) -> Document:
     """Everything in numbers: inputs, fuzzy modulus, extremes, comparison."""
-    case = results.case
-    words = {
+    quoted = results.case.quoted
+    found = {
+        **origin(results.case),
+        **inputs_numbers(results),
+        **material_numbers(results),
+        **motion_numbers(results),
+        **question_numbers(results),
+    }
+    return {**found, "paper": comparison(quoted, found) if quoted else []}
+
+
+def origin(case: Case) -> Document:
+    """The case in words, and what made its results."""
+    return {
+        "format_version": FORMAT,
         "case": case.name,
         "title": case.top.title,
         "about": case.top.about,
         "case_text": case.text_of_file,
-    }
-    found: dict[str, Any] = {
-        "format_version": FORMAT,
-        **words,
         "command": command(),
         "versions": versions(),
     }
+
+
+def inputs_numbers(results: Results) -> Document:
+    """What particles were found, and their share of the area."""
+    found: dict[str, Any] = {}
     particles = results.folder / "microstructure.json"
-    if "microstructure" in case.stages and particles.is_file():
+    if "microstructure" in results.case.stages and particles.is_file():
         found["microstructure"] = json.loads(particles.read_text(encoding="utf-8"))
-    if case.sections.radius:
+    if results.case.sections.radius:
         found["area_fraction"] = area_fraction(results)
+    return found
+
+
+def material_numbers(results: Results) -> Document:
+    """The modulus, computed, proved of an image or given, and the response of the cell."""
+    found: dict[str, Any] = {}
     if results.modulus is not None:
-        radius, *phases = _cell(results)
-        of_shape = spheres.remark(case, spheres.area_share(radius), *phases) or ""
-        found["modulus"] = {**modulus_numbers(results.modulus), "shape": of_shape}
-        numbers = found["modulus"]
-        modal = float(numbers["modal_GPa"]) * GPA, float(numbers["nu"])
-        numbers |= beside(case, *modal, numbers.get("shear_ratio"))
+        found["modulus"] = cell_numbers(results, results.modulus)
     elif results.image is not None:
         found["image"] = json.loads(results.image.attrs["document"])
     elif results.handed is not None:
         found["given_modulus"] = given(results)
     if results.response is not None:
         found["response"] = response.document(results.response)
+    return found
+
+
+def cell_numbers(results: Results, dataset: xarray.Dataset) -> Document:
+    """The fuzzy modulus beside its references."""
+    case = results.case
+    radius, *phases = _cell(results)
+    of_shape = spheres.remark(case, spheres.area_share(radius), *phases) or ""
+    numbers = {**modulus_numbers(dataset), "shape": of_shape}
+    modal = float(numbers["modal_GPa"]) * GPA, float(numbers["nu"])
+    low, high = (GPA * np.asarray(numbers["E_GPa"][side]) for side in ("lower", "upper"))
+    cuts = np.asarray(numbers["alpha"]), low, high
+    return numbers | beside(case, *modal, numbers.get("shear_ratio"), cuts)
+
+
+def motion_numbers(results: Results) -> Document:
+    """The structure, every study's envelope, and what measured modes leave."""
+    found: dict[str, Any] = {}
     if results.envelopes:
         found["structure"] = structure_numbers(results)
         fuzzy = {study.name: study.task.fuzzy for study in results.studies}
@@ -75,13 +114,18 @@ def summary(results: Results) -> Document:
         }
     if results.learned is not None:
         found["update"] = learned_numbers(results)
+    return found
+
+
+def question_numbers(results: Results) -> Document:
+    """Answers to what the case asks of the motion."""
+    found: dict[str, Any] = {}
     if results.exceedance is not None:
         found["exceedance"] = outcomes.exceedances_document(results.exceedance)
     if results.decision is not None:
         found["decision"] = decision_document(results.decision)
     if results.joint is not None:
         found["joint"] = joint_document(results.joint)
-    found["paper"] = comparison(case.quoted, found) if case.quoted else []
     return found
 
 
@@ -105,9 +149,9 @@ def area_fraction(results: Results) -> float:
     return float(rule.mean(np.pi / 4 * radius(rule.nodes) ** 2))
 
 
-def _cell(results: Results) -> tuple[HermiteMap, Phase, Phase]:
+def _cell(results: Results) -> tuple[RadiusMap, Phase, Phase]:
     """The modal map, matrix and particle."""
-    return parts(modal_values(results.case), results.case.radius.theta)
+    return modal_parts(results.case)
 
 
 def modulus_numbers(dataset: xarray.Dataset) -> Document:
@@ -181,36 +225,44 @@ def counted(model: LinearSystem) -> int:
 def envelope_numbers(dataset: xarray.Dataset) -> Document:
     """Extremes over time at the lowest level, widths, errors, cost."""
     lowest = dataset.isel(alpha=0)
-    names = [str(name) for name in dataset["output"].values]
-    low, high = lowest["lower"].min("time").values, lowest["upper"].max("time").values
-    width = (lowest["upper"] - lowest["lower"]).mean("time").values
-    cost = {name: dataset.attrs[name] for name in ("trajectories", "seconds", "method", "nature")}
-    columns = {"min": low, "max": high, "mean_width": width}
-    numbers = {
-        key: dict(zip(names, map(float, column), strict=True)) for key, column in columns.items()
+    columns = {
+        "min": lowest["lower"].min("time").values,
+        "max": lowest["upper"].max("time").values,
+        "mean_width": (lowest["upper"] - lowest["lower"]).mean("time").values,
     }
-    if "gap" in dataset.attrs:
-        cost |= {
-            name: dataset.attrs[name]
-            for name in ("gap", "gap_output", "between_nodes", "proof")
-            if name in dataset.attrs
-        }
-    if "proved_lower" in dataset:
-        ends = (
-            lowest["proved_lower"].min("time").values,
-            lowest["proved_upper"].max("time").values,
-        )
-        sides = (dict(zip(names, map(float, end), strict=True)) for end in ends)
-        proved = dict(zip(("min", "max"), sides, strict=True))
-        cost |= {"proved": {**proved, "gap": float(dataset.attrs["proved_gap"])}}
-    cost |= {name: dataset.attrs[name] for name in ("claim", "unproved") if name in dataset.attrs}
     if "error" in dataset:
-        numbers["error"] = dict(
-            zip(names, map(float, lowest["error"].max("time").values), strict=True)
-        )
-    return (
-        numbers | {"alpha": dataset["alpha"].values, "peak": outcomes.peak_document(dataset)} | cost
-    )
+        columns["error"] = lowest["error"].max("time").values
+    return {
+        **{key: by_output(dataset, column) for key, column in columns.items()},
+        "alpha": dataset["alpha"].values,
+        "peak": outcomes.peak_document(dataset),
+        **{name: dataset.attrs[name] for name in COST},
+        "step": float(dataset["time"].values[1]),
+        **(told(dataset, *GAP) if "gap" in dataset.attrs else {}),
+        **proved_numbers(dataset),
+        **told(dataset, *CLAIM),
+    }
+
+
+def told(dataset: xarray.Dataset, *names: str) -> Document:
+    """Those of the attributes that there are."""
+    return {name: dataset.attrs[name] for name in names if name in dataset.attrs}
+
+
+def by_output(dataset: xarray.Dataset, column: Array) -> dict[str, float]:
+    """A number for each output, by its name."""
+    names = [str(name) for name in dataset["output"].values]
+    return dict(zip(names, map(float, column), strict=True))
+
+
+def proved_numbers(dataset: xarray.Dataset) -> Document:
+    """Proved extremes over time at the lowest level, where there are any."""
+    if "proved_lower" not in dataset:
+        return {}
+    lowest = dataset.isel(alpha=0)
+    least, most = lowest["proved_lower"].min("time"), lowest["proved_upper"].max("time")
+    ends = {"min": by_output(dataset, least.values), "max": by_output(dataset, most.values)}
+    return {"proved": {**ends, "gap": float(dataset.attrs["proved_gap"])}}
 
 
 def comparison(path: Path, found: Document) -> list[Row]:

@@ -15,29 +15,39 @@ import numpy as np
 
 from alphacut.case.case import Case
 from alphacut.fuzzy import Crisp, FuzzyNumber, Reduced, propagate
-from alphacut.io.files import say
+from alphacut.io.files import Document, say
+from alphacut.io.progress import Tick
 from alphacut.stages.material.campaign import Campaign, campaign
-from alphacut.stages.pipeline import Results, Study
+from alphacut.stages.pipeline import Results
+from alphacut.stages.vibration.envelope_task import EnvelopeTask
+from alphacut.stages.vibration.structure import Structure
+from alphacut.stages.vibration.studies import Study, studies
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     import xarray
 
+    from alphacut.frame.structures.linear import LinearSystem
     from alphacut.fuzzy.width_contributions import Shares
 
 
+OF_CELL = ("E", "nu")
+
+
 def modulus_shares(case: Case) -> Shares:
-    """Shares of the cell's fuzzy inputs in the width of E, shape (inputs, levels)."""
+    """Shares of the cell's fuzzy inputs in the widths of E and ν, shape (inputs, levels, 2)."""
     from alphacut.fuzzy.width_contributions import width_shares
 
     wanted = campaign(case)
-    return width_shares(lambda inputs: cell_range(wanted, inputs, wanted.alpha), wanted.inputs)
+    return width_shares(
+        lambda inputs: cell_range(wanted, inputs, wanted.alpha), wanted.inputs, progress=False
+    )
 
 
 def cell_range(
     wanted: Campaign, inputs: Mapping[str, FuzzyNumber], alpha: tuple[float, ...]
 ) -> tuple[Array, Array]:
-    """Ends of E on each level, (A,), by the series, for other numbers as the cell's inputs."""
+    """Ends of E and ν on each level, (A, 2), by the series, for other numbers as inputs."""
     fuzzy = {name: number for name, number in inputs.items() if not isinstance(number, Crisp)}
     crisp = {
         **wanted.task.crisp,
@@ -45,14 +55,33 @@ def cell_range(
     }
     task = replace(wanted.task, choice=replace(wanted.task.choice, method="series"), crisp=crisp)
     if not fuzzy:
-        alone = np.full(len(alpha), float(np.asarray(task([{}])[0]["E"])))
+        only = task([{}])[0]
+        alone = np.tile([float(np.asarray(only[name])) for name in OF_CELL], (len(alpha), 1))
         return alone, alone
     shared = tuple(name for name in fuzzy if name != "inclusion_modulus") or tuple(fuzzy)
-    return propagate(task, fuzzy, Reduced(), alpha=alpha, shared=shared).bounds("E")
+    found = propagate(task, fuzzy, Reduced(), alpha=alpha, shared=shared, progress=False)
+    lower, upper = (
+        np.stack(ends, axis=1)
+        for ends in zip(*(found.bounds(name) for name in OF_CELL), strict=True)
+    )
+    return lower, upper
 
 
-def envelope_shares(results: Results, study: Study) -> tuple[Shares, Array]:
+def asked(task: EnvelopeTask, model: LinearSystem) -> Document:
+    """What `frame.envelope` is called with for shares: they need two digits."""
+    common: Document = {"alpha": task.alpha[:1], "duration": task.duration, "method": "modal"}
+    if model.ground is None:
+        return {**common, "step": task.step}
+    step = thinned(task.duration, task.step)
+    return {**common, "step": step, "tolerance": 1e-2, "relative": True, "passes": 1}
+
+
+def envelope_shares(
+    results: Results, study: Study, progress: Tick | None = None
+) -> tuple[Shares, Array, list[str]]:
     """Shares of a study's inputs in every output's width, (inputs, times, outputs).
+
+    With them the times and the outputs' names.
 
     Raises:
         ModalError: The modal method cannot treat the structure.
@@ -64,27 +93,38 @@ def envelope_shares(results: Results, study: Study) -> tuple[Shares, Array]:
     assert wanted is not None
     assert wanted.linear is not None
     model, inputs = wanted.linear, wanted.inputs(study.task.fuzzy)
-    step = (
-        study.task.step if model.ground is None else thinned(study.task.duration, study.task.step)
-    )
-    # a share needs two digits
-    options: dict[str, Any] = {} if model.ground is None else {"tolerance": 1e-2, "relative": True}
     groups = {name: wanted.members(name) for name in study.task.fuzzy}
-    times: list[Array] = []
+    axes: list[tuple[Array, list[str]]] = []
+
+    def tick(done: float) -> None:
+        if progress:
+            progress((len(axes) + done) / (1 + len(groups)))
 
     def bounds(fuzzy: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
         left = {name: number for name, number in fuzzy.items() if not isinstance(number, Crisp)}
-        level, task = (study.task.alpha[0],), study.task
-        found = frame.envelope(
-            model, left, alpha=level, duration=task.duration, step=step, method="modal", **options
-        )
-        times.append(found.time)
+        found = frame.envelope(model, left, progress=tick, **asked(study.task, model))
+        axes.append((found.time, list(found.outputs)))
         return found.lower[0], found.upper[0]
 
-    return width_shares(bounds, inputs, groups=groups), times[0]
+    return width_shares(bounds, inputs, groups=groups, progress=False), *axes[0]
 
 
-def dataset(results: Results) -> xarray.Dataset:
+def explained(wanted: Structure, task: EnvelopeTask) -> list[str]:
+    """A line on what the shares of a study cost; none where there are none."""
+    from alphacut import frame
+
+    if wanted.linear is None or len(task.fuzzy) < 2:
+        return []
+    given = {"inputs": wanted.inputs(task.fuzzy), **asked(task, wanted.linear)}
+    one, count = frame.plan(wanted.linear, **given)[0], 1 + len(task.fuzzy)
+    cost = f"some {count * one.seconds:.1g} s" if np.isfinite(one.seconds) else "not possible"
+    return [
+        f"what drives the width, of run: {cost}; {count} envelopes more, which [envelope] shares ="
+        " false leaves out"
+    ]
+
+
+def dataset(results: Results, progress: Tick | None = None) -> xarray.Dataset:
     """Shares of every input, by level and by time, where there are two or more."""
     import xarray
 
@@ -94,48 +134,57 @@ def dataset(results: Results) -> xarray.Dataset:
     coordinates: dict[str, Any] = {}
     if results.modulus is not None and len(results.modulus["parameter"]) > 1:
         cell = modulus_shares(results.case)
-        variables["modulus_share"] = (("cell_input", "alpha"), cell.share, {"units": "1"})
+        for column, name in enumerate(("modulus_share", "poisson_share")):
+            share = cell.share[..., column]
+            variables[name] = (("cell_input", "alpha"), share, {"units": "1"})
         coordinates |= {
             "cell_input": list(cell.names),
             "alpha": list(results.case.modulus.alpha),
         }
     study = richest(results)
-    if study is not None and len(study.task.fuzzy) > 1 and not results.case.sections.pendulum:
+    if study is not None and of_width(results, study):
         try:
-            structure, time = envelope_shares(results, study)
+            structure, time, names = envelope_shares(results, study, progress)
         except ModalError as error:
             say(f"no shares of the width over time: {error}")
         else:
             variables["share"] = (("input", "time", "output"), structure.share, {"units": "1"})
-            variables["width"] = (("time", "output"), structure.width)
-            names = [str(name) for name in results.envelopes[study.name]["output"].values]
-            coordinates |= {"input": list(structure.names), "time": time, "output": names}
+            units = {"units": "SI, by output"}
+            variables["width"] = (("time", "output"), structure.width, units)
+            coordinates |= {"input": list(structure.names), "output": names}
+            coordinates["time"] = ("time", time, {"units": "s"})
     return xarray.Dataset(variables, coordinates, {"study": study.name if study else ""})
 
 
+def of_width(results: Results, study: Study) -> bool:
+    """Whether there are shares of a study's width, and they are wanted."""
+    several = len(study.task.fuzzy) > 1 and not results.case.sections.pendulum
+    return several and results.case.envelope.shares
+
+
 def thinned(duration: float, step: float) -> float:
-    """Multiple of the step that leaves some hundreds of nodes."""
+    """Multiple of the step that leaves a hundred nodes or some more."""
     steps = round(duration / step)
-    return step * max(k for k in range(1, max(2, steps // 300)) if steps % k == 0)
+    return step * max(k for k in range(1, max(1, steps // 100) + 1) if steps % k == 0)
 
 
 def richest(results: Results) -> Study | None:
-    """The study with the most fuzzy inputs; None without studies."""
-    return (
-        max(results.studies, key=lambda study: (len(study.task.fuzzy), study.task.duration))
-        if results.studies
-        else None
-    )
+    """The study with the most fuzzy inputs; None where nothing vibrates."""
+    if results.structure is None:
+        return None
+    several = studies(results.case)
+    return max(several, key=lambda study: (len(study.task.fuzzy), study.task.duration))
 
 
 def mean_shares(found: xarray.Dataset) -> dict[str, dict[str, float]]:
     """Mean shares for a table: of E at the lowest level, of outputs over time."""
     table: dict[str, dict[str, float]] = {}
-    if "modulus_share" in found:
-        lowest = found["modulus_share"].isel(alpha=0)
-        table["E"] = {
-            str(name): float(lowest.sel(cell_input=name)) for name in found["cell_input"].values
-        }
+    for quantity, variable in (("E", "modulus_share"), ("ν", "poisson_share")):
+        if variable in found:
+            lowest = found[variable].isel(alpha=0)
+            table[quantity] = {
+                str(name): float(lowest.sel(cell_input=name)) for name in found["cell_input"].values
+            }
     if "share" in found:
         weighted = (found["share"] * found["width"]).sum("time") / found["width"].sum("time")
         for output in found["output"].values:

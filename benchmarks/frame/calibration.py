@@ -26,7 +26,7 @@ from benchmarks.frame.pendulum import inputs as pendulum_inputs
 from benchmarks.frame.pendulum import missed_and_declared
 from benchmarks.frame.references.exact_modes import inner_bounds
 from benchmarks.frame.references.swing import Swing, exact_bounds
-from benchmarks.frame.wide import sixteen
+from benchmarks.frame.references.wide import sixteen
 from benchmarks.rows import write
 
 RESULTS = Path(__file__).parents[1] / "results"

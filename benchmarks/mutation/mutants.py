@@ -177,6 +177,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--jobs", type=int, default=2, help="at once (default 2)")
     parser.add_argument("--out", type=Path, default=RESULTS)
     options = parser.parse_args(arguments)
+    if not os.access(options.out.parent, os.W_OK):
+        parser.error(f"--out {options.out}: its folder cannot be written; name another")
     every, before = [one for one in mutants() if options.only in one.name], kept_rows()
     for mutant in every:  # all apply, or nothing is begun
         mutant.applied((ROOT / mutant.file).read_text(encoding="utf-8"))

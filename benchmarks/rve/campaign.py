@@ -83,11 +83,50 @@ def alone(wanted: Campaign, found: FuzzyResult) -> float:
         groups.setdefault(point[columns].tobytes(), []).append(row)
     for rows in groups.values():
         points = [dict(zip(found.inputs, found.points[row], strict=True)) for row in rows]
-        cells = [parts({**task.crisp, **point}, task.theta) for point in points]
+        cells = [parts({**task.crisp, **point}, task.family) for point in points]
         results = model.solve(cells[0][0], cells[0][1], [cell[2] for cell in cells])
         exact = np.array([result.modulus for result in results])
         worst = max(worst, float(abs(found.values.output("E")[rows] / exact - 1).max()))
     return worst
+
+
+def timed(repeat: int) -> dict[str, float]:
+    """Least seconds of each version for the samples, and of one solve, process included."""
+    seconds: dict[str, list[float]] = {"0.1.0": [], "this": []}
+    with TemporaryDirectory() as place:
+        old = Path(place)
+        check_out(OLD, old)
+        for _ in range(repeat):
+            for name, folder in (("0.1.0", old), ("this", ROOT)):
+                wall, _, answer = modulus(folder, 2)
+                seconds[name].append(wall)
+                print(f"{name}: {wall:.1f} s, {answer['solves']} linear systems", flush=True)
+        solves = [command(folder, "rve", "solve", "cases/paper.toml") for folder in (old, ROOT)]
+    before, now = min(seconds["0.1.0"]), min(seconds["this"])
+    print(f"ratio of the quickest: {before / now:.2f}")
+    for name, (took, spent, _) in zip(("version 0.1.0", "this version"), solves, strict=True):
+        print(f"rve solve of {name}, process included: {took:.2f} s, processors {spent:.2f} s")
+    return {
+        "seconds_0.1.0": before,
+        "seconds": now,
+        "ratio": before / now,
+        "solve_seconds_0.1.0": solves[0][0],
+        "solve_processors_0.1.0": solves[0][1],
+        "solve_seconds": solves[1][0],
+        "solve_processors": solves[1][1],
+    }
+
+
+def compared() -> tuple[bool, float]:
+    """Whether 1 and 2 processes give the same bits, and by how much E is off one alone."""
+    wanted = campaign(load(ROOT / "cases" / "paper.toml"))
+    cell_model(wanted.task.choice)
+    first, second = (compute(wanted, workers=workers).result for workers in (1, 2))
+    same = first.points.tobytes() == second.points.tobytes() and all(
+        first.values.output(name).tobytes() == second.values.output(name).tobytes()
+        for name, _ in first.values.layout
+    )
+    return same, alone(wanted, first)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -98,46 +137,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--repeat", type=int, default=2, help="runs of each version (2)")
     parser.add_argument("--times", action="store_true", help="times only, no bits and no E alone")
     options = parser.parse_args(arguments)
-    seconds: dict[str, list[float]] = {"0.1.0": [], "this": []}
-    with TemporaryDirectory() as place:
-        old = Path(place)
-        check_out(OLD, old)
-        for _ in range(options.repeat):
-            for name, folder in (("0.1.0", old), ("this", ROOT)):
-                wall, _, answer = modulus(folder, 2)
-                seconds[name].append(wall)
-                print(f"{name}: {wall:.1f} s, {answer['solves']} linear systems", flush=True)
-        solves = [command(folder, "rve", "solve", "cases/paper.toml") for folder in (old, ROOT)]
-    least = {name: min(times) for name, times in seconds.items()}
-    ratio = least["0.1.0"] / least["this"]
-    print(f"ratio of the quickest: {ratio:.2f}")
-    for name, (took, spent, _) in zip(("version 0.1.0", "this version"), solves, strict=True):
-        print(f"rve solve of {name}, process included: {took:.2f} s, processors {spent:.2f} s")
-    row = {
-        "seconds_0.1.0": least["0.1.0"],
-        "seconds": least["this"],
-        "ratio": ratio,
-        "solve_seconds_0.1.0": solves[0][0],
-        "solve_processors_0.1.0": solves[0][1],
-        "solve_seconds": solves[1][0],
-        "solve_processors": solves[1][1],
-    }
+    row = {name: round(value, 2) for name, value in timed(options.repeat).items()}
     if options.times:
-        write([{name: round(float(value), 2) for name, value in row.items()}], RESULTS)
+        write([row], RESULTS)
         return 0
-    wanted = campaign(load(ROOT / "cases" / "paper.toml"))
-    cell_model(wanted.task.choice)
-    found = [compute(wanted, workers=workers) for workers in (1, 2)]
-    first, second = (one.result for one in found)
-    same = first.points.tobytes() == second.points.tobytes() and all(
-        found[0].result.values.output(name).tobytes()
-        == found[1].result.values.output(name).tobytes()
-        for name, _ in first.values.layout
-    )
-    off = alone(wanted, first)
+    same, off = compared()
     print(f"the same bits with 1 and 2 processes: {same}; E off by {off:.1e} at the most")
-    rounded = {name: round(float(value), 2) for name, value in row.items()}
-    write([{**rounded, "same_bits": same, "E_off": f"{off:.1e}"}], RESULTS)
+    write([{**row, "same_bits": same, "E_off": f"{off:.1e}"}], RESULTS)
     return int(not same or off > E_OFF)
 
 

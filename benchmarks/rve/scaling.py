@@ -1,22 +1,33 @@
-"""Time per unknown and iterations over mesh size, layers and contrast.
+"""Time per unknown and iterations over mesh size, layers and contrast; one cell on several ranks.
 
-One process, one thread; set-up and both loads. Writes benchmarks/results/cell_scaling.csv; exit
-status 1 where a factor exceeds 1.5.
+One process, one thread; set-up and both loads. Then a cell of mesh size 0.04 with its error
+estimate, from a start without tables, on each number of ranks, and what the model of docs/theory.md
+makes of one rank's times for others. Writes benchmarks/results/cell_scaling.csv; exit status 1
+where a factor exceeds 1.5, or an E of several ranks differs by more than 1e-12.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
+import json
+import resource
+import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from math import ceil
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 from alphacut.rve.cell import Phase
-from benchmarks.rve.solvers import MATRIX, Timing, measure
+from benchmarks.rve.solvers import MATRIX, PAPER_MAP, PARTICLE, Timing, measure
 
 FACTOR = 1.5
+SAME = 1e-12
+MODELLED = (2, 13, 26, 1000)  # ranks
+_LEVELS, _LOADS, _RADII = 13, 2, 6  # radii of a table that are solved at once
+PHASES = ("start", "mesh", "assemble", "setup", "solve", "estimate")
 CHANGES: Mapping[str, tuple[float, ...]] = {
     "mesh size": (0.15, 0.08, 0.04),
     "layers": (12, 24, 48),
@@ -57,6 +68,78 @@ def spreads(rows: Sequence[tuple[str, float, Timing]]) -> dict[str, tuple[float,
     return out
 
 
+def on_rank(mesh_size: float) -> None:
+    """One cell as a rank of mpirun works on it; the first prints a JSON object."""
+    from alphacut.rve.prism.model import PrismModel
+
+    # isort: split
+    from mpi4py import MPI
+
+    ranks = MPI.COMM_WORLD
+    model = PrismModel(mesh_size, parallel=ranks.size > 1, estimate=True)
+    result = model.solve(PAPER_MAP, MATRIX, [PARTICLE])[0]
+    spent = resource.getrusage(resource.RUSAGE_SELF)
+    own = spent.ru_maxrss / 1024, spent.ru_utime + spent.ru_stime
+    megabytes, processor = (max(part) for part in zip(*ranks.allgather(own), strict=True))
+    if ranks.rank == 0:
+        found = {phase: result.seconds[phase] for phase in PHASES[1:]}
+        found |= {"unknowns": result.unknowns, "iterations": max(result.iterations)}
+        found |= {"E": result.modulus, "megabytes": megabytes, "processor": processor}
+        print(json.dumps(found))
+
+
+def shared(ranks: int, mesh_size: float) -> dict[str, float]:
+    """Seconds of one cell by phase and in all, and the most memory and processor of a rank."""
+    own = [sys.executable, "-m", __spec__.name, "--cell", str(mesh_size)]
+    started = perf_counter()
+    done = subprocess.run(
+        ["mpirun", "-n", str(ranks), *own], capture_output=True, text=True, check=True
+    )
+    found: dict[str, float] = {"seconds": perf_counter() - started, **json.loads(done.stdout)}
+    found["start"] = found["seconds"] - sum(found[phase] for phase in PHASES[1:])
+    return found
+
+
+def modelled(one: Mapping[str, float], ranks: int) -> dict[str, float]:
+    """Seconds by phase on so many ranks from those on one; see docs/theory.md."""
+    levels, radii = (ceil(count / ranks) / count for count in (_LEVELS, _RADII))
+    share = {
+        "start": 1.0,
+        "mesh": 1 / ranks,
+        "assemble": 1 / ranks,
+        "setup": levels,
+        "solve": levels / min(max(ranks // _LEVELS, 1), _LOADS),
+        "estimate": max(radii, levels),
+    }
+    found = {phase: share[phase] * one[phase] for phase in PHASES}
+    return {"seconds": sum(found.values()), **found}
+
+
+def on_ranks(counts: Sequence[int], mesh_size: float) -> tuple[list[dict[str, Any]], int]:
+    """Rows of the table, printed, and the number of faults."""
+    rows: list[dict[str, Any]] = []
+    for count in counts:
+        found = shared(count, mesh_size)
+        rows.append({"change": "ranks", "value": count, **found})
+        phases = "".join(f"  {phase} {found[phase]:.2f}" for phase in PHASES)
+        print(
+            f"{count} ranks{found['seconds']:>8.2f} s{found['megabytes']:>7.0f} MB"
+            f"{found['processor']:>8.2f} s of processor, each at most:{phases}",
+            flush=True,
+        )
+    first, faults = rows[0], 0
+    for row in rows[1:]:
+        wall, memory = (row[name] / first[name] for name in ("seconds", "megabytes"))
+        apart = abs(row["E"] / first["E"] - 1)
+        faults += apart > SAME
+        print(f"{row['value']} ranks: {wall:.2f} of the time, {memory:.2f} of the memory of")
+        print(f"  {first['value']}; E differs by {apart:.1e}")
+    if first["value"] == 1:
+        modelled_rows = [(count, modelled(first, count)) for count in MODELLED]
+        rows += [{"change": "ranks, modelled", "value": k, **row} for k, row in modelled_rows]
+    return rows, faults
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure, print, write the CSV file."""
     parser = argparse.ArgumentParser(
@@ -77,7 +160,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         default=Path(__file__).parents[1] / "results" / "cell_scaling.csv",
         help="CSV file to write",
     )
+    parser.add_argument("--ranks", default="1,2", help="MPI ranks of one cell (default 1,2)")
+    parser.add_argument("--cell", type=float, help="what each rank runs: a cell of this mesh size")
     options = parser.parse_args(arguments)
+    if options.cell:
+        on_rank(options.cell)
+        return 0
+    together, faults = on_ranks(
+        [int(k) for k in options.ranks.split(",")], CHANGES["mesh size"][-1]
+    )
     rows = []
     for change, value, timing in series(
         CHANGES, mesh_size=options.mesh_size, repeat=options.repeat
@@ -91,11 +182,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
     options.out.parent.mkdir(parents=True, exist_ok=True)
     with options.out.open("w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(["change", "value", "unknowns", "iterations", "seconds"])
-        writer.writerows(
-            [c, v, t.unknowns, max(t.iterations), f"{t.seconds:.4f}"] for c, v, t in rows
+        names = ["change", "value", "unknowns", "iterations", "seconds", *PHASES]
+        writer = csv.DictWriter(
+            file, [*names, "megabytes", "processor"], restval="", extrasaction="ignore"
         )
+        writer.writeheader()
+        writer.writerows(
+            {
+                "change": c,
+                "value": v,
+                "unknowns": t.unknowns,
+                "iterations": max(t.iterations),
+                "seconds": f"{t.seconds:.4f}",
+            }
+            for c, v, t in rows
+        )
+        for row in together:
+            exact = {name: row[name] for name in ("change", *names[1:4]) if name in row}
+            writer.writerow({k: f"{v:.4f}" for k, v in row.items() if k not in exact} | exact)
     counts = [max(timing.iterations) for _, _, timing in rows]
     print(f"iterations from {min(counts)} to {max(counts)}")
     found = spreads(rows)
@@ -103,7 +207,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(
             f"{change}: time per unknown within a factor {pace:.2f}, iterations within {count:.2f}"
         )
-    return int(any(max(pair) > FACTOR for pair in found.values()))
+    return int(faults > 0 or any(max(pair) > FACTOR for pair in found.values()))
 
 
 if __name__ == "__main__":

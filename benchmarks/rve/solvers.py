@@ -115,53 +115,61 @@ def _row(t: Timing, first: Timing) -> list[str | int]:
     ]
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the table, write the CSV file; exit 1 if the default is too slow."""
-    parser = argparse.ArgumentParser(
+def parser() -> argparse.ArgumentParser:
+    """The options."""
+    found = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument(
+    found.add_argument(
         "--mesh-size",
         type=float,
         default=0.15,
         help="triangle size in halves of the cell's side (default 0.15: 34,000 unknowns)",
     )
-    parser.add_argument(
+    found.add_argument(
         "--out",
         type=Path,
         default=Path(__file__).parents[1] / "results" / "cell_solvers.csv",
         help="CSV file to write",
     )
-    parser.add_argument(
+    found.add_argument(
         "--solvers",
         default="mumps,gamg",
         help="what to set beside the default, separated by commas (default mumps,gamg)",
     )
-    parser.add_argument(
+    found.add_argument(
         "--cap",
         type=float,
         default=120,
         help="seconds after which a solver is stopped (default 120)",
     )
-    options = parser.parse_args(arguments)
-    timings = [measure("theta", mesh_size=options.mesh_size, repeat=4)]
-    for name in options.solvers.split(","):
-        repeat = {"mumps": 2}.get(name, 1)
-        timings.append(
-            measure_capped(
-                name, timings[0], cap=options.cap, mesh_size=options.mesh_size, repeat=repeat
-            )
-        )
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    with options.out.open("w", newline="") as file:
+    return found
+
+
+def write_rows(timings: Sequence[Timing], out: Path) -> None:
+    """Print the table and write it."""
+    out.parent.mkdir(parents=True, exist_ok=True)
+    line = "{:8s}{:>8} unknowns{:>10} s{:>6} iterations   E = {} GPa{:>8} times"
+    with out.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(["solver", "unknowns", "seconds", "iterations", "E_GPa", "times_default"])
         for t in timings:
             row = _row(t, timings[0])
             writer.writerow(row)
-            print(
-                "{:8s}{:>8} unknowns{:>10} s{:>6} iterations   E = {} GPa{:>8} times".format(*row)
-            )
+            print(line.format(*row))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the table, write the CSV file; exit 1 if the default is too slow."""
+    options = parser().parse_args(arguments)
+    size = options.mesh_size
+    timings = [measure("theta", mesh_size=size, repeat=4)]
+    for name in options.solvers.split(","):
+        repeat = {"mumps": 2}.get(name, 1)
+        timings.append(
+            measure_capped(name, timings[0], cap=options.cap, mesh_size=size, repeat=repeat)
+        )
+    write_rows(timings, options.out)
     faults = compare(timings)
     print("\n".join(faults), file=sys.stderr, end="\n" if faults else "")
     return 1 if faults else 0

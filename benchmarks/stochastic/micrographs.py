@@ -29,7 +29,7 @@ from alphacut.stochastic.errors import RefusedError
 from alphacut.stochastic.microstructure import study
 from alphacut.stochastic.microstructure_summary import fragment
 from benchmarks.rows import write
-from benchmarks.rve.image_cases import moduli_of, phases_of
+from benchmarks.rve.image.cases import moduli_of, phases_of
 from benchmarks.stochastic.synthetic_section import Section, micrograph, overlapping_discs
 
 RESULTS = Path(__file__).parents[1] / "results"

@@ -8,12 +8,14 @@ from functools import singledispatch
 import numpy as np
 
 from alphacut.frame.boxes import Boxes
+from alphacut.frame.calculus.jet import Array
 from alphacut.frame.checks.step_error import probes
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem, evaluate
 from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.frame.structures.storey import StoreyFrame
 
+OTHER_UNITS = 500  # from so many times the structure's own value on, or that part of it
 POSITIVE, NOT_NEGATIVE, RATIO = (
     "positive",
     "0 or greater",
@@ -51,7 +53,8 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
         cuts: Its uncertain parameters.
 
     Raises:
-        ValueError: A support is not finite or reaches what its parameter must not be, or the mass
+        ValueError: A support is not finite or reaches what its parameter must not be, or is of
+            another size than the structure's own value, as one in other units, or the mass
             matrix of a linear structure is not positive definite at the modal parameters or a
             corner, or the weight may buckle a storey.
     """
@@ -67,11 +70,23 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
                 f"uncertain parameter {name}: its support [{low:g}, {high:g}] must be"
                 f" {rule or 'finite'}; narrow it"
             )
+        _require_size(name, system.parameters[name], np.array([low, high]))
     if isinstance(system, StoreyFrame):
         ends = zip(cuts.lower.min(0).tolist(), cuts.upper.max(0).tolist(), strict=True)
         system.require_standing(dict(zip(cuts.names, ends, strict=True)))
     if not isinstance(system, LagrangianSystem):
         _require_mass(system, cuts)
+
+
+def _require_size(name: str, own: float, support: Array) -> None:
+    """Refuses a support that lies as far from the structure's own value as kN from N."""
+    size = np.abs(support) / abs(own) if own else np.ones(2)
+    if size.min() >= OTHER_UNITS or (0 < size.max() <= 1 / OTHER_UNITS):
+        low, high = support
+        raise ValueError(
+            f"uncertain parameter {name}: its support [{low:g}, {high:g}] is of another size than"
+            f" the structure's own value, {own:g}; give both in SI units (Pa, kg, m, s, N)"
+        )
 
 
 def _require_mass(system: LinearSystem, cuts: Boxes) -> None:

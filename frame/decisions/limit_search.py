@@ -59,7 +59,7 @@ class LimitSearch:
         ends = np.stack([lower, self.nominal]), np.stack([upper, self.nominal])
         boxes = Boxes(self.flow.names, np.array([0.0, 1.0]), *ends, self.nominal)
         require_admissible(self.flow.system, boxes)
-        unit = LimitFlow(self.flow, boxes, False, self.limits)
+        unit = LimitFlow(self.flow, boxes, False, None, self.limits)
         model, error, self.reason = model_with_error(
             self.flow, unit, Modal(tolerance=self.gap), self.gap
         )

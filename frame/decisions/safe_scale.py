@@ -19,6 +19,7 @@ from alphacut.frame.decisions.limit_search import LEAST, LimitSearch, Reach, unp
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.structures.storey import StoreyFrame
+from alphacut.fuzzy.sets.given import finite_by_name, positive
 
 GAP = 1e-3
 """Share of the limits that the model of the motion and the proof may take, at most."""
@@ -123,10 +124,9 @@ def safe_scale(
 
 
 def _require(limits: Mapping[str, float], most: float) -> None:
-    if not limits or not all(np.isfinite(x) and x > 0 for x in limits.values()):
-        raise ValueError(f"limits: {dict(limits)}; each must be positive and finite, one at least")
-    if not most > 0:
-        raise ValueError(f"most: {most:g} is not allowed; the largest scale must be positive")
+    for name, limit in finite_by_name("limits", limits, "{'q1': 0.1}").items():
+        positive(f"limits: that of {name}", limit)
+    positive("most, the largest scale,", most)
 
 
 def _refuted(search: LimitSearch, most: float, precision: float) -> tuple[float, Array | None]:

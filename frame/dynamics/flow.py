@@ -45,12 +45,16 @@ class Flow(Protocol):
         """Trajectories with internal first and second derivatives, V = (S, T, outputs)."""
 
 
+MOST_NODES = 10_000_000
+"""Steps of a motion at most: bounds of one output at two levels are 320 MB of them."""
+
+
 def nodes(duration: float, step: float) -> Array:
     """Time nodes from 0 to `duration` in s.
 
     Raises:
         ValueError: One is no number, the step is not positive, or the duration is not a positive
-            multiple of it.
+            multiple of it, or of too many steps.
     """
     require_number("step", step, "s")
     require_number("duration", duration, "s")
@@ -60,6 +64,11 @@ def nodes(duration: float, step: float) -> Array:
     if count < 1 or abs(count * step - duration) > 1e-9 * duration:
         raise ValueError(
             f"duration: {duration:g} s is not a positive multiple of the step {step:g} s"
+        )
+    if count > MOST_NODES:
+        raise ValueError(
+            f"duration: {duration:g} s has {count:,} steps of {step:g} s; {MOST_NODES:,} are the"
+            " most: take a longer step"
         )
     return np.arange(count + 1) * step
 

@@ -139,7 +139,7 @@ def _by_modes(found: Envelope, flow: UnitFlow) -> Array | None:
     resolved = 2 * float(found.facts["gain"]) * flow.scale
     if (polynomial_error(model) > resolved).any():
         return None
-    bounds, at, left = search_levels(flow, model, 0, wanted, None)
+    bounds, at, left = search_levels(replace(flow, kept=None), model, 0, wanted, None)
     own = polynomial_error(judged_at_optima(model, at, 0)[0])
     if (own > resolved).any():
         return None

@@ -21,6 +21,7 @@ from alphacut.frame.modal.fitting import MANY, fit_modes
 from alphacut.frame.modal.levels import polished_levels, search_levels
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.polynomial_error import judged_at_optima, polynomial_error
+from alphacut.frame.modal.proportional_response import exact_response
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 
@@ -70,6 +71,8 @@ class Modal:
             certificate.
         boxes: Most boxes of the branch and bound per bound, on average.
         workers: Processes of the branch and bound.
+        passes: Most independent passes of the search of polynomials; 1 takes the least effort
+            throughout, for differences that need two digits.
 
     Raises:
         ValueError: A value is out of its range.
@@ -81,12 +84,14 @@ class Modal:
     certify: float | None = None
     boxes: float = 4000
     workers: int = 1
+    passes: int = 8
 
     def __post_init__(self) -> None:
-        if not self.tolerance > 0 or self.budget < 1 or self.workers < 1 or self.boxes <= 0:
+        counts = (self.budget, self.workers, self.passes)
+        if not self.tolerance > 0 or min(counts) < 1 or self.boxes <= 0:
             raise ValueError(
-                f"tolerance {self.tolerance:g}, budget {self.budget}, workers {self.workers}: each"
-                " must be positive"
+                f"tolerance {self.tolerance:g}, budget {self.budget}, workers {self.workers},"
+                f" passes {self.passes}: each must be positive"
             )
         if self.certify is not None and not self.certify > 0:
             raise ValueError(f"certify: {self.certify:g} is not allowed; the gap must be positive")
@@ -114,7 +119,7 @@ class Modal:
         exact, points = self._exact(model, flow), 0
         guided = progress and (lambda share: progress(GUIDED * share if exact else share))
         bounds, at, left = search_levels(
-            flow, model, self.seed, self.tolerance, guided, guide=exact is not None
+            flow, model, self.seed, self.tolerance, guided, passes=1 if exact else self.passes
         )
         if exact is None:
             model, points = judged_at_optima(model, at, self.seed)
@@ -159,7 +164,7 @@ class Modal:
         peak = np.abs(flow.flow.values(flow.boxes.modal[None])[0]).max(0)
         bent = not (model.error.max(0) > ROUGH * peak).any()
         try:
-            return ExactResponse.of(model, flow.scale, bent=bent)
+            return exact_response(model, flow.scale, bent=bent)
         except ModalError:
             return None
 
@@ -283,7 +288,12 @@ def model_with_error(
 
     def fitted(tolerance: float) -> ModalModel:
         return fit_modes(
-            linear, flow.boxes, tolerance=tolerance, budget=method.budget, scale=flow.scale
+            linear,
+            flow.boxes,
+            tolerance=tolerance,
+            budget=method.budget,
+            scale=flow.scale,
+            energy=True,
         )
 
     model = first = fitted(min(method.tolerance, gap / 30))

@@ -32,7 +32,7 @@ METHODS: dict[str, type[Method]] = {
     "monte-carlo": MonteCarlo,
     "quasi-monte-carlo": QuasiMonteCarlo,
 }
-COUNTS = {"samples": 1, "seed": 0, "batch": 1, "spread": 1, "workers": 1}
+COUNTS = {"samples": 1, "seed": 0, "batch": 1, "spread": 1, "workers": 1, "passes": 1}
 """Options that count, with the least that each may be."""
 
 

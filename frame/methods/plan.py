@@ -12,20 +12,23 @@ from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.box_quadratic import local_maximum
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.modal.exact_response import ExactResponse
 from alphacut.frame.modal.fitting import MANY, fit_modes
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.optima import Response
+from alphacut.frame.modal.proportional_response import exact_response
 from alphacut.frame.structures.modes import ModalError
 
-PROBED = 200
+PROBED = 800
 """Problems on which a step of Newton's method is timed."""
 STEPS = 30
 """Steps a problem takes on polynomials, all passes together."""
 RISE = 3.0
 """Cost of the final polynomials beside those of degree 2, which are timed."""
-POLISHING = (4.0, 8.0)
-"""Steps a problem takes on exact trajectories: the first plus (d / the second)²."""
+LIGHT = 290
+"""The same with the least effort."""
+GUIDING, POLISHING = 680, 100
+"""The same of more than six inputs: on polynomials that guide, with all that is not a step counted
+as so many, and on exact trajectories."""
 GRAPHS = 1500
 """Trajectories that the Graph Follower takes on all levels, where its budget does not end it."""
 
@@ -74,7 +77,7 @@ def planned(name: str, method: object, flow: UnitFlow) -> tuple[Candidate, ...]:
         found: tuple[Candidate, ...] = method.plan(flow)
         return found
     if name == "modal":
-        return (_modal(flow),)
+        return (_modal(flow, light=getattr(method, "passes", 0) == 1),)
     if name.endswith("graph-follower"):
         return (_follower(name, flow, getattr(method, "budget", None) or GRAPHS),)
     d, levels = len(flow.boxes.names), len(flow.boxes.alpha)
@@ -94,7 +97,7 @@ def _follower(name: str, flow: UnitFlow, budget: int) -> Candidate:
     return Candidate(name, graphs * each, words)
 
 
-def _modal(flow: UnitFlow) -> Candidate:
+def _modal(flow: UnitFlow, *, light: bool = False) -> Candidate:
     assert isinstance(flow.flow, LinearFlow)
     d, begun = len(flow.boxes.names), time.process_time()
     try:
@@ -107,13 +110,11 @@ def _modal(flow: UnitFlow) -> Candidate:
         for level in range(len(flow.boxes.alpha))
     )
     problems = 2 * len(flow.time) * len(flow.outputs) * wide
-    steps = STEPS * (1 if d > MANY else RISE)
+    steps = LIGHT if light else GUIDING if d > MANY else STEPS * RISE
     seconds = fitting * (1 if d > MANY else 10) + problems * steps * _step(model, d)
     words = f"{problems} bounds by polynomials of the modes"
-    if d > MANY:
-        first, second = POLISHING
-        polish = first + (d / second) ** 2
-        seconds += problems * polish * _step(ExactResponse.of(model, flow.scale), d)
+    if d > MANY and not light:
+        seconds += problems * POLISHING * _step(exact_response(model, flow.scale), d)
         words += f", since {d} inputs are many polished on exact trajectories"
     return Candidate("modal", seconds, words)
 

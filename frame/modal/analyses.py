@@ -7,7 +7,7 @@ import numpy as np
 from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.structures.linear import evaluate, relative_to_ground
+from alphacut.frame.structures.linear import Matrices, evaluate, relative_to_ground
 from alphacut.frame.structures.modes import (
     ModalError,
     Modes,
@@ -78,13 +78,15 @@ def _discrete(rate: Jet, flow: LinearFlow) -> Jet:
     return rate.chain(f / h, df, ddf * h)
 
 
-def needed_modes(flow: LinearFlow, boxes: Boxes, allowed: Array) -> Array:
+def needed_modes(flow: LinearFlow, boxes: Boxes, allowed: Array, *, energy: bool = False) -> Array:
     """Indices of the modes whose share in some output matters.
 
     Args:
         flow: The trajectories.
         boxes: The parameters' boxes.
         allowed: What all modes left out may reach together, for each output, shape (m,).
+        energy: Whether that is bounded by their energy, as a proof does it, and not by their own
+            shapes alone: fast modes add little to a displacement, but may hold much.
     """
     matrices, rows = evaluate(flow.system, flow.names, boxes.centre[None], derivatives=False)
     rate, X, Y = (jet.value[0] for jet in eigenvectors(state_matrix(matrices)))
@@ -97,6 +99,29 @@ def needed_modes(flow: LinearFlow, boxes: Boxes, allowed: Array) -> Array:
         state += np.abs(Y[:, len(matrices.rigid) :] @ matrices.rigid) * push[:, None]
     upper = np.flatnonzero(rate.imag >= 0)
     size = (2 * np.abs(rows.value[0] @ X).T * state / allowed)[upper]
+    if energy:
+        size = np.maximum(size, _by_energy(matrices, rows.value[0], X, state, upper) / allowed)
     order = np.argsort(size.max(1))
     small = order[:-1][(np.cumsum(size[order[:-1]], 0) <= 1).all(1)]
     return np.setdiff1d(upper, upper[small])
+
+
+def _by_energy(matrices: Matrices, rows: Array, X: Array, state: Array, upper: Array) -> Array:
+    """Bounds of what modes add to the outputs by their energy, shape (modes, m).
+
+    An output r q + s v is at most √(r K⁻¹ rᵀ + s M⁻¹ sᵀ) times √(qᵀ K q + vᵀ M v).
+    """
+    M, K = matrices.mass.value[0], matrices.stiffness.value[0]
+    n = len(M)
+    reading = [
+        np.einsum("oi,io->o", part, np.linalg.solve(matrix, part.T))
+        for part, matrix in ((rows[:, :n], K), (rows[:, n:], M))
+    ]
+    shapes = X[:, upper]
+    held = [
+        np.einsum("ik,ij,jk->k", part.conj(), matrix, part).real
+        for part, matrix in ((shapes[:n], K), (shapes[n:], M))
+    ]
+    size = 2 * np.sqrt(np.maximum(held[0] + held[1], 0.0))[:, None] * state[upper]
+    found: Array = size * np.sqrt(np.maximum(reading[0] + reading[1], 0.0))
+    return found

@@ -17,7 +17,7 @@ from alphacut.frame.calculus.polynomial import Polynomial, fit
 from alphacut.frame.modal.analyses import analyse
 from alphacut.frame.modal.fitting import fit_points
 from alphacut.frame.modal.ground_response import LoadTables
-from alphacut.frame.modal.model import ModalModel
+from alphacut.frame.modal.model import ModalModel, Waves
 from alphacut.frame.structures.linear import evaluate
 from alphacut.frame.structures.modes import (
     ModalError,
@@ -92,7 +92,7 @@ class ExactResponse:
     def value_at(self, unit: Array, node: Array, output: Array) -> Array:
         """Values (N,) of one output at one node per point (N, d)."""
         out = np.empty(len(unit))
-        for rows, points, own in _pieces(unit):
+        for rows, points, own in pieces(unit):
             flow = self.model.flow
             physical = self.model.boxes.to_physical(points)
             matrices, seen = evaluate(flow.system, flow.names, physical, derivatives=False)
@@ -105,14 +105,20 @@ class ExactResponse:
     def at(self, unit: Array, node: Array, output: Array) -> tuple[Array, Array, Array]:
         """Values (N,) and gradients (N, d), exact; Hessians (N, d, d) of the polynomials, or 0."""
         f, g = np.empty(len(unit)), np.empty(unit.shape)
-        for rows, points, own in _pieces(unit):
-            f[rows], g[rows] = self._sloped(points, own, node[rows], output[rows])
-        if not self.bent:
-            return f, g, np.zeros((*unit.shape, unit.shape[1]))
-        return f, g, self.model.at(unit, node, output)[2]
+        H = np.zeros((*unit.shape, unit.shape[1]))
+        for rows, points, own in pieces(unit):
+            f[rows], g[rows], waves = self._sloped(points, own, node[rows], output[rows])
+            if self.bent:
+                H[rows] = self.model.at(unit[rows], node[rows], output[rows], waves)[2]
+        return f, g, H
 
-    def _sloped(self, points: Array, own: Array, node: Array, output: Array) -> tuple[Array, Array]:
-        """Values and gradients, by what each entry of A, the state and the rows do to them."""
+    def _sloped(
+        self, points: Array, own: Array, node: Array, output: Array
+    ) -> tuple[Array, Array, Waves | None]:
+        """Values and gradients, by what each entry of A, the state and the rows do to them.
+
+        Besides the waves of the polynomials' modes, where they are by the way.
+        """
         flow, cuts = self.model.flow, self.model.boxes
         first = Slopes.of(flow.system, flow.names, cuts.to_physical(points))
         matrices = first.matrices
@@ -126,7 +132,7 @@ class ExactResponse:
         back = (Y.swapaxes(1, 2) @ (at.left * at.wave)[..., None])[..., 0].real
         row = 1 / self.scale[output]
         slope = first.gradient(own, through, moved, back, row, output) * cuts.radius
-        return (at.left * at.motion).real.sum(1), slope
+        return (at.left * at.motion).real.sum(1), slope, None
 
     def _at(self, modes: _Modes, own: Array, node: Array, output: Array) -> _AtNode:
         rate, t = modes.rate[own], self.time[node]
@@ -205,7 +211,7 @@ class _AtNode:
         return np.where(near, (df[:, :, None] + df[:, None, :]) / 2, far)
 
 
-def _pieces(unit: Array) -> Iterator[tuple[Array, Array, Array]]:
+def pieces(unit: Array) -> Iterator[tuple[Array, Array, Array]]:
     """Rows that are treated together, their different points, and which of them each row has."""
     order = np.lexsort(unit.T)  # equal points side by side
     for start in range(0, len(unit), PIECE):

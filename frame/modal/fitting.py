@@ -33,6 +33,7 @@ def fit_modes(
     tolerance: float = 1e-6,
     budget: int = 280,
     scale: Array | float = 1.0,
+    energy: bool = False,
 ) -> ModalModel:
     """Fit polynomials of rising degree until held-out trajectories meet `tolerance`.
 
@@ -42,6 +43,7 @@ def fit_modes(
         tolerance: Wanted deviation, in units of the outputs.
         budget: Most eigen-analyses.
         scale: Factor on the tolerance for each output, shape (m,).
+        energy: Whether modes are left out by their energy alone, as a proof needs it.
 
     Raises:
         ModalError: No oscillating modes, or double ones whose polynomials do not reach the
@@ -51,7 +53,7 @@ def fit_modes(
     held = _held_out(d)
     truth, scale = flow.values(boxes.to_physical(held)), np.asarray(scale)
     allowed = tolerance / 4 * np.broadcast_to(scale, truth.shape[-1:])
-    samples, best = _Samples(flow, boxes, needed_modes(flow, boxes, allowed)), None
+    samples, best = _Samples(flow, boxes, needed_modes(flow, boxes, allowed, energy=energy)), None
     reached: list[float] = []
     for degree in range(2, 13 if d <= MANY else 3):
         points = fit_points(d, degree)

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, exp, lgamma, log
+from pathlib import Path
 
 import numpy as np
 
+from alphacut.frame.calculus.c_library import address, c_library
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.dynamics.record_load import load_rule, parts_of
 from alphacut.frame.structures.linear import Accelerogram
 
+SOURCE = Path(__file__).with_name("ground_response.c").read_text(encoding="utf-8")
 REACH = 6.0
 """Largest change of phase (rad) over the box within a window."""
 FADED = 37.0
@@ -90,6 +94,9 @@ class LoadTable:
 
     def response(self, rate: Array, node: Array) -> Waves:
         """R, dR/dλ and d²R/dλ² at one node per point, each shape (N, n), for eigenvalues (N, n)."""
+        compiled = self._compiled(rate, node, 3)
+        if compiled is not None:
+            return compiled[0], compiled[1], compiled[2]
         powers = self._powers(rate).swapaxes(0, 1)  # (n, N, order)
         total = np.einsum("kpi,pkix->pkx", powers, self._differentiated[node], optimize=True)
         for end, later, tau in self._earlier(rate, node):
@@ -104,6 +111,10 @@ class LoadTable:
 
     def response_alone(self, rate: Array, node: Array) -> Array:
         """R without its derivatives."""
+        compiled = self._compiled(rate, node, 1)
+        if compiled is not None:
+            alone: Array = compiled[0]
+            return alone
         powers = self._powers(rate).swapaxes(0, 1)
         total: Array = np.einsum("kpi,pki->pk", powers, self.moment[node])
         for end, later, tau in self._earlier(rate, node):
@@ -114,12 +125,33 @@ class LoadTable:
 
     def _earlier(self, rate: Array, node: Array) -> Iterator[tuple[int, Array, Array]]:
         """Earlier windows: their last node, the points concerned, the time since, (N, 1)."""
-        fade = FADED / max(float(-rate.real.max()), 1e-300)
+        fade = self._fade(rate)
         for end in self.starts[1:]:
             since = self.time[node] - self.time[end]
             later = np.flatnonzero((since > 0) & (since < fade))
             if len(later):
                 yield end, later, since[later, None]
+
+    @staticmethod
+    def _fade(rate: Array) -> float:
+        """Time (s) after which nothing is left of a window."""
+        return FADED / max(float(-rate.real.max(initial=-np.inf)), 1e-300)
+
+    def _compiled(self, rate: Array, node: Array, orders: int) -> Array | None:
+        """R, and its derivatives for 3 orders, (orders, N, n); None without a compiler."""
+        library = c_library(SOURCE)
+        if library is None:
+            return None
+        out = np.empty((orders, *rate.shape), complex)
+        sizes = (rate.shape[1], self.moment.shape[-1], len(self.starts) - 1, orders)
+        counts = (ctypes.c_long(len(rate)), *map(ctypes.c_int, sizes))
+        lengths = (ctypes.c_double(self.scale), ctypes.c_double(self._fade(rate)))
+        complexes = [np.ascontiguousarray(x) for x in (self.middle, self.moment)]
+        reals = [np.ascontiguousarray(x, float) for x in (self.starts[1:], self.time, node)]
+        given = [x.view(float) for x in complexes] + reals
+        given.append(np.ascontiguousarray(rate).view(float))
+        library.ground_response(*counts, *lengths, *map(address, given), address(out.view(float)))
+        return out
 
     @cached_property
     def _differentiated(self) -> Array:

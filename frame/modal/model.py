@@ -7,6 +7,7 @@ motion again.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
@@ -18,6 +19,10 @@ from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.modal.ground_response import LoadTables, decaying
+
+PIECE = 20_000
+"""Points whose values are computed together."""
+Waves = Sequence[tuple[Array, Array, Array] | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,38 +115,73 @@ class ModalModel:
         values = decaying(rate, share, self.flow.step, len(self.time))
         return values if self.load is None else values + self.load.values(unit, rate)
 
-    def at(self, unit: Array, node: Array, output: Array) -> tuple[Array, Array, Array]:
-        """Values (N,), gradients (N, d), Hessians (N, d, d) of one output, node by point (N, d)."""
+    def at(
+        self, unit: Array, node: Array, output: Array, waves: Waves | None = None
+    ) -> tuple[Array, Array, Array]:
+        """Values (N,), gradients (N, d), Hessians (N, d, d) of one output, node by point (N, d).
+
+        Args:
+            unit: Unit coordinates.
+            node: Time nodes, shape (N,).
+            output: Which output, shape (N,).
+            waves: Those of the start and, under a load, of the ground, each w, w' and w'' of shape
+                (N, n), where better ones than by the polynomials λ_k are known.
+        """
         d = unit.shape[1]
         f, g, H = np.empty(len(unit)), np.empty((len(unit), d)), np.empty((len(unit), d, d))
+        rates = self.eigenvalue.quadratic(unit) if self.degree <= 2 else None
+        if rates is not None and waves is None:
+            waves = self._waves(rates[0], node)
         for o in np.unique(output):
             rows = np.flatnonzero(output == o)
-            own = self.of_output[o]
-            if self.degree <= 2:
-                f[rows], g[rows], H[rows] = self._quadratic(own, unit[rows], node[rows])
+            if rates is None:
+                found = self._taylor(self.of_output[o].jet(unit[rows]), node[rows])
             else:
-                f[rows], g[rows], H[rows] = self._taylor(own.jet(unit[rows]), node[rows])
+                assert waves is not None
+                own = [None if w is None else (w[0][rows], w[1][rows], w[2][rows]) for w in waves]
+                slopes = (rates[1][rows], rates[2])
+                found = self._quadratic(self._shares[o], unit[rows], slopes, own)
+            f[rows], g[rows], H[rows] = found
         return f, g, H
 
-    def _quadratic(self, own: Polynomial, unit: Array, node: Array) -> tuple[Array, Array, Array]:
+    def _waves(self, rate: Array, node: Array) -> Waves:
+        """What the start and the ground excite at eigenvalues (N, n); None of what does not."""
+        started = self.coefficient.coefficients.any()
+        free = self._free(rate, node) if started else None
+        return [free, None if self.load is None else self.load.response(rate, node)]
+
+    @cached_property
+    def _shares(self) -> list[list[Polynomial]]:
+        """For each output the polynomials of what the start and the ground put into it."""
+        given = [self.coefficient] + ([] if self.load is None else [self.load.share])
+        m = len(self.outputs)
+        return [[Polynomial(x.index, x.coefficients[:, o::m]) for x in given] for o in range(m)]
+
+    def _quadratic(
+        self,
+        shares: Sequence[Polynomial],
+        unit: Array,
+        slopes: tuple[Array, Array],
+        waves: Waves,
+    ) -> tuple[Array, Array, Array]:
         """As `_taylor`, for degree 2, whose second derivatives are the same everywhere."""
-        n, (both, first, second) = self.count, own.quadratic(unit)
-        rate, slope = both[:, :n], first[:, :, :n]
-        excited = [(slice(n, 2 * n), self._free(rate, node))]
-        if self.load is not None:
-            excited.append((slice(2 * n, 3 * n), self.load.response(rate, node)))
-        f, g = np.zeros(len(unit)), np.zeros(first.shape[:2])
-        weight = np.zeros_like(both)
-        crossed = np.zeros_like(slope)
-        for part, (w, dw, ddw) in excited:
-            share, bent = both[:, part], first[:, :, part]
+        slope, bent = slopes
+        f, g = np.zeros(len(unit)), np.zeros(slope.shape[:2])
+        crossed, turned = np.zeros_like(slope), np.zeros_like(slope[:, 0])
+        weights, seconds = [], []
+        for own, wave in zip(shares, waves, strict=False):
+            if wave is None:
+                continue
+            (share, first, second), (w, dw, ddw) = own.quadratic(unit), wave
             f = f + 2 * (share * w).real.sum(1)
-            g = g + 2 * (bent * w[:, None] + slope * (share * dw)[:, None]).real.sum(2)
-            weight[:, part] = w
-            weight[:, :n] += share * dw
-            crossed += bent * dw[:, None] + slope * (share * ddw)[:, None] / 2
+            g = g + 2 * (first * w[:, None] + slope * (share * dw)[:, None]).real.sum(2)
+            weights.append(w)
+            seconds.append(second)
+            turned += share * dw
+            crossed += first * dw[:, None] + slope * (share * ddw)[:, None] / 2
         H = 2 * _real_product(crossed, slope.swapaxes(1, 2))
-        curved = 2 * _real_product(weight, second.reshape(-1, second.shape[-1]).T)
+        weight, all_bent = np.hstack([turned, *weights]), np.concatenate([bent, *seconds], -1)
+        curved = 2 * _real_product(weight, all_bent.reshape(-1, all_bent.shape[-1]).T)
         return f, g, H + H.swapaxes(1, 2) + curved.reshape(H.shape)
 
     def _taylor(self, both: Jet, node: Array) -> tuple[Array, Array, Array]:
@@ -161,15 +201,21 @@ class ModalModel:
 
     def value_at(self, unit: Array, node: Array, output: Array) -> Array:
         """Values (N,) of one output at one node per point (N, d)."""
-        values, n = np.empty(len(unit)), self.count
+        values, order = np.empty(len(unit)), np.argsort(output, kind="stable")
+        for rows in np.array_split(order, -(-len(order) // PIECE) or 1):
+            values[rows] = self._value_at(unit[rows], node[rows], output[rows])
+        return values
+
+    def _value_at(self, unit: Array, node: Array, output: Array) -> Array:
+        rate, values = self.eigenvalue(unit), np.zeros(len(unit))
+        started = self.coefficient.coefficients.any()
+        waves = [np.exp(rate * self.time[node][:, None]) if started else None]
+        waves.append(None if self.load is None else self.load.response_alone(rate, node))
         for o in np.unique(output):
             rows = np.flatnonzero(output == o)
-            both = self.of_output[o](unit[rows])
-            rate = both[:, :n]
-            total = both[:, n : 2 * n] * np.exp(rate * self.time[node[rows]][:, None])
-            if self.load is not None:
-                total = total + both[:, 2 * n :] * self.load.response_alone(rate, node[rows])
-            values[rows] = 2 * total.real.sum(1)
+            for share, wave in zip(self._shares[o], waves, strict=False):
+                if wave is not None:
+                    values[rows] += 2 * (share(unit[rows]) * wave[rows]).real.sum(1)
         return values
 
 

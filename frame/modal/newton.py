@@ -20,7 +20,7 @@ def refine(
     model: Response, optima: Optima, which: Array, lower: Array, upper: Array, small: float
 ) -> None:
     """Newton's method in the box on `which`, until none promises more than `small`."""
-    size = int(np.clip(PIECE * 36 / lower.size**2, PIECE // 8, PIECE))
+    size = int(np.clip(PIECE * 36 / lower.size**2, PIECE // 2, PIECE))
     for piece in np.array_split(which, -(-len(which) // size) or 1):
         _newton(model, optima, piece, lower, upper, small)
 

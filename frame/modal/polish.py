@@ -10,6 +10,7 @@ import numpy as np
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.modal.contest import contest
 from alphacut.frame.modal.exact_response import ExactResponse
+from alphacut.frame.modal.kept import Kept, Progress, share
 from alphacut.frame.modal.newton import refine
 from alphacut.frame.modal.optima import FEW, Optima, best_of_few, best_of_pool, problems
 from alphacut.frame.modal.probes import probe
@@ -19,6 +20,8 @@ CALM_PASSES = 2
 """Passes one after the other that must gain too little before the search ends."""
 VALUES = 16e6
 """Most numbers of the trajectories of a pass that are kept at a time: 128 MB."""
+PORTIONS = (0.0, 0.1, 0.45, 0.99)
+"""Shares of the time after which passes usually begin, for the progress alone."""
 ROUNDS = 3
 """Rounds of a contest of optima on either side of a jump, in a pass."""
 BEHIND = 0.1
@@ -41,6 +44,8 @@ class Polish:
         graphs: Trajectories of moved points, and as many fresh ones, in a pass.
         anew: Problems solved anew in the first pass; four times as many in each further one.
         seed: Of the fresh points.
+        kept: Keeps what every pass has found, under `name`; None for nothing.
+        name: Of this search among those that are kept.
     """
 
     small: float
@@ -49,9 +54,16 @@ class Polish:
     graphs: int = 2048
     anew: int = 4096
     seed: int = 0
+    kept: Kept | None = None
+    name: str = ""
 
     def run(
-        self, exact: ExactResponse, starts: Sequence[Array], lower: Array, upper: Array
+        self,
+        exact: ExactResponse,
+        starts: Sequence[Array],
+        lower: Array,
+        upper: Array,
+        progress: Progress | None = None,
     ) -> tuple[Array, Array, Array, Array]:
         """Upper bounds of (−output, output) over a box, as `ModalSearch.run` returns them.
 
@@ -62,26 +74,67 @@ class Polish:
             starts: Unit coordinates to start from, each of shape (T, m, 2, d).
             lower: Lower ends of the box, shape (d,).
             upper: Upper ends.
+            progress: Called with the fraction done, if two passes end the search, as is usual.
         """
         *shape, d = starts[0].shape
         found = problems(np.arange(shape[0]), shape[1], d)
-        every, gains = np.arange(len(found.value)), [np.zeros(shape[1])]
-        for points in starts:
-            found.offer(exact, np.clip(points.reshape(-1, d), lower, upper), every)
+        gains: list[Array] = [np.zeros(shape[1])]
         if (upper > lower).any():
-            moved = self._pass(exact, found, every, lower, upper, (0, 0))
-            anew, calm = self.anew, 0
-            for count in range(1, self.passes + 1):
-                before = found.value.copy()
-                moved = self._pass(exact, found, moved, lower, upper, (count, anew))
+            moved, gains = self._begun(exact, found, starts, lower, upper, progress)
+            while len(gains) <= self.passes and not self._calm(gains):
+                before, count = found.value.copy(), len(gains)
+                tick = share(
+                    progress, *(PORTIONS[min(k, len(PORTIONS) - 1)] for k in (count, count + 1))
+                )
+                anew = min(self.anew * 4 ** (count - 1), len(before))
+                moved = self._pass(exact, found, moved, lower, upper, (count, anew), tick)
                 gains.append((found.value - before).reshape(shape).max((0, 2)))
-                calm = calm + 1 if gains[-1].max() <= self.quiet else 0
-                if calm == CALM_PASSES:
-                    break
-                anew = min(4 * anew, len(before))
+                self._keep(found, moved, gains)
+        else:
+            self._offered(exact, found, starts, lower, upper)
         value, left = found.value.reshape(shape), found.left.reshape(shape)
         gained = np.max(gains[-CALM_PASSES:], axis=0)  # one calm pass alone may be luck
         return value, found.point.reshape(*shape, d), left, gained
+
+    def _calm(self, gains: Sequence[Array]) -> bool:
+        """Whether the last passes gained too little to go on for."""
+        last = gains[1:][-CALM_PASSES:]
+        return len(last) == CALM_PASSES and max(gain.max() for gain in last) <= self.quiet
+
+    @staticmethod
+    def _offered(
+        exact: ExactResponse, found: Optima, starts: Sequence[Array], lower: Array, upper: Array
+    ) -> None:
+        every = np.arange(len(found.value))
+        for points in starts:
+            found.offer(exact, np.clip(points.reshape(len(every), -1), lower, upper), every)
+
+    def _begun(
+        self,
+        exact: ExactResponse,
+        found: Optima,
+        starts: Sequence[Array],
+        lower: Array,
+        upper: Array,
+        progress: Progress | None,
+    ) -> tuple[Array, list[Array]]:
+        """Problems moved and gains of each pass, as kept, or after a first pass without fresh."""
+        old = self.kept.load(self.name) if self.kept is not None else None
+        if old is not None:
+            for name in ("point", "value", "left"):
+                getattr(found, name)[:] = old[name]
+            return old["moved"], list(old["gains"])
+        self._offered(exact, found, starts, lower, upper)
+        every, tick = np.arange(len(found.value)), share(progress, *PORTIONS[:2])
+        moved = self._pass(exact, found, every, lower, upper, (0, 0), tick)
+        gains: list[Array] = [np.zeros(len(exact.outputs))]
+        self._keep(found, moved, gains)
+        return moved, gains
+
+    def _keep(self, found: Optima, moved: Array, gains: Sequence[Array]) -> None:
+        if self.kept is not None:
+            state = {name: getattr(found, name) for name in ("point", "value", "left")}
+            self.kept.save(self.name, {**state, "moved": moved, "gains": np.array(gains)})
 
     def _pass(
         self,
@@ -91,6 +144,7 @@ class Polish:
         lower: Array,
         upper: Array,
         effort: tuple[int, int],
+        tick: Progress,
     ) -> Array:
         """Improve `found`; returns the problems that did. Effort: number of pass, solved anew."""
         count, anew = effort
@@ -104,18 +158,23 @@ class Polish:
         fresh = fresh_points(rng, lower, upper, graphs)
         values = trajectories(exact, fresh)
         _take(found, best_of_pool(fresh, values, nodes, 1)[0])
+        tick(0.1)
         if count:
             some = rng.permutation(len(before))[:anew]
             rivals = [best_of_pool(fresh, values, nodes, 1)[0]]
             rivals += [best_of_few(fresh, values, nodes, few, rng) for few in FEW]
-            for rival in rivals:
+            for place, rival in enumerate(rivals):
                 refine(exact, rival, some, lower, upper, self.small)
                 _take(found, rival)
-            for rival in rivals:
+                tick(0.1 + 0.08 * place)
+            for place, rival in enumerate(rivals):
                 self._carried(exact, found, rival, lower, upper)
+                tick(0.42 + 0.08 * place)
         open_ = np.arange(len(before)) if not count else np.flatnonzero(found.value > before)
         refine(exact, found, open_, lower, upper, self.small)
+        tick(0.75)
         contest(exact, found, lower, upper, self.small, ROUNDS)
+        tick(0.9)
         if count and exact.bent:
             probe(exact, exact.model, found, lower, upper, self.small, rng)
         return np.flatnonzero(found.value > before)

@@ -15,6 +15,7 @@ import numpy as np
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.modal.contest import contest
+from alphacut.frame.modal.kept import Progress, share
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.newton import refine
 from alphacut.frame.modal.optima import FEW, Optima, Response, best_of_few, best_of_pool, problems
@@ -68,7 +69,7 @@ class ModalSearch:
         return cls(512 * 2**more, 2 + more, SMALL * wanted, QUIET * wanted, seed=seed)
 
     def run(
-        self, model: ModalModel, lower: Array, upper: Array
+        self, model: ModalModel, lower: Array, upper: Array, progress: Progress | None = None
     ) -> tuple[Array, Array, Array, Array]:
         """Upper bounds of (−output, output), their unit coordinates, and what may be missing.
 
@@ -76,6 +77,7 @@ class ModalSearch:
             model: The modal model.
             lower: Lower ends of the box, shape (d,).
             upper: Upper ends.
+            progress: Called with the fraction done.
 
         Returns:
             Bounds, shape (T, m, 2), points, shape (T, m, 2, d), what Newton's method promises
@@ -85,12 +87,17 @@ class ModalSearch:
         total, m, d = len(model.time), len(model.outputs), len(lower)
         found = problems(np.arange(total), m, d)
         gained: Array = np.zeros(m)
+        tick = share(progress, 0.0, 1.0)
         if (upper > lower).any():
             pool = self._samples(lower, upper)
             values = trajectories(model, pool)
+            tick(0.05)
             coarse, rivals = self._search(model, lower, upper, (pool, values), self.stride(model))
+            tick(0.25)
             found = self._spread(model, [coarse, *rivals], lower, upper, (pool, values))
+            tick(0.5)
             gained = self._second_passes(model, found, lower, upper)
+            tick(0.97)
             refine(model, found, np.arange(len(found.value)), lower, upper, self.small)
         else:
             found.offer(model, np.tile(lower, (2 * m * total, 1)), np.arange(2 * m * total))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,10 +34,23 @@ class Slopes:
     observation: Array
 
     @classmethod
-    def of(cls, system: LinearSystem, names: Sequence[str], points: Array) -> Slopes:
+    def of(
+        cls,
+        system: LinearSystem,
+        names: Sequence[str],
+        points: Array,
+        *,
+        observed: bool = True,
+    ) -> Slopes:
         """Of `system` at `points` (S, d), the values of `names`; others keep modal values.
 
         A set is taken once for each parameter, since jets carry all pairs of theirs.
+
+        Args:
+            system: The structure.
+            names: Its uncertain parameters.
+            points: Their values, shape (S, d).
+            observed: Whether the rows are wanted; else they and their derivatives are empty.
         """
         (total, d), fixed = points.shape, [name for name in system.parameters if name not in names]
         modal = [system.parameters[name] for name in fixed]
@@ -50,11 +63,28 @@ class Slopes:
             )
             for k, name in enumerate([*names, *fixed])
         }
-        matrices, rows = system.matrices(p), system.observation(p)
+        matrices = system.matrices(p)
+        n, m = matrices.mass.value.shape[-1], len(system.outputs)
+        still = Jet.constant(np.zeros((0, m, 2 * n)), 1)
+        rows = system.observation(p) if observed else still
         state = concatenate([matrices.q0, matrices.v0], -2)[..., 0]
         jets = (matrices.mass, matrices.damping, matrices.stiffness, state, rows)
-        first = [jet.first[0].reshape(d, total, *jet.value.shape[1:]) for jet in jets]
+        first = [jet.first[0].reshape(d, -1, *jet.value.shape[1:]) for jet in jets]
         return cls(_values_of(matrices, total), rows.value[:total], *first)
+
+    def moved(self, by: Array) -> Slopes:
+        """At points (S, d) away from the one it is of, where M, K and the start are affine."""
+        m, n = self.matrices, self.matrices.mass.value.shape[-1]
+
+        def there(value: Array, first: Array) -> Jet:
+            flat = by @ first[:, 0].reshape(len(first), -1)
+            return Jet.constant(value + flat.reshape(len(by), *value.shape[1:]), 0)
+
+        q0 = there(m.q0.value, self.state[..., :n, None])
+        v0 = there(m.v0.value, self.state[..., n:, None])
+        mass, stiffness = there(m.mass.value, self.mass), there(m.stiffness.value, self.stiffness)
+        still = Jet.constant(np.zeros_like(mass.value), 0)
+        return replace(self, matrices=Matrices(mass, still, stiffness, q0, v0, m.pattern))
 
     def gradient(
         self, own: Array, through: Array, state: Array, back: Array, row: Array, output: Array
@@ -74,12 +104,30 @@ class Slopes:
         by_K, by_D = np.split(np.linalg.solve(M.swapaxes(1, 2), through[:, n:]), 2, axis=-1)
         light = np.linalg.solve(M, np.concatenate([K, D], -1)).swapaxes(1, 2)
         by_M = by_K @ light[:, :n] + by_D @ light[:, n:]
-        total = _inner(self.mass, own, by_M) - _inner(self.stiffness, own, by_K)
-        total -= _inner(self.damping, own, by_D)
-        total += np.einsum("dns,ns->nd", self.state[:, own], back)
-        seen = self.observation[:, own, output]
-        slope: Array = total + np.einsum("dns,ns->nd", seen, state * row[:, None])
+        found = self.along(own, by_M, -by_K, back, state * row[:, None], output)
+        slope: Array = found - _inner(self.damping, own, by_D)
         return slope
+
+    def along(
+        self, own: Array, by_M: Array, by_K: Array, back: Array, seen: Array, output: Array
+    ) -> Array:
+        """Gradients (N, d) from derivatives by M, K, the start and the rows.
+
+        Args:
+            own: Parameter set of each problem, shape (N,).
+            by_M: Derivative by the entries of M, shape (N, n, n).
+            by_K: By those of K.
+            back: By the initial state, shape (N, 2n).
+            seen: By the row, shape (N, 2n).
+            output: Row of each problem, shape (N,).
+        """
+        total = _inner(self.mass, own, by_M) + _inner(self.stiffness, own, by_K)
+        if self.state.any():
+            place = own if self.state.shape[1] > 1 else np.zeros_like(own)
+            total += np.einsum("dns,ns->nd", self.state[:, place], back)
+        if self.observation.any():
+            total += np.einsum("dns,ns->nd", self.observation[:, own, output], seen)
+        return total
 
 
 def _inner(derivative: Array, own: Array, by: Array) -> Array:
@@ -87,7 +135,9 @@ def _inner(derivative: Array, own: Array, by: Array) -> Array:
     moved = np.flatnonzero(derivative.any((1, 2, 3)))
     out = np.zeros((len(own), len(derivative)))
     for i in moved:
-        out[:, i] = np.einsum("nij,nij->n", derivative[i][own], by)
+        alike = derivative.shape[1] == 1
+        one = derivative[i] if alike else derivative[i][own]
+        out[:, i] = (one * by).sum((1, 2)) if not alike else by.reshape(len(by), -1) @ one.ravel()
     return out
 
 

@@ -227,11 +227,13 @@ class StoreyFrame:
     def observation(self, p: Mapping[str, Jet]) -> Jet:
         """Rows C(p) with output = C(p) [q; v], shape (S, outputs, 2n)."""
         links = springs(self, p)
+        kinds = [self._output(output) for output in self.outputs]
+        at = self.matrices(p) if any(kind in ("a", "ar") for kind, _ in kinds) else None
         rows: list[list[Entry]] = []
-        for output in self.outputs:
-            kind, z = self._output(output)
+        for kind, z in kinds:
             if kind in ("a", "ar"):
-                rows.append(self._acceleration(p, z))
+                assert at is not None
+                rows.append(self._acceleration(at, p, z))
                 continue
             row: list[Entry] = [0.0] * (2 * self.floors)
             factor: Entry = links[z] if kind == "shear" else 1.0
@@ -241,9 +243,9 @@ class StoreyFrame:
             rows.append(row)
         return stack(rows, p)
 
-    def _acceleration(self, p: Mapping[str, Jet], z: int) -> list[Entry]:
+    def _acceleration(self, at: Matrices, p: Mapping[str, Jet], z: int) -> list[Entry]:
         """Row of a floor's absolute acceleration: forces on it over its mass."""
-        at, inertia = self.matrices(p), -1.0 * p[f"m{z + 1}"] ** -1
+        inertia = -1.0 * p[f"m{z + 1}"] ** -1
         forces = (at.stiffness, at.damping)
         return [inertia * force[:, z, j] for force in forces for j in range(self.floors)]
 

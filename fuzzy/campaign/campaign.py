@@ -20,6 +20,8 @@ from alphacut.fuzzy.sets.numbers import Array
 
 Progress = Callable[[float], None]
 _SHOWN = 5  # causes that a message quotes
+_STEP, _NEARLY = 0.002, 0.99  # of what is left to this share each sample of a search does a part
+_LONG = 300  # letters of an error that a message quotes
 _POLL = 0.1  # seconds between two looks at what another campaign is running
 
 
@@ -50,9 +52,15 @@ def _causes(failures: list[tuple[dict[str, float], str]]) -> list[str]:
     told = []
     for error, points in places.items():
         few = points if len(points) <= 2 else points[:1]
-        told += [f"at {point}: {error}" for point in few]
+        told += [f"at {point}: {_one_line(error)}" for point in few]
         told[-1] += f" (the same at {len(points) - 1} more)" if len(points) > 2 else ""
     return told
+
+
+def _one_line(error: str) -> str:
+    """The first line of an error, and no more than some hundred letters of it."""
+    first = error.strip().partition("\n")[0]
+    return first if first == error and len(first) <= _LONG else f"{first[:_LONG]} …"
 
 
 def _point(point: dict[str, float]) -> str:
@@ -120,7 +128,9 @@ class Campaign:
 
     def report_batch(self, share: float) -> None:
         """Tell the share done of the batch under way."""
-        if not self.stepwise:
+        if self.stepwise:  # how many samples are still to come, nobody knows
+            self.report(self._told + _STEP * (_NEARLY - self._told))
+        else:
             self.report(self._before + (1 - self._before) * share)
 
 

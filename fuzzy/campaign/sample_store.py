@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from time import perf_counter
@@ -237,6 +237,11 @@ def shelf(
         raise ValueError(
             "a store comes without an identity; say what a sample depends on besides its inputs:"
             " identity={...}"
+        )
+    if not isinstance(identity, Mapping):
+        raise ValueError(
+            f"the identity is {identity!r}; it must map names to what a sample depends on, as"
+            " identity={'version': 1}"
         )
     if isinstance(store, Store):
         with closing(Shelf(store, identity, names)) as samples:

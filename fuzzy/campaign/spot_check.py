@@ -10,6 +10,7 @@ import numpy as np
 
 from alphacut.fuzzy.campaign.call import Call, Failure, Outcome, Sample
 from alphacut.fuzzy.samples.model import Values
+from alphacut.fuzzy.sets.given import is_real
 from alphacut.fuzzy.sets.numbers import Array
 
 _SAME = 1e-6  # of each output: solvers need not repeat themselves closer
@@ -39,7 +40,7 @@ class SpotCheck:
     _saved: float = field(default=0.0, repr=False)
 
     def __post_init__(self) -> None:
-        if not 0 <= self.share <= 1:
+        if not (is_real(self.share) and 0 <= self.share <= 1):
             raise ValueError(
                 f"the spot check has a share of {self.share!r} of the stored samples' time; it must"
                 " lie in [0, 1]"

@@ -88,6 +88,8 @@ class Store:
     """
 
     def __init__(self, path: str | Path) -> None:
+        if not isinstance(path, str | os.PathLike):
+            raise ValueError(f"the store is {path!r}; it must be the path of a file, or a Store")
         self.path = Path(path)
         self._handle: int | None = None
         self._whole = 0  # up to here the file holds whole records

@@ -97,6 +97,17 @@ def pool(workers: int) -> Iterator[Executor | None]:
             processes.shutdown()
 
 
+def submitted(
+    executor: Executor | None, function: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs
+) -> Future[T]:
+    """A call in one of the executor's processes, or done here and now where there is none."""
+    if executor is not None:
+        return executor.submit(function, *args, **kwargs)
+    done: Future[T] = Future()
+    done.set_result(function(*args, **kwargs))
+    return done
+
+
 def require_workers(workers: object) -> None:
     """Workers are a number of processes.
 

@@ -14,10 +14,13 @@ import numpy as np
 
 from alphacut.fuzzy.arguments import fuzzy_inputs
 from alphacut.fuzzy.decisions.nested_boxes import ByLevel, Scaled, Threshold, Verdict, threshold
+from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.plans.branch_and_bound import BranchAndBound
+from alphacut.fuzzy.progress_bar import Progress, part, told
 from alphacut.fuzzy.propagation import propagate
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain, levels
+from alphacut.fuzzy.sets.given import finite, finite_by_name, positive
 from alphacut.fuzzy.sets.numbers import Array, Crisp, FuzzyNumber, Interval
 
 Limits = Mapping[str, float]
@@ -49,7 +52,7 @@ class Limited:
             name: Interval(low, high) if high > low else Crisp(low) for name, low, high in ends
         }
         plan = BranchAndBound(self.function, self.precision)
-        found = propagate(self.function, inputs, plan, alpha=[1.0], vectorised=True)
+        found = propagate(self.function, inputs, plan, alpha=[1.0], vectorised=True, progress=False)
         return self._verdict(found)
 
     def _verdict(self, found: FuzzyResult) -> Verdict:
@@ -71,7 +74,7 @@ class Limited:
         return float(np.asarray(value).ravel()[0])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Decision:
     """How possible and how necessary it is that a limit is exceeded.
 
@@ -104,6 +107,19 @@ class Decision:
         degrees = f"possibility of exceeding {a:.6g} … {b:.6g}, necessity {c:.6g} … {d:.6g}"
         return "\n".join([f"{self.verdict}: {degrees}", *([self.claim] if self.claim else [])])
 
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        """The decision over its margins as a table, for notebooks."""
+        rows = [
+            (name, f"{alpha:g}", f"{low:.6g}", f"{high:.6g}")
+            for name, ends in self.margin.items()
+            for alpha, low, high in zip(self.alpha, *ends, strict=True)
+        ]
+        at = ", ".join(f"{name} = {x:.6g}" for name, x in (self.witness or {}).items())
+        below = "\n".join([str(self), *([f"a limit is exceeded at {at}"] if at else [])])
+        return html_table(("output", "α", "margin from", "margin to"), rows, below=below)
+
 
 def decide(
     function: Callable[..., object],
@@ -112,6 +128,7 @@ def decide(
     *,
     alpha: Sequence[float] | None = None,
     tolerance: float = 1e-7,
+    progress: Progress | bool | None = None,
 ) -> Decision:
     """Decision on whether outputs exceed their limits, any of them.
 
@@ -121,21 +138,34 @@ def decide(
         limits: Limit by output; `{"y": limit}` of a function without named outputs.
         alpha: Levels of the safety margin; 0, ¼, ½, ¾, 1 if not given.
         tolerance: Wanted distance of the bounds of possibility and necessity.
+        progress: As for `propagate`.
 
     Raises:
-        ValueError: An argument is wrong, or a limit names no output.
+        ValueError: An argument is wrong, or a limit is not finite or names no output.
     """
+    limits = finite_by_name("limits", limits, "{'y': 4.5}")
+    positive("the tolerance", tolerance)
     domain = Domain(fuzzy_inputs(inputs), levels(4) if alpha is None else alpha)
-    plan = BranchAndBound(function)
-    whole = propagate(function, domain.inputs, plan, alpha=domain.alpha, vectorised=True)
-    for name in limits:
-        whole.column(name)
-    family = ByLevel(domain)
-    below = threshold(family, Limited(function, domain.names, limits), tolerance=tolerance)
-    above = [
-        threshold(family, Limited(function, domain.names, {name: limit}, -1), tolerance=tolerance)
-        for name, limit in limits.items()
-    ]
+    sides = [(limits, 1), *(({name: limit}, -1) for name, limit in limits.items())]
+    family, parts, found = ByLevel(domain), 1 + len(sides), []
+    with told(progress) as tell:
+        whole = propagate(
+            function,
+            domain.inputs,
+            BranchAndBound(function),
+            alpha=domain.alpha,
+            vectorised=True,
+            progress=part(tell, 0, parts),
+        )
+        for name in limits:
+            whole.column(name)
+        for turn, (asked, sign) in enumerate(sides, 1):
+            judge = Limited(function, domain.names, asked, sign)
+            tick = part(tell, turn, parts) or None
+            found.append(threshold(family, judge, tolerance=tolerance, progress=tick))
+            if tick:
+                tick(1.0)
+    below, *above = found
     possible = _degree(below)
     staying = [_degree(one) for one in above]
     necessary = max(1 - high for _, high in staying), max(1 - low for low, _ in staying)
@@ -166,6 +196,7 @@ def safe_scale(
     *,
     most: float = 10.0,
     tolerance: float = 1e-8,
+    progress: Progress | bool | None = None,
 ) -> Threshold:
     """Largest factor on given tolerances for which the limits provably hold.
 
@@ -176,20 +207,39 @@ def safe_scale(
         limits: Limit by output.
         most: Largest factor that is asked for.
         tolerance: Wanted distance of the proved and the refuted factor, as a share of `most`.
+        progress: As for `propagate`.
 
     Raises:
-        ValueError: A tolerance is negative or names no input.
+        ValueError: A number is not finite, or a tolerance is negative or names no input.
     """
+    limits = finite_by_name("limits", limits, "{'y': 4.5}")
+    nominal = finite_by_name("nominal values", nominal, "{'x': 1.0}")
+    positive("most", most)
+    positive("the tolerance", tolerance)
+    if not isinstance(tolerances, Mapping):
+        raise ValueError(f"the tolerances are {tolerances!r}; they must be ± by name: {{'x': 0.1}}")
     unknown = sorted(set(tolerances) - set(nominal))
     if unknown:
         raise ValueError(
             f"the tolerances name {', '.join(unknown)}; inputs are {', '.join(nominal)}"
         )
-    pairs = np.array([np.broadcast_to(tolerances.get(name, 0.0), 2) for name in nominal], float)
-    if not ((pairs >= 0).all() and np.isfinite(pairs).all()):
+    pairs = np.array([_reach(tolerances.get(name, 0.0)) for name in nominal])
+    if not (pairs >= 0).all():
         raise ValueError(
             f"the tolerances are {dict(tolerances)}; they must be 0 or greater, finite"
         )
     family = Scaled(np.array([*nominal.values()], float), pairs[:, 0], pairs[:, 1])
     judge = Limited(function, tuple(nominal), limits)
-    return threshold(family, judge, most=most, tolerance=tolerance)
+    with told(progress) as tell:
+        found = threshold(family, judge, most=most, tolerance=tolerance, progress=tell)
+        if tell:
+            tell(1.0)
+        return found
+
+
+def _reach(tolerance: float | tuple[float, float]) -> tuple[float, float]:
+    """A tolerance below and above."""
+    ends = tuple(tolerance) if isinstance(tolerance, Sequence | np.ndarray) else (tolerance,) * 2
+    if len(ends) != 2:
+        raise ValueError(f"a tolerance is {tolerance!r}; it must be ± or (below, above)")
+    return finite("a tolerance", ends[0]), finite("a tolerance", ends[1])

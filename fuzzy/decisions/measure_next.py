@@ -7,19 +7,28 @@ beforehand, so the least gain over those places stands beside the gain at the mo
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
+from contextlib import nullcontext
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
-from alphacut.fuzzy.arguments import fuzzy_inputs
+from alphacut.fuzzy.arguments import fuzzy_inputs, require_callable
+from alphacut.fuzzy.campaign.store import Identity, Store
+from alphacut.fuzzy.campaign.workers import pool, require_executor, require_workers
+from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.knowledge.joint import joined_once
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.plan import Plan
+from alphacut.fuzzy.progress_bar import Progress, part, told
 from alphacut.fuzzy.propagation import propagate
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.numbers import Crisp, Cut, FuzzyNumber, Interval
 
+_ANSWERS = 6  # for each input: its cut halved and exact, in three places
 Answer = Callable[[Mapping[str, FuzzyNumber]], tuple[float, float]]
 """From inputs to the width of the answer and its error."""
 INNER = 0.02
@@ -45,7 +54,7 @@ class Gain:
     exact_least: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Advice:
     """Gains of all inputs, the largest first.
 
@@ -76,6 +85,20 @@ class Advice:
             for x in self.gains
         ]
         return "\n".join([*lines, *([self.note] if self.note else [])])
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        """Gains in per cent of the width as a table, for notebooks."""
+        unit = 100 / self.width if self.width > 0 else 0.0
+        rows = [
+            (x.name, *(f"{unit * y:.3g}" for y in (x.half, x.half_least, x.exact, x.exact_least)))
+            for x in self.gains
+        ]
+        head = ("input", "known twice as well, %", "at least, %", "exactly, %", "at least, %")
+        note = f"; {self.note}" if self.note else ""
+        below = f"less width by; now {self.width:.6g} at α = {self.alpha:g}{note}"
+        return html_table(head, rows, below=below)
 
 
 def advice(answer: Answer, inputs: Mapping[str, FuzzyNumber], *, alpha: float = 0.0) -> Advice:
@@ -116,6 +139,11 @@ def measure_next(
     alpha: float = 0.0,
     known: Known | None = None,
     vectorised: bool = False,
+    workers: int = 1,
+    executor: Executor | None = None,
+    store: Store | str | Path | None = None,
+    identity: Identity | None = None,
+    progress: Progress | bool | None = None,
 ) -> Advice:
     """How much narrower an output is if each input were known twice as well, and exactly.
 
@@ -127,17 +155,39 @@ def measure_next(
         alpha: The level at which widths are compared.
         known: Facts about the function, as for `propagate`.
         vectorised: Whether the function takes arrays.
+        workers: As for `propagate`.
+        executor: As for `propagate`.
+        store: As for `propagate`; all answers share it.
+        identity: As for `propagate`.
+        progress: As for `propagate`, of all answers together.
 
     Raises:
         ValueError: An argument is wrong, or there are several outputs and none is named.
     """
     numbers = joined_once(fuzzy_inputs(inputs))
+    moving = [name for name, number in numbers.items() if number.cut(alpha).width > 0]
+    answers, done = 1 + _ANSWERS * len(moving), itertools.count()
+    require_workers(workers)
+    require_executor(executor, workers)
+    require_callable(function, list(numbers), by_name=True, sent=workers > 1)
+    with told(progress) as tell, nullcontext(executor) if executor else pool(workers) as running:
 
-    def answer(changed: Mapping[str, FuzzyNumber]) -> tuple[float, float]:
-        found = propagate(function, changed, plan, alpha=[1.0], known=known, vectorised=vectorised)
-        return _width(found, output)
+        def answer(changed: Mapping[str, FuzzyNumber]) -> tuple[float, float]:
+            found = propagate(
+                function,
+                changed,
+                plan,
+                alpha=[1.0],
+                known=known,
+                vectorised=vectorised,
+                executor=running,
+                store=store,
+                identity=identity,
+                progress=part(tell, next(done), answers),
+            )
+            return _width(found, output)
 
-    return advice(answer, numbers, alpha=alpha)
+        return advice(answer, numbers, alpha=alpha)
 
 
 def _width(found: FuzzyResult, output: str | None) -> tuple[float, float]:

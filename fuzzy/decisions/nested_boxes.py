@@ -8,6 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
+from alphacut.fuzzy.html import html_table
+from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.numbers import Array
 
@@ -87,7 +89,7 @@ class Verdict:
 Judge = Callable[[Array, Array], Verdict]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Threshold:
     """Size at which boxes cease to be safe.
 
@@ -108,9 +110,33 @@ class Threshold:
         """Distance of the witness beyond what is proved, as a share of it; infinite without one."""
         return self.unsafe / self.safe - 1 if self.safe else float("inf")
 
+    def __str__(self) -> str:
+        """Both sizes, and the point that breaks a limit."""
+        return "; ".join(" ".join(row) for row in self._told())
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        """Both sizes as a table, for notebooks."""
+        return html_table(("what", "size"), self._told())
+
+    def _told(self) -> list[tuple[str, str]]:
+        safe = "none" if self.safe is None else f"{self.safe:.9g}"
+        rows = [("proved safe up to", safe)]
+        if self.witness is not None:
+            at = ", ".join(f"{x:.6g}" for x in self.witness)
+            rows.append(("unsafe from", f"{self.unsafe:.9g}, at ({at})"))
+        return [*rows, ("boxes judged", f"{self.judged}")]
+
 
 def threshold(
-    family: Growing, judge: Judge, *, most: float = 1.0, tolerance: float = 1e-3, limit: int = 100
+    family: Growing,
+    judge: Judge,
+    *,
+    most: float = 1.0,
+    tolerance: float = 1e-3,
+    limit: int = 100,
+    progress: Progress | None = None,
 ) -> Threshold:
     """Halves the interval between the largest box proved safe and the least one that is not.
 
@@ -120,6 +146,7 @@ def threshold(
         most: Largest size that is asked for.
         tolerance: Wanted distance of both sizes, as a share of `most`.
         limit: Most boxes that are judged.
+        progress: Called with the share done.
 
     Raises:
         ValueError: A number is not positive.
@@ -154,4 +181,7 @@ def threshold(
         else:
             undecided.append(middle)
         undecided = [size for size in undecided if safe < size < unsafe]
+        if progress:  # each box halves what is open, down to the tolerance
+            left = max((min(unsafe, most) - safe) / most, tolerance)
+            progress(max(judged / limit, float(np.log(left) / min(np.log(tolerance), -1e-9))))
     return Threshold(safe, unsafe, witness, judged)

@@ -154,7 +154,7 @@ class JointClaim:
         """The claim in one sentence; empty where nothing is fuzzy."""
         if self.rule is None:
             return (
-                f"{', '.join(self.opinions)}: opinions, no cut says how often it holds"
+                f"{', '.join(self.opinions)}: opinions, so that no level has a probability"
                 if self.opinions
                 else ""
             )

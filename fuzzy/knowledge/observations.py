@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -129,6 +129,8 @@ def _pairs(values: Values) -> Array:
 def _numbers(values: Values) -> Array:
     """Numbers as pairs of equal ends, pairs as they are, shape (n, 2)."""
     masked = bool(np.ma.is_masked(values))  # type: ignore[no-untyped-call]
+    if any(isinstance(end, str) for value in values for end in _ends(value)):
+        raise TypeError("text is no measured number")
     if masked or (isinstance(values, np.ndarray) and np.iscomplexobj(values)):
         raise TypeError("masked and complex values are no measured numbers")
     try:
@@ -142,3 +144,7 @@ def _numbers(values: Values) -> Array:
     if table.ndim != 2 or table.shape[1] != 2:
         raise ValueError
     return table
+
+
+def _ends(value: object) -> Iterable[object]:
+    return value if isinstance(value, list | tuple) else (value,)

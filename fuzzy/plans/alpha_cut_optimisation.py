@@ -12,6 +12,7 @@ from alphacut.fuzzy.samples.design import Design
 from alphacut.fuzzy.samples.model import Memo, Model
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.fuzzy.sets.given import require_fields
 from alphacut.fuzzy.sets.interaction import pulled
 from alphacut.fuzzy.sets.numbers import Array
 from alphacut.fuzzy.surrogates.chebyshev_polynomial import corners
@@ -50,6 +51,7 @@ class Optimisation:
     outputs: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        require_fields(self)
         if self.method not in get_args(Method):
             raise ValueError(
                 f"the optimiser is {self.method!r}; it must be one of {', '.join(get_args(Method))}"
@@ -146,25 +148,57 @@ class LevelSearch:
         seen = self.memo.values.select([output])
         return float(np.ptp(seen)) or float(np.abs(seen).max()) or 1.0
 
-    def look(self, per_input: int, seed: int) -> None:
-        """Run the model at the corners and at spread points."""
+    def look(self, per_input: int, seed: int) -> Array:
+        """Run the model at the corners and at spread points; the latter that are in the cut."""
         from scipy.stats import qmc
 
         inputs = len(self.moving)
         spread: Array = qmc.Halton(inputs, rng=np.random.default_rng([seed, self.level])).random(
             per_input * inputs
         )
-        unit = np.concatenate([corners(inputs), spread]) if inputs <= _CORNERS else spread
-        points = self.points(unit)
-        allowed = self.domain.slack(points, self.domain.alpha[self.level]) >= 0
-        if allowed.any():
-            self.memo(points[allowed])
+        fresh = self.allowed(spread)
+        corner = self.allowed(corners(inputs)) if inputs <= _CORNERS else fresh[:0]
+        if len(fresh) + len(corner):
+            self.memo(self.points(np.concatenate([corner, fresh])))
         elif not self.domain.inside(self.memo.points)[self.level].any():
             alpha = self.domain.alpha[self.level]
             raise ValueError(
                 f"no point of the cut at α = {alpha:g} fulfils its interactions: they leave too"
                 " little room, or none"
             )
+        return fresh
+
+    def allowed(self, unit: Array) -> Array:
+        """Those of the points (n, moving) of the unit cube that fulfil the interactions."""
+        slack = self.domain.slack(self.points(unit), self.domain.alpha[self.level])
+        return unit[slack >= 0]
+
+    def along(self, place: Array, output: str, sign: float, rounds: int) -> Array:
+        """Where it leads to leave a place along each input, to both ends of the cut.
+
+        What is better is joined, and descended from: a hill of many inputs is often left by
+        several at once.
+        """
+        each = np.arange(len(place))
+        lines = np.repeat(place[None, None], 2, axis=0).repeat(len(place), axis=1)
+        lines[:, each, each] = np.array([[0.0], [1.0]])
+        here = self.worth(place[None], output, sign)[0]
+        found = np.array([self.worth(line, output, sign) for line in lines])
+        if not (found < here).any():
+            return place
+        joined = np.where(found.min(axis=0) < here, found.argmin(axis=0), place)
+        one = lines.reshape(-1, len(place))[found.argmin()]
+        both = np.stack([joined, one])
+        start: Array = both[self.worth(both, output, sign).argmin()]
+        return self.descend(start, output, sign, rounds)
+
+    def worth(self, unit: Array, output: str, sign: float) -> Array:
+        """`sign` times the output at points of the unit cube; inf outside the interactions."""
+        inside = self.domain.slack(self.points(unit), self.domain.alpha[self.level]) >= 0
+        worth: Array = np.full(len(unit), np.inf)
+        if inside.any():
+            worth[inside] = sign * self.values(unit[inside], output)
+        return worth
 
     def best(self, output: str, sign: float, count: int) -> Array:
         """The best few samples in the cut that lie apart, in unit coordinates."""
@@ -181,8 +215,8 @@ class LevelSearch:
                 chosen.append(unit[row])
         return np.array(chosen)
 
-    def descend(self, start: Array, output: str, sign: float, rounds: int = 50) -> None:
-        """A descent by gradients inside the cut; its samples stay in the memo."""
+    def descend(self, start: Array, output: str, sign: float, rounds: int = 50) -> Array:
+        """End of a descent by gradients inside the cut; its samples stay in the memo."""
         from scipy.optimize import minimize
 
         scale = self.scale(output)
@@ -207,13 +241,12 @@ class LevelSearch:
                 objective, start, jac=True, bounds=bounds, constraints=[room], method="SLSQP"
             )
             place, anchor = self.points(np.clip([found.x, start], 0, 1))
-            self.memo(pulled(place, anchor, lambda points: self.domain.slack(points, alpha))[None])
-        else:
-            minimize(
-                objective,
-                start,
-                jac=True,
-                bounds=bounds,
-                method="L-BFGS-B",
-                options={"maxiter": rounds},
-            )
+            end = pulled(place, anchor, lambda points: self.domain.slack(points, alpha))
+            self.memo(end[None])
+            width = (self.upper - self.lower)[self.moving]
+            return np.asarray((end - self.lower)[self.moving] / width)
+        options = {"maxiter": rounds}
+        found = minimize(
+            objective, start, jac=True, bounds=bounds, method="L-BFGS-B", options=options
+        )
+        return np.asarray(found.x)

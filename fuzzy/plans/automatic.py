@@ -6,18 +6,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from alphacut.fuzzy.plans.alpha_cut_optimisation import LevelSearch
+from alphacut.fuzzy.plans.looks import Looks, Purse, SpentError
 from alphacut.fuzzy.plans.monotonicity import primary
 from alphacut.fuzzy.plans.sparse_chebyshev import Chebyshev
+from alphacut.fuzzy.plans.sparse_grid import SparseGrid
 from alphacut.fuzzy.plans.transformation import Reduced, corners_suffice
 from alphacut.fuzzy.samples.design import Design
 from alphacut.fuzzy.samples.model import Memo, Model
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.fuzzy.sets.given import require_fields
 from alphacut.fuzzy.sets.numbers import Array
 
 _SEARCHED = 12  # outputs up to which each bound of each is searched and confirmed
-_SAFETY = 2  # what a next look finds may be more than what the last one found
+_SURFACE = 400  # samples at which the surface ends where no budget is named
 
 
 @dataclass(frozen=True)
@@ -27,33 +29,42 @@ class Automatic:
     Where the facts known of the model make corners suffice, these alone are run. Elsewhere every
     cut is looked at with fresh points, from the best of which the model itself is descended, until
     such a look finds nothing new. Bounds are attained by samples (inner); their error is what the
-    last look found, doubled, or the surface's, whichever is larger. Only a proof sees a spike that
-    is narrower than the distance of the samples.
+    last look found, doubled, or the surface's, whichever is larger. Where most descents from fresh
+    points end on hills of their own a better hill is likely: the error is then at least twice the
+    step from the best hill to the next. Only a proof sees a spike that is narrower than the
+    distance of the samples.
 
     Args:
         tolerance: Share of an output's range that a look must not find more than.
-        budget: Samples at which the surface ends at the latest.
+        budget: Samples altogether, of which the surface takes half. Where none is named, the
+            surface takes 400 at most and the looks what they need.
         look: Fresh points per level, input and look.
         looks: Looks at most.
         seed: Where the fresh points start from.
         outputs: Outputs whose bounds matter; all if none is named.
 
     Raises:
-        ValueError: A number is not positive.
+        ValueError: A number is not positive, or the budget does not carry the first surface.
     """
 
     tolerance: float = 1e-3
-    budget: int = 400
+    budget: int | None = None
     look: int = 6
     looks: int = 4
     seed: int = 0
     outputs: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if not (self.tolerance > 0 and min(self.budget, self.look, self.looks) >= 1):
+        require_fields(self)
+        if not (
+            0 < self.tolerance < 1
+            and min(self.look, self.looks, 1 if self.budget is None else self.budget) >= 1
+        ):
+            budget = "" if self.budget is None else f", budget {self.budget}"
             raise ValueError(
-                f"tolerance, budget, look and looks are {self.tolerance:g}, {self.budget},"
-                f" {self.look} and {self.looks}; all must be positive"
+                f"tolerance {self.tolerance:g}, look {self.look}, looks {self.looks}{budget}: all"
+                " must be positive, and the tolerance, a share of the range, below 1; samples are"
+                " bounded by budget="
             )
 
     @property
@@ -63,59 +74,80 @@ class Automatic:
 
     def run(self, model: Model, domain: Domain) -> FuzzyResult:
         """Bounds of every output, with one line on how they were verified."""
-        memo = Memo(model)
+        purse = Purse(model, np.inf if self.budget is None else self.budget)
+        memo = Memo(purse)
         columns = memo(domain.modal[None]).columns
         if not domain.interactions and _proved(memo, domain):
+            purse.left = np.inf
             return Reduced().run(memo, domain)
         names = self.outputs or primary(columns, model.known)
         few = len(names) <= _SEARCHED
-        surface = Chebyshev(self.tolerance, self.budget, confirm=few, outputs=names)
-        found = surface.run(memo, domain)
+        found = self._surface(memo, purse, domain, names if few else ())
         spent = len(memo)
-        left = self._looked(memo, domain, names if few else ())
+        looks = Looks(memo, domain, names if few else (), self.tolerance)
+        looks.run(self.looks, self.look, self.seed)
         result = Design.from_samples(domain, memo.points).bounds(memo.values, plan="automatic")
         chosen = [result.column(name) for name in names]
         if not few:
             result = _further(result, found)
-        error = np.maximum(found.error, _SAFETY * left)
+        error = np.maximum(found.error, looks.error)
         return replace(
             result,
             runs=spent,
             verification_runs=len(memo) - spent,
             error=error,
-            notes=(*found.notes, self._told(result, error, chosen, searched=few)),
+            notes=(*found.notes, self._told(result, error[:, chosen], chosen, looks)),
         )
 
-    def _looked(self, memo: Memo, domain: Domain, names: tuple[str, ...]) -> Array:
-        """Gain of the last look at all cuts, which finds nothing new, shape (levels, columns)."""
-        before = _bounds(memo, domain)
-        gain: Array = np.zeros(before.shape[1:])
-        for turn in range(self.looks):
-            for level in reversed(range(len(domain.alpha))):
-                cut = LevelSearch(memo, domain, level)
-                if not len(cut.moving):
-                    continue
-                cut.look(self.look, self.seed + turn + 1)
-                for name in names:
-                    for sign in (1.0, -1.0):
-                        for start in cut.best(name, sign, 2):
-                            cut.descend(start, name, sign, rounds=12)
-            after = _bounds(memo, domain)
-            gain = np.abs(after - before).max(axis=0)
-            before = after
-            if (gain <= self.tolerance * np.ptp(memo.values.array, axis=0)).all():
-                break
-        return gain
+    def _surface(
+        self, memo: Memo, purse: Purse, domain: Domain, names: tuple[str, ...]
+    ) -> FuzzyResult:
+        """Bounds by the surface; a named budget is halved until it carries the last step too."""
+        extremes = 2 * len(domain.alpha) * len(names)
+        budget = self.budget or 2 * _SURFACE
+        first = SparseGrid.first(len(domain.names))
+        if budget < first + extremes:
+            raise ValueError(
+                f"budget is {budget}; {len(names) or 'many'} outputs at {len(domain.alpha)} levels"
+                f" take {first + extremes} samples at least: raise it, or take fewer levels"
+            )
+        purse.left -= extremes
+        share = max(budget // 2, first)
+        while not self._carried(memo, domain, share):
+            share = max(share // 2, first)
+        purse.left += extremes
+        return Chebyshev(
+            self.tolerance, share, confirm=bool(names), outputs=self.outputs or names
+        ).run(memo, domain)
 
-    def _told(self, result: FuzzyResult, error: Array, chosen: list[int], *, searched: bool) -> str:
+    def _carried(self, memo: Memo, domain: Domain, share: int) -> bool:
+        """Whether the budget carries a surface of so many samples, whose last step passes them."""
+        try:
+            SparseGrid(memo, *(ends[0] for ends in domain.boxes)).refine(self.tolerance, share)
+        except SpentError:
+            return False
+        return True
+
+    def _told(self, result: FuzzyResult, error: Array, chosen: list[int], looks: Looks) -> str:
         """One sentence on what was verified."""
         width = (result.upper - result.lower)[0, chosen]
-        share = float((error[:, chosen] / np.where(width > 0, width, np.inf)).max(initial=0.0))
-        how = "and descents from the best of them " if searched else ""
+        share = float((error / np.where(width > 0, width, np.inf)).max(initial=0.0))
+        how = "and descents from the best of them " if looks.names else ""
         grade = "" if share <= 10 * self.tolerance else "; take a larger budget or another plan"
+        many = (
+            "; most descents end on hills of their own, so a better one is likely"
+            if looks.hills.any()
+            else ""
+        )
+        ended = (
+            f"; the budget of {self.budget} samples ended this after {looks.done} whole looks"
+            if looks.spent
+            else ""
+        )
         return (
             f"searched for extremes inside: fresh points in every cut {how}leave an error of"
-            f" {share:.1g} of the width{grade}; a spike between samples would not be seen"
+            f" {share:.1g} of the width{ended}{many}{grade}; a spike between samples would not be"
+            " seen"
         )
 
 
@@ -130,12 +162,6 @@ def _further(samples: FuzzyResult, surface: FuzzyResult) -> FuzzyResult:
         upper_at=np.where(high[..., None], surface.upper_at, samples.upper_at),
         base=surface.base if (low | high).any() else samples.base,
     )
-
-
-def _bounds(memo: Memo, domain: Domain) -> Array:
-    """Least and greatest value of every cut so far, shape (2, levels, columns)."""
-    found = Design.from_samples(domain, memo.points).bounds(memo.values, plan="")
-    return np.array([found.lower, found.upper])
 
 
 def _proved(memo: Memo, domain: Domain) -> bool:

@@ -15,6 +15,7 @@ from alphacut.fuzzy.samples.model import Model, Values
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.fuzzy.sets.given import require_fields
 from alphacut.fuzzy.sets.numbers import Array, Rows
 
 _ROUND_OFF = 1 + 1e-12  # more than the round-off of the mean-value form
@@ -52,6 +53,7 @@ class BranchAndBound:
     budget: int = 50_000
 
     def __post_init__(self) -> None:
+        require_fields(self)
         if not (self.tolerance > 0 and self.budget >= 1):
             raise ValueError(
                 f"tolerance and budget are {self.tolerance:g} and {self.budget}; both must be"

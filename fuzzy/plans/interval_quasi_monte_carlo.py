@@ -23,6 +23,7 @@ from alphacut.fuzzy.plans.transformation import Reduced
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.fuzzy.sets.given import require_fields
 from alphacut.fuzzy.sets.numbers import Array, FuzzyNumber, PiecewiseLinear
 
 _NOTES = 5  # of the plan at its many points that are kept
@@ -129,6 +130,7 @@ class IntervalQuasiMonteCarlo:
     plan: Plan = field(default_factory=Reduced)
 
     def __post_init__(self) -> None:
+        require_fields(self)
         if self.points < 1:
             raise ValueError(
                 f"the number of quasi-random points is {self.points}; it must be 1 or more"

@@ -18,6 +18,7 @@ from alphacut.fuzzy.samples.model import Memo, Model
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.fuzzy.sets.given import require_fields
 from alphacut.fuzzy.sets.numbers import Array, Interval, Rows
 
 _SAFETY = 2  # the error elsewhere may be larger than on the boxes that were held out
@@ -44,6 +45,7 @@ class Metamodel:
     seed: int = 0
 
     def __post_init__(self) -> None:
+        require_fields(self)
         if self.boxes < 2 or self.held_out < 1:
             raise ValueError(
                 f"the metamodel has {self.boxes} boxes and {self.held_out} held out; it needs 2 and"

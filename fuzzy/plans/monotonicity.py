@@ -19,6 +19,7 @@ from alphacut.fuzzy.samples.design import Design
 from alphacut.fuzzy.samples.model import Memo, Values
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.fuzzy.sets.given import require_fields
 from alphacut.fuzzy.sets.numbers import Array, Mask, Rows
 
 
@@ -41,6 +42,7 @@ class Verification:
     step: float = 1e-3
 
     def __post_init__(self) -> None:
+        require_fields(self)
         if self.probes < 0 or self.margin < 0 or not 0 < self.step <= 0.5:
             got = f"probes = {self.probes}, margin = {self.margin:g}, step = {self.step:g}"
             raise ValueError(

@@ -12,6 +12,7 @@ from alphacut.fuzzy.samples.design import Design
 from alphacut.fuzzy.samples.model import Model
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.fuzzy.sets.given import require_fields
 from alphacut.fuzzy.sets.numbers import Array
 
 _TRIES = 200  # rounds of drawing points that fulfil the interactions
@@ -38,6 +39,7 @@ class _Sampling:
         return False
 
     def __post_init__(self) -> None:
+        require_fields(self)
         if self.samples < 1:
             raise ValueError(
                 f"the number of samples per level is {self.samples}; it must be 1 or more"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -13,9 +14,11 @@ from alphacut.fuzzy.samples.model import Memo, Model
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.fuzzy.sets.given import require_fields
 from alphacut.fuzzy.sets.numbers import Array, Rows
 from alphacut.fuzzy.surrogates.chebyshev_polynomial import Polynomial
 
+_SEARCHES = 20_000  # searches of the surface at most
 _SAFETY = 2  # the surface may miss other places by more than the samples that were held out
 
 
@@ -50,6 +53,7 @@ class Chebyshev:
     outputs: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        require_fields(self)
         if not (self.tolerance > 0 and self.budget >= 1):
             raise ValueError(
                 f"tolerance and budget are {self.tolerance:g} and {self.budget}; both must be"
@@ -66,11 +70,11 @@ class Chebyshev:
         from alphacut.fuzzy.plans.sparse_grid import SparseGrid
 
         memo = Memo(model)
+        columns = memo(domain.modal[None]).columns
+        _require_few(self.outputs or primary(columns, model.known), domain)
         grid = SparseGrid(memo, *(ends[0] for ends in domain.boxes))
-        memo(domain.modal[None])
         missed, met = grid.refine(self.tolerance, self.budget)
         missed = _SAFETY * missed
-        columns = memo.values.columns
         chosen = np.array(
             [memo.values.column(name) for name in self.outputs or primary(columns, model.known)]
         )
@@ -107,6 +111,21 @@ class Chebyshev:
         own = np.einsum("loso->los", values.reshape(*ends.values.shape, -1))
         difference: Array = np.abs(own - ends.values).max(axis=2)
         return difference
+
+
+def _require_few(outputs: Sequence[str], domain: Domain) -> None:
+    """Refuse so many outputs that the search of their surfaces would not end.
+
+    Raises:
+        ValueError: There are too many.
+    """
+    searches = len(outputs) * len(domain.alpha)
+    if searches > _SEARCHES:
+        raise ValueError(
+            f"{len(outputs):,} outputs at {len(domain.alpha)} levels are {searches:,} searches of"
+            f" the surface, some {_SEARCHES:,} take minutes: name those that matter, as"
+            f" Automatic(outputs=({outputs[0]!r},)), return fewer, or take Reduced() or Signed()"
+        )
 
 
 def _extremes(surface: Polynomial, domain: Domain, chosen: Rows) -> _Ends:

@@ -11,7 +11,6 @@ from itertools import product
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebvander
-from scipy.stats import qmc
 
 from alphacut.fuzzy.samples.model import Memo
 from alphacut.fuzzy.sets.numbers import Array
@@ -57,9 +56,16 @@ class SparseGrid:
         self._active: dict[Level, Array] = {}  # with its disagreement, shape (outputs,)
         self._terms: dict[Level, Array] = {}
         inputs = len(lower)
+        from scipy.stats import qmc  # which takes longer to load than all else here
+
         spread: Array = qmc.Halton(inputs, scramble=False).random(_CHECKS * inputs + 9)[1:]
         self._checks = lower + spread * (upper - lower)
         self._add((0,) * inputs)
+
+    @staticmethod
+    def first(inputs: int) -> int:
+        """Samples of the modal point, the coarsest surface, and those that judge it."""
+        return 1 + 2 * inputs + 1 + _CHECKS * inputs + 8
 
     def refine(self, tolerance: float, budget: int) -> tuple[Array, bool]:
         """Refine until samples agree with the surface to a share `tolerance` of the range.
@@ -74,7 +80,7 @@ class SparseGrid:
                 return left, True
             if not self._active or len(self.memo) >= budget:
                 return left, False
-            self.memo.report(0.9 * len(self.memo) / budget)
+            self.memo.report(0.5 * len(self.memo) / budget)  # a search follows
             self._accept(rough[0] if rough else self._worst(tolerance))
 
     def polynomial(self) -> Polynomial:

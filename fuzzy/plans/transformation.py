@@ -30,12 +30,15 @@ from alphacut.fuzzy.sets.numbers import FuzzyNumber, Mask
 _SAME = 1e-13
 
 
-def hanss_points(number: FuzzyNumber, alpha: Sequence[float]) -> list[list[float]]:
+def hanss_points(
+    number: FuzzyNumber, alpha: Sequence[float], *, inner: bool = True
+) -> list[list[float]]:
     """Points of every level by Hanss' recursion.
 
     Args:
         number: A fuzzy number or interval.
         alpha: Rising levels.
+        inner: Whether points between the ends of a cut are wanted.
 
     Returns:
         For each level, from the lowest, its points in rising order: n at the top (one where the cut
@@ -45,7 +48,9 @@ def hanss_points(number: FuzzyNumber, alpha: Sequence[float]) -> list[list[float
     rows: list[list[float]] = []
     for level in reversed(alpha):
         lower, upper = number.cut(level)
-        between = [(left + right) / 2 for left, right in pairwise(rows[-1])] if rows else []
+        between = (
+            [(left + right) / 2 for left, right in pairwise(rows[-1])] if rows and inner else []
+        )
         rows.append(
             [
                 _settled(x, known, number.support.width)
@@ -82,8 +87,7 @@ class _Transformation:
         refined = self._refined(domain.names)
         columns = []
         for name, number in domain.inputs.items():
-            rows = hanss_points(number, domain.alpha)
-            columns.append(rows if name in refined else [sorted({row[0], row[-1]}) for row in rows])
+            columns.append(hanss_points(number, domain.alpha, inner=name in refined))
         return [list(level) for level in zip(*columns, strict=True)]
 
     def size(self, domain: Domain) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import prod
 from typing import Protocol
 
@@ -29,7 +30,7 @@ class Values:
     layout: Layout
     array: Array
 
-    @property
+    @cached_property
     def columns(self) -> tuple[str, ...]:
         """Name of each column: `E`, or `s11[0]`, `s11[1]`, … for an output that is an array."""
         names: list[str] = []
@@ -67,9 +68,13 @@ class Values:
         Raises:
             ValueError: There is no such column.
         """
-        if name not in self.columns:
+        if name not in self._places:
             raise ValueError(f"there is no output {name}; there are {', '.join(self.columns)}")
-        return self.columns.index(name)
+        return self._places[name]
+
+    @cached_property
+    def _places(self) -> dict[str, int]:
+        return {name: column for column, name in enumerate(self.columns)}
 
 
 class Model(Protocol):
@@ -96,7 +101,9 @@ def flatten(output: Output) -> tuple[Layout, Array]:
     Raises:
         ValueError: There is no number, one that is not finite, or two of the same name.
     """
-    named = output if isinstance(output, Mapping) else {"y": output}
+    if output is None:
+        raise ValueError("the function returned None, no real number: is its return missing?")
+    named = output if isinstance(output, Mapping) else _labelled(output)
     arrays = {str(name): _numbers(str(name), value) for name, value in named.items()}
     if not sum(array.size for array in arrays.values()):
         raise ValueError("the function returned no number; it must return one at least")
@@ -112,12 +119,28 @@ def flatten(output: Output) -> tuple[Layout, Array]:
     return layout, np.concatenate([array.ravel() for array in arrays.values()])
 
 
+def _labelled(output: object) -> Mapping[str, ArrayLike]:
+    """Outputs by the labels of a pandas object; by the name y where there are none."""
+    labels = getattr(output, "columns" if hasattr(output, "columns") else "index", None)
+    if not type(output).__module__.startswith("pandas") or labels is None:
+        return {"y": output}  # type: ignore[dict-item]
+    named = all(isinstance(label, str) for label in labels)
+    return {label: output[label] for label in labels} if named else {"y": output}  # type: ignore
+
+
 def _numbers(name: str, value: ArrayLike) -> Array:
     """Real numbers of an output.
 
     Raises:
-        ValueError: Text, dates, complex numbers, or values that are masked.
+        ValueError: Text, dates, complex numbers, numbers with a unit, or values that are masked.
     """
+    if isinstance(value, Mapping):
+        raise ValueError(f"output {name!r} is a mapping; outputs have one level of names")
+    if hasattr(value, "magnitude") and hasattr(value, "units"):
+        raise ValueError(
+            f"output {name!r} has the unit {value.units}; return a real number, as"
+            " output.to(unit).magnitude"
+        )
     array = np.asanyarray(value)
     masked = isinstance(array, np.ma.MaskedArray) and bool(np.any(array.mask))
     if masked or array.dtype.kind not in "biufO":

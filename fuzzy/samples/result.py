@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from alphacut.fuzzy.csv_table import write_csv
 from alphacut.fuzzy.drawing import draw_membership, new_axes
 from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.knowledge.contradiction import contradictions
@@ -19,7 +22,7 @@ from alphacut.fuzzy.samples.nature import Nature, condition
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.claimed import Claimed
 from alphacut.fuzzy.sets.numbers import Array, Mask, PiecewiseLinear
-from alphacut.fuzzy.sets.stepwise import outer_steps
+from alphacut.fuzzy.sets.stepwise import Stepwise, outer_steps
 from alphacut.fuzzy.surrogates.response_surface import ResponseSurface
 
 if TYPE_CHECKING:
@@ -58,7 +61,7 @@ class FuzzyResult:
         points: Samples of the model, shape (n, inputs).
         values: Outputs at `points`.
         calls: Calls of the model, each for the samples that share a set-up.
-        reused: Samples taken from a store instead of being run.
+        reused: Of all `samples`, those taken from a store instead of being run.
         seconds: Wall time of the whole propagation.
     """
 
@@ -189,6 +192,10 @@ class FuzzyResult:
     def plot(self, output: str = "y", axes: Axes | None = None) -> Axes:
         """Draw one output's cuts as a membership function, with the levels that were computed.
 
+        Between levels the ends go straight, as those of the inputs do. Where an input's do not (a
+        number from data has steps), the wider of two cuts is drawn up to the next level: cuts there
+        lie inside it.
+
         Args:
             output: Name of the output.
             axes: Where to draw; a new figure if not given.
@@ -201,11 +208,16 @@ class FuzzyResult:
         """
         lower, upper = self.bounds(output)
         axes = new_axes(axes)
-        draw_membership(axes, self.alpha, lower, upper)
+        draw_membership(axes, self.alpha, lower, upper, steps=not self.domain.linear)
         for level, *ends in zip(self.alpha, lower, upper, strict=True):
             axes.plot(ends, (level, level), color="grey", marker="|", linewidth=0.8)
-        axes.set(xlabel=output, title=f"{self.nature} bounds")
+        axes.set(xlabel=output, title=f"{self.nature} bounds{self._between}")
         return axes
+
+    @property
+    def samples(self) -> int:
+        """All samples of the model: those of the bounds and those that verified them."""
+        return self.runs + self.verification_runs
 
     @property
     def claim(self) -> JointClaim:
@@ -250,17 +262,27 @@ class FuzzyResult:
         Raises:
             ValueError: There is no such output.
         """
-        if output not in self.outputs:
+        if output not in self._columns:
             raise ValueError(f"there is no output {output!r}; there are {', '.join(self.outputs)}")
-        return self.outputs.index(output)
+        return self._columns[output]
+
+    @cached_property
+    def _columns(self) -> dict[str, int]:
+        return {name: column for column, name in enumerate(self.outputs)}
 
     def bounds(self, output: str = "y") -> tuple[Array, Array]:
         """Lower and upper ends of one output over the levels, two arrays of shape (levels,)."""
         column = self.column(output)
         return self.lower[:, column], self.upper[:, column]
 
-    def number(self, output: str = "y") -> PiecewiseLinear | Claimed:
-        """One output as a fuzzy number: linear between its α-cuts, in steps where it has a claim.
+    @property
+    def _between(self) -> str:
+        """What a picture draws between levels, in words."""
+        between = "straight" if self.domain.linear else "at most the steps"
+        return f", {between} between levels" if len(self.alpha) > 1 else ""
+
+    def number(self, output: str = "y") -> PiecewiseLinear | Stepwise | Claimed:
+        """One output as a fuzzy number: linear between its α-cuts, in steps where an input is not.
 
         Raises:
             ValueError: The levels do not reach from 0 to 1, and nothing is claimed.
@@ -274,6 +296,8 @@ class FuzzyResult:
                 f"the α-levels of the result are {shown}; a fuzzy number needs some from 0 to 1:"
                 " take alpha=levels(4)"
             )
+        if not self.domain.linear:
+            return outer_steps(self.alpha, lower, upper)
         return PiecewiseLinear(tuple(self.alpha), tuple(lower), tuple(upper))
 
     def surface(self, output: str = "y") -> ResponseSurface:
@@ -283,6 +307,28 @@ class FuzzyResult:
     def charged(self, *, calls: int, reused: int, seconds: float) -> FuzzyResult:
         """The same result with what it cost."""
         return replace(self, calls=calls, reused=reused, seconds=seconds)
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write a CSV file with a row for each output and level.
+
+        Its columns are output, alpha, lower, upper, error, then for each input where the bounds are
+        reached: `NAME at lower`, `NAME at upper`.
+
+        Args:
+            path: The file; one that is there is replaced.
+
+        Raises:
+            ValueError: It cannot be written there.
+        """
+        places = [f"{name} at {end}" for end in ("lower", "upper") for name in self.inputs]
+        tables = self.lower[..., None], self.upper[..., None], self.error[..., None]
+        numbers = np.concatenate([*tables, self.lower_at, self.upper_at], axis=2)
+        rows = (
+            (name, alpha, *numbers[level, column].tolist())
+            for column, name in enumerate(self.outputs)
+            for level, alpha in enumerate(self.domain.alpha)
+        )
+        write_csv(path, ("output", "alpha", "lower", "upper", "error", *places), rows)
 
     def to_dataset(self) -> xarray.Dataset:
         """Bounds over (alpha, output), where they are reached over (alpha, output, parameter)."""

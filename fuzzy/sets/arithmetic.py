@@ -69,9 +69,7 @@ def combine(sign: str, left: FuzzyNumber | float, right: FuzzyNumber | float) ->
         DependencyError: A number occurs on both sides, or two have claims.
         ValueError: The divisor's support holds 0.
     """
-    operands = [
-        side if isinstance(side, FuzzyNumber) else Crisp(float(side)) for side in (left, right)
-    ]
+    operands = [side if isinstance(side, FuzzyNumber) else Crisp(side) for side in (left, right)]
     texts = [_text(operand) for operand in operands]
     sources = [_sources(operand) for operand in operands]
     twice = [number for number in sources[0] if any(number is other for other in sources[1])]

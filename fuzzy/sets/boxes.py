@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from alphacut.fuzzy.sets.claimed import from_level
+from alphacut.fuzzy.sets.given import is_real
 from alphacut.fuzzy.sets.interaction import Interaction
 from alphacut.fuzzy.sets.numbers import Array, FuzzyNumber, Mask
 
 _ROUND_OFF = 1e-12  # of the support: points this close to a cut lie in it
 
+_STRAIGHT = 1e-9  # of the lowest cut: corners this close to a line lie on it
 
 MOST_LEVELS = 10_000
 
@@ -23,7 +25,7 @@ def levels(steps: int) -> tuple[float, ...]:
     Raises:
         ValueError: `steps` is no whole number from 1 to 10,000.
     """
-    if not (isinstance(steps, int) and 1 <= steps <= MOST_LEVELS):
+    if not (isinstance(steps, int) and is_real(steps) and 1 <= steps <= MOST_LEVELS):
         raise ValueError(
             f"the number of steps between α-levels is {steps}; it must be a whole number from 1 to"
             f" {MOST_LEVELS:,}"
@@ -32,13 +34,22 @@ def levels(steps: int) -> tuple[float, ...]:
 
 
 def _levels(alpha: Sequence[float]) -> tuple[float, ...]:
-    try:
-        return tuple(float(level) for level in alpha)
-    except (TypeError, ValueError):
+    given = [] if isinstance(alpha, str) or not isinstance(alpha, Iterable) else list(alpha)
+    if not given or not all(map(is_real, given)):
         raise ValueError(
             f"the α-levels are {alpha!r}; they must be a sequence of numbers that rise within"
             " [0, 1]"
-        ) from None
+        )
+    return tuple(map(float, given))
+
+
+def _straight(number: FuzzyNumber, alpha: Sequence[float]) -> bool:
+    """Whether a number's corners between the first and the last level lie on straight lines."""
+    between = [level for level in number.cuts.alpha if alpha[0] < level < alpha[-1]]
+    ends = np.array([number.cut(level) for level in alpha])
+    lines = np.array([np.interp(between, alpha, ends[:, side]) for side in (0, 1)]).T
+    corners = np.array([number.cut(level) for level in between]).reshape(-1, 2)
+    return bool((np.abs(corners - lines) <= _STRAIGHT * np.ptp(ends[0])).all())
 
 
 @dataclass(frozen=True)
@@ -86,6 +97,11 @@ class Domain:
             [[number.cut(level) for number in self.inputs.values()] for level in self.alpha]
         )
         return cuts[..., 0], cuts[..., 1]
+
+    @property
+    def linear(self) -> bool:
+        """Whether the ends of every input's cut go straight from each level to the next."""
+        return all(_straight(number, self.alpha) for number in self.inputs.values())
 
     @property
     def modal(self) -> Array:

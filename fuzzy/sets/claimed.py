@@ -121,7 +121,11 @@ class Claimed(FuzzyNumber):
         return self.number.cut(alpha)
 
     def __str__(self) -> str:
-        return f"{type(self).__name__}({self.claim.about})"
+        low, high = self.cut(self.decided)
+        ends = f"{low:.6g} … {high:.6g} at α = {self.decided:.4g}"
+        return f"{type(self).__name__}({self.claim.about}: {ends})"
+
+    __repr__ = __str__
 
 
 def from_level(number: FuzzyNumber, alpha: float) -> FuzzyNumber:

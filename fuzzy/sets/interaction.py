@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from numbers import Real
 from typing import Protocol
 
 import numpy as np
 
+from alphacut.fuzzy.sets.given import is_real
 from alphacut.fuzzy.sets.numbers import Array, FuzzyNumber
 
 _HALVINGS = 50
@@ -87,8 +87,8 @@ class Ellipsoidal:
 
     def __post_init__(self) -> None:
         for pair, value in self.correlation.items():
-            if not isinstance(value, Real) or not -1 < value < 1:
-                shown = f"{value:g}" if isinstance(value, Real) else repr(value)
+            if not is_real(value) or not -1 < value < 1:
+                shown = f"{value:g}" if is_real(value) else repr(value)
                 raise ValueError(
                     f"the correlation of {' and '.join(pair)} is {shown}; it must lie inside"
                     " (-1, 1)"
@@ -166,7 +166,7 @@ def _signed_distance(number: FuzzyNumber, x: Array) -> Array:
 
 def _require_weights(weights: object, bound: object) -> None:
     numbers = isinstance(weights, Mapping) and all(
-        isinstance(value, Real) for value in (*weights.values(), bound)
+        is_real(value) for value in (*weights.values(), bound)
     )
     if not numbers:
         raise ValueError(

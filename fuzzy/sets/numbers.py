@@ -9,7 +9,6 @@ from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from numbers import Real
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from alphacut.fuzzy.drawing import draw_membership, new_axes
 from alphacut.fuzzy.html import membership_svg
+from alphacut.fuzzy.sets.given import is_real
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -107,6 +107,15 @@ class FuzzyNumber(ABC):
         )
         return np.where(np.isnan(x), np.nan, grade)
 
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: object) -> object:
+        """NumPy's signs act as the number's own; its functions are refused with what does them."""
+        if method == "__call__" and len(inputs) == 2:
+            return ufunc(*map(_boxed, inputs))
+        raise TypeError(
+            f"numpy.{ufunc.__name__} takes no fuzzy number; take"
+            f" fuzzy.apply(numpy.{ufunc.__name__}, number) or propagate"
+        )
+
     def __add__(self, other: FuzzyNumber | float) -> FuzzyNumber:
         return _combine("+", self, other)
 
@@ -136,6 +145,15 @@ class FuzzyNumber(ABC):
 
     def __pow__(self, exponent: int) -> FuzzyNumber:
         return OPERATORS["**"](self, exponent)
+
+
+def _boxed(value: object) -> NDArray[np.object_]:
+    """NumPy's numbers as Python's, anything else as an array of no dimension."""
+    if isinstance(value, np.ndarray | np.generic):
+        return np.asarray(value).astype(object)
+    box = np.empty((), object)
+    box[()] = value
+    return box
 
 
 OPERATORS: dict[str, Callable[[FuzzyNumber | float, FuzzyNumber | float], FuzzyNumber]] = {}
@@ -174,7 +192,7 @@ def _require_order(kind: str, values: Sequence[float], order: str) -> None:
     wrong = [
         value
         for value in values
-        if not isinstance(value, Real) or (isinstance(value, int) and abs(value) > WHOLE)
+        if not is_real(value) or (isinstance(value, int) and abs(value) > WHOLE)
     ]
     if wrong:
         raise ValueError(

@@ -128,13 +128,17 @@ class _Search:
         place = self._point(found.x)[0]
         if self.slack:
             place = pulled(place, start, self.slack)
-        return place, self.sign * float(self.polynomial(place[None])[0, self.output])
+        return place, self.sign * self._value(place[None])
 
     def _objective(self, unit: Array) -> tuple[float, Array]:
         point = self._point(unit)
         gradient = self.polynomial.gradient(point, self.output)[0] * self._span()
         factor = self.sign / self.scale
-        return factor * float(self.polynomial(point)[0, self.output]), factor * gradient
+        return factor * self._value(point), factor * gradient
+
+    def _value(self, point: Array) -> float:
+        terms = self.polynomial.basis(point)[0]
+        return float(terms @ self.polynomial.coefficients[:, self.output])
 
     def _room(self, unit: Array) -> float:
         return float(self.slack(self._point(unit))[0]) if self.slack else 0.0

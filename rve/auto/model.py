@@ -12,7 +12,7 @@ from pathlib import Path
 
 from alphacut.rve.cell import Phase
 from alphacut.rve.result import Homogenised
-from alphacut.rve.settings import require_accuracy
+from alphacut.rve.settings import require_accuracy, require_parts
 from alphacut.rve.spheres.series.model import SphereSeriesModel
 from alphacut.rve.spheres.table.model import LEAST_ACCURACY, SphereTableModel
 from alphacut.stochastic import RadiusMap
@@ -83,6 +83,7 @@ class AutoModel:
         Raises:
             ChoiceError: No model left reaches the tolerance.
         """
+        require_parts(radius_map, matrix, inclusions)
         if not inclusions:
             return []
         refusals: list[str] = []

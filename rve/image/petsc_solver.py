@@ -13,9 +13,8 @@ import numpy as np
 
 from alphacut.rve.image.fields.solver import ConvergenceError, Solution, Solver
 from alphacut.rve.image.fields.system import Linear, System
-from alphacut.rve.petsc import PETSc
+from alphacut.rve.petsc import PETSc, in_database
 from alphacut.rve.solver.options import PREFIX, OptionError
-from alphacut.rve.solver.petsc_options import in_database
 
 DEFAULTS = {"ksp_type": "cg", "ksp_norm_type": "natural", "pc_type": "python", "ksp_max_it": "2000"}
 TOLERANCES = frozenset({"ksp_rtol", "ksp_atol", "ksp_convergence_test"})

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alphacut.rve.mesh.triangulation import Integers, Triangulation
-from alphacut.stochastic import RadiusMap
-from alphacut.stochastic.theta.truncated_normal import Array, TruncatedNormal
+from alphacut.stochastic import RadiusMap, ThetaLaw
+from alphacut.stochastic.theta.law import Array
 
 
 def moved(mesh: Triangulation, radius: float) -> Array:
@@ -59,30 +59,61 @@ class PrismGrid:
         layers: Number of equal layers in θ, at least 1.
         conforming: Whether the nodes follow the cone; if not they stay where the planar mesh has
             them.
+        wedges: Numbers of the wedges of one rank, layer by layer; None: all. Nodes, cells and
+            positions are those of the layers that they lie in.
     """
 
     plane: Triangulation
     layers: int
     conforming: bool = True
+    wedges: range | None = None
 
     def __post_init__(self) -> None:
         if self.layers < 1:
             raise ValueError(f"the number of layers is {self.layers}; at least 1 is needed")
 
     @property
+    def own(self) -> range:
+        """Numbers of the wedges."""
+        return (
+            range(self.layers * len(self.plane.triangles)) if self.wedges is None else self.wedges
+        )
+
+    @property
+    def span(self) -> range:
+        """Layers that the wedges lie in."""
+        triangles = len(self.plane.triangles)
+        return range(self.own.start // triangles, -(-self.own.stop // triangles))
+
+    def within(self, layer: int) -> tuple[slice, slice]:
+        """The wedges in a layer: their triangles, and their places among the wedges."""
+        first, own = layer * len(self.plane.triangles), self.own
+        stop = first + len(self.plane.triangles)
+        part = range(max(first, own.start), min(stop, own.stop))
+        triangles, places = (slice(part.start - k, part.stop - k) for k in (first, own.start))
+        return triangles, places
+
+    @property
+    def inside(self) -> NDArray[np.bool_]:
+        """Mask of the wedges in the particle."""
+        triangles = [self.within(layer)[0] for layer in self.span]
+        return np.concatenate([self.plane.inside[part] for part in triangles])
+
+    @property
     def nodes(self) -> int:
         """Number of nodes in all."""
-        return (self.layers + 1) * len(self.plane.points) + self.layers * self.plane.vertices
+        layers = len(self.span)
+        return (layers + 1) * len(self.plane.points) + layers * self.plane.vertices
 
     @cached_property
     def cells(self) -> Integers:
-        """Nodes of each wedge in Basix's order, shape (layers · triangles, 15), layer by layer."""
+        """Nodes of each wedge in Basix's order, shape (wedges, 15), layer by layer."""
         planar = len(self.plane.points)
         t = self.plane.triangles
         v0, v1, v2, e01, e02, e12 = t.T
-        layer = np.arange(self.layers)[:, None]
+        layer = np.arange(len(self.span))[:, None]
         below, above = planar * layer, planar * (layer + 1)
-        middle = planar * (self.layers + 1) + self.plane.vertices * layer
+        middle = planar * (len(self.span) + 1) + self.plane.vertices * layer
         columns = [v0 + below, v1 + below, v2 + below, v0 + above, v1 + above, v2 + above]
         columns += [
             e01 + below,
@@ -95,19 +126,20 @@ class PrismGrid:
             e02 + above,
             e12 + above,
         ]
-        return np.stack(columns, axis=-1).reshape(-1, 15)
+        first = self.span.start * len(t)
+        return np.stack(columns, axis=-1).reshape(-1, 15)[self.own.start - first :][: len(self.own)]
 
-    def levels(self, law: TruncatedNormal) -> Array:
-        """θ of the levels, shape (layers + 1,)."""
+    def levels(self, law: ThetaLaw) -> Array:
+        """θ of all levels, shape (layers + 1,)."""
         return np.linspace(law.lower, law.upper, self.layers + 1)
 
     def planes(self, radius: RadiusMap) -> tuple[Array, Array]:
-        """Positions on the levels, shape (layers + 1, n, 2), and half-way, shape (layers, n, 2).
+        """Positions on the levels, shape (span + 1, n, 2), and half-way, shape (span, n, 2).
 
         Half-way the wedges have nodes on vertices only; the midpoints are where their shape
         functions carry them.
         """
-        levels, v, (a, b) = self.levels(radius.distribution), self.plane.vertices, self.plane.ends.T
+        levels, v, (a, b) = self._own_levels(radius), self.plane.vertices, self.plane.ends.T
         full, half = (
             self._at(radius, levels),
             self._at(radius, (levels[1:] + levels[:-1]) / 2).copy(),
@@ -115,6 +147,9 @@ class PrismGrid:
         mean = (full[1:] + full[:-1]) / 2
         half[:, v:] = mean[:, v:] + (half[:, a] + half[:, b] - mean[:, a] - mean[:, b]) / 2
         return full, half
+
+    def _own_levels(self, radius: RadiusMap) -> Array:
+        return self.levels(radius.distribution)[self.span.start : self.span.stop + 1]
 
     def _at(self, radius: RadiusMap, theta: Array) -> Array:
         if not self.conforming:
@@ -124,7 +159,7 @@ class PrismGrid:
     def positions(self, radius: RadiusMap) -> Array:
         """(x1, x2, θ) of all nodes, shape (nodes, 3)."""
         full, half = self.planes(radius)
-        theta = self.levels(radius.distribution)
+        theta = self._own_levels(radius)
         middle = (theta[1:] + theta[:-1]) / 2
         half = half[:, : self.plane.vertices]
         stacked = [

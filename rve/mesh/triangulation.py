@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import gmsh
 import numpy as np
 from numpy.typing import NDArray
 
 from alphacut.rve.settings import require_mesh_size
+from alphacut.stochastic import RadiusMap, require_map
 from alphacut.stochastic.theta.truncated_normal import Array
 
 Integers = NDArray[np.int64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Triangulation:
     """Six-node triangles of the cell [−1, 1]², vertices numbered before edge midpoints.
 
@@ -39,6 +39,18 @@ class Triangulation:
     radius: float
 
 
+def reference_radius(radius_map: RadiusMap) -> float:
+    """Radius of the planar mesh: the middle of the map's range, rounded, in [0.1, 0.9].
+
+    Raises:
+        ValueError: The map gives radii outside (0, 1), or its law of θ is none.
+    """
+    require_map(radius_map)
+    law = radius_map.distribution
+    radii = radius_map(np.linspace(law.lower, law.upper, 65))
+    return float(np.clip(np.round((radii.min() + radii.max()) * 10) / 20, 0.1, 0.9))
+
+
 def triangulate(*, size: float, radius: float) -> Triangulation:
     """Mesh the cell with triangles of about `size`, opposite sides matching.
 
@@ -59,6 +71,8 @@ def triangulate(*, size: float, radius: float) -> Triangulation:
 
 def _gmsh_triangles(size: float, radius: float) -> tuple[Array, Integers, NDArray[np.bool_]]:
     """Vertices (n, 2), triangles (m, 3) and the particle's triangles (m,), by Gmsh."""
+    import gmsh  # here as below: loading it takes a tenth of a second
+
     gmsh.initialize(["", "-v", "1"], readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.setNumber("General.NumThreads", 1)
@@ -82,6 +96,8 @@ def _gmsh_triangles(size: float, radius: float) -> tuple[Array, Integers, NDArra
 
 def _outline(size: float) -> int:
     """Curve loop of the square with opposite sides periodic."""
+    import gmsh
+
     geo = gmsh.model.geo
     corners = [geo.addPoint(x, y, 0, size) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     sides = [geo.addLine(corners[k], corners[(k + 1) % 4]) for k in range(4)]
@@ -95,6 +111,8 @@ def _outline(size: float) -> int:
 
 def _square(size: float) -> tuple[int]:
     """The cell without a particle: its surface."""
+    import gmsh
+
     surface = gmsh.model.geo.addPlaneSurface([_outline(size)])
     gmsh.model.geo.synchronize()
     return (surface,)
@@ -102,6 +120,8 @@ def _square(size: float) -> tuple[int]:
 
 def _square_with_disc(size: float, radius: float) -> tuple[int, int]:
     """Cell with its particle bounded by four arcs: surfaces of particle and matrix."""
+    import gmsh
+
     geo = gmsh.model.geo
     centre = geo.addPoint(0, 0, 0, size)
     poles = [

@@ -10,15 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from alphacut.rve.bounds import hashin_shtrikman_bulk, reuss, voigt
 from alphacut.rve.cell import STRAIN, Phase, square_moduli, with_ratio, with_ratio_errors
+from alphacut.rve.ranks import ALONE, Ranks
 from alphacut.rve.result import Homogenised, StressCurve
 from alphacut.rve.slices.curve import ratio_error
 from alphacut.rve.slices.theta_rule import extreme_radii, theta_rule
+from alphacut.rve.table.build import PlanarSource
 from alphacut.rve.table.cache import stored_table
 from alphacut.rve.table.interpolant import TableRange
 from alphacut.stochastic import RadiusMap
@@ -38,6 +41,7 @@ def judged(
     *,
     layers: Array,
     cache: Path | None = None,
+    ranks: Ranks = ALONE,
 ) -> Homogenised:
     """The result with its declared errors.
 
@@ -48,13 +52,14 @@ def judged(
         layers: About the relative errors that the layers in θ leave in the mean moduli and the
             ratio, shape (4,); the rest is booked to the mesh.
         cache: Folder where tables are kept; None keeps them in the process.
+        ranks: Those that share the making of tables.
     """
     enough = _ACCURACIES[0]  # accuracy that is thought to do
     for accuracy in _ACCURACIES:
         if accuracy > enough and accuracy > _ACCURACIES[-1]:
             continue
         try:
-            exact, left = _reference(radius_map, phases, accuracy, cache)
+            exact, left = _reference(radius_map, phases, accuracy, cache, ranks)
         except RuntimeError:  # no planar mesh, or none fine enough
             mean, nodes = _within_bounds(result.curve, radius_map, phases)
             break
@@ -99,13 +104,18 @@ def moduli_of(curve: StressCurve) -> Array:
 
 
 def _reference(
-    radius_map: RadiusMap, phases: tuple[Phase, Phase], accuracy: float, cache: Path | None
+    radius_map: RadiusMap,
+    phases: tuple[Phase, Phase],
+    accuracy: float,
+    cache: Path | None,
+    ranks: Ranks,
 ) -> tuple[Moduli, Moduli]:
     """Moduli at radii by a table of planar cells, and their declared relative errors."""
     matrix, inclusion = phases
     low, high = (float(r) for r in extreme_radii(radius_map))
     span = TableRange(matrix, inclusion.poisson, (low, high), (inclusion.modulus,) * 2)
-    table, _ = stored_table(span, cache, accuracy=accuracy)
+    make = partial(PlanarSource, ranks=ranks)
+    table, _ = stored_table(span, cache, accuracy=accuracy, make=make, ranks=ranks)
     modulus = np.array([inclusion.modulus])
 
     def exact(radius: Array) -> Array:

@@ -25,32 +25,32 @@ from alphacut.rve.cell import Phase
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import Integers
 from alphacut.rve.mesh.wedge import slab_rule, tabulate, vector_wedge
-from alphacut.stochastic import RadiusMap
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.stochastic import RadiusMap, ThetaLaw
+from alphacut.stochastic.theta.law import Array
 
 # twice as fast as the default -O2, equal to round-off
-JIT = {"cffi_extra_compile_args": ["-O3", "-ffast-math"]}
+JIT = {"cffi_extra_compile_args": ["-O3", "-ffast-math"], "timeout": 120}  # for other processes
 
 
 @dataclass
 class PrismForm:
     """Wedge mesh and stiffness forms of one grid; positions and phases are set anew for every map.
 
+    On several ranks each has a mesh of its own wedges; matrices and vectors add up what they give.
+
     Args:
         grid: Topology.
-        comm: Communicator; layers are dealt out to its ranks.
     """
 
     grid: PrismGrid
-    comm: MPI.Comm
 
     def __post_init__(self) -> None:
-        if self.comm.size > self.grid.layers:
-            raise ValueError(
-                f"{self.comm.size} MPI ranks for {self.grid.layers} layers; every rank needs a"
-                " layer: use fewer ranks or more layers"
-            )
-        self.mesh = self._mesh()
+        self.mesh = dolfinx.mesh.create_mesh(
+            MPI.COMM_SELF,
+            cells=self.grid.cells,
+            x=np.zeros((self.grid.nodes, 3)),
+            e=vector_wedge(3),
+        )
         self.points, self.weights = slab_rule()
         self.shapes = tabulate(self.points)
         started = perf_counter()
@@ -58,36 +58,12 @@ class PrismForm:
         self._compile()
         self.jit_seconds = perf_counter() - started
 
-    def _mesh(self) -> dolfinx.mesh.Mesh:
-        grid, rank, size = self.grid, self.comm.rank, self.comm.size
-        layer = np.repeat(np.arange(grid.layers), len(grid.plane.triangles))
-        owner = (layer * size // grid.layers).astype(np.int32)
-
-        def by_layer(_comm: MPI.Comm, _parts: int, _types: object, _cells: object) -> object:
-            destinations = owner if rank == 0 else owner[:0]
-            ranks = dolfinx.graph.adjacencylist(
-                destinations, np.arange(len(destinations) + 1, dtype=np.int32)
-            )
-            return getattr(ranks, "_cpp_object", ranks)  # newer releases wrap the list
-
-        rough = np.zeros((grid.nodes, 3)) if rank == 0 else np.zeros((0, 3))
-        cells = grid.cells if rank == 0 else grid.cells[:0]
-        return dolfinx.mesh.create_mesh(
-            self.comm,
-            cells=cells,
-            x=rough,
-            e=vector_wedge(3),
-            partitioner=by_layer if size > 1 else None,
-        )
-
     def _compile(self) -> None:
         u, v = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
-        self._law = fem.Constant(self.mesh, 1.0)
         self._load = fem.Constant(self.mesh, np.zeros(3))
         self._stiffness = [fem.Constant(self.mesh, np.zeros(3)) for _ in range(2)]
-        self._share = self._point_function()
-        # f_Θ of eq. 1
-        weight = ufl.exp(-(ufl.SpatialCoordinate(self.mesh)[2] ** 2) / 2) * self._law
+        self._share, self._density = self._point_function(), self._point_function()
+        weight = self._density  # f_Θ of eq. 1
         shares = (1.0, 1.0) if self.grid.conforming else (1 - self._share, self._share)
         measure = self._measure()
         phases = zip(self._stiffness, shares, strict=True)
@@ -108,7 +84,7 @@ class PrismForm:
             return fem.form(form, jit_options=JIT)
 
     def _point_function(self) -> fem.Function:
-        """Function of one value at every quadrature point: 1 in the particle, else 0."""
+        """Function of one value at every quadrature point."""
         element = basix.ufl.quadrature_element("prism", points=self.points, weights=self.weights)
         return fem.Function(fem.functionspace(self.mesh, element))
 
@@ -119,31 +95,45 @@ class PrismForm:
             "quadrature_points": self.points,
             "quadrature_weights": self.weights,
         }
-        inside = np.tile(self.grid.plane.inside, self.grid.layers)[
-            self.mesh.topology.original_cell_index
-        ]
+        inside = self.grid.inside[self.mesh.topology.original_cell_index]
         everywhere = np.ones_like(inside)
         parts = (~inside, inside) if self.grid.conforming else (everywhere, everywhere)
         data = [(k, np.flatnonzero(part).astype(np.int32)) for k, part in enumerate(parts)]
         return ufl.Measure("dx", domain=self.mesh, metadata=rule, subdomain_data=data)
 
     def place(self, radius: RadiusMap) -> Array:
-        """Move the nodes to the cone of `radius`; returns their positions, shape (nodes, 3)."""
+        """Move the nodes to the cone of `radius`; returns their positions, shape (nodes, 3).
+
+        Raises:
+            ValueError: The density of θ is not positive at a quadrature point.
+        """
         positions = self.grid.positions(radius)
         self.mesh.geometry.x[:] = positions[self.mesh.geometry.input_global_indices]
-        self._law.value = 1 / (np.sqrt(2 * np.pi) * radius.distribution.mass)
+        self._weigh(radius.distribution)
         return positions
+
+    def _weigh(self, law: ThetaLaw) -> None:
+        """Set the density of θ at the quadrature points."""
+        levels = self.grid.levels(law)
+        theta = levels[:-1, None] + np.diff(levels)[:, None] * self.points[:, 2]
+        density = law.pdf(theta)
+        if not (density > 0).all():
+            place = theta[~(density > 0)][0]
+            raise ValueError(
+                f"the density of θ is {law.pdf(place):g} at {place:.4g}, and every layer of the"
+                " product space needs probability: shorten the support, or take the series or a"
+                " table"
+            )
+        wedge = self.grid.own.start + self.mesh.topology.original_cell_index
+        self._density.x.array[:] = density[wedge // len(self.grid.plane.triangles)].ravel()
 
     def mark(self, share: Array) -> None:
         """Set the particle's share at the quadrature points, shape (cells, points)."""
         self._share.x.array[:] = share[self.mesh.topology.original_cell_index].ravel()
 
     def node_of_dof(self) -> Integers:
-        """Grid node of every local (owned and ghost) node of the function space."""
-        nodes = np.empty(
-            self.space.dofmap.index_map.size_local + self.space.dofmap.index_map.num_ghosts,
-            np.int64,
-        )
+        """Grid node of every node of the function space."""
+        nodes = np.empty(self.space.dofmap.index_map.size_local, np.int64)
         nodes[self.space.dofmap.list] = self.mesh.geometry.input_global_indices[
             self.mesh.geometry.dofmap
         ]
@@ -160,7 +150,7 @@ class PrismForm:
         petsc.assemble_matrix(matrix, self._forms[phase])
 
     def load(self, phase: int, strain: Array) -> Array:
-        """Nodal forces −⟨Bᵀ E ε̄⟩ of one phase for a unit modulus, shape (local nodes · 2,).
+        """Nodal forces −⟨Bᵀ E ε̄⟩ of one phase for a unit modulus, shape (nodes · 2,).
 
         Args:
             phase: 0 the matrix, 1 the particle.

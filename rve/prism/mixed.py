@@ -12,7 +12,6 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
-from mpi4py import MPI
 
 from alphacut.rve.cell import Phase
 from alphacut.rve.mesh.prism_grid import PrismGrid
@@ -20,9 +19,10 @@ from alphacut.rve.mesh.triangulation import Integers
 from alphacut.rve.mesh.wedge import tabulate
 from alphacut.rve.petsc import PETSc
 from alphacut.rve.prism.mixed_element import MixedElements, mixed_elements, split_bulk
-from alphacut.rve.solver.constraints import LevelNumbering
+from alphacut.rve.solver.constraints import LevelNumbering, Overlap
 from alphacut.rve.solver.theta_preconditioner import LevelPressures
-from alphacut.stochastic.theta.truncated_normal import Array, TruncatedNormal
+from alphacut.stochastic import ThetaLaw
+from alphacut.stochastic.theta.law import Array
 
 _SIX = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0], [0, 0.5], [0.5, 0.5]])
 UNIT_STRAINS = np.eye(3)  # (ε11, ε22, 2 ε12)
@@ -64,13 +64,23 @@ class MixedPhase:
 
     grid: PrismGrid
     positions: Array
-    law: TruncatedNormal
+    law: ThetaLaw
     triangles: Integers
     phase: Phase
 
+    def own(self, layer: int) -> slice:
+        """Which of the triangles the grid has a wedge on in one layer."""
+        part = self.grid.within(layer)[0]
+        return slice(*np.searchsorted(self.triangles, [part.start, part.stop]))
+
+    def wedges(self, layer: int) -> Integers:
+        """Places of those wedges in the grid, shape (m,)."""
+        places = layer * len(self.grid.plane.triangles) - self.grid.own.start + self.triangles
+        return np.asarray(places[self.own(layer)])
+
     def nodes(self, layer: int) -> Integers:
-        """Nodes of the wedges in one layer, shape (m, 15)."""
-        return self.grid.cells[layer * len(self.grid.plane.triangles) + self.triangles]
+        """Nodes of those wedges, shape (m, 15)."""
+        return self.grid.cells[self.wedges(layer)]
 
     def slice(self, layer: int, place: float, weight: float = 0.0) -> MixedSlice:
         """The slice at `place` in [0, 1] of a layer."""
@@ -96,7 +106,7 @@ class MixedSystem:
         phases: By number of the phase, 0 the matrix and 1 the particle.
         affine: Displacements of the nodes under `UNIT_STRAINS`, shape (nodes, 2, 3).
         pattern: Zero matrix of the displacements.
-        comm: Communicator; each rank takes its own layers.
+        overlap: Displacements that each rank owns, and those of its wedges.
     """
 
     def __init__(
@@ -105,35 +115,43 @@ class MixedSystem:
         phases: dict[int, MixedPhase],
         affine: Array,
         pattern: PETSc.Mat,
-        comm: MPI.Comm,
+        overlap: Overlap,
     ) -> None:
-        self.numbering, self.phases, self.affine, self.comm = numbering, phases, affine, comm
+        self.numbering, self.phases, self.affine, self.overlap = numbering, phases, affine, overlap
         first = 0
         self.places: dict[int, slice] = {}
         for k, part in phases.items():
             self.places[k] = slice(first, first + len(part.triangles))
             first += len(part.triangles)
-        self.count, levels = first, numbering.grid.layers + 1
+        self.count, span = first, numbering.grid.span
+        levels = len(span) + 1
         self.triangles = np.concatenate([part.triangles for part in phases.values()])
         self.stiffness = {k: pattern.duplicate(copy=False) for k in phases}
-        self.loads = {k: np.zeros((numbering.size, 3)) for k in phases}
+        self.loads = {k: np.zeros((len(overlap.works), 3)) for k in phases}
         self.pressure_loads = np.zeros((levels, self.count, 3))
-        self._entries: list[tuple[Array, Integers, Integers]] = []
+        none = np.zeros(0, np.int64)
+        self._entries: list[tuple[Array, Integers, Integers]] = [(np.zeros(0), none, none)]
         self._compliance = {
             k: np.zeros((levels, levels, len(p.triangles))) for k, p in phases.items()
         }
-        for layer in numbering.local_layers(comm):
-            for k in phases:
+        for layer in span:
+            for k in self._present(layer):
                 self._add(layer, k)
         for one in self.stiffness.values():
             one.assemble()
-        self._join()
+        values, rows, columns = (np.concatenate(part) for part in zip(*self._entries, strict=True))
+        shape = levels * self.count, len(overlap.works)
+        self.flux = sp.csr_matrix((values, (rows, columns)), shape=shape)
+        spans = [numbering.span_of(rows) for rows in overlap.wanted]
+        works = [range(one.start, one.stop + 1) for one in spans]
+        self.pressures = numbering.on_levels(self.count, overlap.ranks, works)
 
     def _add(self, layer: int, k: int) -> None:
-        part, place = self.phases[k], self.places[k]
+        part, own, level = self.phases[k], self.phases[k].own(layer), self._level(layer)
+        place = slice(self.places[k].start + own.start, self.places[k].start + own.stop)
         nodes = part.nodes(layer)
         first = self.numbering.unknown_of_node[nodes]
-        unknown = np.where(first[:, :, None] >= 0, first[:, :, None] + np.arange(2), -1)
+        unknown = first[:, :, None] + np.arange(2) - self.overlap.start
         unknown, kept = unknown.reshape(len(nodes), 30), np.repeat(first >= 0, 2, axis=1)
         total, fluxes = np.zeros((len(nodes), 30, 30)), np.zeros((2, len(nodes), 30))
         for one in part.slices(layer):
@@ -143,7 +161,7 @@ class MixedSystem:
                 fluxes[i] += one.weight * hat * (one.elements.flux @ spread)
                 for j, other in enumerate(one.hats):
                     rest = split_bulk(part.phase)[2]
-                    self._compliance[k][layer + i, layer + j] += (
+                    self._compliance[k][level + i, level + j, own] += (
                         one.weight * hat * other / rest * one.elements.area
                     )
         pairs = (first // 2).astype(PETSc.IntType)
@@ -152,24 +170,14 @@ class MixedSystem:
         affine = self.affine[nodes].reshape(len(nodes), 30, 3)
         np.add.at(self.loads[k], unknown[kept], -(total @ affine)[kept])
         for i in (0, 1):
-            rows = (layer + i) * self.count + np.arange(place.start, place.stop)
+            rows = (level + i) * self.count + np.arange(place.start, place.stop)
             row = np.broadcast_to(rows[:, None], unknown.shape)
             self._entries.append((fluxes[i][kept], row[kept], unknown[kept]))
-            self.pressure_loads[layer + i, place] -= np.einsum("mi,mil->ml", fluxes[i], affine)
-
-    def _join(self) -> None:
-        """Bring together what the ranks added."""
-        if self.comm.size > 1:
-            for array in (*self.loads.values(), self.pressure_loads, *self._compliance.values()):
-                self.comm.Allreduce(MPI.IN_PLACE, array)
-            self._entries = [entry for part in self.comm.allgather(self._entries) for entry in part]
-        values, rows, columns = (np.concatenate(part) for part in zip(*self._entries, strict=True))
-        shape = (self.pressure_loads[..., 0].size, self.numbering.size)
-        self.flux = sp.csr_matrix((values, (rows, columns)), shape=shape)
+            self.pressure_loads[level + i, place] -= np.einsum("mi,mil->ml", fluxes[i], affine)
 
     def compliance(self, phases: tuple[Phase, Phase]) -> sp.csr_matrix:
-        """Matrix of the mean pressures' compliance in 1/Pa, square in levels · triangles."""
-        levels = self.numbering.grid.layers + 1
+        """This rank's share of the mean pressures' compliance in 1/Pa, (levels · triangles)²."""
+        levels = len(self.pressure_loads)
         found = np.zeros((levels, levels, self.count))
         for k, place in self.places.items():
             found[:, :, place] = self._compliance[k] / phases[k].modulus
@@ -189,16 +197,21 @@ class MixedSystem:
         if count < len(self.numbering.grid.plane.triangles):
             return np.zeros((levels, count, strains))
         sums = sp.kron(sp.identity(levels), np.ones((1, count)), format="csr")
-        mean = (sums @ self.compliance(phases) @ sums.T).toarray()
-        found = np.linalg.solve(mean, -self.pressure_loads.sum(axis=1))
+        span, every = self.numbering.grid.span, self.numbering.grid.layers + 1
+        own = slice(span.start, span.stop + 1)
+        mean, loads = np.zeros((every, every)), np.zeros((every, strains))
+        mean[own, own] = (sums @ self.compliance(phases) @ sums.T).toarray()
+        loads[own] = self.pressure_loads.sum(axis=1)
+        parts = zip(*self.overlap.ranks.all((mean, loads)), strict=True)
+        mean, loads = (sum(part[1:], part[0]) for part in parts)
+        found = np.linalg.solve(mean, -loads)[own]
         return np.repeat(found[:, None], count, axis=1)
 
     @cached_property
     def wedges(self) -> Integers:
-        """Numbers of all wedges of these phases."""
-        grid = self.numbering.grid
-        layer = np.arange(grid.layers)[:, None] * len(grid.plane.triangles)
-        return np.asarray((layer + self.triangles).ravel())
+        """Places of all wedges of these phases in the grid."""
+        span = self.numbering.grid.span
+        return np.concatenate([p.wedges(layer) for layer in span for p in self.phases.values()])
 
     def at_levels(
         self, elements: Sequence[Array], corners: Sequence[Array], phases: tuple[Phase, Phase]
@@ -236,8 +249,8 @@ class MixedSystem:
         """
         loads = displacement.shape[2]
         stress, energy = np.zeros((3, 3, loads)), np.zeros((3, loads, loads))
-        for k, part in self.phases.items():
-            shear, own, _ = split_bulk(phases[k])
+        for k in self._present(layer):
+            part, (shear, own, _) = self.phases[k], split_bulk(phases[k])
             for s, one in enumerate(part.slices(layer)):
                 u = one.at_nodes(displacement[part.nodes(layer)])
                 mean = self._mean_pressure(k, layer, one, pressure)
@@ -251,9 +264,18 @@ class MixedSystem:
                 energy[s] += np.einsum("mia,mib->ab", forces, u)
         return stress, energy
 
+    def _present(self, layer: int) -> list[int]:
+        """The phases of this rank's wedges in a layer."""
+        return [k for k, part in self.phases.items() if len(part.wedges(layer))]
+
+    def _level(self, layer: int) -> int:
+        """Place of the level below a layer among those of the grid's span."""
+        return layer - self.numbering.grid.span.start
+
     def _mean_pressure(self, k: int, layer: int, one: MixedSlice, pressure: Array) -> Array:
         """In a slice, shape (m, loads), from pressures on the levels."""
-        below, above = (pressure[layer + i, self.places[k]] for i in (0, 1))
+        own, level = self.phases[k].own(layer), self._level(layer)
+        below, above = (pressure[level + i, self.places[k]][own] for i in (0, 1))
         return np.asarray(one.hats[0] * below + one.hats[1] * above)
 
     def pressure_at(

@@ -28,12 +28,15 @@ from alphacut.rve.certificate import (
 )
 from alphacut.rve.mesh.periodicity import mismatch
 from alphacut.rve.mesh.prism_grid import PrismGrid
-from alphacut.rve.mesh.triangulation import triangulate
+from alphacut.rve.mesh.triangulation import Triangulation, reference_radius, triangulate
+from alphacut.rve.petsc import clean
 from alphacut.rve.prism.error_estimate import judged, moduli_of
+from alphacut.rve.prism.head_start import HeadStart
 from alphacut.rve.prism.mixed_element import NEARLY_INCOMPRESSIBLE
 from alphacut.rve.prism.modulus_basis import BasisError, ModulusBasis
 from alphacut.rve.prism.system import PrismSystem, SliceMeans
 from alphacut.rve.prism.task import Displacements, PrismTask
+from alphacut.rve.ranks import ALONE, Ranks
 from alphacut.rve.result import Homogenised, StressCurve
 from alphacut.rve.settings import require_mesh_size
 from alphacut.rve.solver.krylov import ConvergenceError
@@ -66,6 +69,7 @@ class PrismModel:
             map is projected on a few solutions; None: each is solved.
         cache: Folder where the tables that errors are measured against are kept; None keeps them
             in the process.
+        ahead: Second process that has begun this one cell; None for all work in this one.
 
     Raises:
         ValueError: An option out of range or unknown.
@@ -81,6 +85,7 @@ class PrismModel:
     estimate: bool = False
     moduli: tuple[float, float] | None = None
     cache: Path | None = None
+    ahead: HeadStart | None = field(default=None, compare=False, repr=False)
     name: ClassVar[str] = "prism"
 
     def __post_init__(self) -> None:
@@ -104,6 +109,14 @@ class PrismModel:
             CertificateError: A property that every right result has is violated.
             FoldedMeshError: The map bends more than the layers can follow.
         """
+        results = self._results(radius_map, matrix, inclusions)
+        clean(self._ranks.comm)
+        return self._judged(radius_map, matrix, inclusions, results) if self.estimate else results
+
+    def _results(
+        self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
+    ) -> list[Homogenised]:
+        """The results without declared errors; matrices and factors do not outlive them."""
         watch = Stopwatch()
         system = self._moved(radius_map, watch)
         task = PrismTask(system, self.options, self._loads, watch)
@@ -119,7 +132,7 @@ class PrismModel:
                 else self._projected(basis, (matrix, inclusion))
             )
             results.append(replace(result, seconds=watch.report()))
-        return self._judged(radius_map, matrix, inclusions, results) if self.estimate else results
+        return results
 
     def _judged(
         self,
@@ -131,9 +144,18 @@ class PrismModel:
         """The results with their declared errors, whose cost is booked as `estimate`."""
         watch = Stopwatch()
         with watch("estimate"):
-            layers = self._errors_of_layers(radius_map, matrix, inclusions)
+            layers = self.ahead.errors() if self.ahead else None
+            if layers is None:
+                layers = self.errors_of_layers(radius_map, matrix, inclusions)
             found = [
-                judged(result, radius_map, (matrix, phase), layers=left, cache=self.cache)
+                judged(
+                    result,
+                    radius_map,
+                    (matrix, phase),
+                    layers=left,
+                    cache=self.cache,
+                    ranks=self._ranks,
+                )
                 for result, phase, left in zip(results, inclusions, layers, strict=True)
             ]
         seconds = watch.seconds["estimate"] / len(results)
@@ -143,16 +165,14 @@ class PrismModel:
             require(result.checks, Limits(discretisation=allowed))
         return [replace(r, seconds={**r.seconds, "estimate": seconds}) for r in found]
 
-    def _errors_of_layers(
+    def errors_of_layers(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
     ) -> list[Array]:
         """About the relative errors that layers leave in the mean moduli and the ratio, shape (4,).
 
         Half as many layers, on a mesh twice as coarse, show them.
         """
-        coarse = replace(
-            self, estimate=False, parallel=False, mesh_size=min(1.0, 2 * self.mesh_size)
-        )
+        coarse = replace(self, estimate=False, mesh_size=min(1.0, 2 * self.mesh_size), ahead=None)
         thick = replace(coarse, layers=max(1, self.layers // 2))
         try:
             pairs = [one.solve(radius_map, matrix, inclusions) for one in (coarse, thick)]
@@ -167,7 +187,8 @@ class PrismModel:
     def _moved(self, radius_map: RadiusMap, watch: Stopwatch) -> PrismSystem:
         with watch("mesh"):
             radius = reference_radius(radius_map) if self.interface == "conforming" else 0.0
-            system = _system(self.mesh_size, self.layers, radius, self.parallel)
+            plane = self.ahead.mesh() if self.ahead else None
+            system = _system(self.mesh_size, self.layers, radius, self.parallel, plane)
             system.move(radius_map)
         watch.shift("mesh", "jit", system.take_jit_seconds())
         return system
@@ -175,6 +196,10 @@ class PrismModel:
     @property
     def _loads(self) -> Array:
         return THREE_LOADS if self.stiffness else LOADS
+
+    @property
+    def _ranks(self) -> Ranks:
+        return Ranks(MPI.COMM_WORLD) if self.parallel else ALONE
 
     @property
     def options(self) -> SolverOptions:
@@ -233,9 +258,10 @@ class PrismModel:
         solved, system = task.solve(phases), task.system
         with task.watch("solve"):
             means = system.means(solved.total, phases, solved.pressure)
+            apart = mismatch(system.positions, solved.total - solved.affine)
             certificate = {
                 "residual": solved.residual,
-                "periodicity": mismatch(system.positions, solved.total - solved.affine),
+                "periodicity": max(system.ranks.all(apart)),
             }
             result = self._result(task, means, phases, certificate)
             return replace(result, iterations=solved.iterations), solved
@@ -295,17 +321,15 @@ def certify(means: SliceMeans, phases: tuple[Phase, Phase], loads: Array) -> dic
     return {"hill_mandel": gap, **bounds}
 
 
-def reference_radius(radius_map: RadiusMap) -> float:
-    """Radius of the planar mesh: the middle of the map's range, rounded, in [0.1, 0.9]."""
-    law = radius_map.distribution
-    radii = radius_map(np.linspace(law.lower, law.upper, 65))
-    return float(np.clip(np.round((radii.min() + radii.max()) * 10) / 20, 0.1, 0.9))
-
-
 @lru_cache(maxsize=4)
-def _system(mesh_size: float, layers: int, radius: float, parallel: bool) -> PrismSystem:
+def _system(
+    mesh_size: float,
+    layers: int,
+    radius: float,
+    parallel: bool,
+    plane: Triangulation | None = None,
+) -> PrismSystem:
     """Topology, forms and numbering: they do not depend on the map, only on these numbers."""
-    return PrismSystem(
-        PrismGrid(triangulate(size=mesh_size, radius=radius), layers, radius > 0),
-        MPI.COMM_WORLD if parallel else MPI.COMM_SELF,
-    )
+    plane = plane or triangulate(size=mesh_size, radius=radius)
+    communicator = MPI.COMM_WORLD if parallel else MPI.COMM_SELF
+    return PrismSystem(PrismGrid(plane, layers, radius > 0), communicator)

@@ -133,8 +133,7 @@ class ModulusBasis:
     def _measure(self) -> None:
         """Means of the slices for the affine fields and every solution."""
         task = self.task
-        nodes = [task.system.numbering.to_nodes(column) for column in self._solutions.T]
-        fluctuations = np.stack(nodes, axis=-1)
+        fluctuations = task.system.at_nodes(self._solutions)
         self.mismatch = mismatch(task.system.positions, fluctuations)
         fields = np.concatenate([task.affine, fluctuations], axis=-1)
         self._means: PhaseMeans = task.system.means_by_phase(fields, self._phases(1.0))

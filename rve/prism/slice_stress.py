@@ -74,15 +74,14 @@ class SliceStress:
     slices: int = 3
 
     def layers(self, displacement: Array, stiffness: Array) -> Iterator[LayerStress]:
-        """Layer by layer.
+        """Layer by layer of the grid's span, what it has of them.
 
         Args:
             displacement: Total displacement of the nodes for each load, shape (nodes, 2, loads).
             stiffness: Voigt stiffness at the quadrature points, shape (cells, q or 1, 3, 3).
         """
-        triangles = len(self.grid.plane.triangles)
-        for first in range(0, len(self.grid.cells), triangles):
-            part = slice(first, first + triangles)
+        for layer in self.grid.span:
+            part = self.grid.within(layer)[1]
             yield self._layer(self.grid.cells[part], displacement, stiffness[part])
 
     def _layer(self, cells: Integers, displacement: Array, stiffness: Array) -> LayerStress:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from mpi4py import MPI
@@ -15,7 +16,8 @@ from alphacut.rve.prism.form import PrismForm
 from alphacut.rve.prism.mixed import UNIT_STRAINS, MixedPhase, MixedSystem
 from alphacut.rve.prism.mixed_element import NEARLY_INCOMPRESSIBLE
 from alphacut.rve.prism.slice_stress import CELL_AREA, SliceStress
-from alphacut.rve.solver.constraints import LevelNumbering
+from alphacut.rve.ranks import Ranks
+from alphacut.rve.solver.constraints import LevelNumbering, Overlap
 from alphacut.rve.solver.level_stiffness import element_stiffness
 from alphacut.rve.solver.theta_preconditioner import LevelPressures, ThetaPreconditioner
 from alphacut.stochastic import RadiusMap, ThetaRule, layered_rule
@@ -74,18 +76,32 @@ class PhaseMeans:
 class PrismSystem:
     """The product-space system of one grid; positions and materials are set anew for each map.
 
+    Each rank has the wedges of its own grid, their nodes, and the unknowns of its levels.
+
     Args:
-        grid: Topology.
+        grid: Topology, whole.
         comm: Communicator.
+
+    Raises:
+        ValueError: There are more ranks than wedges.
     """
 
     def __init__(self, grid: PrismGrid, comm: MPI.Comm) -> None:
-        self.grid, self.comm = grid, comm
-        self.form = PrismForm(grid, comm)
-        self.numbering = LevelNumbering(grid, identify(grid.plane))
-        self.nodes = self.form.node_of_dof()
-        self.local_map = self.numbering.local_map(self.nodes, comm)
-        self.pattern = self.numbering.matrix(self.local_map, comm)
+        self.ranks, wedges = Ranks(comm), len(grid.own)
+        if comm.size > wedges:
+            raise ValueError(
+                f"{comm.size} MPI ranks for {wedges} wedges; every rank needs a wedge: use fewer"
+                " ranks or a finer mesh"
+            )
+        first = [wedges * rank // comm.size for rank in range(comm.size + 1)]
+        dealt = [range(*pair) for pair in pairwise(first)]
+        self.grid = replace(grid, wedges=dealt[comm.rank])
+        self.form = PrismForm(self.grid)
+        self.numbering = LevelNumbering(self.grid, identify(grid.plane))
+        around = [self.numbering.around(part) for part in dealt]
+        self.overlap = Overlap(self.ranks, self.numbering.owned(comm.size), around)
+        self.local_map = self.numbering.local_map(self.form.node_of_dof(), self.ranks)
+        self.pattern = self.numbering.matrix(self.local_map, self.ranks)
         self.mixed: MixedSystem | None = None
         self._jit = self.form.jit_seconds
 
@@ -102,20 +118,21 @@ class PrismSystem:
         """
         self.map = radius_map
         self.positions = self.form.place(radius_map)
-        self.share = self._share()
+        self.share = self._share(self.grid, self.positions)
         if not self.grid.conforming:
             self.form.mark(self.share)
-        elif not (self.slice_stress.determinants() > 0).all():
+        elif not all(self.ranks.all(bool((self.slice_stress.determinants() > 0).all()))):
             raise FoldedMeshError(
                 f"the mesh folds over where it follows the radius through {self.grid.layers} layers"
                 " in θ: take more layers or a smaller mesh size"
             )
 
-    def _share(self) -> Array:
+    def _share(self, grid: PrismGrid, positions: Array | None = None) -> Array:
         """Particle's share, shape (cells, 1), or (cells, points) from the sign of z (eq. 13)."""
-        if self.grid.conforming:
-            return np.tile(self.grid.plane.inside, self.grid.layers)[:, None].astype(float)
-        x = np.einsum("qn,cnd->cqd", self.form.shapes, self.positions[self.grid.cells])
+        if grid.conforming:
+            return grid.inside[:, None].astype(float)
+        nodes = (grid.positions(self.map) if positions is None else positions)[grid.cells]
+        x = np.einsum("qn,cnd->cqd", self.form.shapes, nodes)
         # z < 0 in eq. 14
         return np.asarray(np.hypot(x[..., 0], x[..., 1]) < self.map(x[..., 2]), float)
 
@@ -126,7 +143,7 @@ class PrismSystem:
         self.mixed = None
         if near:
             affine = self.affine(UNIT_STRAINS)
-            self.mixed = MixedSystem(self.numbering, near, affine, self.pattern, self.comm)
+            self.mixed = MixedSystem(self.numbering, near, affine, self.pattern, self.overlap)
 
     def _nearly_incompressible(self, phases: tuple[Phase, Phase]) -> dict[int, MixedPhase]:
         inside = self.grid.plane.inside
@@ -156,9 +173,14 @@ class PrismSystem:
         """Reduced load of one phase for a unit modulus under a strain (ε11, ε22, 2 ε12)."""
         if self.mixed is not None and phase in self.mixed.phases:
             vector = self.pattern.createVecLeft()
-            vector.array[:] = (self.mixed.loads[phase] @ strain)[slice(*vector.owner_range)]
+            load = self.mixed.loads[phase] @ strain
+            vector.array[:] = self.overlap.give(load[:, None], 1)[:, 0]
             return vector
-        return self.numbering.vector(self.local_map, self.form.load(phase, strain), self.comm)
+        return self.numbering.vector(self.local_map, self.form.load(phase, strain), self.ranks)
+
+    def at_nodes(self, values: Array) -> Array:
+        """Displacements of this rank's nodes, shape (nodes, 2, k), from its unknowns (size, k)."""
+        return self.numbering.to_nodes(self.overlap.fetch(values), self.overlap.start)
 
     @property
     def slice_stress(self) -> SliceStress:
@@ -184,25 +206,26 @@ class PrismSystem:
             stiffness[self.mixed.wedges] = 0.0
         rule = layered_rule(self.map.distribution, layers=self.grid.layers, points=slices.slices)
         weights = rule.weights / rule.weights.sum()
-        shares = np.broadcast_to(self.share, (len(self.share), len(self.form.points))).reshape(
-            self.grid.layers, -1, slices.slices, 6
-        )
-        stress, fraction = [], []
-        energy = np.zeros((displacement.shape[2],) * 2)
-        for k, layer in enumerate(slices.layers(displacement, stiffness)):
-            fraction.append(np.einsum("msp,msp->s", layer.area, shares[k]) / CELL_AREA)
+        shares = np.broadcast_to(self.share, (len(self.share), len(self.form.points)))
+        loads, count = displacement.shape[2], self.grid.layers * slices.slices
+        stress, fraction = np.zeros((count, 3, loads)), np.zeros(count)
+        energy = np.zeros((loads, loads))
+        layers = zip(self.grid.span, slices.layers(displacement, stiffness), strict=True)
+        for k, layer in layers:
+            own = slice(k * slices.slices, (k + 1) * slices.slices)
+            share = shares[self.grid.within(k)[1]].reshape(layer.area.shape)
+            fraction[own] = np.einsum("msp,msp->s", layer.area, share) / CELL_AREA
             mean, work = layer.mean, layer.energy
             if self.mixed is not None and pressure is not None:
                 more = self.mixed.means(k, displacement, pressure, phases)
                 mean, work = (
                     own + part / CELL_AREA for own, part in zip((mean, work), more, strict=True)
                 )
-            stress.append(mean)
-            energy += np.tensordot(
-                weights[k * slices.slices : (k + 1) * slices.slices], work, axes=1
-            )
+            stress[own] = mean
+            energy += np.tensordot(weights[own], work, axes=1)
+        parts = zip(*self.ranks.all((stress, fraction, energy)), strict=True)
         return SliceMeans(
-            ThetaRule(rule.nodes, weights), np.concatenate(stress), np.concatenate(fraction), energy
+            ThetaRule(rule.nodes, weights), *(sum(part[1:], part[0]) for part in parts)
         )
 
     def means_by_phase(self, displacement: Array, phases: tuple[Phase, Phase]) -> PhaseMeans:
@@ -267,27 +290,25 @@ class PrismSystem:
 
         Pressures count in units of the matrix's modulus.
         """
-        between = self.share.reshape(self.grid.layers, len(self.grid.plane.triangles), -1).mean(
-            axis=2
-        )
+        levels = self.numbering.shares(self.ranks.size)[self.ranks.rank].levels
+        grid = self.numbering.near(levels)
+        share = self.share if grid is self.grid else self._share(grid)
+        between = share.reshape(len(grid.span), len(grid.plane.triangles), -1).mean(axis=2)
         on = (np.concatenate([between[:1], between]) + np.concatenate([between, between[-1:]])) / 2
-        own = self.numbering.local_levels(self.comm), self.numbering.local_layers(self.comm)
+        own = levels, range(levels.start, min(levels.stop, grid.layers))
         elements: list[list[Array]] = []
         pressures: LevelPressures | None = None
-        for planes, share, places in zip(
-            self.grid.planes(self.map), (on, between), own, strict=True
-        ):
-            corners = [planes[k][self.grid.plane.triangles] for k in places]
+        for planes, share, places in zip(grid.planes(self.map), (on, between), own, strict=True):
+            at = [k - grid.span.start for k in places]
+            corners = [planes[k][grid.plane.triangles] for k in at]
             stiffness = _mixed(share, phases)
-            found = [
-                element_stiffness(x, stiffness[k]) for k, x in zip(places, corners, strict=True)
-            ]
+            found = [element_stiffness(x, stiffness[k]) for k, x in zip(at, corners, strict=True)]
             if self.mixed is not None:
-                levels = self.mixed.at_levels(found, corners, phases)
-                pressures = pressures or levels
+                mixed = self.mixed.at_levels(found, corners, phases)
+                pressures = pressures or mixed
             elements.append(found)
         return ThetaPreconditioner(
-            self.numbering, elements[0], elements[1], self.map.distribution, self.comm, pressures
+            self.numbering, elements[0], elements[1], self.map.distribution, self.ranks, pressures
         )
 
 

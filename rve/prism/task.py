@@ -26,7 +26,8 @@ class Displacements:
     """Solution of the cell for all loads.
 
     Args:
-        total: Displacements of the nodes, ε̄x and fluctuation, shape (nodes, 2, loads).
+        total: Displacements of the nodes, ε̄x and fluctuation, shape (nodes, 2, loads); those
+            of this rank.
         affine: ε̄x alone, same shape.
         iterations: Of the linear solver, for each load.
         residual: Largest relative residual.
@@ -141,9 +142,8 @@ class PrismTask:
         """Stiffness and mean pressures, these in units of the matrix's modulus."""
         mixed, unit = self.system.mixed, phases[0].modulus
         assert mixed is not None
-        levels = self.system.numbering.local_levels(self.system.comm)
-        compliance = unit**2 * mixed.compliance(phases)
-        return Saddle(operator, unit * mixed.flux, compliance, levels, mixed.count)
+        compliance, overlap = unit**2 * mixed.compliance(phases), self.system.overlap
+        return Saddle(operator, unit * mixed.flux, compliance, overlap, mixed.pressures)
 
     def _solve_loads(self, solver: LinearSolver, phases: tuple[Phase, Phase]) -> Displacements:
         size = max(phases[k].modulus * load.norm() for k in range(2) for load in self.loads[k])
@@ -153,18 +153,17 @@ class PrismTask:
             uniform = mixed.uniform_pressure(phases).reshape(-1, 3) @ self.strains.T
             forces = mixed.pressure_loads.reshape(-1, 3) @ self.strains.T
             forces = unit * (forces + mixed.compliance(phases) @ uniform)
-            pairs = zip(loads, np.asarray(forces).T, strict=True)
-            loads = [solver.saddle.vector(load, np.asarray(force)) for load, force in pairs]
+            given = mixed.pressures.give(np.asarray(forces), len(loads))
+            pairs = zip(loads, given.T, strict=True)
+            loads = [solver.saddle.vector(load, force) for load, force in pairs]
         # equal phases: the affine field is the solution
         elif all(load.norm() <= NO_LOAD * size for load in loads):
             return Displacements(self.affine, self.affine, (0,) * len(loads), 0.0)
         solutions = solver.solve(loads)
-        fluctuation = np.stack(
-            [self.system.numbering.to_nodes(column) for column in solutions.values.T], axis=-1
-        )
+        fluctuation = self.system.at_nodes(solutions.values)
         pressure = None
         if mixed is not None and solutions.pressures is not None:
-            pressure = unit * solutions.pressures + uniform
+            pressure = unit * mixed.pressures.fetch(solutions.pressures) + uniform
             pressure = pressure.reshape(-1, mixed.count, len(loads))
         return Displacements(
             self.affine + fluctuation,
@@ -175,9 +174,15 @@ class PrismTask:
         )
 
     def _theta(self, phases: tuple[Phase, Phase]) -> ThetaPreconditioner:
-        """Preconditioner of a contrast on a grid, independent of the other samples."""
+        """Preconditioner of a contrast on a grid, independent of the other samples.
+
+        Raises:
+            RuntimeError: A level of some rank has no factors.
+        """
         step = round(np.log(phases[1].modulus / phases[0].modulus) / np.log(CONTRAST_GRID))
         if self.theta is None or self.theta[0] != step:
             near = replace(phases[1], modulus=phases[0].modulus * CONTRAST_GRID**step)
-            self.theta = step, self.system.preconditioner((phases[0], near))
+            with self.system.ranks.together():
+                self.theta = step, self.system.preconditioner((phases[0], near))
+        assert self.theta is not None
         return self.theta[1]

@@ -19,6 +19,7 @@ from alphacut.stochastic.theta.truncated_normal import Array
 AREA = 4.0
 # ζ(z + P) − ζ(z) = π conj(P) / area: Legendre's relation on the square lattice
 ZETA_PERIOD = np.pi / AREA
+_UNIT_POINTS = 208  # exponent from which |p| ≥ √2 leaves less than 1e-30
 
 
 @dataclass(frozen=True)
@@ -82,8 +83,14 @@ def _conjugate_eisenstein(n: int) -> float:
 
 
 def _near_points(n: int, *, conjugate: bool) -> float:
-    """Direct sum over |m|, |j| ≤ 8; for n ≥ 40 the rest is below round-off."""
+    """Direct sum over |m|, |j| ≤ 8; for n ≥ 40 the rest is below round-off, later all but |p| = 1.
+
+    Its places keep zeros, so that the order of summation, and the last bit with it, stays.
+    """
     m = np.arange(-8.0, 9.0)
     p = (m[:, None] + 1j * m).ravel()
     p = p[p != 0]
-    return float(np.sum((p.conj() if conjugate else 1) * p ** -float(n)).real)
+    near = abs(p) < (12.0 if n < _UNIT_POINTS else 1.2)
+    terms = np.zeros_like(p)
+    terms[near] = (p[near].conj() if conjugate else 1) * p[near] ** -float(n)
+    return float(np.sum(terms).real)

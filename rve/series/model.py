@@ -14,7 +14,7 @@ import numpy as np
 from alphacut.rve.cell import Phase
 from alphacut.rve.result import Homogenised
 from alphacut.rve.series.stiffness import square_stiffness
-from alphacut.rve.settings import require_accuracy, require_points
+from alphacut.rve.settings import require_accuracy, require_parts, require_points
 from alphacut.rve.slices.curve import certified, mean_errors, with_errors
 from alphacut.rve.slices.theta_rule import settle_rule
 from alphacut.stochastic import RadiusMap
@@ -52,6 +52,7 @@ class SeriesModel:
             SeriesError: Particles nearly touch.
             RuleError: No rule in θ settles (a map that is not smooth).
         """
+        require_parts(radius_map, matrix, inclusions)
         start = perf_counter()
         used: dict[float, tuple[Array, Array]] = {}
 

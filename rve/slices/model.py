@@ -14,7 +14,7 @@ import numpy as np
 
 from alphacut.rve.cell import Phase, square_moduli, with_ratio
 from alphacut.rve.result import Homogenised
-from alphacut.rve.settings import require_mesh_size, require_points
+from alphacut.rve.settings import require_mesh_size, require_parts, require_points
 from alphacut.rve.slices.curve import certified, curve_of, mean_errors, with_errors
 from alphacut.rve.slices.theta_rule import DIGITS, extreme_radii, theta_error, theta_rule
 from alphacut.stochastic import RadiusMap
@@ -70,6 +70,7 @@ class SlicesModel:
         Raises:
             PlanarError: A linear system was not solved.
         """
+        require_parts(radius_map, matrix, inclusions)
         start = perf_counter()
         rule = theta_rule(radius_map, points=self.points)
         at_nodes = np.round(radius_map(rule.nodes), DIGITS)

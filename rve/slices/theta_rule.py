@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Hashable
 from functools import lru_cache
+from typing import TypeGuard
 
 import numpy as np
 
@@ -11,8 +13,8 @@ from alphacut.rve.bounds import mori_tanaka
 from alphacut.rve.cell import Phase, square_moduli, with_ratio
 from alphacut.rve.result import StressCurve
 from alphacut.rve.slices.curve import curve_of
-from alphacut.stochastic import HermiteMap, RadiusMap, ThetaRule, gauss_rule
-from alphacut.stochastic.theta.truncated_normal import Array, TruncatedNormal
+from alphacut.stochastic import RadiusMap, ThetaLaw, ThetaRule, gauss_rule, require_map
+from alphacut.stochastic.theta.law import Array
 
 _SAMPLES = 2049
 _LEAST_JUMP, _LEAST_BEND = 1e-3, 1e-8  # in radii, over one or two steps of the sampling
@@ -23,9 +25,22 @@ _NOISE = 1e-13  # of a declared error: what rounding leaves
 DIGITS = 12  # radii equal to so many decimals are one slice
 
 
+def _gauss_rule(law: ThetaLaw, points: int) -> ThetaRule:
+    return _kept_rule(law, points) if can_hash(law) else gauss_rule(law, points=points)
+
+
 @lru_cache(maxsize=256)
-def _gauss_rule(law: TruncatedNormal, points: int) -> ThetaRule:
+def _kept_rule(law: ThetaLaw, points: int) -> ThetaRule:
     return gauss_rule(law, points=points)
+
+
+def can_hash(of: object) -> TypeGuard[Hashable]:
+    """True if what is known of an object can be kept under it."""
+    try:
+        hash(of)
+    except TypeError:
+        return False
+    return True
 
 
 class RuleError(RuntimeError):
@@ -55,7 +70,7 @@ def breaks(radius_map: RadiusMap) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _kept_breaks(radius_map: HermiteMap) -> Array:
+def _kept_breaks(radius_map: RadiusMap) -> Array:
     return breaks(radius_map)
 
 
@@ -85,14 +100,18 @@ def _bisect_bend(radius_map: RadiusMap, low: float, high: float) -> float:
 def theta_rule(radius_map: RadiusMap, *, points: int) -> ThetaRule:
     """Gauss rule of f_Θ with `points` nodes in each smooth piece of the map."""
     law = radius_map.distribution
-    cuts = _kept_breaks(radius_map) if isinstance(radius_map, HermiteMap) else breaks(radius_map)
+    cuts = _kept_breaks(radius_map) if can_hash(radius_map) else breaks(radius_map)
     if cuts.size == 0:
         return _gauss_rule(law, points)
-    x, w = np.polynomial.legendre.leggauss(points)
-    edges = np.concatenate([[law.lower], cuts, [law.upper]])
-    half = np.diff(edges)[:, None] / 2
-    nodes = (edges[:-1, None] + half * (1 + x)).ravel()
-    weights = (half * w).ravel() * law.pdf(nodes)
+    edges = [law.lower, *(float(cut) for cut in cuts), law.upper]
+    shares = np.diff(law.cdf(edges))
+    pieces = [
+        (share, gauss_rule(law, points=points, between=ends))
+        for share, ends in zip(shares, itertools.pairwise(edges), strict=True)
+        if share > 0
+    ]
+    nodes = np.concatenate([rule.nodes for _, rule in pieces])
+    weights = np.concatenate([share * rule.weights for share, rule in pieces])
     return ThetaRule(nodes, weights / weights.sum())
 
 
@@ -125,7 +144,9 @@ def settle_rule(
 
     Raises:
         RuleError: No rule in reach settles.
+        ValueError: The map gives radii outside (0, 1), or its law of θ is none.
     """
+    require_map(radius_map)
     count = points or max(6, int(np.ceil(1 - 0.75 * np.log10(accuracy))))
     known: dict[int, list[StressCurve]] = {}
     settled: dict[int, tuple[StressCurve, Array]] = {}
@@ -183,7 +204,12 @@ def _gap(value: Array, finer: Array, finest: Array) -> Array:
 
 
 def extreme_radii(radius_map: RadiusMap) -> Array:
-    """Bounds of the radius on the support, shape (2,)."""
+    """Bounds of the radius on the support, shape (2,).
+
+    Raises:
+        ValueError: The map gives radii outside (0, 1), or its law of θ is none.
+    """
+    require_map(radius_map)
     law = radius_map.distribution
     radii = radius_map(np.linspace(law.lower, law.upper, _SAMPLES))
     ends = np.sort(radii[[0, -1]])

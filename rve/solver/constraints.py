@@ -5,23 +5,113 @@ PETSc's local-to-global map carries it and element matrices are added where they
 
 Unknowns are numbered level by level: all planar unknowns of level 0, the vertex unknowns half-way
 to level 1, those of level 1, and so on; two displacement components each. On several ranks each
-owns whole levels.
+owns whole levels; where there are more ranks than levels, several own parts of one.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
-from mpi4py import MPI
 
 from alphacut.rve.mesh.periodicity import Periodicity
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import Integers
 from alphacut.rve.petsc import PETSc
+from alphacut.rve.ranks import Ranks
 from alphacut.stochastic.theta.truncated_normal import Array
+
+
+@dataclass(frozen=True)
+class LevelShare:
+    """The levels of one rank, and its part of them.
+
+    Args:
+        levels: With a level goes what lies between it and the next.
+        part: Number of this rank among those of the same levels.
+        parts: Number of those.
+    """
+
+    levels: range
+    part: int = 0
+    parts: int = 1
+
+    def of(self, numbers: range, multiple: int = 1) -> range:
+        """The rank's part of what belongs to its levels, bounds being multiples of a number."""
+        bounds = [len(numbers) // multiple * k // self.parts for k in (self.part, self.part + 1)]
+        return range(*(numbers.start + multiple * bound for bound in bounds))
+
+
+class Overlap:
+    """Rows of vectors that each rank owns, and those that it works on.
+
+    Args:
+        ranks: The ranks.
+        owned: For each rank, in rising order.
+        wanted: For each rank; they may overlap.
+        shares: Where ranks of the same levels part the columns among them: the parts.
+    """
+
+    def __init__(
+        self,
+        ranks: Ranks,
+        owned: Sequence[range],
+        wanted: Sequence[range],
+        shares: Sequence[LevelShare] = (),
+    ) -> None:
+        self.ranks, self.owned, self.wanted = ranks, owned, wanted
+        self.shares = shares or [LevelShare(range(0))] * ranks.size
+
+    @property
+    def own(self) -> range:
+        """Rows that this rank owns."""
+        return self.owned[self.ranks.rank]
+
+    @property
+    def works(self) -> range:
+        """Rows that this rank works on."""
+        return self.wanted[self.ranks.rank]
+
+    @property
+    def start(self) -> int:
+        """The first of them."""
+        return self.works.start
+
+    def columns(self, rank: int, count: int) -> slice:
+        """Columns that a rank works on, of so many."""
+        part = self.shares[rank].of(range(count))
+        return slice(part.start, part.stop)
+
+    def fetch(self, own: Array) -> Array:
+        """The rows and columns to work on from those owned, shape (rows, columns)."""
+        if self.ranks.size == 1:
+            return own
+        columns = own.shape[1]
+        pieces = [
+            own[_common(self.own, rows), self.columns(k, columns)]
+            for k, rows in enumerate(self.wanted)
+        ]
+        return np.concatenate(self.ranks.swap(pieces))
+
+    def give(self, worked: Array, columns: int) -> Array:
+        """The rows owned, `columns` wide, as sums of those that were worked on."""
+        if self.ranks.size == 1:
+            return worked
+        total, wanted = np.zeros((len(self.own), columns)), self.works
+        pieces = [worked[_common(wanted, rows)] for rows in self.owned]
+        for k, piece in enumerate(self.ranks.swap(pieces)):
+            total[_common(self.own, self.wanted[k]), self.columns(k, columns)] += piece
+        return total
+
+
+def _common(own: range, other: range) -> slice:
+    """Places in `own` of the numbers that both have."""
+    start, stop = max(own.start, other.start), min(own.stop, other.stop)
+    return slice(start - own.start, max(start, stop) - own.start)
 
 
 @dataclass(frozen=True)
@@ -29,7 +119,7 @@ class LevelNumbering:
     """Positions of the unknowns of each level.
 
     Args:
-        grid: Topology.
+        grid: Topology; all levels count, but nodes are those of its span.
         periodicity: Unknowns of one level.
     """
 
@@ -49,13 +139,14 @@ class LevelNumbering:
     @cached_property
     def unknown_of_node(self) -> Integers:
         """First of the two unknowns of each grid node, −1 on the fixed line, shape (nodes,)."""
+        span = self.grid.span
         planar, vertices = (
             self.periodicity.unknown,
             self.periodicity.unknown[: self.grid.plane.vertices],
         )
         level, middle = (
-            np.arange(self.grid.layers + 1)[:, None],
-            np.arange(self.grid.layers)[:, None],
+            np.arange(span.start, span.stop + 1)[:, None],
+            np.array(span)[:, None],
         )
         full = np.where(planar >= 0, 2 * planar + level * self.stride, -1)
         half = np.where(
@@ -63,33 +154,71 @@ class LevelNumbering:
         )
         return np.concatenate([full.ravel(), half.ravel()])
 
-    def local_levels(self, comm: MPI.Comm) -> range:
-        """Levels of this rank; with a level goes what lies between it and the next."""
-        layers, size = self.grid.layers, comm.size
-        first = [-(-layers * rank // size) for rank in range(size)] + [layers + 1]
-        return range(first[comm.rank], first[comm.rank + 1])
+    def shares(self, ranks: int) -> list[LevelShare]:
+        """Levels of so many ranks; several share one where there are more ranks than levels."""
+        layers, levels = self.grid.layers, self.grid.layers + 1
+        if ranks <= levels:
+            first = [-(-layers * rank // ranks) for rank in range(ranks)] + [levels]
+            return [LevelShare(range(*pair)) for pair in pairwise(first)]
+        level = [rank * levels // ranks for rank in range(ranks)]
+        return [
+            LevelShare(range(k, k + 1), rank - level.index(k), level.count(k))
+            for rank, k in enumerate(level)
+        ]
 
-    def local_layers(self, comm: MPI.Comm) -> range:
-        """Layers of this rank."""
-        levels = self.local_levels(comm)
-        return range(levels.start, min(levels.stop, self.grid.layers))
+    def rows(self, levels: range) -> range:
+        """Unknowns of levels, and of what lies between each and the next."""
+        return range(levels.start * self.stride, min(levels.stop * self.stride, self.size))
 
-    def local_size(self, comm: MPI.Comm) -> int:
-        """Unknowns of this rank."""
-        levels = self.local_levels(comm)
-        return len(levels) * self.stride - (
-            2 * self.periodicity.vertices if levels.stop > self.grid.layers else 0
-        )
+    def owned(self, ranks: int) -> list[range]:
+        """Unknowns of each of so many ranks."""
+        return [share.of(self.rows(share.levels), 2) for share in self.shares(ranks)]
 
-    def local_map(self, nodes: Integers, comm: MPI.Comm) -> PETSc.LGMap:
-        """Reduced unknowns of DOLFINx's local nodes; −1 where dropped."""
+    def beside(self, levels: range) -> range:
+        """Unknowns of levels, and of what lies below and above each."""
+        below = 2 * self.periodicity.vertices if levels.start else 0
+        return range(levels.start * self.stride - below, self.rows(levels).stop)
+
+    def on_levels(self, count: int, ranks: Ranks, wanted: Sequence[range] = ()) -> Overlap:
+        """So many unknowns of every level, owned as displacements are.
+
+        Args:
+            count: Of a level.
+            ranks: The ranks.
+            wanted: Levels that each works on; none: its own, and its part of the columns.
+        """
+        shares = self.shares(ranks.size)
+        own = [range(s.levels.start * count, s.levels.stop * count) for s in shares]
+        works = [range(part.start * count, part.stop * count) for part in wanted] or own
+        owned = [share.of(rows) for share, rows in zip(shares, own, strict=True)]
+        return Overlap(ranks, owned, works, () if wanted else shares)
+
+    def near(self, levels: range) -> PrismGrid:
+        """The wedges below and above levels."""
+        triangles = len(self.grid.plane.triangles)
+        first, last = max(levels.start - 1, 0), min(levels.stop, self.grid.layers)
+        wedges = range(first * triangles, last * triangles)
+        return self.grid if wedges == self.grid.own else replace(self.grid, wedges=wedges)
+
+    def span_of(self, around: range) -> range:
+        """Layers of unknowns that are `around` wedges."""
+        return range(around.start // self.stride, around.stop // self.stride)
+
+    def around(self, wedges: range) -> range:
+        """Unknowns of the layers that wedges lie in."""
+        span = replace(self.grid, wedges=wedges).span
+        last = span.stop * self.stride + 2 * self.periodicity.count
+        return range(span.start * self.stride, last)
+
+    def local_map(self, nodes: Integers, ranks: Ranks) -> PETSc.LGMap:
+        """Reduced unknowns of DOLFINx's nodes; −1 where dropped."""
         first = self.unknown_of_node[nodes]
         return PETSc.LGMap().create(
-            np.where(first >= 0, first // 2, -1).astype(PETSc.IntType), bsize=2, comm=comm
+            np.where(first >= 0, first // 2, -1).astype(PETSc.IntType), bsize=2, comm=ranks.comm
         )
 
-    def couplings(self) -> sp.csr_matrix:
-        """Pattern of unknown pairs that share a wedge, by blocks of 2."""
+    def couplings(self, rows: range) -> sp.csr_matrix:
+        """Pattern of unknown pairs that share a wedge, by blocks of 2, in rows of unknowns."""
         pairs = self.unknown_of_node[self.grid.cells] // 2
         kept = pairs >= 0
         cell = np.broadcast_to(np.arange(len(pairs))[:, None], pairs.shape)
@@ -97,12 +226,14 @@ class LevelNumbering:
             (np.ones(kept.sum(), np.int8), (cell[kept], pairs[kept])),
             shape=(len(pairs), self.size // 2),
         )
-        return (incidence.T @ incidence).astype(bool).tocsr()
+        own = incidence.T.tocsr()[rows.start // 2 : rows.stop // 2]
+        return (own @ incidence).astype(bool).tocsr()
 
-    def matrix(self, local_map: PETSc.LGMap, comm: MPI.Comm) -> PETSc.Mat:
+    def matrix(self, local_map: PETSc.LGMap, ranks: Ranks) -> PETSc.Mat:
         """Zero matrix in 2 × 2 blocks that keeps Pᵀ K P of element matrices."""
-        first = sum(comm.allgather(self.local_size(comm))[: comm.rank])
-        rows = self.couplings()[first // 2 : (first + self.local_size(comm)) // 2]
+        own = self.owned(ranks.size)[ranks.rank]
+        near = self.near(self.shares(ranks.size)[ranks.rank].levels)
+        rows = replace(self, grid=near).couplings(own)
         rows.sort_indices()
         csr = (
             rows.indptr.astype(PETSc.IntType),
@@ -110,22 +241,28 @@ class LevelNumbering:
             np.zeros(4 * rows.nnz),
         )
         matrix = PETSc.Mat().createBAIJ(
-            ((self.local_size(comm), self.size),) * 2, bsize=2, csr=csr, comm=comm
+            ((len(own), self.size),) * 2, bsize=2, csr=csr, comm=ranks.comm
         )
         matrix.setLGMap(local_map, local_map)
         return matrix
 
-    def vector(self, local_map: PETSc.LGMap, values: Array, comm: MPI.Comm) -> PETSc.Vec:
-        """Pᵀ f from contributions in DOLFINx's local numbering, shape (local nodes · 2,)."""
-        vector = PETSc.Vec().createMPI((self.local_size(comm), self.size), bsize=2, comm=comm)
+    def vector(self, local_map: PETSc.LGMap, values: Array, ranks: Ranks) -> PETSc.Vec:
+        """Pᵀ f from contributions in DOLFINx's numbering, shape (nodes · 2,)."""
+        own = self.owned(ranks.size)[ranks.rank]
+        vector = PETSc.Vec().createMPI((len(own), self.size), bsize=2, comm=ranks.comm)
         vector.setLGMap(local_map)
         nodes = np.arange(len(values) // 2, dtype=PETSc.IntType)
         vector.setValuesBlockedLocal(nodes, values, addv=PETSc.InsertMode.ADD_VALUES)
         vector.assemble()
         return vector
 
-    def to_nodes(self, solution: Array) -> Array:
-        """Displacements of all nodes from the solution, shape (nodes, 2), zero on the line."""
+    def to_nodes(self, values: Array, start: int) -> Array:
+        """Displacements of the nodes, zero on the line, shape (nodes, 2, columns).
+
+        Args:
+            values: Solutions from the unknown `start` on, shape (unknowns, columns).
+            start: The first unknown of the nodes' levels.
+        """
         first = self.unknown_of_node
-        values = solution[np.maximum(first, 0)[:, None] + np.arange(2)]
-        return np.where(first[:, None] >= 0, values, 0.0)
+        found = values[np.maximum(first - start, 0)[:, None] + np.arange(2)]
+        return np.where(first[:, None, None] >= 0, found, 0.0)

@@ -8,9 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
-from alphacut.rve.petsc import PETSc
+from alphacut.rve.petsc import PETSc, in_database
 from alphacut.rve.solver.options import PREFIX, SolverOptions
-from alphacut.rve.solver.petsc_options import in_database
 from alphacut.rve.solver.saddle import Saddle
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -31,16 +30,16 @@ class Solutions:
     """Solutions of one system for several loads.
 
     Args:
-        values: The whole vectors, on every rank, shape (size, loads).
+        values: This rank's part of the vectors, shape (its unknowns, loads).
+        pressures: This rank's part of the pressures of a `Saddle`, shape (its pressures, loads).
         iterations: For each load.
         residual: The largest relative residual, as it truly is.
-        pressures: Whole vectors of the pressures of a `Saddle`, shape (pressures, loads).
     """
 
     values: Array
+    pressures: Array | None
     iterations: tuple[int, ...]
     residual: float
-    pressures: Array | None = None
 
 
 class Operator(Protocol):
@@ -146,10 +145,8 @@ class LinearSolver:
         iterations = tuple(count for values, count in solved for _ in range(values.shape[1]))
         residual = max(self._residuals(loads, values))
         if self.saddle is None:
-            whole = np.concatenate(self.krylov.comm.tompi4py().allgather(values))
-            return Solutions(whole, iterations, residual)
-        whole, pressures = self.saddle.split(values)
-        return Solutions(whole, iterations, residual, pressures)
+            return Solutions(values, None, iterations, residual)
+        return Solutions(*self.saddle.split(values), iterations, residual)
 
     def _solve(self, columns: Array) -> tuple[Array, int]:
         """This rank's solutions for unit loads, shape (local size, loads), and iterations."""

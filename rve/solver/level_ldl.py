@@ -77,6 +77,8 @@ class LevelLDL:
 
     def _apply(self, vectors: Array, system: int) -> Array:
         result = np.empty_like(vectors)
+        if not vectors.size:  # no column is left for this rank
+            return result
         for factor, source, target in zip(self._factors, vectors, result, strict=True):
             columns = matrix(source)
             cholmod.solve(factor, columns, sys=system)

@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from alphacut.rve.petsc import PETSc
+from alphacut.rve.solver.constraints import Overlap
 from alphacut.stochastic.theta.truncated_normal import Array
 
 
@@ -16,10 +17,10 @@ class Saddle:
 
     Args:
         stiffness: K, distributed.
-        flux: B, whole on every rank.
-        compliance: C, likewise.
-        levels: This rank's levels.
-        count: Pressures of a level.
+        flux: What this rank's wedges give of B, in the rows and columns that it works on.
+        compliance: What they give of C.
+        displacements: Those that each rank owns and works on.
+        pressures: Likewise.
     """
 
     def __init__(
@@ -27,20 +28,18 @@ class Saddle:
         stiffness: PETSc.Mat,
         flux: sp.csr_matrix,
         compliance: sp.csr_matrix,
-        levels: range,
-        count: int,
+        displacements: Overlap,
+        pressures: Overlap,
     ) -> None:
         self.stiffness, self._flux, self._compliance = stiffness, flux, compliance
-        self._pressures = slice(levels.start * count, levels.stop * count)
-        self._displacements = slice(*stiffness.getOwnershipRange())
-        self._transposed = flux[:, self._displacements].T.tocsr()
+        self._displacements, self._pressures = displacements, pressures
+        self._transposed = flux.T.tocsr()
         self._dense: tuple[PETSc.Mat, PETSc.Mat] | None = None
 
     @property
     def local_size(self) -> int:
         """Entries of a vector on this rank."""
-        u, p = self._displacements, self._pressures
-        return int(u.stop - u.start + p.stop - p.start)
+        return len(self._displacements.own) + len(self._pressures.own)
 
     def matrix(self, columns: int = 1) -> PETSc.Mat:
         """PETSc's matrix of this operator for so many vectors side by side."""
@@ -52,11 +51,13 @@ class Saddle:
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Matrix times vectors side by side, entry by entry."""
         values = x.array_r.reshape(self.local_size, -1)
-        cut = self._displacements.stop - self._displacements.start
-        u, p = self._gather(values[:cut]), self._gather(values[cut:])
+        own = self.split(values)
+        u, p = self._displacements.fetch(own[0]), self._pressures.fetch(own[1])
+        cut, columns = len(own[0]), values.shape[1]
         result = y.array.reshape(values.shape)
-        result[:cut] = self._stiff(values[:cut]) + self._transposed @ p
-        result[cut:] = self._flux[self._pressures] @ u - self._compliance[self._pressures] @ p
+        pushed = self._displacements.give(self._transposed @ p, columns)
+        result[:cut] = self._stiff(own[0]) + pushed
+        result[cut:] = self._pressures.give(self._flux @ u - self._compliance @ p, columns)
 
     def _stiff(self, values: Array) -> Array:
         columns = values.shape[1]
@@ -71,19 +72,15 @@ class Saddle:
         self.stiffness.matMult(source, result=target)
         return np.asarray(target.getDenseArray(readonly=True))
 
-    def _gather(self, local: Array) -> Array:
-        comm = self.stiffness.comm.tompi4py()
-        return np.concatenate(comm.allgather(local)) if comm.size > 1 else local
-
     def split(self, values: Array) -> tuple[Array, Array]:
-        """Whole displacements and pressures from this rank's part of vectors (local size, k)."""
-        cut = self._displacements.stop - self._displacements.start
-        return self._gather(values[:cut]), self._gather(values[cut:])
+        """Displacements and pressures of this rank's part of vectors (local size, k)."""
+        cut = len(self._displacements.own)
+        return values[:cut], values[cut:]
 
     def vector(self, displacements: PETSc.Vec, pressures: Array) -> PETSc.Vec:
-        """Vector of distributed displacements and whole pressures."""
+        """Vector of displacements and this rank's pressures."""
         found = self.matrix().createVecLeft()
-        found.array[:] = np.concatenate([displacements.array_r, pressures[self._pressures]])
+        found.array[:] = np.concatenate([displacements.array_r, pressures])
         return found
 
     def assembled(self) -> PETSc.Mat:

@@ -23,24 +23,29 @@ Nearly incompressible triangles have mean pressures besides, hats along θ. Each
 then a saddle point, L_k J L_kᵀ with signs J, and the middle factor above becomes M ⊗ J. L_k stays
 bounded as the compressibility vanishes, so the count does not depend on Poisson's ratio either.
 The second summand has no part in the pressures.
+
+Each rank factorises its own levels. Products along θ want all levels: the vectors are turned about,
+each rank then having all levels of some planar unknowns, and back. Ranks of the same level share
+the loads.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
-from mpi4py import MPI
 
 from alphacut.rve.mesh.triangulation import Integers
 from alphacut.rve.petsc import PETSc
-from alphacut.rve.solver.constraints import LevelNumbering
+from alphacut.rve.ranks import Ranks
+from alphacut.rve.solver.constraints import LevelNumbering, LevelShare, Overlap
 from alphacut.rve.solver.level_cholesky import LevelCholesky
 from alphacut.rve.solver.level_ldl import LevelLDL
 from alphacut.rve.solver.level_stiffness import LevelPattern
-from alphacut.stochastic.theta.truncated_normal import Array, TruncatedNormal
+from alphacut.stochastic.theta.law import Array, ThetaLaw
 
 
 @dataclass(frozen=True)
@@ -59,7 +64,7 @@ class ThetaMass:
     excess: Array
 
 
-def theta_mass(law: TruncatedNormal, levels: Array) -> ThetaMass:
+def theta_mass(law: ThetaLaw, levels: Array) -> ThetaMass:
     """The mass matrices on the given levels, shape (layers + 1,)."""
     layers = len(levels) - 1
     abscissae, double = np.polynomial.legendre.leggauss(3)  # as the stiffness is integrated
@@ -124,7 +129,7 @@ class ThetaPreconditioner:
         on: Element matrices on this rank's levels, shape (m, 12, 12) each.
         between: The same half-way between levels.
         law: Law of θ.
-        comm: Communicator; each rank factorises its own levels.
+        ranks: Each factorises its own levels.
         pressures: Mean pressures of nearly incompressible triangles.
     """
 
@@ -133,18 +138,24 @@ class ThetaPreconditioner:
         numbering: LevelNumbering,
         on: Sequence[Array],
         between: Sequence[Array],
-        law: TruncatedNormal,
-        comm: MPI.Comm,
+        law: ThetaLaw,
+        ranks: Ranks,
         pressures: LevelPressures | None = None,
     ) -> None:
-        self.numbering, self.comm = numbering, comm
+        self.numbering, self.ranks = numbering, ranks
         grid, periodicity = numbering.grid, numbering.periodicity
         self.mass = theta_mass(law, grid.levels(law))
-        self.levels, self.middles = numbering.local_levels(comm), numbering.local_layers(comm)
+        shares = numbering.shares(ranks.size)
+        self.levels = shares[ranks.rank].levels
+        self.middles = [list(_middles(share, grid.layers)) for share in shares]
+        self.overlap = Overlap(
+            ranks, numbering.owned(ranks.size), [numbering.beside(s.levels) for s in shares], shares
+        )
         self.injection = sp.kron(periodicity.linear_injection(grid.plane), np.eye(2), format="csr")
         triangles = grid.plane.triangles
         unknowns = _with_components(periodicity.unknown[triangles])
         self.pressures = 0 if pressures is None else len(pressures.triangles)
+        self.pressed = numbering.on_levels(self.pressures, ranks)
         self.quadratic: LevelCholesky | LevelLDL
         if pressures is None:
             quadratic = LevelPattern(unknowns)
@@ -158,77 +169,94 @@ class ThetaPreconditioner:
 
     def apply(self, _pc: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
         """Result = P⁻¹ residual, called by PETSc; several loads side by side."""
-        rows = self.numbering.local_size(self.comm) + self.pressures * len(self.levels)
+        rows = len(self.overlap.own) + len(self.pressed.own)
         result.array[:] = self.solve(residual.array_r.reshape(rows, -1)).ravel()
 
     def solve(self, vectors: Array) -> Array:
         """P⁻¹ times this rank's part of vectors, shape (unknowns, loads)."""
-        cut = self.numbering.local_size(self.comm)
-        level, middle = self._split(self._gather(vectors[:cut]))
-        vertices = middle.shape[1]
+        cut, loads = len(self.overlap.own), vectors.shape[1]
+        before, level, middle = self._split(self.overlap.fetch(vectors[:cut]))
+        vertices, planar = 2 * self.numbering.periodicity.vertices, level.shape[1]
         # from nodal values half-way to bubbles on top of the hats
-        level[:-1, :vertices] += middle / 2
-        level[1:, :vertices] += middle / 2
-        own, between = (
-            slice(self.levels.start, self.levels.stop),
-            slice(self.middles.start, self.middles.stop),
-        )
-        planar = level.shape[1]
-        pressure = vectors[cut:].reshape(len(self.levels), self.pressures, vectors.shape[1])
-        both = np.concatenate([level[own], pressure], axis=1) if self.pressures else level[own]
-        solved = self.quadratic.backward(
-            _along_theta(self.mass.linear[own], self._gather(self.quadratic.forward(both)))
-        )
-        hats = solved[:, :planar]
-        correction, bubbles = self._excess(_in_plane(self.injection.T, level[own]), middle[between])
-        hats = self._gather(hats + _in_plane(self.injection, correction))
-        above = slice(between.start + 1, between.stop + 1)
-        joined = self._join(
-            hats[own], bubbles + (hats[between, :vertices] + hats[above, :vertices]) / 2
-        )
-        return np.concatenate([joined, solved[:, planar:].reshape(-1, vectors.shape[1])])
+        level[: len(middle), :vertices] += middle / 2
+        level[1:, :vertices] += middle[: len(level) - 1] / 2
+        level[: len(before), :vertices] += before / 2
+        both = level
+        if self.pressures:
+            pressure = self.pressed.fetch(vectors[cut:])
+            shape = len(level), self.pressures, level.shape[2]
+            both = np.concatenate([level, pressure.reshape(shape)], axis=1)
+        rows = [list(share.levels) for share in self.overlap.shares]
+        lifted = self.quadratic.forward(both)
+        solved = self.quadratic.backward(self._along_theta(self.mass.linear, lifted, rows, loads))
+        correction, bubbles = self._excess(_in_plane(self.injection.T, level), middle, rows, loads)
+        hats = solved[:, :planar] + _in_plane(self.injection, correction)
+        ends = hats[: len(middle), :vertices].copy()
+        ends[: len(level) - 1] += hats[1 : len(middle) + 1, :vertices]
+        joined = self._join(hats[: len(before), :vertices] / 2, hats, bubbles + ends / 2)
+        result = self.overlap.give(joined, loads)
+        if not self.pressures:
+            return result
+        rest = solved[:, planar:].reshape(len(level) * self.pressures, level.shape[2])
+        return np.concatenate([result, self.pressed.give(rest, loads)])
 
-    def _excess(self, level: Array, middle: Array) -> tuple[Array, Array]:
+    def _excess(
+        self, level: Array, middle: Array, rows: list[list[int]], loads: int
+    ) -> tuple[Array, Array]:
         """(M_quad⁻¹ − M_lin⁻¹) ⊗ K_1⁻¹ on this rank's vertices, on and between levels."""
         lifted = self.linear.forward(np.concatenate([level, middle]))
-        every = np.concatenate(
-            [self._gather(lifted[: len(level)]), self._gather(lifted[len(level) :])]
-        )
         layers = self.numbering.grid.layers
-        rows = [*self.levels, *(layers + 1 + k for k in self.middles)]
-        solved = self.linear.backward(_along_theta(self.mass.excess[rows], every))
+        every = [
+            [*on, *(layers + 1 + k for k in between)]
+            for on, between in zip(rows, self.middles, strict=True)
+        ]
+        solved = self.linear.backward(self._along_theta(self.mass.excess, lifted, every, loads))
         return solved[: len(level)], solved[len(level) :]
 
-    def _gather(self, local: Array) -> Array:
-        return np.concatenate(self.comm.allgather(local)) if self.comm.size > 1 else local
+    def _along_theta(
+        self, matrix: Array, vectors: Array, rows: list[list[int]], loads: int
+    ) -> Array:
+        """Matrix (l, l) times vectors (l, size, loads); of both this rank has its rows."""
+        size, ranks = vectors.shape[1], self.ranks.size
+        if ranks == 1:
+            return np.asarray((matrix @ vectors.reshape(len(vectors), -1)).reshape(vectors.shape))
+        bounds = [size * k // ranks for k in range(ranks + 1)]
+        columns = [self.overlap.columns(k, loads) for k in range(ranks)]
+        turned = self.ranks.swap([vectors[:, slice(*pair)] for pair in pairwise(bounds)])
+        whole = np.empty((len(matrix), len(turned[0][0]), loads))
+        for row, column, piece in zip(rows, columns, turned, strict=True):
+            whole[row, :, column] = piece
+        product = (matrix @ whole.reshape(len(matrix), -1)).reshape(whole.shape)
+        pieces = [product[row][:, :, part] for row, part in zip(rows, columns, strict=True)]
+        return np.concatenate(self.ranks.swap(pieces), axis=1)
 
-    def _split(self, vectors: Array) -> tuple[Array, Array]:
-        """Values on the levels and half-way between them."""
-        stride, planar, columns = (
-            self.numbering.stride,
-            2 * self.numbering.periodicity.count,
-            vectors.shape[1],
-        )
-        table = vectors[:-planar].reshape(-1, stride, columns)
-        return np.concatenate([table[:, :planar], vectors[None, -planar:]]), table[:, planar:]
+    def _split(self, vectors: Array) -> tuple[Array, Array, Array]:
+        """Values half-way below the first level, on the levels, and half-way above them."""
+        stride, planar = self.numbering.stride, 2 * self.numbering.periodicity.count
+        between, columns = len(self.middles[self.ranks.rank]), vectors.shape[1]
+        last, below = len(self.levels) - between, int(self.levels.start > 0)
+        before, rest = np.split(vectors, [below * (stride - planar)])
+        table = rest[: between * stride].reshape(between, stride, columns)
+        top = rest[between * stride :].reshape(last, planar, columns)
+        before = before.reshape(below, stride - planar, columns)
+        return before, np.concatenate([table[:, :planar], top]), table[:, planar:]
 
     @staticmethod
-    def _join(level: Array, middle: Array) -> Array:
-        """This rank's part of the vectors from its levels and what lies between."""
+    def _join(before: Array, level: Array, middle: Array) -> Array:
+        """The vectors from what `_split` makes of them."""
         columns = level.shape[2]
-        paired = np.concatenate([level[: len(middle)], middle], axis=1).reshape(-1, columns)
-        return np.concatenate([paired, level[len(middle) :].reshape(-1, columns)])
+        paired = np.concatenate([level[: len(middle)], middle], axis=1)
+        parts = before, paired, level[len(middle) :]
+        return np.concatenate([part.reshape(len(part) * part.shape[1], columns) for part in parts])
 
 
-def _along_theta(matrix: Array, vectors: Array) -> Array:
-    """Matrix (k, l) times vectors (l, size, columns)."""
-    return np.asarray(
-        (matrix @ vectors.reshape(len(vectors), -1)).reshape(len(matrix), *vectors.shape[1:])
-    )
+def _middles(share: LevelShare, layers: int) -> range:
+    """Layers above the levels of one rank."""
+    return range(share.levels.start, min(share.levels.stop, layers))
 
 
 def _in_plane(matrix: sp.csr_matrix, vectors: Array) -> Array:
     """Sparse matrix (m, size) times each of vectors (k, size, columns)."""
     k, size, columns = vectors.shape
     flat = vectors.transpose(1, 0, 2).reshape(size, k * columns)
-    return np.asarray((matrix @ flat).reshape(-1, k, columns).transpose(1, 0, 2))
+    return np.asarray((matrix @ flat).reshape(matrix.shape[0], k, columns).transpose(1, 0, 2))

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from time import perf_counter
 from typing import Protocol
 
 import numpy as np
 
 from alphacut.rve.cell import Phase, square_moduli
+from alphacut.rve.ranks import ALONE, Ranks
 from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.rve.slices.model import solve_slice
 from alphacut.rve.table.interpolant import Table, TableRange, coefficients, tail
@@ -63,10 +65,14 @@ class SeriesSource:
 
 @dataclass
 class PlanarSource:
-    """Moduli by planar cells of order 4 on meshes as fine as `accuracy` needs."""
+    """Moduli by planar cells of order 4 on meshes as fine as `accuracy` needs.
+
+    `ranks` share the radii at which a mesh is judged.
+    """
 
     span: TableRange
     accuracy: float
+    ranks: Ranks = ALONE
     mesh_size: float = field(init=False)
     space: Array = field(init=False)
     unknowns: int = 0
@@ -77,7 +83,8 @@ class PlanarSource:
         size, found = _ROUGH, self._all_errors(radii, _ROUGH)
         while found[:, :3].max() > self.accuracy:  # a finer mesh gains more at one than at another
             worst = int(found[:, :3].max(axis=1).argmax())
-            size = self._fine_enough(radii[worst], size, found[worst])
+            finer = partial(self._fine_enough, radii[worst], size, found[worst])
+            size = self.ranks.first(finer)
             found = self._all_errors(radii, size)
         self.mesh_size = size
         self.space = np.vstack([radii, found.T])
@@ -98,7 +105,7 @@ class PlanarSource:
 
     def _all_errors(self, radii: Array, size: float) -> Array:
         """Declared relative errors at all radii, shape (radii, 4)."""
-        return np.array([self._errors(radius, size) for radius in radii])
+        return np.array(self.ranks.each(partial(self._errors, size=size), list(radii)))
 
     def _errors(self, radius: float, size: float) -> Array:
         """Declared relative errors at one radius of both extreme inclusions, shape (4,)."""
@@ -151,6 +158,7 @@ def build_table(
     source: str = "planar",
     make: Callable[[TableRange, float], Source] | None = None,
     progress: Callable[[float], None] | None = None,
+    ranks: Ranks = ALONE,
 ) -> Table:
     """Table of relative error `accuracy` in every modulus, by its own estimate.
 
@@ -160,6 +168,7 @@ def build_table(
         source: "planar" or "series"; another name beside `make`.
         make: Maker of the source from range and accuracy, in place of that of its name.
         progress: Called with the fraction done of the present degree.
+        ranks: Those that share the radii, each of which solves its own.
 
     Raises:
         TableError: The accuracy is not reached.
@@ -174,11 +183,9 @@ def build_table(
     known: dict[float, Array] = {}
     while True:
         radii, moduli = span.nodes(counts)
-        for k, radius in enumerate(radii):
-            if radius not in known:
-                known[radius] = _logarithms(span, supply.moduli, float(radius), moduli)
-            if progress:
-                progress((k + 1) / radii.size)
+        fresh = [float(radius) for radius in radii if radius not in known]
+        solve = partial(_logarithms, span, supply.moduli, modulus=moduli)
+        known.update(zip(fresh, ranks.each(solve, fresh, progress), strict=True))
         found = coefficients(np.array([known[radius] for radius in radii]))
         noise = supply.space[1:].max(axis=1)
         tails = tail(found, 0, noise=noise), tail(found, 1, noise=noise)
@@ -190,7 +197,7 @@ def build_table(
                 supply.space,
                 supply.mesh_size,
                 supply.unknowns,
-                supply.systems,
+                sum(ranks.all(supply.systems)),
                 perf_counter() - started,
             )
         if max(counts) >= _MOST_NODES:

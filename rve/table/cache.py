@@ -15,6 +15,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
+from alphacut.rve.ranks import ALONE, Ranks
 from alphacut.rve.table.build import Source, build_table
 from alphacut.rve.table.interpolant import Table, TableRange
 
@@ -65,19 +66,23 @@ def stored_table(
     source: str = "planar",
     make: Callable[[TableRange, float], Source] | None = None,
     progress: Callable[[float], None] | None = None,
+    ranks: Ranks = ALONE,
 ) -> tuple[Table, bool]:
     """The table from `folder`, or made and put there; and the truth of "it was there".
+
+    `ranks` share the making; the first of them reads and writes.
 
     Raises:
         TableError: The accuracy is not reached.
     """
     key = table_key(span, accuracy=accuracy, source=source)
-    found = _in_process.get(key) or (_read(folder / f"table-{key}.npz", span) if folder else None)
+    file = folder / f"table-{key}.npz" if folder else None
+    found = ranks.first(lambda: _in_process.get(key) or (_read(file, span) if file else None))
     fresh = found or build_table(
-        span, accuracy=accuracy, source=source, make=make, progress=progress
+        span, accuracy=accuracy, source=source, make=make, progress=progress, ranks=ranks
     )
-    if folder and not found:
-        _write(fresh, folder / f"table-{key}.npz")
+    if file and not found:
+        ranks.first(lambda: _write(fresh, file))
     _in_process[key] = fresh
     return fresh, found is not None
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from alphacut.rve.cell import Phase
 from alphacut.rve.result import Homogenised
-from alphacut.rve.settings import require_accuracy
+from alphacut.rve.settings import require_accuracy, require_parts
 from alphacut.rve.slices.curve import certified, mean_errors, with_errors
 from alphacut.rve.slices.theta_rule import extreme_radii, settle_rule
 from alphacut.rve.table.cache import stored_table
@@ -68,6 +68,7 @@ class TableModel:
             RuleError: No rule in θ settles (a map that is not smooth).
             ValueError: The map or a modulus leaves the range that was given.
         """
+        require_parts(radius_map, matrix, inclusions)
 
         def made(poisson: float, moduli: Array) -> list[Homogenised]:
             started = perf_counter()

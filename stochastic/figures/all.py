@@ -96,7 +96,7 @@ def of_discs(found: Microstructure) -> dict[str, Callable[[], Figure]]:
         "radius_map": lambda: draw_map(found),
     }
     if isinstance(source, Measured) and isinstance(source.file, SectionImage):
-        picture, discs = source.file.picture(), found.sections[0].discs
+        picture, discs = source.file.material(), found.sections[0].discs
         figures["image_circles"] = lambda: draw_overlay(picture, discs)
     return figures
 

@@ -138,9 +138,11 @@ class MeasuredCircles:
         rejected: What was left out: row (or label) to reason.
         phase_fraction: Area fraction of the particles in the whole image; None without an image.
         lost: Share of that area which lies in particles left out inside the image.
+        misfit: Share of the particles' pixels outside the circle of their own piece.
     """
 
     discs: Discs
     rejected: dict[int, str] = field(default_factory=dict)
     phase_fraction: float | None = None
     lost: float = 0.0
+    misfit: float = 0.0

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from alphacut.stochastic.particles.annotation import Crop, cropped
 from alphacut.stochastic.particles.circles_csv import MeasuredCircles
 from alphacut.stochastic.particles.discs import Discs
 from alphacut.stochastic.particles.touching import (
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
 CUT = 1.2
 CUT_OFF = "is cut by the image's edge"
 LOST = 0.02  # share of the particles' area that may be left out
+MISFIT = 0.09  # share of the particles' pixels that may lie outside the circle of their piece
 FLATTENED = 0.45  # roundness of a disc that several neighbours overlap
 PARTICLES = ("auto", "bright", "dark")
 
@@ -59,7 +61,10 @@ class SectionImage:
         smoothing: Standard deviation of the smoothing, in pixels.
         roundness: Least share of its own smallest round hull (diameter = longest chord) that a
             particle must fill.
-        drop: Go on where particles left out hold more than `LOST` of the particles' area.
+        drop: Go on where particles left out hold more than `LOST` of the particles' area, or more
+            than `MISFIT` of it lies outside the circles.
+        crop: The part of the image that is material (left, top, right, bottom, in pixels from the
+            upper left corner); None for all of it, which must then have no scale bar or caption.
 
     Raises:
         ValueError: A value lies outside its range.
@@ -72,6 +77,7 @@ class SectionImage:
     smoothing: float = 1.5
     roundness: float = 0.7
     drop: bool = False
+    crop: Crop | None = None
 
     def __post_init__(self) -> None:
         if not 0 < self.pixel < np.inf:
@@ -92,7 +98,16 @@ class SectionImage:
         Raises:
             ValueError: The file is no image, has no contrast, or shows no particle.
         """
-        return self.circles(self.picture())
+        return self.circles(self.material())
+
+    def material(self) -> Array:
+        """Grey values of the part that is material, shape (rows, columns).
+
+        Raises:
+            ValueError: As `picture`, or `crop` lies outside the image, or what it leaves has a
+                rectangle of one grey.
+        """
+        return cropped(self.picture(), self.crop, self.path)
 
     def picture(self) -> Array:
         """Grey values of the file, shape (rows, columns).
@@ -123,7 +138,7 @@ class SectionImage:
                 particles' area lies in pieces that are no round particles, unless `drop` is set.
         """
         share, labels = self._segmented(picture)
-        found, rejected, lost = self._sorted(share, labels)
+        found, rejected, lost, misfit = self._sorted(share, labels)
         if not found:
             raise ValueError(
                 f"{self.path} shows no round particle of {self.smallest:g} pixels or more in radius"
@@ -138,30 +153,44 @@ class SectionImage:
                 f" that lies in pieces that were left out ({_counted(rejected)}): take the image"
                 " itself as the cell ([cell] image), or drop them (drop = true)"
             )
+        if misfit > MISFIT and not self.drop:
+            raise ValueError(
+                f"{self.path} shows particles on {fraction:.4f} of its area, and {misfit:.1%} of"
+                f" that lies outside the circles that would stand for them, where discs that touch"
+                f" leave less than {MISFIT:.0%}: the particles are not round; take the image itself"
+                " as the cell ([cell] image), or go on with the circles (drop = true)"
+            )
         (row, column, radius), (height, width) = np.array(found).T, picture.shape
         centres = np.stack([column + 0.5, height - row - 0.5], axis=1)
         centres = pushed_apart(centres, radius) * self.pixel
         size = np.array([width, height]) * self.pixel
         discs = Discs(centres, radius * self.pixel, size, periodic=False)
-        return MeasuredCircles(discs, rejected, fraction, missing)
+        return MeasuredCircles(discs, rejected, fraction, missing, misfit)
 
     def _sorted(
         self, share: Array, labels: Labels
-    ) -> tuple[list[tuple[float, float, float]], dict[int, str], float]:
-        """Circles in pixels, reasons of what was left out, and pixels left out inside the image."""
+    ) -> tuple[list[tuple[float, float, float]], dict[int, str], float, float]:
+        """Circles in pixels, reasons of what was left out, pixels left out inside, and the misfit.
+
+        That is the share of the circles' pieces that lies outside their own circle.
+        """
         from skimage import measure
 
         found, rejected, lost = [], {}, 0.0
+        beyond, kept = 0.0, 0
         touching = _touching(labels)
         for region in measure.regionprops(labels):  # type: ignore[no-untyped-call]
             circle = _circle(share, labels, region.label, region.bbox)
             reason = self._reason(region, circle[2], labels.shape, touching[region.label])
             if not reason:
                 found.append(circle)
+                rows, columns = region.coords.T
+                kept += len(rows)
+                beyond += float((np.hypot(rows - circle[0], columns - circle[1]) > circle[2]).sum())
                 continue
             rejected[region.label] = reason
             lost += 0.0 if reason == CUT_OFF else np.pi * circle[2] ** 2
-        return found, rejected, lost
+        return found, rejected, lost, beyond / max(kept, 1)
 
     def _reason(
         self, region: RegionProperties, radius: float, shape: tuple[int, ...], touches: bool

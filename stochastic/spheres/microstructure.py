@@ -32,6 +32,7 @@ ROUNDS = 6  # at the packings of one law; the nearest counts
 NEAR = 5e-3  # relative difference of volume fractions that ends them
 STEEPER = 1.5  # the limit cuts off more than in proportion
 OFF = 0.02  # relative difference of the final map's that is told
+TOLD = 0.5  # share of the volume beyond the limits that is told
 _ATTEMPTS = 20  # at one packing
 
 
@@ -77,6 +78,12 @@ class SphereMicrostructure(FittedMap):
     def remarks(self) -> Iterator[str]:
         """What the map does not hold, and what the section cannot tell."""
         asked, own = self.source.packing.volume_fraction, self.fraction_of_map
+        if self.share_beyond > TOLD:
+            yield (
+                f"{self.share_beyond:.1%} of the volume lies in cells tighter than r_n ="
+                f" {self.limits[1]:.3g}, as no cubic cell is; the map, and E, are of the other"
+                f" {1 - self.share_beyond:.1%} alone"
+            )
         if abs(own / asked - 1) > OFF:
             yield (
                 f"the map has the volume fraction {own:.4f}, {asked:.4f} is asked for: cells of a"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.stochastic.theta.truncated_normal import Array, TruncatedNormal
+from alphacut.stochastic.theta.law import Array, ThetaLaw, panel_edges
 
 
 @dataclass(frozen=True)
@@ -27,39 +27,53 @@ class ThetaRule:
         return np.tensordot(self.weights, values, axes=1)
 
 
-def layered_rule(distribution: TruncatedNormal, *, layers: int, points: int) -> ThetaRule:
+_MOST_PANELS = 64  # to begin with
+
+
+def layered_rule(distribution: ThetaLaw, *, layers: int, points: int) -> ThetaRule:
     """Gauss–Legendre with `points` nodes in each of `layers` equal slabs, weighted by f_Θ.
 
     The weights are scaled to the sum 1, so that a constant is its own mean whatever the number of
-    layers; the error of the mean of a smooth function falls with the power 2·points of the layer
-    height.
+    layers; where the density is smooth, the error of the mean of a smooth function falls with the
+    power 2·points of the layer height.
     """
     if layers < 1 or points < 1:
         raise ValueError(
             f"got {layers} layers with {points} points each; at least one of either is needed"
         )
-    x, w = np.polynomial.legendre.leggauss(points)
     edges = np.linspace(distribution.lower, distribution.upper, layers + 1)
+    return _weighted(distribution, edges, np.polynomial.legendre.leggauss(points))
+
+
+def _weighted(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> ThetaRule:
+    """A rule on [−1, 1] in each panel between edges, weighted by f_Θ and scaled to the sum 1."""
+    x, w = rule
     half = np.diff(edges)[:, None] / 2
     nodes = (edges[:-1, None] + half * (1 + x)).ravel()
-    weights = (half * w).ravel() * distribution.pdf(nodes)
+    weights = (half * w).ravel() * law.pdf(nodes)
     return ThetaRule(nodes, weights / weights.sum())
 
 
-def gauss_rule(distribution: TruncatedNormal, *, points: int) -> ThetaRule:
+def gauss_rule(
+    distribution: ThetaLaw, *, points: int, between: tuple[float, float] | None = None
+) -> ThetaRule:
     """Gauss rule of f_Θ itself: exact for polynomials in θ up to degree 2·points − 1.
 
     The recurrence of the orthogonal polynomials comes from the discretised Stieltjes procedure on a
     fine Legendre rule (Gautschi, Orthogonal Polynomials, 2004, section 2.2.3), the nodes from the
     Jacobi matrix (Golub & Welsch 1969).
+
+    Args:
+        distribution: Law of θ.
+        points: Nodes, at least 1.
+        between: Ends of a part of the support; the whole of it if left out.
+
+    Raises:
+        ValueError: No point is asked for, or density and distribution function disagree.
     """
     if points < 1:
         raise ValueError(f"got a rule of {points} points; at least one is needed")
-    fine = layered_rule(
-        distribution,
-        layers=math.ceil(distribution.upper - distribution.lower),
-        points=16 + 2 * points,
-    )
+    fine = _fine_rule(distribution, 16 + 2 * points, between)
     weights = fine.weights
     diagonal, off = np.zeros(points), np.zeros(points)
     previous, current = np.zeros_like(fine.nodes), np.ones_like(fine.nodes)
@@ -71,6 +85,14 @@ def gauss_rule(distribution: TruncatedNormal, *, points: int) -> ThetaRule:
     jacobi = np.diag(diagonal) + np.diag(off[:-1], 1) + np.diag(off[:-1], -1)
     nodes, vectors = np.linalg.eigh(jacobi)
     return ThetaRule(nodes, vectors[0] ** 2)
+
+
+def _fine_rule(law: ThetaLaw, points: int, between: tuple[float, float] | None) -> ThetaRule:
+    """Legendre rule in panels of at most 1 that integrates the density between two ends."""
+    lower, upper = between or (law.lower, law.upper)
+    edges = np.linspace(lower, upper, min(math.ceil(upper - lower), _MOST_PANELS) + 1)
+    rule = np.polynomial.legendre.leggauss(points)
+    return _weighted(law, panel_edges(law, edges, rule), rule)
 
 
 FEWEST = 10  # nodes, from which on a polynomial through those of a Gauss rule beats pieces

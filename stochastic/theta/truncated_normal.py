@@ -1,16 +1,17 @@
-"""Basic random variable θ: a normalised, truncated standard normal (section 3.1)."""
+"""Truncated normal law of the basic random variable θ (section 3.1)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import ndtr, ndtri
 
-Array = NDArray[Any]  # of floats; shapes and units are said in words
+from alphacut.stochastic.theta.law import Array, require_shares, require_support
+
+__all__ = ["Array", "TruncatedNormal"]
 
 
 @dataclass(frozen=True)
@@ -29,11 +30,7 @@ class TruncatedNormal:
     upper: float = 3.0
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.lower) and np.isfinite(self.upper) and self.lower < self.upper):
-            raise ValueError(
-                f"the support of θ is [{self.lower}, {self.upper}]; it needs two finite ends, lower"
-                " < upper"
-            )
+        require_support(self.lower, self.upper)
         if not self.mass > 0:
             raise ValueError(
                 f"the standard normal gives the support [{self.lower}, {self.upper}] of θ no"
@@ -64,11 +61,7 @@ class TruncatedNormal:
     def quantile(self, probability: ArrayLike) -> Array:
         """The θ below which a share `probability` in [0, 1] lies, any shape."""
         share = np.asarray(probability, float)
-        if not ((share >= 0) & (share <= 1)).all():
-            raise ValueError(
-                f"a probability is {share[~((share >= 0) & (share <= 1))].flat[0]:g}; each must lie"
-                " in [0, 1]"
-            )
+        require_shares(share)
         theta = (
             -ndtri(ndtr(-self.lower) - share * self.mass)
             if self.lower > 0

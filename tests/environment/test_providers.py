@@ -11,6 +11,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("stochastic", "rve", "fuzzy", "frame", "alphacut", "tests", "benchmarks", "docs")
 DIRECT = {
+    "IPython": "python3-ipykernel",  # which depends on it
     "PIL": "python3-matplotlib",  # which depends on Pillow, by pip too
     "basix": "python3-dolfinx",
     "cvxopt": "python3-cvxopt",
@@ -29,6 +30,7 @@ DIRECT = {
     "nbclient": "python3-nbclient",
     "nbformat": "python3-nbclient",  # which depends on it
     "numpy": "python3-numpy",
+    "pandas": "python3-xarray",  # which depends on it
     "petsc4py": "python3-petsc4py-real",
     "pint": "python3-pint",
     "pytest": "python3-pytest",

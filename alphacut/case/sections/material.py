@@ -20,11 +20,14 @@ from alphacut.case.key import (
 )
 from alphacut.case.sections.picture import Picture
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.stochastic import TruncatedNormal
+from alphacut.stochastic import Beta, ThetaLaw, TruncatedNormal
+from alphacut.stochastic.radius_map import Kind, MapFamily
+from alphacut.stochastic.theta.beta import LARGEST_EXPONENT
 
 CellMethod = Literal["prism", "slices", "table", "series", "image", "auto"]
 PlanName = Literal["general", "reduced", "extended", "signed"]
 Particles = Literal["cylinders", "spheres"]
+LawName = Literal["normal", "uniform", "beta"]
 SPHERE_METHODS = ("series", "table", "auto")
 CELL_METHODS: tuple[str, ...] = get_args(CellMethod)
 PLANS: tuple[str, ...] = get_args(PlanName)
@@ -34,26 +37,69 @@ PLANS: tuple[str, ...] = get_args(PlanName)
 class Radius(Section):
     """Random radius of the particle over half the cell's side.
 
-    Cubic Hermite map of the truncated normal θ (eq. 12).
+    A map of the random variable θ: the cubic Hermite map of a truncated normal θ (eq. 12), or
+    another map or law.
     """
 
     theta: Annotated[
-        tuple[float, ...], Key("support of θ in standard deviations", allowed=DEVIATIONS)
+        tuple[float, ...],
+        Key("support of θ, of the normal law in standard deviations", allowed=DEVIATIONS),
     ] = (-3.0, 3.0)
+    law: Annotated[
+        LawName,
+        Key(
+            "law of θ: normal, a standard normal cut to the support; uniform; or beta, with the"
+            " exponents"
+        ),
+    ] = "normal"
+    exponents: Annotated[
+        tuple[float, ...] | None,
+        Key(
+            "p and q of the beta law, whose density is as ξ^(p-1) (1-ξ)^(q-1), ξ from 0 to 1 over"
+            " the support",
+            allowed=Range(
+                f"from 1 to {LARGEST_EXPONENT:g}", 1.0, upper=LARGEST_EXPONENT, closed=True
+            ),
+        ),
+    ] = None
+    map: Annotated[
+        Kind,
+        Key(
+            "radius over ξ: hermite, the cubic with the slopes a2 and a4; linear from a1 to a3; or"
+            " exponential, a1 (a3/a1)^ξ"
+        ),
+    ] = "hermite"
     a1: Annotated[FuzzyNumber, Key("radius at the lower end of θ", allowed=UNIT)]
-    a2: Annotated[FuzzyNumber, Key("slope dr/dξ at the lower end")]
     a3: Annotated[FuzzyNumber, Key("radius at the upper end of θ", allowed=UNIT)]
-    a4: Annotated[FuzzyNumber, Key("slope dr/dξ at the upper end")]
+    a2: Annotated[
+        FuzzyNumber | None,
+        Key("slope dr/dξ at the lower end; needed by map hermite", beside=("map", "hermite")),
+    ] = None
+    a4: Annotated[
+        FuzzyNumber | None,
+        Key("slope dr/dξ at the upper end; needed by map hermite", beside=("map", "hermite")),
+    ] = None
 
     @property
-    def slopes(self) -> tuple[FuzzyNumber, FuzzyNumber, FuzzyNumber, FuzzyNumber]:
-        """The factors a1 … a4 of the Hermite functions, eq. 12."""
-        return self.a1, self.a2, self.a3, self.a4
+    def numbers(self) -> dict[str, FuzzyNumber]:
+        """Parameters of the map by name: of eq. 12 the factors a1 … a4 of its functions."""
+        given = {"a1": self.a1, "a2": self.a2, "a3": self.a3, "a4": self.a4}
+        kept = ((name, given[name]) for name in self.family.names)
+        return {name: number for name, number in kept if number is not None}
 
     @property
-    def law(self) -> TruncatedNormal:
-        """The truncated normal law of θ."""
-        return TruncatedNormal(self.theta[0], self.theta[1])
+    def family(self) -> MapFamily:
+        """The maps of this kind, under the law of θ."""
+        return MapFamily(self.map, self.distribution)
+
+    @property
+    def distribution(self) -> ThetaLaw:
+        """The law of θ."""
+        lower, upper = self.theta[0], self.theta[1]
+        if self.law == "normal":
+            return TruncatedNormal(lower, upper)
+        p, q = (1.0, 1.0) if self.exponents is None else self.exponents
+        return Beta(p, q, lower, upper)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

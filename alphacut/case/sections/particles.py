@@ -115,6 +115,9 @@ class Circles(Section):
     ] = 0.0
 
 
+PIXELS = Range("from 0 to 1e6", 0.0, 1e6, closed=True)
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Photograph(Section):
     """Circles segmented from the image of a section."""
@@ -125,6 +128,14 @@ class Photograph(Section):
         Literal["auto", "bright", "dark"], Key("bright or dark against the matrix")
     ] = "auto"
     drop: Annotated[bool, Key("go on without the pieces that are no round particles")] = False
+    crop: Annotated[
+        tuple[float, ...] | None,
+        Key(
+            "the part that is material, without scale bar and caption: left, top, right and bottom"
+            " in pixels from the upper left corner; an image with a rectangle of one grey needs it",
+            allowed=PIXELS,
+        ),
+    ] = None
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

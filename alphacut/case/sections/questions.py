@@ -20,7 +20,7 @@ class Decision(Section):
         Key(
             "limits on the magnitude of outputs of the frame, one or several: 'drift1 <= 40 mm',"
             " 'a3 <= 2 m/s^2', 'base_shear <= 300 kN'; of a drift also a share of the storey's"
-            " height: 'drift1 <= 0.5 %'"
+            " height: 'drift1 <= 0.5 %'; an output may have several"
         ),
     ]
 

@@ -106,6 +106,10 @@ class Envelope(Section):
             allowed=POSITIVE,
         ),
     ] = None
+    shares: Annotated[
+        bool,
+        Key("whether run tells what drives the width: an envelope more for each fuzzy input"),
+    ] = True
     duration: Annotated[float, Key("length of the simulation", "s", allowed=POSITIVE)]
     step: Annotated[float, Key("time step", "s", allowed=POSITIVE)]
 

@@ -22,10 +22,13 @@ from alphacut.stages.material.cell import (
     cell_inputs,
     modal_values,
     parts,
+    phases_of,
 )
 from alphacut.stages.material.cell_models import cell_model
+from alphacut.stochastic import ThetaLaw
+from alphacut.stochastic.radius_map import MapFamily
+from alphacut.stochastic.theta.law import Array
 from alphacut.stochastic.theta.quadrature import between_nodes
-from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     from alphacut.rve.result import Homogenised
@@ -39,9 +42,9 @@ OF_CURVES = (
 SHOWN = 61  # points of a stored stress curve
 
 
-def theta_shown(theta: tuple[float, ...]) -> Array:
+def theta_shown(law: ThetaLaw) -> Array:
     """The θ at which stress curves are stored, shape (SHOWN,)."""
-    return np.linspace(theta[0], theta[1], SHOWN)
+    return np.linspace(law.lower, law.upper, SHOWN)
 
 
 @dataclass(frozen=True)
@@ -51,18 +54,18 @@ class CellTask:
     Args:
         choice: Model of the cell.
         crisp: Inputs that are not fuzzy, by name, in SI.
-        theta: Support of θ.
+        family: Radius maps and the law of θ.
     """
 
     choice: CellChoice
     crisp: Mapping[str, float]
-    theta: tuple[float, ...]
+    family: MapFamily
 
     def __call__(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float | Array]]:
         """Outputs of each point: E, nu, stresses, curves, systems, errors, certificate."""
         values = [{**self.crisp, **point} for point in points]
-        radius, matrix, _ = parts(values[0], self.theta)
-        inclusions = [parts(value, self.theta)[2] for value in values]
+        radius, matrix, _ = parts(values[0], self.family)
+        inclusions = [phases_of(value)[1] for value in values]
         results = cell_model(self.choice).solve(radius, matrix, inclusions)
         outputs: list[dict[str, float | Array]] = []
         for result in results:
@@ -93,13 +96,13 @@ class CellTask:
         """A sample once more with its error estimate or the reason of auto."""
         if self.choice.method not in JUDGED:
             return None
-        radius, matrix, inclusion = parts({**self.crisp, **point}, self.theta)
+        radius, matrix, inclusion = parts({**self.crisp, **point}, self.family)
         model = cell_model(replace(self.choice, estimate=True))
         return model.solve(radius, matrix, [inclusion])[0]
 
     def resampled(self, nodes: Array, stress: Array) -> Array:
         """Stress curve at `SHOWN` points over θ, for pictures."""
-        return between_nodes(nodes, stress, theta_shown(self.theta))
+        return between_nodes(nodes, stress, theta_shown(self.family.law))
 
 
 def plan_of(case: Case) -> Plan:
@@ -145,7 +148,7 @@ class Campaign:
     @property
     def identity(self) -> Document | None:
         """Origin of a sample besides its fuzzy inputs; None without a store."""
-        return identity(self.task.choice, self.task.crisp, self.task.theta) if self.store else None
+        return identity(self.task) if self.store else None
 
 
 def campaign(
@@ -175,7 +178,7 @@ def campaign(
     if case.sections.response and choice.method == "auto" and "series" not in choice.exclude:
         # a curve needs more nodes than its mean, and they cost little
         choice = replace(choice, tolerance=min(choice.tolerance or 1.0, OF_CURVES))
-    task = CellTask(choice, crisp, case.radius.theta)
+    task = CellTask(choice, crisp, case.radius.family)
     shared = tuple(name for name in inputs if name in SHARED) or ("inclusion_modulus",)
     return Campaign(
         task,
@@ -194,8 +197,9 @@ def known(case: Case, inputs: Mapping[str, FuzzyNumber]) -> Known:
     Where both phases have the same Poisson's ratio ν >= 0, more stiff material can only stiffen: A
     and B of eq. 16 rise, and with them E = 3A/2 − A²/(2B); of spheres the bulk modulus and both
     averages of the shear modulus, and with them E of Hill's average. The radius rises with a1, a2,
-    a3 and falls with a4, since h1, h2, h3 >= 0 >= h4 (eq. 12). Nothing is stated for finite
-    elements on the product space, whose error depends on the mesh that moves with the radius.
+    a3 and falls with a4, since h1, h2, h3 >= 0 >= h4 (eq. 12); under maps without slopes it rises
+    with a1 and a3 as well. The law of θ has no part in it. Nothing is stated for finite elements
+    on the product space, whose error depends on the mesh that moves with the radius.
     """
     cell = case.cell
     matrix, inclusion = cell.matrix_modulus.support, cell.inclusion_modulus.support
@@ -223,13 +227,14 @@ def known(case: Case, inputs: Mapping[str, FuzzyNumber]) -> Known:
     return Known(signs=of_inputs, source="as mechanics proves of exact cells")
 
 
-def identity(choice: CellChoice, crisp: Mapping[str, float], theta: tuple[float, ...]) -> Document:
+def identity(task: CellTask) -> Document:
     """Origin of a sample besides its fuzzy inputs: model, resolution, program."""
     source = source_digest(("stochastic", "rve"))
     content = {
-        "choice": asdict(choice),
-        "crisp": dict(crisp),
-        "theta": theta,
+        "choice": asdict(task.choice),
+        "crisp": dict(task.crisp),
+        "map": task.family.kind,
+        "law": repr(task.family.law),
         "source": source,
         "versions": versions(),
     }

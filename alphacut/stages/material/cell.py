@@ -18,7 +18,8 @@ from alphacut.rve.cell import Phase
 from alphacut.rve.result import error_of_means, error_of_ratio, error_of_stiffness
 from alphacut.rve.spheres.result import HomogenisedSpheres
 from alphacut.stages.material import spheres
-from alphacut.stochastic import HermiteMap, RadiusMap, TruncatedNormal
+from alphacut.stochastic import RadiusMap
+from alphacut.stochastic.radius_map import CaseMap, MapFamily
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
@@ -41,8 +42,8 @@ SHARED = tuple(name for name in INPUTS if name != "inclusion_modulus")
 
 
 def cell_inputs(case: Case) -> dict[str, FuzzyNumber]:
-    """The values of `INPUTS`, crisp or fuzzy, in SI."""
-    return dict(zip(INPUTS, case.radius.slopes, strict=False)) | cell_phases(case)
+    """The values of those of `INPUTS` that the map has, crisp or fuzzy, in SI."""
+    return case.radius.numbers | cell_phases(case)
 
 
 def cell_phases(case: Case) -> dict[str, FuzzyNumber]:
@@ -156,11 +157,14 @@ def cell_choice(
     )
 
 
-def parts(values: Mapping[str, float], theta: tuple[float, ...]) -> tuple[HermiteMap, Phase, Phase]:
+def parts(values: Mapping[str, float], family: MapFamily) -> tuple[CaseMap, Phase, Phase]:
     """Radius map, matrix and inclusion from the values of `INPUTS`, in SI."""
-    law = TruncatedNormal(theta[0], theta[1])
-    radius = HermiteMap(values["a1"], values["a2"], values["a3"], values["a4"], law)
-    return radius, *phases_of(values)
+    return family(values), *phases_of(values)
+
+
+def modal_parts(case: Case) -> tuple[CaseMap, Phase, Phase]:
+    """Radius map, matrix and inclusion at the modal values of a case."""
+    return parts(modal_values(case), case.radius.family)
 
 
 def phases_of(values: Mapping[str, float]) -> tuple[Phase, Phase]:
@@ -181,14 +185,14 @@ def solve(case: Case, model: CellModel) -> Homogenised:
         BadInput: r(θ) leaves (0, 1).
     """
     try:
-        radius, matrix, inclusion = parts(modal_values(case), case.radius.theta)
+        radius, matrix, inclusion = modal_parts(case)
     except ValueError as error:
         raise BadInput(Problem("radius", str(error), file=str(case.path))) from None
     return model.solve(radius, matrix, [inclusion])[0]
 
 
 def anisotropy(
-    radius: HermiteMap, matrix: Phase, inclusion: Phase, particles: str = "cylinders"
+    radius: RadiusMap, matrix: Phase, inclusion: Phase, particles: str = "cylinders"
 ) -> tuple[float, float] | None:
     """Shear ratio of a cell and its declared error, by the series whatever model gives E.
 

@@ -21,6 +21,7 @@ from alphacut.io.files import as_json, say, whole_file, write_text
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
 from alphacut.io.units import engineering
+from alphacut.stages.material.micrograph import crop_of, fractions
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
@@ -77,6 +78,7 @@ def source(case: Case) -> Simulated | Measured | SpherePackings:
             photograph.pixel,
             photograph.particles,
             drop=photograph.drop,
+            crop=crop_of(case),
         )
     )
 
@@ -289,9 +291,8 @@ def left_out(found: Microstructure | SphereMicrostructure) -> Iterator[str]:
         )
     if found.is_crystalline:
         yield f"warning: {crystalline(found.hexagonal_order)}"
-    if (fraction := found.sections[0].phase_fraction) is not None:
-        cells = found.sample.area_fraction
-        yield f"area fraction: {fraction:.4f} in the image, {cells:.4f} in the circles' whole cells"
+    if found.sections[0].phase_fraction is not None:
+        yield from fractions(found, found.sections[0].phase_fraction)
 
 
 def crystalline(order: float) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,7 @@ from alphacut.fuzzy import explain as fuzzy_explain
 from alphacut.fuzzy.dry_run import Explanation
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.fuzzy.samples.result import FuzzyResult
-from alphacut.io.files import Document, whole_file
+from alphacut.io.files import Document, say, whole_file
 from alphacut.io.netcdf import read_dataset
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
@@ -23,6 +23,7 @@ from alphacut.stages.material.campaign import Campaign, theta_shown
 from alphacut.stages.material.cell import GPA, CellChoice, anisotropy, parts
 from alphacut.stages.material.cell_models import cell_model
 from alphacut.stages.material.measured_modulus import measured_modulus
+from alphacut.stochastic import ThetaLaw, TruncatedNormal
 
 if TYPE_CHECKING:
     import xarray
@@ -58,7 +59,7 @@ class FuzzyModulus:
     Args:
         result: Bounds of every output over the levels, with all samples.
         choice: Model of the cell that was used.
-        theta: Support of θ.
+        law: Law of θ.
         judged: The modal sample once more, with its estimated error and auto's reason; None for
             models that give both with every sample.
         shear_ratio: Anisotropy of the modal cell, see `rve.anisotropy`; None where it could not be
@@ -67,7 +68,7 @@ class FuzzyModulus:
 
     result: FuzzyResult
     choice: CellChoice
-    theta: tuple[float, ...] = (-3.0, 3.0)
+    law: ThetaLaw = field(default_factory=TruncatedNormal)
     judged: Homogenised | None = None
     shear_ratio: tuple[float, float] | None = None
 
@@ -187,7 +188,7 @@ class FuzzyModulus:
         coordinates = {
             "error_name": list(self.error),
             "check_name": list(checks),
-            "theta": theta_shown(self.theta),
+            "theta": theta_shown(self.law),
             "alpha": result.alpha,
             "bound": ["lower", "upper"],
             "parameter": list(result.inputs),
@@ -256,16 +257,16 @@ def compute(wanted: Campaign, *, workers: int = 1, progress: Tick | None = None)
         alpha=wanted.alpha,
         shared=wanted.shared,
         workers=workers,
-        progress=progress,
+        progress=progress or False,
         known=wanted.known,
         store=wanted.store,
         identity=wanted.identity,
     )
     modal = {name: number.modal for name, number in wanted.inputs.items()}
-    cell = parts({**wanted.task.crisp, **modal}, wanted.task.theta)
-    choice, theta = wanted.task.choice, wanted.task.theta
+    cell = parts({**wanted.task.crisp, **modal}, wanted.task.family)
+    choice, law = wanted.task.choice, wanted.task.family.law
     ratio = anisotropy(*cell, choice.particles)
-    return FuzzyModulus(result, choice, theta, wanted.task.judged(modal), ratio)
+    return FuzzyModulus(result, choice, law, wanted.task.judged(modal), ratio)
 
 
 def explain(wanted: Campaign) -> Explanation:
@@ -281,9 +282,20 @@ def explain(wanted: Campaign) -> Explanation:
     )
 
 
-def write(modulus: FuzzyModulus, path: Path | str, *, case_text: str, key: str) -> None:
-    """Write ``modulus.nc``, whole or not at all."""
+def write(
+    modulus: FuzzyModulus, path: Path | str, *, case_text: str, key: str, outside: str = ""
+) -> None:
+    """Write ``modulus.nc``, whole or not at all.
+
+    Args:
+        modulus: What to write.
+        path: The file.
+        case_text: The case it is of.
+        key: Fingerprint of what it depends on.
+        outside: Warning to whoever reads E that it leaves bounds, or ''.
+    """
     dataset = modulus.dataset().assign_attrs(attributes(case_text, key))
+    dataset = dataset.assign_attrs(outside=outside) if outside else dataset
     with whole_file(path) as partial:
         dataset.to_netcdf(partial)
 
@@ -298,8 +310,8 @@ def listed(dataset: xarray.Dataset, kind: str) -> dict[str, float]:
     }
 
 
-def read_number(path: Path | str, option: str = "--modulus") -> FuzzyNumber:
-    """The fuzzy modulus in Pa from a file that `write` made.
+def read_number(path: Path | str, option: str = "--modulus", *, warn: bool = True) -> FuzzyNumber:
+    """The fuzzy modulus in Pa from a file that `write` made, and its warning unless not to `warn`.
 
     Raises:
         BadInput: The file is missing, holds no modulus, or was written by a newer program.
@@ -316,6 +328,8 @@ def read_number(path: Path | str, option: str = "--modulus") -> FuzzyNumber:
                 "a modulus.nc of this program",
             )
         ) from None
+    if warn and (warned := dataset.attrs.get("outside")):
+        say(f"warning: {option}: {warned}")
     if len(alpha) == 1:
         return Crisp(float(ends.mean()))
     return PiecewiseLinear(

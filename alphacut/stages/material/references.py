@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from alphacut.case.case import Case
+from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import Document, say
 from alphacut.rve import bounds as plane
 from alphacut.rve.anisotropy import plane_average
@@ -15,12 +18,17 @@ from alphacut.rve.result import effective_modulus
 from alphacut.rve.spheres import bounds as space
 from alphacut.rve.spheres.cubic import hill_average
 from alphacut.rve.spheres.result import volume_fraction
-from alphacut.stages.material.cell import modal_values, parts
+from alphacut.stages.material.cell import cell_inputs, modal_parts, parts
+from alphacut.stages.material.modulus import FuzzyModulus
 from alphacut.stages.material.spheres import says_spheres
-from alphacut.stochastic import HermiteMap, gauss_rule
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.stochastic import RadiusMap, gauss_rule
+from alphacut.stochastic.theta.law import Array
 
 GPA = 1e9
+VALUES = ("E", "nu")
+KINDS = ("fibres", "spheres")
+Cuts = tuple[Array, Array, Array]
+"""Levels α, rising, with the lower and upper ends of E in Pa, shape (A,) each."""
 SLACK = 1e-4
 """Share of E by which it may pass a bound without a warning: what models of the cell declare."""
 
@@ -65,7 +73,7 @@ class References:
 
 
 def references(
-    radius: HermiteMap,
+    radius: RadiusMap,
     phases: tuple[Phase, Phase],
     moduli: tuple[float, float],
     ratio: float | None,
@@ -80,34 +88,93 @@ def references(
         ratio: Shear modulus along the diagonals over that along the axes; None where unknown.
         particles: "cylinders" or "spheres".
     """
-    rule = gauss_rule(radius.distribution, points=40)
-    radii = radius(rule.nodes)
-    part = volume_fraction(radii) if particles == "spheres" else np.pi / 4 * radii**2
-    share = np.asarray(rule.mean(part), float)
-    in_plane, in_space = (
-        plane.hashin_shtrikman(share, *phases),
-        space.hashin_shtrikman(share, *phases),
-    )
+    share = np.asarray(mean_share(radius, particles))
+    fibres, spheres = bounds_of(float(share), phases)
     whole, _, shear = plane.mori_tanaka(share, *phases)
     average = None if particles == "spheres" or ratio is None else _average(*moduli, ratio)
     return References(
         particles,
         float(share),
-        (_across(in_plane[:, 0]), _across(in_plane[:, 1])),
-        _across(np.array([whole / 2, shear])),
-        (_young(in_space[:, 0]), _young(in_space[:, 1])),
-        _young(space.mori_tanaka(share, *phases)),
+        fibres,
+        across(np.array([whole / 2, shear])),
+        spheres,
+        young(space.mori_tanaka(share, *phases)),
         average,
     )
 
 
-def _across(moduli: Array) -> float:
+def bounds_over_cuts(case: Case, alpha: Sequence[float]) -> Document:
+    """Least lower and greatest upper bound of E on each level, in GPa, of fibres and of spheres.
+
+    At the corners of the box of the cell's inputs, and half-way of Poisson's ratios, in which the
+    bounds need not be monotone.
+
+    Args:
+        case: With a cell and its radius.
+        alpha: Levels, shape (A,).
+    """
+    inputs = cell_inputs(case)
+    ends = np.array([_over_box(case, inputs, level) for level in alpha])
+    return {
+        "alpha": list(alpha),
+        **{
+            kind: {"lower": ends[:, k, 0] / GPA, "upper": ends[:, k, 1] / GPA}
+            for k, kind in enumerate(KINDS)
+        },
+    }
+
+
+def _over_box(case: Case, inputs: dict[str, FuzzyNumber], level: float) -> Array:
+    """Bounds over one α-cut, shape (fibres and spheres, 2), in Pa."""
+    found = np.array(list(_at_corners(case, inputs, level)))
+    return np.stack([found[..., 0].min(axis=0), found[..., 1].max(axis=0)], axis=-1)
+
+
+def _at_corners(case: Case, inputs: dict[str, FuzzyNumber], level: float) -> Iterator[Array]:
+    """Bounds at each corner, shape (fibres and spheres, 2), in Pa."""
+    family, particles = case.radius.family, case.cell.particles
+    shares: dict[RadiusMap, float] = {}
+    for corner in itertools.product(*(_places(name, n, level) for name, n in inputs.items())):
+        radius, *phases = parts(dict(zip(inputs, corner, strict=True)), family)
+        if radius not in shares:
+            shares[radius] = mean_share(radius, particles)
+        yield np.array(bounds_of(shares[radius], (phases[0], phases[1])))
+
+
+def _places(name: str, number: FuzzyNumber, level: float) -> list[float]:
+    """Values of an input that are tried on a level."""
+    low, high = number.cut(level)
+    middle = {(low + high) / 2} if name.endswith("poisson") else set[float]()
+    return sorted({low, high} | middle)
+
+
+def mean_share(radius: RadiusMap, particles: str) -> float:
+    """Mean part of the material that the particles take."""
+    rule = gauss_rule(radius.distribution, points=40)
+    radii = radius(rule.nodes)
+    part = volume_fraction(radii) if particles == "spheres" else np.pi / 4 * radii**2
+    return float(rule.mean(part))
+
+
+def bounds_of(
+    share: float, phases: tuple[Phase, Phase]
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Bounds of E in Pa of long fibres, across them, and of spheres: lower and upper of each."""
+    at = np.asarray(share)
+    in_plane, in_space = plane.hashin_shtrikman(at, *phases), space.hashin_shtrikman(at, *phases)
+    return (across(in_plane[:, 0]), across(in_plane[:, 1])), (
+        young(in_space[:, 0]),
+        young(in_space[:, 1]),
+    )
+
+
+def across(moduli: Array) -> float:
     """E of eq. 16 of an isotropic plane, from its bulk and shear modulus."""
     bulk, shear = 2 * STRAIN * moduli
     return effective_modulus(float(bulk), float(shear))[0]
 
 
-def _young(moduli: Array) -> float:
+def young(moduli: Array) -> float:
     """E of an isotropic material from K and μ."""
     bulk, shear = moduli
     return float(hill_average(np.array([bulk, shear, shear]))[0])
@@ -120,27 +187,53 @@ def _average(modulus: float, poisson: float, ratio: float) -> float:
     return float(plane_average(np.array([whole, 2 * diagonals, axes]))[0])
 
 
-def beside(case: Case, modulus: float, poisson: float, ratio: float | None) -> Document:
-    """References at the modal values of a case's cell, and a warning where E contradicts its words.
+def beside(
+    case: Case,
+    modulus: float,
+    poisson: float,
+    ratio: float | None,
+    cuts: Cuts | None = None,
+) -> Document:
+    """References at the modal values of a case's cell, over its α-cuts, and what they say of E.
 
     Args:
         case: With a cell and its radius.
         modulus: E in Pa at the modal values.
         poisson: ν there.
         ratio: Its shear ratio; None where unknown.
+        cuts: Levels with the lower and upper ends of E in Pa, where E is fuzzy.
+
+    Returns:
+        "beside", with "cuts" where E is fuzzy, "outside", a warning where E contradicts the case's
+        words or data, and "publish", which E to publish.
     """
-    radius, matrix, inclusion = parts(modal_values(case), case.radius.theta)
+    radius, matrix, inclusion = modal_parts(case)
     particles, moduli = case.cell.particles, (modulus, poisson)
     ratio = None if case.modulus.average == "isotropic" else ratio  # E is that average itself
     found = references(radius, (matrix, inclusion), moduli, ratio, particles).document()
-    return {"beside": found, "outside": outside(case, found, modulus / GPA)}
+    support = (modulus, modulus)
+    if cuts is not None and len(cuts[0]):
+        found["cuts"] = bounds_over_cuts(case, [float(level) for level in cuts[0]])
+        support = float(cuts[1][0]), float(cuts[2][0])
+    return {
+        "beside": found,
+        "outside": outside(case, found, modulus / GPA, (support[0] / GPA, support[1] / GPA)),
+        "publish": publish(case, found),
+    }
+
+
+def of_modulus(case: Case, found: FuzzyModulus) -> Document:
+    """`beside` a fuzzy modulus."""
+    modal, poisson = (float(np.mean([ends[-1] for ends in found.result.bounds(x)])) for x in VALUES)
+    cuts = (np.asarray(found.result.alpha), *found.result.bounds("E"))
+    return beside(case, modal, poisson, found.shear_ratio and found.shear_ratio[0], cuts)
 
 
 def text_of(case: Case, told: Document) -> str:
-    """The line of the references for people; a warning goes to standard error."""
+    """The lines of the references for people; a warning goes to standard error."""
     if told["outside"]:
         say(f"warning: {told['outside']}")
-    return f"{line(told['beside'], case.cell.particles)}\n"
+    return f"{line(told['beside'], case.cell.particles)}\n{told['publish']}\n"
 
 
 def line(found: Document, particles: str) -> str:
@@ -157,12 +250,52 @@ def line(found: Document, particles: str) -> str:
     )
     return (
         f"Hashin–Shtrikman bounds of E at the fraction {found['fraction']:.4f}, GPa:"
-        f" {'; '.join(kinds)}{own}; {shape}"
+        f" {'; '.join(kinds)}{own}; {shape}{over_support(found)}"
     )
 
 
-def outside(case: Case, found: Document, modulus: float) -> str:
-    """Warning where E in GPa leaves the bounds in space and the case's words say spheres, or ''."""
+def over_support(found: Document) -> str:
+    """The bounds beside a fuzzy E, over the same whole ranges of its inputs; empty without."""
+    cuts = found.get("cuts")
+    if cuts is None:
+        return ""
+    ends = [
+        f"{words} {cuts[kind]['lower'][0]:.3f} … {cuts[kind]['upper'][0]:.3f}"
+        for words, kind in (("long fibres", "fibres"), ("spheres", "spheres"))
+    ]
+    return f". Over the inputs' ranges at α = {cuts['alpha'][0]:g}: {'; '.join(ends)}"
+
+
+def publish(case: Case, found: Document) -> str:
+    """Which E to publish, in one sentence."""
+    if case.cell.particles == "spheres":
+        return "To publish: this E, the isotropic (Hill) average of spheres in a cubic array."
+    if (told := says_spheres(case)) is not None:
+        return (
+            f'To publish, since {told}: E of spheres, by cell.particles = "spheres"; the E above is'
+            " of long parallel fibres, across them."
+        )
+    if case.modulus.average == "isotropic":
+        return "To publish: this E, the isotropic average of the square array."
+    average = found["isotropic_average_E_GPa"]
+    told = f", {average:.3f} GPa at the modal values" if average else ""
+    return (
+        f"To publish for long fibres: the isotropic average{told}"
+        ' (modulus.average = "isotropic"); E of the square array (eq. 16) is of its axes alone.'
+    )
+
+
+def outside(
+    case: Case, found: Document, modulus: float, support: tuple[float, float] | None = None
+) -> str:
+    """Warning where E in GPa leaves the bounds in space and the case's words say spheres, or ''.
+
+    Args:
+        case: The case.
+        found: The references.
+        modulus: E at the modal values.
+        support: E at the lowest level, where it is fuzzy.
+    """
     told = says_spheres(case)
     if told is None:
         return ""
@@ -171,7 +304,20 @@ def outside(case: Case, found: Document, modulus: float) -> str:
         return ""
     side, bound = ("below", low) if modulus < low else ("above", high)
     return (
-        f"E = {modulus:.3f} GPa lies {side} the Hashin–Shtrikman bound {bound:.3f} GPa of spheres,"
-        f" and {told}: its discs are long fibres;"
+        f"E = {modulus:.3f} GPa lies {side} the Hashin–Shtrikman bound {bound:.3f} GPa of spheres"
+        f"{_whole(found, support)}, and {told}: its discs are long fibres, and its nu is theirs"
+        " too;"
         ' cell.particles = "spheres" takes spheres, "cylinders" ends this warning'
     )
+
+
+def _whole(found: Document, support: tuple[float, float] | None) -> str:
+    """Words where the whole fuzzy E lies beyond the bounds over the same cuts."""
+    cuts = found.get("cuts")
+    if cuts is None or support is None:
+        return ""
+    least, most = cuts["spheres"]["lower"][0], cuts["spheres"]["upper"][0]
+    ends = f"[{support[0]:.3f}, {support[1]:.3f}] GPa"
+    if support[1] < least or support[0] > most:
+        return f" (so does all of its support {ends}: bounds there {least:.3f} … {most:.3f})"
+    return f" (its support is {ends}, the bounds over it {least:.3f} … {most:.3f})"

@@ -49,7 +49,7 @@ def random_response(case: Case, modulus: xarray.Dataset) -> RandomResponse:
         values, plan="stored samples"
     )
     return RandomResponse.from_curves(
-        samples, "curve", theta="theta", quantile=case.radius.law.quantile
+        samples, "curve", theta="theta", quantile=case.radius.distribution.quantile
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from alphacut.rve.result import effective_modulus
 from alphacut.rve.spheres.bounds import mori_tanaka as of_spheres
 from alphacut.rve.spheres.cubic import cubic_voigt, hill_average, young_along
 from alphacut.rve.spheres.result import HomogenisedSpheres
-from alphacut.stochastic import HermiteMap, gauss_rule
+from alphacut.stochastic import RadiusMap, gauss_rule
 from alphacut.stochastic.theta.truncated_normal import Array
 
 GPA = 1e9
@@ -128,6 +129,16 @@ def remark(case: Case, share: float, matrix: Phase, inclusion: Phase) -> str | N
     )
 
 
+def unmeasured(case: Case) -> Iterator[str]:
+    """That warning before the fraction is known: without the size of the difference."""
+    if case.cell.particles == "cylinders" and (told := says_spheres(case)) is not None:
+        yield (
+            f"cell.particles: {told}, and the particles are cylinders, whose E is lower than that"
+            ' of stiffer spheres; cell.particles = "spheres" takes spheres, "cylinders" ends this'
+            " warning"
+        )
+
+
 def says_spheres(case: Case) -> str | None:
     """What of a case says that its particles are round in space; None where nothing does.
 
@@ -144,7 +155,7 @@ def says_spheres(case: Case) -> str | None:
     return None
 
 
-def area_share(radius: HermiteMap) -> float:
+def area_share(radius: RadiusMap) -> float:
     """Mean area fraction of a cylinder over θ, E[π r²/4]."""
     rule = gauss_rule(radius.distribution, points=40)
     return float(rule.mean(np.pi / 4 * radius(rule.nodes) ** 2))

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from alphacut.frame import Accelerogram
 
 COLUMNS = {"time": "s", "acceleration": "m/s^2"}
-ALLOWED = "time [s],acceleration [m/s^2], or [g]"
+ALLOWED = "time [s],acceleration [m/s^2], [g] or [gal]"
 PAIR = "a time and an acceleration, such as 0.02,-0.35, with points and not commas in the numbers"
 EVEN = 1e-6  # relative: steps that differ by more are not even
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from alphacut.case.case import Case
-from alphacut.case.limits import limits_of
+from alphacut.case.limits import Limit, limits_of
 from alphacut.io.files import Document
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
@@ -50,9 +50,10 @@ def decision(
     from alphacut.frame.structures.modes import ModalError
 
     limits, task = limits_of(case), task_of(case)
-    if peaks is None or not set(limits) <= set(map(str, peaks["output"].values)):
+    outputs = tuple(dict.fromkeys(one.output for one in limits))
+    if peaks is None or not set(outputs) <= set(map(str, peaks["output"].values)):
         assert wanted.frame is not None
-        limited = replace(wanted, model=replace(wanted.frame, outputs=tuple(limits)))
+        limited = replace(wanted, model=replace(wanted.frame, outputs=outputs))
         peaks = with_peaks(envelope.compute(limited, task), limited, task)
     try:
         found = _decisions(wanted, task, limits, workers, progress)
@@ -64,7 +65,7 @@ def decision(
 def _decisions(
     wanted: Structure,
     task: EnvelopeTask,
-    limits: Mapping[str, float],
+    limits: Sequence[Limit],
     workers: int,
     progress: Tick | None,
 ) -> dict[str, Exceeding]:
@@ -84,20 +85,20 @@ def _decisions(
             workers=workers,
         )
 
-    each = {}
-    for name, limit in limits.items():
-        each[name] = of({name: limit})
+    each, least = {}, {one.output: one.value for one in sorted(limits, key=lambda x: -x.value)}
+    for one in limits:
+        each[one.name] = of({one.output: one.value})
         if progress:
             progress(len(each) / count)
     if count == 2:
         return each
-    passed = any(one.scale.safe is None for one in each.values())
-    return {**each, ANY: any_exceeding(each, of(limits) if passed else None)}
+    passed = any(found.scale.safe is None for found in each.values())
+    return {**each, ANY: any_exceeding(each, of(least) if passed else None)}
 
 
 def _dataset(
     found: Mapping[str, Exceeding],
-    limits: Mapping[str, float],
+    limits: Sequence[Limit],
     peaks: xarray.Dataset,
     task: EnvelopeTask,
 ) -> xarray.Dataset:
@@ -106,13 +107,14 @@ def _dataset(
     names = [*next(iter(found.values())).scale.names]
     nowhere = np.full(len(names), np.nan)
     witness = [nowhere if x.scale.witness is None else x.scale.witness for x in found.values()]
-    of = peaks["peak"].sel(output=list(limits)).transpose("alpha", "bound", "output").values
+    outputs, values = [one.output for one in limits], [one.value for one in limits]
+    of = peaks["peak"].sel(output=outputs).transpose("alpha", "bound", "output").values
     above, below = (
-        peaks[name].sel(output=list(limits)).values if name in peaks else 0.0
+        peaks[name].sel(output=outputs).values if name in peaks else 0.0
         for name in ("peak_error", "peak_below")
     )
     ends = np.stack([of[:, 1] + above, np.maximum(of[:, 0] - below, 0.0)], axis=1)
-    margin = np.array([*limits.values()]) - ends
+    margin = np.array(values) - ends
     words = {"units": "SI, by output", "long_name": "limit less the peak of the magnitude"}
     return xarray.Dataset(
         {
@@ -126,8 +128,9 @@ def _dataset(
             "bound": ["lower", "upper"],
             "parameter": names,
             "alpha": peaks["alpha"].values,
-            "output": list(limits),
-            "allowed": ("output", [*limits.values()], {"units": "SI, by output"}),
+            "output": [one.name for one in limits],
+            "observed": ("output", outputs),
+            "allowed": ("output", values, {"units": "SI, by output"}),
         },
         {
             "verdict": ", ".join(x.verdict for x in found.values()),
@@ -157,9 +160,11 @@ def decision_document(found: xarray.Dataset) -> Document:
             "witness": None if np.isnan(one["witness"].values).any() else point,
         }
     for name in map(str, found["output"].values):
+        observed = str(found.coords.get("observed", found["output"]).sel(output=name).values)
         margins[name] = {
+            "output": observed,
             "limit": float(found["allowed"].sel(output=name)),
-            "unit": output_unit(name),
+            "unit": output_unit(observed),
             **{side: found["margin"].sel(output=name, bound=side).values for side in SIDES},
         }
     facts = {key: found.attrs[key] for key in ("reason", "claim", "step", "peaks")}
@@ -188,7 +193,7 @@ def sentences(found: Document) -> Iterator[str]:
         of = name
         if name in found["margins"]:
             margin = found["margins"][name]
-            of = f"|{name}| > {engineering(margin['limit'], margin['unit'])}"
+            of = f"|{margin.get('output', name)}| > {engineering(margin['limit'], margin['unit'])}"
         (a, b), (c, d) = one["possibility"], one["necessity"]
         degrees = f"possible to {degree(a, b)}, necessary to {degree(c, d)}"
         worth = f"{one['nature']}, at nodes every {found['step']:g} s"

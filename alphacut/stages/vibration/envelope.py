@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING
 from alphacut.case.case import Case
 from alphacut.case.limits import asked_gap, asked_tolerance, names_rough_integrator
 from alphacut.io.files import Document, say, whole_file
+from alphacut.io.kept_arrays import KeptArrays
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
 from alphacut.io.provenance import attributes, versions
 from alphacut.stages.contract import keep
 from alphacut.stages.vibration.envelope_task import EnvelopeTask
+from alphacut.stages.vibration.provable import too_many, unproved_reason
 from alphacut.stages.vibration.resolution_checks import guard_against
 from alphacut.stages.vibration.structure import Structure
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -33,6 +35,7 @@ def compute(
     strict: bool = False,
     workers: int = 1,
     progress: Tick | None = None,
+    kept: KeptArrays | None = None,
 ) -> Envelope:
     """The envelope of all outputs on all levels.
 
@@ -42,26 +45,47 @@ def compute(
         strict: Refuse a step or tolerance that is coarse beside the motion instead of warning.
         workers: Processes that share the proof, where a certificate is wanted.
         progress: Told the share done.
+        kept: Keeps what is found so far, until the envelope is whole; None for nothing.
     """
     from alphacut import frame
 
+    require_affordable(wanted, task)
     guard_against(wanted, task, strict=strict)
     given = arguments(wanted, task)
     if task.certify is not None:
         given["workers"] = workers
     try:
         with told_once():
-            return frame.envelope(wanted.model, progress=progress, **given)
+            found = frame.envelope(wanted.model, progress=progress, kept=kept, **given)
     except ValueError as error:
         raise BadInput(Problem("envelope", str(error))) from None
+    return found
+
+
+def require_affordable(wanted: Structure, task: EnvelopeTask) -> None:
+    """Refuse a certificate with more inputs than a proof is affordable for.
+
+    Raises:
+        BadInput: It is asked for.
+    """
+    if task.certify is not None and (problems := list(too_many("certify", wanted, task))):
+        raise BadInput(problems)
 
 
 def explain(wanted: Structure, task: EnvelopeTask) -> list[str]:
-    """A line for each method that would be tried: what it does, and the seconds expected."""
+    """A line for each method that would be tried: what it does, and the seconds expected.
+
+    Before them the reason why a certificate that is asked for will not be proved.
+    """
     from alphacut import frame
 
+    require_affordable(wanted, task)
+    reason = unproved_reason(wanted, task) if task.certify is not None else ""
+    told = [f"certify: verified by sampling, not proved: {reason}"] if reason else []
     try:
-        return [str(candidate) for candidate in frame.plan(wanted.model, **arguments(wanted, task))]
+        return told + [
+            str(candidate) for candidate in frame.plan(wanted.model, **arguments(wanted, task))
+        ]
     except ValueError as error:
         raise BadInput(Problem("envelope", str(error))) from None
 

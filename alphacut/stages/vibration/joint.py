@@ -84,7 +84,7 @@ def joint(case: Case, wanted: Structure) -> xarray.Dataset:
     supports = np.array([number.cut(task.alpha[0]) for number in inputs.values()])
     pair = Pair(flow, (one, other)).scaled(*supports.T)
     try:
-        found = joint_outputs(pair, inputs, alpha=task.alpha, vectorised=True)
+        found = joint_outputs(pair, inputs, alpha=task.alpha, vectorised=True, progress=False)
     except ValueError as error:
         raise BadInput(Problem("joint", str(error), file=str(case.path))) from None
     words = [

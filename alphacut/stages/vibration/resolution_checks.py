@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import acos, cos, pi
+from math import acos, ceil, cos, pi
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from alphacut.io.files import say
 from alphacut.io.problem import BadInput, Problem
@@ -14,6 +16,7 @@ if TYPE_CHECKING:
     from alphacut.stages.vibration.envelope_task import EnvelopeTask
 
 MISSED = 0.01  # of a peak, between two nodes
+ADDED = 0.03  # of a peak that its bound between nodes adds
 WITH_TOLERANCE = ("auto", "modal", "graph-follower", "improved-graph-follower")
 
 
@@ -22,6 +25,7 @@ def rough(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
     yield from coarse_step(wanted, task)
     yield from coarse_tolerance(wanted, task)
     yield from coarse_nodes(wanted, task)
+    yield from coarse_outputs(wanted, task)
 
 
 def coarse_step(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
@@ -88,6 +92,25 @@ def coarse_nodes(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
             f" {2 * acos(1 - MISSED) / slowest:.2g} s"
         )
         yield Problem("envelope.step", what)
+
+
+def coarse_outputs(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
+    """Outputs whose peaks are bounded between nodes some hundredths higher than at them."""
+    from alphacut.frame.checks.between_nodes import stray
+    from alphacut.frame.exceedance import within_steps
+
+    if wanted.linear is None:
+        return
+    flow = wanted.flow((), task.duration, task.step, "exact")
+    size, nothing = np.abs(flow.values(np.zeros((1, 0)))[0]), np.zeros((1, 0))
+    peak = np.maximum(size.max(0), 1e-300)
+    added = within_steps(size, stray(flow, nothing)).max(0) / peak - 1
+    coarse = [k for k in np.argsort(-added) if added[k] > ADDED and size[:, k].any()]
+    if coarse:
+        each = ", ".join(f"{flow.outputs[k]} {100 * added[k]:.0f} %" for k in coarse)
+        finer = task.step / ceil((added[coarse[0]] / ADDED) ** 0.5)  # it falls with the square
+        what = f"{task.step:g} s between nodes leaves peaks between them open by some {each}"
+        yield Problem("envelope.step", f"{what}; {finer:.3g} s leaves {100 * ADDED:g} %")
 
 
 def guard_against(wanted: Structure, task: EnvelopeTask, *, strict: bool) -> None:

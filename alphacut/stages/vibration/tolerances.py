@@ -178,7 +178,13 @@ def _moduli(cell: Campaign, scale: float) -> tuple[float, float]:
         low, high = _scaled(number, scale)
         inputs[name] = Interval(low, high)
     found = propagate(
-        cell.task, inputs, Signed(outputs=("E",)), alpha=[1.0], shared=cell.shared, known=cell.known
+        cell.task,
+        inputs,
+        Signed(outputs=("E",)),
+        alpha=[1.0],
+        shared=cell.shared,
+        known=cell.known,
+        progress=False,
     )
     lower, upper = found.bounds("E")
     return float(lower[0]), float(upper[0])

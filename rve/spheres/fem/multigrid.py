@@ -8,10 +8,9 @@ quadratic ones too, its stiffness is Galerkin's.
 
 from __future__ import annotations
 
-from alphacut.rve.petsc import PETSc
+from alphacut.rve.petsc import PETSc, in_database
 from alphacut.rve.solver.krylov import ConvergenceError
 from alphacut.rve.solver.options import PREFIX
-from alphacut.rve.solver.petsc_options import in_database
 from alphacut.stochastic.theta.truncated_normal import Array
 
 SOLVER = "cg, multigrid quadratic–linear–gamg"

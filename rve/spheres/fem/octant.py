@@ -10,6 +10,7 @@ from dolfinx.io import gmshio
 from mpi4py import MPI
 
 from alphacut.rve.mesh.planar import TouchingError
+from alphacut.rve.ranks import Ranks
 from alphacut.rve.settings import require_mesh_size, require_radius
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -48,8 +49,7 @@ def octant(radius: float, *, size: float, comm: MPI.Comm = MPI.COMM_SELF) -> gms
     try:
         gmsh.option.setNumber("General.NumThreads", 1)
         gmsh.option.setNumber("General.Terminal", 0)  # errors are raised, the rest is not for here
-        if comm.rank == 0:
-            _generate_sound(radius, size)
+        Ranks(comm).first(lambda: _generate_sound(radius, size))
         return gmshio.model_to_mesh(gmsh.model, comm, 0, gdim=3)
     finally:
         gmsh.finalize()

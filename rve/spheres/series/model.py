@@ -9,7 +9,7 @@ from time import perf_counter
 import numpy as np
 
 from alphacut.rve.cell import Phase
-from alphacut.rve.settings import require_accuracy, require_points
+from alphacut.rve.settings import require_accuracy, require_parts, require_points
 from alphacut.rve.slices.theta_rule import settle_rule
 from alphacut.rve.spheres.cubic import cubic_moduli
 from alphacut.rve.spheres.result import HomogenisedSpheres, certified_spheres
@@ -49,6 +49,7 @@ class SphereSeriesModel:
             SeriesError: Spheres nearly touch.
             RuleError: No rule in θ settles (a map that is not smooth).
         """
+        require_parts(radius_map, matrix, inclusions)
         start = perf_counter()
         used: dict[float, tuple[Array, Array]] = {}
 

@@ -115,7 +115,10 @@ def test_levels_on_the_command_line_are_a_list(capfd):
         (["modulus", PAPER, "--out", "/proc/none/m.nc"], "nothing can be written in /proc"),
         (["modulus", PAPER, "--out", "m.csv"], r"this ending is not known; allowed: \.nc"),
         (["envelope", PAPER, "--out", "m.csv"], r"this ending is not known; allowed: \.nc"),
-        (["mesh", PAPER, "--out", "m.stl"], "no format that holds quadratic elements.*allowed: .vtu"),
+        (
+            ["mesh", PAPER, "--out", "m.stl"],
+            "no format that holds quadratic elements.*allowed: .vtu",
+        ),
         (["cell", PAPER, "--json", "x.csv"], "not that of JSON"),
         (["cell", PAPER, "--json", PAPER + "/x.json"], "nothing can be written"),
     ],

@@ -4,6 +4,8 @@ whatever the workers.
 
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -289,9 +291,8 @@ def test_a_second_run_takes_what_is_up_to_date(tmp_path, monkeypatch, capfd):
 
 
 def test_another_structure_or_record_is_computed_anew(tmp_path, capfd):
-    import xarray
-
-    from alphacut.stages.pipeline import Chain, studies
+    from alphacut.stages.pipeline import Chain
+    from alphacut.stages.vibration.studies import studies
 
     record = tmp_path / "building.record.csv"
     record.write_text((CASES / "building.record.csv").read_text(encoding="utf-8"), encoding="utf-8")
@@ -301,12 +302,7 @@ def test_another_structure_or_record_is_computed_anew(tmp_path, capfd):
 
     def key_of(changes):
         chain = Chain(load(case, changes), tmp_path, quiet=True)
-        keys = []
-        object.__setattr__(
-            chain, "stored", lambda name, key, compute: keys.append(key) or xarray.Dataset()
-        )
-        chain.envelope(studies(chain.case)[0], None, None)
-        return keys[0]
+        return chain.key_of(studies(chain.case)[0], None)
 
     for changes in ([], ["tower.mass=12 t/m"], ["envelope.step=0.04 s"]):
         seen.add(key_of(changes))
@@ -353,6 +349,22 @@ def test_an_interrupt_says_how_to_go_on(monkeypatch, capfd):
     assert "the same command goes on from there" in capfd.readouterr().err
 
 
+def test_a_command_line_means_the_command_that_it_begins_with():
+    assert list(COMMANDS.meant(["repair", "run"])) == ["repair"]
+    assert list(COMMANDS.meant(["--version", "run"])) == list(COMMANDS)
+    assert list(COMMANDS.meant([])) == list(COMMANDS)
+
+
+def test_a_command_loads_no_other():
+    program = (
+        "import sys; from alphacut.entry import main; main(['check', 'no-such.toml']);"
+        " print(*(name for name in sys.modules if name.startswith('alphacut.commands.')))"
+    )
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert "alphacut.commands.check" in run.stdout.split()
+    assert not {"alphacut.commands.run", "alphacut.commands.cell"} & set(run.stdout.split())
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_has_help_and_takes_quiet(name):
     _, made = parsers("alphacut", COMMANDS)
@@ -391,3 +403,12 @@ def test_the_other_cases_draw_their_figures_too(name, tmp_path, capfd):
     summary = quick_run(CASES / f"{name}.toml", tmp_path, capfd)
     assert summary["figures"]
     assert all((tmp_path / figure).stat().st_size > 1000 for figure in summary["figures"])
+
+
+def test_the_program_ends_with_its_status_its_output_and_what_was_left_for_the_end():
+    program = (
+        "import atexit; from alphacut.entry import leave; atexit.register(print, 'last');"
+        " print('first'); leave(3)"
+    )
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (run.returncode, run.stdout, run.stderr) == (3, "first\nlast\n", "")

@@ -1,12 +1,11 @@
-"""Progress is shown on a terminal and nowhere else. They say what
-they ran.
-"""
+"""Progress: a bar on a terminal, a line now and then elsewhere, nothing when quiet."""
 
 import io
 import sys
 
 import pytest
 
+from alphacut.io import progress as told
 from alphacut.io.progress import progress
 
 
@@ -29,13 +28,47 @@ def test_a_terminal_sees_the_share_done_and_the_time_left(monkeypatch):
 
 @pytest.mark.parametrize(
     ("stream", "quiet", "rank"),
-    [(io.StringIO(), False, "0"), (Terminal(), True, "0"), (Terminal(), False, "1")],
+    [(io.StringIO(), True, "0"), (Terminal(), True, "0"), (Terminal(), False, "1")],
 )
-def test_nothing_is_shown_off_a_terminal_when_quiet_or_on_other_ranks(
-    stream, quiet, rank, monkeypatch
-):
+def test_nothing_is_shown_when_quiet_or_on_other_ranks(stream, quiet, rank, monkeypatch):
     monkeypatch.setattr(sys, "stderr", stream)
     monkeypatch.setenv("OMPI_COMM_WORLD_RANK", rank)
     with progress("Envelopes", quiet=quiet) as tick:
         assert tick is None
     assert stream.getvalue() == ""
+
+
+def test_off_a_terminal_a_line_every_ten_seconds_says_the_share_and_the_time_left(monkeypatch):
+    shown, clock = io.StringIO(), iter([0.0, 4.0, 12.0, 15.0, 24.0])
+    monkeypatch.setattr(sys, "stderr", shown)
+    monkeypatch.setattr(told.time, "monotonic", lambda: next(clock))
+    with progress("Envelopes") as tick:
+        for done in (0.1, 0.25, 0.3, 0.75):
+            tick(done)
+    lines = shown.getvalue().splitlines()
+    assert [line.split("Envelopes: ")[1] for line in lines] == [
+        "25% done after 12 s, some 36 s left",
+        "75% done after 24 s, some 8 s left",
+    ]
+
+
+def test_an_interrupted_envelope_without_a_file_says_that_nothing_is_kept():
+    from argparse import Namespace
+
+    from alphacut.entry import interrupted
+
+    assert "nothing is kept" in interrupted(Namespace(command="envelope", out=None))
+    assert "goes on from there" in interrupted(Namespace(command="envelope", out="x.nc"))
+    assert "goes on from there" in interrupted(Namespace(command="run", out=None))
+
+
+def test_enter_knows_the_program_by_its_name():
+    import subprocess
+    from pathlib import Path
+
+    enter = Path(__file__).parents[3] / "enter"
+    done = subprocess.run(
+        [enter, "alphacut", "--help"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "usage: alphacut" in done.stdout

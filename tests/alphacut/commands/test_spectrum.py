@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from alphacut.entry import main
+from alphacut.io.units import engineering
 
 
 def record(folder: Path, unit: str = "g") -> Path:
@@ -80,6 +81,46 @@ def test_options_that_make_no_sense_are_refused(
     assert pattern in err
     assert "Traceback" not in err
     assert not out.exists()
+
+
+def test_the_report_of_a_folder_shows_the_spectrum_in_it(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    case, out = str(Path(__file__).parents[3] / "cases" / "pendulum.toml"), tmp_path / "run"
+    assert main(["run", case, "--quick", "--no-figures", "--quiet", "--out", str(out)]) == 0
+    asked = ["spectrum", str(record(tmp_path)), "--damping", "2 %,5 %", "--quiet"]
+    assert main([*asked, "--out", str(out)]) == 0
+    assert main(["report", str(out), "--quiet"]) == 0
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "<h2>Response spectrum</h2>" in page
+    assert "displacement, 2 %" in page
+    rows = (out / "spectrum.csv").read_text(encoding="utf-8").splitlines()[1:]
+    five = [row.split(",") for row in rows if row.startswith("0.05,")]
+    peak = max(float(row[4]) for row in five)
+    assert "With damping 5 %: largest displacement" in page
+    assert f"largest pseudo-acceleration {engineering(peak, 'm/s^2')}" in page
+    assert "natural period, s" in page  # the figure
+    (out / "spectrum.csv").write_text("nothing\n", encoding="utf-8")
+    assert main(["report", str(out), "--quiet"]) == 2
+    assert "this is no response spectrum" in capfd.readouterr().err
+
+
+def test_a_record_in_gal_and_one_with_decimal_commas(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def largest(unit: str, factor: float) -> float:
+        path = tmp_path / f"{factor:g}.csv"
+        rows = "".join(f"{0.02 * k},{factor * (k % 7 - 3)}\n" for k in range(50))
+        path.write_text(f"time [s],acceleration [{unit}]\n{rows}", encoding="utf-8")
+        assert main(["spectrum", str(path), "--json", "-"]) == 0
+        found = json.loads(capfd.readouterr().out)["spectra"][0]["displacement_m"]
+        return max(map(float, found))
+
+    assert largest("gal", 100.0) == pytest.approx(largest("m/s^2", 1.0), rel=1e-12)
+    path = tmp_path / "comma.csv"
+    path.write_text("time [s],acceleration [gal]\n0,000,-0,5\n0,02,1,0\n", encoding="utf-8")
+    assert main(["spectrum", str(path)]) == 2
+    assert "comma.csv:2: record = 0,000,-0,5: this row is no pair" in capfd.readouterr().err
 
 
 def test_a_record_that_is_none_is_refused(

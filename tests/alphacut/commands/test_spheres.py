@@ -146,7 +146,7 @@ def test_the_shipped_spheres_fill_what_the_papers_circles_cover(capfd):
         case = str(Path(PAPER).with_name(f"{name}.toml"))
         curve = answer(capfd, "cell", case, "--method", "series")["curve"]
         radius = load(case).radius
-        values = HermiteMap(*(slope.modal for slope in radius.slopes))(curve["theta"])
+        values = HermiteMap(*(one.modal for one in radius.numbers.values()))(curve["theta"])
         shares.append(np.pi / (4 if power == 2 else 6) * np.dot(curve["weights"], values**power))
     assert shares[1] == pytest.approx(shares[0], rel=5e-3)
 

@@ -8,6 +8,7 @@ import shlex
 import subprocess
 import sys
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -122,6 +123,28 @@ def test_documented_commands_exist(path, package, rest):
     _, made = parsers("alphacut", COMMANDS)
     _, left = made[words[0]].parse_known_args([*words[1:], *(["CASE"] if "…" in rest else [])])
     assert not left
+
+
+def entered():
+    """Programs that the documentation calls through ./enter, with what tells one from another."""
+    text = "\n".join(path.read_text(encoding="utf-8") for path in PAGES)
+    found = re.findall(r"\./enter ((?:jupyter|python -m) [\w.]+|[a-z][\w.-]*)", text)
+    return sorted(set(found))
+
+
+@pytest.mark.parametrize("command", entered())
+def test_programs_behind_enter_exist(command, tmp_path):
+    python = tmp_path / "python"
+    python.write_text('#!/bin/sh\necho "$@"\n')
+    python.chmod(0o755)
+    there = {**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}", "ALPHACUT_INSIDE": "1"}
+    words = command.split()
+    if words[0] not in ("jupyter", "alphacut") and len(words) == 1:
+        words = ["sh", "-c", f"command -v {words[0]}"]
+    called = subprocess.run([ROOT / "enter", *words], capture_output=True, text=True, env=there)
+    assert called.returncode == 0, called.stderr
+    if command != words[-1] and "-m" in called.stdout.split():
+        assert find_spec(called.stdout.split()[1]), called.stdout
 
 
 @pytest.mark.slow

@@ -50,6 +50,33 @@ def test_the_report_writes_them_on_demand(tmp_path, capfd):
     assert main(["report", str(out), "--csv", str(folder), "--json", "-"]) == 0
     told = json.loads(capfd.readouterr().out)
     assert sorted(told["tables"]) == sorted(map(str, folder.glob("*.csv")))
-    assert (folder / "envelope_all.csv").read_text(encoding="utf-8").startswith("alpha,time [s]")
+    stored = xarray.load_dataset(out / "envelope_all.nc")
+    name = str(stored["output"].values[-1])
+    with (folder / f"envelope_all-{name}.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0])[:3] == ["time [s]", "lower at alpha 0 [N]", "upper at alpha 0 [N]"]
+    upper = stored["upper"].sel(output=name, alpha=0.0).values
+    assert [float(row["upper at alpha 0 [N]"]) for row in rows] == upper.tolist()
+    with (folder / "peaks.csv").open(encoding="utf-8") as file:
+        peaks = list(csv.DictReader(file))
+    assert len(peaks) == stored["output"].size * stored["alpha"].size
+    assert {row["unit"] for row in peaks} == {"N"}
+    last = stored["peak"].sel(output=name, alpha=1.0, bound="upper")
+    assert float(peaks[-1]["greatest peak at nodes"]) == float(last)
+    error = "error and what lies between nodes"
+    assert float(peaks[-1][error]) == float(stored["peak_error"].sel(output=name, alpha=1.0))
     (tmp_path / "file").touch()
     assert main(["report", str(out), "--csv", str(tmp_path / "file")]) == 2
+
+
+def test_values_of_several_units_have_theirs_in_a_column(tmp_path):
+    margin = {"units": "SI, by output"}
+    data = xarray.Dataset(
+        {"margin": (("alpha", "output"), np.ones((1, 2)), margin)},
+        {"alpha": [0.0], "output": ["drift1", "a2"]},
+        {"format_version": 2},
+    )
+    data.to_netcdf(tmp_path / "decision.nc")
+    (made,) = write_tables(tmp_path, tmp_path / "tables")
+    lines = made.read_text(encoding="utf-8").splitlines()
+    assert lines == ["alpha,output,margin,unit", "0.0,drift1,1.0,m", "0.0,a2,1.0,m/s^2"]

@@ -21,3 +21,21 @@ def test_an_acceleration_in_g_is_one_of_standard_gravity():
     one = registry().Quantity(Decimal(1), registry().parse_units("g_0"))
     assert factor("g", "m/s^2") == one.to("m/s^2").magnitude
     assert factor("g", "kg") == Decimal("0.001")
+
+
+@pytest.mark.parametrize(
+    ("unit", "si", "told"),
+    [
+        ("kN", "kg", "it is a force; what weighs 1 kN has a mass of 102 kg"),
+        ("t", "N", "it is a mass, which weighs 9807 N"),
+        ("GPa", "kg", '"GPa" is wrong$'),
+        ("kN", "m", '"kN" is wrong$'),
+    ],
+)
+def test_a_force_for_a_mass_is_told(unit, si, told):
+    with pytest.raises(ValueError, match=told):
+        factor(unit, si)
+
+
+def test_a_gal_is_a_hundredth_of_a_metre_per_second_squared():
+    assert factor("gal", "m/s^2") == factor("Gal", "m/s^2") == Decimal("0.01")

@@ -155,7 +155,7 @@ def test_a_certificate_is_told_with_its_gap_and_what_it_rests_on():
     study |= {"gap_output": "q2", "between_nodes": 3e-5}
     page = methods({"envelopes": {"E": study}})
     assert "envelope E are proved at every node, and no wider than 1.0 µm of q2" in page
-    assert "by 30 µm at most. Bounded by &lt;energy&gt;." in page
+    assert "the largest of all steps. Bounded by &lt;energy&gt;." in page
     assert "Guaranteed: proved to hold" in page
     assert "proved at" not in methods(
         {"envelopes": {"E": {k: v for k, v in study.items() if k not in ("gap", "proof")}}}

@@ -38,9 +38,9 @@ def run(tmp_path, *changes, case="paper"):
 
 @pytest.mark.parametrize(
     ("duration", "step", "factor"),
-    [(20.0, 0.01, 5), (1.0, 0.01, 1), (30.0, 0.01, 8), (0.07, 0.01, 1)],
+    [(20.0, 0.01, 20), (1.0, 0.01, 1), (30.0, 0.01, 30), (0.07, 0.01, 1), (10.0, 0.02, 5)],
 )
-def test_shares_take_some_hundreds_of_nodes(duration, step, factor):
+def test_shares_take_a_hundred_nodes(duration, step, factor):
     assert thinned(duration, step) == pytest.approx(factor * step)
     assert round(duration / thinned(duration, step), 9) == int(
         round(duration / thinned(duration, step), 9)
@@ -58,7 +58,10 @@ def test_a_frame_under_an_earthquake_has_shares_and_its_report_names_periods(tmp
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "First natural periods at the modal values: 7, 3.12, 1.93 s" in page
     assert "Inner: attained by the parameters" in page
-    assert page.count(">error up to<") == 2  # of the extremes and of the peaks
+    assert page.count(">error up to<") == 1  # of the extremes
+    assert ">between nodes and by error, up to<" in page
+    assert "All are peaks at the nodes, " in page
+    assert "; between nodes at most " in page
 
 
 def test_a_modal_envelope_tells_its_error(tmp_path, capfd):
@@ -75,3 +78,20 @@ def test_without_oscillating_modes_a_run_goes_on_without_shares(tmp_path, capfd)
     assert "no shares of the width over time: a mode does not oscillate" in capfd.readouterr().err
     with xarray.open_dataset(tmp_path / "out" / "shares.nc") as found:
         assert "share" not in found
+
+
+def test_shares_that_are_not_wanted_are_left_out(tmp_path, capfd):
+    assert run(tmp_path, "envelope.shares=false") == 0, capfd.readouterr().err
+    with xarray.open_dataset(tmp_path / "out" / "shares.nc") as found:
+        assert "share" not in found
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert not summary["shares"]
+
+
+def test_the_plan_tells_what_shares_cost(tmp_path, capsys):
+    asked = ["envelope", str(CASES / "paper.toml"), "--explain", "--set"]
+    asked += ["frame.modulus=[24, 24.8, 25] GPa", "--fuzzy", "E,m"]
+    assert main(asked) == 0
+    assert "what drives the width, of run: some" in capsys.readouterr().out
+    assert main([*asked, "--set", "envelope.shares=false"]) == 0
+    assert "what drives" not in capsys.readouterr().out

@@ -46,6 +46,11 @@ def computed(inputs: Any = E, model: Any = FRAME, **changes: Any) -> Any:
             r"'m' is unknown; known are E, .*; it is short for m1, m2: .*frame.group\('m'\)",
         ),
         ({"q0": Interval(0, 1)}, "short for q1_0, q2_0"),
+        (
+            {"E": Triangular(24, 25, 26)},
+            r"E: its support \[24, 26\] is of another size than .* 2.5e\+10; give both in SI",
+        ),
+        ({"m2": Interval(9e6, 11e6)}, "m2: its support .* is of another size"),
         ({"x": Interval(0, 1)}, "'x' is unknown; known are E, I, .*zeta$"),
         ([1], "the inputs are a list; they must map names"),
     ],

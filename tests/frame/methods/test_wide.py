@@ -12,8 +12,8 @@ import pytest
 
 from alphacut.frame import envelope
 from benchmarks.frame import random_frames as frame_random
-from benchmarks.frame import wide as frame_wide
 from benchmarks.frame.envelopes import FRAME, INPUTS
+from benchmarks.frame.references import wide as frame_wide
 
 LONG: dict[str, Any] = {"duration": 30, "step": 0.01, "alpha": (0,), "integrator": "exact"}
 

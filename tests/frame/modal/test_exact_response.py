@@ -10,6 +10,7 @@ import pytest
 from alphacut.frame import Accelerogram, Exact, LinearFlow, MatrixStructure, StoreyFrame, envelope
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus import box_quadratic
+from alphacut.frame.calculus.c_library import c_library
 from alphacut.frame.methods.auto import Auto, ToleranceError
 from alphacut.frame.methods.modal import Modal
 from alphacut.frame.methods.plan import candidates
@@ -17,6 +18,7 @@ from alphacut.frame.modal import fitting
 from alphacut.frame.modal.exact_response import ExactResponse
 from alphacut.frame.modal.fitting import fit_modes, fit_points, hopeless
 from alphacut.frame.modal.levels import ENDS, UNSEEN
+from alphacut.frame.modal.proportional_response import ProportionalResponse, exact_response
 from alphacut.frame.modal.search import QUIET
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.modes import ModalError
@@ -34,6 +36,7 @@ FRAME = StoreyFrame(
     (0.1, -0.2, 0.3),
     outputs=("q3", "v1", "shear2"),
 )
+ACCELERATED = ("a2", "v3", "drift1")
 MANY = ("E", "m1", "m2", "m3", "l1", "d2", "q1_0", "v3_0")
 
 
@@ -52,11 +55,15 @@ def unit_flow(
         replace(FRAME, ground=RECORD),
         replace(FRAME, dampers=(), damping_ratio=0.03, outputs=("q1", "drift2", "q3")),
         replace(FRAME, dampers=(3e5, 50.0, 50.0)),  # overdamped
+        replace(FRAME, dampers=(), damping_ratio=0.03, ground=RECORD),
+        replace(FRAME, dampers=(), damping_ratio=0.02, rayleigh=(0.2, 1e-3), outputs=ACCELERATED),
+        replace(FRAME, dampers=(), ground=RECORD, gravity=1.0, rayleigh=(0.2, 0.0)),
     ],
-    ids=["free", "record", "ratio", "overdamped"],
+    ids=["free", "record", "ratio", "overdamped", "ratio, record", "Rayleigh", "P-Delta"],
 )
 def test_values_and_gradients_are_those_of_exact_trajectories(system: StoreyFrame) -> None:
-    names = ("E", "m2", "l1", "q3_0") + (("d1",) if any(system.dampers) else ("zeta",))
+    last = "d1" if any(system.dampers) else "zeta" if system.ratios else "rayleigh_mass"
+    names = ("E", "m2", "l1", "q3_0", last)
     flow = unit_flow(system, names, 0.1)
     try:
         model = fit_modes(flow.flow, flow.boxes, tolerance=1e-3, budget=60)  # type: ignore[arg-type]
@@ -64,7 +71,8 @@ def test_values_and_gradients_are_those_of_exact_trajectories(system: StoreyFram
         calm = unit_flow(FRAME, names, 0.1)
         model = fit_modes(calm.flow, calm.boxes, tolerance=1e-3, budget=60)  # type: ignore[arg-type]
         model = replace(model, flow=flow.flow, boxes=flow.boxes)
-    exact = ExactResponse.of(model, np.array([1.0, 2.0, 3.0]))
+    exact = exact_response(model, np.array([1.0, 2.0, 3.0]))
+    assert isinstance(exact, ProportionalResponse) is not any(system.dampers)
     rng = np.random.default_rng(0)
     points, each = rng.uniform(-1, 1, (12, 5)), np.arange(12)
     points[5:8] = points[4]  # problems that share a point
@@ -87,13 +95,55 @@ def test_gradients_of_modes_with_one_frequency() -> None:
     )
     flow = unit_flow(two, ("k",), 0.1)
     model = fit_modes(flow.flow, flow.boxes, tolerance=1e-2)  # type: ignore[arg-type]
-    exact, point = ExactResponse.of(model, np.ones(1)), np.zeros((1, 1))  # k = 9: both 3 rad/s
-    for t in (7, 40, 80):
-        _, gradient, _ = exact.at(point, np.array([t]), np.array([0]))
-        time = 0.05 * t
-        assert gradient[0, 0] == pytest.approx(
-            0.9 * -0.1 * time * np.sin(3 * time) / 6, rel=1e-6, abs=1e-9
-        )
+    point = np.zeros((1, 1))  # k = 9: both 3 rad/s
+    for exact in (ExactResponse.of(model, np.ones(1)), exact_response(model, np.ones(1))):
+        for t in (7, 40, 80):
+            _, gradient, _ = exact.at(point, np.array([t]), np.array([0]))
+            time = 0.05 * t
+            assert gradient[0, 0] == pytest.approx(
+                0.9 * -0.1 * time * np.sin(3 * time) / 6, rel=1e-6, abs=1e-9
+            )
+
+
+def test_modes_that_do_not_couple_give_what_all_give_in_many_parameters() -> None:
+    stiff = replace(
+        FRAME, modulus=None, second_moment=None, stiffness=(3e6, 2e6, 1e6), lengths=(), columns=()
+    )
+    system = replace(stiff, dampers=(), damping_ratio=0.03, ground=RECORD, outputs=ACCELERATED)
+    flow = unit_flow(system, ("k1", "k2", "k3", "m1", "m2", "m3", "q1_0"), 0.05)
+    model = fit_modes(flow.flow, flow.boxes, tolerance=1e-2, budget=60)  # type: ignore[arg-type]
+    rng = np.random.default_rng(5)
+    points, node = rng.uniform(-1, 1, (40, 7)), rng.integers(81, size=40)
+    output = rng.integers(3, size=40)
+    one, other = (make(model, np.ones(3)) for make in (exact_response, ExactResponse.of))
+    assert isinstance(one, ProportionalResponse)
+    assert one.law is not None
+    assert one.law.affine
+    for a, b in zip(one.at(points, node, output), other.at(points, node, output), strict=True):
+        assert np.abs(a - b).max() < 1e-2 * np.abs(b).max()  # Hessians are the polynomials'
+    value, gradient, _ = one.at(points, node, output)
+    assert np.abs(value - other.value_at(points, node, output)).max() < 1e-11
+    assert np.abs(gradient - other.at(points, node, output)[1]).max() < 1e-10
+
+
+def test_the_answer_to_the_ground_is_the_same_compiled_and_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    long = replace(FRAME, ground=Accelerogram(0.01, np.random.default_rng(1).normal(size=900)))
+    flow = unit_flow(long, ("E", "m1"), 0.4, 12.0)
+    model = fit_modes(flow.flow, flow.boxes, tolerance=1e-2)  # type: ignore[arg-type]
+    assert model.load is not None
+    assert len(model.load.starts) > 2
+    rng = np.random.default_rng(6)
+    rate, node = model.eigenvalue(rng.uniform(-1, 1, (50, 2))), rng.integers(240, size=50)
+    fast = *model.load.response(rate, node), model.load.response_alone(rate, node)
+    monkeypatch.setenv("ALPHACUT_KERNEL", "numpy")
+    c_library.cache_clear()
+    slow = *model.load.response(rate, node), model.load.response_alone(rate, node)
+    c_library.cache_clear()
+    for a, b in zip(fast, slow, strict=True):
+        assert np.abs(a - b).max() < 1e-12 * np.abs(b).max()
+        assert not np.array_equal(a, b)
 
 
 def test_bounds_of_eight_inputs_hold_all_samples_within_their_error() -> None:

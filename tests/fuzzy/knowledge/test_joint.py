@@ -75,7 +75,7 @@ def test_a_proved_result_rests_on_no_bounds_and_interactions_are_a_condition():
 
 def test_opinions_are_said_to_be_opinions():
     assert str(propagate(total, {"x": Triangular(0, 1, 2), "y": 1})).endswith(
-        "x: opinions, no cut says how often it holds"
+        "x: opinions, so that no level has a probability"
     )
     assert not JointClaim.of({"x": Crisp(1.0)}).opinions
 

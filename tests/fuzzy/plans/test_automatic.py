@@ -145,7 +145,7 @@ def test_what_cannot_be_covered_is_said():
 
 
 def test_wrong_numbers_are_refused():
-    with pytest.raises(ValueError, match="tolerance, budget, look and looks are 0, 400, 6 and 4"):
+    with pytest.raises(ValueError, match="tolerance 0, look 6, looks 4: all must be positive"):
         Automatic(tolerance=0)
 
 
@@ -160,3 +160,43 @@ def test_what_is_printed_counts_every_call():
     assert result.verification_runs > 0
     assert f"{result.runs} runs and {result.verification_runs} more" in str(result)
     assert len(set(calls)) == result.runs + result.verification_runs
+
+
+@pytest.mark.parametrize("budget", [20, 33, 50, 100, 300, 700])
+def test_a_named_budget_is_never_passed(budget):
+    calls = []
+
+    def wavy(a, b):
+        calls.append((a, b))
+        return np.sin(5 * a) * np.cos(4 * b)
+
+    inputs = {"a": Interval(-1, 1), "b": Triangular(-1, 0, 1)}
+    if budget < 30:
+        with pytest.raises(ValueError, match="budget is 20; 1 outputs at 2 levels take"):
+            propagate(wavy, inputs, Automatic(budget=budget), alpha=[0, 1])
+        assert len(calls) == 1
+        return
+    result = propagate(wavy, inputs, Automatic(budget=budget), alpha=[0, 1])
+    assert len(calls) == result.runs + result.verification_runs <= budget
+    assert np.isfinite(result.error).all()
+
+
+def rastrigin(**x):
+    return sum(10 + v**2 - 10 * np.cos(2 * np.pi * v) for v in x.values())
+
+
+@pytest.mark.parametrize("inputs", [2, 3])
+def test_many_hills_go_into_the_error(inputs):
+    box = {f"x{i}": Interval(-4.8, 5.12) for i in range(inputs)}
+    result = propagate(rastrigin, box, alpha=(0.0,), vectorised=True)
+    assert 0 <= result.lower[0, 0] <= result.error[0, 0] + 1e-6
+    assert "a better one is likely" in result.notes[-1]
+
+
+def test_a_hill_at_a_corner_of_many_inputs_is_reached():
+    box = {f"x{i}": Triangular(-1, 0, 1.5) for i in range(25)}
+    result = propagate(
+        lambda **x: sum(v**2 for v in x.values()), box, alpha=(0.0,), vectorised=True
+    )
+    assert abs(result.upper[0, 0] - 56.25) <= result.error[0, 0] + 1e-9
+    assert "a better one is likely" not in result.notes[-1]

@@ -153,3 +153,13 @@ def test_wrong_arguments_are_refused_by_name():
         propagate(monotone, {})
     with pytest.raises(ValueError, match="steps between α-levels is 0"):
         levels(0)
+
+
+def test_corners_alone_are_no_recursion():
+    number, alpha = Triangular(0, 1, 3), levels(3000)
+    rows = hanss_points(number, alpha, inner=False)
+    assert [tuple(row) for row in rows[:-1]] == [tuple(number.cut(level)) for level in alpha[:-1]]
+    assert rows[-1] == [1.0]
+    few = levels(5)
+    ends = [(row[0], row[-1]) for row in hanss_points(number, few)]
+    assert [(row[0], row[-1]) for row in hanss_points(number, few, inner=False)] == ends

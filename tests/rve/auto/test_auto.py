@@ -95,8 +95,9 @@ def test_reason_names_model_tolerance_and_what_was_excluded():
     assert AutoModel(1e-3).solve(PAPER, MATRIX, [Phase(80e9)])[0].method == "series"
 
 
-def test_no_inclusions_give_no_results():
-    assert AutoModel(1e-3).solve(PAPER, MATRIX, []) == []
+def test_no_inclusions_are_refused():
+    with pytest.raises(ValueError, match=r"list \(empty\); it takes the radius map"):
+        AutoModel(1e-3).solve(PAPER, MATRIX, [])
 
 
 class Touching:

@@ -6,10 +6,18 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 pytest.importorskip("dolfinx")
+
+from alphacut.rve.mesh.periodicity import identify
+from alphacut.rve.mesh.prism_grid import PrismGrid
+from alphacut.rve.mesh.triangulation import triangulate
+from alphacut.rve.prism.system import PrismSystem
+from alphacut.rve.solver.constraints import LevelNumbering
+
 ROOT = Path(__file__).parents[3]
 SOLVE = [
     "-m",
@@ -18,8 +26,6 @@ SOLVE = [
     "cases/paper.toml",
     "--mesh-size",
     "0.3",
-    "--layers",
-    "4",
     "--json",
     "-",
 ]
@@ -44,11 +50,11 @@ def solve(ranks, *options):
 
 
 @pytest.mark.skipif(shutil.which("mpirun") is None, reason="no mpirun")
-@pytest.mark.parametrize("ranks", [2, 3])
-def test_any_number_of_ranks_gives_the_same_result(ranks):
-    code, alone, _ = solve(1)
+@pytest.mark.parametrize(("ranks", "layers"), [(2, 4), (3, 2)])
+def test_any_number_of_ranks_gives_the_same_result(ranks, layers):
+    code, alone, _ = solve(1, "--layers", str(layers))
     assert code == 0
-    code, together, errors = solve(ranks)
+    code, together, errors = solve(ranks, "--layers", str(layers))
     assert code == 0, errors
     one, many = json.loads(alone), json.loads(together)  # one object: only one rank prints
     assert many["E_GPa"] == pytest.approx(one["E_GPa"], rel=1e-12)
@@ -57,9 +63,73 @@ def test_any_number_of_ranks_gives_the_same_result(ranks):
     assert many["unknowns"] == one["unknowns"]
 
 
+MODELS = """
+import json, sys
+import numpy as np
+from mpi4py import MPI
+from alphacut.rve.cell import LOADS, Phase
+from alphacut.rve.mesh.triangulation import reference_radius
+from alphacut.rve.prism.model import PrismModel, _system
+from alphacut.rve.prism.task import PrismTask
+from alphacut.rve.solver.options import SolverOptions
+from alphacut.rve.solver.stopwatch import Stopwatch
+from alphacut.stochastic import HermiteMap
+
+radii, ranks, found = HermiteMap(0.1337, 0.1, 0.8663, 0.1692), MPI.COMM_WORLD, []
+for layers, matrix, options in (
+    (2, Phase(20e9), {"stiffness": True}),
+    (2, Phase(20e9), {"interface": "sign"}),
+    (5, Phase(20e9, 0.49), {}),
+):
+    model = PrismModel(0.4, layers, parallel=ranks.size > 1, **options)
+    curve = model.solve(radii, matrix, [Phase(80e9)])[0].curve
+    found.append([*curve.mean, *curve.s11, *curve.s12])
+system = _system(0.4, 5, reference_radius(radii), ranks.size > 1)
+system.move(radii)
+solved = PrismTask(system, SolverOptions(), LOADS, Stopwatch()).solve((Phase(20e9), Phase(80e9)))
+found.append(ranks.gather(len(solved.total)))
+found.append(ranks.gather(system.pattern.getLocalSize()[0]))
+if ranks.rank == 0:
+    print(json.dumps(found))
+"""
+
+
 @pytest.mark.skipif(shutil.which("mpirun") is None, reason="no mpirun")
-def test_more_ranks_than_layers_are_refused():
-    code, printed, errors = solve(5)
-    assert code != 0
-    assert printed == ""
-    assert "5 MPI ranks for 4 layers" in errors
+def test_more_ranks_than_levels_give_the_same_and_none_has_the_whole():
+    """2 layers, whole or cut by the interface, and 5 nearly incompressible ones, on 4 ranks."""
+    results = []
+    for ranks in (1, 4):
+        code, printed, errors = run(["mpirun", "-n", str(ranks), sys.executable, "-c", MODELS])
+        assert code == 0, errors
+        results.append(json.loads(printed))
+    one, four = results
+    for k in range(3):
+        assert four[k] == pytest.approx(one[k], rel=1e-11)
+        assert four[k][:2] == pytest.approx(one[k][:2], rel=1e-12)
+    (nodes,), (unknowns,) = one[3:]
+    assert sum(four[4]) == unknowns
+    assert max(four[3]) < 0.5 * nodes
+    assert max(four[4]) < 0.4 * unknowns
+
+
+@pytest.mark.parametrize("layers", [1, 2, 3, 12])
+def test_levels_rows_and_loads_are_dealt_out_whatever_the_number_of_ranks(layers):
+    grid = PrismGrid(triangulate(size=0.9, radius=0.5), layers)
+    numbering = LevelNumbering(grid, identify(grid.plane))
+    for ranks in (1, 2, 3, 4, 5, 13, 14, 40):
+        owned = numbering.owned(ranks)
+        assert [k for rows in owned for k in rows] == list(range(numbering.size))
+        worked = [
+            (level, load)
+            for share in numbering.shares(ranks)
+            for level in share.levels
+            for load in share.of(range(3))
+        ]
+        assert sorted(worked) == [(level, load) for level in range(layers + 1) for load in range(3)]
+
+
+def test_more_ranks_than_wedges_are_refused():
+    grid = PrismGrid(triangulate(size=0.9, radius=0.5), 1)
+    many = SimpleNamespace(size=10**4, rank=0)
+    with pytest.raises(ValueError, match=r"10000 MPI ranks for \d+ wedges; every rank needs a"):
+        PrismSystem(grid, many)

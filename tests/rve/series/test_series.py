@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from alphacut.rve import Phase
+from alphacut.rve.series.lattice_sums import lattice_sums
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.rve.series.truncation import SeriesError
@@ -208,3 +209,17 @@ def test_smooth_maps_are_not_cut(slopes):
 def test_options_out_of_range(options, message):
     with pytest.raises(ValueError, match=message):
         SeriesModel(**options)
+
+
+def every_point(n, conjugate):
+    """Sum over all of |m|, |j| ≤ 8, whatever n."""
+    m = np.arange(-8.0, 9.0)
+    p = (m[:, None] + 1j * m).ravel()
+    p = p[p != 0]
+    return np.sum((p.conj() if conjugate else 1) * p ** -float(n)).real
+
+
+def test_far_points_left_out_of_lattice_sums_change_no_bit():
+    sums = lattice_sums(900)
+    assert all(sums.plain[n] == every_point(n, False) for n in range(40, 900, 4))
+    assert all(sums.conjugate[n] == every_point(n, True) for n in range(43, 900, 4))

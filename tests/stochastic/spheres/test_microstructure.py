@@ -59,7 +59,9 @@ def test_the_map_has_the_volume_fraction_asked_for(one):
 def test_denser_than_any_packing_is_said_and_not_refused():
     found = sphere_study(spheres(80, fraction=0.44))
     assert found.packed[0].fraction == 0.5
-    (remark,) = found.remarks
+    tight, remark = found.remarks
+    assert found.share_beyond > 0.5
+    assert f"{found.share_beyond:.1%} of the volume lies" in tight
     assert "0.4400 is asked for" in remark
     assert found.fraction_of_map < 0.43
 

@@ -13,7 +13,7 @@ from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.moduli import PlaneModuli
 from alphacut.rve.image.solve import solve_image
 from alphacut.rve.image.windows import CONFIDENCE, solve_tiles, tiles_of
-from benchmarks.rve.image_cases import moduli_of, noise, phases_of
+from benchmarks.rve.image.cases import moduli_of, noise, phases_of
 
 LEVEL = 0.5  # of the noise above which a pixel is particle: 31 % of the area
 

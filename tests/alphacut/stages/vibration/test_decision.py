@@ -75,6 +75,31 @@ def test_a_safe_limit_and_a_sure_failure(
     assert "possible to 1, necessary to 1: unsafe" in capsys.readouterr().out
 
 
+def test_two_limits_on_one_output_are_two_decisions(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, high = tmp_path / "out", f"{1000 * peak(1250)} mm"
+    limits = [f"q1 <= {high}", f"q1 <= {peak(900)} m", "drift1 <= 1 m"]
+    path = written(tmp_path, limits)
+    assert main(["run", str(path), "--out", str(out)]) == 0
+    found = json.loads((out / "summary.json").read_text(encoding="utf-8"))["decision"]
+    verdicts = {name: one["verdict"] for name, one in found["limits"].items()}
+    assert list(verdicts) == [limits[0], limits[1], "drift1", "any of them"]
+    assert list(verdicts.values()) == ["safe", "undecided", "safe", "undecided"]
+    assert found["limits"]["any of them"]["necessity"] == pytest.approx([0.5, 0.5], abs=0.01)
+    margins = [found["margins"][name] for name in limits[:2]]
+    assert [margin["output"] for margin in margins] == ["q1", "q1"]
+    assert [margin["unit"] for margin in margins] == ["m", "m"]
+    assert margins[0]["limit"] - margins[1]["limit"] == pytest.approx(peak(1250) - peak(900))
+    assert margins[0]["lower"][0] - margins[1]["lower"][0] == pytest.approx(peak(1250) - peak(900))
+    printed = capsys.readouterr().out
+    assert f"safety margin of {limits[0]} at" in printed
+    assert main(["report", str(out), "--quiet"]) == 0
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert page.count("<td>q1</td>") >= 2
+    assert (out / "figures" / "decision.png").is_file() or (out / "decision.png").is_file()
+
+
 def test_motion_between_nodes_takes_from_one_end_of_a_margin_alone(tmp_path: Path) -> None:
     out, limit = tmp_path / "out", peak(1000)
     asked = ["--out", str(out), "--no-figures", "--quiet", "--set", "envelope.step=50 ms"]
@@ -93,7 +118,7 @@ def test_motion_between_nodes_takes_from_one_end_of_a_margin_alone(tmp_path: Pat
         (["q1 <= 40"], "decision.limits"),
         (["q1 <= 40 kN"], "a quantity in m"),
         (["q1 <= -4 mm"], "greater than 0"),
-        (["q1 <= 4 mm", "q1 <= 5 mm"], "q1 has two limits"),
+        (["q1 <= 4 mm", "q1 <= 0.004 m"], "a limit is there twice"),
         (["q7 <= 4 mm"], "q7 is not among the structure's outputs"),
         (["roof <= 4 m"], "roof is not among the structure's outputs"),
         ([], "the array is empty"),
@@ -109,6 +134,61 @@ def test_limits_that_make_no_sense(
     assert pattern in told
     assert len(told.splitlines()) == 1
     assert not out.exists()
+
+
+MANY = """
+schema = 1
+title = "Many inputs"
+about = "More than a proof can take."
+stages = ["envelope"]
+[frame]
+masses = ["20 t ± 3 %", "20 t ± 3 %", "20 t ± 3 %", "20 t ± 3 %"]
+stiffness = ["40 MN/m ± 5 %", "40 MN/m ± 5 %", "40 MN/m ± 5 %", "40 MN/m ± 5 %"]
+damping_ratio = RATIO
+displacements = "0 m"
+velocities = "1 m/s"
+[envelope]
+fuzzy = ["stiffness", "m"]
+duration = "1 s"
+step = "0.02 s"
+MORE
+"""
+FEW = ["--set", "envelope.fuzzy=m1"]
+
+
+@pytest.mark.parametrize(
+    ("command", "more"),
+    [
+        (["check"], "[decision]\nlimits = ['q1 <= 1 m']"),
+        (["run"], "[decision]\nlimits = ['q1 <= 1 m']"),
+        (["check"], "certify = '1 mm'"),
+        (["envelope"], "certify = '1 mm'"),
+        (["envelope", "--explain"], "certify = '1 mm'"),
+    ],
+)
+def test_a_proof_that_none_can_afford_is_refused_before(
+    command: list[str], more: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "many.toml"
+    path.write_text(MANY.replace("RATIO", '"3 %"').replace("MORE", more), encoding="utf-8")
+    where = ["--out", str(tmp_path / "out")] if command == ["run"] else []
+    assert main([command[0], str(path), *command[1:], *where]) == 2
+    told = capsys.readouterr().err
+    assert "proofs are affordable up to 6 fuzzy inputs, and there are 8" in told
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_proof_that_the_damping_forbids_is_told_before(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "own.toml"
+    text = MANY.replace("RATIO", '["3 %", "3 %", "4 %", "5 %"]').replace("MORE", "certify = '1 mm'")
+    path.write_text(text, encoding="utf-8")
+    told = "verified by sampling, not proved: a damping ratio for each mode"
+    assert main(["check", str(path), *FEW]) == 0
+    assert told in "".join(capsys.readouterr())
+    assert main(["envelope", str(path), "--explain", *FEW]) == 0
+    assert told in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

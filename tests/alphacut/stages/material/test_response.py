@@ -15,7 +15,7 @@ from alphacut.io.problem import BadInput
 from alphacut.stages.material import response
 from alphacut.stochastic import TruncatedNormal
 
-PAPER = Path(__file__).parents[3] / "cases" / "paper.toml"
+PAPER = Path(__file__).parents[4] / "cases" / "paper.toml"
 CRISP = [
     "radius.a2=0.1",
     "radius.a4=0.1692",

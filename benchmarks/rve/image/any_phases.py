@@ -13,7 +13,7 @@ import numpy as np
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.reduced.build import ReducedBounds, reduced_bounds, widths
 from alphacut.rve.image.solve import solve_image
-from benchmarks.rve.image_cases import Array, discs
+from benchmarks.rve.image.cases import Array, discs
 
 FACTOR = 16.0
 BATCH = 20_000

@@ -8,15 +8,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from alphacut.case.case import Case
+from alphacut.case.load import load
 from alphacut.entry import main
+from alphacut.report.key_results import of_cell
 from alphacut.rve import bounds as plane
 from alphacut.rve.cell import Phase
 from alphacut.rve.representative.averages import Isotropic
 from alphacut.rve.spheres import bounds as space
-from alphacut.stages.material.references import references
-from alphacut.stochastic import HermiteMap
+from alphacut.stages.material.cell import cell_inputs, modal_parts, parts
+from alphacut.stages.material.modulus import read_number
+from alphacut.stages.material.references import beside, bounds_over_cuts, references
+from alphacut.stages.material.spheres import unmeasured
+from alphacut.stochastic import HermiteMap, RadiusMap
 
-CASES = Path(__file__).parents[3] / "cases"
+CASES = Path(__file__).parents[4] / "cases"
 MATRIX, STIFF = Phase(20e9, 0.3), Phase(80e9, 0.3)
 
 
@@ -135,3 +141,87 @@ def test_fibres_and_named_cylinders_are_not_warned_of(
         out, err = capfd.readouterr()
         assert json.loads(out)["outside"] == ""
         assert "lies below" not in err
+
+
+def polymer(tmp_path: Path, what: str = "beads") -> Path:
+    """A case with a fuzzy matrix, whose Poisson's ratio is fuzzy as well."""
+    path = tmp_path / "fuzzy.toml"
+    text = POLYMER.replace("WHAT", what).replace('"2.8 GPa"', '"[2.7, 2.8, 2.9] GPa"')
+    path.write_text(text.replace("0.38", "[0.36, 0.38, 0.4]"), encoding="utf-8")
+    return path
+
+
+def test_bounds_over_cuts_hold_those_of_every_choice_inside(tmp_path: Path) -> None:
+    case = load(polymer(tmp_path))
+    found = bounds_over_cuts(case, [0.0, 0.5, 1.0])
+    modal = references(*modal_case(case), (4.6e9, 0.37), None, "cylinders")
+    for kind, ends in (("fibres", modal.fibres), ("spheres", modal.spheres)):
+        assert found[kind]["lower"][2] == pytest.approx(ends[0] / 1e9, rel=1e-12)
+        assert found[kind]["upper"][2] == pytest.approx(ends[1] / 1e9, rel=1e-12)
+    rng, inputs = np.random.default_rng(), cell_inputs(case)
+    for k, level in enumerate(found["alpha"][:2]):
+        drawn = []
+        for _ in range(60):
+            values = {name: rng.uniform(*one.cut(level)) for name, one in inputs.items()}
+            radius, *phases = parts(values, case.radius.family)
+            one = references(radius, (phases[0], phases[1]), (4.6e9, 0.37), None, "cylinders")
+            drawn.append([one.fibres, one.spheres])
+        ends = np.array(drawn) / 1e9
+        for column, kind in enumerate(("fibres", "spheres")):
+            low, high = found[kind]["lower"][k], found[kind]["upper"][k]
+            assert (ends[:, column] >= low * (1 - 1e-12)).all()
+            assert (ends[:, column] <= high * (1 + 1e-12)).all()
+            span = np.ptp(ends[:, column], axis=0)  # and they are not wider than need be
+            assert low > ends[:, column, 0].min() - span[0] - 1e-9
+            assert high < ends[:, column, 1].max() + span[1] + 1e-9
+
+
+def modal_case(case: Case) -> tuple[RadiusMap, tuple[Phase, Phase]]:
+    """The modal map and phases."""
+    radius, matrix, inclusion = modal_parts(case)
+    return radius, (matrix, inclusion)
+
+
+def test_a_fuzzy_e_below_the_bound_of_spheres_is_flagged_wherever_it_goes(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """In the words of the command, in Key results, and where a frame takes it from the file."""
+    path, file = polymer(tmp_path), tmp_path / "modulus.nc"
+    assert main(["modulus", str(path), "--out", str(file), "--json", "-"]) == 0
+    told = json.loads(capfd.readouterr().out)
+    assert "so does all of its support" in told["outside"]
+    assert told["publish"].startswith("To publish, since the case says 'beads': E of spheres")
+    numbers = {**told, "modal_GPa": 4.56, "lower_GPa": 4.4, "upper_GPa": 4.7, "nu": 0.37}
+    numbers["nu_cuts"] = {"lower": [0.36, 0.37], "upper": [0.38, 0.37]}
+    rows = list(of_cell(numbers))
+    assert rows[0][0] == "Young's modulus E of the square array (eq. 16)"
+    assert [row[0].split(" of ")[0] for row in rows] == [
+        "Young's modulus E",
+        "Poisson's ratio ν",
+        "Hashin–Shtrikman bounds",
+    ]
+    assert all("outside the bounds of spheres" in row[3] for row in rows[:2])
+    assert "GPa" in rows[2][2]
+    read_number(file)
+    assert "--modulus: E = 4.5" in capfd.readouterr().err
+    read_number(file, warn=False)
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ([], "the isotropic average, 5"),
+        (["modulus.average=isotropic"], "this E, the isotropic average of the square array"),
+        (["cell.particles=spheres"], "isotropic (Hill) average of spheres"),
+    ],
+)
+def test_one_e_is_named_to_be_published(tmp_path: Path, change: list[str], words: str) -> None:
+    case = load(polymer(tmp_path, "fibres"), change)
+    assert words in beside(case, 4.6e9, 0.37, 1.35)["publish"]
+
+
+def test_measured_particles_of_spheres_are_warned_of_before_the_run(tmp_path: Path) -> None:
+    (told,) = unmeasured(load(polymer(tmp_path)))
+    assert "whose E is lower than that of stiffer spheres" in told
+    assert not list(unmeasured(load(polymer(tmp_path), ["cell.particles=cylinders"])))

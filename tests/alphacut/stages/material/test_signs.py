@@ -9,7 +9,7 @@ import pytest
 from alphacut.case.load import load
 from alphacut.stages.material.campaign import campaign
 
-CASES = Path(__file__).parents[3] / "cases"
+CASES = Path(__file__).parents[4] / "cases"
 
 
 def stated(name, *changes):

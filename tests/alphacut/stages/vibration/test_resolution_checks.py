@@ -18,7 +18,7 @@ from alphacut.fuzzy import Triangular
 from alphacut.stages.readiness import ready
 from alphacut.stages.vibration.envelope_task import task_of
 
-CASES = Path(__file__).parents[3] / "cases"
+CASES = Path(__file__).parents[4] / "cases"
 PAPER = str(CASES / "paper.toml")
 SHORT = ["--fuzzy", "E", "--duration", "2", "--alpha", "0"]
 FRAME = StoreyFrame(

@@ -16,7 +16,7 @@ from alphacut.rve.image.cuts import ImageBox, solve_cuts
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
 from alphacut.rve.image.solve import solve_image
-from benchmarks.rve.image_cases import Array, moduli_of, noise
+from benchmarks.rve.image.cases import Array, moduli_of, noise
 
 LEVELS = (1.0, 0.75, 0.5, 0.25, 0.0)
 PHASES = ((16.7, 7.7), (66.7, 30.8))  # K and G of matrix and particle, E = 20 and 80, ν = 0.3

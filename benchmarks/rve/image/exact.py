@@ -24,7 +24,7 @@ from alphacut.rve.image.outlines.outline import Grid, phase_ranges
 from alphacut.rve.image.phase_images import moduli_images
 from alphacut.rve.image.solve import CrispBounds, solve_between, solve_image
 from alphacut.rve.series.stiffness import square_stiffness
-from benchmarks.rve.image_cases import Array, discs, moduli_of
+from benchmarks.rve.image.cases import Array, discs, moduli_of
 
 ACCURACY = 1e-5  # the default of the command
 Draw = Callable[[np.random.Generator], tuple[bool, float]]  # → exact value inside, width

@@ -12,7 +12,7 @@ import xarray
 
 from alphacut.entry import main
 
-CASES = Path(__file__).parents[3] / "cases"
+CASES = Path(__file__).parents[4] / "cases"
 SHORT = ["--set", "envelope.duration=1 s", "--set", "frame.outputs=['q4']"]
 FEW = ["--set", "update.alpha=[0.05, 1]", "--set", "envelope.alpha=[0.05, 1]"]
 

@@ -1,6 +1,6 @@
 """Wide supports and many parameters, against dense, polished references.
 
-Run `python -m benchmarks.frame.wide --help`.
+Run `python -m benchmarks.frame.references.wide --help`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from benchmarks.frame.envelopes import FRAME, INPUTS
 from benchmarks.frame.references.polished_search import TrueEnvelope, true_envelope
 from benchmarks.rows import write
 
-RESULTS = Path(__file__).parents[1] / "results"
+RESULTS = Path(__file__).parents[2] / "results"
 STEP = 0.01
 
 

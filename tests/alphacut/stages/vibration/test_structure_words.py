@@ -17,7 +17,7 @@ from alphacut.io.quantity import fuzzy
 from alphacut.stages.vibration.structure import structure
 from alphacut.stages.vibration.structure_words import in_unit, structure_words
 
-CASES = Path(__file__).parents[3] / "cases"
+CASES = Path(__file__).parents[4] / "cases"
 MODULUS = Triangular(22e9, 25e9, 26e9)
 
 

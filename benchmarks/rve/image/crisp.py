@@ -17,7 +17,7 @@ from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.model import ImageModel
 from alphacut.rve.image.phase_images import ModuliImages
 from alphacut.stages.image.reading import ACCURACY
-from benchmarks.rve.image_cases import discs, moduli_of, noise, phases_of
+from benchmarks.rve.image.cases import discs, moduli_of, noise, phases_of
 
 RUNS = [  # picture, pixels a side, contrast, parts of a pixel: 0 as the command takes by itself
     ("discs", 512, 4.0, 0),
@@ -65,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         one(picture, int(size), float(contrast), int(division), options.seed)
         return 0
     for run in RUNS[: options.runs]:
-        command = [sys.executable, "-m", "benchmarks.rve.image_crisp", "--seed", str(options.seed)]
+        command = [sys.executable, "-m", "benchmarks.rve.image.crisp", "--seed", str(options.seed)]
         began = time.perf_counter()
         subprocess.run([*command, "--one", *map(str, run)], check=True)
         print(f"    the whole process: {time.perf_counter() - began:.1f} s", flush=True)

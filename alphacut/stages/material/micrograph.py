@@ -1,0 +1,58 @@
+"""Micrograph of a case: the part that is material, and what its circles keep of its particles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from alphacut.case.case import Case
+
+if TYPE_CHECKING:
+    from alphacut.stochastic.microstructure import Microstructure
+
+FALLEN = 0.05
+"""Relative distance of the fraction that E takes from the image's that is warned of."""
+
+
+def crop_of(case: Case) -> tuple[int, int, int, int] | None:
+    """The part of a photograph that is material, in whole pixels.
+
+    Raises:
+        BadInput: It is not four whole numbers.
+    """
+    photograph = case.microstructure.image
+    given = None if photograph is None else photograph.crop
+    if given is None:
+        return None
+    if len(given) != 4 or any(value != int(value) for value in given):
+        raise case.refuse(
+            "microstructure.image.crop",
+            "the part needs left, top, right and bottom in whole pixels",
+            "for example [0, 0, 1024, 884]",
+        )
+    left, top, right, bottom = map(int, given)
+    return left, top, right, bottom
+
+
+def fractions(found: Microstructure, fraction: float) -> Iterator[str]:
+    """The one area fraction to compare with, what E takes of it, and what is lost between."""
+    from alphacut.stochastic.particles.image import MISFIT
+
+    taken, cells = found.fraction_of_map, len(found.sample.values)
+    count = sum(len(section.discs) for section in found.sections)
+    yield (
+        f"area fraction to compare with others: {fraction:.4f}, the particles' share of the whole"
+        f" image; E takes {taken:.4f}, from the {cells} of {count} circles whose cells the image's"
+        " edge cannot change"
+    )
+    if abs(taken / fraction - 1) > FALLEN:
+        yield (
+            f"warning: E takes an area fraction of {taken:.4f}, {taken / fraction - 1:+.0%} of the"
+            f" image's {fraction:.4f}: particles were left out or are not round, or the image shows"
+            " too few; the image itself as the cell ([cell] image) loses none"
+        )
+    if (misfit := found.sections[0].misfit) > MISFIT:
+        yield (
+            f"warning: {misfit:.1%} of the particles' area lies outside the circles that stand for"
+            f" them, where discs that touch leave less than {MISFIT:.0%}: they are not round"
+        )

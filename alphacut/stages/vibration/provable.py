@@ -1,0 +1,36 @@
+"""What can be known of a proof before anything is computed: whether there will be one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from alphacut.io.problem import Problem
+from alphacut.stages.vibration.envelope_task import EnvelopeTask
+from alphacut.stages.vibration.structure import Structure
+
+
+def too_many(key: str, wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
+    """The problem that a proof is asked for with too many inputs, by the key that asks."""
+    from alphacut.frame.certificate.remainder import MOST_PARAMETERS
+
+    names = wanted.inputs(task.fuzzy)
+    if len(names) > MOST_PARAMETERS:
+        what = f"proofs are affordable up to {MOST_PARAMETERS} fuzzy inputs, and there are"
+        cure = "fewer in [envelope] fuzzy, or no proof: envelopes and peaks need none"
+        yield Problem(key, f"{what} {len(names)}", ", ".join(names), cure)
+
+
+def unproved_reason(wanted: Structure, task: EnvelopeTask) -> str:
+    """Why the bounds of a linear structure will not be guaranteed; empty if that is not known."""
+    from alphacut.frame.boxes import boxes
+    from alphacut.frame.structures.polynomial_dependence import UnprovedError, degrees
+
+    if wanted.linear is None:
+        return ""
+    cuts = boxes(wanted.inputs(task.fuzzy), task.alpha)
+    ends = {name: (cuts.lower[0, k], cuts.upper[0, k]) for k, name in enumerate(cuts.names)}
+    try:
+        degrees(wanted.linear, ends)
+    except UnprovedError as error:
+        return str(error)
+    return ""

@@ -1,0 +1,91 @@
+"""Progress of a computation: told to the caller, or a bar on a terminal or in a notebook."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from time import monotonic
+from typing import Any, Literal
+
+Progress = Callable[[float], None]
+_WAIT = 1.0  # seconds before a bar appears
+_EVERY = 0.2  # seconds between its moves
+_WIDTH = 30
+
+
+@contextmanager
+def told(progress: Progress | bool | None) -> Iterator[Progress | None]:
+    """What to tell the share done to.
+
+    Args:
+        progress: The caller's function; None (or True) for a bar, if there is a terminal or a
+            notebook to show it; False for nothing.
+
+    Raises:
+        ValueError: It is neither.
+    """
+    if not (progress is None or isinstance(progress, bool) or callable(progress)):
+        raise ValueError(
+            f"progress is {progress!r}; it must be a function of the share done, or False for none"
+        )
+    if callable(progress) or progress is False:
+        yield progress or None
+        return
+    bar = _Bar(_notebook() or (_on_terminal if sys.stderr.isatty() else None))
+    try:
+        yield bar if bar.show else None
+    finally:
+        bar.close()
+
+
+def part(progress: Progress | None, done: int, of: int) -> Progress | Literal[False]:
+    """Progress of one of several equal parts, to be told to the whole; False where nobody asks."""
+    return (lambda share: progress((done + share) / of)) if progress else False
+
+
+class _Bar:
+    """A bar that appears if it is still wanted after a second, and leaves nothing behind."""
+
+    def __init__(self, show: Callable[[str], None] | None) -> None:
+        self.show, self.begun, self.moved, self.seen = show, monotonic(), 0.0, False
+
+    def __call__(self, share: float) -> None:
+        now = monotonic()
+        if self.show and now - self.begun >= _WAIT and now - self.moved >= _EVERY:
+            self.moved, self.seen = now, True
+            full = round(_WIDTH * share)
+            bar = "█" * full + "░" * (_WIDTH - full)
+            self.show(f"{bar} {share:4.0%} {now - self.begun:.0f} s")
+
+    def close(self) -> None:
+        if self.show and self.seen:
+            self.show("")
+
+
+def _on_terminal(text: str) -> None:
+    sys.stderr.write(f"\r\x1b[K{text}")
+    sys.stderr.flush()
+
+
+def _notebook() -> Callable[[str], None] | None:
+    """What shows a text in the notebook that this runs in; None elsewhere."""
+    python: Any = sys.modules.get("IPython")
+    shell = python.get_ipython() if python else None
+    if shell is None or not hasattr(shell, "kernel"):
+        return None
+    from html import escape
+
+    from IPython.display import HTML, display
+
+    handle: Any = None
+
+    def show(text: str) -> None:
+        nonlocal handle
+        page = HTML(f"<code>{escape(text)}</code>" if text else "")  # type: ignore[no-untyped-call]
+        if handle is None:
+            handle = display(page, display_id=True)  # type: ignore[no-untyped-call]
+        else:
+            handle.update(page)
+
+    return show

@@ -1,0 +1,68 @@
+"""Figures that show what they showed are not drawn again; studies side by side are the same."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from alphacut.entry import main
+from alphacut.figures.all import keep, kept
+
+CASES = Path(__file__).parents[3] / "cases"
+
+
+def test_figures_are_kept_while_all_are_there_and_their_fingerprint_is_the_same(tmp_path):
+    (tmp_path / "figures").mkdir()
+    names = ["figures/one.svg", "figures/two.png"]
+    for name in names:
+        (tmp_path / name).write_text("drawn", encoding="utf-8")
+    assert kept(tmp_path, "key") is None
+    keep(tmp_path, "key", names)
+    assert kept(tmp_path, "key") == names
+    assert kept(tmp_path, "other") is None
+    (tmp_path / names[0]).write_text("", encoding="utf-8")
+    assert kept(tmp_path, "key") is None
+    (tmp_path / names[0]).unlink()
+    assert kept(tmp_path, "key") is None
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"fingerprint": "key", "figures": 3}'])
+def test_a_damaged_list_of_figures_draws_them_again(text, tmp_path):
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "figures" / ".kept.json").write_text(text, encoding="utf-8")
+    assert kept(tmp_path, "key") is None
+
+
+def test_a_second_run_draws_only_what_is_missing_or_asked_for(tmp_path, capfd):
+    words = ["run", str(CASES / "pendulum.toml"), "--quick", "--out", str(tmp_path)]
+
+    def drawn(*more):
+        """Times of all figures after a run."""
+        assert main([*words, *more]) == 0, capfd.readouterr().err
+        told = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["figures"]
+        return {name: (tmp_path / name).stat().st_mtime_ns for name in told}
+
+    first = drawn()
+    assert first
+    assert drawn() == first
+    (tmp_path / min(first)).unlink()
+    third = drawn()
+    assert third.keys() == first.keys()
+    assert all(third[name] > first[name] for name in first)
+    anew = drawn("--fresh")
+    assert all(anew[name] > third[name] for name in first)
+
+
+def test_studies_side_by_side_give_what_they_give_one_by_one(tmp_path, capfd):
+    words = ["run", str(CASES / "paper.toml"), "--quick", "--set", "modulus.method=series"]
+    told = []
+    for workers in "12":
+        folder = tmp_path / workers
+        more = ["--no-figures", "--workers", workers, "--out", str(folder)]
+        assert main([*words, *more]) == 0, capfd.readouterr().err
+        told.append(json.loads((folder / "summary.json").read_text(encoding="utf-8")))
+    one, two = told
+    assert len(one["envelopes"]) == 4
+    for name, study in one["envelopes"].items():
+        assert {**study, "seconds": 0} == {**two["envelopes"][name], "seconds": 0}
+    assert one["shares"] == two["shares"]

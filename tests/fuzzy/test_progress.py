@@ -1,0 +1,141 @@
+"""Progress moves from the first sample to the last; what is interrupted says what it keeps."""
+
+import io
+import re
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+
+import pytest
+
+from alphacut.fuzzy import (
+    Automatic,
+    Chebyshev,
+    Extended,
+    General,
+    Metamodel,
+    Optimisation,
+    QuasiMonteCarlo,
+    Reduced,
+    Signed,
+    Triangular,
+    decide,
+    progress_bar,
+    propagate,
+    safe_scale,
+    width_shares,
+)
+from alphacut.fuzzy.decisions.measure_next import measure_next
+
+X = {"x": Triangular(0, 1, 2), "y": Triangular(1, 2, 4)}
+PLANS = (
+    *(Automatic(), Chebyshev(), Extended(), General(), Metamodel(), Optimisation()),
+    *(QuasiMonteCarlo(8), Reduced(), Signed()),
+)
+
+
+def bent(x, y):
+    return (x - 0.7) ** 2 * y + x
+
+
+def rises(shares):
+    return all(a < b for a, b in pairwise(shares)) and shares[0] > 0 and shares[-1] <= 1
+
+
+@pytest.mark.parametrize("plan", PLANS, ids=lambda plan: type(plan).__name__)
+def test_progress_moves_with_every_sample_of_every_plan(plan):
+    calls, at, shares = [], [], []
+
+    def counted(x, y):
+        calls.append(x)
+        return bent(x, y)
+
+    propagate(
+        counted, X, plan, progress=lambda share: (at.append(len(calls)), shares.append(share))
+    )
+    assert rises(shares)
+    assert shares[-1] == 1
+    assert max(b - a for a, b in pairwise([0, *at])) <= 2
+
+
+def test_questions_of_many_propagations_tell_their_share_too():
+    def bounds(inputs):
+        return propagate(bent, inputs, Reduced(), progress=False).bounds()
+
+    for ask in (
+        lambda tell: decide(bent, X, {"y": 5}, tolerance=1e-2, progress=tell),
+        lambda tell: safe_scale(bent, {"x": 1, "y": 1}, {"x": 0.1}, {"y": 2}, progress=tell),
+        lambda tell: width_shares(bounds, X, progress=tell),
+        lambda tell: measure_next(bent, X, Reduced(), progress=tell),
+    ):
+        shares = []
+        ask(lambda share, shares=shares: shares.append(share))
+        assert len(shares) > 2
+        assert 0 < min(shares) < 0.6
+        assert 0.9 < max(shares) <= 1
+        assert shares == sorted(shares)
+
+
+def test_a_bar_shows_itself_on_a_terminal_and_leaves_nothing(monkeypatch):
+    screen = io.StringIO()
+    screen.isatty = lambda: True
+    monkeypatch.setattr(sys, "stderr", screen)
+    propagate(bent, X, Reduced())
+    assert not screen.getvalue()  # over within a second
+    monkeypatch.setattr(progress_bar, "_WAIT", 0.0)
+    propagate(bent, X, Reduced(), progress=False)
+    assert not screen.getvalue()
+    propagate(bent, X, Reduced())
+    assert re.search(r"█+░* +\d+ %", screen.getvalue().replace("%", " %"))
+    assert screen.getvalue().endswith("\r\x1b[K")
+
+
+def test_nothing_is_shown_without_a_terminal(monkeypatch, capfd):
+    monkeypatch.setattr(progress_bar, "_WAIT", 0.0)
+    propagate(bent, X, Reduced())
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("progress", [3, "bar"])
+def test_progress_is_a_function(progress):
+    with pytest.raises(ValueError, match="it must be a function of the share done"):
+        propagate(bent, X, progress=progress)
+
+
+def test_an_interrupt_says_what_is_kept_and_the_same_call_goes_on(tmp_path):
+    calls = []
+
+    def stopped(x, y):
+        calls.append(x)
+        if len(calls) == 20:
+            raise KeyboardInterrupt
+        return bent(x, y)
+
+    given = {"store": tmp_path / "s.db", "identity": {"v": 1}}
+    with pytest.raises(
+        KeyboardInterrupt, match=r"^interrupted; 19 samples are kept in .*s\.db: the"
+    ):
+        propagate(stopped, X, **given)
+    assert propagate(bent, X, spot_check=0, **given).reused == 19
+    calls.clear()
+    with pytest.raises(
+        KeyboardInterrupt, match="19 samples were done and none is kept: `propagate` keeps them"
+    ):
+        propagate(stopped, X)
+
+
+def test_what_to_measure_next_takes_an_executor_and_a_store(tmp_path):
+    plain = measure_next(bent, X, Reduced())
+    calls = []
+
+    def counted(x, y):
+        calls.append(x)
+        return bent(x, y)
+
+    given = {"store": tmp_path / "s.db", "identity": {"v": 1}}
+    with ThreadPoolExecutor(2) as executor:
+        found = measure_next(counted, X, Reduced(), executor=executor, **given)
+    assert found == plain
+    ran = len(calls)
+    assert measure_next(counted, X, Reduced(), **given) == plain
+    assert len(calls) - ran < ran  # of each answer one stored sample is run again

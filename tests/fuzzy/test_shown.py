@@ -1,0 +1,101 @@
+"""What results say of themselves in text, in a notebook, and in a CSV file."""
+
+import csv
+
+import pytest
+
+from alphacut.frame import StoreyFrame, envelope
+from alphacut.fuzzy import (
+    Interval,
+    Reduced,
+    Triangular,
+    decide,
+    explain,
+    from_data,
+    propagate,
+    safe_scale,
+    width_shares,
+)
+from alphacut.fuzzy.decisions.measure_next import measure_next
+
+X = {"x": Triangular(0, 1, 2), "y": Interval(1, 2)}
+
+
+def product(x, y):
+    return x * y
+
+
+def bounds(inputs):
+    found = propagate(product, inputs, Reduced(), alpha=[0, 1])
+    return found.bounds()
+
+
+SHOWN = {
+    "explanation": (lambda: explain(product, X, Reduced()), "would run", "<td>0</td>"),
+    "advice": (lambda: measure_next(product, X, Reduced()), "known twice as well", "<td>x</td>"),
+    "shares": (lambda: width_shares(bounds, X), "  x: ", "<td>y</td>"),
+    "decision": (lambda: decide(product, X, {"y": 3}), "undecided: possibility", "<td>0.75</td>"),
+    "threshold": (
+        lambda: safe_scale(product, {"x": 1, "y": 1}, {"x": 0.1}, {"y": 1.2}),
+        "proved safe up to 1.9999",
+        "<td>unsafe from</td>",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SHOWN)
+def test_what_is_found_shows_itself_as_lines_and_as_a_table(name):
+    make, words, cell = SHOWN[name]
+    found = make()
+    assert words in str(found) == repr(found)
+    assert max(map(len, str(found).splitlines())) < 200
+    page = found._repr_html_()
+    assert cell in page
+    assert page.startswith("<table>")
+
+
+def test_a_number_from_data_says_its_claim_and_its_widest_cut():
+    number = from_data([1.0, 2.0, 3.0], "median", bounds=(0, 9))
+    assert f"{[number]}" == "[Claimed(median: 0 … 9 at α = 0)]"
+    free = from_data([1.0, 2.0, 3.0], "median")
+    assert str(free) == "Claimed(median: 1 … 3 at α = 0.25)"
+
+
+def table(path):
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_bounds_go_into_a_csv_file_with_all_digits_and_where_they_are_reached(tmp_path):
+    found = propagate(lambda x, y: {"a, b": x * y / 3, "c": x}, X, Reduced(), alpha=[0, 0.3, 1])
+    found.to_csv(tmp_path / "found.csv")
+    rows = table(tmp_path / "found.csv")
+    assert len(rows) == 6
+    for row in rows:
+        level, column = list(found.alpha).index(float(row["alpha"])), found.column(row["output"])
+        assert float(row["lower"]) == found.lower[level, column]
+        assert float(row["upper"]) == found.upper[level, column]
+        assert float(row["y at upper"]) == found.upper_at[level, column, 1]
+    found.to_csv(str(tmp_path / "found.csv"))
+    assert [path.name for path in tmp_path.iterdir()] == ["found.csv"]
+
+
+def test_an_envelope_goes_into_a_csv_file_with_its_units(tmp_path):
+    frame = StoreyFrame(masses=[2e4], lengths=[3.0], modulus=25e9, second_moment=1e-6, q0=[0.01])
+    found = envelope(frame, {"E": Interval(24e9, 26e9)}, duration=0.4, step=0.2, alpha=[0, 1])
+    found.to_csv(tmp_path / "motion.csv")
+    rows = table(tmp_path / "motion.csv")
+    assert len(rows) == 2 * 3
+    assert {row["unit"] for row in rows} == {"m"}
+    last = rows[-1]
+    assert (float(last["time [s]"]), float(last["alpha"])) == (0.4, 1.0)
+    assert float(last["lower"]) == found.lower[-1, -1, 0]
+    assert float(last["E at upper"]) == found.upper_at[-1, -1, 0, 0]
+
+
+@pytest.mark.parametrize("place", ["none/found.csv", "."])
+def test_a_table_that_cannot_be_written_is_refused_and_leaves_nothing(place, tmp_path):
+    found = propagate(product, X, Reduced(), alpha=[0, 1])
+    with pytest.raises(ValueError, match=r"cannot be written to .* a folder that exists"):
+        found.to_csv(tmp_path / place)
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,66 @@
+"""The exact cell under other laws of θ and other maps, against Monte Carlo over their quantiles and
+a quadrature in probability.
+"""
+
+import numpy as np
+import pytest
+from scipy import stats
+from scipy.interpolate import make_interp_spline
+
+from alphacut.rve.cell import Phase, square_moduli
+from alphacut.rve.series.model import SeriesModel
+from alphacut.rve.series.stiffness import square_stiffness
+from alphacut.rve.slices.theta_rule import theta_rule
+from alphacut.stochastic import Beta, ExponentialMap, HermiteMap, TruncatedNormal
+
+MATRIX, PARTICLE = Phase(20e9), Phase(80e9)
+
+
+class Broken:
+    """A map of a user that jumps, under a law with a corner."""
+
+    class distribution:  # noqa: N801 - an instance is not needed
+        lower, upper = 0.0, 1.0
+        pdf = staticmethod(stats.triang(0.3).pdf)
+        cdf = staticmethod(stats.triang(0.3).cdf)
+        quantile = staticmethod(stats.triang(0.3).ppf)
+
+    def __call__(self, theta):
+        theta = np.asarray(theta, float)
+        return np.where(theta < 0.5, 0.3 + 0.2 * theta, 0.6 + 0.2 * theta)
+
+
+MAPS = {
+    "uniform": HermiteMap(0.1337, 0.1, 0.8663, 0.1692, Beta()),
+    "beta": HermiteMap(0.1337, 0.1, 0.8663, 0.1692, Beta(2, 5, -1.0, 1.0)),
+    "exponential": ExponentialMap(0.2, 0.8, TruncatedNormal(-2.0, 3.0)),
+    "user": Broken(),
+}
+
+
+def mean_moduli(radius, shares):
+    """Mean C11 + C12 and C33 over shares of probability, from a spline over the radius."""
+    radii = radius(radius.distribution.quantile(shares))
+    grid = np.linspace(radii.min() - 1e-9, radii.max() + 1e-9, 40)
+    exact = square_moduli(square_stiffness(grid, MATRIX, [PARTICLE], tolerance=1e-9).matrix[:, 0])
+    return make_interp_spline(grid, exact[:, [0, 2]], k=7)(radii)
+
+
+@pytest.mark.parametrize("name", MAPS)
+def test_mean_is_that_over_quantiles_and_of_random_draws(name):
+    found = SeriesModel().solve(MAPS[name], MATRIX, [PARTICLE])[0]
+    own = found.curve.weights @ square_moduli(np.asarray(found.curve.stiffness))[:, [0, 2]]
+    even = mean_moduli(MAPS[name], (np.arange(200_000) + 0.5) / 200_000).mean(axis=0)
+    assert own == pytest.approx(even, rel=2e-6)
+    drawn = mean_moduli(MAPS[name], np.random.default_rng(5).random(20_000))
+    error = drawn.std(axis=0) / np.sqrt(len(drawn))
+    assert (abs(own - drawn.mean(axis=0)) < 5 * error).all()
+    other = SeriesModel().solve(HermiteMap(0.1337, 0.1, 0.8663, 0.1692), MATRIX, [PARTICLE])[0]
+    normal = other.curve.weights @ square_moduli(np.asarray(other.curve.stiffness))[:, [0, 2]]
+    assert (abs(normal - drawn.mean(axis=0)) > 5 * error).any()  # the law is seen
+
+
+def test_rule_of_a_map_in_pieces_keeps_the_probability_of_each():
+    rule = theta_rule(Broken(), points=6)
+    below = rule.weights[rule.nodes < 0.5].sum()
+    assert below == pytest.approx(stats.triang(0.3).cdf(0.5), abs=1e-8)

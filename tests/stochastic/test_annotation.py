@@ -1,0 +1,70 @@
+"""Scale bars and captions are found, named and cut; particles that are not round are told by what
+their circles leave uncovered.
+"""
+
+import numpy as np
+import pytest
+
+from alphacut.stochastic.particles.annotation import cropped, rectangles
+from alphacut.stochastic.particles.image import MISFIT, SectionImage
+
+SIDE = 300
+
+
+def section(generator, aspect=1.0, count=60, noise=12.0, dark=False):
+    """Particles of one aspect ratio that may touch, at random angles, grey and noisy."""
+    y, x = np.mgrid[:SIDE, :SIDE] + 0.5
+    mask, placed = np.zeros((SIDE, SIDE), bool), []
+    while len(placed) < count:
+        at, angle, radius = generator.uniform(0, SIDE, 2), generator.uniform(0, np.pi), 12.0
+        if all(np.hypot(*(at - other)) > 0.95 * 2 * radius for other in placed):
+            placed.append(at)
+            u = (x - at[0]) * np.cos(angle) + (y - at[1]) * np.sin(angle)
+            v = (y - at[1]) * np.cos(angle) - (x - at[0]) * np.sin(angle)
+            mask |= (u**2 / aspect + v**2 * aspect) < radius**2
+    grey = np.where(mask != dark, 170, 80) + generator.normal(0, noise, mask.shape)
+    return np.clip(grey, 0, 255).round()
+
+
+@pytest.mark.parametrize(
+    ("box", "grey"), [((200, 270, 300, 300), 0), ((0, 0, 90, 20), 255), ((0, 280, 300, 300), 128)]
+)
+def test_a_drawn_rectangle_is_named_with_the_crop_that_cuts_it(box, grey):
+    picture = section(np.random.default_rng(), count=30)
+    left, top, right, bottom = box
+    picture[top:bottom, left:right] = grey
+    picture[top + 6 : top + 9, left + 10 : left + 50] = 255 - grey  # the bar itself
+    (found,) = rectangles(picture)[:1]
+    assert found.box == pytest.approx(box, abs=1)
+    with pytest.raises(ValueError, match=r"rectangle of one grey.*crop = \[.*cuts it off") as told:
+        cropped(picture, None, "bar.png")
+    part = tuple(map(int, str(told.value).split("crop = [")[1].split("]")[0].split(", ")))
+    left_over = cropped(picture, part, "bar.png")
+    assert left_over.size > 0.85 * picture.size
+    assert cropped(picture, (0, 0, SIDE, SIDE), "bar.png") is not None  # taken as it is, on request
+
+
+@pytest.mark.parametrize("noise", [0.0, 6.0])
+def test_no_micrograph_of_discs_is_taken_for_a_caption(noise):
+    picture = section(np.random.default_rng(), noise=noise)
+    assert cropped(picture, None, "discs.png").shape == picture.shape
+
+
+def test_a_part_outside_the_image_is_refused():
+    with pytest.raises(ValueError, match=r"must lie in its 300 × 300 pixels"):
+        cropped(section(np.random.default_rng(), count=5), (0, 0, 301, 100), "x.png")
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_discs_that_touch_are_covered_by_their_circles_and_ellipses_are_not(dark):
+    generator = np.random.default_rng()
+    kind = "dark" if dark else "bright"
+    discs = SectionImage("d.png", 1.0, kind).circles(section(generator, dark=dark))
+    assert discs.misfit < 0.7 * MISFIT
+    picture = section(generator, aspect=1.8, dark=dark)
+    with pytest.raises(ValueError, match=r"not round"):
+        SectionImage("e.png", 1.0, kind).circles(picture)
+    found = SectionImage("e.png", 1.0, kind, drop=True).circles(picture)
+    assert found.misfit > 1.2 * MISFIT
+    with pytest.raises(ValueError, match=r"lies outside the circles that would stand for them"):
+        SectionImage("e.png", 1.0, kind, roundness=0.2).circles(picture)

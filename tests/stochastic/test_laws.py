@@ -1,0 +1,151 @@
+"""Laws of θ besides the truncated normal, and maps besides the cubic: against SciPy's, in closed
+form, and refused where they are none.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from alphacut.stochastic import (
+    Beta,
+    ExponentialMap,
+    HermiteMap,
+    TruncatedNormal,
+    gauss_rule,
+    layered_rule,
+    require_map,
+)
+from alphacut.stochastic.radius_map import KINDS, MapFamily
+
+
+@dataclass(frozen=True)
+class Own:
+    """A law of SciPy as a user writes it; `off` scales its density wrongly."""
+
+    kind: str = "triang"
+    shape: tuple = (0.3,)
+    lower: float = 0.0
+    upper: float = 1.0
+    off: float = 1.0
+
+    def pdf(self, theta):
+        return self.off * getattr(stats, self.kind).pdf(theta, *self.shape)
+
+    def cdf(self, theta):
+        return getattr(stats, self.kind).cdf(theta, *self.shape)
+
+    def quantile(self, probability):
+        return getattr(stats, self.kind).ppf(probability, *self.shape)
+
+
+@pytest.mark.parametrize("exponents", [(1, 1), (2, 5), (1.3, 1.7), (60, 40)])
+def test_beta_is_scipys(exponents):
+    law, reference = Beta(*exponents, -2.0, 1.0), stats.beta(*exponents, loc=-2, scale=3)
+    theta = np.linspace(-2.5, 1.5, 41)
+    assert law.pdf(theta) == pytest.approx(reference.pdf(theta), rel=1e-10, abs=1e-300)
+    assert law.cdf(theta) == pytest.approx(reference.cdf(theta), rel=1e-10, abs=1e-300)
+    share = np.linspace(0, 1, 11)
+    assert law.quantile(share) == pytest.approx(reference.ppf(share), abs=1e-12)
+
+
+@pytest.mark.parametrize("exponents", [(1, 1), (2, 5), (1.3, 1.7), (60, 40)])
+def test_gauss_rule_has_the_moments_of_the_law(exponents):
+    rule, (p, q), exact = gauss_rule(Beta(*exponents), points=5), exponents, 1.0
+    for power in range(10):
+        assert rule.weights @ ((rule.nodes + 3) / 6) ** power == pytest.approx(exact, rel=1e-11)
+        exact *= (p + power) / (p + q + power)
+
+
+@pytest.mark.parametrize("law", [Own(), Own("rv_histogram"), Own("beta", (3.5, 1.2))], ids=str)
+def test_corners_and_jumps_of_a_density_are_integrated(law):
+    if law.kind == "rv_histogram":  # density 1.6 below 1/4 and 0.8 above: a jump
+        law = Step()
+    rule, theta = gauss_rule(law, points=12), (np.arange(200_000) + 0.5) / 200_000
+    by_quantiles = np.mean(np.exp(2 * law.quantile(theta)))
+    assert rule.mean(np.exp(2 * rule.nodes)) == pytest.approx(by_quantiles, rel=1e-8)
+    assert rule.weights.sum() == pytest.approx(1, abs=1e-12)
+
+
+class Step:
+    """Density 1.6 on [0, 1/4] and 0.8 on [1/4, 1]."""
+
+    lower, upper = 0.0, 1.0
+
+    def pdf(self, theta):
+        return np.where(np.asarray(theta) < 0.25, 1.6, 0.8)
+
+    def cdf(self, theta):
+        return np.interp(theta, [0, 0.25, 1], [0, 0.4, 1])
+
+    def quantile(self, probability):
+        return np.interp(probability, [0, 0.4, 1], [0, 0.25, 1])
+
+
+def test_rule_on_a_part_of_the_support_is_the_law_there():
+    whole, ends = TruncatedNormal(), (0.4, 3.0)
+    rule = gauss_rule(whole, points=4, between=ends)
+    part = TruncatedNormal(*ends)
+    for power in range(8):
+        fine = layered_rule(part, layers=40, points=4)
+        exact = fine.mean(fine.nodes**power)
+        assert rule.weights @ rule.nodes**power == pytest.approx(exact, rel=1e-11)
+
+
+def test_density_that_is_not_of_its_distribution_is_refused():
+    with pytest.raises(ValueError, match="pdf must be the derivative of cdf"):
+        gauss_rule(Own(off=1.01), points=4)
+
+
+@pytest.mark.parametrize("exponents", [(0.5, 2), (2, np.nan), (1, 1e9)])
+def test_exponents_outside_their_range_are_refused(exponents):
+    with pytest.raises(ValueError, match=r"exponent . of the beta law"):
+        Beta(*exponents)
+
+
+def test_exponential_map_of_a_normal_is_log_normal():
+    radius = ExponentialMap(0.2, 0.8)
+    assert radius([-3, 0, 3]) == pytest.approx([0.2, np.sqrt(0.2 * 0.8), 0.8])
+    rule = gauss_rule(radius.distribution, points=20)
+    deviation = np.log(4) / 6
+    logs = np.log(radius(rule.nodes))
+    assert rule.mean(logs**2) - rule.mean(logs) ** 2 == pytest.approx(
+        (deviation * stats.truncnorm(-3, 3).std()) ** 2
+    )
+    with pytest.raises(ValueError, match="radius a3 of the exponential map is 1"):
+        ExponentialMap(0.2, 1.0)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_of_map_goes_from_a1_to_a3_under_its_law(kind):
+    family = MapFamily(kind, Beta(2, 3, 0.0, 1.0))
+    made = family({"a1": 0.3, "a2": 0.1, "a3": 0.7, "a4": 0.2})
+    assert made([0.0, 1.0]) == pytest.approx([0.3, 0.7])
+    assert made.distribution == Beta(2, 3, 0.0, 1.0)
+    assert made.extremes() == pytest.approx((0.3, 0.7))
+    straight = HermiteMap(0.3, 0.4, 0.7, 0.4, Beta(2, 3, 0.0, 1.0))(0.31)
+    assert bool(made(0.31) == pytest.approx(straight)) is (kind == "linear")
+
+
+class Wide:
+    """A radius map of a user that leaves the cell."""
+
+    def __init__(self, law=None, rise=0.5):
+        self.distribution, self.rise = law or TruncatedNormal(), rise
+
+    def __call__(self, theta):
+        return 0.5 + self.rise * np.asarray(theta)
+
+
+@pytest.mark.parametrize(
+    ("radius", "words"),
+    [
+        (Wide(), r"gives r = -1 at θ = -3; radii must stay inside \(0, 1\)"),
+        (Wide(Own(upper=np.inf)), "two finite ends"),
+        (Wide(rise=np.zeros((1, 1))), r"the shape \(1, 65\)"),
+    ],
+)
+def test_maps_that_are_none_are_refused(radius, words):
+    with pytest.raises(ValueError, match=words):
+        require_map(radius)
