@@ -120,6 +120,21 @@ class Polynomial:
         value = self.coefficients[0] + (u[:, :, None] * (self.slope[:, 0] + turned / 2)).sum(1)
         return value, self.slope[:, 0] + turned, bent
 
+    def along(self, u: Array, axes: Array, moved: Array) -> Array:
+        """Values (N, L, M, K) on lines through points (N, d), of degree 2.
+
+        Args:
+            u: Points on the lines.
+            axes: Each line's direction, shape (N, L).
+            moved: Distances from the point along the line, shape (N, L, M).
+        """
+        value, slope, bent = self.quadratic(u)
+        first = np.take_along_axis(slope, axes[:, :, None], 1)[:, :, None]
+        second = bent[axes, axes][:, :, None] / 2
+        far = moved[..., None]
+        total: Array = value[:, None, None] + far * (first + far * second)
+        return total
+
     def __call__(self, u: Array) -> Array:
         """Values at (S, d), shape (S, K)."""
         return product(basis(u, self.index), self.coefficients)

@@ -10,6 +10,7 @@ import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.threads import threads
 from alphacut.frame.certificate.certificate import certify
 from alphacut.frame.certificate.model_error import proved_error
 from alphacut.frame.certificate.remainder import MOST_PARAMETERS, require_certifiable
@@ -216,7 +217,7 @@ def guaranteed(flow: UnitFlow, gap: float, progress: Progress | None = None) -> 
     if len(flow.boxes.names) > MOST_PARAMETERS:
         raise UnprovedError(f"proofs are affordable up to {MOST_PARAMETERS} parameters")
     size = 2 * len(flow.outputs) * len(flow.time)
-    method = Modal(certify=gap, boxes=min(BOXES, MOST_BOXES / size))
+    method = Modal(certify=gap, boxes=min(BOXES, MOST_BOXES / size), workers=threads())
     return _certified(flow, method, gap, time.perf_counter(), progress, insist=True)
 
 

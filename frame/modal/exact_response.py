@@ -14,6 +14,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial, fit
+from alphacut.frame.calculus.threads import each
 from alphacut.frame.modal.analyses import analyse
 from alphacut.frame.modal.fitting import fit_points
 from alphacut.frame.modal.ground_response import LoadTables
@@ -91,15 +92,18 @@ class ExactResponse:
 
     def value_at(self, unit: Array, node: Array, output: Array) -> Array:
         """Values (N,) of one output at one node per point (N, d)."""
-        out = np.empty(len(unit))
-        for rows, points, own in pieces(unit):
-            flow = self.model.flow
+        out, flow = np.empty(len(unit)), self.model.flow
+
+        def piece(part: tuple[Array, Array, Array]) -> None:
+            rows, points, own = part
             physical = self.model.boxes.to_physical(points)
             matrices, seen = evaluate(flow.system, flow.names, physical, derivatives=False)
             state = np.concatenate([matrices.q0.value, matrices.v0.value], -2)
             modes = _Modes.of(state_matrix(matrices).value, seen.value, state, matrices.rigid)
             at = self._at(modes, own, node[rows], output[rows])
             out[rows] = (at.left * at.motion).real.sum(1)
+
+        each(piece, pieces(unit))
         return out
 
     def at(self, unit: Array, node: Array, output: Array) -> tuple[Array, Array, Array]:

@@ -16,7 +16,8 @@ import numpy as np
 
 from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.jet import Array, Jet
-from alphacut.frame.calculus.polynomial import Polynomial
+from alphacut.frame.calculus.polynomial import Polynomial, basis, product
+from alphacut.frame.calculus.threads import each
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.modal.ground_response import LoadTables, decaying
 
@@ -140,7 +141,7 @@ class ModalModel:
                 assert waves is not None
                 own = [None if w is None else (w[0][rows], w[1][rows], w[2][rows]) for w in waves]
                 slopes = (rates[1][rows], rates[2])
-                found = self._quadratic(self._shares[o], unit[rows], slopes, own)
+                found = self._quadratic(self.shares[o], unit[rows], slopes, own)
             f[rows], g[rows], H[rows] = found
         return f, g, H
 
@@ -151,7 +152,7 @@ class ModalModel:
         return [free, None if self.load is None else self.load.response(rate, node)]
 
     @cached_property
-    def _shares(self) -> list[list[Polynomial]]:
+    def shares(self) -> list[list[Polynomial]]:
         """For each output the polynomials of what the start and the ground put into it."""
         given = [self.coefficient] + ([] if self.load is None else [self.load.share])
         m = len(self.outputs)
@@ -202,21 +203,29 @@ class ModalModel:
     def value_at(self, unit: Array, node: Array, output: Array) -> Array:
         """Values (N,) of one output at one node per point (N, d)."""
         values, order = np.empty(len(unit)), np.argsort(output, kind="stable")
-        for rows in np.array_split(order, -(-len(order) // PIECE) or 1):
+
+        def piece(rows: Array) -> None:
             values[rows] = self._value_at(unit[rows], node[rows], output[rows])
+
+        each(piece, np.array_split(order, -(-len(order) // PIECE) or 1))
         return values
 
     def _value_at(self, unit: Array, node: Array, output: Array) -> Array:
-        rate, values = self.eigenvalue(unit), np.zeros(len(unit))
-        started = self.coefficient.coefficients.any()
-        waves = [np.exp(rate * self.time[node][:, None]) if started else None]
-        waves.append(None if self.load is None else self.load.response_alone(rate, node))
+        powers, values = basis(unit, self.eigenvalue.index), np.zeros(len(unit))
+        waves = self.waves_alone(product(powers, self.eigenvalue.coefficients), node)
         for o in np.unique(output):
             rows = np.flatnonzero(output == o)
-            for share, wave in zip(self._shares[o], waves, strict=False):
+            for share, wave in zip(self.shares[o], waves, strict=False):
                 if wave is not None:
-                    values[rows] += 2 * (share(unit[rows]) * wave[rows]).real.sum(1)
+                    own = product(powers[rows], share.coefficients)
+                    values[rows] += 2 * (own * wave[rows]).real.sum(1)
         return values
+
+    def waves_alone(self, rate: Array, node: Array) -> list[Array | None]:
+        """As `_waves`, without derivatives."""
+        started = self.coefficient.coefficients.any()
+        free = np.exp(rate * self.time[node][:, None]) if started else None
+        return [free, None if self.load is None else self.load.response_alone(rate, node)]
 
 
 def _real_product(a: Array, b: Array) -> Array:

@@ -6,6 +6,7 @@ import numpy as np
 
 from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_maximum
 from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.threads import each
 from alphacut.frame.modal.optima import Optima, Response
 
 PIECE = 2000
@@ -21,8 +22,8 @@ def refine(
 ) -> None:
     """Newton's method in the box on `which`, until none promises more than `small`."""
     size = int(np.clip(PIECE * 36 / lower.size**2, PIECE // 2, PIECE))
-    for piece in np.array_split(which, -(-len(which) // size) or 1):
-        _newton(model, optima, piece, lower, upper, small)
+    pieces = np.array_split(which, -(-len(which) // size) or 1)
+    each(lambda piece: _newton(model, optima, piece, lower, upper, small), pieces)
 
 
 def _newton(
