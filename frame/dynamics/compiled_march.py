@@ -15,6 +15,24 @@ from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.calculus.symbolic import Compiled
 
 MARCH = Path(__file__).with_name("march.c").read_text(encoding="utf-8")
+WIDTH = 8
+"""Parameter sets that march side by side, one in each lane of a vector."""
+VECTOR = f"""\
+#include <math.h>
+#include <string.h>
+#define W {WIDTH}
+typedef double V __attribute__((vector_size(8 * W)));
+#define BROAD(x) ((x) + (V){{0}})
+static inline V power(V x, int n)
+{{
+    V out = BROAD(1);
+    for (int k = 0; k < (n < 0 ? -n : n); k++) out *= x;
+    return n < 0 ? 1 / out : out;
+}}
+"""
+"""Head of the code: what an expression is made of takes and gives vectors."""
+ONE = "sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp log sqrt cbrt erf erfc"
+TWO = "pow atan2"
 MOST = 12
 """Most coordinates and uncertain parameters together; more would be long code."""
 FAILURES = {
@@ -49,16 +67,17 @@ class CompiledMarch:
         """
         d, sets = start.directions, len(parameters)
         shape = (sets, nodes, self.outputs)
-        out = Jet(np.empty(shape), np.empty((d, *shape)), np.empty((d, d, *shape)))
-        last, parts = np.zeros(1), np.asarray(lengths, float)
+        made = [np.empty(shape), np.empty((*shape, d)), np.empty((*shape, d, d)), np.zeros(1)]
+        parts = np.asarray(lengths, float)
         given = [
             np.ascontiguousarray(x, float)
             for x in (parts, parameters, start.value, start.first, start.second)
         ]
-        made = [out.value, out.first, out.second, last]
         counts = [ctypes.c_long(sets), ctypes.c_long(nodes), ctypes.c_int(d)]
         counts.append(ctypes.c_int(len(parts)))
         code = self.library.march(*counts, *map(address, [*given, *made]))
+        value, first, second, last = made
+        out = Jet(value, np.moveaxis(first, -1, 0), np.moveaxis(second, (-2, -1), (0, 1)))
         return out, FAILURES[code].format(last=last[0]) if code else ""
 
 
@@ -81,10 +100,23 @@ def compiled_march(
     if "newton" in functions:
         sizes["VARIATIONAL"] = 1
     defined = [f"#define {name} {size}" for name, size in sizes.items()]
-    head = "\n".join(["#include <math.h>", "#include <string.h>", *defined])
+    lanes = [_lanes(name, "x") for name in ONE.split()]
+    lanes += [_lanes(name, "x, y") for name in TWO.split()]
     written = [_function(name, part) for name, part in sorted(functions.items())]
-    library = c_library("\n".join([head, *written, MARCH]))
+    library = c_library("\n".join([VECTOR, *defined, *lanes, *written, MARCH]))
     return None if library is None else CompiledMarch(library, outputs)
+
+
+def _lanes(name: str, of: str) -> str:
+    """A function of C's library, lane by lane, in place of its namesake."""
+    each = ", ".join(f"{x}[l]" for x in of.split(", "))
+    all_ = ", ".join(f"BROAD({x})" for x in of.split(", "))
+    taken = ", ".join(f"V {x}" for x in of.split(", "))
+    return (
+        f"static inline V {name}_of({taken})\n"
+        f"{{\n    for (int l = 0; l < W; l++) x[l] = ({name})({each});\n    return x;\n}}\n"
+        f"#define {name}({of}) {name}_of({all_})"
+    )
 
 
 def _function(name: str, part: Compiled) -> str:
@@ -99,9 +131,26 @@ def _body(name: str, arguments: Sequence[Any], expressions: Sequence[Any]) -> st
 
     shared, reduced = sympy.cse(list(expressions), symbols=sympy.numbered_symbols("w_"))
     place = {x: sympy.Symbol(f"x[{k}]") for k, x in enumerate(arguments)}
-
-    named = [(f"const double {symbol}", e) for symbol, e in shared]
+    write = _printer().doprint
+    named = [(f"const V {symbol}", e) for symbol, e in shared]
     named += [(f"out[{k}]", e) for k, e in enumerate(reduced)]
-    lines = [f"{left} = {sympy.ccode(sympy.sympify(e).xreplace(place))};" for left, e in named]
+    lines = [f"{left} = {_right(sympy.sympify(e).xreplace(place), write)};" for left, e in named]
     text = "\n    ".join(lines)
-    return f"static void {name}(const double *x, double *out)\n{{\n    {text}\n}}\n"
+    return f"static void {name}(const V *x, V *out)\n{{\n    {text}\n}}\n"
+
+
+def _right(expression: Any, write: Any) -> str:
+    return f"BROAD({write(expression)})" if expression.is_number else str(write(expression))
+
+
+def _printer() -> Any:
+    """Writes whole powers as products."""
+    from sympy.printing.c import C99CodePrinter
+
+    class Printer(C99CodePrinter):  # type: ignore[misc]
+        def _print_Pow(self, expr: Any) -> str:  # noqa: N802
+            if expr.exp.is_Integer:
+                return f"power({self._print(expr.base)}, {expr.exp})"
+            return str(super()._print_Pow(expr))
+
+    return Printer()

@@ -1,29 +1,41 @@
-/* Trajectories of a Lagrangian system with derivatives, one parameter set after the other.
+/* Trajectories of a Lagrangian system with derivatives, W parameter sets side by side.
  *
  * Before this text stand the macros N (coordinates), OWN (uncertain parameters), REST (others),
- * OUT (outputs) and the functions made from the system's expressions: each takes the arguments x
- * and writes values, first derivatives by the active arguments (they come first in x), and the
- * upper triangle of the second ones. The twin is nonlinear.py. */
+ * OUT (outputs), the vector V (lanes.h) and the functions made from the system's expressions: each
+ * takes the arguments x and writes values, first derivatives by the active arguments (they come
+ * first in x, the uncertain parameters last among them), and the upper triangle of the second ones.
+ * No lane depends on the others: a converged one stays as it is. The twin is nonlinear.py. */
 
-#define ACTIVE_MOST (2 * N + OWN)
 #define PAIRS(a) ((a) * ((a) + 1) / 2)
+#define ACTIVE (2 * N + OWN)
 #define ROWS_MOST (2 * N > OUT ? 2 * N : OUT)
-#define SIZE (ROWS_MOST * (1 + ACTIVE_MOST + PAIRS(ACTIVE_MOST)))
+#define SIZE (ROWS_MOST * (1 + ACTIVE + PAIRS(ACTIVE)))
+
+typedef long long Mask __attribute__((vector_size(8 * W)));
 
 typedef struct {
-    double value[2 * N], first[2 * N][OWN + 1], second[2 * N][OWN + 1][OWN + 1];
+    V value[2 * N], first[2 * N][OWN + 1], second[2 * N][PAIRS(OWN) + 1];
 } State;
 
-static int inverse(const double *given, double *out)
+static V chosen(Mask where, V a, V b) { return (V)(((Mask)a & where) | ((Mask)b & ~where)); }
+static V larger(V a, V b) { return chosen(a > b, a, b); }
+static V magnitude(V x) { return chosen(x < 0, -x, x); }
+
+static int any(Mask where)
 {
-    double A[N * N];
-    memcpy(A, given, sizeof A);
+    long long found = 0;
+    for (int l = 0; l < W; l++) found |= where[l];
+    return found != 0;
+}
+
+static int inverse(double *A, double *out)
+{
     for (int i = 0; i < N * N; i++) out[i] = i % (N + 1) == 0;
     for (int k = 0; k < N; k++) {
         int p = k;
         for (int i = k + 1; i < N; i++)
-            if (fabs(A[i * N + k]) > fabs(A[p * N + k])) p = i;
-        if (!(fabs(A[p * N + k]) > 0)) return 0;
+            if ((fabs)(A[i * N + k]) > (fabs)(A[p * N + k])) p = i;
+        if (!((fabs)(A[p * N + k]) > 0)) return 0;
         for (int j = 0; j < N; j++) {
             double t = A[k * N + j];
             A[k * N + j] = A[p * N + j];
@@ -49,221 +61,250 @@ static int inverse(const double *given, double *out)
     return 1;
 }
 
-/* Second derivatives of rows of a function along `a` active arguments with slopes F[a][d]. */
-static void bent(int rows, int a, int d, const double *flat, double F[][OWN + 1],
-                 double out[][OWN + 1][OWN + 1])
+/* Inverses of the lanes that are open; others keep theirs. */
+static int inverses(const V *given, V *out, Mask open)
 {
-    const double *H = flat + rows * (1 + a);
-    for (int m = 0; m < rows; m++, H += PAIRS(a)) {
-        double half[ACTIVE_MOST][OWN + 1];
-        memset(half, 0, sizeof half);
-        const double *entry = H;
-        for (int p = 0; p < a; p++)
-            for (int q = p; q < a; q++, entry++) {
-                if (*entry == 0) continue;
-                for (int i = 0; i < d; i++) half[p][i] += *entry * F[q][i];
-                if (p != q)
-                    for (int i = 0; i < d; i++) half[q][i] += *entry * F[p][i];
+    if (N == 1) {
+        if (any(open & ~(magnitude(given[0]) > 0))) return 0;
+        out[0] = chosen(open, 1 / given[0], out[0]);
+        return 1;
+    }
+    for (int l = 0; l < W; l++) {
+        double A[N * N], made[N * N];
+        if (!open[l]) continue;
+        for (int i = 0; i < N * N; i++) A[i] = given[i][l];
+        if (!inverse(A, made)) return 0;
+        for (int i = 0; i < N * N; i++) out[i][l] = made[i];
+    }
+    return 1;
+}
+
+/* Second derivatives of rows along the parameters, from slopes F of the 2N arguments before them. */
+static void bent(int rows, const V *flat, V F[][OWN + 1], V out[][PAIRS(OWN) + 1])
+{
+    const V *H = flat + rows * (1 + ACTIVE);
+    for (int m = 0; m < rows; m++, H += PAIRS(ACTIVE)) {
+        V half[2 * N][OWN + 1];
+        const V *own = H + PAIRS(ACTIVE) - PAIRS(OWN);
+        for (int p = 0; p < 2 * N; p++)
+            for (int i = 0; i < OWN; i++)
+                half[p][i] = H[p * ACTIVE - p * (p - 1) / 2 + 2 * N + i - p];
+        for (int p = 0; p < 2 * N; p++)
+            for (int q = 0; q < 2 * N; q++) {
+                int low = p < q ? p : q, high = p < q ? q : p;
+                V entry = 0.5 * H[low * ACTIVE - low * (low - 1) / 2 + high - low];
+                for (int i = 0; i < OWN; i++) half[p][i] += entry * F[q][i];
             }
-        for (int i = 0; i < d; i++)
-            for (int j = i; j < d; j++) {
-                double total = 0;
-                for (int p = 0; p < a; p++) total += F[p][i] * half[p][j];
-                out[m][i][j] = out[m][j][i] = total;
+        for (int i = 0, e = 0; i < OWN; i++)
+            for (int j = i; j < OWN; j++, e++) {
+                V total = own[e];
+                for (int p = 0; p < 2 * N; p++)
+                    total += F[p][i] * half[p][j] + F[p][j] * half[p][i];
+                out[m][e] = total;
             }
     }
 }
 
-/* A function's jet along the state, the first 2N active arguments, and the parameters. */
-static void chain(int rows, int d, const double *flat, const State *s, double value[],
-                  double first[][OWN + 1], double second[][OWN + 1][OWN + 1])
+/* A function's jet along the state, its first 2N arguments, and the parameters. */
+static void chain(int rows, const V *flat, State *s, V value[], V first[][OWN + 1],
+                  V second[][PAIRS(OWN) + 1])
 {
-    const int a = 2 * N + OWN;
-    double F[ACTIVE_MOST][OWN + 1];
-    memset(F, 0, sizeof F);
-    for (int p = 0; p < 2 * N; p++) memcpy(F[p], s->first[p], d * sizeof(double));
-    for (int p = 0; p < OWN; p++) F[2 * N + p][p] = 1;
-    bent(rows, a, d, flat, F, second);
+    bent(rows, flat, s->first, second);
     for (int m = 0; m < rows; m++) {
-        const double *g = flat + rows + m * a;
+        const V *g = flat + rows + m * ACTIVE;
         value[m] = flat[m];
-        for (int i = 0; i < d; i++) {
-            double total = 0;
-            for (int p = 0; p < a; p++) total += g[p] * F[p][i];
-            first[m][i] = total;
-            for (int j = 0; j < d; j++)
-                for (int p = 0; p < 2 * N; p++) second[m][i][j] += g[p] * s->second[p][i][j];
+        for (int i = 0; i < OWN; i++) first[m][i] = g[2 * N + i];
+        for (int p = 0; p < 2 * N; p++) {
+            for (int i = 0; i < OWN; i++) first[m][i] += g[p] * s->first[p][i];
+            for (int e = 0; e < PAIRS(OWN); e++) second[m][e] += g[p] * s->second[p][e];
         }
     }
 }
 
 #ifdef VARIATIONAL
-static int step(State *s, const double *par, double h, int d, double *last)
+/* Derivatives of the implicit step, from those of its equations and the inverse of its slopes. */
+static void differentiated(State *s, const V *flat, const V *inv)
 {
-    double x[2 * N + OWN + REST + 1], flat[SIZE], J[N * N], inv[N * N], change[N];
-    int done = 0;
+    V F[2 * N][OWN + 1], curve[2 * N][PAIRS(OWN) + 1], right[N];
+    const V *g = flat + 2 * N;
+    for (int i = 0; i < OWN; i++) {
+        for (int m = 0; m < N; m++) {
+            right[m] = s->first[N + m][i] - g[m * ACTIVE + 2 * N + i];
+            for (int p = 0; p < N; p++) right[m] -= g[m * ACTIVE + N + p] * s->first[p][i];
+        }
+        for (int m = 0; m < N; m++) {
+            F[m][i] = inv[m * N] * right[0];
+            for (int k = 1; k < N; k++) F[m][i] += inv[m * N + k] * right[k];
+            F[N + m][i] = s->first[m][i];
+        }
+    }
+    bent(2 * N, flat, F, curve);
+    for (int e = 0; e < PAIRS(OWN); e++) {
+        for (int m = 0; m < 2 * N; m++)
+            for (int p = 0; p < N; p++) curve[m][e] += g[m * ACTIVE + N + p] * s->second[p][e];
+        for (int m = 0; m < N; m++) right[m] = s->second[N + m][e] - curve[m][e];
+        for (int m = 0; m < N; m++) {
+            s->second[m][e] = inv[m * N] * right[0];
+            for (int k = 1; k < N; k++) s->second[m][e] += inv[m * N + k] * right[k];
+        }
+        for (int m = 0; m < N; m++) {
+            s->second[N + m][e] = curve[N + m][e];
+            for (int k = 0; k < N; k++)
+                s->second[N + m][e] += g[(N + m) * ACTIVE + k] * s->second[k][e];
+        }
+    }
+    for (int m = 0; m < N; m++)
+        for (int i = 0; i < OWN; i++) {
+            s->first[m][i] = F[m][i];
+            s->first[N + m][i] = g[(N + m) * ACTIVE + 2 * N + i];
+            for (int p = 0; p < 2 * N; p++) s->first[N + m][i] += g[(N + m) * ACTIVE + p] * F[p][i];
+        }
+}
+
+static int step(State *s, const V *par, double h, int d, double *last)
+{
+    V x[2 * N + OWN + REST + 1], flat[SIZE], inv[N * N], change[N];
+    Mask open = ~(Mask){0};
     for (int i = 0; i < N; i++) x[i] = x[N + i] = s->value[i];
-    memcpy(x + 2 * N, par, (OWN + REST) * sizeof(double));
-    x[2 * N + OWN + REST] = h;
-    for (int count = 0; count < 30 && !done; count++) {
-        double most = 0, size = 0;
+    memcpy(x + 2 * N, par, (OWN + REST) * sizeof(V));
+    x[2 * N + OWN + REST] = BROAD(h);
+    memset(inv, 0, sizeof inv);
+    for (int count = 0; count < 30 && any(open); count++) {
+        V most = {0}, size = {0};
         newton_values(x, flat);
-        memcpy(J, flat + N, sizeof J);
-        if (!inverse(J, inv)) return 3;
+        if (!inverses(flat + N, inv, open)) return 3;
         for (int i = 0; i < N; i++) {
-            change[i] = 0;
+            change[i] = (V){0};
             for (int j = 0; j < N; j++) change[i] += inv[i * N + j] * (flat[j] - s->value[N + j]);
-            if (!isfinite(change[i])) return 2;
-            most = fmax(most, fabs(change[i]));
+            if (any(open & ~(change[i] - change[i] == 0))) return 2;
+            most = larger(most, magnitude(change[i]));
         }
         for (int i = 0; i < N; i++) {
-            x[i] -= change[i];
-            size = fmax(size, fabs(x[i]));
+            x[i] = chosen(open, x[i] - change[i], x[i]);
+            size = larger(size, magnitude(x[i]));
         }
-        *last = most;
-        done = most <= 1e-12 * (1 + size);
+        open &= ~(most <= 1e-12 * (1 + size));
+        *last = 0;
+        for (int l = 0; l < W; l++)
+            if (open[l] && most[l] > *last) *last = most[l];
     }
-    if (!done) return 1;
-    if (!d) {
+    if (any(open)) return 1;
+    if (d) {
+        both_full(x, flat);
+        differentiated(s, flat, inv);
+    } else
         both_values(x, flat);
-        memcpy(s->value, x, N * sizeof(double));
-        memcpy(s->value + N, flat + N, N * sizeof(double));
-        return 0;
-    }
-    const int a = 2 * N + OWN;
-    double F[ACTIVE_MOST][OWN + 1], curve[2 * N][OWN + 1][OWN + 1];
-    State t;
-    both_full(x, flat);
-    memset(F, 0, sizeof F);
-    for (int p = 0; p < N; p++) memcpy(F[N + p], s->first[p], d * sizeof(double));
-    for (int p = 0; p < OWN; p++) F[2 * N + p][p] = 1;
-    const double *g = flat + 2 * N;
-    for (int i = 0; i < d; i++) {
-        double right[N];
-        for (int m = 0; m < N; m++) {
-            right[m] = s->first[N + m][i];
-            for (int p = N; p < a; p++) right[m] -= g[m * a + p] * F[p][i];
-        }
-        for (int m = 0; m < N; m++) {
-            F[m][i] = 0;
-            for (int k = 0; k < N; k++) F[m][i] += inv[m * N + k] * right[k];
-        }
-    }
-    bent(2 * N, a, d, flat, F, curve);
-    for (int i = 0; i < d; i++)
-        for (int j = 0; j < d; j++) {
-            double new[N];
-            for (int m = 0; m < 2 * N; m++)
-                for (int p = 0; p < N; p++)
-                    curve[m][i][j] += g[m * a + N + p] * s->second[p][i][j];
-            for (int m = 0; m < N; m++) {
-                new[m] = 0;
-                for (int k = 0; k < N; k++)
-                    new[m] += inv[m * N + k] * (s->second[N + k][i][j] - curve[k][i][j]);
-            }
-            for (int m = 0; m < N; m++) {
-                t.second[m][i][j] = new[m];
-                t.second[N + m][i][j] = curve[N + m][i][j];
-                for (int k = 0; k < N; k++) t.second[N + m][i][j] += g[(N + m) * a + k] * new[k];
-            }
-        }
-    for (int m = 0; m < N; m++) {
-        t.value[m] = x[m];
-        t.value[N + m] = flat[N + m];
-        for (int i = 0; i < d; i++) {
-            t.first[m][i] = F[m][i];
-            t.first[N + m][i] = 0;
-            for (int p = 0; p < a; p++) t.first[N + m][i] += g[(N + m) * a + p] * F[p][i];
-        }
-    }
-    *s = t;
+    memcpy(s->value, x, N * sizeof(V));
+    memcpy(s->value + N, flat + N, N * sizeof(V));
     return 0;
 }
 #else
-static void moved(State *out, const State *s, const State *k, double h, int d)
+static void moved(State *out, const State *s, const State *k, double h)
 {
-    for (int m = 0; m < 2 * N; m++) {
-        out->value[m] = s->value[m] + h * k->value[m];
-        for (int i = 0; i < d; i++) {
-            out->first[m][i] = s->first[m][i] + h * k->first[m][i];
-            for (int j = 0; j < d; j++)
-                out->second[m][i][j] = s->second[m][i][j] + h * k->second[m][i][j];
-        }
-    }
+    V *to = (V *)out;
+    const V *from = (const V *)s, *along = (const V *)k;
+    for (size_t i = 0; i < sizeof(State) / sizeof(V); i++) to[i] = from[i] + h * along[i];
 }
 
-static void slope(State *k, const State *s, const double *par, int d)
+static void slope(State *k, State *s, const V *par, int d)
 {
-    double x[2 * N + OWN + REST], flat[SIZE];
+    V x[2 * N + OWN + REST], flat[SIZE];
     memcpy(x, s->value, sizeof s->value);
-    memcpy(x + 2 * N, par, (OWN + REST) * sizeof(double));
+    memcpy(x + 2 * N, par, (OWN + REST) * sizeof(V));
     if (!d) {
         flow_values(x, k->value);
         return;
     }
     flow_full(x, flat);
-    chain(2 * N, d, flat, s, k->value, k->first, k->second);
+    chain(2 * N, flat, s, k->value, k->first, k->second);
 }
 
-static int step(State *s, const double *par, double h, int d, double *last)
+static int step(State *s, const V *par, double h, int d, double *last)
 {
     State k1, k2, k3, k4, at = *s;
     (void)last;
+    memset(&k1, 0, sizeof k1);
+    k2 = k3 = k4 = k1;
     slope(&k1, s, par, d);
-    moved(&at, s, &k1, h / 2, d);
+    moved(&at, s, &k1, h / 2);
     slope(&k2, &at, par, d);
-    moved(&at, s, &k2, h / 2, d);
+    moved(&at, s, &k2, h / 2);
     slope(&k3, &at, par, d);
-    moved(&at, s, &k3, h, d);
+    moved(&at, s, &k3, h);
     slope(&k4, &at, par, d);
-    moved(s, s, &k1, h / 6, d);
-    moved(s, s, &k2, h / 3, d);
-    moved(s, s, &k3, h / 3, d);
-    moved(s, s, &k4, h / 6, d);
+    moved(s, s, &k1, h / 6);
+    moved(s, s, &k2, h / 3);
+    moved(s, s, &k3, h / 3);
+    moved(s, s, &k4, h / 6);
     return 0;
 }
 #endif
 
-/* Outputs at all nodes: value (S, T, OUT), first (d, S, T, OUT), second (d, d, S, T, OUT). */
+/* One lane's outputs at one node: value (OUT), first (OUT, OWN), second (OUT, OWN, OWN). */
+static void written(int l, int d, const V *f, V g[][OWN + 1], V H[][PAIRS(OWN) + 1], double *value,
+                    double *first, double *second)
+{
+    for (int o = 0; o < OUT; o++) {
+        value[o] = f[o][l];
+        if (!d) continue;
+        for (int i = 0, e = 0; i < OWN; i++) {
+            first[o * OWN + i] = g[o][i][l];
+            for (int j = i; j < OWN; j++, e++)
+                second[(o * OWN + i) * OWN + j] = second[(o * OWN + j) * OWN + i] = H[o][e][l];
+        }
+    }
+}
+
+/* Sets from `begin` on: outputs at all nodes, (S, T, OUT), and their derivatives behind. */
+static int several(long begin, long sets, long nodes, int d, int parts, const double *lengths,
+                   const double *parameters, const double *start, const double *start_first,
+                   const double *start_second, double *value, double *first, double *second,
+                   double *last)
+{
+    V par[OWN + REST + 1];
+    State s;
+    memset(&s, 0, sizeof s);
+    for (int l = 0; l < W; l++) {
+        long set = begin + l < sets ? begin + l : sets - 1;
+        for (int k = 0; k < OWN + REST; k++) par[k][l] = parameters[set * (OWN + REST) + k];
+        for (int m = 0; m < 2 * N; m++) {
+            s.value[m][l] = start[m * sets + set];
+            for (int i = 0, e = 0; d && i < OWN; i++) {
+                s.first[m][i][l] = start_first[(i * 2 * N + m) * sets + set];
+                for (int j = i; j < OWN; j++, e++)
+                    s.second[m][e][l] = start_second[((i * d + j) * 2 * N + m) * sets + set];
+            }
+        }
+    }
+    for (long t = 0; t < nodes; t++) {
+        V x[2 * N + OWN + REST], flat[SIZE], f[OUT], g[OUT][OWN + 1], H[OUT][PAIRS(OWN) + 1];
+        for (int p = 0; t && p < parts; p++) {
+            int failed = step(&s, par, lengths[p], d, last);
+            if (failed) return failed;
+        }
+        memcpy(x, s.value, sizeof s.value);
+        memcpy(x + 2 * N, par, (OWN + REST) * sizeof(V));
+        if (d) {
+            observe_full(x, flat);
+            chain(OUT, flat, &s, f, g, H);
+        } else
+            observe_values(x, f);
+        for (int l = 0; l < W && begin + l < sets; l++) {
+            long at = ((begin + l) * nodes + t) * OUT;
+            written(l, d, f, g, H, value + at, first + at * OWN, second + at * OWN * OWN);
+        }
+    }
+    return 0;
+}
+
 int march(long sets, long nodes, int d, int parts, const double *lengths, const double *parameters,
           const double *start, const double *start_first, const double *start_second,
           double *value, double *first, double *second, double *last)
 {
-    for (long set = 0; set < sets; set++) {
-        const double *par = parameters + set * (OWN + REST);
-        State s;
-        memset(&s, 0, sizeof s);
-        for (int m = 0; m < 2 * N; m++) {
-            s.value[m] = start[m * sets + set];
-            for (int i = 0; i < d; i++) {
-                s.first[m][i] = start_first[(i * 2 * N + m) * sets + set];
-                for (int j = 0; j < d; j++)
-                    s.second[m][i][j] = start_second[((i * d + j) * 2 * N + m) * sets + set];
-            }
-        }
-        for (long t = 0; t < nodes; t++) {
-            double x[2 * N + OWN + REST], flat[SIZE], f[OUT];
-            double g[OUT][OWN + 1], H[OUT][OWN + 1][OWN + 1];
-            for (int p = 0; t && p < parts; p++) {
-                int failed = step(&s, par, lengths[p], d, last);
-                if (failed) return failed;
-            }
-            memcpy(x, s.value, sizeof s.value);
-            memcpy(x + 2 * N, par, (OWN + REST) * sizeof(double));
-            if (d) {
-                observe_full(x, flat);
-                chain(OUT, d, flat, &s, f, g, H);
-            } else
-                observe_values(x, f);
-            for (int o = 0; o < OUT; o++) {
-                long at = (set * nodes + t) * OUT + o, all = sets * nodes * OUT;
-                value[at] = f[o];
-                for (int i = 0; i < d; i++) {
-                    first[i * all + at] = g[o][i];
-                    for (int j = 0; j < d; j++) second[(i * d + j) * all + at] = H[o][i][j];
-                }
-            }
-        }
+    for (long begin = 0; begin < sets; begin += W) {
+        int failed = several(begin, sets, nodes, d, parts, lengths, parameters, start, start_first,
+                             start_second, value, first, second, last);
+        if (failed) return failed;
     }
     return 0;
 }

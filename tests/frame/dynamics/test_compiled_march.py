@@ -47,6 +47,16 @@ def test_compiled_trajectories_and_derivatives_are_those_of_numpy(scheme: str) -
     assert np.abs(compiled.values(POINTS) - slow.value).max() < 1e-11
 
 
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_compiled_trajectory_does_not_depend_on_those_beside_it(scheme: str) -> None:
+    flow = LagrangianFlow(SPRINGS, NAMES, 2.0, 0.02, scheme)
+    many = flow.taylor(np.vstack([POINTS, 1.3 * POINTS[0], *[POINTS] * 2, 0.8 * POINTS[1]]))
+    alone = [flow.taylor(point[None]) for point in POINTS]
+    for k, one in enumerate(alone):
+        assert np.array_equal(many.value[k], one.value[0])
+        assert np.array_equal(many.second[:, :, k], one.second[:, :, 0])
+
+
 def test_without_a_compiler_numpy_marches(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ALPHACUT_KERNEL", "numpy")
     c_library.cache_clear()
