@@ -85,13 +85,22 @@ class Boxes:
         points: Array = np.clip(self.centre + self.radius * unit, self.lower[0], self.upper[0])
         return points
 
-    def in_unit(self, jet: Jet) -> Jet:
-        """Derivatives by the unit coordinates from those by the physical parameters."""
+    def in_unit(self, jet: Jet, *, anew: bool = True) -> Jet:
+        """Derivatives by the unit coordinates from those by the physical parameters.
+
+        Args:
+            jet: The latter.
+            anew: Whether its arrays stay as they are.
+        """
         shape, r = (1,) * jet.value.ndim, self.radius
         return Jet(
             jet.value,
-            jet.first * r.reshape(-1, *shape),
-            jet.second * (r[:, None] * r).reshape(len(r), len(r), *shape),
+            np.multiply(jet.first, r.reshape(-1, *shape), out=None if anew else jet.first),
+            np.multiply(
+                jet.second,
+                (r[:, None] * r).reshape(len(r), len(r), *shape),
+                out=None if anew else jet.second,
+            ),
         )
 
     def unit(self, level: int) -> tuple[Array, Array]:
@@ -180,4 +189,4 @@ class UnitFlow:
 
     def taylor(self, unit: Array) -> Jet:
         """Trajectories with derivatives by the unit coordinates, V = (S, T, outputs)."""
-        return self.boxes.in_unit(self.flow.taylor(self.boxes.to_physical(unit)))
+        return self.boxes.in_unit(self.flow.taylor(self.boxes.to_physical(unit)), anew=False)

@@ -21,6 +21,7 @@ from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.checks.corners import taken_in
 from alphacut.frame.envelope import Envelope, signed_envelope
+from alphacut.frame.methods.held_models import HeldModels, models_at
 
 Progress = Callable[[float], None]
 APART = 100_003
@@ -108,10 +109,10 @@ class BatchFollower:
     def pursue(self, flow: UnitFlow, *, progress: Progress | None = None) -> Pursuit:
         """Pursues all levels of `flow.boxes`, from the narrowest box to the widest."""
         levels = len(flow.boxes.alpha)
-        out = Pursuit.empty(flow)
+        out = Pursuit.empty(flow, beside=self.contests > 0)
         for done, level in enumerate(reversed(range(levels))):
             lower, upper = flow.boxes.unit(level)
-            out.enter(level, lower, upper, self)
+            out.enter(lower, upper, self)
             limit = self.budget * (done + 1) // levels
             points, contests = (
                 self._start(flow, lower, upper, out)[: max(1, limit - len(out.points))],
@@ -119,12 +120,12 @@ class BatchFollower:
             )
             while len(points):
                 for chunk in np.array_split(points, -(-len(points) // self.batch)):
-                    out.take(chunk, self)
+                    out.take(chunk)
                 if progress:
                     progress(min(1.0, len(out.points) / self.budget))
                 points = out.proposals(self, min(self.batch, limit - len(out.points)))
                 while not len(points) and contests and len(out.points) < limit:
-                    out.contest(self)
+                    out.contest()
                     contests -= 1
                     points = out.proposals(self, min(self.batch, limit - len(out.points)))
             out.leave(level)
@@ -157,6 +158,7 @@ class Pursuit:
         where: Their unit coordinates.
         correction: What the final models still promise, at most the tolerance.
         open_gain: What they promise above the tolerance when the budget ends the search.
+        held: Models of the graphs that attain the bounds.
     """
 
     flow: UnitFlow
@@ -169,52 +171,32 @@ class Pursuit:
     where: Array
     correction: Array
     open_gain: Array
+    held: HeldModels
     lower: Array = field(default_factory=lambda: np.zeros(0))
     upper: Array = field(default_factory=lambda: np.zeros(0))
     tolerance: float = 0.0
     reach: float = 0.6
 
     @classmethod
-    def empty(cls, flow: UnitFlow) -> Pursuit:
-        """Nothing known yet."""
+    def empty(cls, flow: UnitFlow, *, beside: bool) -> Pursuit:
+        """Nothing known yet; `beside` keeps models for contests."""
         d, shape = len(flow.boxes.names), (len(flow.time), len(flow.outputs), 2)
         levels = len(flow.boxes.alpha)
         low, at = np.full(shape, -np.inf), np.zeros((*shape, d))
         many, where = np.zeros((levels, *shape)), np.zeros((levels, *shape, d))
-        return cls(
-            flow,
-            np.zeros((0, d)),
-            low,
-            at,
-            low.copy(),
-            at.copy(),
-            many,
-            where,
-            many.copy(),
-            many.copy(),
-        )
+        grids = (low, at, low.copy(), at.copy(), many, where, many.copy(), many.copy())
+        held = HeldModels.empty((0,) * (levels > 1) + (-1, 1) * beside, shape, d)
+        return cls(flow, np.zeros((0, d)), *grids, held)
 
-    def enter(self, level: int, lower: Array, upper: Array, method: BatchFollower) -> None:
+    def enter(self, lower: Array, upper: Array, method: BatchFollower) -> None:
         """Start a level; attained values stay, models are asked anew in the wider box."""
-        del level
-        self.lower, self.upper, self.tolerance, self.reach = (
-            lower,
-            upper,
-            method.tolerance,
-            method.reach,
-        )
+        self.lower, self.upper = lower, upper
+        self.tolerance, self.reach = method.tolerance, method.reach
         self.promise[:] = self.value
-        known = (
-            np.unique(self.at.reshape(-1, self.at.shape[-1]), axis=0)
-            if len(self.points)
-            else np.zeros((0, len(lower)))
-        )
-        if len(known) and (upper > lower).any():
-            keep = known[
-                np.linspace(0, len(known) - 1, min(len(known), 2 * method.spread)).astype(int)
-            ]
-            for chunk in np.array_split(keep, -(-len(keep) // method.batch)):
-                self._ask(chunk, self.flow.taylor(chunk), method)
+        if len(self.points) and (upper > lower).any():
+            places = np.nonzero(np.isfinite(self.value))
+            found = self._optima(self.at[places], self.held.models(0, places), places[-1])
+            self.promise[places], self.target[places] = found
 
     def leave(self, level: int) -> None:
         """Post-processing of a level."""
@@ -224,75 +206,54 @@ class Pursuit:
         self.correction[level] = np.where(small, promised, 0.0)
         self.open_gain[level] = np.where(small, 0.0, promised)
 
-    def take(self, points: Array, method: BatchFollower) -> None:
+    def take(self, points: Array) -> None:
         """Computes graphs, updates the bounds at all nodes and asks their models."""
         jet = self.flow.taylor(points)
         self.points = np.vstack([self.points, points])
-        self._ask(points, jet, method)
+        self._ask(points, jet)
 
-    def _ask(self, points: Array, jet: Jet, method: BatchFollower) -> None:
+    def _ask(self, points: Array, jet: Jet) -> None:
+        holder = np.full(self.value.shape, -1)
         for s, point in enumerate(points):
             signed = np.stack([-jet.value[s], jet.value[s]], -1)
             better = signed > self.value
-            self.value[better], self.at[better] = signed[better], point
+            self.value[better], self.at[better], holder[better] = signed[better], point, s
             self._propose(point, jet, s, signed >= self.value)
+        self.held.keep(jet, holder)
 
-    def contest(self, method: BatchFollower) -> None:
+    def contest(self) -> None:
         """Ask the models that hold a bound at one node about the next node."""
-        rivals: dict[bytes, list[tuple[int, int, int]]] = {}
-        for here, there in ((slice(1, None), slice(None, -1)), (slice(None, -1), slice(1, None))):
-            jumps = (
-                np.abs(self.at[here] - self.at[there]).max(-1)
-                > JUMP * (self.upper - self.lower).max()
-            )
-            for t, o, side in np.argwhere(jumps):
-                place = (int(t) + (here.start or 0), int(o), int(side))
-                rivals.setdefault(self.at[there][t, o, side].tobytes(), []).append(place)
-        points = np.array([np.frombuffer(key) for key in rivals]).reshape(-1, self.at.shape[-1])
-        for chunk, keys in zip(
-            _batches(points, method.batch),
-            _batches(np.array(list(rivals), object), method.batch),
-            strict=True,
-        ):
-            jet = self.flow.taylor(chunk)
-            self.points = np.vstack([self.points, chunk])
-            for s, key in enumerate(keys):
-                self._challenge(chunk[s], jet, s, np.array(rivals[key]))
-
-    def _challenge(self, point: Array, jet: Jet, s: int, places: Array) -> None:
-        """Let the model of one graph promise at `places` (K, 3)."""
-        t, o, side = places.T
-        promised, target = self._optima(point, jet, s, (t, o, side))
-        more = promised > self.promise[t, o, side]
-        self.promise[t[more], o[more], side[more]], self.target[t[more], o[more], side[more]] = (
-            promised[more],
-            target[more],
-        )
+        width = JUMP * (self.upper - self.lower).max()
+        jumps = np.argwhere(np.abs(np.diff(self.at, axis=0)).max(-1) > width)
+        for shift in (1, -1):  # of the node asked about from that of the rival
+            t, o, side = np.add(jumps, [shift < 0, 0, 0]).T
+            rivals, places = (t, o, side), (t + shift, o, side)
+            found = self._optima(self.at[rivals], self.held.models(shift, rivals), side)
+            more = found[0] > self.promise[places]
+            places = tuple(x[more] for x in places)
+            self.promise[places], self.target[places] = (x[more] for x in found)
 
     def _propose(self, point: Array, jet: Jet, s: int, close: Array) -> None:
         """Optima of the model of one graph where it is best."""
-        t, o, side = np.nonzero(close)
-        if not len(t) or not (self.upper > self.lower).any():
+        places = np.nonzero(close)
+        if not len(places[0]) or not (self.upper > self.lower).any():
             return
-        self.promise[t, o, side], self.target[t, o, side] = self._optima(
-            point, jet, s, (t, o, side)
-        )
+        points = np.broadcast_to(point, (len(places[0]), len(point)))
+        models = models_at(jet, (np.full(len(points), s), *places[:2]))
+        self.promise[places], self.target[places] = self._optima(points, models, places[2])
 
     def _optima(
-        self, point: Array, jet: Jet, s: int, places: tuple[Array, Array, Array]
+        self, points: Array, models: tuple[Array, Array, Array], side: Array
     ) -> tuple[Array, Array]:
-        """Promises of the model of one graph at K places, shape (K,), and points (K, d)."""
-        t, o, side = places
+        """Promises of models about K points, shape (K,), and where they are, shape (K, d)."""
         sign = 2.0 * side - 1
-        g = (jet.first[:, s, t, o] * sign).T
-        H = np.moveaxis(jet.second[:, :, s, t, o] * sign, -1, 0)
+        value, g, H = models[0] * sign, models[1] * sign[:, None], models[2] * sign[:, None, None]
         reach = self.reach * np.maximum((self.upper - self.lower) / 2, 1e-300)
-        low = np.maximum(self.lower - point, -reach)
-        high = np.minimum(self.upper - point, reach)
-        rows = (len(t), len(point))
-        maximise = global_maximum if len(point) <= 4 else local_maximum
-        x = maximise(g, H, np.broadcast_to(low, rows), np.broadcast_to(high, rows))
-        return jet.value[s, t, o] * sign + gain(g, H, x), point + x
+        low = np.maximum(self.lower - points, -reach)
+        high = np.minimum(self.upper - points, reach)
+        maximise = global_maximum if points.shape[1] <= 4 else local_maximum
+        x = maximise(g, H, low, high)
+        return value + gain(g, H, x), points + x
 
     def proposals(self, method: BatchFollower, count: int) -> Array:
         """Most promising points of every window of time, apart from others, (≤ count, d)."""
@@ -314,10 +275,6 @@ class Pursuit:
                     chosen.append(point)
                     break
         return np.array(chosen)[:count].reshape(-1, len(self.lower))
-
-
-def _batches(array: Array, size: int) -> list[Array]:
-    return [array[k : k + size] for k in range(0, len(array), size)]
 
 
 JUMP = 0.05
