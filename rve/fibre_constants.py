@@ -72,6 +72,27 @@ def fibre_constants(result: Homogenised) -> FibreConstants:
     return FibreConstants(_by_name(values), _by_name(found))
 
 
+def across_fibres(cell: Cell, bulk: float, shear: float) -> dict[str, float]:
+    """Constants of fibres with no direction of their own across, from those of the plane.
+
+    1/E_T = 1/(4 G23) + 1/(4 K23) + ν_LT²/E_L (Hill 1964).
+
+    Args:
+        cell: Phases and radius, by which E_L and ν_LT follow from K23.
+        bulk: In-plane bulk modulus K23 = (C11 + C12)/2 in Pa, of plane strain.
+        shear: G23 in Pa.
+
+    Returns:
+        "E_T", "E_L", "G23" and "K23" in Pa, and "nu_LT".
+    """
+    slack = _Slack.of(cell)
+    z, *_ = slack.between(bulk, 0.0)
+    values = _by_name(_constants(bulk, z, 2 * shear, shear, shear, slack=slack))
+    across, young = values["E1"], values["E3"]
+    ratio = values["nu13"] * young / across
+    return {"E_T": across, "E_L": young, "G23": shear, "K23": bulk, "nu_LT": ratio}
+
+
 def _by_name(values: Array) -> dict[str, float]:
     return dict(zip(CONSTANTS, map(float, values), strict=True))
 

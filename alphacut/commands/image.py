@@ -65,7 +65,8 @@ def summary(found: Document) -> str:
         else ""
     )
     return (
-        f"alpha  lower GPa   upper GPa   (E of eq. 16, plane strain)\n{rows}"
+        "alpha  lower GPa   upper GPa   (E of eq. 16, plane strain: not E_T, the transverse Young's"
+        f" modulus of a fibre composite)\n{rows}"
         f"width of the stiffness's bounds at the top level: {found['width']:.2e}\n"
         f"plane-strain bulk modulus: {_interval(bulk)}\n{anisotropy(found)}"
         f"{apparent}{quantiles(found)}"

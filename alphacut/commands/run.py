@@ -33,7 +33,7 @@ from alphacut.io.units import engineering, largest_by_unit
 from alphacut.stages import summary
 from alphacut.stages import width_shares as shares
 from alphacut.stages.contract import require_choice
-from alphacut.stages.material.references import line
+from alphacut.stages.material.references import lines
 from alphacut.stages.pipeline import Chain
 from alphacut.stages.readiness import ready
 from alphacut.stages.vibration import decision, joint, update
@@ -212,7 +212,7 @@ def modulus_lines(found: Document) -> Iterator[str]:
             f"E = {core(cell)}, support [{cell['lower_GPa']:.4f}, {cell['upper_GPa']:.4f}] GPa;"
             f" nu = {cell['nu']:.4f}"
         )
-        yield line(cell["beside"], cell["particles"])
+        yield from lines(cell["beside"], cell["particles"])
         if cell["outside"]:
             yield f"warning: {cell['outside']}"
         yield cell["publish"]

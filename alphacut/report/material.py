@@ -9,7 +9,7 @@ from alphacut.io.files import Document
 from alphacut.report.tables import code, paragraphs, section, sentence, table
 from alphacut.stages.material import response
 from alphacut.stages.material.microstructure import crystalline
-from alphacut.stages.material.references import line
+from alphacut.stages.material.references import lines
 
 
 def microstructure(found: Document) -> Markup:
@@ -70,8 +70,8 @@ def of_map(found: Document) -> str:
 
 
 MEANING = {
-    "cylinders": "E is the modulus of eq. 16, the paper's convention: a square array is not"
-    " isotropic.",
+    "cylinders": "E is the modulus of eq. 16 in plane strain, the paper's convention: a square"
+    " array is not isotropic.",
     "isotropic": "E is that of the isotropic average of the square array's plane stiffness.",
     "spheres": "E is Hill's isotropic average of spheres in a simple cubic array.",
 }
@@ -93,7 +93,7 @@ def modulus(found: Document, drawn: Markup) -> Markup:
     ]
     head = ("α", "lower E, GPa", "upper E, GPa", "lower ν", "upper ν")[: 1 + len(ends)]
     beside = found.get("beside")
-    told = [f"{line(beside, found['particles'])}."] if beside else []
+    told = [f"{one}." for one in lines(beside, found["particles"])] if beside else []
     told += [found[name] for name in ("outside", "publish") if found.get(name)]
     words = Markup(
         "<p>{} <strong>{}</strong>, support [{:.4f}, {:.4f}] GPa; Poisson's ratio {:.4f}. {} {}"
@@ -161,7 +161,8 @@ def image(found: Document, drawn: Markup) -> Markup:
         else ""
     )
     words = paragraphs(
-        "Plane strain: every section of the material is the image, as with fibres. If the"
+        "Plane strain: every section of the material is the image, as with fibres; E is that of an"
+        " isotropic solid with its plane bulk and shear moduli, not E_T across the fibres. If the"
         f" particles are grains, the Hashin–Shtrikman interval of E is {grains}. The plane-strain"
         f" Young's modulus of the softest direction lies in {least}, of the stiffest in"
         f" {greatest}.{own}"

@@ -13,7 +13,8 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import Document, say
 from alphacut.rve import bounds as plane
 from alphacut.rve.anisotropy import plane_average
-from alphacut.rve.cell import STRAIN, Phase
+from alphacut.rve.cell import STRAIN, Cell, Phase
+from alphacut.rve.fibre_constants import across_fibres
 from alphacut.rve.result import effective_modulus
 from alphacut.rve.spheres import bounds as space
 from alphacut.rve.spheres.cubic import hill_average
@@ -46,6 +47,8 @@ class References:
         spheres_estimate: Mori and Tanaka's estimate of spheres.
         average: Isotropic average of the array's whole plane stiffness (mean of Voigt's and Reuss's
             over all directions, Hill 1952); None where E is such an average itself, or unknown.
+        across: Constants of the array as fibres, see `across_fibres`, its G23 that of the isotropic
+            average; None of spheres, or where that is unknown.
     """
 
     particles: str
@@ -55,6 +58,7 @@ class References:
     spheres: tuple[float, float]
     spheres_estimate: float
     average: float | None
+    across: dict[str, float] | None = None
 
     def document(self) -> Document:
         """In GPa."""
@@ -69,6 +73,13 @@ class References:
                 for name, (low, high) in ends.items()
             },
             "isotropic_average_E_GPa": None if self.average is None else self.average / GPA,
+            "across": self.across
+            and {
+                name if name == "nu_LT" else f"{name}_GPa": value
+                if name == "nu_LT"
+                else value / GPA
+                for name, value in self.across.items()
+            },
         }
 
 
@@ -78,6 +89,8 @@ def references(
     moduli: tuple[float, float],
     ratio: float | None,
     particles: str,
+    *,
+    averaged: bool = False,
 ) -> References:
     """The composites beside a cell.
 
@@ -87,11 +100,15 @@ def references(
         moduli: Its E in Pa and ν, of eq. 16 or of Hill's average.
         ratio: Shear modulus along the diagonals over that along the axes; None where unknown.
         particles: "cylinders" or "spheres".
+        averaged: Whether E of cylinders is that of the isotropic average.
     """
     share = np.asarray(mean_share(radius, particles))
     fibres, spheres = bounds_of(float(share), phases)
     whole, _, shear = plane.mori_tanaka(share, *phases)
-    average = None if particles == "spheres" or ratio is None else _average(*moduli, ratio)
+    own = particles == "cylinders" and (averaged or ratio is not None)
+    average, poisson = _average(*moduli, 1.0 if averaged else ratio or 1.0)
+    cell, shear23 = Cell(phases[0], phases[1], radius), average / (2 * (1 + poisson))
+    bulk23 = shear23 / (1 - 2 * poisson)
     return References(
         particles,
         float(share),
@@ -99,7 +116,8 @@ def references(
         across(np.array([whole / 2, shear])),
         spheres,
         young(space.mori_tanaka(share, *phases)),
-        average,
+        average if own and not averaged else None,
+        across_fibres(cell, bulk23, shear23) if own else None,
     )
 
 
@@ -180,11 +198,11 @@ def young(moduli: Array) -> float:
     return float(hill_average(np.array([bulk, shear, shear]))[0])
 
 
-def _average(modulus: float, poisson: float, ratio: float) -> float:
-    """E of the isotropic average of an array whose shear modulus along its axes eq. 16 took."""
+def _average(modulus: float, poisson: float, ratio: float) -> Array:
+    """E and ν of the isotropic average of an array whose shear along its axes eq. 16 took."""
     axes = modulus / (2 * (1 + poisson))
     whole, diagonals = 2 * axes / (1 - 2 * poisson), ratio * axes
-    return float(plane_average(np.array([whole, 2 * diagonals, axes]))[0])
+    return plane_average(np.array([whole, 2 * diagonals, axes]))
 
 
 def beside(
@@ -209,8 +227,8 @@ def beside(
     """
     radius, matrix, inclusion = modal_parts(case)
     particles, moduli = case.cell.particles, (modulus, poisson)
-    ratio = None if case.modulus.average == "isotropic" else ratio  # E is that average itself
-    found = references(radius, (matrix, inclusion), moduli, ratio, particles).document()
+    averaged, phases = case.modulus.average == "isotropic", (matrix, inclusion)
+    found = references(radius, phases, moduli, ratio, particles, averaged=averaged).document()
     support = (modulus, modulus)
     if cuts is not None and len(cuts[0]):
         found["cuts"] = bounds_over_cuts(case, [float(level) for level in cuts[0]])
@@ -233,10 +251,34 @@ def text_of(case: Case, told: Document) -> str:
     """The lines of the references for people; a warning goes to standard error."""
     if told["outside"]:
         say(f"warning: {told['outside']}")
-    return f"{line(told['beside'], case.cell.particles)}\n{told['publish']}\n"
+    return "\n".join([*lines(told["beside"], case.cell.particles), told["publish"], ""])
 
 
-def line(found: Document, particles: str) -> str:
+def lines(found: Document, particles: str) -> list[str]:
+    """The references, and what E is not, a line each."""
+    return [_bounds_in_words(found, particles), *_fibres_in_words(found, particles)]
+
+
+def _fibres_in_words(found: Document, particles: str) -> Iterator[str]:
+    """That E of the plane is not the transverse Young's modulus, and what that one is."""
+    if particles == "spheres":
+        return
+    if own := found.get("across"):
+        told = (
+            f"that is E_T = {own['E_T_GPa']:.3f} GPa: 1/E_T = 1/(4 G23) + 1/(4 K23) + ν_LT²/E_L,"
+            f" G23 {own['G23_GPa']:.3f} GPa averaged over all directions, K23"
+            f" {own['K23_GPa']:.3f} GPa of plane strain, E_L {own['E_L_GPa']:.3f} GPa, ν_LT"
+            f" {own['nu_LT']:.4f}"
+        )
+    else:
+        told = "that one follows from the series, which refuses this cell"
+    yield (
+        "E is of plane strain: that of an isotropic solid with the plane's bulk and shear moduli,"
+        f" not the transverse Young's modulus of a fibre composite; {told}"
+    )
+
+
+def _bounds_in_words(found: Document, particles: str) -> str:
     """The references as one line."""
     kinds = [
         f"{words} {' … '.join(f'{x:.3f}' for x in one['hashin_shtrikman_E_GPa'])}"
@@ -246,7 +288,9 @@ def line(found: Document, particles: str) -> str:
     average = found["isotropic_average_E_GPa"]
     own = f"; this array averaged over all directions {average:.3f}" if average else ""
     shape = (
-        "discs of the plane are long fibres" if particles == "cylinders" else "these are spheres"
+        "discs of the plane are long fibres, their E in the same sense as the E above"
+        if particles == "cylinders"
+        else "these are spheres"
     )
     return (
         f"Hashin–Shtrikman bounds of E at the fraction {found['fraction']:.4f}, GPa:"
@@ -276,11 +320,15 @@ def publish(case: Case, found: Document) -> str:
             " of long parallel fibres, across them."
         )
     if case.modulus.average == "isotropic":
-        return "To publish: this E, the isotropic average of the square array."
-    average = found["isotropic_average_E_GPa"]
+        return (
+            "To publish: this E for plane strain, the isotropic average of the square array; E_T as"
+            " modulus across long fibres."
+        )
+    average, across = found["isotropic_average_E_GPa"], found["across"]
     told = f", {average:.3f} GPa at the modal values" if average else ""
+    first = f" E_T = {across['E_T_GPa']:.3f} GPa as modulus across them;" if across else ""
     return (
-        f"To publish for long fibres: the isotropic average{told}"
+        f"To publish for long fibres:{first} for plane strain the isotropic average{told}"
         ' (modulus.average = "isotropic"); E of the square array (eq. 16) is of its axes alone.'
     )
 

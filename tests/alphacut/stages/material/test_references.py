@@ -13,12 +13,15 @@ from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.report.key_results import of_cell
 from alphacut.rve import bounds as plane
-from alphacut.rve.cell import Phase
+from alphacut.rve.anisotropy import plane_average, shear_ratio
+from alphacut.rve.cell import Cell, Phase, square_moduli
+from alphacut.rve.fibre_constants import across_fibres, fibre_constants
 from alphacut.rve.representative.averages import Isotropic
+from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres import bounds as space
 from alphacut.stages.material.cell import cell_inputs, modal_parts, parts
 from alphacut.stages.material.modulus import read_number
-from alphacut.stages.material.references import beside, bounds_over_cuts, references
+from alphacut.stages.material.references import beside, bounds_over_cuts, lines, references
 from alphacut.stages.material.spheres import unmeasured
 from alphacut.stochastic import HermiteMap, RadiusMap
 
@@ -66,7 +69,6 @@ def test_the_references_are_the_numbers_that_the_benchmark_prints() -> None:
 
 
 def test_the_average_over_directions_is_that_of_the_whole_stiffness() -> None:
-    from alphacut.rve.anisotropy import shear_ratio
     from alphacut.rve.result import effective_modulus
     from alphacut.rve.series.stiffness import square_stiffness
 
@@ -83,6 +85,40 @@ def test_the_average_over_directions_is_that_of_the_whole_stiffness() -> None:
     assert between[0] < found.average < between[1]
     assert eq16[0] < found.average
     assert references(circle(0.8), (MATRIX, STIFF), eq16, None, "cylinders").average is None
+
+
+def test_the_transverse_modulus_of_fibres_stands_beside_e_of_plane_strain(tmp_path: Path) -> None:
+    """By its formula, between those of the array's axes and diagonals, above E of plane strain."""
+    case = load(polymer(tmp_path, "fibres"))
+    result = SeriesModel().solve(*modal_parts(case)[:2], [modal_parts(case)[2]])[0]
+    exact, stiffness = fibre_constants(result).values, np.asarray(result.stiffness)
+    ratio, own = shear_ratio(stiffness), (result.modulus, result.poisson)
+    told = beside(case, *own, ratio)
+    found, bulk = told["beside"]["across"], float(plane.bulk_modulus(stiffness))
+    by_formula = (
+        1 / (4 * found["G23_GPa"])
+        + 1 / (4 * found["K23_GPa"])
+        + found["nu_LT"] ** 2 / found["E_L_GPa"]
+    )
+    assert found["E_T_GPa"] == pytest.approx(1 / by_formula, rel=1e-12)
+    assert found["K23_GPa"] == pytest.approx(bulk / 1e9, rel=1e-9)
+    assert found["E_L_GPa"] == pytest.approx(exact["E3"] / 1e9, rel=1e-9)
+    diagonal = across_fibres(
+        Cell(*modal_parts(case)[1:], modal_parts(case)[0]), bulk, ratio * stiffness[2, 2]
+    )
+    assert diagonal["E_T"] == pytest.approx(exact["E1"], rel=1e-9)
+    assert told["beside"]["isotropic_average_E_GPa"] < found["E_T_GPa"] < exact["E1"] / 1e9
+    text = "\n".join(lines(told["beside"], "cylinders"))
+    assert (
+        f"not the transverse Young's modulus of a fibre composite; that is E_T = {found['E_T_GPa']:.3f} GPa"
+        in text
+    )
+    averaged = plane_average(square_moduli(stiffness))
+    again = beside(load(case.path, ["modulus.average=isotropic"]), *averaged, ratio)
+    assert again["beside"]["across"] == pytest.approx(found, rel=1e-9)
+    assert "refuses this cell" in "".join(lines(beside(case, *own, None)["beside"], "cylinders"))
+    spheres = load(case.path, ["cell.particles=spheres"])
+    assert "transverse" not in "".join(lines(beside(spheres, *own, 1.0)["beside"], "spheres"))
 
 
 POLYMER = """
@@ -212,7 +248,7 @@ def test_a_fuzzy_e_below_the_bound_of_spheres_is_flagged_wherever_it_goes(
     ("change", "words"),
     [
         ([], "the isotropic average, 5"),
-        (["modulus.average=isotropic"], "this E, the isotropic average of the square array"),
+        (["modulus.average=isotropic"], "this E for plane strain, the isotropic average"),
         (["cell.particles=spheres"], "isotropic (Hill) average of spheres"),
     ],
 )
