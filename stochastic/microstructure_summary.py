@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import xarray
 
 
+CRISP = 1e-6  # of a3 − a1: nearer to the fitted slope, an end is round-off of the fit
 PERIODIC = "none: the boxes are periodic"
 EDGE = (
     "only cells that no disc beyond the window's edge can change; each stands for 1/p, p the share"
@@ -155,7 +156,9 @@ def fragment(found: Microstructure | SphereMicrostructure) -> str:
     law, box, shape = found.pbox.fit.distribution, found.pbox, found.study.shape
 
     def triangle(ends: tuple[float, float, float]) -> str:
-        return "[" + ", ".join(f"{end:.8g}" for end in ends) + "]"
+        near = CRISP * (box.fit.a3 - box.fit.a1)
+        told = (ends[1] if abs(end - ends[1]) <= near else end for end in ends)
+        return "[" + ", ".join(f"{end:.8g}" for end in told) + "]"
 
     if isinstance(found, SphereMicrostructure):
         particles, cells = found.packed[0].fraction, volume_fraction(found.sample)

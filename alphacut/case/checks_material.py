@@ -198,6 +198,14 @@ def sphere_model(case: Case) -> Iterator[Problem]:
             method,
             ", ".join(SPHERE_METHODS),
         )
+    own = "modulus.average" in case.changed or "cell.particles" not in case.changed
+    if case.cell.particles == "spheres" and own and case.asked("modulus.average"):
+        yield Problem(
+            "modulus.average",
+            "E of spheres is Hill's isotropic average, and this has an effect on cylinders alone",
+            str(case.written["modulus.average"]),
+            'beside cell.particles = "cylinders"',
+        )
     if "microstructure" in case.stages and case.sections.microstructure:
         yield from one_shape(case)
 
@@ -211,8 +219,7 @@ def one_shape(case: Case) -> Iterator[Problem]:
             "stage microstructure measures discs in their planar cells here, whose radii are not"
             " those of spheres",
             "spheres",
-            '"cylinders", or section [microstructure.spheres] with its volume fraction in place of'
-            " the discs",
+            f'"cylinders", or {taking_spheres(case)}',
         )
     if case.cell.particles == "cylinders" and packed:
         yield Problem(
@@ -221,6 +228,28 @@ def one_shape(case: Case) -> Iterator[Problem]:
             "cylinders",
             '"spheres"',
         )
+
+
+def taking_spheres(case: Case) -> str:
+    """What a case takes spheres by, whatever its particles come from."""
+    takes, given = 'cell.particles = "spheres"', case.sections.microstructure
+    if "microstructure" not in case.stages or given is None or given.spheres:
+        return takes
+    wanted = "its volume_fraction, spheres, and radii or a file of diameters"
+    behind = "its volume_fraction, spheres, smallest_radius, largest_radius, and circles"
+    source = "packing"
+    if given.circles:
+        source, wanted = "circles", f'{behind} = "{given.circles.file}"'
+    elif given.image:
+        source = "image"
+        wanted = (
+            f"{behind} = FOLDER/circles.csv, which alphacut microstructure --out FOLDER writes of"
+            " this case with cylinders: circles seen in an image are smaller than their spheres"
+        )
+    return (
+        f"{takes} with section [microstructure.spheres] in place of [microstructure.{source}]:"
+        f" {wanted}"
+    )
 
 
 def guilty(family: MapFamily, values: Mapping[str, float]) -> str:

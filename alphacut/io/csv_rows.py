@@ -10,7 +10,7 @@ from pathlib import Path
 from alphacut.io.output_paths import hint
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.units import factor
-from alphacut.stochastic.particles.csv_columns import with_points
+from alphacut.stochastic.particles.csv_columns import not_text, with_points
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,8 @@ class CsvFile:
         try:
             lines = self.path.read_text(encoding="utf-8-sig").splitlines()
         except UnicodeDecodeError:
-            raise self.unreadable(f"the {self.what} is not text in UTF-8", self.allowed) from None
+            what = f"the {self.what} {not_text(self.path)}"
+            raise self.unreadable(what, self.allowed) from None
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
             what = f"the {self.what} cannot be read: {reason}"

@@ -72,7 +72,7 @@ def inputs_numbers(results: Results) -> Document:
     if "microstructure" in results.case.stages and particles.is_file():
         found["microstructure"] = json.loads(particles.read_text(encoding="utf-8"))
     if results.case.sections.radius:
-        found["area_fraction"] = area_fraction(results)
+        found |= fraction(results)
     return found
 
 
@@ -137,7 +137,7 @@ def learned_numbers(results: Results) -> Document:
     return found if "refuted" in found else {**found, "envelope_width": narrower(results.update)}
 
 
-def area_fraction(results: Results) -> float:
+def fraction(results: Results) -> Document:
     """Mean fraction of the cell that the particle takes: E[π r²/4], of spheres E[π r³/6]."""
     from alphacut.stochastic import gauss_rule
 
@@ -145,8 +145,8 @@ def area_fraction(results: Results) -> float:
     radius, _, _ = _cell(results)
     rule = gauss_rule(radius.distribution, points=20)
     if case.cell.particles == "spheres":
-        return float(rule.mean(volume_fraction(radius(rule.nodes))))
-    return float(rule.mean(np.pi / 4 * radius(rule.nodes) ** 2))
+        return {"volume_fraction": float(rule.mean(volume_fraction(radius(rule.nodes))))}
+    return {"area_fraction": float(rule.mean(np.pi / 4 * radius(rule.nodes) ** 2))}
 
 
 def _cell(results: Results) -> tuple[RadiusMap, Phase, Phase]:

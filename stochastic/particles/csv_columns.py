@@ -147,12 +147,33 @@ def with_points(rows: list[tuple[int, list[str]]], path: Path) -> list[tuple[int
     ]
 
 
+BEGINNINGS = {
+    b"\x89PNG": "is a PNG image",
+    b"\xff\xd8\xff": "is a JPEG image",
+    b"II*\0": "is a TIFF image",
+    b"MM\0*": "is a TIFF image",
+    b"PK\3\4": "is a spreadsheet or another archive; save the table as CSV",
+    b"\x89HDF": "is an HDF5 or NetCDF file",
+}
+"""First bytes of files that are taken for tables, and what they are."""
+
+
+def not_text(path: Path) -> str:
+    """What a file is that cannot be read as text."""
+    with path.open("rb") as file:
+        first = file.read(4)
+    known = [what for bytes_, what in BEGINNINGS.items() if first.startswith(bytes_)]
+    return known[0] if known else "is not text in UTF-8; save it as CSV in UTF-8"
+
+
 def _lines(path: Path, columns: Sequence[str]) -> list[tuple[int, str]]:
     """Numbered lines that are neither empty nor comments, the header first."""
     try:
         text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path} cannot be read as text: {error}") from error
+    except UnicodeDecodeError:
+        raise ValueError(f"{path} is no CSV file: it {not_text(path)}") from None
+    except OSError as error:
+        raise ValueError(f"{path} cannot be read: {error.strerror}") from error
     lines = [
         (number, line)
         for number, line in enumerate(text.splitlines(), 1)

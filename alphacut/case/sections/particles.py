@@ -39,8 +39,8 @@ class Microstructure(Section):
         bool | None,
         Key(
             "whether a2 and a4 also hold the slopes' own bootstrap band, as far as its maps are"
-            " monotone: fewer data, a fuzzier map; true for circles and image, false for packing if"
-            " left out"
+            " monotone: fewer data, a fuzzier map; true for circles and image, false for packing"
+            " and spheres (whose band is of packings drawn anew) if left out"
         ),
     ] = None
     packing: Packing | None = None

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from alphacut.stochastic.spheres.wicksell import RadiiPBox
 
 
+LEAST_SLOPE = 1e-4
+"""Slope at and below which it is that of a map that barely rises."""
 CRYSTALLISE = 0.8
 """Area fraction from which packings of equal discs were measured to be crystals in part."""
 
@@ -174,6 +176,7 @@ def require_readable(case: Case) -> Study:
         BadInput: A file cannot be read, or holds what makes no sense.
     """
     from alphacut.stochastic.errors import RefusedError
+    from alphacut.stochastic.particles.image import SectionImage
     from alphacut.stochastic.sections import Measured
     from alphacut.stochastic.spheres.packing import SpherePackings
     from alphacut.stochastic.spheres.power_cells import voro
@@ -184,13 +187,13 @@ def require_readable(case: Case) -> Study:
             voro()
         except RefusedError as error:
             raise case.refuse("microstructure.spheres", str(error)) from None
-    elif isinstance(wanted.source, Measured) and case.microstructure.circles:
+    elif isinstance(wanted.source, Measured):
+        file = wanted.source.file
         try:
-            wanted.source.file.read()
+            file.material() if isinstance(file, SectionImage) else file.read()
         except ValueError as error:
-            raise BadInput(
-                Problem("microstructure.circles.file", str(error), file=str(case.path))
-            ) from None
+            kind = "image" if isinstance(file, SectionImage) else "circles"
+            raise case.refuse(f"microstructure.{kind}.file", str(error)) from None
     return wanted
 
 
@@ -323,11 +326,16 @@ def without_numbers(reason: str) -> str:
 
 
 def crisp_slopes(fragment: str) -> Iterator[str]:
-    """Warning for each slope that came out crisp, its band holding one map."""
+    """Line for each slope that came out crisp, its band holding one map."""
     radius = tomllib.loads(fragment)["radius"]
     for name in ("a2", "a4"):
         ends = radius[name] if isinstance(radius[name], list) else [radius[name]]
-        if len(set(ends)) == 1:
+        if len(set(ends)) == 1 and ends[0] <= LEAST_SLOPE:
+            yield (
+                f"{name} is crisp: the fit wants the least slope of a rising map there, as where"
+                " radii pile up at that end, and no key widens it"
+            )
+        elif len(set(ends)) == 1:
             why = (
                 "the band around the particles' distribution is so wide that no width of this slope"
                 " is needed to reach into it"
@@ -350,6 +358,13 @@ def read_fragment(path: Path) -> str:
     return path.read_text(encoding="utf-8")
 
 
+def circles_of(found: Microstructure) -> str:
+    """The circles seen in an image as a CSV file, lengths in m."""
+    discs = found.sections[0].discs
+    rows = np.column_stack([discs.centres, discs.radii])
+    return "x [m],y [m],r [m]\n" + "".join(f"{x:.7g},{y:.7g},{r:.7g}\n" for x, y, r in rows)
+
+
 def write(
     found: Microstructure | SphereMicrostructure,
     folder: Path,
@@ -359,6 +374,7 @@ def write(
 ) -> list[str]:
     """Write numbers, figures, fragment and dataset; returns the paths from `folder`."""
     from alphacut.stochastic.figures.all import draw
+    from alphacut.stochastic.microstructure import Microstructure
     from alphacut.stochastic.microstructure_summary import fragment, summary, to_dataset
 
     write_text(folder / "microstructure.json", as_json(summary(found), indent=2))
@@ -366,8 +382,9 @@ def write(
     write_text(folder / "radius.toml", fragment(found))
     with whole_file(folder / "microstructure.nc") as partial:
         to_dataset(found).assign_attrs(said).to_netcdf(partial)
-    numbers = [
-        folder / name for name in ("microstructure.json", "microstructure.nc", "radius.toml")
-    ]
-    files = [*numbers, *(path for paths in drawn.values() for path in paths)]
+    names = ["microstructure.json", "microstructure.nc", "radius.toml"]
+    if isinstance(found, Microstructure) and found.sections[0].phase_fraction is not None:
+        write_text(folder / "circles.csv", circles_of(found))
+        names.append("circles.csv")
+    files = [*(folder / name for name in names), *(path for of in drawn.values() for path in of)]
     return [str(path.relative_to(folder)) for path in files]

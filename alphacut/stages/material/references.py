@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.case.case import Case
+from alphacut.case.checks_material import taking_spheres
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import Document, say
 from alphacut.rve import bounds as plane
@@ -21,7 +22,7 @@ from alphacut.rve.spheres.cubic import hill_average
 from alphacut.rve.spheres.result import volume_fraction
 from alphacut.stages.material.cell import cell_inputs, modal_parts, parts
 from alphacut.stages.material.modulus import FuzzyModulus
-from alphacut.stages.material.spheres import says_spheres
+from alphacut.stages.material.spheres import cure, says_spheres
 from alphacut.stochastic import RadiusMap, gauss_rule
 from alphacut.stochastic.theta.law import Array
 
@@ -285,6 +286,7 @@ def _bounds_in_words(found: Document, particles: str) -> str:
         f" (Mori–Tanaka {one['mori_tanaka_E_GPa']:.3f})"
         for words, one in (("long fibres", found["fibres"]), ("spheres", found["spheres"]))
     ]
+    kind = "volume" if particles == "spheres" else "area"  # of a section across the fibres
     average = found["isotropic_average_E_GPa"]
     own = f"; this array averaged over all directions {average:.3f}" if average else ""
     shape = (
@@ -293,7 +295,7 @@ def _bounds_in_words(found: Document, particles: str) -> str:
         else "these are spheres"
     )
     return (
-        f"Hashin–Shtrikman bounds of E at the fraction {found['fraction']:.4f}, GPa:"
+        f"Hashin–Shtrikman bounds of E at the {kind} fraction {found['fraction']:.4f}, GPa:"
         f" {'; '.join(kinds)}{own}; {shape}{over_support(found)}"
     )
 
@@ -316,8 +318,8 @@ def publish(case: Case, found: Document) -> str:
         return "To publish: this E, the isotropic (Hill) average of spheres in a cubic array."
     if (told := says_spheres(case)) is not None:
         return (
-            f'To publish, since {told}: E of spheres, by cell.particles = "spheres"; the E above is'
-            " of long parallel fibres, across them."
+            f"To publish, since {told}: E of spheres, by {taking_spheres(case)}; the E above is of"
+            " long parallel fibres, across them."
         )
     if case.modulus.average == "isotropic":
         return (
@@ -355,7 +357,7 @@ def outside(
         f"E = {modulus:.3f} GPa lies {side} the Hashin–Shtrikman bound {bound:.3f} GPa of spheres"
         f"{_whole(found, support)}, and {told}: its discs are long fibres, and its nu is theirs"
         " too;"
-        ' cell.particles = "spheres" takes spheres, "cylinders" ends this warning'
+        f" cell.particles: {cure(case)}"
     )
 
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from alphacut.case.case import Case
+from alphacut.case.checks_material import taking_spheres
 from alphacut.io.files import Document
 from alphacut.rve.bounds import mori_tanaka as of_cylinders
 from alphacut.rve.cell import STRAIN, Phase
@@ -122,10 +123,9 @@ def remark(case: Case, share: float, matrix: Phase, inclusion: Phase) -> str | N
     space = float(hill_average(np.array([k, mu, mu]))[0])
     return (
         f"cell.particles: {told}, and the particles are cylinders; of"
-        f" spheres at the same fraction {share:.4f} the Hashin–Shtrikman bound of E is"
+        f" spheres at the same volume fraction {share:.4f} the Hashin–Shtrikman bound of E is"
         f" {space / GPA:.2f} GPa, of cylinders {plane / GPA:.2f} GPa"
-        f' ({100 * (space / plane - 1):+.1f} %); cell.particles = "spheres" takes'
-        ' spheres, "cylinders" ends this warning'
+        f" ({100 * (space / plane - 1):+.1f} %); {cure(case)}"
     )
 
 
@@ -134,9 +134,13 @@ def unmeasured(case: Case) -> Iterator[str]:
     if case.cell.particles == "cylinders" and (told := says_spheres(case)) is not None:
         yield (
             f"cell.particles: {told}, and the particles are cylinders, whose E is lower than that"
-            ' of stiffer spheres; cell.particles = "spheres" takes spheres, "cylinders" ends this'
-            " warning"
+            f" of stiffer spheres; {cure(case)}"
         )
+
+
+def cure(case: Case) -> str:
+    """What takes spheres, and what ends the warning."""
+    return f'"cylinders" there ends this warning, spheres are taken by {taking_spheres(case)}'
 
 
 def says_spheres(case: Case) -> str | None:

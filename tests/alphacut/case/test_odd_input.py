@@ -22,6 +22,7 @@ FILES = {
     "emoji": PAPER.replace('"2.5 m"', '"2.5 📏"'),
     "outside": BUILDING.replace("building.record.csv", "/nowhere/record.csv"),
     "folder": BUILDING.replace("building.record.csv", "."),
+    "image": BUILDING.replace("building.record.csv", str(CASES / "composite.png")),
     "binary record": BUILDING.replace("building.record.csv", "binary.csv"),
     "name in a list": BUILDING.replace('"E", "m8"', '"E", 8'),
 }
@@ -39,6 +40,7 @@ FILES = {
         ("emoji", 'entry 1, "2.5 📏"'),
         ("outside", "only the project, the current folder, home"),
         ("folder", "this is a folder"),
+        ("image", "the record is a PNG image"),
         ("binary record", "the record is not text in UTF-8"),
         ("name in a list", 'entry 2, "8": this is not text'),
     ],

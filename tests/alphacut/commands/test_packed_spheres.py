@@ -1,11 +1,17 @@
 """Stage microstructure of spheres from the command line: check, run, report, bad input."""
 
 import json
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from alphacut.case.load import load
 from alphacut.entry import main
+from alphacut.stages.material.campaign import campaign
+from alphacut.stages.material.cell import cell_choice
+from alphacut.stages.material.microstructure import crisp_slopes
 
 CASE = Path(__file__).parents[3] / "cases" / "spheres.toml"
 FEW = (
@@ -38,8 +44,8 @@ def test_a_section_of_spheres_becomes_a_modulus_and_a_report(tmp_path, capfd):
     found = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     own = found["microstructure"]
     assert own["particles"] == "spheres"
-    assert found["area_fraction"] == pytest.approx(own["mean_volume_fraction_of_map"], rel=1e-6)
-    assert found["area_fraction"] == pytest.approx(0.2, rel=0.03)
+    assert found["volume_fraction"] == pytest.approx(own["mean_volume_fraction_of_map"], rel=1e-6)
+    assert found["volume_fraction"] == pytest.approx(0.2, rel=0.03)
     low, high = found["modulus"]["lower_GPa"], found["modulus"]["upper_GPa"]
     assert low < found["modulus"]["modal_GPa"] < high
     assert (folder / "figures" / "radii_bounds.png").stat().st_size > 1000
@@ -79,6 +85,7 @@ SPHERES = "microstructure.spheres"
         ([f'{SPHERES}.file="spheres.circles.csv"'], "the radii come from measured spheres besides"),
         ([f'{SPHERES}.circles="paper.toml"'], "paper.toml"),
         ([f'{SPHERES}.circles="none.csv"'], "there is no such file"),
+        ([f'{SPHERES}.circles="composite.png"'], "composite.png is no CSV file: it is a PNG image"),
         ([f"{SPHERES}.packings=3"], "from 5 to 10,000"),
         ([f"{SPHERES}.level=1"], "inside (0, 1)"),
         (['cell.particles="cylinders"', 'modulus.method="series"'], "stage microstructure packs"),
@@ -93,6 +100,73 @@ def test_what_spheres_cannot_be_is_one_line(changes, words, tmp_path, capfd):
     assert words in err
     assert err.count("\n") == 1
     assert not folder.exists()
+
+
+def test_samples_of_the_series_keep_a_tolerance_where_none_is_asked_for(tmp_path):
+    """1e-9 near touching takes minutes a level; a single cell keeps it."""
+    text = CASE.with_name("paper-3d.toml").read_text(encoding="utf-8")
+    (tmp_path / "own.toml").write_text(re.sub(r"\ntolerance = 1e-6.*", "", text), encoding="utf-8")
+    case = load(tmp_path / "own.toml")
+    assert cell_choice(case).tolerance is None
+    assert campaign(case).task.choice.tolerance == 1e-5
+    assert campaign(load(CASE.with_name("paper-3d.toml"))).task.choice.tolerance == 1e-6
+
+
+IMAGE = """
+schema = 1
+title = "Epoxy with glass beads"
+about = "A section seen under the microscope."
+stages = ["microstructure", "modulus"]
+[microstructure]
+seed = 1
+bootstrap = 100
+[microstructure.image]
+file = "section.png"
+pixel = "1 µm"
+[cell]
+matrix_modulus = "3 GPa"
+matrix_poisson = 0.35
+inclusion_modulus = "70 GPa"
+inclusion_poisson = 0.22
+[modulus]
+method = "series"
+"""
+
+
+def test_an_image_of_spheres_is_led_to_the_spheres_behind_its_circles(tmp_path, capfd):
+    """No stage unfolds an image's circles: one line says how, and every step of it goes through."""
+    io = pytest.importorskip("skimage.io")
+    rows, columns = np.mgrid[:294, :294]
+    grey = np.full((294, 294), 60, np.uint8)
+    for k, (row, column) in enumerate(np.argwhere(np.ones((7, 7))) * 42 + 21):
+        grey[np.hypot(rows - row, columns - column) < 10 + k % 7] = 200
+    io.imsave(tmp_path / "section.png", grey, check_contrast=False)
+    path = tmp_path / "own.toml"
+    path.write_text(IMAGE, encoding="utf-8")
+    assert main(["check", str(path)]) == 0
+    assert "in place of [microstructure.image]" in capfd.readouterr().err
+    assert main(["check", str(path), "--set", "cell.particles=spheres"]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert "circles = FOLDER/circles.csv, which alphacut microstructure --out FOLDER" in line
+    out = ["--out", str(tmp_path / "FOLDER"), "--no-figures"]
+    assert main(["microstructure", str(path), *out]) == 0
+    spheres = (
+        '[microstructure.spheres]\ncircles = "FOLDER/circles.csv"\nsmallest_radius = "9 µm"\n'
+        'largest_radius = "20 µm"\nvisible = "3 µm"\nvolume_fraction = 0.2\nspheres = 50\n[cell]'
+    )
+    text = re.sub(r"\[microstructure\.image\].*\[cell\]", spheres, IMAGE, flags=re.DOTALL)
+    path.write_text(text, encoding="utf-8")
+    assert main(["check", str(path), "--set", "cell.particles=spheres"]) == 0
+    assert "radii 9 µm … 20 µm" in re.sub(r"\.0+ ", " ", capfd.readouterr().out)
+
+
+def test_a_slope_at_the_least_of_rising_maps_is_not_told_to_be_widened():
+    section = "[radius]\na1 = 0.42\na2 = [0.8, 0.9, 1]\na3 = 0.97\na4 = "
+    (line,) = crisp_slopes(f"{section}[1e-5, 1e-5, 1e-5]")
+    assert line.startswith("a4 is crisp: the fit wants the least slope")
+    assert "sampling" not in line
+    (other,) = crisp_slopes(f"{section}[0.5, 0.5, 0.5]")
+    assert "microstructure.sampling = true" in other
 
 
 def test_keys_of_circles_need_circles(tmp_path, capfd):

@@ -86,6 +86,7 @@ def test_text_says_what_e_is(capfd):
         (["--method", "auto", "--exclude", "slices"], "known models are series, table"),
         (["--method", "auto", "--exclude", "series,table"], "leave one of series, table"),
         (["--method", "series", "--set", 'cell.particles="cubes"'], "cylinders, spheres"),
+        (["--method", "series", "--set", "modulus.average=isotropic"], "effect on cylinders alone"),
     ],
 )
 def test_what_spheres_cannot_have_is_one_line(arguments, words, capfd):
@@ -326,7 +327,7 @@ def test_sizes_without_places_say_spheres_before_they_are_packed(words, told, tm
     assert main(["check", str(tmp_path / "own.toml")]) == 0
     err = capfd.readouterr().err
     assert ("d.csv has sizes without places" in err) == told
-    assert ("of spheres at the same fraction 0.2000" in err) == told
+    assert ("of spheres at the same volume fraction 0.2000" in err) == told
 
 
 @pytest.mark.parametrize("ending", [".inp", ".comm", ".mac", ".json"])
@@ -345,4 +346,4 @@ def test_discs_make_no_radii_of_spheres(capfd):
     assert main(["check", case, *changes]) == 2
     (line,) = capfd.readouterr().err.splitlines()
     assert "cell.particles = spheres: stage microstructure measures discs" in line
-    assert "section [microstructure.spheres] with its volume fraction" in line
+    assert "section [microstructure.spheres] in place of [microstructure.packing]" in line
