@@ -7,6 +7,8 @@ from typing import Annotated, Literal
 
 from alphacut.case.key import MEMBERSHIP, NATURAL, NOT_NEGATIVE, POSITIVE, UNIT, Key, Range, Section
 
+PACKINGS = Key("independent packings", allowed=Range("from 5 to 10,000", 5.0, 1e4, closed=True))
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Microstructure(Section):
@@ -56,9 +58,7 @@ class Packing(Section):
     Equal, truncated log-normal (eq. 11), or of the radii in a file.
     """
 
-    packings: Annotated[
-        int, Key("independent packings", allowed=Range("from 5 to 10,000", 5.0, 1e4, closed=True))
-    ] = 20
+    packings: Annotated[int, PACKINGS] = 20
     discs: Annotated[
         int, Key("discs in each packing", allowed=Range("from 10 to 1e6", 10.0, 1e6, closed=True))
     ]
@@ -146,9 +146,7 @@ class PackedSpheres(Section):
     plane section leave possible.
     """
 
-    packings: Annotated[
-        int, Key("independent packings", allowed=Range("from 5 to 10,000", 5.0, 1e4, closed=True))
-    ] = 20
+    packings: Annotated[int, PACKINGS] = 20
     spheres: Annotated[
         int, Key("spheres in each packing", allowed=Range("from 50 to 1e5", 50.0, 1e5, closed=True))
     ]

@@ -9,9 +9,9 @@ from alphacut import frame
 from alphacut.frame import Envelope, GraphFollower, envelope
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_maximum
-from alphacut.frame.methods.alpha_cut_optimisation import CutOptimisation
 from alphacut.fuzzy import Triangular
 from benchmarks.frame.envelopes import FRAME
+from benchmarks.frame.references.alpha_cut_optimisation import CutOptimisation
 
 E = {"E": Triangular(22.7626e9, 24.7561e9, 25.8312e9)}
 MASSES = {f"m{i + 1}": Triangular(0.95 * m, m, 1.05 * m) for i, m in enumerate(FRAME.masses)}

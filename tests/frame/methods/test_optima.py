@@ -8,8 +8,8 @@ import pytest
 from alphacut.frame import LinearFlow, StoreyFrame, envelope
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.box_quadratic import FACES_UP_TO, gain, global_maximum
-from alphacut.frame.methods.alpha_cut_optimisation import CutOptimisation
 from alphacut.fuzzy import Triangular
+from benchmarks.frame.references.alpha_cut_optimisation import CutOptimisation
 
 FRAME = StoreyFrame((3.0, 2.0), (1.0, 1.2), 5.0, 1.0, q0=(0.1, 0.0), v0=(0.0, 0.4))
 INPUTS = {"E": Triangular(4, 5, 6), "m1": Triangular(2.5, 3, 3.5)}
