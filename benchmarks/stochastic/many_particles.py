@@ -21,12 +21,12 @@ from pathlib import Path
 import numpy as np
 
 from alphacut.rve.cell import Phase
-from alphacut.rve.representative.averages import Averages, Isotropic, averages, mori_tanaka
 from alphacut.stochastic.particles.discs import Discs
 from alphacut.stochastic.particles.packing import Packing, packings
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 from alphacut.stochastic.radius_map import HermiteMap
 from alphacut.stochastic.sections import Simulated, reduced_radii
+from benchmarks.stochastic.averages import Averages, Isotropic, averages, mori_tanaka
 
 RESULTS = Path(__file__).parents[1] / "results"
 MATRIX, INCLUSION = Phase(20e9), Phase(80e9)

@@ -16,7 +16,6 @@ from alphacut.rve import bounds as plane
 from alphacut.rve.anisotropy import plane_average, shear_ratio
 from alphacut.rve.cell import Cell, Phase, square_moduli
 from alphacut.rve.fibre_constants import across_fibres, fibre_constants
-from alphacut.rve.representative.averages import Isotropic
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres import bounds as space
 from alphacut.stages.material.cell import cell_inputs, modal_parts, parts
@@ -24,6 +23,7 @@ from alphacut.stages.material.modulus import read_number
 from alphacut.stages.material.references import beside, bounds_over_cuts, lines, references
 from alphacut.stages.material.spheres import unmeasured
 from alphacut.stochastic import HermiteMap, RadiusMap
+from benchmarks.stochastic.averages import Isotropic
 
 CASES = Path(__file__).parents[4] / "cases"
 MATRIX, STIFF = Phase(20e9, 0.3), Phase(80e9, 0.3)
