@@ -59,7 +59,7 @@ exit status:
   1    a computation failed: one line says which and what to do
   2    bad input: one line for each problem; nothing was computed or written
   3    a campaign ended with failed samples: the others are kept
-  130  interrupted; what was finished is kept, and the same command goes on from there
+  130  interrupted; one line says whether what was finished is kept
 """
 
 
@@ -161,8 +161,11 @@ def leave(status: int) -> NoReturn:
 
 def interrupted(options: argparse.Namespace) -> str:
     """What is left of the work of a command that was interrupted."""
-    if options.command == "envelope" and not options.out:
-        return "without --out nothing is kept"
+    keeping = {"envelope": ("out",), "modulus": ("store", "resume")}
+    names = keeping.get(options.command, ())
+    if options.command != "run" and not any(getattr(options, name, None) for name in names):
+        how = " or ".join(f"--{name}" for name in names)
+        return f"without {how} nothing is kept" if how else "nothing is kept"
     return "what was finished is kept, and the same command goes on from there"
 
 

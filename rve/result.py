@@ -95,8 +95,8 @@ class Homogenised:
         """E and ν with the declared error, the model and its cost."""
         cost = self.seconds.get("total", 0.0)
         return (
-            f"Homogenised(E = {self.modulus:.7g} Pa, ν = {self.poisson:.5g}, relative error of E"
-            f" {self.estimated_error:.2g}, by {self.method}, {cost:.2g} s)"
+            f"Homogenised(E = {self.modulus:.7g} Pa, ν = {self.poisson:.5g} ({self.convention}),"
+            f" relative error of E {self.estimated_error:.2g}, by {self.method}, {cost:.2g} s)"
         )
 
     def _repr_html_(self) -> str:

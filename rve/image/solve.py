@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from threading import Event
 
 from alphacut.rve.image.bounds import StiffnessBounds, inverse_below
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
@@ -107,13 +108,24 @@ def both_sides(
         clamped: Fluctuations vanish on the edge of each tile.
         pixels: Keep the energy of each pixel.
     """
+    stopped = Event()
+
+    def watch() -> None:
+        if stopped.is_set():
+            raise InterruptedError("the other side's solution was stopped")
+        try:
+            solver.watch()
+        except BaseException:
+            stopped.set()
+            raise
+
     with ThreadPoolExecutor(solver.threads) as pool:
         upper, lower = (
             pool.submit(
                 solve_side,
                 side,
                 *moduli[k],
-                solver=solver,
+                solver=replace(solver, watch=watch),
                 aspect=aspect,
                 division=division,
                 start=None if start is None else start[k],
@@ -122,7 +134,11 @@ def both_sides(
             )
             for k, side in enumerate((DISPLACEMENT, STRESS))
         )
-        return upper.result(), lower.result()
+        try:
+            return upper.result(), lower.result()
+        except BaseException:  # Ctrl-C among them, which is not to wait for the solution
+            stopped.set()
+            raise
 
 
 def _bounds(lower: SideSolution, upper: SideSolution) -> StiffnessBounds:

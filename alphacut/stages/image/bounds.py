@@ -88,11 +88,18 @@ def compute(study: ImageStudy, *, progress: Tick | None = None) -> FuzzyImage:
     began = perf_counter()
     tick = progress or (lambda share: None)
     modal = study.images(None, None)
-    start = study.model
+    done = [0.0]
+
+    def told(share: float) -> None:
+        done[0] = share
+        tick(share)
+
+    watched = replace(study.model.solver, watch=lambda: tick(done[0]))
+    start = replace(study.model, solver=watched)
     if study.random is not None:  # many images: pixels are divided only where that is asked for
         start = replace(start, division=start.parts)
     model, crisp = start.refined(modal)
-    tick(0.3)
+    told(0.3)
     random = None if study.random is None else responses(study, model, study.random)
     if random is not None:
         cuts = random.cuts
@@ -100,7 +107,7 @@ def compute(study: ImageStudy, *, progress: Tick | None = None) -> FuzzyImage:
     else:
         levels = [study.images(level, level) for level in study.alpha]
         cuts = tuple(model.cuts(levels, (modal, crisp)))
-        tick(0.7)
+        told(0.7)
 
         def alone(threshold: Level, phases: Level) -> float:
             images = study.images(threshold, phases)

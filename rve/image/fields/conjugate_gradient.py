@@ -56,6 +56,7 @@ class ConjugateGradient(Solver):
         allowed = self.accuracy * system.scale
         limit = LIMIT if self.iterations is None else self.iterations
         for number in range(limit):
+            self.watch()
             if self.iterations is None and np.all(reach * product <= allowed):
                 return Solution(fields, number)
             image = system.operator.apply(direction)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Self
 
 from alphacut.rve.image.fields.system import System
@@ -36,12 +37,14 @@ class Solver(ABC):
     Args:
         accuracy: Energy that the fields may lack, relative to the system's scale, in (0, 0.1]; a
             bound of the stiffness is then within three times that of the one of solved fields.
+        watch: Called before every iteration of this program's own solver; what it raises ends it.
 
     Raises:
         ValueError: The accuracy lies outside its range.
     """
 
     accuracy: float = 3e-6
+    watch: Callable[[], None] = field(default=lambda: None, compare=False, repr=False, kw_only=True)
     threads: ClassVar[int] = 1
     """Systems that may be solved at once."""
 

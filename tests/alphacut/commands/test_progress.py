@@ -58,6 +58,11 @@ def test_an_interrupted_envelope_without_a_file_says_that_nothing_is_kept():
     from alphacut.entry import interrupted
 
     assert "nothing is kept" in interrupted(Namespace(command="envelope", out=None))
+    assert interrupted(Namespace(command="image", out="image.nc")) == "nothing is kept"
+    bare = Namespace(command="modulus", store=None, resume=False)
+    assert interrupted(bare) == "without --store or --resume nothing is kept"
+    for kept in (Namespace(command="modulus", resume=True), Namespace(command="run", out=None)):
+        assert "goes on from there" in interrupted(kept)
     assert "goes on from there" in interrupted(Namespace(command="envelope", out="x.nc"))
     assert "goes on from there" in interrupted(Namespace(command="run", out=None))
 

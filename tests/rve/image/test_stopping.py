@@ -140,3 +140,21 @@ def test_the_energy_left_is_bounded_by_the_residual():
     wrong = rng.normal(size=system.load.shape)
     residual = system.operator.apply(wrong)
     assert (inner(wrong, residual) <= system.lacking(residual)).all()
+
+
+def test_what_a_watch_raises_ends_both_sides_at_once():
+    """Ctrl-C does not wait for a solution; the share done is told while it is under way."""
+    calls = []
+
+    def watch():
+        calls.append(1)
+        if len(calls) == 6:
+            raise KeyboardInterrupt
+
+    shear = np.random.default_rng(1).uniform(1, 100, (24, 24))
+    with pytest.raises((KeyboardInterrupt, InterruptedError)):
+        solve_image(3 * shear, shear, solver=ConjugateGradient(1e-12, watch=watch))
+    assert 6 <= len(calls) < 20
+    calls.clear()
+    solve_image(3 * shear, shear, solver=ConjugateGradient(1e-3, watch=lambda: calls.append(1)))
+    assert len(calls) > 6
