@@ -14,6 +14,7 @@ from alphacut.fuzzy.campaign.call import BATCH, Call, Function, named_point
 from alphacut.fuzzy.campaign.memory_check import needed
 from alphacut.fuzzy.campaign.sample_store import Shelf, shelf
 from alphacut.fuzzy.campaign.store import Identity, Store, Stored
+from alphacut.fuzzy.counted import counted
 from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.automatic import Automatic
@@ -58,11 +59,9 @@ class Explanation:
 
     def __str__(self) -> str:
         missing = self.samples - self.stored
-        samples = f"the first {self.samples}" if self.open_end else f"{self.samples} samples"
-        head = (
-            f"{self.open_end}{samples}: {self.stored} stored, {missing} to run in {self.calls}"
-            " calls"
-        )
+        samples = f"the first {self.samples}" if self.open_end else counted(self.samples, "sample")
+        calls = counted(self.calls, "call")
+        head = f"{self.open_end}{samples}: {self.stored} stored, {missing} to run in {calls}"
         time = "" if self.seconds is None else f", about {self.seconds:.3g} s of work"
         first = [
             ", ".join(f"{name} = {value:.6g}" for name, value in point.items())
@@ -200,13 +199,14 @@ def _rehearsed(
         if len(missing)
         else ("everything is stored: nothing would run",)
     )
+    count = rehearsal.seen + len(missing) if len(missing) else len(points)
     return Explanation(
-        samples=len(points),
-        stored=len(points) - len(missing),
+        samples=count,
+        stored=count - len(missing),
         missing=tuple(named_point(domain.names, missing[row]) for row in range(len(missing))),
         calls=len(list(call.tasks(missing))),
         seconds=rehearsal.seconds / rehearsal.seen * len(missing) if rehearsal.seen else None,
-        memory=needed(len(points), len(domain.names) + rehearsal.columns),
+        memory=needed(count, len(domain.names) + rehearsal.columns),
         reasons=reasons,
         open_end=_open_end(plan) if plan.stepwise and len(missing) else "",
     )
@@ -270,7 +270,7 @@ def _new_values(samples: Shelf, domain: Domain, missing: Array) -> list[str]:
         fresh = {float(value) for value in missing[:, column]} - {point[name] for point in stored}
         if fresh:
             found.append(
-                f"{name} takes {len(fresh)} values that no stored sample has, the first"
+                f"{name} takes {counted(len(fresh), 'value')} that no stored sample has, the first"
                 f" {min(fresh):.6g}"
             )
     return found or ["the inputs take stored values in new combinations"]

@@ -23,6 +23,7 @@ from alphacut.fuzzy.campaign.sample_store import shelf
 from alphacut.fuzzy.campaign.spot_check import SpotCheck
 from alphacut.fuzzy.campaign.store import Identity, Store
 from alphacut.fuzzy.campaign.workers import pool, require_executor, require_workers
+from alphacut.fuzzy.counted import counted
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.plan import Plan
@@ -114,10 +115,17 @@ def propagate(
             result = plan.run(campaign, domain)
         result = result.confronted(known.stated(domain.names, result.outputs))
         campaign.report(1.0)
-    result = replace(result, notes=(*result.notes, *shared_numbers(domain)))
+    torn = (TORN,) if samples is not None and samples.torn else ()
+    result = replace(result, notes=(*result.notes, *shared_numbers(domain), *torn))
     return result.charged(
         calls=campaign.calls, reused=campaign.reused, seconds=perf_counter() - start
     )
+
+
+TORN = (
+    "the store ended within a sample, as after a kill or a partial copy: what is whole was taken,"
+    " the rest was run anew"
+)
 
 
 @contextmanager
@@ -128,8 +136,10 @@ def kept_on_interrupt(campaign: Campaign, store: Store | str | Path | None) -> I
     except KeyboardInterrupt:
         done = campaign.runs + campaign.reused
         if store is None:
-            cure = f"{done} samples were done and none is kept: `propagate` keeps them in a store="
+            were = f"{counted(done, 'sample')} {'was' if done == 1 else 'were'} done"
+            cure = f"{were} and none is kept: `propagate` keeps them in a store="
         else:
             path = store.path if isinstance(store, Store) else store
-            cure = f"{done} samples are kept in {path}: the same call goes on from there"
+            kept = f"{counted(done, 'sample')} {'is' if done == 1 else 'are'} kept"
+            cure = f"{kept} in {path}: the same call goes on from there"
         raise KeyboardInterrupt(f"interrupted; {cure}") from None

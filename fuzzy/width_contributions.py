@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alphacut.fuzzy.arguments import fuzzy_inputs
 from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.progress_bar import Progress, told
 from alphacut.fuzzy.sets.numbers import Array, Crisp, FuzzyNumber
@@ -61,9 +62,15 @@ class Shares:
         ]
 
 
+ASKED = (
+    "the first argument is a propagation, from the inputs by name to lower and upper ends, two"
+    " arrays, such as lambda inputs: propagate(function, inputs).bounds()"
+)
+
+
 def width_shares(
     bounds: Bounds,
-    inputs: Mapping[str, FuzzyNumber],
+    inputs: Mapping[str, FuzzyNumber | float],
     *,
     groups: Mapping[str, Sequence[str]] | None = None,
     progress: Progress | bool | None = None,
@@ -81,6 +88,7 @@ def width_shares(
     Raises:
         ValueError: A group names no input, or a propagation gives no two arrays.
     """
+    inputs = fuzzy_inputs(inputs)
     chosen = (
         {name: tuple(members) for name, members in groups.items()}
         if groups
@@ -93,12 +101,12 @@ def width_shares(
         )
 
     def width(fuzzy: Mapping[str, FuzzyNumber]) -> Array:
-        found = bounds(fuzzy)
+        try:
+            found = bounds(fuzzy)
+        except TypeError as error:
+            raise ValueError(f"{ASKED}, and it raised TypeError: {error}") from error
         if not isinstance(found, Sequence | np.ndarray) or len(found) != 2:
-            raise ValueError(
-                f"the propagation returned {found!r}; it must return lower and upper ends, two"
-                " arrays, as result.bounds() does"
-            )
+            raise ValueError(f"{ASKED}, and it returned {repr(found).partition(chr(10))[0][:80]}")
         difference: Array = np.asarray(found[1], float) - np.asarray(found[0], float)
         return difference
 

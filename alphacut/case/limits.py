@@ -209,9 +209,12 @@ def decision(case: Case) -> Iterator[Problem]:
         yield Problem("decision", "limits are judged for a storey frame", "", "[frame]")
         return
     try:
-        known = frame_outputs(len(case.frame.masses))
-        limits = list(dict.fromkeys(one.output for one in limits_of(case)))
-        yield from unknown("decision.limits", limits, known)
+        known, key = frame_outputs(len(case.frame.masses)), "decision.limits"
+        limits = list(dict.fromkeys(limit_parts(case, key, x)[0] for x in case.decision.limits))
+        strangers = list(unknown(key, limits, known))
+        yield from strangers
+        if not strangers:
+            limits_of(case)  # of a storey that is not there nothing can be said
         for name in limits if case.frame.accelerogram else ():
             if name.startswith("ar"):
                 what = f"{name} is relative to the ground, and decisions are on absolute values"

@@ -10,7 +10,7 @@ from alphacut.case.sections.particles import Microstructure
 from alphacut.io.files import Document
 
 NODES = 120  # time steps of an envelope
-LEVELS = (0.0, 1.0)
+LEVELS = (0.0, 1.0)  # where a case names more than one
 COARSE = {
     "microstructure": (
         "microstructure.bootstrap",
@@ -88,18 +88,23 @@ def quick(case: Case) -> Case:
             microstructure=old.microstructure and few_particles(old.microstructure),
             mesh=old.mesh and replace(old.mesh, layers=3, size=0.4),
             modulus=old.modulus
-            and replace(old.modulus, plan="reduced", alpha=LEVELS, tolerance=1e-2),
+            and replace(old.modulus, plan="reduced", alpha=few(old.modulus.alpha), tolerance=1e-2),
             study=tuple(replace(x, duration=min(x.duration, longest)) for x in old.study),
             envelope=old.envelope
             and replace(
                 old.envelope,
-                alpha=LEVELS,
+                alpha=few(old.envelope.alpha),
                 relative_tolerance=1e-2,
                 duration=min(old.envelope.duration, longest),
             ),
             exceedance=old.exceedance and replace(old.exceedance, samples=10),
         ),
     )
+
+
+def few(alpha: tuple[float, ...]) -> tuple[float, ...]:
+    """The outer levels; one level stays alone."""
+    return LEVELS if len(alpha) > 1 else alpha
 
 
 def few_particles(wanted: Microstructure) -> Microstructure:

@@ -38,7 +38,7 @@ from alphacut.io.units import engineering, largest_by_unit
 from alphacut.stages import width_shares
 from alphacut.stages.contract import require_choice
 from alphacut.stages.material.modulus import stand_in
-from alphacut.stages.vibration import envelope
+from alphacut.stages.vibration import decision, envelope
 from alphacut.stages.vibration import exceedance as outcomes
 from alphacut.stages.vibration.envelope_task import EnvelopeTask, task_of
 from alphacut.stages.vibration.structure import Structure, structure
@@ -98,6 +98,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         refuse_beside(options, "--explain", UNEXPLAINED)
         plan = envelope.explain(wanted, task)
         plan += width_shares.explained(wanted, task) if case.envelope.shares else []
+        plan += decision.explained(case, wanted, task) if case.sections.decision else []
         answer(options, {"plan": plan}, out, "".join(f"{line}\n" for line in plan))
         return 0
     content = {"case": case.sections, "task": task, "modulus": handed}
@@ -244,7 +245,14 @@ def summary(found: Envelope, tried: Array | None = None) -> str:
         f" {found.alpha[0]:g}, nodes every {found.time[1]:g} s)\n"
     )
     claim = f"{found.facts['claim']}\n" if "claim" in found.facts else ""
-    return f"{head}{''.join(lines)}{cost}\n{proved(found)}{claim}"
+    lines.append(f"{cost}\n{unproved(found)}{proved(found)}{claim}")
+    return f"{head}{''.join(lines)}"
+
+
+def unproved(found: Envelope) -> str:
+    """Line on why bounds are estimated, where a proof would have been tried; empty elsewhere."""
+    reason = found.facts.get("unproved", "")
+    return f"{found.nature}, not proved: {reason}\n" if reason else ""
 
 
 def beyond(error: float | None, output: str) -> str:
@@ -289,10 +297,5 @@ def proved(found: Envelope) -> str:
     if "gap" not in found.facts:
         return ""
     of = str(found.facts["gap_output"])
-    gap, between = (
-        engineering(float(found.facts[name]), output_unit(of)) for name in ("gap", "between_nodes")
-    )
-    return (
-        f"every node's bounds enclosed to within {gap} of {of}, up to {between} beyond them between"
-        f" nodes; {found.facts['proof']}\n"
-    )
+    gap = engineering(float(found.facts["gap"]), output_unit(of))
+    return f"every node's bounds enclosed to within {gap} of {of}; {found.facts['proof']}\n"

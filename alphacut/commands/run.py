@@ -240,3 +240,5 @@ def envelope_lines(name: str, study: Document) -> Iterator[str]:
     for output, unit, *values in ends:
         low, high = (engineering(value, unit, beside=largest[unit]) for value in values)
         yield f"{output} from {low} to {high} at the lowest α (study {name})"
+    if study.get("unproved"):
+        yield f"these bounds are {study['nature']}, not proved: {study['unproved']}"

@@ -74,15 +74,10 @@ def proofs(summary: Document) -> Iterator[str]:
             )
         if "gap" in study:
             of = str(study.get("gap_output", next(iter(study.get("min", {"q": 0})))))
-            gap, between = (
-                engineering(float(study.get(key, 0.0)), output_unit(of), digits=2)
-                for key in ("gap", "between_nodes")
-            )
+            gap = engineering(float(study["gap"]), output_unit(of), digits=2)
             yield (
                 f"The bounds of envelope {name} are proved at every node, and no wider than {gap}"
-                f" of {of} beyond what is attained. Within a step no motion leaves the bounds at"
-                f" both of its ends by more than {between} of {of}, the largest of all steps."
-                f" {sentence(study['proof'])}"
+                f" of {of} beyond what is attained. {sentence(study['proof'])}"
             )
 
 

@@ -18,7 +18,7 @@ from alphacut.stages.material import modulus, spheres
 from alphacut.stages.material.cell import cell_phases, modal_parts, phases_of
 from alphacut.stages.vibration import update
 from alphacut.stages.vibration.envelope_task import task_of
-from alphacut.stages.vibration.provable import too_many, unproved_reason
+from alphacut.stages.vibration.provable import estimated_reason, too_many, unproved_reason
 from alphacut.stages.vibration.resolution_checks import rough
 from alphacut.stages.vibration.structure import Structure, structure
 from alphacut.stages.vibration.studies import studies
@@ -271,6 +271,9 @@ def motion(case: Case, wanted: Structure) -> Iterator[str]:
     fuzzy = (name for name, number in wanted.numbers.items() if number.support.width > 0)
     if fixed := [name for name in fuzzy if name not in named]:
         yield f"fixed at the middle of the top cut, since no study names them: {', '.join(fixed)}"
+    for reason in dict.fromkeys(estimated_reason(wanted, task) for task in tasks):
+        if reason:
+            yield f"envelope: bounds will be estimated, with their error: {reason}"
     levels = max(len(task.alpha) for task in tasks)
     alike = named and all(isinstance(one, Interval) for one in named.values())
     if levels > 1 and alike and case.sections.update is None:  # what is learned has levels

@@ -34,7 +34,7 @@ MATRIX, INCLUSION = Phase(20e9), Phase(80e9)
 
 def homogenised(discs: Discs, *, size: float, around: int) -> np.ndarray:
     """Stiffness of one packing, shape (3, 3), in Pa."""
-    from alphacut.rve.representative.many_particles import many_particles
+    from benchmarks.stochastic.representative.many_particles import many_particles
 
     return many_particles(discs, MATRIX, INCLUSION, size=size, around=around)
 

@@ -9,6 +9,7 @@ from math import comb, prod
 
 import numpy as np
 from scipy.fft import dctn
+from scipy.sparse import csr_array
 
 from alphacut.frame.calculus.jet import Array, Jet
 
@@ -206,6 +207,98 @@ class ChebyshevGrid:
             out[(slice(None),) * axis + (0,)] /= 2
         coefficients: Array = out.reshape(values.shape)
         return coefficients
+
+
+@dataclass(frozen=True)
+class LowerGrid:
+    """As many points as terms, for products of a polynomial of `degrees` and one of total `excess`.
+
+    Args:
+        degrees: Exponents along each axis that are free of any sum, d of them.
+        excess: Largest sum of what exponents exceed these by.
+    """
+
+    degrees: tuple[int, ...]
+    excess: int
+
+    def __len__(self) -> int:
+        counts = np.eye(1, self.excess + 1, dtype=object)[0]  # sets of axes so far, by their sum
+        for degree in self.degrees:
+            counts = (degree * counts) + np.cumsum(counts)
+        return int(counts.sum())
+
+    @cached_property
+    def index(self) -> Index:
+        """Exponents of the terms, shape (S, d)."""
+        rows, spent = np.zeros((1, 0), np.int64), np.zeros(1, np.int64)
+        for degree in self.degrees:
+            count = degree + 1 + self.excess - spent
+            which = np.repeat(np.arange(len(rows)), count)
+            own = np.concatenate([np.arange(most) for most in count])
+            rows = np.column_stack([rows[which], own])
+            spent = spent[which] + np.maximum(own - degree, 0)
+        return rows
+
+    @property
+    def points(self) -> Array:
+        """Leja points on which the terms are known, shape (S, d)."""
+        return leja(max(self.degrees) + self.excess + 1)[self.index]
+
+    def coefficients(self, values: Array) -> Array:
+        """Chebyshev coefficients of values (S, …), as those of `ChebyshevGrid`.
+
+        The matrix of T_k at the points is L U along each axis, and so is that of all terms, since
+        with a term the set holds all of lower exponents.
+        """
+        out = values.reshape(len(values), -1)
+        for factor in self._factors:
+            out = factor @ out
+        return np.asarray(out.reshape(values.shape))
+
+    @cached_property
+    def _factors(self) -> list[csr_array]:
+        """L⁻¹ along each axis, then U⁻¹."""
+        triangles = _triangles(max(self.degrees) + self.excess + 1)
+        axes = range(len(self.degrees))
+        return [self._along(axis, triangle) for triangle in triangles for axis in axes]
+
+    def _along(self, axis: int, factor: Array) -> csr_array:
+        """A triangular matrix along one axis, on all terms."""
+        own = self.index[:, axis]
+        weights = len(factor) ** np.arange(len(self.degrees))
+        order = np.argsort(keys := self.index @ weights)
+        rows, columns = [], []
+        for drop in range(int(own.max()) + 1):
+            high = np.flatnonzero(own >= drop)
+            low = order[np.searchsorted(keys[order], keys[high] - drop * weights[axis])]
+            rows.append(high)
+            columns.append(low)
+        high, low = np.concatenate(rows), np.concatenate(columns)
+        down = bool(factor[-1, 0])  # a lower triangle takes from the terms below
+        to, of = (high, low) if down else (low, high)
+        return csr_array((factor[own[to], own[of]], (to, of)), shape=(len(own),) * 2)
+
+
+@lru_cache
+def leja(count: int) -> Array:
+    """Leja points on [−1, 1], each as far from those before it as it can be, shape (count,)."""
+    places = np.cos(np.linspace(0, np.pi, 4001))
+    found, apart = [0.0], np.abs(places)
+    while len(found) < count:
+        found.append(float(places[apart.argmax()]))
+        apart = apart * np.abs(places - found[-1])
+    return np.array(found)
+
+
+@lru_cache
+def _triangles(count: int) -> tuple[Array, Array]:
+    """L⁻¹ and U⁻¹ of the matrix L U of Chebyshev polynomials at Leja points."""
+    upper = np.polynomial.chebyshev.chebvander(leja(count), count - 1)
+    lower = np.eye(count)
+    for k in range(count - 1):
+        lower[k + 1 :, k] = upper[k + 1 :, k] / upper[k, k]
+        upper[k + 1 :] -= np.outer(lower[k + 1 :, k], upper[k])
+    return np.tril(np.linalg.inv(lower)), np.triu(np.linalg.inv(np.triu(upper)))
 
 
 def _differentiated(B: Array, index: Index, axes: tuple[int, ...]) -> Array:

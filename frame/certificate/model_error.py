@@ -10,13 +10,13 @@ Damping by one ratio for all modes is no polynomial; `ratio_damping` bounds what
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.calculus.polynomial import ChebyshevGrid, Polynomial
+from alphacut.frame.calculus.polynomial import ChebyshevGrid, LowerGrid, Polynomial
 from alphacut.frame.certificate.ratio_damping import Comparison, RatioDamping
 from alphacut.frame.certificate.remainder import largest_growth, suprema
 from alphacut.frame.certificate.wave_bounds import Part, parts
@@ -33,11 +33,16 @@ from alphacut.frame.structures.polynomial_dependence import (
 
 MOST_NUMBERS = 120_000_000
 """Values of the defects on their grid, at most: 1 GB."""
+DEAR = 3
+"""Cost of a value where points are as few as terms, beside one on a grid of all combinations."""
 CHUNK = 10_000
+Sample = Callable[[Array], dict[str, Array]]
 
 
-def proved_error(model: ModalModel) -> Array:
+def proved_error(model: ModalModel, *, patient: bool = True) -> Array:
     """Bound of |model − true motion| over the box, shape (T, m), in units of the outputs.
+
+    Unless `patient`, inputs are refused whose combinations are more than can be afforded.
 
     Raises:
         UnprovedError: The structure is not known to be a polynomial that loses energy, the scheme
@@ -50,14 +55,17 @@ def proved_error(model: ModalModel) -> Array:
             " propagator is covered"
         )
     reach, m = np.ones(len(model.boxes.names)), len(model.outputs)
-    grid, ratio = _grid(model), RatioDamping.of(model)
+    ratio, growth = RatioDamping.of(model), largest_growth(model.eigenvalue, reach)
+    samples = [
+        (part, partial(_defects, model, part, states, ratio))
+        for part, states in zip(parts(model, growth), fit_states(model), strict=False)
+    ]
+    grid = _grid(model, [sample for _, sample in samples], patient=patient)
     structure = _expanded(grid, partial(_structure, model))
     stiffness, mass = Comparison.of(structure["stiffness"]), Comparison.of(structure["mass"])
     deviation, own = np.zeros(len(model.time)), np.zeros((len(model.time), m))
-    for part, states in zip(
-        parts(model, largest_growth(model.eigenvalue, reach)), fit_states(model), strict=False
-    ):
-        defect = _expanded(grid, partial(_defects, model, part, states, ratio))
+    for part, sample in samples:
+        defect = _expanded(grid, sample)
         deviation += part.push * np.hypot(
             stiffness.sup(defect["start_q"]), mass.sup(defect["start_v"])
         )
@@ -86,8 +94,8 @@ def proved_error(model: ModalModel) -> Array:
     return bound
 
 
-def _grid(model: ModalModel) -> ChebyshevGrid:
-    """The grid on which all defects are known by their values."""
+def _grids(model: ModalModel) -> tuple[ChebyshevGrid, LowerGrid]:
+    """Points on which all defects are known by their values: all combinations, and fewer."""
     box = dict(
         zip(
             model.boxes.names,
@@ -96,20 +104,38 @@ def _grid(model: ModalModel) -> ChebyshevGrid:
         )
     )
     exponents = degrees(model.flow.system, box)
-    return ChebyshevGrid(tuple(2 * model.degree + exponents[name] for name in model.boxes.names))
+    own, more = tuple(exponents[name] for name in model.boxes.names), 2 * model.degree
+    return ChebyshevGrid(tuple(more + degree for degree in own)), LowerGrid(own, more)
 
 
-def _expanded(grid: ChebyshevGrid, sample: Callable[[Array], dict[str, Array]]) -> dict[str, Array]:
-    """Chebyshev coefficients of `sample` at unit coordinates (S, d), each (J, …)."""
-    width = sum(
-        part.size * (2 if np.iscomplexobj(part) else 1)
-        for part in sample(np.zeros((1, len(grid.degrees)))).values()
+def _grid(
+    model: ModalModel, samples: Sequence[Sample], *, patient: bool
+) -> ChebyshevGrid | LowerGrid:
+    """The points that are taken: fewer than all combinations where these are too many."""
+    (whole, few), count = _grids(model), len(model.boxes.names)
+    middle = np.zeros((1, count))
+    width = max(
+        sum(x.size * (2 if np.iscomplexobj(x) else 1) for x in sample(middle).values())
+        for sample in samples
     )
-    if len(grid) * width > MOST_NUMBERS:
+    if len(whole) * width <= MOST_NUMBERS:
+        return whole
+    if not patient:
         raise UnprovedError(
-            f"the defects need {len(grid):.2g} points of a grid over {len(grid.degrees)}"
-            " parameters: too many"
+            f"with {count} fuzzy inputs a proof takes minutes and is not tried unasked;"
+            " envelope.certify asks for one, and fewer fuzzy inputs are proved at once"
         )
+    if DEAR * len(few) * width > MOST_NUMBERS:
+        raise UnprovedError(
+            f"the error of the modes takes {len(few)} points of {count} fuzzy inputs, and"
+            f" {MOST_NUMBERS // DEAR // width} are affordable; narrower or fewer inputs, or a wider"
+            " gap, can be proved"
+        )
+    return few
+
+
+def _expanded(grid: ChebyshevGrid | LowerGrid, sample: Sample) -> dict[str, Array]:
+    """Chebyshev coefficients of `sample` at unit coordinates (S, d), each (J, …)."""
     pieces = [sample(chunk) for chunk in np.array_split(grid.points, -(-len(grid) // CHUNK))]
     return {
         name: grid.coefficients(np.concatenate([piece.pop(name) for piece in pieces]))

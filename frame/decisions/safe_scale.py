@@ -25,6 +25,8 @@ GAP = 1e-3
 """Share of the limits that the model of the motion and the proof may take, at most."""
 FINE = 0.01
 """The same as a share of what the nominal motion leaves of the limits."""
+EASY = (1.0, 0.3)
+"""The same as shares of that, tried first: they serve where the largest box is far from limits."""
 SHRINK = (0.004, 0.008, 0.015, 0.03, 0.06, 0.12, 0.25, 0.5, 0.75)
 """By how much the box to be proved is smaller than the refuted one, until all is proved."""
 Progress = Callable[[float], None]
@@ -113,9 +115,13 @@ def safe_scale(
         box, shares = (centre, centre), (nominal_share, nominal_share)
         worth = ("guaranteed", "")
         return SafeScale(names, centre, None, *box, 0.0, centre, *shares, *worth, 0, seconds)
-    search.gap = min(GAP, FINE * (1 - nominal_share))
-    refuted = _refuted(search, most, precision)
-    safe, unsafe, witness, boxes = _proved(search, refuted, most, budget, workers, progress)
+    done, boxes = _easily(search, 1 - nominal_share, most, budget, workers)
+    safe, unsafe, witness = most, np.inf, None
+    if not done:
+        search.gap = min(GAP, FINE * (1 - nominal_share))
+        refuted = _refuted(search, most, precision)
+        safe, unsafe, witness, more = _proved(search, refuted, most, budget, workers, progress)
+        boxes += more
     share = 0.0 if witness is None else search.share(witness)
     worth = ("verified by sampling" if search.reason else "guaranteed", search.reason)
     seconds = time.perf_counter() - begun
@@ -127,6 +133,23 @@ def _require(limits: Mapping[str, float], most: float) -> None:
     for name, limit in finite_by_name("limits", limits, "{'q1': 0.1}").items():
         positive(f"limits: that of {name}", limit)
     positive("most, the largest scale,", most)
+
+
+def _easily(
+    search: LimitSearch, left: float, most: float, budget: float, workers: int
+) -> tuple[bool, int]:
+    """Whether a rough model, cheaper to bound, proves the largest box, and boxes looked at."""
+    pending: Array = np.arange(2 * len(search.flow.time) * len(search.flow.outputs))
+    boxes = 0
+    for search.gap in (share * left for share in EASY):
+        search.fit(most)
+        if search.reason or search.witness(most) is not None:
+            break
+        pending, _, looked = unproved(search, most, pending, budget, workers)
+        boxes += looked
+        if not len(pending):
+            return True, boxes
+    return False, boxes
 
 
 def _refuted(search: LimitSearch, most: float, precision: float) -> tuple[float, Array | None]:

@@ -20,6 +20,8 @@ from alphacut.frame.modal.starting_points import trajectories
 
 PARTS = 200
 """Parts of a box that are looked at before its proof is given up."""
+EASY = 0.5
+"""Share of the limits that a rough model, which is tried first, may take at most."""
 UNDECIDED = 3
 """Sizes without a proof or a refutation after which the search ends."""
 POINTS = 64
@@ -49,6 +51,12 @@ def sure_exceeding(search: LimitSearch, most: float, precision: float = 1e-3) ->
         most: Largest size asked for.
         precision: Wanted distance of both sizes, as a share of `most`.
     """
+    fine, search.gap = search.gap, min(EASY, search.share(search.nominal) - 1)
+    if search.gap > fine:
+        search.fit(most)
+        if not search.reason and surely(search, most)[0]:
+            return Sure(most, np.inf, None)
+    search.gap = fine
     search.fit(most)
     low, high, witness = 0.0, np.inf, keeping(search, most)
     if witness is None and surely(search, most)[0]:

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
-from alphacut.frame.calculus.jet import Array
 from alphacut.frame.checks.step_error import step_error
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.batch_graph_follower import BatchFollower
@@ -151,7 +150,8 @@ def _proved(
         reached = _estimate(found, flow)
         if reached <= wanted:
             return found, ""
-        return None, f"the boxes that a proof may look at left a gap of {reached:.2g}"
+        left = f"the boxes that a proof may look at left a gap of {reached:.2g}"
+        return None, f"{left}; envelope.certify allows more, fewer or narrower inputs need fewer"
     return None, reason
 
 
@@ -210,18 +210,3 @@ def _estimate(found: Envelope, flow: UnitFlow) -> float:
 def _reported(found: Envelope, flow: UnitFlow, begun: float, reason: str) -> Envelope:
     facts = {**found.facts, "estimated_error": _estimate(found, flow), "reason": reason}
     return replace(found, facts=facts, seconds=time.perf_counter() - begun)
-
-
-def width_shares(whole: Envelope, fixed: Sequence[Envelope]) -> Array:
-    """Share of each input in the width over time, shape (d, A, T, m).
-
-    Args:
-        whole: Envelope with all inputs fuzzy.
-        fixed: Envelopes with one input each at its modal value, in the order of the inputs.
-    """
-    width = whole.upper - whole.lower
-    lost = np.stack([width - (other.upper - other.lower) for other in fixed])
-    shares: Array = np.divide(
-        lost, width, out=np.zeros_like(lost), where=width > 1e-12 * np.abs(width).max()
-    )
-    return shares

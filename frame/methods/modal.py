@@ -33,7 +33,7 @@ PORTION = 0.2
 """Share of the gap that the error of the modal model may take on either side."""
 USUAL = 10.0
 """Proved over sampled error, seldom less."""
-TOO_WIDE = "its bound, some"
+TOO_WIDE = "the proved error of the modes, some"
 """Beginning of the reason where the error of the modes takes too much of the gap."""
 ATTEMPTS = 5
 """Models of rising degree that are tried before the error is sampled instead of proved."""
@@ -215,7 +215,10 @@ def guaranteed(flow: UnitFlow, gap: float, progress: Progress | None = None) -> 
         ModalError: The structure has no smooth oscillating modes over the box.
     """
     if len(flow.boxes.names) > MOST_PARAMETERS:
-        raise UnprovedError(f"proofs are affordable up to {MOST_PARAMETERS} parameters")
+        raise UnprovedError(
+            f"proofs are affordable up to {MOST_PARAMETERS} fuzzy inputs, and there are"
+            f" {len(flow.boxes.names)}; fewer can be proved"
+        )
     size = 2 * len(flow.outputs) * len(flow.time)
     method = Modal(certify=gap, boxes=min(BOXES, MOST_BOXES / size), workers=threads())
     return _certified(flow, method, gap, time.perf_counter(), progress, insist=True)
@@ -232,7 +235,7 @@ def _certified(
 ) -> Envelope:
     assert isinstance(flow.flow, LinearFlow)
     require_certifiable(len(flow.boxes.names))
-    model, error, unproved = model_with_error(flow.flow, flow, method, gap)
+    model, error, unproved = model_with_error(flow.flow, flow, method, gap, patient=not insist)
     if unproved and insist:
         raise (GapError if unproved.startswith(TOO_WIDE) else UnprovedError)(unproved)
     proof = certify(
@@ -279,12 +282,12 @@ def _certified(
 
 
 def model_with_error(
-    linear: LinearFlow, flow: UnitFlow, method: Modal, gap: float
+    linear: LinearFlow, flow: UnitFlow, method: Modal, gap: float, *, patient: bool = True
 ) -> tuple[ModalModel, Array, str]:
     """Modal model for a certificate, its error (T, m), and why that is only sampled.
 
     The proved bound exceeds the sampled error some thirty times, so the polynomials are refined
-    until it takes little of the gap.
+    until it takes little of the gap. `patient` is as for `proved_error`.
     """
 
     def fitted(tolerance: float) -> ModalModel:
@@ -304,14 +307,17 @@ def model_with_error(
         largest = USUAL * sampled  # a bound is seldom less, and takes time
         if largest <= PORTION * gap:
             try:
-                error = proved_error(model)
+                error = proved_error(model, patient=patient)
             except UnprovedError as unknown:
                 reason = str(unknown)
                 break
             largest = float((error / flow.scale).max())
             if largest <= PORTION * gap:
                 return model, error, ""
-        reason = f"{TOO_WIDE} {largest:.2g}, takes too much of the gap {gap:g}"
+        reason = (
+            f"{TOO_WIDE} {largest:.2g}, takes too much of the gap {gap:g}; a gap of some"
+            f" {1.2 * largest / PORTION:.2g}, or narrower or fewer fuzzy inputs, can be proved"
+        )
         # a degree more divides it by ten or so
         model, before = (
             fitted(sampled * min(0.99, 4 * PORTION * gap / largest)),

@@ -50,7 +50,11 @@ class Candidate:
 
     def __str__(self) -> str:
         """One line."""
-        cost = f"some {self.seconds:.1g} s" if np.isfinite(self.seconds) else "not possible"
+        cost = (
+            f"some {float(f'{self.seconds:.1g}'):g} s"
+            if np.isfinite(self.seconds)
+            else "not possible"
+        )
         return f"{self.name}: {cost}; {self.words}"
 
 

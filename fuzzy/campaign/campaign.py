@@ -14,6 +14,7 @@ from alphacut.fuzzy.campaign.dispatch import Task, completed
 from alphacut.fuzzy.campaign.memory_check import require
 from alphacut.fuzzy.campaign.sample_store import Shelf
 from alphacut.fuzzy.campaign.spot_check import SpotCheck
+from alphacut.fuzzy.counted import counted
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.samples.model import Layout, Values
 from alphacut.fuzzy.sets.numbers import Array
@@ -40,7 +41,8 @@ class CampaignError(RuntimeError):
         shown = "; ".join(causes[:_SHOWN])
         more = f"; and {len(causes) - _SHOWN} causes more" if len(causes) > _SHOWN else ""
         super().__init__(
-            f"{len(failures)} of {total} samples failed, the others are done: {shown}{more}"
+            f"{len(failures)} of {counted(total, 'sample')} failed, the others are done:"
+            f" {shown}{more}"
         )
 
 

@@ -70,7 +70,7 @@ class Shelf:
         self._named, self._end = False, 0
         self._claims: Claims | None = None  # not made before there is something to run
         self._look()
-        self._begun = self._end
+        self._begun, self.torn = self._end, store.torn  # before anybody writes
 
     def key(self, point: Array) -> str:
         """A point as text, exact to the last bit and the same whatever the order of the inputs."""

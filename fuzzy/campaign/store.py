@@ -93,6 +93,7 @@ class Store:
         self.path = Path(path)
         self._handle: int | None = None
         self._whole = 0  # up to here the file holds whole records
+        self.torn = False  # whether it was seen to end within a record
         if self.path.is_dir():
             raise ValueError(
                 f"{self.path} is a folder; give the store a file in it, such as"
@@ -150,6 +151,7 @@ class Store:
         for one in self._scan(start):
             if isinstance(one, Damage):
                 damage += [] if one.torn else [one]
+                self.torn |= one.torn
             else:
                 yield one.end, _entry(one) if one.content.startswith(model) else None
         if damage:

@@ -8,13 +8,16 @@ Theory, chapter 1). Inputs with claims make a bound of the possibility one of th
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from alphacut.fuzzy.arguments import fuzzy_inputs
+from alphacut.fuzzy.counted import counted
 from alphacut.fuzzy.decisions.nested_boxes import ByLevel, Scaled, Threshold, Verdict, threshold
 from alphacut.fuzzy.html import html_table
+from alphacut.fuzzy.knowledge.enclosure import Enclosed
 from alphacut.fuzzy.plans.branch_and_bound import BranchAndBound
 from alphacut.fuzzy.progress_bar import Progress, part, told
 from alphacut.fuzzy.propagation import propagate
@@ -37,6 +40,8 @@ class Limited:
         limits: Limit of each output.
         sign: +1 where outputs must stay at most at their limits, −1 where at least.
         precision: Gap of the proved bounds, as a share of the range of the output.
+        budget: As of `BranchAndBound`, for each box.
+        vectorised: Whether the function takes arrays, as `takes_arrays` tells.
     """
 
     function: Callable[..., object]
@@ -44,6 +49,8 @@ class Limited:
     limits: Limits
     sign: int = 1
     precision: float = 1e-9
+    budget: int = 50_000
+    vectorised: bool = True
 
     def __call__(self, lower: Array, upper: Array) -> Verdict:
         """What branch and bound proves of a box, two arrays of shape (inputs,)."""
@@ -51,9 +58,11 @@ class Limited:
         inputs = {
             name: Interval(low, high) if high > low else Crisp(low) for name, low, high in ends
         }
-        plan = BranchAndBound(self.function, self.precision)
-        found = propagate(self.function, inputs, plan, alpha=[1.0], vectorised=True, progress=False)
-        return self._verdict(found)
+        plan, arrays = BranchAndBound(self.function, self.precision, self.budget), self.vectorised
+        found = propagate(
+            self.function, inputs, plan, alpha=[1.0], vectorised=arrays, progress=False
+        )
+        return replace(self._verdict(found), runs=found.runs)
 
     def _verdict(self, found: FuzzyResult) -> Verdict:
         proved = (found.upper if self.sign > 0 else -found.lower)[0]
@@ -69,9 +78,12 @@ class Limited:
         return Verdict(False)
 
     def _value(self, point: Array, output: str) -> float:
-        found = self.function(**dict(zip(self.names, point[:, None], strict=True)))
-        value = found[output] if isinstance(found, Mapping) else found
-        return float(np.asarray(value).ravel()[0])
+        found = self._enclosed(point[None], point[None])[output].value
+        return float(found[0 if self.sign > 0 else 1][0])
+
+    @cached_property
+    def _enclosed(self) -> Enclosed:
+        return Enclosed(self.function, self.names)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -85,6 +97,7 @@ class Decision:
         alpha: Levels of the margin.
         witness: The most possible inputs found that exceed a limit; None where none do.
         claim: What the cuts of the inputs claim.
+        runs: Samples of the function; its enclosures over boxes are not among them.
     """
 
     possibility: tuple[float, float]
@@ -93,6 +106,7 @@ class Decision:
     alpha: tuple[float, ...]
     witness: Mapping[str, float] | None
     claim: str
+    runs: int
 
     @property
     def verdict(self) -> str:
@@ -105,6 +119,7 @@ class Decision:
         """The decision in a line, with what is claimed."""
         (a, b), (c, d) = self.possibility, self.necessity
         degrees = f"possibility of exceeding {a:.6g} … {b:.6g}, necessity {c:.6g} … {d:.6g}"
+        degrees += f"; {counted(self.runs, 'run')}"
         return "\n".join([f"{self.verdict}: {degrees}", *([self.claim] if self.claim else [])])
 
     __repr__ = __str__
@@ -128,6 +143,7 @@ def decide(
     *,
     alpha: Sequence[float] | None = None,
     tolerance: float = 1e-7,
+    budget: int = 50_000,
     progress: Progress | bool | None = None,
 ) -> Decision:
     """Decision on whether outputs exceed their limits, any of them.
@@ -138,29 +154,32 @@ def decide(
         limits: Limit by output; `{"y": limit}` of a function without named outputs.
         alpha: Levels of the safety margin; 0, ¼, ½, ¾, 1 if not given.
         tolerance: Wanted distance of the bounds of possibility and necessity.
+        budget: Boxes per bound at which a proof ends at the latest, as of `BranchAndBound`.
         progress: As for `propagate`.
 
     Raises:
-        ValueError: An argument is wrong, or a limit is not finite or names no output.
+        ValueError: An argument is wrong, a limit is not finite or names no output, or the function
+            cannot be enclosed.
     """
     limits = finite_by_name("limits", limits, "{'y': 4.5}")
     positive("the tolerance", tolerance)
     domain = Domain(fuzzy_inputs(inputs), levels(4) if alpha is None else alpha)
     sides = [(limits, 1), *(({name: limit}, -1) for name, limit in limits.items())]
     family, parts, found = ByLevel(domain), 1 + len(sides), []
+    arrays = takes_arrays(function, domain.names, *family.at(1.0))
     with told(progress) as tell:
         whole = propagate(
             function,
             domain.inputs,
-            BranchAndBound(function),
+            BranchAndBound(function, budget=budget),
             alpha=domain.alpha,
-            vectorised=True,
+            vectorised=arrays,
             progress=part(tell, 0, parts),
         )
         for name in limits:
             whole.column(name)
         for turn, (asked, sign) in enumerate(sides, 1):
-            judge = Limited(function, domain.names, asked, sign)
+            judge = Limited(function, domain.names, asked, sign, budget=budget, vectorised=arrays)
             tick = part(tell, turn, parts) or None
             found.append(threshold(family, judge, tolerance=tolerance, progress=tick))
             if tick:
@@ -178,7 +197,31 @@ def decide(
         if below.witness is None
         else dict(zip(domain.names, map(float, below.witness), strict=True))
     )
-    return Decision(possible, necessary, margin, tuple(domain.alpha), witness, str(whole.claim))
+    levels_of, runs = tuple(domain.alpha), whole.runs + sum(one.runs for one in found)
+    return Decision(possible, necessary, margin, levels_of, witness, str(whole.claim), runs)
+
+
+def takes_arrays(
+    function: Callable[..., object], names: Sequence[str], lower: Array, upper: Array
+) -> bool:
+    """Whether a function gives for arrays of points what it encloses; else it is run by points.
+
+    Raises:
+        ValueError: It cannot be enclosed, so that nothing of it can be proved.
+    """
+    points = np.stack([lower, upper])
+    try:
+        found = Enclosed(function, names)(points, points)
+    except ValueError as error:
+        what = f"{error}; of any other function `propagate` estimates bounds to set beside a limit"
+        raise ValueError(f"nothing is proved: {what}") from None
+    try:
+        given = function(**dict(zip(names, points.T, strict=True)))
+        values = given.values() if isinstance(given, Mapping) else [given]
+        pairs = zip(found.values(), values, strict=True)
+        return all(np.allclose(one.value, np.asarray(value, float)) for one, value in pairs)
+    except Exception:
+        return False
 
 
 def _degree(found: Threshold) -> tuple[float, float]:
@@ -196,6 +239,7 @@ def safe_scale(
     *,
     most: float = 10.0,
     tolerance: float = 1e-8,
+    budget: int = 50_000,
     progress: Progress | bool | None = None,
 ) -> Threshold:
     """Largest factor on given tolerances for which the limits provably hold.
@@ -207,10 +251,12 @@ def safe_scale(
         limits: Limit by output.
         most: Largest factor that is asked for.
         tolerance: Wanted distance of the proved and the refuted factor, as a share of `most`.
+        budget: As for `decide`.
         progress: As for `propagate`.
 
     Raises:
-        ValueError: A number is not finite, or a tolerance is negative or names no input.
+        ValueError: A number is not finite, a tolerance is negative or names no input, or the
+            function cannot be enclosed.
     """
     limits = finite_by_name("limits", limits, "{'y': 4.5}")
     nominal = finite_by_name("nominal values", nominal, "{'x': 1.0}")
@@ -229,7 +275,8 @@ def safe_scale(
             f"the tolerances are {dict(tolerances)}; they must be 0 or greater, finite"
         )
     family = Scaled(np.array([*nominal.values()], float), pairs[:, 0], pairs[:, 1])
-    judge = Limited(function, tuple(nominal), limits)
+    arrays = takes_arrays(function, tuple(nominal), *family.at(1.0))
+    judge = Limited(function, tuple(nominal), limits, budget=budget, vectorised=arrays)
     with told(progress) as tell:
         found = threshold(family, judge, most=most, tolerance=tolerance, progress=tell)
         if tell:

@@ -8,9 +8,9 @@ beforehand, so the least gain over those places stands beside the gain at the mo
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +19,7 @@ import numpy as np
 from alphacut.fuzzy.arguments import fuzzy_inputs, require_callable
 from alphacut.fuzzy.campaign.store import Identity, Store
 from alphacut.fuzzy.campaign.workers import pool, require_executor, require_workers
+from alphacut.fuzzy.counted import counted
 from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.knowledge.joint import joined_once
 from alphacut.fuzzy.knowledge.known import Known
@@ -163,14 +164,19 @@ def measure_next(
 
     Raises:
         ValueError: An argument is wrong, or there are several outputs and none is named.
+        KeyboardInterrupt: Interrupted; its message says what the store keeps.
     """
-    numbers = joined_once(fuzzy_inputs(inputs))
+    numbers, alpha = joined_once(fuzzy_inputs(inputs)), one_level(alpha)
     moving = [name for name, number in numbers.items() if number.cut(alpha).width > 0]
     answers, done = 1 + _ANSWERS * len(moving), itertools.count()
     require_workers(workers)
     require_executor(executor, workers)
     require_callable(function, list(numbers), by_name=True, sent=workers > 1)
-    with told(progress) as tell, nullcontext(executor) if executor else pool(workers) as running:
+    with (
+        told(progress) as tell,
+        nullcontext(executor) if executor else pool(workers) as running,
+        kept_on_interrupt(store, identity),
+    ):
 
         def answer(changed: Mapping[str, FuzzyNumber]) -> tuple[float, float]:
             found = propagate(
@@ -188,6 +194,33 @@ def measure_next(
             return _width(found, output)
 
         return advice(answer, numbers, alpha=alpha)
+
+
+@contextmanager
+def kept_on_interrupt(
+    store: Store | str | Path | None, identity: Identity | None
+) -> Iterator[None]:
+    """Say on Ctrl-C how many samples of all answers are kept, and how to go on."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        if store is None:
+            cure = "none of the samples is kept: `measure_next` keeps them in a store="
+        else:
+            with nullcontext(store) if isinstance(store, Store) else Store(store) as opened:
+                models = [one for one in opened.models() if one.identity == dict(identity or {})]
+                kept = counted(sum(one.samples for one in models), "sample")
+                cure = f"{opened.path} keeps {kept} of all answers: the same call goes on from them"
+        raise KeyboardInterrupt(f"interrupted; {cure}") from None
+
+
+def one_level(alpha: object) -> float:
+    """The level at which widths are compared, refused if it is no number from 0 to 1."""
+    level = alpha if isinstance(alpha, int | float | np.number) else np.nan
+    if not 0 <= level <= 1:
+        what = "widths are compared at one level, a number from 0 to 1, such as alpha=0.5"
+        raise ValueError(f"alpha is {alpha!r}: {what}")
+    return float(level)
 
 
 def _width(found: FuzzyResult, output: str | None) -> tuple[float, float]:

@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from alphacut.fuzzy.counted import counted
 from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.sets.boxes import Domain
@@ -80,10 +81,12 @@ class Verdict:
     Args:
         safe: Whether the limits are proved to hold in all of the box.
         witness: A point where one does not hold, shape (inputs,); None where none is known.
+        runs: Samples of the function that this took.
     """
 
     safe: bool
     witness: Array | None = None
+    runs: int = 0
 
 
 Judge = Callable[[Array, Array], Verdict]
@@ -98,12 +101,14 @@ class Threshold:
         unsafe: Size of the least box that holds the witness; infinite without one.
         witness: The point that breaks a limit, shape (inputs,), or None.
         judged: Boxes that were judged.
+        runs: Samples of the function that this took.
     """
 
     safe: float | None
     unsafe: float
     witness: Array | None
     judged: int
+    runs: int = 0
 
     @property
     def gap(self) -> float:
@@ -126,7 +131,7 @@ class Threshold:
         if self.witness is not None:
             at = ", ".join(f"{x:.6g}" for x in self.witness)
             rows.append(("unsafe from", f"{self.unsafe:.9g}, at ({at})"))
-        return [*rows, ("boxes judged", f"{self.judged}")]
+        return [*rows, ("boxes judged", f"{self.judged}, with {counted(self.runs, 'run')}")]
 
 
 def threshold(
@@ -156,11 +161,11 @@ def threshold(
             f"most, tolerance and limit are {most:g}, {tolerance:g}, {limit}; they must be positive"
         )
     last, first = judge(*family.at(most)), judge(*family.at(0.0))
-    if last.safe or not first.safe:
-        witness = None if last.safe else first.witness
-        return Threshold(
-            most if last.safe else None, np.inf if witness is None else 0.0, witness, 2
-        )
+    runs = last.runs + first.runs
+    if last.safe:
+        return Threshold(most, np.inf, None, 2, runs)
+    if first.witness is not None or not (first.safe or last.witness is not None):
+        return Threshold(None, 0.0 if first.witness is not None else np.inf, first.witness, 2, runs)
     safe, unsafe, witness, judged = 0.0, np.inf, last.witness, 2
     if witness is not None:
         unsafe = min(family.size_of(witness), most)
@@ -174,6 +179,7 @@ def threshold(
         else:
             break
         found, judged = judge(*family.at(middle)), judged + 1
+        runs += found.runs
         if found.safe:
             safe = middle
         elif found.witness is not None:
@@ -184,4 +190,5 @@ def threshold(
         if progress:  # each box halves what is open, down to the tolerance
             left = max((min(unsafe, most) - safe) / most, tolerance)
             progress(max(judged / limit, float(np.log(left) / min(np.log(tolerance), -1e-9))))
-    return Threshold(safe, unsafe, witness, judged)
+    least = None if safe == 0 and not first.safe else safe
+    return Threshold(least, unsafe, witness, judged, runs)

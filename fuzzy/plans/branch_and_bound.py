@@ -100,7 +100,7 @@ class BranchAndBound:
             error=np.abs(proved - attained).max(axis=2),
             proved=np.ones(proved.shape[:2], bool),
             enforced=np.zeros(proved.shape[:2], bool),
-            given=(f"the enclosed function is the model, as at all {runs} samples",),
+            given=(f"the enclosed function is the model, as at all {runs:,} samples",),
         )
 
 
@@ -199,7 +199,9 @@ class _Search:
 
     def _scale(self) -> float:
         """Range of the values seen; a share of the least one where there is none."""
-        return max(self.worst - self.best, abs(self.best) * 1e-9)
+        with np.errstate(over="ignore"):
+            seen = np.subtract(self.worst, self.best)
+        return float(max(seen, abs(self.best) * 1e-9, np.finfo(float).tiny))
 
     def _halves(self, chosen: Rows) -> tuple[Array, Array]:
         """Chosen boxes cut in two across the input that matters most."""
@@ -217,12 +219,13 @@ class _Search:
         value, slope = self._enclosed(lower, upper)
         about = self._enclosed(middle, middle)[0][0]
         steep = np.maximum(np.abs(slope[0]), np.abs(slope[1]))
-        reach = (np.nan_to_num(steep * half, nan=np.inf) * _ROUND_OFF).sum(axis=0) * _ROUND_OFF
-        effect = np.where(half > 0, np.minimum(steep, 1e300) * half + half * 1e-300, -1.0)
+        with np.errstate(over="ignore", invalid="ignore"):  # what overflows bounds nothing
+            reach = (np.nan_to_num(steep * half, nan=np.inf) * _ROUND_OFF).sum(axis=0) * _ROUND_OFF
+            effect = np.where(half > 0, np.minimum(steep, 1e300) * half + half * 1e-300, -1.0)
+            mean_value = np.nextafter(about - reach, -np.inf)
         # monotone inputs go to their end
         low_end = np.where(slope[0].T >= 0, lower, np.where(slope[1].T <= 0, upper, middle))
         self._attain(low_end, value)
-        mean_value = np.nextafter(about - reach, -np.inf)
         return _Boxes(
             lower,
             upper,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -148,3 +150,18 @@ def test_accelerations_under_unknown_masses_are_proved_and_attained() -> None:
     assert found.nature == "guaranteed"
     omega = np.sqrt(RIGIDITY * 2.6e10 / 2.5e10 / 900.0)  # of the fastest: |a| = v0 ω
     assert np.abs(found.lower).max() <= 0.5 * omega * (1 + 1e-3)
+
+
+def six_storeys() -> tuple[StoreyFrame, dict[str, FuzzyNumber]]:
+    stiffness = (60e6, 60e6, 50e6, 50e6, 40e6, 40e6)
+    frame = StoreyFrame([3e4] * 6, stiffness=stiffness, damping_ratio=0.03, v0=[0.5] * 6)
+    return frame, {f"k{n + 1}": Interval(0.98 * k, 1.02 * k) for n, k in enumerate(stiffness)}
+
+
+def test_six_stiffnesses_under_one_ratio_are_proved_far_from_the_limit() -> None:
+    frame, inputs = six_storeys()
+    flow = LinearFlow(replace(frame, outputs=("drift1",)), (), 1.0, 0.05, Exact())
+    peak = float(np.abs(flow.values(np.zeros((1, 0)))).max())
+    for limit, verdict in ((2.0, "safe"), (0.4, "unsafe")):
+        found = exceeding(frame, inputs, {"drift1": limit * peak}, duration=1.0, step=0.05)
+        assert (found.verdict, found.scale.nature) == (verdict, "guaranteed")

@@ -5,6 +5,7 @@ from time import perf_counter
 
 import pytest
 
+from alphacut import fuzzy
 from alphacut.fuzzy import (
     CampaignError,
     Chebyshev,
@@ -177,3 +178,23 @@ def test_too_many_samples_are_counted_without_being_made(plan):
     assert perf_counter() - start < 1
     assert found.samples == 4 * 2**40 + 1
     assert "too many to list" in str(found)
+
+
+def test_samples_of_earlier_steps_count_and_a_torn_end_is_told(tmp_path):
+    path, identity = tmp_path / "s.db", {"a": 1}
+    inputs, ran = {"x": Triangular(0, 1, 2), "y": Triangular(1, 2, 3)}, []
+
+    def stopped(x, y):
+        ran.append(x)
+        if len(ran) == 3:
+            raise KeyboardInterrupt
+        return x * y
+
+    with pytest.raises(KeyboardInterrupt, match="2 samples are kept"):
+        fuzzy.propagate(stopped, inputs, store=path, identity=identity)
+    assert explain(inputs, store=path, identity=identity).stored == 2
+    path.write_bytes(path.read_bytes()[:-3])
+    found = fuzzy.propagate(lambda x, y: x * y, inputs, store=path, identity=identity)
+    assert any("the store ended within a sample" in note for note in found.notes)
+    again = fuzzy.propagate(lambda x, y: x * y, inputs, store=path, identity=identity)
+    assert not any("the store ended" in note for note in again.notes)

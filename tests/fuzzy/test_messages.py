@@ -42,7 +42,7 @@ class Quantity:
         ),
         (lambda: propagate(lambda x: np.ones(10_000) * x, X), "50,000 searches of the surface"),
         (lambda: propagate(lambda x: x, X).plot("y", 3), "the axes are 3; give Matplotlib's"),
-        (lambda: width_shares(lambda inputs: 3, X), "returned 3; it must return lower and upper"),
+        (lambda: width_shares(lambda inputs: 3, X), r"two arrays, such as .*, and it returned 3$"),
         (lambda: F * "2", "holds '2'; it needs plain numbers"),
         (lambda: F + True, "holds True; it needs plain numbers"),
         (lambda: Phase("3 GPa"), "Young's modulus is '3 GPa'; a phase takes plain numbers"),

@@ -18,6 +18,7 @@ from alphacut.stages.vibration import envelope
 from alphacut.stages.vibration.envelope_task import EnvelopeTask, task_of
 from alphacut.stages.vibration.exceedance import with_peaks
 from alphacut.stages.vibration.structure import Structure
+from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     import xarray
@@ -96,6 +97,26 @@ def _decisions(
     return {**each, ANY: any_exceeding(each, of(least) if passed else None)}
 
 
+def explained(case: Case, wanted: Structure, task: EnvelopeTask) -> list[str]:
+    """A line on what the decisions cost: each limit takes models of its own, and their proofs."""
+    from alphacut import frame
+
+    if wanted.frame is None:
+        return []
+    limits, lowest = limits_of(case), replace(task, method="modal", alpha=task.alpha[:1])
+    names = tuple(dict.fromkeys(one.output for one in limits))
+    limited = replace(wanted.frame, outputs=names[:1])
+    one = frame.plan(limited, **envelope.arguments(wanted, lowest))[0]
+    cost = MODELS * len(limits) * one.seconds
+    count = f"{len(limits)} limits" if len(limits) > 1 else "a limit"
+    words = f"{count}, ten times as much if one lies within the peaks"
+    return [f"decision, of run: some {float(f'{cost:.1g}'):g} s; {words}"]
+
+
+MODELS = 3
+"""Cost of a decision far from the limit, beside that of the envelope of its output."""
+
+
 def _dataset(
     found: Mapping[str, Exceeding],
     limits: Sequence[Limit],
@@ -133,7 +154,7 @@ def _dataset(
             "allowed": ("output", values, {"units": "SI, by output"}),
         },
         {
-            "verdict": ", ".join(x.verdict for x in found.values()),
+            "verdict": ", ".join(_verdicts(found, margin[0], str(peaks.attrs["nature"]))),
             "nature": ", ".join(x.scale.nature for x in found.values()),
             "reason": next((x.scale.reason for x in found.values() if x.scale.reason), ""),
             "claim": next(iter(found.values())).claim,
@@ -141,6 +162,28 @@ def _dataset(
             "peaks": str(peaks.attrs["nature"]),
         },
     )
+
+
+def _verdicts(found: Mapping[str, Exceeding], margin: Array, nature: str) -> Iterator[str]:
+    """A verdict on each limit; where nothing is proved, what the envelope says of it.
+
+    `margin` is limit less peak at the lowest level, lower and upper ends, (2, limits).
+    """
+    told = []
+    for one, (low, high) in zip(found.values(), [*margin.T, (np.nan, np.nan)], strict=False):
+        verdict = one.verdict
+        if verdict == "undecided" and one.scale.witness is None and low > 0:
+            verdict = HOLDS.format(nature)
+        elif verdict == "undecided" and high < 0:
+            verdict = f"exceeded by the {nature} envelope (not proved)"
+        told.append(verdict)
+    kept = {"safe", HOLDS.format(nature)}
+    if ANY in found and told[-1] == "undecided" and set(told[:-1]) <= kept:
+        told[-1] = HOLDS.format(nature)
+    yield from told
+
+
+HOLDS = "holds by the {} envelope (not proved)"
 
 
 def decision_document(found: xarray.Dataset) -> Document:
@@ -187,6 +230,17 @@ def degree(low: float, high: float) -> str:
     return " … ".join(dict.fromkeys(ends))
 
 
+def why(one: Document) -> str:
+    """Why a limit is neither safe nor unsafe, and what would decide it."""
+    if one["verdict"] in ("safe", "unsafe"):
+        return ""
+    if one["verdict"] != "undecided":
+        return "; fewer or narrower fuzzy inputs would give a proof"
+    if one["witness"] is None:
+        return ", since neither a proof nor a motion beyond it was found; narrower inputs decide"
+    return ", since some of the motions exceed it and some do not; narrower inputs decide"
+
+
 def sentences(found: Document) -> Iterator[str]:
     """A line for each limit and one for any of them, then the proof and what is claimed."""
     for name, one in found["limits"].items():
@@ -197,12 +251,12 @@ def sentences(found: Document) -> Iterator[str]:
         (a, b), (c, d) = one["possibility"], one["necessity"]
         degrees = f"possible to {degree(a, b)}, necessary to {degree(c, d)}"
         worth = f"{one['nature']}, at nodes every {found['step']:g} s"
-        yield f"{of}: {degrees}: {one['verdict']} ({worth})"
+        yield f"{of}: {degrees}: {one['verdict']} ({worth}){why(one)}"
     for name, margin in found["margins"].items():
         ends = (engineering(float(margin[side][0]), margin["unit"], digits=3) for side in SIDES)
         level = f"α = {found['alpha'][0]:g}"
         yield f"safety margin of {name} at {level}: {' … '.join(ends)} (peaks {found['peaks']})"
     if found["reason"]:
-        yield str(found["reason"])
+        yield f"not proved: {found['reason']}"
     if found["claim"]:
         yield f"a limit is exceeded with P at most as it is possible: {found['claim']}"

@@ -17,7 +17,7 @@ from alphacut.io.progress import Tick
 from alphacut.io.provenance import attributes, versions
 from alphacut.stages.contract import keep
 from alphacut.stages.vibration.envelope_task import EnvelopeTask
-from alphacut.stages.vibration.provable import too_many, unproved_reason
+from alphacut.stages.vibration.provable import estimated_reason, too_many, unproved_reason
 from alphacut.stages.vibration.resolution_checks import guard_against
 from alphacut.stages.vibration.structure import Structure
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -82,6 +82,8 @@ def explain(wanted: Structure, task: EnvelopeTask) -> list[str]:
     require_affordable(wanted, task)
     reason = unproved_reason(wanted, task) if task.certify is not None else ""
     told = [f"certify: verified by sampling, not proved: {reason}"] if reason else []
+    if estimated := estimated_reason(wanted, task):
+        told = [f"bounds: estimated, with their error, not proved: {estimated}"]
     try:
         return told + [
             str(candidate) for candidate in frame.plan(wanted.model, **arguments(wanted, task))

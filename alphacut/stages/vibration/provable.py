@@ -8,6 +8,9 @@ from alphacut.io.problem import Problem
 from alphacut.stages.vibration.envelope_task import EnvelopeTask
 from alphacut.stages.vibration.structure import Structure
 
+MANY = 5
+"""Inputs from which on a proof may take minutes."""
+
 
 def too_many(key: str, wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
     """The problem that a proof is asked for with too many inputs, by the key that asks."""
@@ -18,6 +21,26 @@ def too_many(key: str, wanted: Structure, task: EnvelopeTask) -> Iterator[Proble
         what = f"proofs are affordable up to {MOST_PARAMETERS} fuzzy inputs, and there are"
         cure = "fewer in [envelope] fuzzy, or no proof: envelopes and peaks need none"
         yield Problem(key, f"{what} {len(names)}", ", ".join(names), cure)
+
+
+def estimated_reason(wanted: Structure, task: EnvelopeTask) -> str:
+    """Why bounds will be estimated where no proof is asked for; empty where one will be tried."""
+    from alphacut.frame.certificate.remainder import MOST_PARAMETERS
+
+    count = len(wanted.inputs(task.fuzzy))
+    if wanted.linear is None or task.certify is not None or task.method != "auto":
+        return ""
+    if count > MOST_PARAMETERS:
+        what = f"proofs are affordable up to {MOST_PARAMETERS} fuzzy inputs, and there are {count}"
+        return f"{what}; fewer can be proved"
+    if reason := unproved_reason(wanted, task):
+        return reason
+    if count < MANY:
+        return ""
+    return (
+        f"a proof with {count} fuzzy inputs may take minutes and is then not tried unasked;"
+        " envelope.certify asks for one, and fewer fuzzy inputs are proved at once"
+    )
 
 
 def unproved_reason(wanted: Structure, task: EnvelopeTask) -> str:

@@ -73,7 +73,9 @@ def coarse_tolerance(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]
             if wanted.linear
             else "pendulum.tolerance"
         )
-        yield Problem(key, found.message.removeprefix("tolerance: "))
+        cure = "envelope.relative_tolerance = 0.001"
+        told = found.message.replace("a relative tolerance such as 0.001", cure)
+        yield Problem(key, told.removeprefix("tolerance: "))
 
 
 def coarse_nodes(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:

@@ -152,10 +152,10 @@ def test_a_certificate_is_told_with_its_gap_and_what_it_rests_on():
         "gap": 1e-6,
         "proof": "bounded by <energy>",
     }
-    study |= {"gap_output": "q2", "between_nodes": 3e-5}
+    study |= {"gap_output": "q2"}
     page = methods({"envelopes": {"E": study}})
     assert "envelope E are proved at every node, and no wider than 1.0 µm of q2" in page
-    assert "the largest of all steps. Bounded by &lt;energy&gt;." in page
+    assert "what is attained. Bounded by &lt;energy&gt;." in page
     assert "Guaranteed: proved to hold" in page
     assert "proved at" not in methods(
         {"envelopes": {"E": {k: v for k, v in study.items() if k not in ("gap", "proof")}}}

@@ -427,3 +427,19 @@ def test_a_wrong_start_counts_by_its_energy(kind, most, monkeypatch) -> None:
     deviation = np.abs(moved @ rows.value[0].T)
     assert (deviation <= bound * (1 + 1e-6)).all()
     assert deviation.max() > bound.max() / most
+
+
+def test_fewer_points_than_all_combinations_give_the_same_bound(monkeypatch) -> None:
+    inputs = {"E": Interval(24e9, 26e9), "m1": Interval(19e3, 21e3), "zeta": Interval(0.02, 0.04)}
+    frame = replace(SHAKEN, dampers=(), damping_ratio=0.03, outputs=("q3", "drift2"))
+    found = model(frame, inputs)
+    whole = proved_error(found)
+    many = len(ChebyshevGrid((2 * found.degree + 1,) * 3))
+    monkeypatch.setattr(model_error, "MOST_NUMBERS", many)
+    monkeypatch.setattr(model_error, "DEAR", 1e-3)
+    assert proved_error(found) == pytest.approx(whole, rel=1e-6)
+    with pytest.raises(UnprovedError, match="takes minutes and is not tried unasked"):
+        proved_error(found, patient=False)
+    monkeypatch.setattr(model_error, "DEAR", 100)
+    with pytest.raises(UnprovedError, match=r"points of 3 fuzzy inputs, and \d+ are affordable"):
+        proved_error(found)

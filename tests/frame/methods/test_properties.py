@@ -10,8 +10,8 @@ from hypothesis import HealthCheck, given, reject, settings
 from hypothesis import strategies as st
 
 from alphacut.frame import Envelope, Exact, LinearFlow, StoreyFrame, envelope
-from alphacut.frame.methods.auto import ToleranceError, width_shares
-from alphacut.fuzzy import Crisp, FuzzyNumber, Triangular
+from alphacut.frame.methods.auto import ToleranceError
+from alphacut.fuzzy import FuzzyNumber, Triangular
 
 TIME = {"duration": 6, "step": 0.1}
 
@@ -125,24 +125,6 @@ def test_graph_follower_is_inner_for_any_frame() -> None:
     assert outside(followed, truth.lower, truth.upper) < 2e-3
     assert (followed.upper <= truth.upper).all()
     assert (followed.lower >= truth.lower).all()
-
-
-def test_widths_are_shared_out_and_a_crisp_input_has_none() -> None:
-    frame = StoreyFrame((9e3,), (2.4,), 25e9, 1e-6, (90,), "ground", (0.05,), (0.0,))
-    fuzzy: dict[str, FuzzyNumber] = {
-        "E": Triangular(23e9, 25e9, 26e9),
-        "m1": Triangular(8.9e3, 9e3, 9.1e3),
-    }
-    whole = envelope(frame, fuzzy, alpha=(0,), **TIME)
-    fixed = [
-        envelope(frame, {**fuzzy, name: Crisp(fuzzy[name].modal)}, alpha=(0,), **TIME)
-        for name in fuzzy
-    ]
-    shares = width_shares(whole, fixed)
-    assert shares.shape == (2, 1, 61, 1)
-    wide = whole.upper - whole.lower > 0.005
-    assert (shares[0][wide] > shares[1][wide]).mean() > 0.9  # E is the wider input
-    assert shares.max() <= 1
 
 
 def test_auto_says_what_it_cannot_do() -> None:

@@ -100,3 +100,49 @@ def test_a_family_without_a_decision_stays_open():
 def test_bad_tolerances_are_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_functions_of_plain_numbers_are_decided_on():
+    def entry(x, y):
+        return (np.linspace(0, 1, 3) * x)[2] * y  # arrays of points do not go through it
+
+    with pytest.raises(ValueError, match="broadcast"):
+        entry(np.ones(4), np.ones(4))
+    found = decide(entry, {"x": X, "y": X}, {"y": 2.25})
+    assert found.possibility == pytest.approx((0.5, 0.5), abs=1e-6)  # (2 − α)² = 2.25
+    assert f"; {found.runs:,} runs" in str(found)
+    assert found.runs > 100
+    scale = safe_scale(entry, {"x": 1, "y": 1}, {"x": 0.1, "y": 0.1}, {"y": 1.21})
+    assert scale.safe == pytest.approx(1, abs=1e-6)
+    assert f"with {scale.runs} runs" in str(scale)
+
+
+def test_the_output_that_is_limited_decides_not_the_first_of_a_list():
+    found = decide(lambda x: [0 * x, 3 * x], {"x": X}, {"y[1]": 4.5})
+    assert found.possibility == pytest.approx((0.5, 0.5), abs=1e-6)
+    assert found.runs < 2000  # an output that is nought all over ends at once
+
+
+def test_a_limit_that_the_middle_reaches_is_exceeded_beyond_it():
+    found = decide(lambda x: 2 * x, {"x": X}, {"y": 2})
+    assert found.possibility == pytest.approx((1, 1), abs=1e-6)
+
+
+def test_what_cannot_be_enclosed_is_refused_in_a_line_before_it_runs():
+    def black(x):
+        calls.append(x)
+        return x if x > 1 else 1.0
+
+    calls = []
+    with pytest.raises(ValueError, match=r"nothing is proved: .* `propagate` estimates") as told:
+        decide(black, {"x": X}, {"y": 2})
+    with pytest.raises(ValueError, match="nothing is proved: "):
+        safe_scale(black, {"x": 1}, {"x": 0.1}, {"y": 2})
+    assert "\n" not in str(told.value)
+    assert len(calls) == 2
+
+
+def test_a_budget_ends_a_proof_that_has_no_end():
+    found = decide(lambda x: x - x + x, {"x": X}, {"y": 1.5}, budget=4)
+    assert found.possibility[0] <= 0.5 <= found.possibility[1]
+    assert found.runs < 3000

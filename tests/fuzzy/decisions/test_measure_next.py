@@ -128,3 +128,29 @@ def test_claims_are_joined_before_they_are_cut() -> None:
     found = measure_next(lambda a, b: a + b, inputs, Reduced(), alpha=0.1)
     apart = sum(number.cut(0.05).width for number in inputs.values())
     assert found.width == pytest.approx(apart, rel=0.02)
+
+
+@pytest.mark.parametrize("alpha", [[0, 1], 1.5, None])
+def test_widths_are_compared_at_one_level(alpha):
+    with pytest.raises(ValueError, match="compared at one level, a number from 0 to 1"):
+        measure_next(lambda x: x, {"x": Triangular(0, 1, 2)}, Reduced(), alpha=alpha)
+
+
+def test_an_interruption_counts_the_samples_of_all_answers(tmp_path):
+    calls = []
+
+    def stopped(x, y):
+        calls.append((x, y))
+        if len(calls) == 12:
+            raise KeyboardInterrupt
+        return x * y
+
+    inputs = {"x": Triangular(0, 1, 2), "y": Triangular(1, 2, 3)}
+    kept = {"store": tmp_path / "s.db", "identity": {"a": 1}}
+    with pytest.raises(KeyboardInterrupt, match=r"s\.db keeps \d+ samples of all answers") as told:
+        measure_next(stopped, inputs, Reduced(), **kept)
+    count = int(str(told.value).split("keeps ")[1].split()[0])
+    assert 4 < count < 12
+    del calls[:]
+    with pytest.raises(KeyboardInterrupt, match="none of the samples is kept"):
+        measure_next(stopped, inputs, Reduced())

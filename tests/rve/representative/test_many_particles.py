@@ -10,13 +10,13 @@ import pytest
 
 from alphacut.rve.bounds import bulk_modulus, hashin_shtrikman_bulk
 from alphacut.rve.cell import Phase
-from alphacut.rve.representative.many_particles import many_particles
 from alphacut.rve.result import effective_modulus
 from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.stochastic.particles.discs import Discs
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 from benchmarks.stochastic.averages import Isotropic, averages, mori_tanaka
+from benchmarks.stochastic.representative.many_particles import many_particles
 
 MATRIX, INCLUSION = Phase(20e9), Phase(80e9, 0.2)
 PACKING = Packing(20, 0.3, LogNormalRadii(1e-3, 4e-3), gap=2e-4).make(np.random.default_rng(1))

@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from alphacut.case.load import load
+from alphacut.case.quick import quick
 from alphacut.entry import main
-from alphacut.stages.vibration.decision import degree, outward
+from alphacut.stages.vibration.decision import ANY, _verdicts, degree, outward, why
 from tests.alphacut.one_floor import RIGIDITY, one_floor
 
 # |q| = v0 / ω, base shear v0 ω m
@@ -204,3 +206,44 @@ def test_degrees_carry_no_digits_of_the_search(ends, kept, told):
     assert outward(ends) == pytest.approx(kept, abs=1e-15)
     assert outward(ends)[0] <= ends[0] <= ends[1] <= outward(ends)[1]
     assert degree(*ends) == told
+
+
+def test_a_storey_that_is_not_there_is_told_before_its_height(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = written(tmp_path, ["drift7 <= 0.5 %"])
+    assert main(["check", str(path)]) == 2
+    told = capsys.readouterr().err
+    assert "drift7 is not among the structure's outputs" in told
+    assert "frame.lengths" not in told
+
+
+def test_what_is_not_proved_is_judged_by_the_envelope_with_a_reason() -> None:
+    from types import SimpleNamespace
+    from typing import Any, cast
+
+    def one(witness: object, verdict: str = "undecided") -> Any:
+        return cast("Any", SimpleNamespace(verdict=verdict, scale=SimpleNamespace(witness=witness)))
+
+    margin = np.array([[0.2, 0.1, -0.1, -0.3], [0.4, 0.3, 0.2, -0.1]])
+    found = {"a": one(None), "b": one(1.0), "c": one(None), "d": one(None), ANY: one(1.0)}
+    told = list(_verdicts(found, margin, "estimated"))
+    kept = "holds by the estimated envelope (not proved)"
+    passed = "exceeded by the estimated envelope (not proved)"
+    assert told == [kept, "undecided", "undecided", passed, "undecided"]
+    calm = {"a": one(None), "b": one(None, "safe"), ANY: one(None)}
+    assert list(_verdicts(calm, margin, "estimated")) == [kept, "safe", kept]
+    for verdict, witness, words in (
+        (kept, None, "; fewer or narrower fuzzy inputs would give a proof"),
+        ("undecided", None, ", since neither a proof nor a motion beyond it was found"),
+        ("undecided", {"m1": 1.0}, ", since some of the motions exceed it"),
+        ("safe", None, ""),
+    ):
+        assert why({"verdict": verdict, "witness": witness}).startswith(words)
+
+
+def test_quick_keeps_one_level_alone(tmp_path: Path) -> None:
+    path = written(tmp_path, ["q1 <= 1 m"])
+    case = load(str(path), ["envelope.alpha=[0]"])
+    assert quick(case).envelope.alpha == (0.0,)
+    assert quick(load(str(path), ["envelope.alpha=[0, 0.5, 1]"])).envelope.alpha == (0.0, 1.0)

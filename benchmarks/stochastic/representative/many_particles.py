@@ -33,7 +33,7 @@ def many_particles(
         ValueError: The discs touch, or the box is not a periodic square.
         RuntimeError: The mesh is not periodic, or the linear solver failed.
     """
-    from alphacut.rve.representative.mesh import many_mesh
+    from benchmarks.stochastic.representative.mesh import many_mesh
 
     mesh, inside = many_mesh(discs, size=size, around=around)
     stiffness, nodes = _stiffness(mesh, inside, matrix, inclusion)
