@@ -9,7 +9,7 @@ from alphacut.frame.boxes import boxes
 from alphacut.frame.certificate.model_error import proved_error
 from alphacut.frame.modal.analyses import needed_modes
 from alphacut.frame.modal.fitting import fit_modes
-from alphacut.frame.structures.excited import excited
+from alphacut.frame.structures.excited import _reached, excited
 from alphacut.fuzzy import Interval
 
 CHAIN = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
@@ -60,6 +60,13 @@ def test_what_a_start_beside_the_ground_moves_is_kept() -> None:
     flows = [LinearFlow(x, (), 2.0, 0.1, Exact()) for x in (moved, excited(moved))]
     one, other = (flow.values(np.zeros((1, 0))) for flow in flows)
     assert np.abs(one - other).max() < 1e-11 * np.abs(one).max()
+
+
+def test_what_is_coupled_over_others_to_what_moves_is_kept() -> None:
+    coupled = np.array([[1, 1, 0, 0], [1, 1, 1, 0], [0, 1, 1, 0], [0, 0, 0, 1]], bool)
+    first, last = np.array([True, False, False, False]), np.array([False, False, False, True])
+    assert _reached(coupled, first).tolist() == [True, True, True, False]
+    assert _reached(coupled, last).tolist() == [False, False, False, True]
 
 
 def test_bounds_of_the_part_that_moves_are_guaranteed_and_hold_motions_of_the_whole() -> None:
