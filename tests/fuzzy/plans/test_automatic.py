@@ -8,6 +8,7 @@ from scipy.optimize import minimize
 from scipy.stats import qmc
 
 from alphacut.fuzzy import Automatic, General, Interval, Known, Linear, Triangular, propagate
+from alphacut.fuzzy.plans.looks import Purse, SpentError
 from alphacut.fuzzy.samples.nature import Nature
 
 KINDS = ("monotone", "inside", "ridge", "kink", "wave")
@@ -160,6 +161,16 @@ def test_what_is_printed_counts_every_call():
     assert result.verification_runs > 0
     assert f"{result.runs} runs and {result.verification_runs} more" in str(result)
     assert len(set(calls)) == result.runs + result.verification_runs
+
+
+def test_what_passes_the_budget_by_one_sample_is_refused_and_none_is_run():
+    run = []
+    purse = Purse(lambda points: run.append(len(points)), 21)
+    purse(np.zeros((10, 2)))
+    with pytest.raises(SpentError):
+        purse(np.zeros((12, 2)))
+    purse(np.zeros((11, 2)))
+    assert (run, purse.left) == ([10, 11], 0)
 
 
 @pytest.mark.parametrize("budget", [20, 33, 50, 100, 300, 700])
