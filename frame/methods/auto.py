@@ -12,7 +12,7 @@ from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.checks.step_error import step_error
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.batch_graph_follower import BatchFollower
-from alphacut.frame.methods.modal import GapError, Modal, guaranteed
+from alphacut.frame.methods.modal import FINE, GapError, Modal, guaranteed
 from alphacut.frame.methods.plan import Candidate, candidates
 from alphacut.frame.outputs import output_unit
 from alphacut.frame.structures.modes import ModalError
@@ -102,7 +102,7 @@ class Auto:
                 if proof is not None:
                     why = "modal: polynomials of the modes, whose bounds are proved"
                     return _reported(proof, flow, begun, why)
-                found = Modal(tolerance=left / 8).run(flow, progress)
+                found = Modal(tolerance=left / FINE).run(flow, progress)
                 found = replace(found, facts={**found.facts, "unproved": unproved})
                 if _estimate(found, flow) <= left:
                     return _reported(found, flow, begun, _why(found))

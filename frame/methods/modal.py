@@ -27,6 +27,8 @@ from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 
 Progress = Callable[[float], None]
+FINE = 8
+"""Wanted error of an envelope over the tolerance of the polynomials that keeps it."""
 SAFETY = 3.0
 """Factor on the model error sampled at held-out points."""
 PORTION = 0.2

@@ -48,6 +48,10 @@ class EnvelopeTask:
     @property
     def resolution(self) -> float:
         """Tolerance of the method itself, of a Graph Follower the gain worth a trajectory."""
+        from alphacut.frame.methods.modal import FINE
+
+        if self.method == "modal":
+            return self.tolerance / FINE
         return self.tolerance * (self.gain if self.method in FOLLOWERS else 1.0)
 
     @property

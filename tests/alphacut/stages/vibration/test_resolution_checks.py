@@ -125,3 +125,8 @@ def test_tolerances_that_contradict_each_other(case, changes, words, capfd):
         == 2
     )
     assert words in capfd.readouterr().err
+
+
+def test_modal_named_keeps_the_tolerance_that_is_asked_for():
+    fuzzy = ["--fuzzy", "E,m", "--duration", "30", "--step", "0.1", "--alpha", "0"]
+    assert main(["envelope", PAPER, *fuzzy, "--method", "modal", "--tolerance", "1e-4"]) == 0
