@@ -133,8 +133,7 @@ class Polynomial:
         first = np.take_along_axis(slope, axes[:, :, None], 1)[:, :, None]
         second = bent[axes, axes][:, :, None] / 2
         far = moved[..., None]
-        total: Array = value[:, None, None] + far * (first + far * second)
-        return total
+        return np.asarray(value[:, None, None] + far * (first + far * second))
 
     def __call__(self, u: Array) -> Array:
         """Values at (S, d), shape (S, K)."""

@@ -16,16 +16,14 @@ MOST = 8
 
 def threads() -> int:
     """Cores of this process, at most `MOST`; one in a worker, whose siblings have the others."""
-    if parent_process() is not None:
-        return 1
-    here = hasattr(os, "sched_getaffinity")  # Linux
-    return min(MOST, len(os.sched_getaffinity(0)) if here else os.cpu_count() or 1)
+    own = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))  # Linux
+    return 1 if parent_process() is not None else min(MOST, len(own(0)))
 
 
 def each(function: Callable[[T], R], parts: Iterable[T]) -> list[R]:
     """The function's value for each part, in their order, the same for any number of threads."""
-    listed, count = list(parts), threads()
-    if count == 1 or len(listed) < 2:
+    listed = list(parts)
+    if (count := min(threads(), len(listed))) < 2:
         return [function(part) for part in listed]
-    with ThreadPoolExecutor(min(count, len(listed))) as pool:
+    with ThreadPoolExecutor(count) as pool:
         return list(pool.map(function, listed))

@@ -44,7 +44,8 @@ def probe(
         The problems that improved.
     """
     rival = found.take(np.arange(len(found.value)))
-    for piece in np.array_split(np.arange(len(rival.value)), _pieces(rival)):
+    count = len(rival.value) * min(rival.point.shape[1], LINES) * POINTS
+    for piece in np.array_split(np.arange(len(rival.value)), -(-count // COMPARED)):
         part = rival.take(piece)
         rival.point[piece], rival.value[piece] = _best_hills(guide, part, lower, upper, rng)
     near = rival.value > found.value - BEHIND * np.abs(found.value).max()
@@ -53,10 +54,6 @@ def probe(
     rival.offer(model, rival.point[chosen], chosen)
     refine(model, rival, chosen, lower, upper, small)
     return found.offer(model, rival.point[chosen], chosen)
-
-
-def _pieces(rival: Optima) -> int:
-    return -(-len(rival.value) * min(rival.point.shape[1], LINES) * POINTS // COMPARED)
 
 
 def _best_hills(

@@ -50,9 +50,8 @@ class EnvelopeTask:
         """Tolerance of the method itself, of a Graph Follower the gain worth a trajectory."""
         from alphacut.frame.methods.modal import FINE
 
-        if self.method == "modal":
-            return self.tolerance / FINE
-        return self.tolerance * (self.gain if self.method in FOLLOWERS else 1.0)
+        shares = {"modal": 1 / FINE, **dict.fromkeys(FOLLOWERS, self.gain)}
+        return self.tolerance * shares.get(self.method, 1.0)
 
     @property
     def scheme(self) -> str:

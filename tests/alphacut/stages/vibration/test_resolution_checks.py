@@ -48,7 +48,7 @@ def test_a_coarse_tolerance_warns_and_is_refused_under_strict(capfd):
     assert main(["envelope", PAPER, *SHORT, "--tolerance", "1 cm"]) == 0
     (line,) = capfd.readouterr().err.splitlines()
     assert "warning: envelope.tolerance: 0.01 m is 3." in line
-    assert "or a relative tolerance such as 0.001" in line
+    assert "or envelope.relative_tolerance = 0.001" in line
     assert main(["envelope", PAPER, *SHORT, "--tolerance", "1 cm", "--strict"]) == 2
     captured = capfd.readouterr()
     assert captured.out == ""
