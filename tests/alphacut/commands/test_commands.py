@@ -340,13 +340,13 @@ def test_a_failed_campaign_ends_with_status_3(tmp_path, monkeypatch, capfd):
     assert not list(tmp_path.iterdir())
 
 
-def test_an_interrupt_says_how_to_go_on(monkeypatch, capfd):
+def test_an_interrupt_of_a_command_that_keeps_nothing_says_so(monkeypatch, capfd):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(COMMANDS["check"], "load", interrupted)
     assert main(["check", PAPER]) == 130
-    assert "the same command goes on from there" in capfd.readouterr().err
+    assert "interrupted; nothing is kept" in capfd.readouterr().err
 
 
 def test_a_command_line_means_the_command_that_it_begins_with():
