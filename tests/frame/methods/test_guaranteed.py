@@ -55,7 +55,7 @@ def test_more_than_six_inputs_are_not_proved() -> None:
     }
     found = envelope(FRAME, many, tolerance=1e-4, **SPAN)
     assert found.nature == "searched"
-    assert "up to 6 parameters" in str(found.facts["unproved"])
+    assert "up to 6 fuzzy inputs" in str(found.facts["unproved"])
 
 
 @pytest.mark.parametrize("method", ["graph-follower", "improved-graph-follower"])
