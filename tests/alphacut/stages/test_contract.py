@@ -95,16 +95,16 @@ def test_a_fixed_method_is_held_to_the_tolerance_of_the_file(method, capfd, tmp_
     old = 'method = "graph-follower"                   # section 5.3\norder = 2 '
     assert old in text
     text = text.replace(old, f'method = "{method}"\norder = 2 ')
-    text = text.replace('tolerance = "1 mm" ', 'tolerance = "1e-16 m" ')
+    text = text.replace('tolerance = "1 mm" ', 'tolerance = "1e-10 m" ')
     if method == "modal":  # which has neither
         text = re.sub(r"(?m)^(order|gain) = .*\n", "", text)
     case.write_text(text, encoding="utf-8")
-    words = [*SHORT, "--set", "envelope.step=0.05 s"]
+    words = [*SHORT, "--set", "envelope.step=0.05 s", "--set", "envelope.integrator=midpoint"]
     words[1] = str(case)
     assert main(words) == 1
     last = lines(capfd)[-1]
     assert f"by method {method}, in m, is up to" in last
-    assert "1e-16 is asked for; --method auto reaches it" in last
+    assert "1e-10 is asked for; --method auto " in last
     assert main([*words, "--best-effort"]) == 0
 
 
