@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from alphacut.frame import StoreyFrame
-from alphacut.frame.decisions.safe_scale import safe_scale, scaled
+from alphacut.frame.decisions.limit_search import LimitSearch
+from alphacut.frame.decisions.safe_scale import _easily, limit_search, safe_scale, scaled
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 
@@ -88,3 +89,30 @@ def test_random_frames_have_a_tight_safe_scale(seed):
     for part in np.array_split(middle + half * points, 50):
         assert np.abs(flow.values(part)).max() <= limit
     assert found.gap <= 0.01
+
+
+def swaying() -> LimitSearch:
+    frame, rigidity = one_floor({"v0": [0.5]}), 24 * 2.5e10 * 1e-6 / 27
+    centre = np.array([1e3])
+    reach = scaled(centre, 0.1 * centre, 0.1 * centre)
+    limit = 0.5 * np.sqrt(1.15e3 / rigidity)  # passed from scale 1.5 on
+    return limit_search(frame, {"m1": 1e3}, reach, {"q1": limit}, 5, 0.01)
+
+
+def test_a_rough_model_proves_no_box_that_holds_what_passes_a_limit(monkeypatch):
+    search = swaying()
+    left = 1 - search.share(search.nominal)
+    assert _easily(search, left, 1.2, 100, 1)[0]
+    monkeypatch.setattr(LimitSearch, "witness", lambda *_: None)
+    assert not _easily(search, left, 1.6, 100, 1)[0]
+
+
+def test_a_rough_model_whose_error_is_sampled_proves_nothing(monkeypatch):
+    search, fit = swaying(), LimitSearch.fit
+
+    def sampled(self, size):
+        fit(self, size)
+        self.reason = "sampled"
+
+    monkeypatch.setattr(LimitSearch, "fit", sampled)
+    assert not _easily(search, 1 - search.share(search.nominal), 0.5, 100, 1)[0]

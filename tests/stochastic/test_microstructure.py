@@ -5,6 +5,7 @@ whole study.
 import json
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -311,6 +312,14 @@ def test_fragment_is_toml_that_gives_the_map(found):
     assert (radius["a1"], radius["a3"]) == (0.15, 0.85)
     assert radius["a2"] == pytest.approx(found.pbox.a2, rel=1e-7)
     assert radius["theta"] == [-3, 3]
+
+
+def test_slopes_that_differ_by_round_off_alone_are_crisp(found):
+    a2, width = found.pbox.a2, found.pbox.fit.a3 - found.pbox.fit.a1
+    for near, crisp in ((1e-9, True), (1e-4, False)):
+        box = replace(found.pbox, a2=(a2[1] - near * width, a2[1], a2[1] + near * width))
+        slopes = tomllib.loads(fragment(replace(found, pbox=box)))["radius"]["a2"]
+        assert (len(set(slopes)) == 1) is crisp
 
 
 def test_narrower_band_gives_a_wider_pbox(found):
