@@ -56,6 +56,7 @@ PROVED = (
     "the error of its polynomials is bounded over the whole box by the energy of what they miss in"
     " the equations of motion"
 )
+SAMPLED = "the error of its polynomials is verified by sampling, since it could not be proved"
 
 
 class GapError(UnprovedError):
@@ -135,6 +136,7 @@ class Modal:
         else:
             error = polynomial_error(model) + left.max(-1)
             facts = _judged(model, points, self.tolerance, flow.scale)
+        error = np.maximum(error, rounding(model, np.abs(bounds).max((0, 1, 3))))
         facts["search_error"] = float((left.max(-1) / flow.scale).max())
         return signed_envelope(
             flow,
@@ -172,6 +174,17 @@ class Modal:
             return None
 
 
+def rounding(model: ModalModel, peak: Array) -> Array:
+    """Least error of trajectories in doubles, given their peaks (m,), shape (T, m).
+
+    Squared eigenvalues carry the rounding of the largest, by which a slow mode runs early or late.
+    """
+    rates, t = np.abs(model.eigenvalue.coefficients[0]), model.time
+    late = rates.max() ** 2 * np.minimum(t**2, t / max(rates.min(), 1e-300)) / 2
+    share: Array = np.finfo(float).eps * (64 + late)
+    return share[:, None] * peak
+
+
 def _nature(flow: UnitFlow, exact: ExactResponse | None) -> str:
     """Worth of the error: that of a search without a guide, or in many dimensions, is less."""
     led = len(flow.boxes.names) <= MANY and (exact is None or exact.bent)
@@ -187,20 +200,13 @@ def _judged(
         "model_error": float(model.error.max()),
         "judged_by": f"trajectories at {points} optima, corners and random points",
     }
-    short = _short_of(model, tolerance, scale)
-    return facts if short is None else facts | {"reason": short}
-
-
-def _short_of(model: ModalModel, tolerance: float, scale: Array) -> str | None:
-    """Remark on a model that misses its error; None where it keeps it."""
     reached = float((model.error / scale).max())
-    if reached <= tolerance:
-        return None
-    cure = "take the method auto, narrower supports or a larger budget"
-    return (
-        f"modal: the polynomials reach {reached:.2g} and not the tolerance {tolerance:.2g}, see the"
-        f" error; {cure}"
-    )
+    if reached > tolerance:
+        facts["reason"] = (
+            f"modal: the polynomials reach {reached:.2g} and not the tolerance {tolerance:.2g}, see"
+            " the error; take the method auto, narrower supports or a larger budget"
+        )
+    return facts
 
 
 def guaranteed(flow: UnitFlow, gap: float, progress: Progress | None = None) -> Envelope:
@@ -253,8 +259,6 @@ def _certified(
         "model_error": float((error / flow.scale).max()),
         "degree": model.degree,
         "gap": proof.gap,
-    }
-    facts |= {
         "gap_output": flow.outputs[flow.reference],
         "between_nodes": float((proof.between / flow.scale).max()),
         "boxes": proof.boxes,
@@ -262,11 +266,8 @@ def _certified(
         "proof": f"the branch and bound is rigorous for the modal model; {PROVED}",
     }
     if unproved:
-        sampled = (
-            "the error of its polynomials is verified by sampling, since it could not be proved"
-        )
         facts["proof"] = (
-            f"the branch and bound is rigorous for the modal model; {sampled}: {unproved}"
+            f"the branch and bound is rigorous for the modal model; {SAMPLED}: {unproved}"
         )
     envelope = signed_envelope(
         flow,

@@ -18,6 +18,7 @@ from alphacut.frame import (
     LinearFlow,
     Midpoint,
     RungeKutta4,
+    StoreyFrame,
     envelope,
 )
 from alphacut.frame.boxes import Boxes, UnitFlow, boxes
@@ -270,3 +271,22 @@ def test_what_is_proved_on_a_wide_box_is_taken_up_on_those_inside(
         FRAME, INPUTS, duration=3, step=0.1, alpha=(0, 0.001, 0.002), method="modal", certify=2e-3
     )
     assert found.nesting_violation() == 0
+
+
+def test_at_tolerances_that_no_double_keeps_rounding_is_declared():
+    frame = StoreyFrame(
+        masses=(1e3, 1e3), modulus=2.5e10, lengths=(3, 3), second_moment=1e-6, v0=(0, 0.5)
+    )
+    modulus = {"E": Triangular(2.4975e10, 2.5e10, 2.5025e10)}
+    options = dict(alpha=(0,), method="modal", tolerance=1e-15)
+    found = envelope(frame, modulus, duration=60, step=0.05, **options)
+    wide = np.longdouble
+    root = (3 + np.array([-1, 1]) * np.sqrt(wide(5))) / 2  # of det(K − λ k M / m), in longer words
+    shapes = np.stack([np.ones(2, wide), 2 - root])
+    for bound, at in ((found.lower, found.lower_at), (found.upper, found.upper_at)):
+        stiffness = 24 * at[0].astype(wide) * wide(1e-6) / 27
+        rates = np.sqrt(stiffness / 1000 * root)
+        waves = np.sin(rates * found.time[:, None, None]) / rates
+        exact = (wide(0.5) * shapes * shapes[1] / (shapes**2).sum(0) * waves).sum(-1)
+        assert (np.abs(bound[0] - exact) <= found.error[0]).all()
+    assert found.error.max() < 1e-12 * np.abs(found.upper).max()
