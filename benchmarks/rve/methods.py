@@ -124,7 +124,7 @@ def _table_modulus(table: object) -> float:
 
     assert isinstance(table, Table)
     moduli = np.array([PARTICLE.modulus])
-    curves, _ = settle_rule(
+    curves, *_ = settle_rule(
         PAPER_MAP, lambda radii: table.stiffness(radii, moduli), points=None, accuracy=1e-10
     )
     return effective_modulus(*curves[0].mean)[0]

@@ -71,7 +71,7 @@ def _count_nodes(table: Table, radius_map: RadiusMap, moduli: Array, accuracy: f
     def stiffness_at(radii: Array) -> Array:
         return table.stiffness(radii, moduli)
 
-    curves, _ = settle_rule(radius_map, stiffness_at, points=None, accuracy=max(accuracy, 1e-13))
+    curves, *_ = settle_rule(radius_map, stiffness_at, points=None, accuracy=max(accuracy, 1e-13))
     return max(2, min(curves[0].theta.size, 64))
 
 

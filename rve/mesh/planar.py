@@ -18,7 +18,7 @@ from alphacut.stochastic.theta.truncated_normal import Array
 EDGES = ((1, 2), (0, 2), (0, 1))  # of a triangle, in the order of Basix
 _TOUCH = 1e-6
 _CLOSEST = 0.9995
-_COARSEST = 0.9  # mesh size: three edges a side, for two tell nothing of their error
+_COARSEST = 0.7  # mesh size: on coarser ones small particles hide from every order
 
 
 class TouchingError(RuntimeError):

@@ -62,25 +62,24 @@ class SeriesModel:
                 used[float(radius)] = error, harmonics
             return cells.matrix
 
-        curves, gaps = settle_rule(
+        curves, gaps, finest = settle_rule(
             radius_map, stiffness_at, points=self.points, accuracy=self.accuracy
         )
         seconds = {"solve": perf_counter() - start, "total": perf_counter() - start}
         results = []
-        for k, (curve, gap) in enumerate(zip(curves, gaps, strict=True)):
-            spent = [used[float(r)] for r in radius_map(curve.theta)]
-            error, harmonics = np.array([e[k] for e, _ in spent]), max(int(n[k]) for _, n in spent)
+        for k, (curve, gap, judge) in enumerate(zip(curves, gaps, finest, strict=True)):
+            own, other = ([used[float(r)] for r in radius_map(c.theta)] for c in (curve, judge))
+            error, harmonics = np.array([e[k] for e, _ in own]), max(int(n[k]) for _, n in own)
+            left = mean_errors(judge, np.array([e[k] for e, _ in other]))
             results.append(
                 Homogenised(
                     curve=with_errors(curve, error),
                     method=self.name,
                     unknowns=harmonics,
                     seconds=seconds,
-                    errors={"space": mean_errors(curve, error), "theta": gap},
+                    errors={"space": np.maximum(mean_errors(curve, error), left), "theta": gap},
                     reason=f"{curve.theta.size} nodes in θ, {harmonics} harmonics",
                 )
             )
-        return [
-            certified(r, radius_map, matrix, phase)
-            for r, phase in zip(results, inclusions, strict=True)
-        ]
+        pairs = zip(results, inclusions, strict=True)
+        return [certified(result, radius_map, matrix, phase) for result, phase in pairs]

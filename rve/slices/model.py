@@ -27,7 +27,7 @@ _LOCKING = 0.45  # Poisson's ratio above which order 2 locks
 _ORDERS = 2, 3, 4
 _ROUND_OFF = 1e-13
 _SAFETY = 3.3
-_COARSE, _COARSE_SAFETY = 0.6, 6.6  # mesh size above which orders do not yet leave what they should
+_COARSE, _COARSE_SAFETY = 0.6, 5.5  # mesh size above which orders do not yet leave what they should
 _POINTWISE = 1.5  # safety of a single θ, where errors do not average
 _SHARED = np.array([0.03, 0.5, 0.5, 0.5])  # C11 + C12 is the easiest by far
 

@@ -126,7 +126,7 @@ def settle_rule(
     points: int | None,
     accuracy: float,
     moduli: Callable[[Array], Array] = _square_moduli_and_ratio,
-) -> tuple[list[StressCurve], list[Array]]:
+) -> tuple[list[StressCurve], list[Array], list[StressCurve]]:
     """Curves whose nodes are added until the mean moduli settle, and their declared errors.
 
     Two finer rules tell how large the error of a rule is: its distance from them, with a margin.
@@ -140,7 +140,8 @@ def settle_rule(
         moduli: The three moduli of a stiffness, and what else of it is to be judged.
 
     Returns:
-        For each inclusion its curve and the errors of `moduli` of the mean stiffness.
+        For each inclusion its curve, the errors of `moduli` of the mean stiffness, and the finest
+        curve, by which they are judged: what it is off by is in no error yet.
 
     Raises:
         RuleError: No rule in reach settles.
@@ -149,7 +150,7 @@ def settle_rule(
     require_map(radius_map)
     count = points or max(6, int(np.ceil(1 - 0.75 * np.log10(accuracy))))
     known: dict[int, list[StressCurve]] = {}
-    settled: dict[int, tuple[StressCurve, Array]] = {}
+    settled: dict[int, tuple[StressCurve, Array, StressCurve]] = {}
     while True:
         counts = [count, _finer(count), _finer(_finer(count))]
         _add_curves(known, [n for n in counts if n not in known], radius_map, stiffness_at)
@@ -159,11 +160,11 @@ def settle_rule(
         ]
         for k, (curve, gap) in enumerate(zip(known[count], gaps, strict=True)):
             if k not in settled and (points or gap[:3].max() <= accuracy):
-                settled[k] = curve, gap  # each inclusion by itself, whatever its companions need
+                # each inclusion by itself, whatever its companions need
+                settled[k] = curve, gap, known[counts[-1]][k]
         if len(settled) == len(gaps):
-            return [settled[k][0] for k in range(len(gaps))], [
-                settled[k][1] for k in range(len(gaps))
-            ]
+            curves, errors, finest = zip(*(settled[k] for k in range(len(gaps))), strict=True)
+            return list(curves), list(errors), list(finest)
         if counts[-1] >= _MOST_POINTS:
             raise RuleError(
                 f"the rule of {count} nodes in θ leaves a relative error of {np.max(gaps):.1e} and"

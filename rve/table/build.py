@@ -21,6 +21,7 @@ _ORDER = 4
 _ROUGH, _FINEST = 0.5, 0.04  # mesh sizes
 _RATE = 7.5  # of the moduli in the mesh size
 _LEAST, _MOST_NODES = 7, 65  # radii
+_JUDGED = 0.03, 0.1, 0.3, 0.6, 0.72, 0.85  # radii, at which a mesh is judged
 _SPACE_SHARE = 0.6  # of the accuracy; the rest is for interpolation
 
 
@@ -79,7 +80,7 @@ class PlanarSource:
     systems: int = 0
 
     def __post_init__(self) -> None:
-        radii = np.unique(np.clip([0.3, 0.6, 0.72, 0.85, *self.span.radii], *self.span.radii))
+        radii = np.unique(np.clip([*_JUDGED, *self.span.radii], *self.span.radii))
         size, found = _ROUGH, self._all_errors(radii, _ROUGH)
         while found[:, :3].max() > self.accuracy:  # a finer mesh gains more at one than at another
             worst = int(found[:, :3].max(axis=1).argmax())

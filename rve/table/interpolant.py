@@ -225,7 +225,6 @@ class Table:
         rows = chebyshev.chebvander(at_r, self.coefficients.shape[0] - 1)
         columns = np.ascontiguousarray(chebyshev.chebvander(at_e, self.coefficients.shape[1] - 1))
         # one by one: same bits in any company
-        # one by one: same bits in any company
         scales = [
             np.exp(rows @ np.tensordot(column, self.coefficients, axes=(0, 1)))
             for column in columns

@@ -98,7 +98,7 @@ class TableModel:
         def stiffness_at(radii: Array) -> Array:
             return table.stiffness(radii, moduli)
 
-        curves, gaps = settle_rule(
+        curves, gaps, _ = settle_rule(
             radius_map, stiffness_at, points=None, accuracy=max(_THETA_SHARE * self.accuracy, 1e-13)
         )
         seconds = {

@@ -58,7 +58,7 @@ class SphereSeriesModel:
             used.update(zip(radii, zip(cells.errors, cells.degrees, strict=True), strict=True))
             return cells.matrix
 
-        curves, gaps = settle_rule(
+        curves, gaps, finest = settle_rule(
             radius_map,
             stiffness_at,
             points=self.points,
@@ -67,22 +67,22 @@ class SphereSeriesModel:
         )
         seconds = perf_counter() - start
         results = []
-        for k, (curve, gap) in enumerate(zip(curves, gaps, strict=True)):
-            spent = [used[r] for r in radius_map(curve.theta)]
-            error, degree = np.array([e[k] for e, _ in spent]), max(int(n[k]) for _, n in spent)
-            moduli = cubic_moduli(np.asarray(curve.stiffness))
-            mean = curve.weights @ (moduli * error) / (curve.weights @ moduli)
+        for k, (curve, gap, judge) in enumerate(zip(curves, gaps, finest, strict=True)):
+            left = []
+            for one in (judge, curve):
+                spent = [used[r] for r in radius_map(one.theta)]
+                moduli = one.weights[:, None] * cubic_moduli(np.asarray(one.stiffness))
+                left.append((moduli * [e[k] for e, _ in spent]).sum(0) / moduli.sum(0))
+            degree = max(int(n[k]) for _, n in spent)
             results.append(
                 HomogenisedSpheres(
                     curve=curve,
                     method=self.name,
                     unknowns=3 * (degree + 2) ** 2 // 16,
                     seconds={"solve": seconds, "total": seconds},
-                    errors={"space": mean, "theta": gap},
+                    errors={"space": np.maximum(*left), "theta": gap},
                     reason=f"{curve.theta.size} nodes in θ, multipoles up to degree {degree}",
                 )
             )
-        return [
-            certified_spheres(result, radius_map, matrix, phase)
-            for result, phase in zip(results, inclusions, strict=True)
-        ]
+        pairs = zip(results, inclusions, strict=True)
+        return [certified_spheres(result, radius_map, matrix, phase) for result, phase in pairs]

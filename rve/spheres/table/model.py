@@ -198,7 +198,7 @@ class SphereTableModel:
         def stiffness_at(radii: Array) -> Array:
             return cubic_voigt(*np.moveaxis(table.moduli(radii, moduli), -1, 0))
 
-        curves, gaps = settle_rule(
+        curves, gaps, _ = settle_rule(
             radius_map,
             stiffness_at,
             points=None,

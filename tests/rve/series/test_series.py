@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from alphacut.rve import Phase
+from alphacut.rve.cell import square_moduli, with_ratio
 from alphacut.rve.series.lattice_sums import lattice_sums
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
@@ -223,3 +224,18 @@ def test_far_points_left_out_of_lattice_sums_change_no_bit():
     sums = lattice_sums(900)
     assert all(sums.plain[n] == every_point(n, False) for n in range(40, 900, 4))
     assert all(sums.conjugate[n] == every_point(n, True) for n in range(43, 900, 4))
+
+
+def test_errors_of_the_rules_that_judge_are_declared_too():
+    """The truncated series is off by as much in the finer rules, which hides the rule's own."""
+    matrix, inclusion = Phase(20e9, 0.1999066306116199), Phase(10699475127752.52, 0.495977377247303)
+    radius_map = HermiteMap(
+        0.7875875295007674, 0.7644365906291268, 0.44422990978156, 0.4115147381559643
+    )
+    model = SeriesModel(accuracy=3.067095793873665e-07)
+    found, exact = (
+        one.solve(radius_map, matrix, [inclusion])[0]
+        for one in (model, SeriesModel(accuracy=1e-12))
+    )
+    own, right = (with_ratio(square_moduli(one.stiffness)) for one in (found, exact))
+    assert (abs(own / right - 1) <= sum(found.errors.values())).all()

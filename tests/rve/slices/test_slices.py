@@ -171,6 +171,24 @@ def test_error_of_a_slice_is_declared_at_the_edges(radius, contrast):
     assert true < solved.error[0, [0, 2]].max() < 10 * true
 
 
+@pytest.mark.parametrize(
+    ("radius", "matrix", "inclusion"),
+    [
+        (0.00109, Phase(20e9, 0.4997), Phase(5.5e9, 0.2336)),
+        (0.00418, Phase(20e9, 0.4998), Phase(0.25e9, 0.2836)),
+        (0.005763695545, Phase(20e9, 0.12270752), Phase(331588660.6, 0.42187752)),
+    ],
+)
+def test_coarse_meshes_hide_no_small_particle_from_every_order(radius, matrix, inclusion):
+    exact = square_stiffness(np.array([radius]), matrix, [inclusion]).matrix[0]
+    for order in (2, 3, 4):
+        orders = (2, 3, 4)
+        solved = solve_slice(radius, matrix, [inclusion], orders=orders, order=order, mesh_size=1.0)
+        own, right = (with_ratio(square_moduli(one)) for one in (solved.stiffness, exact))
+        true = abs(right / own - 1).ravel()[[0, 2]]
+        assert (true <= solved.error[0, [0, 2]]).all()
+
+
 @pytest.mark.parametrize(("order", "most"), [(2, 1.1), (3, 1.8)])
 def test_an_order_below_4_is_judged_by_order_4(order, most):
     orders = (2, 3, 4)
