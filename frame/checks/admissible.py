@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from functools import singledispatch
 
 import numpy as np
@@ -56,7 +57,10 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
         ValueError: A support is not finite or reaches what its parameter must not be, or is of
             another size than the structure's own value, as one in other units, or the mass
             matrix of a linear structure is not positive definite at the modal parameters or a
-            corner, or the weight may buckle a storey.
+            corner, or nothing moves it, or the weight may buckle a storey.
+
+    Warns:
+        UserWarning: A stiffness or damping has a negative eigenvalue there.
     """
     for name, low, high in zip(cuts.names, cuts.lower.min(0), cuts.upper.max(0), strict=True):
         rule = wanted(system, name)
@@ -75,7 +79,7 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
         ends = zip(cuts.lower.min(0).tolist(), cuts.upper.max(0).tolist(), strict=True)
         system.require_standing(dict(zip(cuts.names, ends, strict=True)))
     if not isinstance(system, LagrangianSystem):
-        _require_mass(system, cuts)
+        _require_motion(system, cuts)
 
 
 def _require_size(name: str, own: float, support: Array) -> None:
@@ -89,19 +93,35 @@ def _require_size(name: str, own: float, support: Array) -> None:
         )
 
 
-def _require_mass(system: LinearSystem, cuts: Boxes) -> None:
-    """Refuse a mass matrix that is not positive."""
+def _require_motion(system: LinearSystem, cuts: Boxes) -> None:
+    """Refuse a mass matrix that is not positive, and a structure that stays at rest."""
+    moved = system.ground is not None and np.any(system.ground.acceleration)
+    growing: dict[str, str] = {}
     for point in probes(cuts):
+        at = ", ".join(f"{name} = {x:g}" for name, x in zip(cuts.names, point, strict=True))
         try:
-            mass = evaluate(system, cuts.names, point[None], derivatives=False)[0].mass.value
-            positive = bool(np.linalg.eigvalsh(mass).min() > 0)
+            found = evaluate(system, cuts.names, point[None], derivatives=False)[0]
+            positive = bool(np.linalg.eigvalsh(found.mass.value).min() > 0)
         except np.linalg.LinAlgError:  # from damping by ratios, which divides by the mass
             positive = False
         if not positive:
-            at = ", ".join(
-                f"{name} = {value:g}" for name, value in zip(cuts.names, point, strict=True)
-            )
             raise ValueError(
                 f"mass: the matrix is not positive definite at {at}; narrow the supports to where"
                 " every unknown has a mass"
             )
+        moved = moved or found.q0.value.any() or found.v0.value.any()
+        for kind, jet in (("stiffness", found.stiffness), ("damping", found.damping)):
+            rates = np.linalg.eigvalsh((jet.value[0] + jet.value[0].T) / 2)
+            if rates[0] < -1e-9 * np.abs(rates).max():
+                growing[kind] = f"{rates[0]:.3g} beside {rates[-1]:.3g} at {at}"
+    if not moved:
+        raise ValueError(
+            "nothing moves the structure: q0 and v0 are zero, and there is no ground motion; give"
+            " q0 or v0 that is not zero, or ground=Accelerogram(step, acceleration)"
+        )
+    for kind, seen in growing.items():
+        warnings.warn(
+            f"{kind}: the matrix has the negative eigenvalue {seen}, so that motions may grow"
+            " without end; check its entries and their signs",
+            stacklevel=4,
+        )

@@ -28,9 +28,9 @@ def excited(system: MatrixStructure) -> MatrixStructure:
         system: The structure; its outputs, parameters and motion stay what they are.
     """
     kinds = ("mass", "stiffness", "damping")
-    total: Array = np.sum([np.asarray(array, float) for _, array in system.mass], axis=0)
+    total: Array = np.sum([array for _, array in system.mass], axis=0)
     below = np.linalg.inv(np.linalg.cholesky(total))
-    arrays = [np.asarray(a, float) for kind in kinds for _, a in getattr(system, kind)]
+    arrays = [a for kind in kinds for _, a in getattr(system, kind)]
     scaled = [below @ array @ below.T for array in arrays]
     scaled = [one / max(float(np.linalg.norm(one, 2)), 1e-300) for one in scaled]
     weight = np.random.default_rng(0).uniform(1, 2, len(scaled))
@@ -41,7 +41,7 @@ def excited(system: MatrixStructure) -> MatrixStructure:
     onto = kept.T @ np.linalg.inv(below).T
 
     def part(terms: Terms) -> Terms:
-        return [(f, _symmetric(basis.T @ np.asarray(a, float) @ basis)) for f, a in terms]
+        return [(f, _symmetric(basis.T @ a @ basis)) for f, a in terms]
 
     pattern = np.ones(system.size) if system.pattern is None else np.asarray(system.pattern)
     whole = {

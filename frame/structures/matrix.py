@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,7 +14,7 @@ from alphacut.frame.structures.damping import modal_damping
 from alphacut.frame.structures.linear import Accelerogram, Matrices
 
 
-def require_factors(kind: str, terms: Iterable[object], parameters: Mapping[str, float]) -> None:
+def require_factors(kind: str, terms: object, parameters: Mapping[str, float]) -> None:
     """Refuse terms that are no pairs, and factors without derivatives.
 
     Args:
@@ -25,6 +25,11 @@ def require_factors(kind: str, terms: Iterable[object], parameters: Mapping[str,
     Raises:
         ValueError: There is one.
     """
+    if isinstance(terms, str) or not isinstance(terms, Sequence):
+        raise ValueError(
+            f"{kind}: {type(terms).__name__} is no list of terms; give pairs (factor, array), as"
+            " [(1.0, array)]"
+        )
     for term in terms:
         if not isinstance(term, Sequence) or isinstance(term, str) or len(term) != 2:
             raise ValueError(
@@ -41,9 +46,10 @@ def require_factors(kind: str, terms: Iterable[object], parameters: Mapping[str,
         elif not isinstance(factor, str) and (
             np.ndim(factor) or np.asarray(factor).dtype.kind not in "iuf" or not np.isfinite(factor)
         ):
+            shown = type(factor).__name__ if np.ndim(factor) else repr(factor)
             raise ValueError(
-                f"{kind}: factor {factor!r} is not allowed; give a number, the name of a parameter"
-                " or a function of all"
+                f"{kind}: factor {shown} is not allowed; give a number, the name of a parameter or"
+                " a function of all, then the array"
             )
 
 
@@ -67,6 +73,27 @@ def _require_smooth(kind: str, factor: Any, parameters: Mapping[str, float]) -> 
         )
 
 
+def _symmetric(kind: str, given: Any, n: int) -> Array:
+    """The array, also a sparse one, without the round-off that parts its triangles."""
+    array = np.asarray(given.toarray() if hasattr(given, "toarray") else given)
+    if array.shape != (n, n):
+        raise ValueError(f"{kind}: an array has shape {array.shape}; all must be ({n}, {n})")
+    require_numbers(kind, array, "SI units")
+    array = array.astype(float)
+    off = np.abs(array - array.T)
+    i, j = np.unravel_index(off.argmax(), off.shape)
+    if off[i, j] <= 1e-9 * np.abs(array).max():
+        even: Array = (array + array.T) / 2
+        return even
+    cure = "mirror the one that is right, or take (A + A.T) / 2 where round-off parts them"
+    if not (np.triu(array, 1).any() and np.tril(array, -1).any()):
+        cure = "only one triangle is there: take A + A.T - np.diag(np.diag(A))"
+    raise ValueError(
+        f"{kind}: an array is not symmetric, by {off[i, j]:.2g}: entry [{i}, {j}] is"
+        f" {array[i, j]:g} and [{j}, {i}] is {array[j, i]:g}; {cure}"
+    )
+
+
 Factor = Callable[[Mapping[str, Any]], Any]
 Terms = Sequence[tuple[Factor | str | float, Array]]
 
@@ -81,11 +108,12 @@ class MatrixStructure:
 
     Args:
         parameters: All parameters with their modal values, in SI units.
-        mass: Pairs (factor, symmetric array (n, n)), in kg.
-        stiffness: Pairs, in N/m.
+        mass: Pairs (factor, symmetric array (n, n)), in kg; an array may be sparse, as those that
+            `scipy.io.mmread` reads.
+        stiffness: The same, in N/m.
         observed: Rows by output name, each (n,) acting on displacements or (2n,) acting on
             displacements and velocities.
-        damping: Pairs, in N s/m.
+        damping: The same, in N s/m.
         q0: Initial displacements, shape (n,), in m; zero when None.
         v0: Initial velocities, shape (n,), in m/s; zero when None.
         ground: Base excitation, or None.
@@ -95,9 +123,9 @@ class MatrixStructure:
             (`frame.damping`).
 
     Raises:
-        ValueError: A shape does not fit, a number is not finite, a factor names no parameter, the
-            modal mass matrix is not symmetric and positive definite, or a modal ratio is outside
-            [0, 1).
+        ValueError: A shape does not fit, a number is not finite, a factor names no parameter, an
+            array is not symmetric, the modal mass matrix is not positive definite, or a modal ratio
+            is outside [0, 1).
     """
 
     parameters: Mapping[str, float]
@@ -113,21 +141,21 @@ class MatrixStructure:
     size: int = field(init=False)
 
     def __post_init__(self) -> None:
-        if not self.mass or not self.stiffness or not self.observed:
-            raise ValueError("mass, stiffness and observed: each needs at least one entry")
         for name, value in self.parameters.items():
             require_number(f"parameter {name}", value, "SI units")
         for kind in ("mass", "damping", "stiffness"):
             require_factors(kind, getattr(self, kind), self.parameters)
-        n = len(self.mass[0][1])
+        rows = self.observed if isinstance(self.observed, Mapping) else ()
+        if not (self.mass and self.stiffness and rows):
+            raise ValueError(
+                "mass, stiffness and observed: each needs at least one entry, observed by name, as"
+                " {'q1': row}"
+            )
+        n = max((1, *np.shape(self.mass[0][1])))
         object.__setattr__(self, "size", n)
         for kind in ("mass", "damping", "stiffness"):
-            for _, array in getattr(self, kind):
-                if np.shape(array) != (n, n):
-                    raise ValueError(
-                        f"{kind}: an array has shape {np.shape(array)}; all must be ({n}, {n})"
-                    )
-                require_numbers(kind, np.asarray(array), "SI units")
+            even = tuple((factor, _symmetric(kind, a, n)) for factor, a in getattr(self, kind))
+            object.__setattr__(self, kind, even)
         self._check_vectors()
         self._check_ratios()
         self._check_mass()
@@ -150,13 +178,7 @@ class MatrixStructure:
             require_numbers(f"observed: '{name}'", row, "SI units")
 
     def _check_mass(self) -> None:
-        for _, array in self.mass:
-            uneven = np.abs(np.asarray(array, float) - np.transpose(array)).max()
-            if uneven > 1e-9 * np.abs(array).max():
-                raise ValueError(
-                    f"mass: an array is not symmetric, by {uneven:.2g}; a mass matrix is"
-                )
-        modal = sum(float(_value(f, self.parameters)) * np.asarray(A, float) for f, A in self.mass)
+        modal = sum(float(_value(f, self.parameters)) * A for f, A in self.mass)
         if not np.linalg.eigvalsh(modal).min() > 0:
             raise ValueError(
                 "mass: the matrix at the modal parameters is not positive definite; every unknown"
@@ -204,7 +226,7 @@ class MatrixStructure:
         def total(terms: Terms) -> Jet:
             out = Jet.constant(np.zeros((samples, n, n)), d)
             for factor, array in terms:
-                out = out + lifted(factor)[:, None, None] * np.asarray(array, float)
+                out = out + lifted(factor)[:, None, None] * array
             return out
 
         start = [np.zeros(n) if x is None else np.asarray(x, float) for x in (self.q0, self.v0)]

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
 from alphacut.frame import MatrixStructure, StoreyFrame, envelope, pendulum, record
 from alphacut.frame.methods.named import METHODS, options_of
@@ -140,6 +141,14 @@ def test_frames_without_a_meaning(changes: dict[str, Any], message: str) -> None
         ),
         ({"mass": ("m", EYE)}, r"mass: str is no term; give a list of pairs \(factor, array\)"),
         ({"mass": [EYE]}, "mass: ndarray is no term"),
+        (
+            {"stiffness": EYE},
+            r"stiffness: ndarray is no list of terms; give pairs .* \[\(1.0, array\)\]",
+        ),
+        ({"mass": csr_array(EYE)}, "mass: csr_array is no list of terms"),
+        ({"mass": [(csr_array(EYE), 1.0)]}, "mass: factor csr_array is not allowed"),
+        ({"mass": [("m", 1.0)]}, r"mass: an array has shape \(\); all must be \(1, 1\)"),
+        ({"observed": EYE}, "observed by name, as {'q1': row}"),
         ({"stiffness": [("x", EYE)]}, "stiffness: factor 'x' is no parameter; known are m, k, z"),
         ({"stiffness": [(np.nan, EYE)]}, "stiffness: factor nan is not allowed"),
         (

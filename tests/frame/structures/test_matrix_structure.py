@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import warnings
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
+from scipy.sparse import coo_array
 
 from alphacut.frame import Exact, LinearFlow, MatrixStructure, StoreyFrame, envelope
-from alphacut.fuzzy import Triangular
+from alphacut.fuzzy import Crisp, Triangular
 
 STOREY = StoreyFrame(
     (3.0, 2.0),
@@ -65,3 +70,53 @@ def test_matrices_that_do_not_fit_are_refused() -> None:
         MatrixStructure({}, [(1.0, eye)], [(1.0, eye)], {"q": np.ones(3)})
     with pytest.raises(ValueError, match="q0: shape"):
         MatrixStructure({}, [(1.0, eye)], [(1.0, eye)], row, q0=np.ones(3))
+
+
+def test_sparse_arrays_are_those_that_they_stand_for() -> None:
+    def sparse(terms: Any) -> Any:
+        return [(factor, coo_array(array)) for factor, array in terms]
+
+    kinds = {kind: sparse(getattr(MATRIX, kind)) for kind in ("mass", "damping", "stiffness")}
+    whole = replace(MATRIX, **kinds)
+    a, b = (
+        LinearFlow(system, ("E", "m1"), 1, 0.1, Exact()).values(np.array([[5.2, 2.9]]))
+        for system in (MATRIX, whole)
+    )
+    assert (a == b).all()
+
+
+@pytest.mark.parametrize("kind", ["mass", "damping", "stiffness"])
+def test_arrays_that_are_not_symmetric_are_refused(kind: str) -> None:
+    lower = np.array([[2.0, 0.0], [-1.0, 2.0]])
+    cure = r"\[0, 1\] is 0 and \[1, 0\] is -1; only one triangle is there: take A \+ A.T - np"
+    with pytest.raises(ValueError, match=f"{kind}: an array is not symmetric, by 1: entry {cure}"):
+        replace(MATRIX, **{kind: [(1.0, lower)]})
+    with pytest.raises(ValueError, match=r"by 0.5: .*; mirror the one that is right"):
+        replace(MATRIX, **{kind: [(1.0, lower - np.diag([0.5], 1))]})
+    even = lower - np.diag([1.0 + 1e-12], 1)
+    taken = getattr(replace(MATRIX, **{kind: [(1.0, even)]}), kind)[0][1]
+    assert (taken == taken.T).all()
+
+
+@pytest.mark.parametrize(
+    ("kind", "least"), [("stiffness", "-1"), ("damping", "-0.1")], ids=["stiffness", "damping"]
+)
+def test_motions_that_may_grow_are_warned_of(kind: str, least: str) -> None:
+    changed = replace(MATRIX, **{kind: [("m1", np.diag([float(least) / 3, 1.0]))]})
+    told = rf"{kind}: the matrix has the negative eigenvalue {least} beside 3 at E = [^,]*, m1 = 3,"
+    inputs = {"E": Triangular(4.8, 5, 5.2), "m1": Crisp(3.0)}
+    asked = {"duration": 0.2, "step": 0.01, "alpha": (0,), "method": "vertex"}
+    with pytest.warns(UserWarning, match=told) as seen:
+        envelope(changed, inputs, **asked)
+    assert len(seen) == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        envelope(MATRIX, inputs, **asked)
+
+
+@pytest.mark.parametrize(
+    "model", [replace(STOREY, q0=(), v0=()), replace(MATRIX, q0=None, v0=None)]
+)
+def test_a_structure_at_rest_is_refused(model: Any) -> None:
+    with pytest.raises(ValueError, match=r"nothing moves the structure: .*; give q0 or v0"):
+        envelope(model, {"E": Triangular(4.8, 5, 5.2)}, duration=0.2, step=0.1)

@@ -103,7 +103,9 @@ def test_weights_that_buckle_a_storey_are_refused_where_they_first_do() -> None:
 
 
 def test_a_box_that_reaches_buckling_is_refused() -> None:
-    frame = StoreyFrame((2e3,), (1.0,), 1e9, 1e-6, gravity=G)  # k l / P = 24 E I / (l² m g)
+    frame = StoreyFrame(
+        (2e3,), (1.0,), 1e9, 1e-6, q0=(0.1,), gravity=G
+    )  # k l / P = 24 E I / (l² m g)
     inside = np.sqrt(24 * 1e3 / (2.2e3 * G))
     time = {"duration": 0.1, "step": 0.1}
     heavy = {"m1": Interval(1.9e3, 2.2e3)}
