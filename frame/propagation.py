@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -29,8 +29,7 @@ from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arguments import fuzzy_inputs
 from alphacut.fuzzy.knowledge.joint import JointClaim
-
-Progress = Callable[[float], None]
+from alphacut.fuzzy.progress_bar import Progress, told
 
 
 def envelope(
@@ -43,7 +42,7 @@ def envelope(
     method: str | None = None,
     integrator: str | Integrator | None = None,
     relative: bool = False,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     kept: Kept | None = None,
     **options: object,
 ) -> Envelope:
@@ -63,7 +62,8 @@ def envelope(
             Lagrangian systems midpoint (unless given), composition4 or rk4.
         relative: Whether the method's tolerance is a share of each output's peak at the modal
             parameters, instead of a length in SI units.
-        progress: Called with the fraction done.
+        progress: Called with the share done; a bar on a terminal or in a notebook if not given,
+            False for none.
         kept: Keeps what a search of modal intervening variables has found so far, from which the
             same call goes on; None for nothing.
         options: Options of the method, see below.
@@ -73,7 +73,7 @@ def envelope(
 
     - auto: `tolerance` (wanted error, 1e-4), `exclude` (of modal and improved-graph-follower),
       `budget` (most trajectories, 20000), `seconds` (largest estimate of a method that is started,
-      3600).
+      3600), `seed`, `workers` (of the proof; all cores).
     - modal: `tolerance` (of the polynomials of the modes, 1e-6), `budget` (most eigen-analyses,
       280), `seed`; `certify` (wanted gap between attained and proved bounds; none), then `boxes`
       (most boxes for each bound, 4000) and `workers` (processes, 1); `passes` (most independent
@@ -104,18 +104,23 @@ def envelope(
         arguments |= {"kept": kept}
         still = envelope(absolute(model), inputs, **arguments, **options)  # type: ignore[arg-type]
         return shifted(still, model, moved)
+    own = ", ".join(sorted(set(options) - set(options_of("auto")))) if method is None else ""
     method, way, asked, scheme = _prepared(
         model, inputs, duration, step, alpha, method, integrator, relative, options
     )
     cuts, which = asked.boxes.distinct()
     over = replace(asked, boxes=cuts, kept=kept)
     steps = step_error(over)
-    found = with_step_error(way.run(over, progress), over, scheme, steps)
+    with told(progress) as tell:
+        found = with_step_error(way.run(over, tell), over, scheme, steps)
     if method.endswith("graph-follower"):
         found = judged(found, over, steps)
     found = with_stray(found, over)
     claim = str(JointClaim.of(fuzzy_inputs(inputs)).resting_on(found.nature))
     found = replace(found, facts={**found.facts, "claim": claim}) if claim else found
+    if own and method == "modal" and "proof" not in found.facts:
+        why = f"{own} chose the method modal, which proves nothing without certify; auto does"
+        found = replace(found, facts={**found.facts, "unproved": why})
     if method == "modal":
         warn_of_roughness(found)
     return found.on_levels(asked.boxes.alpha, which)

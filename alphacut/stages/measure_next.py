@@ -115,6 +115,7 @@ def _width(
         method="modal",
         tolerance=TOLERANCE,
         relative=True,
+        progress=False,
     )
     width = (found.upper - found.lower)[0, :, column].mean()
     error = np.inf if found.error is None else 2 * found.error[0, :, column].mean()

@@ -53,6 +53,8 @@ class Auto:
         exclude: Methods that must not be taken, out of `CANDIDATES`.
         budget: Most trajectories of the Graph Follower.
         seconds: Largest estimate of a method that is started.
+        seed: Of the searches where nothing is proved.
+        workers: Threads of the proof, which is the same for any number; None for all cores.
 
     Raises:
         ValueError: An excluded name is unknown, or the tolerance is not positive.
@@ -62,6 +64,8 @@ class Auto:
     exclude: Sequence[str] = ()
     budget: int = 20000
     seconds: float = 3600.0
+    seed: int = 0
+    workers: int | None = None
 
     def __post_init__(self) -> None:
         for name in self.exclude:
@@ -98,11 +102,11 @@ class Auto:
         ]
         if "modal" in tried:
             try:
-                proof, unproved = _proved(flow, left, progress)
+                proof, unproved = _proved(flow, left, progress, self.workers)
                 if proof is not None:
                     why = "modal: polynomials of the modes, whose bounds are proved"
                     return _reported(proof, flow, begun, why)
-                found = Modal(tolerance=left / FINE).run(flow, progress)
+                found = Modal(tolerance=left / FINE, seed=self.seed).run(flow, progress)
                 found = replace(found, facts={**found.facts, "unproved": unproved})
                 if _estimate(found, flow) <= left:
                     return _reported(found, flow, begun, _why(found))
@@ -110,7 +114,7 @@ class Auto:
             except ModalError as error:
                 refused.append(str(error))
         if "improved-graph-follower" in tried:
-            followed = _followed(flow, left, self.budget, progress)
+            followed = _followed(flow, left, self.budget, progress, self.seed)
             if followed is not None:
                 why = "; ".join(refused) or "the system is not linear"
                 return _reported(followed, flow, begun, f"improved-graph-follower, since {why}")
@@ -135,13 +139,13 @@ class Auto:
 
 
 def _proved(
-    flow: UnitFlow, wanted: float, progress: Progress | None
+    flow: UnitFlow, wanted: float, progress: Progress | None, workers: int | None
 ) -> tuple[Envelope | None, str]:
     """A guaranteed envelope within the wanted error, or None and the reason why there is none."""
     reason = ""
     for share in GAPS:
         try:
-            found = guaranteed(flow, share * wanted, progress)
+            found = guaranteed(flow, share * wanted, progress, workers)
         except GapError as error:
             reason = str(error)
             continue
@@ -156,17 +160,17 @@ def _proved(
 
 
 def _followed(
-    flow: UnitFlow, tolerance: float, budget: int, progress: Progress | None
+    flow: UnitFlow, tolerance: float, budget: int, progress: Progress | None, seed: int
 ) -> Envelope | None:
     """The Graph Follower, begun with more points until one that shares none with it agrees."""
     spread, strict, used = 256, tolerance / 4, 0
     for attempt in range(4):
-        method = BatchFollower(strict, budget, spread, contests=3, seed=2 * attempt)
+        method = BatchFollower(strict, budget, spread, contests=3, seed=seed + 2 * attempt)
         first = method.run(flow, progress)
         used += first.trajectories
         if "reason" in first.facts:
             return None
-        second = replace(method, seed=2 * attempt + 1).run(flow, progress)
+        second = replace(method, seed=method.seed + 1).run(flow, progress)
         used += second.trajectories
         apart = distance(first, second, flow)
         if apart <= AGREED * tolerance and "reason" not in second.facts:

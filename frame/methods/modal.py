@@ -209,13 +209,16 @@ def _judged(
     return facts
 
 
-def guaranteed(flow: UnitFlow, gap: float, progress: Progress | None = None) -> Envelope:
+def guaranteed(
+    flow: UnitFlow, gap: float, progress: Progress | None = None, workers: int | None = None
+) -> Envelope:
     """Proved envelope of a linear structure, within a gap unless the boxes do not suffice.
 
     Args:
         flow: Trajectories of a `LinearFlow`.
         gap: Wanted gap between attained and proved bounds, in units of the outputs.
         progress: Called with the fraction done.
+        workers: Threads; None for all cores.
 
     Raises:
         UnprovedError: The error of the modal model cannot be bounded, or there are too many
@@ -228,7 +231,8 @@ def guaranteed(flow: UnitFlow, gap: float, progress: Progress | None = None) -> 
             f" {len(flow.boxes.names)}; fewer can be proved"
         )
     size = 2 * len(flow.outputs) * len(flow.time)
-    method = Modal(certify=gap, boxes=min(BOXES, MOST_BOXES / size), workers=threads())
+    boxes = min(BOXES, MOST_BOXES / size)
+    method = Modal(certify=gap, boxes=boxes, workers=workers or threads())
     return _certified(flow, method, gap, time.perf_counter(), progress, insist=True)
 
 

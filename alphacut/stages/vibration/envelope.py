@@ -56,7 +56,7 @@ def compute(
         given["workers"] = workers
     try:
         with told_once():
-            found = frame.envelope(wanted.model, progress=progress, kept=kept, **given)
+            found = frame.envelope(wanted.model, progress=progress or False, kept=kept, **given)
     except ValueError as error:
         raise BadInput(Problem("envelope", str(error))) from None
     return found

@@ -5,11 +5,12 @@ tolerance.
 from __future__ import annotations
 
 import warnings
+from typing import Any
 
 import numpy as np
 import pytest
 
-from alphacut.frame import Exact, LinearFlow, MatrixStructure, StoreyFrame, envelope
+from alphacut.frame import Envelope, Exact, LinearFlow, MatrixStructure, StoreyFrame, envelope
 from alphacut.frame.modal.exact_response import ExactResponse
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy import Interval, Triangular
@@ -69,3 +70,20 @@ def test_forces_alone_are_told_to_a_share_of_their_peaks() -> None:
     assert found.method == "modal"
     assert found.error is not None
     assert (found.error.max((0, 1)) < 1e-3 * np.abs(found.lower).max((0, 1))).all()
+
+
+def test_options_that_a_proof_can_keep_do_not_end_it() -> None:
+    def found(**options: Any) -> Envelope:
+        inputs = {"E": Triangular(24e9, 25e9, 26e9)}
+        return envelope(FRAME, inputs, duration=0.5, step=0.05, alpha=(0,), **options)
+
+    plain = found()
+    for asked in ({"workers": 2}, {"seed": 1}, {"progress": False}, {"progress": True}):
+        same = found(**asked)
+        assert (same.nature, same.facts["reason"]) == ("guaranteed", plain.facts["reason"])
+        assert (same.upper == plain.upper).all()
+    light = found(passes=1)
+    assert "passes chose the method modal, which proves nothing" in str(light.facts["unproved"])
+    assert "unproved" not in found(certify=1e-3).facts
+    with pytest.raises(ValueError, match="progress is 5; it must be a function"):
+        found(progress=5)
