@@ -20,6 +20,7 @@ from alphacut.frame.decisions.sure_exceeding import sure_exceeding
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arguments import fuzzy_inputs
+from alphacut.fuzzy.counted import ranged
 from alphacut.fuzzy.knowledge.joint import JointClaim, joined_once
 
 
@@ -50,8 +51,8 @@ class Exceeding:
 
     def __str__(self) -> str:
         """The decision with what it rests on."""
-        (a, b), (c, d) = self.possibility, self.necessity
-        degrees = f"possibility of exceeding {a:.4g} … {b:.4g}, necessity {c:.4g} … {d:.4g}"
+        possible, necessary = ranged(*self.possibility), ranged(*self.necessity)
+        degrees = f"possibility of exceeding {possible}, necessity {necessary}"
         lines = [f"{self.verdict}: {degrees} ({self.scale.nature})"]
         return "\n".join([*lines, *([self.claim] if self.claim else [])])
 

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from alphacut.fuzzy.arguments import fuzzy_inputs
-from alphacut.fuzzy.counted import counted
+from alphacut.fuzzy.counted import counted, ranged
 from alphacut.fuzzy.decisions.nested_boxes import ByLevel, Scaled, Threshold, Verdict, threshold
 from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.knowledge.enclosure import Enclosed
@@ -116,11 +116,18 @@ class Decision:
         return "unsafe" if self.necessity[0] == 1 else "undecided"
 
     def __str__(self) -> str:
-        """The decision in a line, with what is claimed."""
-        (a, b), (c, d) = self.possibility, self.necessity
-        degrees = f"possibility of exceeding {a:.6g} … {b:.6g}, necessity {c:.6g} … {d:.6g}"
-        degrees += f"; {counted(self.runs, 'run')}"
-        return "\n".join([f"{self.verdict}: {degrees}", *([self.claim] if self.claim else [])])
+        """The decision, the margin to each limit at the lowest level, and what is claimed."""
+        possible, necessary = ranged(*self.possibility), ranged(*self.necessity)
+        degrees = f"possibility of exceeding {possible}, necessity {necessary}"
+        head = f"{self.verdict}: {degrees}; {counted(self.runs, 'run')}"
+        if self.verdict == "undecided" and " … " not in possible:
+            head = f"possible, not certain: {head.split(': ', 1)[1]}"
+        margins = [
+            f"margin of {name} {ranged(low[0], high[0])} at α = {self.alpha[0]:g}"
+            + (", so that its limit may be passed" if low[0] < 0 else "")
+            for name, (low, high) in self.margin.items()
+        ]
+        return "\n".join([head, *margins, *([self.claim] if self.claim else [])])
 
     __repr__ = __str__
 
@@ -192,11 +199,8 @@ def decide(
     for name, limit in limits.items():
         lower, upper = whole.bounds(name)
         margin[name] = (limit - upper, limit - lower)
-    witness = (
-        None
-        if below.witness is None
-        else dict(zip(domain.names, map(float, below.witness), strict=True))
-    )
+    at = below.witness
+    witness = None if at is None else dict(zip(domain.names, map(float, at), strict=True))
     levels_of, runs = tuple(domain.alpha), whole.runs + sum(one.runs for one in found)
     return Decision(possible, necessary, margin, levels_of, witness, str(whole.claim), runs)
 

@@ -85,7 +85,14 @@ class Advice:
             f" {unit * x.exact:.3g} % ({unit * x.exact_least:.3g} %)"
             for x in self.gains
         ]
-        return "\n".join([*lines, *([self.note] if self.note else [])])
+        return "\n".join([*lines, *self._said])
+
+    @property
+    def _said(self) -> list[str]:
+        """What cannot be said, and what the level ranks."""
+        bounds = "at α = 0 the outermost bounds of the inputs are ranked: where you set them"
+        bounds += " yourself, more values narrow only the cuts above, as alpha=0.5 ranks them"
+        return [*([self.note] if self.note else []), *([bounds] if self.alpha == 0 else [])]
 
     __repr__ = __str__
 
@@ -97,8 +104,8 @@ class Advice:
             for x in self.gains
         ]
         head = ("input", "known twice as well, %", "at least, %", "exactly, %", "at least, %")
-        note = f"; {self.note}" if self.note else ""
-        below = f"less width by; now {self.width:.6g} at α = {self.alpha:g}{note}"
+        now = f"less width by; now {self.width:.6g} at α = {self.alpha:g}"
+        below = "\n".join([now, *self._said])
         return html_table(head, rows, below=below)
 
 
@@ -243,13 +250,14 @@ def _note(gains: list[Gain], width: float, error: float) -> str:
         return "no input is fuzzy at this level: there is nothing to measure"
     if not np.isfinite([width, error]).all():
         return "the width is not finite: nothing can be said"
+    share = 100 * error / width if width > 0 else 0.0
     if gains[0].half <= error:
-        least = f"the error of a difference, {error:.3g}"
+        least = f"the error of a difference, {share:.3g} % of the width"
         return f"no input can be named: no gain is above {least}; try measuring two of them"
     tied = [x.name for x in gains[1:] if gains[0].half - x.half <= error]
     return (
         f"{gains[0].name} cannot be told from {', '.join(tied)}: their gains differ by less than"
-        f" {error:.3g}, the error"
+        f" the error, {share:.3g} % of the width"
         if tied
         else ""
     )

@@ -20,7 +20,7 @@ class Known:
 
     Args:
         signs: +1 for an input with which every output rises, −1 where every output falls; or such a
-            mapping by output.
+            mapping by output, `{"load": {"deflection": 1}}`.
         monotone: Inputs in which every output is monotone while the others are fixed, in whatever
             direction: an output linear in each input alone is, for one. Inputs with a sign need not
             be named again.
@@ -77,9 +77,11 @@ class Known:
         ]
         unknown = sorted(set(named) - set(inputs))
         if unknown:
+            swapped = next((x for x in unknown if isinstance(self.signs.get(x), Mapping)), "")
+            cure = f"; signs go by input first, as {{'{inputs[0]}': {{'{swapped}': 1}}}}"
             raise ValueError(
                 f"what is known of the model names {', '.join(unknown)}; the fuzzy inputs are"
-                f" {', '.join(inputs)}"
+                f" {', '.join(inputs)}{cure if swapped else ''}"
             )
         for name, sign in self.signs.items():
             for value in sign.values() if isinstance(sign, Mapping) else (sign,):

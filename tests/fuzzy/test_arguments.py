@@ -96,6 +96,10 @@ def test_a_text_in_a_fuzzy_number_is_named():
         ),
         ({"interactions": "ab"}, "the interactions are 'ab'; they must be a list such as"),
         (
+            {"known": Known({"y": {"a": 1}})},
+            "the fuzzy inputs are a.*; signs go by input first, as {'a': {'y': 1}}",
+        ),
+        (
             {"known": Known({"a": {"z": 1}})},
             "what is known of the model names z; its outputs are y",
         ),

@@ -146,3 +146,11 @@ def test_a_budget_ends_a_proof_that_has_no_end():
     found = decide(lambda x: x - x + x, {"x": X}, {"y": 1.5}, budget=4)
     assert found.possibility[0] <= 0.5 <= found.possibility[1]
     assert found.runs < 3000
+
+
+def test_a_decision_names_the_limit_that_may_be_passed_and_its_margin():
+    found = decide(lambda x: {"a": x, "b": -x}, {"x": X}, {"a": 1.8, "b": 3.0})
+    head, a, b, *_ = str(found).splitlines()
+    assert head.startswith("possible, not certain: possibility of exceeding 0.2, necessity 0;")
+    assert a == "margin of a -0.2 … 1.8 at α = 0, so that its limit may be passed"
+    assert b == "margin of b 3 … 5 at α = 0"

@@ -115,6 +115,10 @@ def test_it_says_when_it_cannot_rank() -> None:
         lambda a, b: a + b, {"a": Interval(0, 1), "b": Interval(0, 1)}, Automatic()
     )
     assert "cannot be told from" in str(alike)
+    assert f"the error, {100 * alike.error / alike.width:.3g} % of the width" in alike.note
+    assert "at α = 0 the outermost bounds of the inputs are ranked" in str(alike)
+    above = measure_next(lambda a: a, {"a": Interval(0, 1)}, Reduced(), alpha=0.5)
+    assert "ranked" not in str(above)
     assert "nothing to measure" in measure_next(lambda a: a, {"a": Crisp(1.0)}, Reduced()).note
     nothing = measure_next(lambda a, b: 0 * a + b, {"a": Interval(0, 1), "b": Crisp(1)}, Reduced())
     assert "no input can be named" in nothing.note
