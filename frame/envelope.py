@@ -254,12 +254,8 @@ class Envelope:
         }
         if self.between is not None:
             data["between"] = (("time", "output"), self.between)
-        axes = {
-            "alpha": self.alpha,
-            "time": self.time,
-            "output": list(self.outputs),
-            "parameter": list(self.parameters),
-        }
+        axes: dict[str, Any] = {"alpha": self.alpha, "time": self.time}
+        axes |= {"output": list(self.outputs), "parameter": list(self.parameters)}
         counts = {"trajectories": self.trajectories, "seconds": self.seconds}
         dataset = xarray.Dataset(
             data, axes, {"method": self.method, "nature": self.nature, **counts, **self.facts}
@@ -289,22 +285,10 @@ def signed_envelope(
     """Envelope from upper bounds of (−output, output), (A, T, m, 2), and their coordinates."""
     cuts = flow.boxes
     where = cuts.to_physical(at)
+    ends = (-bounds[..., 0], bounds[..., 1], where[..., 0, :], where[..., 1, :])
+    told = (*ends, method, nature, trajectories, seconds, error)
     return Envelope(
-        cuts.alpha,
-        flow.time,
-        flow.outputs,
-        cuts.names,
-        -bounds[..., 0],
-        bounds[..., 1],
-        where[..., 0, :],
-        where[..., 1, :],
-        method,
-        nature,
-        trajectories,
-        seconds,
-        error,
-        between=between,
-        facts=facts,
+        cuts.alpha, flow.time, flow.outputs, cuts.names, *told, between=between, facts=facts
     )
 
 

@@ -22,7 +22,7 @@ from alphacut.fuzzy.sets.numbers import Array
 _STRATA = 2000  # equally likely parts of θ: the resolution of a probability is 1 / _STRATA
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RandomResponse:
     """A response that is random at every sample of the fuzzy inputs.
 

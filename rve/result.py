@@ -32,7 +32,7 @@ def effective_modulus(s11: float, s12: float) -> tuple[float, float]:
     return shear * (1 + nu), nu
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class StressCurve:
     """Homogenised stress of the slice at each θ (Fig. 16).
 
@@ -59,7 +59,7 @@ class StressCurve:
         return float(self.weights @ self.s11), float(self.weights @ self.s12)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Homogenised:
     """Effective behaviour of one cell with what it cost.
 

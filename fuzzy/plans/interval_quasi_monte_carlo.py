@@ -58,7 +58,7 @@ class RandomInput:
         return values.min(axis=0), values.max(axis=0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class IntervalResponse:
     """A response with bounds at every quasi-random point.
 

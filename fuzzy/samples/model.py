@@ -18,7 +18,7 @@ Output = float | Sequence[float] | Mapping[str, ArrayLike] | ArrayLike
 Layout = tuple[tuple[str, tuple[int, ...]], ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Values:
     """Outputs at many points.
 

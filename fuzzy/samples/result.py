@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -11,8 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from alphacut.fuzzy.counted import counted
 from alphacut.fuzzy.csv_table import write_csv
-from alphacut.fuzzy.drawing import draw_membership, new_axes
+from alphacut.fuzzy.drawing import draw_bands, draw_membership, new_axes
 from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.knowledge.contradiction import contradictions
 from alphacut.fuzzy.knowledge.joint import JointClaim
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-_PRINTED = 50  # outputs that are printed
+_ROWS = 25  # that are printed, a level each
 
 
 def _shown(value: float) -> str:
@@ -38,7 +40,7 @@ def _shown(value: float) -> str:
     return f"{0.0 if abs(value) < np.finfo(float).tiny else value:.6g}"
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FuzzyResult:
     """Fuzzy outputs by their α-cuts.
 
@@ -158,30 +160,35 @@ class FuzzyResult:
         return replace(self, proved=kept, notes=(*self.notes, *notes)) if found else self
 
     def __str__(self) -> str:
-        """Bounds of the first 50 outputs, a line for each level, with nature and cost."""
+        """Bounds of the first outputs, a line for each level, with nature and cost."""
         given = condition(self._rests_on)
         runs = f"{self.runs} runs"
         if self.verification_runs:
             runs += f" and {self.verification_runs} more that looked for what they missed"
         lines = [f"{self.nature} bounds{given} by the plan {self.plan}, {runs}"]
-        for column, name in enumerate(self.outputs[:_PRINTED]):
+        for column, name in enumerate(self.outputs[: self._printed]):
             cuts = zip(self.domain.alpha, self.lower[:, column], self.upper[:, column], strict=True)
             lines += [
                 f"{name}, α = {alpha:g}: {_shown(low)} … {_shown(high)}"
                 for alpha, low, high in cuts
             ]
-        hidden = len(self.outputs) - _PRINTED
-        more = [f"… and {hidden:,} outputs more: bounds(NAME) has them"] if hidden > 0 else []
+        hidden = len(self.outputs) - self._printed
+        what = f"… and {counted(hidden, 'output')} more: bounds(NAME) has them"
+        more = [what] if hidden > 0 else []
         said = [str(self.claim)] if str(self.claim) else []
         return "\n".join([*lines, *more, *self.notes, *said])
 
     __repr__ = __str__
 
+    @property
+    def _printed(self) -> int:
+        return max(1, _ROWS // len(self.alpha))
+
     def _repr_html_(self) -> str:
         """The text of the result with its cuts as a table, for notebooks."""
         head, *said = str(self).split("\n")
         notes = [line for line in said if ", α = " not in line]
-        shown = range(min(len(self.outputs), _PRINTED))
+        shown = range(min(len(self.outputs), self._printed))
         rows = [
             (self.outputs[k], f"{alpha:g}", _shown(self.lower[a, k]), _shown(self.upper[a, k]))
             for k in shown
@@ -197,7 +204,7 @@ class FuzzyResult:
         lie inside it.
 
         Args:
-            output: Name of the output.
+            output: Name of the output; `y` of an array y[0], y[1], …: bands over the index.
             axes: Where to draw; a new figure if not given.
 
         Returns:
@@ -206,6 +213,13 @@ class FuzzyResult:
         Raises:
             ValueError: There is no such output.
         """
+        item = re.compile(rf"{re.escape(str(output))}\[\d+\]")
+        row = [k for k, name in enumerate(self.outputs) if item.fullmatch(name)]
+        if row and output not in self._columns:
+            axes = new_axes(axes)
+            draw_bands(axes, range(len(row)), self.alpha, self.lower[:, row], self.upper[:, row])
+            axes.set(xlabel="index", ylabel=output, title=f"{self.nature} bounds")
+            return axes
         lower, upper = self.bounds(output)
         axes = new_axes(axes)
         draw_membership(axes, self.alpha, lower, upper, steps=not self.domain.linear)
@@ -263,7 +277,8 @@ class FuzzyResult:
             ValueError: There is no such output.
         """
         if output not in self._columns:
-            raise ValueError(f"there is no output {output!r}; there are {', '.join(self.outputs)}")
+            there = [*self.outputs[:_ROWS], *(["…"] if len(self.outputs) > _ROWS else [])]
+            raise ValueError(f"there is no output {output!r}; there are {', '.join(there)}")
         return self._columns[output]
 
     @cached_property
@@ -334,26 +349,12 @@ class FuzzyResult:
         """Bounds over (alpha, output), where they are reached over (alpha, output, parameter)."""
         import xarray
 
-        bounds, places = ("alpha", "output"), ("alpha", "output", "parameter")
+        names = {"lower": 2, "upper": 2, "error": 2, "lower_at": 3, "upper_at": 3}
+        axes = {"alpha": self.alpha, "output": [*self.outputs], "parameter": [*self.inputs]}
+        told = ("plan", "worth", "runs", "verification_runs")
         return xarray.Dataset(
-            {
-                "lower": (bounds, self.lower),
-                "upper": (bounds, self.upper),
-                "error": (bounds, self.error),
-                "lower_at": (places, self.lower_at),
-                "upper_at": (places, self.upper_at),
-            },
-            coords={
-                "alpha": self.alpha,
-                "output": list(self.outputs),
-                "parameter": list(self.inputs),
-            },
-            attrs={
-                "plan": self.plan,
-                "nature": str(self.nature),
-                "worth": self.worth,
-                "runs": self.runs,
-                "verification_runs": self.verification_runs,
-                "claim": str(self.claim),
-            },
+            {name: ((*axes,)[:size], getattr(self, name)) for name, size in names.items()},
+            axes,
+            {**{name: getattr(self, name) for name in told}, "nature": str(self.nature)}
+            | {"claim": str(self.claim)},
         )

@@ -16,7 +16,7 @@ _HIGHEST = 8
 _SAMPLES_PER_TERM = 1.5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ResponseSurface:
     """Polynomial of full total degree fitted by least squares.
 

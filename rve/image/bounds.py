@@ -12,7 +12,7 @@ from alphacut.rve.image.fields.energy import SAFETY, UNIT
 from alphacut.stochastic.theta.truncated_normal import Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class StiffnessBounds:
     """Lower ≤ C ≤ upper as quadratic forms of the mean strain.
 

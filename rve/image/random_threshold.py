@@ -80,7 +80,7 @@ def threshold_nodes(grey: Array, law: NormalThreshold) -> Array:
     return nodes if len(nodes) else np.array([sum(law.mean) / 2])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ThresholdResponse:
     """Stiffness over the threshold of two phases, falling in the Loewner order with its argument.
 

@@ -2,9 +2,10 @@
 
 import csv
 
+import numpy as np
 import pytest
 
-from alphacut.frame import StoreyFrame, envelope
+from alphacut.frame import Envelope, StoreyFrame, envelope
 from alphacut.fuzzy import (
     Interval,
     Reduced,
@@ -17,6 +18,14 @@ from alphacut.fuzzy import (
     width_shares,
 )
 from alphacut.fuzzy.decisions.measure_next import measure_next
+from alphacut.fuzzy.plans.interval_quasi_monte_carlo import IntervalResponse
+from alphacut.fuzzy.random_response import RandomResponse
+from alphacut.fuzzy.samples.model import Values
+from alphacut.fuzzy.samples.result import FuzzyResult
+from alphacut.fuzzy.surrogates.response_surface import ResponseSurface
+from alphacut.rve.image.bounds import StiffnessBounds
+from alphacut.rve.image.random_threshold import ThresholdResponse
+from alphacut.rve.result import Homogenised, StressCurve
 
 X = {"x": Triangular(0, 1, 2), "y": Interval(1, 2)}
 
@@ -34,7 +43,11 @@ SHOWN = {
     "explanation": (lambda: explain(product, X, Reduced()), "would run", "<td>0</td>"),
     "advice": (lambda: measure_next(product, X, Reduced()), "known twice as well", "<td>x</td>"),
     "shares": (lambda: width_shares(bounds, X), "  x: ", "<td>y</td>"),
-    "decision": (lambda: decide(product, X, {"y": 3}), "undecided: possibility", "<td>0.75</td>"),
+    "decision": (
+        lambda: decide(product, X, {"y": 3}),
+        "possible, not certain: pos",
+        "<td>0.75</td>",
+    ),
     "threshold": (
         lambda: safe_scale(product, {"x": 1, "y": 1}, {"x": 0.1}, {"y": 1.2}),
         "proved safe up to 1.9999",
@@ -99,3 +112,27 @@ def test_a_table_that_cannot_be_written_is_refused_and_leaves_nothing(place, tmp
     with pytest.raises(ValueError, match=r"cannot be written to .* a folder that exists"):
         found.to_csv(tmp_path / place)
     assert not list(tmp_path.iterdir())
+
+
+def test_an_array_is_drawn_as_bands_over_its_index_and_printed_in_part():
+    found = propagate(lambda x, y: x * np.arange(30.0) + y, X, Reduced())
+    axes = found.plot("y")
+    assert len(axes.collections) == len(found.alpha)
+    assert axes.get_xlabel() == "index"
+    assert axes.get_xlim()[1] > 29
+    assert len(str(found).splitlines()) == 28
+    assert "… and 25 outputs more: bounds(NAME) has them" in found._repr_html_()
+    with pytest.raises(ValueError, match=r"no output 'z'; there are y\[0\], .*, y\[24\], …$"):
+        found.plot("z")
+
+
+def test_results_with_arrays_are_compared_and_hashed_as_objects():
+    found = propagate(product, X, Reduced(), alpha=[0])
+    again = propagate(product, X, Reduced(), alpha=[0])
+    assert found == found
+    assert found != again
+    assert len({found, again}) == 2
+    for kind in (FuzzyResult, Values, ResponseSurface, RandomResponse, IntervalResponse):
+        assert kind.__eq__ is object.__eq__
+    for kind in (Envelope, Homogenised, StressCurve, StiffnessBounds, ThresholdResponse):
+        assert kind.__eq__ is object.__eq__
