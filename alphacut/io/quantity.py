@@ -57,6 +57,9 @@ def listed(inner: str, unit: str, si: str) -> tuple[Decimal, ...]:
 def spread(match: re.Match[str], si: str) -> tuple[Decimal, ...]:
     """Both ends of the interval "20 t ± 5 %", "20 t ± 1 t" or "20 ± 1 t"."""
     middle, unit, width, width_unit = match[1], match[2].strip(), match[3], match[4].strip()
+    if (unit and not width_unit) or unit == width_unit == "%":
+        cure = "the ends, such as [2, 4] %" if unit == "%" else f"± {width} % or ± {width} {unit}"
+        raise ValueError(f"the spread ± {width} may mean two things: write {cure}")
     if width_unit == "%":
         modal = decimal(middle) * factor(unit, si)
         half = abs(modal) * decimal(width) / 100

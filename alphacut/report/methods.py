@@ -75,8 +75,9 @@ def proofs(summary: Document) -> Iterator[str]:
         if "gap" in study:
             of = str(study.get("gap_output", next(iter(study.get("min", {"q": 0})))))
             gap = engineering(float(study["gap"]), output_unit(of), digits=2)
+            worth = "proved" if "guaranteed" in str(study["nature"]) else "verified by sampling"
             yield (
-                f"The bounds of envelope {name} are proved at every node, and no wider than {gap}"
+                f"The bounds of envelope {name} are {worth} at every node, and no wider than {gap}"
                 f" of {of} beyond what is attained. {sentence(study['proof'])}"
             )
 

@@ -270,6 +270,7 @@ def _certified(
         "proof": f"the branch and bound is rigorous for the modal model; {PROVED}",
     }
     if unproved:
+        facts["unproved"] = unproved
         facts["proof"] = (
             f"the branch and bound is rigorous for the modal model; {SAMPLED}: {unproved}"
         )

@@ -19,6 +19,20 @@ def test_a_spread_is_an_interval(text):
     assert quantity.fuzzy(f"-{text}", "kg") == Interval(-21e3, -19e3)
 
 
+@pytest.mark.parametrize(
+    ("text", "si", "cure"),
+    [
+        ("25170 cm^4 ± 10", "m^4", "write ± 10 % or ± 10 cm^4"),
+        ("3 % ± 1 %", "", "write the ends, such as [2, 4] %"),
+        ("3 % ± 1", "", "write the ends, such as [2, 4] %"),
+    ],
+)
+def test_a_spread_that_may_mean_two_things_is_refused(text, si, cure):
+    with pytest.raises(ValueError, match="may mean two things") as refusal:
+        quantity.fuzzy(text, si)
+    assert cure in str(refusal.value)
+
+
 def test_check_prints_what_every_fuzzy_input_was_read_as(tmp_path, capfd):
     case = tmp_path / "case.toml"
     text = PAPER.read_text(encoding="utf-8").replace('"[19, 20, 21] t"', '"20 t ± 5 %"')

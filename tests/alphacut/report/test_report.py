@@ -157,6 +157,8 @@ def test_a_certificate_is_told_with_its_gap_and_what_it_rests_on():
     assert "envelope E are proved at every node, and no wider than 1.0 µm of q2" in page
     assert "what is attained. Bounded by &lt;energy&gt;." in page
     assert "Guaranteed: proved to hold" in page
+    sampled = study | {"nature": "verified by sampling"}
+    assert "E are verified by sampling at every node" in methods({"envelopes": {"E": sampled}})
     assert "proved at" not in methods(
         {"envelopes": {"E": {k: v for k, v in study.items() if k not in ("gap", "proof")}}}
     )

@@ -231,6 +231,7 @@ def test_certificate_says_why_it_is_only_sampled() -> None:
     assert proved.nature == "guaranteed"
     assert "energy" in str(proved.facts["proof"])
     assert sampled.nature == "verified by sampling"
+    assert sampled.facts["unproved"] in sampled.facts["proof"]
     assert "stiffness has a factor that is a function" in str(sampled.facts["proof"])
     assert np.abs(proved.upper - sampled.upper).max() < 1e-4
 
