@@ -5,13 +5,15 @@ before either. Open MPI's transport for one-sided messages over fabrics, which n
 takes a second to look for a fabric when MPI starts; it is left out unless the caller names
 transports. UCX rewrites the process's functions of memory to watch them, which takes 0.05 s and
 serves fabrics alone; it does not unless the caller asks for it. Options stand under the project's
-prefix; what PETSc does not use is an error.
+prefix; what PETSc does not use is an error. Ctrl-C waits for PETSc's end.
 """
 
 from __future__ import annotations
 
 import ctypes
 import os
+import signal
+import threading
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -31,17 +33,30 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
 _LIBRARY = ctypes.CDLL(PETSc.__file__)  # petsc4py does not wrap PetscOptionsUsed
-_LIBRARY.PetscOptionsUsed.argtypes = [
-    ctypes.c_void_p,
-    ctypes.c_char_p,
-    ctypes.POINTER(ctypes.c_int),
-]
+_INTEGER = ctypes.POINTER(ctypes.c_int)
+_LIBRARY.PetscOptionsUsed.argtypes = [ctypes.c_void_p, ctypes.c_char_p, _INTEGER]
 
 
 def clean(comm: MPI.Comm | None) -> None:
     """Free what ranks shared and nothing refers to any more; petsc4py keeps it until all ask."""
     if comm is not None:
         PETSc.garbage_cleanup(comm)
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Hold Ctrl-C back to the end of the block; PETSc loses what Python raises below it."""
+    before, held = signal.getsignal(signal.SIGINT), list[int]()
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
+        yield
+        return
+    signal.signal(signal.SIGINT, lambda number, _: held.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if held:
+            before(held[0], None)
 
 
 @contextmanager

@@ -13,7 +13,7 @@ import numpy as np
 
 from alphacut.rve.image.fields.solver import ConvergenceError, Solution, Solver
 from alphacut.rve.image.fields.system import Linear, System
-from alphacut.rve.petsc import PETSc, in_database
+from alphacut.rve.petsc import PETSc, in_database, uninterrupted
 from alphacut.rve.solver.options import PREFIX, OptionError
 
 DEFAULTS = {"ksp_type": "cg", "ksp_norm_type": "natural", "pc_type": "python", "ksp_max_it": "2000"}
@@ -68,7 +68,8 @@ class PetscSolver(Solver):
         rounds = MOST_ROUNDS if TOLERANCES.isdisjoint(self.options) else 1
         iterations = 0
         for _ in range(rounds):
-            method.solve(right, left)
+            with uninterrupted():
+                method.solve(right, left)
             iterations += method.getIterationNumber()
             if method.getConvergedReason() <= 0:
                 raise ConvergenceError(

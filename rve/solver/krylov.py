@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from alphacut.rve.petsc import PETSc, in_database
+from alphacut.rve.petsc import PETSc, in_database, uninterrupted
 from alphacut.rve.solver.options import PREFIX, SolverOptions
 from alphacut.rve.solver.saddle import Saddle
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -121,7 +121,7 @@ class LinearSolver:
         self.krylov = PETSc.KSP().create(operator.comm)
         self.krylov.setOptionsPrefix(PREFIX)
         self.krylov.setOperators(operator)
-        with in_database(options.all, wanted=options.given):
+        with uninterrupted(), in_database(options.all, wanted=options.given):
             self.krylov.setFromOptions()
             if self.krylov.pc.getType() == "python":
                 self.krylov.pc.setPythonContext(context)
@@ -135,11 +135,7 @@ class LinearSolver:
         """
         norms = np.array([load.norm() or 1.0 for load in loads])
         columns = np.stack([load.array_r for load in loads], axis=1) / norms
-        groups = (
-            [columns]
-            if self.together == len(loads)
-            else [columns[:, [k]] for k in range(len(loads))]
-        )
+        groups = np.split(columns, 1 if self.together == len(loads) else len(loads), axis=1)
         solved = [self._solve(group) for group in groups]
         values = np.concatenate([values for values, _ in solved], axis=1) * norms
         iterations = tuple(count for values, count in solved for _ in range(values.shape[1]))
@@ -148,6 +144,7 @@ class LinearSolver:
             return Solutions(values, None, iterations, residual)
         return Solutions(*self.saddle.split(values), iterations, residual)
 
+    @uninterrupted()
     def _solve(self, columns: Array) -> tuple[Array, int]:
         """This rank's solutions for unit loads, shape (local size, loads), and iterations."""
         load = self.krylov.getOperators()[0].createVecLeft()
@@ -163,6 +160,7 @@ class LinearSolver:
             )
         return x.array_r.reshape(columns.shape).copy(), iterations
 
+    @uninterrupted()
     def _residuals(self, loads: Sequence[PETSc.Vec], solutions: Array) -> list[float]:
         """Relative residual of each load."""
         operator, found = self.krylov.getOperators()[0], []
