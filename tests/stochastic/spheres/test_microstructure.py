@@ -56,6 +56,12 @@ def test_the_map_has_the_volume_fraction_asked_for(one):
     assert not list(one.remarks)
 
 
+def test_what_is_left_out_is_told_from_a_quarter_of_the_volume_on():
+    found = sphere_study(spheres(60, fraction=0.36))
+    assert 0.25 < found.share_beyond < 0.5
+    assert f"{found.share_beyond:.1%} of the volume lies in cells" in next(iter(found.remarks))
+
+
 def test_denser_than_any_packing_is_said_and_not_refused():
     found = sphere_study(spheres(80, fraction=0.44))
     assert found.packed[0].fraction == 0.5
