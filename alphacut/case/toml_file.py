@@ -106,6 +106,8 @@ def cure(line: str) -> str:
     if re.fullmatch(r"[\w\-]+", name) and not name.isascii():
         return "keys of plain letters, digits and _"
     if match := re.fullmatch(r"([-+]?\d+),(\d+)(.*)", value):
+        if name in ("seed", "discs", "packings", "bootstrap", "samples"):
+            return "a whole number"
         return f"{match[1]}.{match[2]}{match[3]}, with a point"
     unquoted = re.fullmatch(r"(\[[^\]\"']*\]|[-+]?[\d.,]+)\s*[A-Za-z%µ][^\"']*", value)
     return f'put it in quotes: "{value}"' if unquoted else ""

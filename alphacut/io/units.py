@@ -96,6 +96,9 @@ EVERYDAY = {
 }
 
 
+PRINTED = r"pixel|px\b|\b(pel|dot|pt)s?\b|pica|point|didot|cicero|\b[pb]p\b"
+"""Units of print and screens, which Pint takes for 1/96 inch, 1/72 inch and the like."""
+
 # units that are others than were meant
 MEANT = {
     ("m/s^2", "G"): "g",
@@ -136,6 +139,8 @@ def factor(unit: str, si: str) -> Decimal:
         return Decimal(EVERYDAY[si][unit])
     if si == "rad" and not re.search("rad|deg|turn|rev|arc", unit):  # pint: % is an angle
         raise ValueError(f'the unit "{unit}" is wrong')
+    if re.search(PRINTED, unit, re.IGNORECASE):
+        raise ValueError(f'"{unit}" is no length; give the length of one pixel, such as "0.5 µm"')
     import pint
 
     if re.search(r"\btons?\b", unit):

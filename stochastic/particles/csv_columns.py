@@ -13,6 +13,7 @@ import numpy as np
 
 from alphacut.stochastic.theta.truncated_normal import Array
 
+Rows = list[tuple[int, list[str]]]
 DIAMETERS = ("d", "diameter", "size", "sieve")  # columns of diameters, which may stand in for radii
 
 
@@ -37,7 +38,9 @@ class LengthColumns:
         return f"{length / self.metres:.{digits}g} {self.unit}"
 
 
-def length_columns(path: Path, columns: Sequence[str], unit: str = "") -> LengthColumns:
+def length_columns(
+    path: Path, columns: Sequence[str], unit: str = "", also: Sequence[str] = ()
+) -> LengthColumns:
     """The columns of a file that are wanted.
 
     Args:
@@ -45,10 +48,12 @@ def length_columns(path: Path, columns: Sequence[str], unit: str = "") -> Length
             passed over.
         columns: Names of the columns; one of `DIAMETERS` may stand in for "r".
         unit: Unit of columns whose header names none; empty if each does.
+        also: Names of columns that the caller reads by itself.
 
     Raises:
-        ValueError: The file cannot be read, a column or its unit is missing, two give the same, a
-            row has more fields than the header, or a number is written with a decimal comma where
+        ValueError: The file cannot be read, a column or its unit is missing, two give the same or a
+            column is not read (`_refuse_unread`), a row has more fields than the header, or a
+            number is written with a decimal comma where
             commas separate fields or other numbers have points.
     """
     header, rows = _fields(path, columns)
@@ -57,20 +62,15 @@ def length_columns(path: Path, columns: Sequence[str], unit: str = "") -> Length
     table = []
     for number, fields in rows:
         _refuse_surplus(path, number, fields, wanted)
-        table.append(
-            [
-                factor * _number(fields[k] if k < len(fields) else "", path, number)
-                for k, factor, _ in places
-            ]
-        )
+        cells = [(fields[k] if k < len(fields) else "", factor) for k, factor, _ in places]
+        table.append([factor * _number(cell, path, number) for cell, factor in cells])
+    if "r" in columns:
+        shares = {[*map(_name, header)].index(name) for name in also}
+        _refuse_unread(path, header, rows, {place for place, _, _ in places} | shares)
     first = places[0][2]
     values = np.array(table, float).reshape(-1, len(columns))
-    return LengthColumns(
-        np.array([number for number, _ in rows], int),
-        values,
-        first,
-        _metres(first, columns[0], path),
-    )
+    numbers = np.array([number for number, _ in rows], int)
+    return LengthColumns(numbers, values, first, _metres(first, columns[0], path))
 
 
 def share_column(path: Path, name: str) -> Array | None:
@@ -87,11 +87,11 @@ def share_column(path: Path, name: str) -> Array | None:
         ValueError: The file cannot be read, the column has another unit, or a share lies outside.
     """
     header, rows = _fields(path, (name,))
-    cells = [re.fullmatch(HEADER, cell) for cell in header]
-    places = [k for k, cell in enumerate(cells) if cell and cell[1].lower() == name]
+    places = [k for k, cell in enumerate(header) if _name(cell) == name]
     if not places:
         return None
-    place, unit = places[0], cells[places[0]][2]  # type: ignore[index]
+    place, match = places[0], re.fullmatch(HEADER, header[places[0]])
+    unit = match and match[2]
     if unit not in (None, "%", "1", "-"):
         raise ValueError(f"{path}: column {name!r} has the unit {unit!r}; it takes % or 1")
     values = np.array([_number(f[place] if place < len(f) else "", path, n) for n, f in rows])
@@ -105,9 +105,16 @@ def share_column(path: Path, name: str) -> Array | None:
 
 HEADER = r"\s*(\w+)\s*(?:[\[(]\s*([^\])]+?)\s*[\])])?\s*"
 """Name of a column, and its unit in brackets."""
+PRINTED = r"pixel|px\b|\b(pel|dot|pt)s?\b|pica|point|didot|cicero|\b[pb]p\b"
 
 
-def _fields(path: Path, columns: Sequence[str]) -> tuple[list[str], list[tuple[int, list[str]]]]:
+def _name(cell: str) -> str:
+    """Name of a column; empty where the header has none."""
+    match = re.fullmatch(HEADER, cell)
+    return match[1].lower() if match else ""
+
+
+def _fields(path: Path, columns: Sequence[str]) -> tuple[list[str], Rows]:
     """Fields of the header, and of the rows with their numbers."""
     lines = _lines(path, columns)
     separator = ";" if ";" in lines[0][1] else "\t" if "\t" in lines[0][1] else ","
@@ -160,8 +167,7 @@ BEGINNINGS = {
 
 def not_text(path: Path) -> str:
     """What a file is that cannot be read as text."""
-    with path.open("rb") as file:
-        first = file.read(4)
+    first = path.read_bytes()[:4]
     known = [what for bytes_, what in BEGINNINGS.items() if first.startswith(bytes_)]
     return known[0] if known else "is not text in UTF-8; save it as CSV in UTF-8"
 
@@ -189,12 +195,30 @@ def _lines(path: Path, columns: Sequence[str]) -> list[tuple[int, str]]:
 def _refuse_surplus(path: Path, number: int, fields: list[str], wanted: int) -> None:
     """Refuse a row with more fields than the header, as decimal commas make them."""
     if any(field.strip() for field in fields[wanted:]):
-        told = ",".join(fields)
-        cure = "write decimals with a point (1.25, not 1,25), or name every column"
         raise ValueError(
-            f"{path}: row {number} holds {told!r}, {len(fields)} fields where the header has"
-            f" {wanted}: a decimal comma? {cure}"
+            f"{path}: row {number} holds {','.join(fields)!r}, {len(fields)} fields where the"
+            f" header has {wanted}: a decimal comma? write 1.25, not 1,25, or name every column"
         )
+
+
+IDENTIFIER = r"(.* )?(id|label|name|notes?|comment|index)|particle|circle|image|row|[xyz]m?"
+NUMERAL = r"[-+]?(?=[.,]?\d)[\d.,' ]+([eE][-+]?\d+)?\s*%?"
+
+
+def _refuse_unread(path: Path, header: list[str], rows: Rows, read: set[int]) -> None:
+    """Refuse a column of numbers that is not read, such as counts, unless it numbers the rows."""
+    for place, cell in enumerate(header):
+        fields = [fields[place].strip() for _, fields in rows if place < len(fields)]
+        numbers = [int(field) for field in fields if field.isdecimal()]
+        counts_up = len(fields) == len(numbers) > 1 and bool((np.diff(numbers) == 1).all())
+        words = re.findall(r"[^\W_]+", re.sub(r"[\[(].*", "", cell).lower())
+        identifies = counts_up or re.fullmatch(IDENTIFIER, " ".join(words))
+        if place not in read and not identifies and any(re.fullmatch(NUMERAL, x) for x in fields):
+            raise ValueError(
+                f"{path}: column {cell.strip()!r} is not read, and frequencies or shares in it"
+                " would be ignored; write one row for each particle, or a sieve curve (size [mm],"
+                " passing [%]), or remove it (or name it id if it numbers the rows)"
+            )
 
 
 def _places(
@@ -205,8 +229,7 @@ def _places(
         _metres(unit, "unit for all columns", path)
     named: dict[str, tuple[int, float, str]] = {}
     for place, cell in enumerate(header):
-        match = re.fullmatch(HEADER, cell)
-        name = match[1].lower() if match else ""
+        match, name = re.fullmatch(HEADER, cell), _name(cell)
         radius = "r" if name in DIAMETERS else name
         if match and radius in columns:
             if radius in named:
@@ -216,20 +239,14 @@ def _places(
                     " one of them: rename the other"
                 )
             own = match[2] or unit
-            named[radius] = (
-                place,
-                _metres(own, cell.strip(), path) * (0.5 if name in DIAMETERS else 1.0),
-                own,
-            )
+            metres = _metres(own, cell.strip(), path) * (0.5 if name in DIAMETERS else 1.0)
+            named[radius] = (place, metres, own)
     missing = [name for name in columns if name not in named]
     if missing:
-        told = (
-            f"the header {', '.join(map(str.strip, header))!r} has no column {', '.join(missing)}"
-        )
+        told = f"header {', '.join(map(str.strip, header))!r} has no column {', '.join(missing)}"
         wanted = ", ".join(f"{name} [mm]" for name in columns)
         raise ValueError(
-            f"{path}: {told}; it needs '{wanted}', units in the header; d for diameters may stand"
-            " in for r"
+            f"{path}: the {told}; it needs '{wanted}', units in the header; d may stand for r"
         )
     return [named[name] for name in columns]
 
@@ -237,15 +254,14 @@ def _places(
 def _metres(unit: str, column: str, path: Path) -> float:
     """Metres in one `unit` of length."""
     if not unit:
-        raise ValueError(
-            f"{path}: column {column!r} has no unit; write it in the header, such as 'r [mm]'"
-        )
+        raise ValueError(f"{path}: column {column!r} has no unit; write it in the header: 'r [mm]'")
     try:
+        if re.search(PRINTED, unit, re.IGNORECASE):
+            raise ValueError
         return float(_units()(f"1 {unit}").to("m").magnitude)  # type: ignore[attr-defined]
     except Exception as error:  # the reader raises what it likes
         raise ValueError(
-            f"{path}: column {column!r} has the unit {unit!r}, which is not a length; take mm, cm,"
-            " m, …"
+            f"{path}: column {column!r} has the unit {unit!r}, which is not a length; take mm, …"
         ) from error
 
 

@@ -133,7 +133,7 @@ def read_radii(path: Path, power: int = 2) -> RadiusLaw:
         law = MeasuredRadii.read(path)
         _refuse_sieves(path, law)
         return law
-    sizes = length_columns(path, ("r",))
+    sizes = length_columns(path, ("r",), also=(PASSING,))
     radii, shares = sizes.values[:, 0], passing
     known = np.isfinite(radii) & np.isfinite(shares) & (radii > 0)
     if not known.all():

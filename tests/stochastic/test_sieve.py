@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import kstest
 
 from alphacut.entry import main
-from alphacut.stages.material.microstructure import left_out
+from alphacut.stages.material.microstructure import kinds, left_out
 from alphacut.stochastic.errors import RefusedError
 from alphacut.stochastic.microstructure import Study, study
 from alphacut.stochastic.microstructure_summary import summary
@@ -81,6 +81,16 @@ def test_the_same_curve_in_other_words(text, tmp_path):
         ("size [mm],passing [%]\n1,0\nx,50\n2,100\n", "row 3 holds no positive size and share"),
         ("size [mm],passing [%]\n1,0\n2,\n2,100\n", "row 3 holds no positive size and share"),
         ("size [mm],passing [%]\n2,0\n2,100\n", "two or more, positive, all unlike"),
+        ("d [µm],count\n4.1,100\n6.6,3000\n5,20\n", "column 'count' is not read, and frequen"),
+        ("d [µm],number\n4,20\n6,100\n", "'number' is not read"),
+        ("d [µm];share\n4;20 %\n6;80 %\n", "'share' is not read"),
+        ("d [µm];\n4;3,5\n6;\n", "row 2 holds"),
+        ("d [µm],count per image\n4,20\n6,9\n", "'count per image' is not read"),
+        (",d [µm]\n7,4\n7,6\n", "column '' is not read"),
+        ("size [µm],retained [%]\n4,20\n6,80\n", "'retained .%.' is not read"),
+        ("size [µm],volume [%]\n4,20\n6,80\n", "write one row for each particle"),
+        ("size [mm],passing [%],passing [%]\n1,0,0\n2,100,100\n", "'passing .%.' is not read"),
+        ("d [px]\n4\n6\n", "unit 'px', which is not a length"),
         ("size,passing [%]\n1,0\n2,100\n", "'size' has no unit"),
         ("passing [%]\n0\n100\n", "no column r"),
     ],
@@ -96,8 +106,14 @@ def test_what_is_no_curve_is_refused_in_one_line(text, pattern, tmp_path, capfd)
     assert "microstructure.packing.file" in err
 
 
+NUMBERED = [
+    f"{name},d [mm]\n4,3\n7,1\n9,2\n" for name in ("id", "Particle ID", "x [mm]", "label")
+] + [f"{name},d [mm]\n4,3\n5,1\n6,2\n" for name in ("No.", "number", "")]
+
+
 @pytest.mark.parametrize(
-    "text", ["d [mm]\n1\n2\n4\n4\n", "d [mm]\n1\n2\n4\n", "d [mm]\n3\n1\n2\n4\n"]
+    "text",
+    ["d [mm]\n1\n2\n4\n4\n", "d [mm]\n1\n2\n4\n", "d [mm]\n3\n1\n2\n4\n", *NUMBERED],
 )
 def test_measured_diameters_are_not_taken_for_sieves(text, tmp_path):
     assert isinstance(read_radii(written(tmp_path, text)), MeasuredRadii)
@@ -174,3 +190,11 @@ def test_check_tells_the_circles_that_it_read(tmp_path, capfd):
     assert (
         "3 circles, diameters from 4.000 mm to 8.000 mm, median 6.000 mm" in capfd.readouterr().out
     )
+
+
+def test_reasons_of_what_was_left_out_are_whole_sentences():
+    small, far = "is smaller than 2 pixels in radius", "overlaps the circle of row {} by {} mm"
+    assert list(kinds([small, far.format(2, 6.59), small, far.format(3, 1), far.format(4, 1)])) == [
+        "3 such as one that overlaps the circle of row 2 by 6.59 mm",
+        "2 since each is smaller than 2 pixels in radius",
+    ]

@@ -280,10 +280,7 @@ def left_out(found: Microstructure | SphereMicrostructure) -> Iterator[str]:
         return
     reasons = [reason for section in found.sections for reason in section.rejected.values()]
     if reasons:
-        told = ", ".join(
-            f"{reason} ({count})"
-            for reason, count in Counter(map(without_numbers, reasons)).most_common(4)
-        )
+        told = "; ".join(kinds(reasons))
         taken = sum(len(section.discs) for section in found.sections)
         yield f"warning: {len(reasons)} of {taken + len(reasons)} particles were left out: {told}"
     if found.share_capped > 0:
@@ -320,9 +317,14 @@ def dense_remark(case: Case) -> Iterator[str]:
         )
 
 
-def without_numbers(reason: str) -> str:
-    """The kind of a reason: each of its numbers an ellipsis."""
-    return re.sub(r"-?\d[\d.e+-]*", "…", reason)
+def kinds(reasons: list[str]) -> Iterator[str]:
+    """The four commonest kinds of reasons, which differ by numbers alone, each with its first."""
+    kind = [re.sub(r"-?\d[\d.e+-]*", "…", reason) for reason in reasons]
+    for name, count in Counter(kind).most_common(4):
+        same = {reason for reason, its in zip(reasons, kind, strict=True) if its == name}
+        first = reasons[kind.index(name)]
+        words = "such as one that" if len(same) > 1 else "since each"
+        yield f"{count} {words} {first}"
 
 
 def crisp_slopes(fragment: str) -> Iterator[str]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from alphacut.case.toml_file import cure
 from alphacut.commands.microstructure import advise
 from alphacut.entry import main
 from alphacut.io import units
@@ -89,6 +90,10 @@ def test_broken_toml_names_its_cure(value, pattern, tmp_path, capfd):
         text.replace('matrix_modulus = "20 GPa"', f"matrix_modulus = {value}", 1), encoding="utf-8"
     )
     refused(["check", str(tmp_path / "c.toml")], pattern, capfd)
+
+
+def test_a_comma_in_a_seed_asks_for_a_whole_number():
+    assert cure("seed = 1,5") == "a whole number"
 
 
 def test_units_with_plain_powers_are_understood():

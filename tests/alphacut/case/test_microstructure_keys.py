@@ -77,7 +77,7 @@ def test_both_area_fractions_and_what_was_left_out_are_told(section, capfd):
         out,
     )
     assert told
-    assert "warning: 2 of 402 particles were left out: lacks a finite number (2)" in err
+    assert "warning: 2 of 402 particles were left out: 2 since each lacks a finite number" in err
 
 
 def test_a_run_warns_of_what_was_left_out_as_well(section, tmp_path, capfd):
