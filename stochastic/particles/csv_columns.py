@@ -202,6 +202,7 @@ def _refuse_surplus(path: Path, number: int, fields: list[str], wanted: int) -> 
 
 
 IDENTIFIER = r"(.* )?(id|label|name|notes?|comment|index)|particle|circle|image|row|[xyz]m?"
+SHAPE = r"area|perim(eter)?|circ(ularity)?|(min)?feret.*|angle|major|minor|ar|round(ness)?|solidity"
 NUMERAL = r"[-+]?(?=[.,]?\d)[\d.,' ]+([eE][-+]?\d+)?\s*%?"
 
 
@@ -212,7 +213,7 @@ def _refuse_unread(path: Path, header: list[str], rows: Rows, read: set[int]) ->
         numbers = [int(field) for field in fields if field.isdecimal()]
         counts_up = len(fields) == len(numbers) > 1 and bool((np.diff(numbers) == 1).all())
         words = re.findall(r"[^\W_]+", re.sub(r"[\[(].*", "", cell).lower())
-        identifies = counts_up or re.fullmatch(IDENTIFIER, " ".join(words))
+        identifies = counts_up or re.fullmatch(f"{IDENTIFIER}|{SHAPE}", " ".join(words))
         if place not in read and not identifies and any(re.fullmatch(NUMERAL, x) for x in fields):
             raise ValueError(
                 f"{path}: column {cell.strip()!r} is not read, and frequencies or shares in it"

@@ -107,7 +107,17 @@ def test_what_is_no_curve_is_refused_in_one_line(text, pattern, tmp_path, capfd)
 
 
 NUMBERED = [
-    f"{name},d [mm]\n4,3\n7,1\n9,2\n" for name in ("id", "Particle ID", "x [mm]", "label")
+    f"{name},d [mm]\n4,3\n7,1\n9,2\n"
+    for name in (
+        "id",
+        "Particle ID",
+        "x [mm]",
+        "label",
+        "Area [mm^2]",
+        "Circ.",
+        "MinFeret",
+        "Feret X",
+    )
 ] + [f"{name},d [mm]\n4,3\n5,1\n6,2\n" for name in ("No.", "number", "")]
 
 
