@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+import pickle
 import re
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
+from matplotlib import pyplot
+
 import alphacut.figures.all
+import alphacut.figures.style
 import alphacut.frame
 import alphacut.frame.decisions.safe_scale
 import alphacut.fuzzy.campaign.workers
@@ -21,6 +25,8 @@ from alphacut.stages import pipeline
 
 def watch(command_modules: Iterable[object], events: list, monkeypatch) -> None:
     """Note every computation, pool, bar and answer of the commands in `events`."""
+    envelope = _remembered(alphacut.frame.envelope)
+    monkeypatch.setattr(alphacut.frame, "envelope", envelope)
     for name, module in (
         ("safe scale", alphacut.frame.decisions.safe_scale),
         ("envelope", alphacut.frame),
@@ -32,13 +38,13 @@ def watch(command_modules: Iterable[object], events: list, monkeypatch) -> None:
     drawings = {alphacut.figures.all: ["a.png"], alphacut.stochastic.figures.all: {}}
     for module, drawn in drawings.items():
         monkeypatch.setattr(module, "draw", _drawing(drawn, events))
-    bar, answer = _bar(events), _answer(events)
-    monkeypatch.setattr(alphacut.fuzzy.campaign.workers, "pool", _pool(events))
+    spies = {"progress": _bar(events), "answer": _answer(events), "pool": _pool(events)}
+    monkeypatch.setattr(alphacut.figures.style, "save", _saving(events))
+    monkeypatch.setattr(alphacut.fuzzy.campaign.workers, "pool", spies["pool"])
     for module in (alphacut.io.progress, pipeline, *command_modules):
-        if hasattr(module, "progress"):
-            monkeypatch.setattr(module, "progress", bar)
-        if hasattr(module, "answer"):
-            monkeypatch.setattr(module, "answer", answer)
+        for name, spy in spies.items():
+            if hasattr(module, name):
+                monkeypatch.setattr(module, name, spy)
 
 
 def _counted(name, real, events):
@@ -47,6 +53,33 @@ def _counted(name, real, events):
         return real(*given, **named)
 
     return spy
+
+
+def _remembered(real):
+    """A function that computes the same call once: an option that goes past it seems idle."""
+    known = {}
+
+    def once(*given, progress=None, **named):
+        key = pickle.dumps((given, sorted(named.items())))
+        if key not in known:
+            known[key] = pickle.dumps(real(*given, **named))
+        return pickle.loads(known[key])
+
+    return once
+
+
+def _saving(events):
+    """A figure's file without the figure: drawing is judged elsewhere."""
+
+    def save(figure, path):
+        events.append("figures")
+        pyplot.close(figure)
+        drawn = path.with_suffix(".png")
+        drawn.parent.mkdir(parents=True, exist_ok=True)
+        drawn.touch()
+        return [drawn]
+
+    return save
 
 
 def _drawing(drawn, events):
