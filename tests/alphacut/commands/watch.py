@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from importlib.util import find_spec
 
 from matplotlib import pyplot
 
@@ -20,13 +21,15 @@ import alphacut.io.progress
 import alphacut.stages.material.modulus
 import alphacut.stochastic.figures.all
 from alphacut.commands import options
+from alphacut.rve.series.model import SeriesModel
 from alphacut.stages import pipeline
+from alphacut.stages.material import references
 
 
 def watch(command_modules: Iterable[object], events: list, monkeypatch) -> None:
     """Note every computation, pool, bar and answer of the commands in `events`."""
-    envelope = _remembered(alphacut.frame.envelope)
-    monkeypatch.setattr(alphacut.frame, "envelope", envelope)
+    for place, function in _pure():
+        monkeypatch.setattr(place, function, _remembered(getattr(place, function)))
     for name, module in (
         ("safe scale", alphacut.frame.decisions.safe_scale),
         ("envelope", alphacut.frame),
@@ -55,12 +58,23 @@ def _counted(name, real, events):
     return spy
 
 
+def _pure():
+    """What is computed once for the same arguments, however often it is asked."""
+    yield alphacut.frame, "envelope"
+    yield references, "gauss_rule"
+    yield SeriesModel, "solve"
+    if find_spec("dolfinx"):
+        from alphacut.rve.prism.model import PrismModel
+
+        yield PrismModel, "solve"
+
+
 def _remembered(real):
     """A function that computes the same call once: an option that goes past it seems idle."""
     known = {}
 
     def once(*given, progress=None, **named):
-        key = pickle.dumps((given, sorted(named.items())))
+        key = (repr(given), pickle.dumps((given[1:], sorted(named.items()))))
         if key not in known:
             known[key] = pickle.dumps(real(*given, **named))
         return pickle.loads(known[key])
