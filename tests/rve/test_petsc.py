@@ -110,3 +110,19 @@ def test_an_interruption_below_petsc_arrives_after_the_solve():
         solver.solve([load])
     assert context.calls > 1
     assert np.allclose(solver.solve([load]).values[:, 0], [1, 1 / 2, 1 / 3])
+
+
+class InterruptedSetUp(Interrupted):
+    """The same while it is set up."""
+
+    def setUp(self, _pc):
+        interrupt()
+        self.calls += 1
+
+
+def test_an_interruption_while_a_solver_is_set_up_arrives_thereafter():
+    matrix = PETSc.Mat().createConstantDiagonal(3, 2.0, comm=PETSc.COMM_SELF)
+    context = InterruptedSetUp()
+    with pytest.raises(KeyboardInterrupt):
+        LinearSolver(matrix, SolverOptions("theta"), context)
+    assert context.calls == 1

@@ -11,8 +11,11 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Envelope, Exact, LinearFlow, MatrixStructure, StoreyFrame, envelope
+from alphacut.frame.methods import auto
+from alphacut.frame.methods.modal import Modal
 from alphacut.frame.modal.exact_response import ExactResponse
 from alphacut.frame.structures.modes import ModalError
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy import Interval, Triangular
 
 FRAME = StoreyFrame((2e4, 1e4), (3.0, 3.0), 25e9, 1e-6, q0=(0.0, 0.01))
@@ -87,3 +90,21 @@ def test_options_that_a_proof_can_keep_do_not_end_it() -> None:
     assert "unproved" not in found(certify=1e-3).facts
     with pytest.raises(ValueError, match="progress is 5; it must be a function"):
         found(progress=5)
+
+
+def test_a_seed_is_that_of_the_search_where_nothing_is_proved(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def unproved(*_: object) -> Envelope:
+        raise UnprovedError("not here")
+
+    def made(**options: Any) -> Modal:
+        seeds.append(options["seed"])
+        return Modal(**options)
+
+    seeds: list[int] = []
+    monkeypatch.setattr(auto, "guaranteed", unproved)
+    monkeypatch.setattr(auto, "Modal", made)
+    inputs = {"E": Triangular(24e9, 25e9, 26e9)}
+    envelope(FRAME, inputs, duration=0.2, step=0.1, alpha=(0,), seed=7)
+    assert seeds == [7]
