@@ -18,6 +18,7 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy.progress_bar import Progress, told
 from alphacut.fuzzy.sets.given import positive
 
 LIMITS = 201
@@ -137,7 +138,7 @@ def exceedance(
     samples: int = 200,
     spread: int = 64,
     rng: np.random.Generator | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | bool | None = None,
 ) -> FuzzyProbability:
     """Fuzzy probability of exceeding a limit when some inputs are random and others fuzzy.
 
@@ -160,7 +161,7 @@ def exceedance(
         samples: Random draws.
         spread: Points of the box besides its corners, per level.
         rng: Source of the draws; seeded with 0 unless given.
-        progress: Called with the fraction done.
+        progress: As for `envelope`.
 
     Raises:
         ValueError: A parameter is both fuzzy and random, or the limit is not positive.
@@ -197,22 +198,11 @@ def exceedances(
     samples: int = 200,
     spread: int = 64,
     rng: np.random.Generator | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | bool | None = None,
 ) -> dict[str, FuzzyProbability]:
     """Fuzzy probabilities of exceeding several limits, from the same trajectories, as `exceedance`.
 
-    Args:
-        system: The structure.
-        inputs: Fuzzy parameters.
-        random: Samplers of random parameters by name.
-        limits: Magnitude that each output must not exceed, in its unit, by output.
-        duration: Length of the simulation, in s.
-        step: Distance of nodes, in s.
-        alpha: Levels.
-        samples: Random draws.
-        spread: Points of the box besides its corners, per level.
-        rng: Source of the draws; seeded with 0 unless given.
-        progress: Called with the fraction done.
+    Its arguments are the same, with the limits in their units by output in place of one.
 
     Returns:
         One for each output, and beside several `ANY`: that any limit is exceeded, over shares of
@@ -237,22 +227,23 @@ def exceedances(
     spaced = tried[0][:: -(-len(tried[0]) // LOOKED_AT)]
     few = np.array([[*point, *draw] for point in spaced for draw in draws[:LOOKED_AT]])
     between = stray(flow, few)
-    for point in np.concatenate(tried):
-        size = np.abs(flow.values(np.hstack([np.tile(point, (len(draws), 1)), draws])))
-        found.append(size.max(1)[:, columns] / sizes)
-        higher.append(within_steps(size, between).max(1)[:, columns] / sizes)
-        if progress:
-            progress(len(found) / total)
+    with told(progress) as tell:
+        for point in np.concatenate(tried):
+            size = np.abs(flow.values(np.hstack([np.tile(point, (len(draws), 1)), draws])))
+            found.append(size.max(1)[:, columns] / sizes)
+            higher.append(within_steps(size, between).max(1)[:, columns] / sizes)
+            if tell:
+                tell(len(found) / total)
     of = np.repeat(np.arange(len(tried)), [len(points) for points in tried])
     peak, more = np.array(found), np.array(higher)  # (points, draws, limits)
-    told = [
+    each = [
         _probability(peak[..., k], more[..., k], of, size, random=bool(random), alpha=cuts.alpha)
         for k, size in enumerate(sizes)
     ]
-    if len(told) > 1:
+    if len(each) > 1:
         parts = peak.max(-1), more.max(-1)
-        told.append(_probability(*parts, of, 1.0, random=bool(random), alpha=cuts.alpha))
-    return dict(zip((*limits, ANY), told, strict=False))
+        each.append(_probability(*parts, of, 1.0, random=bool(random), alpha=cuts.alpha))
+    return dict(zip((*limits, ANY), each, strict=False))
 
 
 def _limits_of(

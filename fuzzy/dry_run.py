@@ -140,22 +140,8 @@ def explain(
 ) -> Explanation:
     """Preview of `propagate` with the same arguments; nothing is run or written.
 
-    Args:
-        function: Not called; may be left out, so that the inputs come first.
-        inputs: Fuzzy number of each input; a plain number is crisp.
-        plan: How the boxes of the inputs are searched; if not given, a search that sees extremes
-            inside and says what was verified.
-        alpha: Rising levels; 0, ¼, ½, ¾, 1 if not given.
-        interactions: Constraints between the inputs.
-        shared: Inputs whose equality lets samples share one call.
-        vectorised: Whether the function takes arrays.
-        workers: Changes nothing here.
-        executor: Changes nothing here.
-        known: Facts about the model.
-        store: Where samples are kept, if there.
-        identity: What a sample depends on besides its inputs.
-        spot_check: Changes nothing here.
-        progress: Changes nothing here.
+    The function is not called and may be left out, so that the inputs come first; `workers`,
+    `executor`, `spot_check` and `progress` change nothing.
 
     Raises:
         ValueError: An argument is wrong.

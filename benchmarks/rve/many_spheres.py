@@ -167,6 +167,16 @@ def parser() -> argparse.ArgumentParser:
     return found
 
 
+def require(options: argparse.Namespace) -> None:
+    """Raise ValueError for a number out of its range that nothing else refuses in time."""
+    for name, least in (("draws", 1), ("seed", 0), ("workers", 1)):
+        if (value := getattr(options, name)) < least:
+            raise ValueError(f"--{name} is {value}; it must be {least} or more")
+    few, many = options.spheres
+    if many < 2 * few:
+        raise ValueError(f"--spheres is {few} {many}; the second must be twice the first or more")
+
+
 def random_cells(options: argparse.Namespace) -> list[RandomCells]:
     """Cells of both sizes, their radii log-normal over a factor of ten."""
     law = LogNormalRadii(1e-3, 1e-2)
@@ -191,10 +201,15 @@ def grids_hold(draws: int, seed: int) -> bool:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Compute, write, print; exit 1 where the grids' error does not cover."""
+    """Compute, write, print; exit 1 where the grids' error does not cover, 2 for bad input."""
     options = parser().parse_args(arguments)
+    try:
+        require(options)
+        phases, sizes = (Phase(20e9), Phase(20e9 * options.contrast)), random_cells(options)
+    except ValueError as error:
+        print(f"many_spheres: {error}", file=sys.stderr)
+        return 2
     hold = grids_hold(options.draws, options.seed)
-    phases, sizes = (Phase(20e9), Phase(20e9 * options.contrast)), random_cells(options)
     start = perf_counter()
     found = random_material(
         *sizes, phases[0], phases[1], seed=options.seed, workers=options.workers

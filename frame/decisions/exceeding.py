@@ -15,13 +15,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.decisions.safe_scale import Progress, SafeScale, limit_search, safe_scale
+from alphacut.frame.decisions.safe_scale import SafeScale, limit_search, safe_scale
 from alphacut.frame.decisions.sure_exceeding import sure_exceeding
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arguments import fuzzy_inputs
 from alphacut.fuzzy.counted import ranged
 from alphacut.fuzzy.knowledge.joint import JointClaim, joined_once
+from alphacut.fuzzy.progress_bar import Progress
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +67,7 @@ def exceeding(
     step: float,
     lowest: float = 0.0,
     workers: int = 1,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Exceeding:
     """Bounds of the possibility and the necessity that some |output| exceeds its limit at a node.
 
@@ -79,7 +80,7 @@ def exceeding(
         step: Distance of nodes, in s.
         lowest: Lowest level that the inputs decide.
         workers: Processes of the proof.
-        progress: Called with the fraction done.
+        progress: As for `envelope`.
 
     Raises:
         ValueError: A limit is not positive, or an input is no parameter.

@@ -9,7 +9,7 @@ smaller scale alone, since a box holds the smaller ones.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from alphacut.frame.decisions.limit_search import LEAST, LimitSearch, Reach, unp
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.structures.storey import StoreyFrame
+from alphacut.fuzzy.progress_bar import Progress, told
 from alphacut.fuzzy.sets.given import finite_by_name, positive
 
 GAP = 1e-3
@@ -29,7 +30,6 @@ EASY = (1.0, 0.3)
 """The same as shares of that, tried first: they serve where the largest box is far from limits."""
 SHRINK = (0.004, 0.008, 0.015, 0.03, 0.06, 0.12, 0.25, 0.5, 0.75)
 """By how much the box to be proved is smaller than the refuted one, until all is proved."""
-Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,7 @@ def safe_scale(
     precision: float = 1e-3,
     budget: float = 100,
     workers: int = 1,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> SafeScale:
     """Largest scale of a family of boxes in which every |output| stays at most at its limit.
 
@@ -100,7 +100,7 @@ def safe_scale(
         precision: Relative precision of the refuted scale.
         budget: Most boxes per node on average at each scale that is tried.
         workers: Processes of the proof.
-        progress: Called with the fraction done.
+        progress: As for `envelope`.
 
     Raises:
         ValueError: A limit is not positive, or the largest box reaches values without a meaning.
@@ -115,13 +115,14 @@ def safe_scale(
         box, shares = (centre, centre), (nominal_share, nominal_share)
         worth = ("guaranteed", "")
         return SafeScale(names, centre, None, *box, 0.0, centre, *shares, *worth, 0, seconds)
-    done, boxes = _easily(search, 1 - nominal_share, most, budget, workers)
     safe, unsafe, witness = most, np.inf, None
-    if not done:
-        search.gap = min(GAP, FINE * (1 - nominal_share))
-        refuted = _refuted(search, most, precision)
-        safe, unsafe, witness, more = _proved(search, refuted, most, budget, workers, progress)
-        boxes += more
+    with told(progress) as tell:
+        done, boxes = _easily(search, 1 - nominal_share, most, budget, workers)
+        if not done:
+            search.gap = min(GAP, FINE * (1 - nominal_share))
+            refuted = _refuted(search, most, precision)
+            safe, unsafe, witness, more = _proved(search, refuted, most, budget, workers, tell)
+            boxes += more
     share = 0.0 if witness is None else search.share(witness)
     worth = ("verified by sampling" if search.reason else "guaranteed", search.reason)
     seconds = time.perf_counter() - begun

@@ -16,10 +16,11 @@ from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arguments import fuzzy_inputs, known_facts
 from alphacut.fuzzy.campaign.call import Call, Function
-from alphacut.fuzzy.campaign.campaign import Campaign, Progress
+from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.plan import Plan
 from alphacut.fuzzy.plans.transformation import Reduced
+from alphacut.fuzzy.progress_bar import Progress, told
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
@@ -145,7 +146,7 @@ class IntervalQuasiMonteCarlo:
         alpha: Sequence[float],
         vectorised: bool = False,
         known: Known | None = None,
-        progress: Progress | None = None,
+        progress: Progress | bool | None = None,
     ) -> IntervalResponse:
         """Bound the response at every point and level.
 
@@ -156,7 +157,7 @@ class IntervalQuasiMonteCarlo:
             alpha: Rising levels from 0 to 1.
             vectorised: Whether the function takes arrays.
             known: Facts about the function.
-            progress: Called with the share done, 0 … 1.
+            progress: As for `propagate`.
 
         Raises:
             ValueError: There is no random input, an input is named twice, or the levels do not rise
@@ -181,14 +182,15 @@ class IntervalQuasiMonteCarlo:
             Call(function, (*random, *inputs), vectorised=vectorised), known=facts, stepwise=True
         )
         response = _Gathered()
-        for k in range(self.points):
-            drawn = {
-                name: _number(alpha, [cut[0][k] for cut in cuts], [cut[1][k] for cut in cuts])
-                for name, cuts in ends.items()
-            }
-            response.add(self.plan.run(campaign, Domain({**drawn, **fuzzy}, alpha)), facts)
-            if progress:
-                progress((k + 1) / self.points)
+        with told(progress) as tell:
+            for k in range(self.points):
+                drawn = {
+                    name: _number(alpha, [cut[0][k] for cut in cuts], [cut[1][k] for cut in cuts])
+                    for name, cuts in ends.items()
+                }
+                response.add(self.plan.run(campaign, Domain({**drawn, **fuzzy}, alpha)), facts)
+                if tell:
+                    tell((k + 1) / self.points)
         return response.response(tuple(alpha))
 
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,6 +44,7 @@ CUT = 1.2
 CUT_OFF = "is cut by the image's edge"
 LOST = 0.02  # share of the particles' area that may be left out
 MISFIT = 0.09  # share of the particles' pixels that may lie outside the circle of their piece
+UNEVEN = 1 / 3  # of the contrast, by which the brightness of the image's quarters may differ
 FLATTENED = 0.45  # roundness of a disc that several neighbours overlap
 PARTICLES = ("auto", "bright", "dark")
 
@@ -142,23 +143,22 @@ class SectionImage:
         if not found:
             raise ValueError(
                 f"{self.path} shows no round particle of {self.smallest:g} pixels or more in radius"
-                f" ({_counted(rejected)}); particles that are not round need the image itself as"
-                " the cell: [cell] image"
+                f" ({_counted(rejected)}); {self._cure(picture, share, '')}"
             )
         fraction = float(share.mean())
         missing = lost / share.sum()
         if missing > LOST and not self.drop:
             raise ValueError(
                 f"{self.path} shows particles on {fraction:.4f} of its area, and {missing:.1%} of"
-                f" that lies in pieces that were left out ({_counted(rejected)}): take the image"
-                " itself as the cell ([cell] image), or drop them (drop = true)"
+                f" that lies in pieces that were left out ({_counted(rejected)});"
+                f" {self._cure(picture, share, ', or drop them (drop = true)')}"
             )
         if misfit > MISFIT and not self.drop:
             raise ValueError(
                 f"{self.path} shows particles on {fraction:.4f} of its area, and {misfit:.1%} of"
                 f" that lies outside the circles that would stand for them, where discs that touch"
-                f" leave less than {MISFIT:.0%}: the particles are not round; take the image itself"
-                " as the cell ([cell] image), or go on with the circles (drop = true)"
+                f" leave less than {MISFIT:.0%}: the particles are not round;"
+                f" {self._cure(picture, share, ', or go on with the circles (drop = true)')}"
             )
         (row, column, radius), (height, width) = np.array(found).T, picture.shape
         centres = np.stack([column + 0.5, height - row - 0.5], axis=1)
@@ -166,6 +166,23 @@ class SectionImage:
         size = np.array([width, height]) * self.pixel
         discs = Discs(centres, radius * self.pixel, size, periodic=False)
         return MeasuredCircles(discs, rejected, fraction, missing, misfit)
+
+    def _cure(self, picture: Array, share: Array, besides: str) -> str:
+        """What helps where pieces are not round: other phase, even light, the image as the cell."""
+        other = "dark" if np.vdot(share - share.mean(), picture) > 0 else "bright"
+        turned = replace(self, particles=other)
+        seen = turned._segmented(picture)
+        found, _, lost, misfit = turned._sorted(*seen)
+        if found and lost <= LOST * seen[0].sum() and misfit <= MISFIT:
+            return f'the {other} phase is round: take it as the particles (particles = "{other}")'
+        halves = [half for rows in np.array_split(share, 2) for half in np.array_split(rows, 2, 1)]
+        if (apart := float(np.ptp([quarter.mean() for quarter in halves]))) > UNEVEN:
+            return (
+                f"the light is uneven, the quarters' brightness is {apart:.2f} of the contrast"
+                " apart: subtract the background in the program that makes the image"
+            )
+        cell = "particles that are not round need the image itself as the cell ([cell] image)"
+        return cell + besides
 
     def _sorted(
         self, share: Array, labels: Labels

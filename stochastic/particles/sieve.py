@@ -18,7 +18,7 @@ from alphacut.stochastic.particles.csv_columns import length_columns, share_colu
 from alphacut.stochastic.particles.radius_laws import MeasuredRadii, RadiusLaw
 from alphacut.stochastic.theta.truncated_normal import Array
 
-PASSING = "passing"
+PASSING, RETAINED = "passing", "retained"
 SIEVES = (
     *(0.063, 0.075, 0.125, 0.15, 0.18, 0.212, 0.25, 0.3, 0.355, 0.425, 0.5, 0.6, 0.71, 0.85, 1.0),
     *(1.18, 1.4, 1.7, 2.0, 2.36, 2.8, 3.35, 4.0, 4.75, 5.6, 6.3, 6.7, 8.0, 9.5, 10.0, 11.2, 12.5),
@@ -119,7 +119,8 @@ class SieveRadii:
 def read_radii(path: Path, power: int = 2) -> RadiusLaw:
     """The law of the radii in a CSV file: a list of them, or a sieve curve.
 
-    A list has a column r or d with its unit, a sieve curve a column ``passing [%]`` beside it.
+    A list has a column r or d with its unit, a sieve curve a column ``passing [%]`` beside it. What
+    each sieve retains, alone or with those above, may stand there too if it says the same.
 
     Args:
         path: The file.
@@ -133,17 +134,41 @@ def read_radii(path: Path, power: int = 2) -> RadiusLaw:
         law = MeasuredRadii.read(path)
         _refuse_sieves(path, law)
         return law
-    sizes = length_columns(path, ("r",), also=(PASSING,))
+    retained = share_column(path, RETAINED)
+    also = (PASSING,) if retained is None else (PASSING, RETAINED)
+    sizes = length_columns(path, ("r",), also=also)
     radii, shares = sizes.values[:, 0], passing
     known = np.isfinite(radii) & np.isfinite(shares) & (radii > 0)
     if not known.all():
         row = int(sizes.rows[np.argmin(known)])
         raise ValueError(f"{path}: row {row} holds no positive size and share that passes it")
     order = np.argsort(radii, kind="stable")
+    if retained is not None:
+        _refuse_contradiction(path, 2e3 * radii[order], shares[order], retained[order])
     try:
         return SieveRadii(tuple(radii[order]), tuple(shares[order]), power, path.name)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
+
+
+def _refuse_contradiction(path: Path, sizes: Array, passing: Array, retained: Array) -> None:
+    """Refuse shares retained that do not follow from those that pass rising sizes in mm, (n,)."""
+    digits = min(_digits(passing), _digits(retained))
+    either = np.array([np.append(passing[1:], 1.0) - passing, 1.0 - passing])
+    apart = np.where(np.isfinite(retained), np.abs(either - retained), 0.0)
+    nearer = int(apart.max(1).argmin())
+    row = int(apart[nearer].argmax())
+    if apart[nearer, row] > 0.0151 / 10**digits:  # half a digit each of three that are rounded
+        raise ValueError(
+            f"{path}: column 'retained' has {retained[row]:.4%} at {sizes[row]:g} mm, where passing"
+            f" leaves {either[nearer, row]:.4%}; correct one of the two, or remove the column"
+        )
+
+
+def _digits(shares: Array) -> int:
+    """Digits behind the point that shares have as percentages."""
+    known = shares[np.isfinite(shares)]
+    return next((k for k in range(6) if np.allclose(known, known.round(k + 2))), 6)
 
 
 def _refuse_sieves(path: Path, law: MeasuredRadii) -> None:

@@ -1,13 +1,19 @@
 """Progress moves from the first sample to the last; what is interrupted says what it keeps."""
 
+import inspect
 import io
 import re
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
+import numpy as np
 import pytest
 
+from alphacut import frame, fuzzy
+from alphacut.frame.decisions.exceeding import exceeding
+from alphacut.frame.decisions.safe_scale import safe_scale as frame_safe_scale
+from alphacut.frame.exceedance import exceedance, exceedances
 from alphacut.fuzzy import (
     Automatic,
     Chebyshev,
@@ -139,3 +145,71 @@ def test_what_to_measure_next_takes_an_executor_and_a_store(tmp_path):
     ran = len(calls)
     assert measure_next(counted, X, Reduced(), **given) == plain
     assert len(calls) - ran < ran  # of each answer one stored sample is run again
+
+
+def taking_progress():
+    """Functions and methods of the library that a user hands `progress` to."""
+    given = [getattr(room, name) for room in (frame, fuzzy) for name in room.__all__]
+    given += [exceedance, exceedances, exceeding, frame_safe_scale, measure_next]
+    given += [method for one in given if inspect.isclass(one) for method in vars(one).values()]
+    for one in given:
+        if inspect.isfunction(one) and "progress" in inspect.signature(one).parameters:
+            yield one
+
+
+def test_every_function_takes_the_same_progress():
+    asked = {
+        one.__qualname__: inspect.signature(one).parameters["progress"].annotation
+        for one in taking_progress()
+    }
+    assert {"propagate", "envelope", "exceedance", "IntervalQuasiMonteCarlo.run"} <= set(asked)
+    inner = ("GraphFollower.run", "GraphFollower.follow", "GraphFollower._sweep")
+    left = {name: given for name, given in asked.items() if name not in (*inner, "explain")}
+    assert {name for name, given in left.items() if given != "Progress | bool | None"} == set()
+
+
+def uniform(u, m):
+    return m * u
+
+
+def reach(size):
+    return np.array([2.5e10 - size * 1e9]), np.array([2.5e10 + size * 1e9])
+
+
+BUILDING = frame.StoreyFrame([1e3], [3.0], 2.5e10, 1e-6, v0=[0.5])
+MODULUS, TIME = {"E": Triangular(2.4e10, 2.5e10, 2.6e10)}, {"duration": 0.2, "step": 0.01}
+LIBRARY = {
+    "probability": lambda tell: exceedance(
+        BUILDING, MODULUS, {}, limit=0.01, alpha=(0,), spread=4, progress=tell, **TIME
+    ),
+    "safe scale": lambda tell: frame_safe_scale(
+        BUILDING, {"E": 2.5e10}, reach, {"q1": 0.086}, progress=tell, **TIME
+    ),
+    "decision": lambda tell: exceeding(BUILDING, MODULUS, {"q1": 0.086}, progress=tell, **TIME),
+    "quasi-Monte Carlo": lambda tell: fuzzy.IntervalQuasiMonteCarlo(points=2).run(
+        bent,
+        {"y": fuzzy.RandomInput(uniform, {"m": X["y"]})},
+        {"x": X["x"]},
+        alpha=(0, 1),
+        progress=tell,
+    ),
+}
+
+
+@pytest.mark.parametrize("ask", LIBRARY.values(), ids=LIBRARY)
+def test_the_bar_is_there_unless_it_is_switched_off(ask, monkeypatch):
+    screen = io.StringIO()
+    screen.isatty = lambda: True
+    monkeypatch.setattr(sys, "stderr", screen)
+    monkeypatch.setattr(progress_bar, "_WAIT", 0.0)
+    ask(False)
+    assert not screen.getvalue()
+    shares = []
+    ask(shares.append)
+    assert not screen.getvalue()
+    for progress in (None, True):
+        ask(progress)
+        assert bool(screen.getvalue()) == bool(shares)
+    with pytest.raises(ValueError, match="it must be a function of the share done"):
+        ask("bar")
+    assert shares

@@ -68,3 +68,25 @@ def test_discs_that_touch_are_covered_by_their_circles_and_ellipses_are_not(dark
     assert found.misfit > 1.2 * MISFIT
     with pytest.raises(ValueError, match=r"lies outside the circles that would stand for them"):
         SectionImage("e.png", 1.0, kind, roundness=0.2).circles(picture)
+
+
+def test_the_wrong_phase_is_named_and_naming_it_ends_the_refusal():
+    y, x = np.mgrid[:200, :200]
+    centres = [(50, 50), (50, 140), (140, 60), (145, 145), (100, 100)]
+    grey = np.sum([(x - a) ** 2 + (y - b) ** 2 < 18**2 for a, b in centres], axis=0)
+    for kind, other, sign in (("dark", "bright", 1.0), ("bright", "dark", -1.0)):
+        with pytest.raises(ValueError, match=f'the {other} phase is round: .*"{other}".$') as told:
+            SectionImage("phase.png", 1.0, kind).circles(sign * grey)
+        assert "drop" not in str(told.value)
+        assert len(SectionImage("phase.png", 1.0, other).circles(sign * grey).discs) == 5
+
+
+def test_uneven_light_is_named_and_evening_it_ends_the_refusal():
+    y, x = np.mgrid[:200, :200]
+    centres = [(50, 50), (50, 140), (140, 60), (145, 145), (100, 100)]
+    grey = np.sum([(x - a) ** 2 + (y - b) ** 2 < 18**2 for a, b in centres], axis=0)
+    for light in ((x + y) / 200, -(x + y) / 200, x / 50):
+        with pytest.raises(ValueError, match=r"light is uneven.*subtract the background") as told:
+            SectionImage("light.png", 1.0, "bright").circles(grey + light)
+        assert "drop" not in str(told.value)
+    assert len(SectionImage("light.png", 1.0, "bright").circles(grey).discs) == 5

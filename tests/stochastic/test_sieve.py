@@ -60,6 +60,9 @@ def test_drawn_particles_hold_the_volume_that_each_sieve_passes(power, tmp_path)
         "# a comment\nd [cm];passing\n0,1;0\n0,2;0,25\n0,4;0,6\n0,8;0,6\n1,6;1\n",
         "r [mm],passing [1]\n0.5,0\n1,0.25\n2,0.6\n4,0.6\n8,1\n",
         "D [mm],Passing\n1,0\n2,25\n4,60\n8,60\n16,100\n",
+        "d [mm],retained [%],passing [%]\n1,25,0\n2,35,25\n4,0,60\n8,40,60\n16,0,100\n",
+        "d [mm],passing [%],retained [1]\n16,100,0\n8,60,0.4\n4,60,\n2,25,0.35\n1,0,0.25\n",
+        "d [mm],passing [%],retained [%]\n1,0,100\n2,25,75\n4,60,40\n8,60,40\n16,100,0\n",
     ],
 )
 def test_the_same_curve_in_other_words(text, tmp_path):
@@ -88,6 +91,11 @@ def test_the_same_curve_in_other_words(text, tmp_path):
         ("d [µm],count per image\n4,20\n6,9\n", "'count per image' is not read"),
         (",d [µm]\n7,4\n7,6\n", "column '' is not read"),
         ("size [µm],retained [%]\n4,20\n6,80\n", "'retained .%.' is not read"),
+        (
+            "size [mm],passing [%],retained [%]\n1,0,25\n2,25,35\n4,60,12\n8,100,0\n",
+            r"column 'retained' has 12.0000% at 4 mm, where passing leaves 40.0000%; correct one",
+        ),
+        ("size [mm],passing [%],retained [g]\n1,0,2\n2,100,0\n", "'retained' has the unit 'g'"),
         ("size [µm],volume [%]\n4,20\n6,80\n", "write one row for each particle"),
         ("size [mm],passing [%],passing [%]\n1,0,0\n2,100,100\n", "'passing .%.' is not read"),
         ("d [px]\n4\n6\n", "unit 'px', which is not a length"),
@@ -127,6 +135,28 @@ NUMBERED = [
 )
 def test_measured_diameters_are_not_taken_for_sieves(text, tmp_path):
     assert isinstance(read_radii(written(tmp_path, text)), MeasuredRadii)
+
+
+@pytest.mark.parametrize(
+    ("passing", "retained", "agree"),
+    [
+        ("0,33,67,100", "33.4,33.3,33.3,0", True),
+        ("0,33.3,66.7,100", "33.3,33.4,33.3,0", True),
+        ("0,33.3,66.7,100", "33.3,33.4,33.0,0", False),
+        ("0,33,67,100", "33,33,32,0", True),
+        ("0,33.33,66.67,100", "33,33,33,0", True),
+        ("0,33,67,100", "36,33,31,0", False),
+    ],
+)
+def test_what_is_retained_may_differ_by_rounding(passing, retained, agree, tmp_path):
+    columns = zip((1, 2, 4, 8), passing.split(","), retained.split(","), strict=True)
+    rows = "".join(f"{size},{one},{other}\n" for size, one, other in columns)
+    path = written(tmp_path, "size [mm],passing [%],retained [%]\n" + rows)
+    if agree:
+        assert isinstance(read_radii(path), SieveRadii)
+    else:
+        with pytest.raises(ValueError, match="column 'retained' has"):
+            read_radii(path)
 
 
 def test_a_packing_of_a_curve_covers_what_it_says(tmp_path):

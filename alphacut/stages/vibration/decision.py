@@ -84,6 +84,7 @@ def _decisions(
             step=task.step,
             lowest=task.alpha[0],
             workers=workers,
+            progress=False,
         )
 
     each, least = {}, {one.output: one.value for one in sorted(limits, key=lambda x: -x.value)}

@@ -206,7 +206,7 @@ def exceedance(case: Case, wanted: Structure, progress: Tick | None = None) -> x
         alpha=over.alpha,
         samples=limited.samples,
         rng=np.random.default_rng(limited.seed),
-        progress=progress,
+        progress=progress or False,
     )
     facts = {
         "fuzzy": ", ".join(fuzzy),

@@ -151,7 +151,7 @@ def tolerances(
         step=over.step,
         most=most,
         workers=workers,
-        progress=progress,
+        progress=progress or False,
     )
     if cell is not None and found.safe and "E" in inputs:
         found = _within_cell(found, cell, list(inputs).index("E"))
