@@ -1,65 +1,95 @@
-"""Fuzzy inputs of a case as they were read: the shape of each, and its values."""
+"""Quantities of a case as they were read, fuzzy or not, and its limits."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
+from itertools import groupby
 
 from alphacut.case.case import Case
 from alphacut.case.key import Section, keys_of
+from alphacut.case.limits import exceeded_limits, limits_of, storey_height
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.sets.numbers import Interval, Trapezoidal, Triangular
 from alphacut.io.units import engineering
 
-SHAPES = {Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
+SHAPES = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
 FILED = {"picture": "cell"}  # sections that the file calls otherwise
 
 
 @dataclass(frozen=True)
 class Reading:
-    """One fuzzy input.
+    """One quantity.
 
     Args:
-        key: Full name of its key; of a list with the number of the entry, from 1.
-        shape: interval, triangle or trapezoid.
-        values: Its two to four values, rising, in SI.
+        key: Full name of its key; of a list with the numbers of the entries, from 1; of a limit
+            with its output.
+        shape: crisp, interval, triangle, trapezoid, or limit.
+        values: Its one to four values, rising, in SI.
         unit: SI unit.
+        beside: What else a limit amounts to, in words.
     """
 
     key: str
     shape: str
     values: tuple[float, ...]
     unit: str
+    beside: str = ""
 
     def __str__(self) -> str:
-        """The input in words."""
+        """The quantity in words."""
         told = " … ".join(engineering(value, self.unit) for value in self.values)
-        return f"{self.key}: {self.shape} {told}"
+        shape = f"{self.shape} " if len(self.values) > 1 else ""
+        return f"{self.key}: {shape}{told}{self.beside}"
 
 
 def readings(case: Case) -> Iterator[Reading]:
-    """Every input of a case that is not crisp and stands in the file."""
+    """Every quantity that stands in the file, and every limit."""
+    from alphacut.frame.outputs import output_unit
+
     for entry in fields(case.sections):
         section = getattr(case.sections, entry.name)
         if isinstance(section, Section):
             yield from _of(section, FILED.get(entry.name, entry.name), case)
+    for key, output, limit in limits(case):
+        height = storey_height(case, output)
+        beside = f", {100 * limit / height:.3g} % of the storey's height" if height else ""
+        yield Reading(f"{key} limit of {output}", "limit", (limit,), output_unit(output), beside)
+
+
+def limits(case: Case) -> Iterator[tuple[str, str, float]]:
+    """Section, output and value in SI of each limit of a case."""
+    if case.sections.exceedance:
+        yield from (("exceedance", *one) for one in exceeded_limits(case).items())
+    if case.sections.decision:
+        yield from (("decision", one.output, one.value) for one in limits_of(case))
 
 
 def _of(section: Section, name: str, case: Case) -> Iterator[Reading]:
     for key, about in keys_of(type(section)).items():
-        if f"{name}.{key}" not in case.written or not about.kind.startswith("fuzzy"):
+        fuzzy = about.kind.startswith("fuzzy")
+        if f"{name}.{key}" not in case.written or not (fuzzy or about.unit):
             continue
-        value = getattr(section, key)
+        value = getattr(section, key, None)
         listed = value if isinstance(value, tuple) else (value,)
-        for number, one in enumerate(listed, start=1):
-            if isinstance(one, FuzzyNumber) and not isinstance(one, Crisp):
-                full = f"{name}.{key}" + (f" {number}" if len(listed) > 1 else "")
-                yield Reading(full, *_shape(one), about.unit)
+        for one, places in _alike(listed):
+            more = f" to {places[-1]}" if len(places) > 1 else ""
+            full = f"{name}.{key}" + (f" {places[0]}{more}" if len(listed) > 1 else "")
+            yield Reading(full, *_shape(one), about.unit)
+
+
+def _alike(listed: Sequence[object]) -> Iterator[tuple[FuzzyNumber, Sequence[int]]]:
+    """Numbers of a list with their places, from 1; crisp ones that follow each other are one."""
+    numbers = [Crisp(one) if isinstance(one, float) else one for one in listed]
+    placed = [(k, one) for k, one in enumerate(numbers, start=1) if isinstance(one, FuzzyNumber)]
+    for _, run in groupby(placed, lambda pair: pair[isinstance(pair[1], Crisp)]):
+        alike = list(run)
+        yield alike[0][1], [k for k, _ in alike]
 
 
 def _shape(number: FuzzyNumber) -> tuple[str, tuple[float, ...]]:
     """Name of a shape and its values, rising; a triangle has one modal value."""
     (low, high), (left, right) = number.support, number.cut(1.0)
     shape = SHAPES[type(number)]
-    middle = {"interval": (), "triangle": (left,), "trapezoid": (left, right)}[shape]
-    return shape, (low, *middle, high)
+    values = {"crisp": (low,), "interval": (low, high), "triangle": (low, left, high)}
+    return shape, values.get(shape, (low, left, right, high))

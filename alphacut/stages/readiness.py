@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from alphacut.case.case import Case
+from alphacut.case.limits import storey_height
 from alphacut.case.names import named_inputs
+from alphacut.case.readings import limits, readings
 from alphacut.fuzzy import FuzzyNumber, Interval, Triangular
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.units import STANDARD_GRAVITY, engineering
@@ -28,8 +30,13 @@ if TYPE_CHECKING:
 
 PERIODS = (0.02, 30.0)  # s, from a stiff machine frame to the slenderest towers
 MODULI = (1e5, 2e12)  # Pa, from soft gels to diamond
+BUILT = (1e9, 1e12)  # Pa, of what frames are made of
 CONTRAST = 1000.0  # between the phases
-STRONGEST = 50.0  # m/s², more than any ground acceleration recorded
+DRIFTS = (1e-5, 0.2)  # of the storey's height
+ANY = (0.0, math.inf)
+LIMITS = {"m": (1e-6, 20.0), "m/s": (1e-4, 50.0), "m/s^2": (1e-3, 500.0), "N": (1.0, 1e9)}
+PEAKS = (0.003, 30.0)  # m/s², of the ground, from the weakest record to the strongest
+DESIGNED = (0.5, 15.0)  # m/s², the same of records that structures are designed for
 
 
 @dataclass(frozen=True)
@@ -68,17 +75,10 @@ def ready(case: Case) -> Readiness:
         study_of(case)
     stand_in = modulus.stand_in(case) if "modulus" in case.stages or case.stand_ins else None
     if "envelope" not in case.stages:
-        if "modulus" in case.stages and case.stand_ins:
-            given = ", ".join(case.stand_ins)
+        if "modulus" in case.stages and (given := ", ".join(case.stand_ins)):
             what = f"there is nothing to compute: {given} stands in for stage modulus"
-            raise BadInput(
-                Problem(
-                    "stages",
-                    what,
-                    str(list(case.stages)),
-                    'stages = ["modulus", "envelope"], with a structure',
-                )
-            )
+            cure = 'stages = ["modulus", "envelope"], with a structure'
+            raise BadInput(Problem("stages", what, str(list(case.stages)), cure))
         return Readiness((*shape(case), *dense, *unlikely_material(case)))
     if problems := list(lacking(case)):
         raise BadInput(problems)
@@ -99,6 +99,7 @@ def ready(case: Case) -> Readiness:
         *unlikely_material(case),
         *outlasted(case, ground),
         *unlikely(case, ground, period),
+        *odd(case),
         *unproved(case, wanted),
     )
     return Readiness(remarks, tuple(found), period, wanted)
@@ -161,12 +162,30 @@ def unlikely(case: Case, ground: Accelerogram | None, period: float | None) -> I
             f"a first natural period of {period:.3g} s is unusual for a structure; check the units"
             " of masses, lengths and moduli"
         )
-    peak = 0.0 if ground is None else float(abs(ground.acceleration).max())
-    if peak > STRONGEST:
-        yield (
-            f"{record_key(case)}: a peak of {peak:.3g} m/s² is above any earthquake recorded; check"
-            " the unit in its header"
-        )
+    if ground is not None:
+        peak = float(abs(ground.acceleration).max())
+        if not PEAKS[0] <= peak <= PEAKS[1]:
+            told = f"a peak of {peak:.3g} m/s² is unusual for the ground"
+            yield f"{record_key(case)}: {told}; check the unit in its header"
+
+
+def odd(case: Case) -> Iterator[str]:
+    """Remarks on moduli of a structure and on limits that most likely have the wrong unit."""
+    from alphacut.frame.outputs import output_unit
+
+    for one in readings(case):
+        if one.unit == "Pa" and one.key.startswith(("frame.", "tower.")):
+            yield from unlike(one.key, one.values[0], one.unit, BUILT, "a frame")
+    for section, output, value in limits(case):
+        height, unit = storey_height(case, output), output_unit(output)
+        usual = (DRIFTS[0] * height, DRIFTS[1] * height) if height else LIMITS.get(unit, ANY)
+        yield from unlike(f"{section}: the limit of {output}", value, unit, usual, "one")
+
+
+def unlike(key: str, value: float, unit: str, usual: tuple[float, float], of: str) -> Iterator[str]:
+    """A remark on a value outside what is usual."""
+    if not usual[0] <= value <= usual[1]:
+        yield f"{key}: {engineering(value, unit)} is unusual for {of}; check its unit"
 
 
 def unlikely_material(case: Case) -> Iterator[str]:
@@ -174,16 +193,12 @@ def unlikely_material(case: Case) -> Iterator[str]:
     if phases := case.sections.cell:
         named = {"matrix": phases.matrix_modulus, "inclusion": phases.inclusion_modulus}
         for name, modulus in named.items():
-            if not MODULI[0] <= modulus.modal <= MODULI[1]:
-                shown = engineering(modulus.modal, "Pa")
-                yield f"cell.{name}_modulus: {shown} is unusual for a solid; check its unit"
-        for name, poisson in (
-            ("matrix", phases.matrix_poisson),
-            ("inclusion", phases.inclusion_poisson),
-        ):
+            yield from unlike(f"cell.{name}_modulus", modulus.modal, "Pa", MODULI, "a solid")
+        ratios = {"matrix": phases.matrix_poisson, "inclusion": phases.inclusion_poisson}
+        for name, poisson in ratios.items():
             if poisson.modal < 0:
-                shown = f"{poisson.modal:g} is unusual for a solid"
-                yield f"cell.{name}_poisson: {shown}; check its sign"
+                told = f"{poisson.modal:g} is unusual for a solid"
+                yield f"cell.{name}_poisson: {told}; check its sign"
         ratio = phases.inclusion_modulus.modal / phases.matrix_modulus.modal
         meant = re.search(r"(?i)\b(pore|void|hole|rigid)", case.text_of_file)
         if not 1 / CONTRAST <= ratio <= CONTRAST and not meant:
@@ -284,6 +299,8 @@ def motion(case: Case, wanted: Structure) -> Iterator[str]:
     if (ground := None if wanted.linear is None else wanted.linear.ground) is not None:
         values, peak = ground.acceleration, float(abs(ground.acceleration).max())
         end = "" if values[-1] == 0 else f"; ends on {values[-1]:.3g} m/s², then the ground rests"
+        if not DESIGNED[0] <= peak <= DESIGNED[1]:
+            end += f"; {'weak' if peak < 1 else 'strong'}: is the unit in its header right?"
         yield (
             f"{record_key(case)}: {len(values)} values every {ground.step:g} s, to"
             f" {(len(values) - 1) * ground.step:g} s, peak {peak:.3g} m/s²"

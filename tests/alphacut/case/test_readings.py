@@ -1,6 +1,7 @@
 """What the words of a case mean as fuzzy numbers, and how `check` tells it."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -42,7 +43,7 @@ def test_check_prints_what_every_fuzzy_input_was_read_as(tmp_path, capfd):
     assert "frame.masses 1: interval 1.9e+04 kg … 2.1e+04 kg\n" in told
     assert "cell.inclusion_modulus: trapezoid 75.00 GPa … 79.00 GPa … 81.00 GPa … 85.00 GPa" in told
     assert "radius.a2: triangle 0.001 … 0.1 … 0.3145" in told
-    assert "matrix_modulus" not in told  # crisp
+    assert "cell.matrix_modulus: 20.00 GPa\n" in told
 
 
 def test_check_hands_the_inputs_on_as_data(capfd):
@@ -68,3 +69,83 @@ def test_check_says_what_is_fixed_which_levels_are_alike_and_what_the_record_is(
     assert "frame.accelerogram: 2001 values every 0.01 s, to 20 s, peak 2.5 m/s² (0.255 g)" in told
     assert "ends on -0.0089 m/s², then the ground rests" in told
     assert "fixed at" not in told
+
+
+FRAME = """
+schema = 1
+title = "Steel"
+about = "Two storeys."
+stages = ["envelope"]
+
+[frame]
+masses = ["20 t", "20 t"]
+lengths = ["3.5 m"]
+columns = 8
+second_moment = "25170 cm^4"
+modulus = "210 GPa"
+damping_ratio = "[2, 4] %"
+accelerogram = "r.csv"
+outputs = ["drift1", "a2"]
+
+[envelope]
+fuzzy = ["zeta"]
+duration = "0.1 s"
+step = "10 ms"
+
+[decision]
+limits = ["drift1 <= 0.5 %", "a2 <= 1 g"]
+"""
+
+
+def steel(folder, *changes, peak="2.5", capfd):
+    """What `check` says on a frame of steel, with changes of its text."""
+    text = FRAME
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    record = f"time [s],acceleration [m/s^2]\n0,0\n0.05,{peak}\n0.1,0\n"
+    (folder / "r.csv").write_text(record, encoding="utf-8")
+    (folder / "steel.toml").write_text(text, encoding="utf-8")
+    assert main(["check", str(folder / "steel.toml")]) == 0
+    return "\n".join(capfd.readouterr())
+
+
+def test_check_prints_crisp_values_and_limits_as_they_were_read(tmp_path, capfd):
+    told = steel(tmp_path, capfd=capfd)
+    for line in (
+        "frame.masses 1 to 2: 2e+04 kg",
+        "frame.lengths: 3.500 m",
+        "frame.columns: 8",
+        "frame.second_moment: 0.0002517 m^4",
+        "frame.modulus: 210.0 GPa",
+        "frame.damping_ratio: interval 0.02 … 0.04",
+        "envelope.step: 10.00 ms",
+        "decision limit of drift1: 17.50 mm, 0.5 % of the storey's height",
+        "decision limit of a2: 9.807 m/s^2",
+    ):
+        assert f"\n{line}\n" in f"\n{told}"
+    assert "is unusual" not in told
+    assert "is the unit in its header right" not in told
+
+
+def test_a_limit_of_exceedance_is_told_too(tmp_path, capfd):
+    text = '[exceedance]\nrandom = ["zeta"]\nlimits = ["drift1 <= 12 mm"]\n\n[decision]'
+    told = steel(tmp_path, ("[decision]", text), capfd=capfd)
+    assert "exceedance limit of drift1: 12.00 mm, 0.343 % of the storey's height\n" in told
+
+
+@pytest.mark.parametrize(
+    ("change", "peak", "remark"),
+    [
+        (("210 GPa", "210 MPa"), "2.5", "frame.modulus: 210.0 MPa is unusual for a frame"),
+        (("<= 0.5 %", "<= 0.012 mm"), "2.5", "decision: the limit of drift1: 12.00 µm is unusual"),
+        (("<= 0.5 %", "<= 12 m"), "2.5", "decision: the limit of drift1: 12.00 m is unusual"),
+        (("a2 <= 1 g", "a2 <= 0.1 mm/s^2"), "2.5", r"the limit of a2: 100.0 µm/s\^2 is unusual"),
+        (("Two", "2"), "0.002", "warning: frame.accelerogram: a peak of 0.002 m/s² is unusual"),
+        (("Two", "2"), "31", "warning: frame.accelerogram: a peak of 31 m/s² is unusual"),
+        (("Two", "2"), "0.25", r"\(0.0255 g\); weak: is the unit in its header right\?"),
+        (("Two", "2"), "24", r"\(2.45 g\); strong: is the unit in its header right\?"),
+    ],
+)
+def test_what_a_unit_most_likely_spoilt_is_remarked_on(change, peak, remark, tmp_path, capfd):
+    assert re.search(remark, steel(tmp_path, change, peak=peak, capfd=capfd))
