@@ -168,6 +168,11 @@ class UnitFlow:
             (index for index, name in enumerate(self.outputs) if output_unit(name) == "m"), 0
         )
 
+    def told(self, value: float) -> str:
+        """An error or gap in words, with the unit of a tolerance."""
+        unit = "of each peak" if self.relative else output_unit(self.outputs[self.reference])
+        return f"{value:.3g} {unit}"
+
     @cached_property
     def scale(self) -> Array:
         """Factor on a tolerance for each output, shape (m,).

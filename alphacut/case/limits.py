@@ -312,6 +312,11 @@ def asked_gap(case: Case) -> float | None:
     return case.envelope.certify if case.asked("envelope.certify") else None
 
 
+def by_auto(case: Case, key: str) -> str:
+    """How method auto is asked for, in place of one that the command line gives or the file."""
+    return f"{key}=auto in its place" if key in case.changed else f"--set {key}=auto"
+
+
 def names_rough_integrator(case: Case) -> bool:
     """Whether the case names a time stepping that is not exact."""
     return case.asked("envelope.integrator") and case.envelope.integrator != "exact"

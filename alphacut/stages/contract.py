@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from alphacut.case.case import Case
-from alphacut.case.limits import asked_tolerance
+from alphacut.case.limits import asked_tolerance, by_auto
 from alphacut.io.files import say
 from alphacut.io.problem import BadInput, Problem
 
@@ -46,7 +46,7 @@ def keep_modulus(case: Case, method: str, error: Mapping[str, float], *, best_ef
     """
     if (asked := case.modulus_tolerance) is None:
         return
-    cure = "--method auto reaches it"
+    cure = f"{by_auto(case, 'modulus.method')} reaches it"
     if method in ("prism", "slices"):
         cure = f"without mesh.size and mesh.layers method {method} is refined; {cure}"
     keep(

@@ -117,11 +117,10 @@ def explained(wanted: Structure, task: EnvelopeTask) -> list[str]:
         return []
     given = {"inputs": wanted.inputs(task.fuzzy), **asked(task, wanted.linear)}
     one, count = frame.plan(wanted.linear, **given)[0], 1 + len(task.fuzzy)
-    cost = f"some {count * one.seconds:.1g} s" if np.isfinite(one.seconds) else "not possible"
-    return [
-        f"what drives the width, of run: {cost}; {count} envelopes more, which [envelope] shares ="
-        " false leaves out"
-    ]
+    each = f"one with all {count - 1} inputs fuzzy and one with each of them fixed"
+    plan = str(replace(one, name="what drives the width, of run", seconds=count * one.seconds))
+    cost = plan.partition(";")[0]
+    return [f"{cost}; {count} envelopes, {each}, which [envelope] shares = false leaves out"]
 
 
 def dataset(results: Results, progress: Tick | None = None) -> xarray.Dataset:
@@ -137,10 +136,7 @@ def dataset(results: Results, progress: Tick | None = None) -> xarray.Dataset:
         for column, name in enumerate(("modulus_share", "poisson_share")):
             share = cell.share[..., column]
             variables[name] = (("cell_input", "alpha"), share, {"units": "1"})
-        coordinates |= {
-            "cell_input": list(cell.names),
-            "alpha": list(results.case.modulus.alpha),
-        }
+        coordinates |= {"cell_input": list(cell.names), "alpha": list(results.case.modulus.alpha)}
     study = richest(results)
     if study is not None and of_width(results, study):
         try:

@@ -56,6 +56,7 @@ def certify(
     workers: int = 1,
     budget: float = 4000,
     progress: Callable[[float], None] | None = None,
+    told: Callable[[float], str] = "{:.3g}".format,
 ) -> Certificate:
     """Encloses the bounds of all levels, the narrowest first.
 
@@ -68,6 +69,7 @@ def certify(
         workers: Threads.
         budget: Most boxes per bound on average.
         progress: Called with the fraction done.
+        told: A gap in words, with its unit.
 
     Raises:
         ValueError: The model error alone exceeds the gap.
@@ -80,8 +82,8 @@ def certify(
     if slack <= 0:
         limit = float((2 * error + rounding).max())
         raise ValueError(
-            f"certify: the gap {gap:g} is not above twice the model error, {limit:.2g}; ask for a"
-            " wider gap or a lower tolerance"
+            f"certify: the gap {told(gap)} is not above twice the model error, {told(limit)}; ask"
+            " for a wider gap or a lower tolerance"
         )
     levels, found = len(model.boxes.alpha), list[Enclosed]()
     for done, level in enumerate(reversed(range(levels))):

@@ -90,8 +90,9 @@ class Auto:
         left, refused = tolerance - reached, [f"{name} excluded" for name in self.exclude]
         if left <= 0:
             raise ToleranceError(
-                f"auto: the error of time stepping, {reached:.2g}, is above the tolerance"
-                f" {tolerance:g}; take the integrator exact, a smaller step or a larger tolerance"
+                f"auto: the error of time stepping, {flow.told(reached)}, is above the"
+                f" tolerance {flow.told(tolerance)}; take the integrator exact, a smaller step or"
+                " a larger tolerance"
             )
         plan = self.plan(flow)
         tried = [candidate.name for candidate in plan if candidate.seconds <= self.seconds]
@@ -110,7 +111,7 @@ class Auto:
                 found = replace(found, facts={**found.facts, "unproved": unproved})
                 if _estimate(found, flow) <= left:
                     return _reported(found, flow, begun, _why(found))
-                refused.append(f"modal estimates {_estimate(found, flow):.2g}")
+                refused.append(f"modal estimates {flow.told(_estimate(found, flow))}")
             except ModalError as error:
                 refused.append(str(error))
         if "improved-graph-follower" in tried:
@@ -120,8 +121,8 @@ class Auto:
                 return _reported(followed, flow, begun, f"improved-graph-follower, since {why}")
             refused.append(f"improved-graph-follower needs more than {self.budget} trajectories")
         raise ToleranceError(
-            f"auto: no method reaches {tolerance:g} ({'; '.join(refused)}); allow more methods, a"
-            " larger budget or tolerance"
+            f"auto: no method reaches {flow.told(tolerance)} ({'; '.join(refused)}); allow more"
+            " methods, a larger budget or tolerance"
         )
 
     def plan(self, flow: UnitFlow) -> tuple[Candidate, ...]:
@@ -154,7 +155,7 @@ def _proved(
         reached = _estimate(found, flow)
         if reached <= wanted:
             return found, ""
-        left = f"the boxes that a proof may look at left a gap of {reached:.2g}"
+        left = f"the boxes that a proof may look at left a gap of {flow.told(reached)}"
         return None, f"{left}; envelope.certify allows more, fewer or narrower inputs need fewer"
     return None, reason
 

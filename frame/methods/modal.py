@@ -135,7 +135,7 @@ class Modal:
             facts: dict[str, float | str] = {"degree": model.degree, "bounds": EXACT}
         else:
             error = polynomial_error(model) + left.max(-1)
-            facts = _judged(model, points, self.tolerance, flow.scale)
+            facts = _judged(model, points, self.tolerance, flow)
         error = np.maximum(error, rounding(model, np.abs(bounds).max((0, 1, 3))))
         facts["search_error"] = float((left.max(-1) / flow.scale).max())
         return signed_envelope(
@@ -192,7 +192,7 @@ def _nature(flow: UnitFlow, exact: ExactResponse | None) -> str:
 
 
 def _judged(
-    model: ModalModel, points: int, tolerance: float, scale: Array
+    model: ModalModel, points: int, tolerance: float, flow: UnitFlow
 ) -> dict[str, float | str]:
     """Facts of bounds that polynomials give, judged at a number of points."""
     facts: dict[str, float | str] = {
@@ -200,11 +200,12 @@ def _judged(
         "model_error": float(model.error.max()),
         "judged_by": f"trajectories at {points} optima, corners and random points",
     }
-    reached = float((model.error / scale).max())
+    reached = float((model.error / flow.scale).max())
     if reached > tolerance:
         facts["reason"] = (
-            f"modal: the polynomials reach {reached:.2g} and not the tolerance {tolerance:.2g}, see"
-            " the error; take the method auto, narrower supports or a larger budget"
+            f"modal: the polynomials reach {flow.told(reached)} and not the tolerance"
+            f" {flow.told(tolerance)}, see the error; take the method auto, narrower supports or"
+            " a larger budget"
         )
     return facts
 
@@ -258,6 +259,7 @@ def _certified(
         workers=method.workers,
         budget=method.boxes,
         progress=progress,
+        told=flow.told,
     )
     facts: dict[str, float | str] = {
         "model_error": float((error / flow.scale).max()),
@@ -323,14 +325,12 @@ def model_with_error(
             if largest <= PORTION * gap:
                 return model, error, ""
         reason = (
-            f"{TOO_WIDE} {largest:.2g}, takes too much of the gap {gap:g}; a gap of some"
-            f" {1.2 * largest / PORTION:.2g}, or narrower or fewer fuzzy inputs, can be proved"
+            f"{TOO_WIDE} {flow.told(largest)}, takes too much of the gap {flow.told(gap)}; a proof"
+            f" may need a gap of some {flow.told(1.2 * largest / PORTION)}, or narrower or fewer"
+            " fuzzy inputs"
         )
         # a degree more divides it by ten or so
-        model, before = (
-            fitted(sampled * min(0.99, 4 * PORTION * gap / largest)),
-            model.degree,
-        )
+        model, before = (fitted(sampled * min(0.99, 4 * PORTION * gap / largest)), model.degree)
         if model.degree <= before:
             break
     return first, SAFETY * first.error, reason

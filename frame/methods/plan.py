@@ -51,7 +51,7 @@ class Candidate:
     def __str__(self) -> str:
         """One line."""
         cost = (
-            f"some {float(f'{self.seconds:.1g}'):g} s"
+            f"about {float(f'{self.seconds:.1g}'):g} s"
             if np.isfinite(self.seconds)
             else "not possible"
         )

@@ -8,13 +8,7 @@ from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.structures.linear import Matrices, evaluate, relative_to_ground
-from alphacut.frame.structures.modes import (
-    ModalError,
-    Modes,
-    eigenvectors,
-    modes,
-    state_matrix,
-)
+from alphacut.frame.structures.modes import ModalError, Modes, eigenvectors, modes, state_matrix
 
 
 def analyse(
@@ -51,10 +45,7 @@ def analyse(
     found = modes(matrices, rows, chosen)
     rate = _discrete(found.eigenvalue, flow)
     return Modes(
-        boxes.in_unit(rate),
-        boxes.in_unit(found.coefficient),
-        boxes.in_unit(found.load),
-        found.of,
+        boxes.in_unit(rate), boxes.in_unit(found.coefficient), boxes.in_unit(found.load), found.of
     )
 
 

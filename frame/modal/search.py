@@ -141,13 +141,7 @@ class ModalSearch:
         return found, best
 
     def _follow(
-        self,
-        model: Response,
-        found: Optima,
-        nodes: int,
-        lower: Array,
-        upper: Array,
-        fresh: Array,
+        self, model: Response, found: Optima, nodes: int, lower: Array, upper: Array, fresh: Array
     ) -> None:
         """Tries at every node what its neighbours found, near and far, until nothing improves."""
         grid = np.arange(len(found.value)).reshape(nodes, -1)
@@ -214,12 +208,7 @@ class ModalSearch:
 
 
 def second_pass(
-    model: Response,
-    found: Optima,
-    lower: Array,
-    upper: Array,
-    search: ModalSearch,
-    count: int,
+    model: Response, found: Optima, lower: Array, upper: Array, search: ModalSearch, count: int
 ) -> Array:
     """Offer what fresh samples and fresh starts reach, without the optima found so far.
 

@@ -111,7 +111,7 @@ def explained(case: Case, wanted: Structure, task: EnvelopeTask) -> list[str]:
     cost = MODELS * len(limits) * one.seconds
     count = f"{len(limits)} limits" if len(limits) > 1 else "a limit"
     words = f"{count}, ten times as much if one lies within the peaks"
-    return [f"decision, of run: some {float(f'{cost:.1g}'):g} s; {words}"]
+    return [f"decision, of run: about {float(f'{cost:.1g}'):g} s; {words}"]
 
 
 MODELS = 3

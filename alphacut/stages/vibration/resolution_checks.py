@@ -60,9 +60,8 @@ def coarse_tolerance(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]
                 f"{task.certify:.3g} m lets bounds of {gap.output} be wide by {100 * gap.share:.3g}"
                 " % of its peak, more than 1 %"
             )
-            yield Problem(
-                "envelope.certify", f"{what}; take at most {0.01 * task.certify / gap.share:.2g} m"
-            )
+            less = f"{0.01 * task.certify / gap.share:.2g} m would be 1 %, if it can be proved"
+            yield Problem("envelope.certify", f"{what}; {less}: envelope --certify tells")
         return
     found = tolerance_guard(UnitFlow(flow, boxes(inputs, (0.0,)), task.relative), task.tolerance)
     if not found.ok:

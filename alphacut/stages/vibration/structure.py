@@ -12,6 +12,7 @@ from alphacut.case.case import Case
 from alphacut.case.sections.structures import Frame, Pendulum, Tower
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.problem import BadInput, Problem
+from alphacut.io.provenance import door
 from alphacut.io.units import STANDARD_GRAVITY
 from alphacut.stages.vibration.accelerogram import accelerogram
 
@@ -249,10 +250,7 @@ def with_field(case: Case, model: StoreyFrame, numbers: Mapping[str, FuzzyNumber
 
 def parameters(given: Frame, modulus: FuzzyNumber | None) -> dict[str, FuzzyNumber]:
     """Every value of the frame by the name that `frame` gives it as a parameter, in SI."""
-    found = {
-        "rayleigh_mass": given.rayleigh_mass,
-        "rayleigh_stiffness": given.rayleigh_stiffness,
-    }
+    found = {"rayleigh_mass": given.rayleigh_mass, "rayleigh_stiffness": given.rayleigh_stiffness}
     moments = given.second_moment or ()
     found |= {} if modulus is None else {"E": modulus}
     found |= {"I": moments[0]} if len(moments) == 1 else {}
@@ -298,8 +296,9 @@ def modulus_of(case: Case, given: FuzzyNumber | None) -> FuzzyNumber | None:
         raise BadInput(
             Problem(
                 "frame.modulus",
-                "missing: give it here, or by --modulus FILE.nc from `fuzzy modulus CASE --out"
-                " FILE.nc`; `alphacut run CASE` does both",
+                "missing: give it here, or by --modulus modulus.nc from"
+                f" `{door('modulus', case.path)} --out modulus.nc`; `{door('run', case.path)}` does"
+                " both",
                 file=str(case.path),
             )
         )

@@ -49,7 +49,7 @@ def test_a_named_resolution_that_misses_the_tolerance_fails_in_one_line(capfd):
     assert main(["cell", PAPER, *COARSE, "--tolerance", "1e-6"]) == 1
     (line,) = lines(capfd)
     assert "1e-06 is asked for" in line
-    assert "--method auto reaches it" in line
+    assert "modulus.method=auto in its place reaches it" in line
     assert main(["cell", PAPER, *COARSE, "--tolerance", "1e-6", "--best-effort"]) == 0
     assert any(line.startswith("alphacut: warning:") for line in lines(capfd))
     assert main(["cell", PAPER, *COARSE, "--tolerance", "0.1"]) == 0
@@ -85,7 +85,7 @@ def test_a_model_without_a_named_resolution_is_steered(method, capfd, tmp_path):
 def test_an_envelope_that_misses_its_tolerance_fails_in_one_line(capfd):
     asked = [*SHORT, "--method", "improved-graph-follower", "--tolerance", "1e-6"]
     assert main(asked) == 1
-    assert "--method auto reaches it" in lines(capfd)[-1]
+    assert "; envelope.method=auto in its place reaches it" in lines(capfd)[-1]
     assert main([*asked, "--best-effort"]) == 0
 
 
@@ -104,7 +104,8 @@ def test_a_fixed_method_is_held_to_the_tolerance_of_the_file(method, capfd, tmp_
     assert main(words) == 1
     last = lines(capfd)[-1]
     assert f"by method {method}, in m, is up to" in last
-    assert "1e-10 is asked for; --method auto " in last
+    assert "1e-10 is asked for; " in last
+    assert "--set envelope.method=auto" in last
     assert main([*words, "--best-effort"]) == 0
 
 

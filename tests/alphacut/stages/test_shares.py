@@ -3,6 +3,7 @@ there are no modes.
 """
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -90,8 +91,11 @@ def test_shares_that_are_not_wanted_are_left_out(tmp_path, capfd):
 
 def test_the_plan_tells_what_shares_cost(tmp_path, capsys):
     asked = ["envelope", str(CASES / "paper.toml"), "--explain", "--set"]
-    asked += ["frame.modulus=[24, 24.8, 25] GPa", "--fuzzy", "E,m"]
+    asked += ["frame.modulus=[24, 24.8, 25] GPa", "--fuzzy", "E,m", "--method", "auto"]
     assert main(asked) == 0
-    assert "what drives the width, of run: some" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert re.search(r"what drives the width, of run: about \d[\d.]* s; 3 envelopes, one with", out)
+    assert "all 2 inputs fuzzy and one with each of them fixed" in out
+    assert "proof: not counted above" in out
     assert main([*asked, "--set", "envelope.shares=false"]) == 0
     assert "what drives" not in capsys.readouterr().out

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from alphacut.frame import Exact, LinearFlow, StoreyFrame, envelope
+from alphacut.frame.boxes import UnitFlow, boxes
+from alphacut.frame.methods.modal import Modal, model_with_error
 from alphacut.fuzzy import Triangular
 
 FRAME = StoreyFrame((2e4, 1e4), (3.0, 3.0), 25e9, 1e-6, (50.0, 50.0), q0=(0.0, 0.01))
@@ -46,6 +49,18 @@ def test_the_reason_is_told_where_nothing_is_guaranteed(frame, reason) -> None:
     found = envelope(frame, INPUTS, **SPAN)
     assert found.nature == ("guaranteed" if reason is None else "estimated")
     assert reason is None or reason in str(found.facts["unproved"])
+
+
+def test_gaps_and_errors_are_told_with_their_unit_and_promise_no_proof() -> None:
+    flow = UnitFlow(LinearFlow(FRAME, tuple(INPUTS), 1.0, 0.1, Exact()), boxes(INPUTS, (0,)))
+    *_, reason = model_with_error(flow.flow, flow, Modal(), 1e-16)
+    told = (
+        r"some \S+ m, takes too much of the gap 1e-16 m; a proof may need a gap of some \S+ m, or"
+    )
+    assert re.search(told, reason)
+    assert replace(flow, relative=True).told(0.001) == "0.001 of each peak"
+    with pytest.raises(ValueError, match=r"gap 1e-16 m is not above twice .* error, \S+ m; ask"):
+        envelope(FRAME, INPUTS, method="modal", certify=1e-16, duration=1.0, step=0.1, alpha=(0,))
 
 
 def test_more_than_six_inputs_are_not_proved() -> None:
