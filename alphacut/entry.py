@@ -9,15 +9,17 @@ import sys
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
 from typing import NoReturn
 
 from alphacut.commands.parser import Parser, refuse_petsc, split_petsc
 from alphacut.fuzzy import CampaignError
 from alphacut.io.files import rank, ranks, say, standard_output
+from alphacut.io.netcdf import finished
 from alphacut.io.output_paths import check_destinations
 from alphacut.io.problem import BadInput, missing
-from alphacut.io.provenance import own_version
+from alphacut.io.provenance import door, own_version
 from alphacut.rve.prism.head_start import launched
 from alphacut.rve.solver.options import OptionError
 
@@ -140,7 +142,7 @@ def main(
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 0
     except CampaignError as error:
-        say(str(error))
+        say(pasted(str(error)))
         return 3
     except (RuntimeError, ValueError, ArithmeticError, OSError, MemoryError, ImportError) as error:
         return failed(error)
@@ -166,7 +168,23 @@ def interrupted(options: argparse.Namespace) -> str:
     if options.command != "run" and not any(getattr(options, name, None) for name in names):
         how = " or ".join(f"--{name}" for name in names)
         return f"without {how} nothing is kept" if how else "nothing is kept"
-    return "what was finished is kept, and the same command goes on from there"
+    if not (kept := unfinished(options)):
+        return "nothing was finished yet, so nothing is kept"
+    return f"what was finished is kept in {kept}, and the same command goes on from there"
+
+
+def unfinished(options: argparse.Namespace) -> Path | None:
+    """The file or folder from which the same command goes on; None if nothing is kept there."""
+    if options.command == "run":
+        from alphacut.commands.run import folder_of
+
+        folder = folder_of(options)
+        return folder if finished(folder) else None
+    store = options.store if options.command == "modulus" else None
+    path = Path(store or f"results/{Path(options.case).stem}/samples.db")
+    if options.command == "envelope":
+        path = Path(options.out).with_suffix(".partial.npz")
+    return path if path.is_file() and path.stat().st_size else None
 
 
 def failed(error: Exception) -> int:
@@ -178,5 +196,10 @@ def failed(error: Exception) -> int:
     if ranks() > 1 and "mpi4py.MPI" in sys.modules:
         print(f"alphacut: rank {rank()}: {message}", file=sys.stderr, flush=True)
         sys.modules["mpi4py.MPI"].COMM_WORLD.Abort(1)
-    say(message)
+    say(pasted(message))
     return 1
+
+
+def pasted(message: str) -> str:
+    """A message of the libraries, whose commands are those of this door."""
+    return message.replace("python -m alphacut", door())

@@ -17,6 +17,7 @@ from alphacut.case.sections.structures import Frame, Pendulum, Tower
 from alphacut.case.sections.top import Top
 from alphacut.case.sections.vibration import Envelope, Exceedance, Study
 from alphacut.io.problem import BadInput, Problem
+from alphacut.io.provenance import door
 
 S = TypeVar("S", bound=Section)
 
@@ -203,8 +204,8 @@ class Case:
             what = "missing; the cell is a picture, whose modulus command image computes"
         if section == "radius" and "microstructure" in self.stages:
             what += (
-                f": alphacut microstructure {self.path.name} --out FOLDER makes it from the"
-                " particles, in FOLDER/radius.toml"
+                f": {door('microstructure', self.path)} --out particles makes it from the"
+                " particles, in particles/radius.toml"
             )
         return BadInput(Problem(section, what, file=str(self.path)))
 

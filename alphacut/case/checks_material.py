@@ -9,6 +9,7 @@ from alphacut.case.case import Case
 from alphacut.case.sections.material import SPHERE_METHODS
 from alphacut.case.sections.particles import PackedSpheres, Packing
 from alphacut.io.problem import Problem
+from alphacut.io.provenance import door
 from alphacut.stochastic import HermiteMap
 from alphacut.stochastic.radius_map import MapFamily
 
@@ -243,8 +244,9 @@ def taking_spheres(case: Case) -> str:
     elif given.image:
         source = "image"
         wanted = (
-            f"{behind} = FOLDER/circles.csv, which alphacut microstructure --out FOLDER writes of"
-            " this case with cylinders: circles seen in an image are smaller than their spheres"
+            f"{behind} = particles/circles.csv, which {door('microstructure', case.path)} --out"
+            " particles writes of this case with cylinders: circles seen in an image are"
+            " smaller than their spheres"
         )
     return (
         f"{takes} with section [microstructure.spheres] in place of [microstructure.{source}]:"

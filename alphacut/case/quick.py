@@ -19,13 +19,7 @@ COARSE = {
         "microstructure.spheres.packings",
         "microstructure.spheres.spheres",
     ),
-    "modulus": (
-        "mesh.layers",
-        "mesh.size",
-        "modulus.plan",
-        "modulus.alpha",
-        "modulus.tolerance",
-    ),
+    "modulus": ("mesh.layers", "mesh.size", "modulus.plan", "modulus.alpha", "modulus.tolerance"),
     "image": ("modulus.alpha",),
     "envelope": (
         "envelope.alpha",

@@ -71,9 +71,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     add_exclude(parser, " or ".join(OF_AUTO))
     add_workers(parser, "the proof of --certify")
     parser.add_argument(
-        "--strict",
-        action="store_true",
-        help="refuse a step or tolerance too coarse for the motion",
+        "--strict", action="store_true", help="refuse a step or tolerance too coarse for the motion"
     )
     parser.add_argument(
         "--explain", action="store_true", help="say what would be run, in seconds; run nothing"
@@ -108,12 +106,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     kept = KeptArrays(beside, key) if beside else None
     with progress("Envelopes", quiet=options.quiet) as tick:
         found = envelope.compute(
-            wanted,
-            task,
-            strict=options.strict,
-            workers=options.workers,
-            progress=tick,
-            kept=kept,
+            wanted, task, strict=options.strict, workers=options.workers, progress=tick, kept=kept
         )
     dataset = outcomes.with_peaks(found, wanted, task)
     envelope.keep_tolerance(case, dataset, best_effort=options.best_effort)
@@ -183,30 +176,16 @@ def contradictions(options: argparse.Namespace, case: Case, task: EnvelopeTask) 
 def excluded(text: str) -> tuple[str, ...]:
     """Names of methods, separated by commas."""
     names = tuple(name.strip() for name in text.split(",") if name.strip())
+    what, close = "", ""
     for name in names:
         if name not in ENVELOPE_METHODS:
-            raise BadInput(
-                Problem(
-                    "--exclude",
-                    f"there is no method {name}",
-                    text,
-                    " or ".join(OF_AUTO),
-                    nearest(name, OF_AUTO),
-                )
-            )
-        if name not in OF_AUTO:
-            raise BadInput(
-                Problem(
-                    "--exclude",
-                    f"'{name}' is unknown to auto, which takes other methods",
-                    text,
-                    " or ".join(OF_AUTO),
-                )
-            )
+            what, close = f"there is no method {name}", nearest(name, OF_AUTO)
+        elif name not in OF_AUTO:
+            what = f"'{name}' is unknown to auto, which takes other methods"
     if set(names) == set(OF_AUTO):
-        raise BadInput(
-            Problem("--exclude", "no method is left for auto to take", text, " or ".join(OF_AUTO))
-        )
+        what = "no method is left for auto to take"
+    if what:
+        raise BadInput(Problem("--exclude", what, text, " or ".join(OF_AUTO), close))
     return names
 
 
@@ -284,10 +263,7 @@ def proved(found: Envelope) -> str:
 
     if found.proved_lower is not None and found.proved_upper is not None:
         ends = zip(
-            found.outputs,
-            found.proved_lower[0].min(0),
-            found.proved_upper[0].max(0),
-            strict=True,
+            found.outputs, found.proved_lower[0].min(0), found.proved_upper[0].max(0), strict=True
         )
         words = (
             f"{name} {' … '.join(engineering(float(x), output_unit(name)) for x in pair)}"

@@ -28,7 +28,7 @@ from alphacut.fuzzy import Store
 from alphacut.io.files import Document, say
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import progress
-from alphacut.io.provenance import fingerprint
+from alphacut.io.provenance import door, fingerprint
 from alphacut.rve.auto.model import ORDER
 from alphacut.stages.contract import contract, keep_modulus, require_choice
 from alphacut.stages.material import modulus, response
@@ -61,9 +61,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="keep every sample; the same command goes on where it was stopped",
     )
     place.add_argument(
-        "--resume",
-        action="store_true",
-        help="the same in results/NAME-OF-THE-CASE/samples.db",
+        "--resume", action="store_true", help="the same in results/NAME-OF-THE-CASE/samples.db"
     )
     parser.add_argument(
         "--explain", action="store_true", help="say what would be run and why, and run nothing"
@@ -91,8 +89,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         )
     if answer(options, document, out, text) and not options.out:
         say(
-            "to keep this and hand it on: the same command with --out modulus.nc, then alphacut"
-            " envelope CASE --modulus modulus.nc"
+            "to keep this and hand it on: the same command with --out modulus.nc, then"
+            f" {door('envelope', options.case)} --modulus modulus.nc"
         )
     return 0
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import shlex
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -64,15 +63,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="compute everything anew instead of taking what is up to date",
     )
     parser.add_argument(
-        "--strict",
-        action="store_true",
-        help="refuse a step or tolerance too coarse for the motion",
+        "--strict", action="store_true", help="refuse a step or tolerance too coarse for the motion"
     )
     add_best_effort(parser)
     parser.add_argument(
-        "--quick",
-        action="store_true",
-        help="all stages in seconds, coarse: numbers mean nothing",
+        "--quick", action="store_true", help="all stages in seconds, coarse: numbers mean nothing"
     )
     parser.add_argument("--no-figures", action="store_true", help="numbers only")
 
@@ -97,7 +92,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     if answer(options, found, out, words(found)):
         told = f"{len(drawn)} figures among them, after {found['seconds']:.0f} s"
         say(f"results are in {chain.folder}, {told}")
-        say(f"next: {door()} report {shlex.quote(str(chain.folder))}")
+        say(f"next: {door('report', chain.folder)}")
     return 0
 
 
@@ -138,10 +133,16 @@ def asked(options: argparse.Namespace) -> tuple[Case, Path]:
     require_read(case, read_by(case), "run")
     require_effect(options, case)
     case = quick(case) if options.quick else case
-    folder = Path(options.out or f"results/{case.name}{'-quick' if options.quick else ''}")
+    folder = folder_of(options)
     if problems := list(unwritable("--out", folder, folder=True)):
         raise BadInput(problems)
     return case, folder
+
+
+def folder_of(options: argparse.Namespace) -> Path:
+    """Where results go."""
+    name = f"{Path(options.case).stem}{'-quick' if options.quick else ''}"
+    return Path(options.out or f"results/{name}")
 
 
 def words(found: Document) -> str:

@@ -146,12 +146,7 @@ def stress(file: str, picture: str) -> None:
 def add_sheet(plotter: Plotter, sheet: PolyData, limits: tuple[float, float]) -> None:
     """One slice in colours of its stress, with its outline."""
     plotter.add_mesh(
-        sheet,
-        scalars="stress",
-        clim=limits,
-        cmap="cividis",
-        scalar_bar_args=BAR,
-        lighting=False,
+        sheet, scalars="stress", clim=limits, cmap="cividis", scalar_bar_args=BAR, lighting=False
     )
     outline = sheet.extract_feature_edges(feature_edges=False, manifold_edges=False)
     plotter.add_mesh(outline, color="#222222", line_width=1.5)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 from alphacut.io.files import Document
 from alphacut.io.output_paths import hint
 from alphacut.io.problem import BadInput, Problem
-from alphacut.io.provenance import FORMAT, own_version
+from alphacut.io.provenance import FORMAT, door, own_version
 
 NEEDED = ("case", "title", "case_text", "command", "versions", "seconds")  # of summary.json
 
@@ -44,7 +45,7 @@ def require_known(version: object, path: Path, *, key: str, maker: str = "") -> 
         made = f", written by {maker}" if maker else ""
         cure = (
             f"install that version, or make the file anew with this one, {own_version()}, by"
-            " alphacut run --fresh"
+            f" {door('run', 'CASE.toml', '--fresh')}"
         )
         raise BadInput(
             Problem(
@@ -97,9 +98,15 @@ def damaged(path: Path, why: str) -> BadInput:
         Problem(
             str(path),
             f"this file is damaged: {why}",
-            allowed="make it anew with alphacut run, which keeps what is computed",
+            allowed=f"make it anew: {door('run')} CASE.toml keeps what is computed",
         )
     )
+
+
+def finished(folder: Path) -> list[Path]:
+    """Files of a run, whole or begun, that the same run goes on from."""
+    found = (file for ending in ("nc", "npz", "db") for file in sorted(folder.glob(f"*.{ending}")))
+    return [file for file in found if file.stat().st_size]
 
 
 def read_summary(folder: Path) -> Document:
@@ -109,13 +116,14 @@ def read_summary(folder: Path) -> Document:
         BadInput: There is none, it is no JSON, or its format is newer.
     """
     path = folder / "summary.json"
-    allowed = "a folder that alphacut run has written"
     if not path.is_file():
-        raise BadInput(
-            Problem(
-                str(folder), "there are no results here: summary.json is missing", allowed=allowed
-            )
-        )
+        kept = ", ".join(file.name for file in finished(folder))
+        what = "there are no results here: summary.json is missing"
+        allowed = f"a folder that {door('run')} has written"
+        if kept:
+            what = f"the run here has not ended: summary.json is missing, and there are {kept}"
+            allowed = f"the end of that run, by {door('run')} CASE.toml --out {quote(str(folder))}"
+        raise BadInput(Problem(str(folder), what, allowed=allowed))
     try:
         found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:

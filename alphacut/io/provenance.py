@@ -102,9 +102,10 @@ def _canonical(value: object) -> object:
     return str(value)
 
 
-def door() -> str:
-    """Name of this program here: ``./enter python -m alphacut``, or ``alphacut``."""
-    return "./enter python -m alphacut" if os.environ.get("ALPHACUT_INSIDE") else "alphacut"
+def door(*words: object) -> str:
+    """This program here, ``./enter python -m alphacut`` or ``alphacut``, and words to paste."""
+    program = "./enter python -m alphacut" if os.environ.get("ALPHACUT_INSIDE") else "alphacut"
+    return f"{program} {shlex.join(map(str, words))}".strip()
 
 
 def command() -> str:

@@ -18,15 +18,7 @@ from alphacut.report.key_results import key_results
 from alphacut.report.material import given, image, microstructure, modulus, stress
 from alphacut.report.methods import methods
 from alphacut.report.spectrum import spectrum
-from alphacut.report.tables import (
-    citation,
-    code,
-    details,
-    items,
-    paragraphs,
-    section,
-    table,
-)
+from alphacut.report.tables import citation, code, details, items, paragraphs, section, table
 
 
 def sections(summary: Document, folder: Path) -> Iterator[Markup]:

@@ -10,6 +10,7 @@ from markupsafe import Markup
 
 from alphacut.figures.captions import caption
 from alphacut.io.problem import BadInput, Problem
+from alphacut.io.provenance import door
 from alphacut.io.units import engineering
 from alphacut.report.figures import picture
 from alphacut.report.tables import paragraphs, section, table
@@ -31,7 +32,7 @@ def spectrum(folder: Path) -> Markup:
             rows = [[float(row[name]) for name in COLUMNS] for row in csv.DictReader(stream)]
         values = np.array(rows).reshape(-1, len(np.unique(np.array(rows)[:, 1])), len(COLUMNS))
     except (OSError, ValueError, KeyError, TypeError, IndexError):
-        cure = "the file of `alphacut spectrum RECORD.csv --out FOLDER`, or none"
+        cure = f"the file of `{door('spectrum', 'RECORD.csv', '--out', folder)}`, or none"
         raise BadInput(Problem("FOLDER", "this is no response spectrum", str(path), cure)) from None
     ratios = [f"{100 * one[0, 0]:.3g} %" for one in values]
     periods = values[0, :, 1]

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from errno import EDQUOT, EFBIG, ENOSPC
 from hashlib import blake2b
 from pathlib import Path
+from shlex import quote
 from threading import RLock
 from time import monotonic, sleep
 from typing import Any, NamedTuple
@@ -174,9 +175,9 @@ class Store:
         which = f"; among what is lost: the sample {named[0]}" if named else ""
         return (
             f"the store {self.path} is damaged at {len(damage)} places, the first at byte"
-            f" {damage[0].start}{which}: run `python -m alphacut repair {self.path}` (in Python:"
-            " fuzzy.Store(path).repair()), which drops what is lost; the next run computes only"
-            " that anew"
+            f" {damage[0].start}{which}: run `python -m alphacut repair {quote(str(self.path))}`"
+            " (in Python: fuzzy.Store(path).repair()), which drops what is lost; the next run"
+            " computes only that anew"
         )
 
     def append(self, contents: Iterable[bytes]) -> None:

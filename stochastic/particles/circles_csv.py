@@ -71,8 +71,10 @@ class CircleFile:
         reasons |= overlaps
         if reasons and not self.drop:
             told = "; ".join(f"row {row} {reason}" for row, reason in sorted(reasons.items())[:10])
-            cure = "mend them, or drop them (drop = true)" + (
-                ", or allow a small overlap (overlap = 0.02)" if overlaps else ""
+            cure = "mend them, or drop them: [microstructure.circles] drop = true" + (
+                ", or allow a small overlap: [microstructure.circles] overlap = 0.02"
+                if overlaps
+                else ""
             )
             raise ValueError(f"{self.path}: {_counted(len(reasons))} no sense: {told}; {cure}")
         good = np.array([row not in reasons for row in rows], bool)

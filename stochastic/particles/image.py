@@ -46,6 +46,7 @@ LOST = 0.02  # share of the particles' area that may be left out
 MISFIT = 0.09  # share of the particles' pixels that may lie outside the circle of their piece
 UNEVEN = 1 / 3  # of the contrast, by which the brightness of the image's quarters may differ
 FLATTENED = 0.45  # roundness of a disc that several neighbours overlap
+DROP = "[microstructure.image] drop = true"
 PARTICLES = ("auto", "bright", "dark")
 
 
@@ -151,14 +152,14 @@ class SectionImage:
             raise ValueError(
                 f"{self.path} shows particles on {fraction:.4f} of its area, and {missing:.1%} of"
                 f" that lies in pieces that were left out ({_counted(rejected)});"
-                f" {self._cure(picture, share, ', or drop them (drop = true)')}"
+                f" {self._cure(picture, share, ', or drop them: ' + DROP)}"
             )
         if misfit > MISFIT and not self.drop:
             raise ValueError(
                 f"{self.path} shows particles on {fraction:.4f} of its area, and {misfit:.1%} of"
                 f" that lies outside the circles that would stand for them, where discs that touch"
                 f" leave less than {MISFIT:.0%}: the particles are not round;"
-                f" {self._cure(picture, share, ', or go on with the circles (drop = true)')}"
+                f" {self._cure(picture, share, ', or go on with the circles: ' + DROP)}"
             )
         (row, column, radius), (height, width) = np.array(found).T, picture.shape
         centres = np.stack([column + 0.5, height - row - 0.5], axis=1)
@@ -174,7 +175,8 @@ class SectionImage:
         seen = turned._segmented(picture)
         found, _, lost, misfit = turned._sorted(*seen)
         if found and lost <= LOST * seen[0].sum() and misfit <= MISFIT:
-            return f'the {other} phase is round: take it as the particles (particles = "{other}")'
+            key = f'[microstructure.image] particles = "{other}"'
+            return f"the {other} phase is round: take it as the particles ({key})"
         halves = [half for rows in np.array_split(share, 2) for half in np.array_split(rows, 2, 1)]
         if (apart := float(np.ptp([quarter.mean() for quarter in halves]))) > UNEVEN:
             return (

@@ -18,12 +18,7 @@ from alphacut.stochastic.errors import RefusedError
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.fit.hermite_fit import HermiteFit
 from alphacut.stochastic.microstructure import FittedMap, Study, fitted_map, fraction_of
-from alphacut.stochastic.spheres.packing import (
-    FEWEST,
-    MOST_VOLUME,
-    SpherePacking,
-    SpherePackings,
-)
+from alphacut.stochastic.spheres.packing import FEWEST, MOST_VOLUME, SpherePacking, SpherePackings
 from alphacut.stochastic.spheres.power_cells import cell_volumes, reduced_radii
 from alphacut.stochastic.spheres.spheres import Spheres
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -138,11 +133,7 @@ def sphere_study(
 
 
 def _packed(
-    case: Study,
-    law: tuple[int, str],
-    packing: SpherePacking,
-    count: int,
-    executor: Executor | None,
+    case: Study, law: tuple[int, str], packing: SpherePacking, count: int, executor: Executor | None
 ) -> Packed:
     """Packings of one law, as dense as makes its own map's volume fraction that of `packing`."""
     number, name = law

@@ -60,7 +60,9 @@ def test_what_is_not_round_is_refused_until_it_may_be_dropped():
     for k in range(5):
         grey[((x - 50 - 50 * k) / 9) ** 2 + ((y - 90) / 36) ** 2 < 1] = 1
         grey[(x - 50 - 50 * k) ** 2 + (y - 200) ** 2 < 15**2] = 1
-    with pytest.raises(ValueError, match=r"left out \(5 not round\).*drop = true"):
+    with pytest.raises(
+        ValueError, match=r"left out \(5 not round\).*\[microstructure.image\] drop = true"
+    ):
         SectionImage("ellipses.png", 1.0).circles(grey)
     found = SectionImage("ellipses.png", 1.0, drop=True).circles(grey)
     assert len(found.discs) == 5

@@ -80,12 +80,7 @@ class Parted:
 def _model(given: Picture, aspect: float, petsc: Mapping[str, str]) -> ImageModel:
     accuracy = ACCURACY if given.width is None else min(ACCURACY, given.width / 100)
     return ImageModel(
-        aspect,
-        given.boundary,
-        given.tiles,
-        given.division,
-        _solver(accuracy, petsc),
-        given.width,
+        aspect, given.boundary, given.tiles, given.division, _solver(accuracy, petsc), given.width
     )
 
 

@@ -186,13 +186,7 @@ def campaign(
     task = CellTask(choice, crisp, case.radius.family)
     shared = tuple(name for name in inputs if name in SHARED) or ("inclusion_modulus",)
     return Campaign(
-        task,
-        inputs,
-        plan_of(case),
-        case.modulus.alpha,
-        shared,
-        known(case, inputs),
-        store,
+        task, inputs, plan_of(case), case.modulus.alpha, shared, known(case, inputs), store
     )
 
 

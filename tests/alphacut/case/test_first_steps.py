@@ -65,7 +65,10 @@ def refused(arguments, pattern, capfd):
             ["envelope", BUILDING, "--set", "frame.masses=['20 t']"],
             "number of floors is that of frame.masses, which has 1",
         ),
-        (["envelope", BUILDING, "--fuzzy", "m"], "fuzzy modulus CASE --out FILE.nc.*alphacut run"),
+        (
+            ["envelope", BUILDING, "--fuzzy", "m"],
+            r"alphacut modulus \S*building.toml --out modulus.nc`; .*alphacut run \S*building.toml",
+        ),
     ],
 )
 def test_a_slip_is_answered_with_what_to_type(arguments, pattern, capfd):
@@ -198,7 +201,7 @@ def test_a_modulus_that_is_not_kept_says_how_to_keep_it(capfd):
         == 0
     )
     assert (
-        "--out modulus.nc, then alphacut envelope CASE --modulus modulus.nc"
+        f"--out modulus.nc, then {door()} envelope {CASES / 'porous.toml'} --modulus modulus.nc"
         in capfd.readouterr().err
     )
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from alphacut.entry import main
+from alphacut.entry import main, pasted
+from alphacut.io.provenance import door
 
 CASES = Path(__file__).parents[3] / "cases"
 BUILDING = (CASES / "building.toml").read_text(encoding="utf-8")
@@ -134,6 +135,17 @@ def test_the_next_command_can_be_pasted(tmp_path, capfd):
         == 0
     )
     assert f"report '{folder}'" in capfd.readouterr().err
+
+
+def test_a_command_in_a_message_has_the_door_the_path_and_its_quotes(tmp_path, capfd, monkeypatch):
+    monkeypatch.setenv("ALPHACUT_INSIDE", "1")
+    path = tmp_path / "my house.toml"
+    path.write_text(BUILDING, encoding="utf-8")
+    (tmp_path / "building.record.csv").write_text(RECORD, encoding="utf-8")
+    assert main(["envelope", str(path)]) == 2
+    line = capfd.readouterr().err
+    assert f"`./enter python -m alphacut modulus '{path}' --out modulus.nc`" in line
+    assert pasted("run `python -m alphacut repair s.db`") == f"run `{door()} repair s.db`"
 
 
 def test_one_argument_too_many_is_called_so(capfd):

@@ -9,6 +9,7 @@ import pytest
 from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.io.problem import BadInput
+from alphacut.io.provenance import door
 from alphacut.stages.material.microstructure import study_of
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii
@@ -19,7 +20,7 @@ CONCRETE = Path(__file__).parents[3] / "cases" / "concrete.toml"
 def test_a_cell_without_a_radius_map_tells_where_it_comes_from(capfd):
     assert main(["cell", str(CONCRETE), "--set", "modulus.method=series"]) == 2
     assert (
-        "alphacut microstructure concrete.toml --out FOLDER makes it from the particles"
+        f"{door()} microstructure {CONCRETE} --out particles makes it from the particles"
         in capfd.readouterr().err
     )
 

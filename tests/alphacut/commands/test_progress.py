@@ -52,7 +52,7 @@ def test_off_a_terminal_a_line_every_ten_seconds_says_the_share_and_the_time_lef
     ]
 
 
-def test_an_interrupted_envelope_without_a_file_says_that_nothing_is_kept():
+def test_an_interrupted_command_says_what_is_kept_and_where(tmp_path):
     from argparse import Namespace
 
     from alphacut.entry import interrupted
@@ -61,10 +61,20 @@ def test_an_interrupted_envelope_without_a_file_says_that_nothing_is_kept():
     assert interrupted(Namespace(command="image", out="image.nc")) == "nothing is kept"
     bare = Namespace(command="modulus", store=None, resume=False)
     assert interrupted(bare) == "without --store or --resume nothing is kept"
-    for kept in (Namespace(command="modulus", resume=True), Namespace(command="run", out=None)):
-        assert "goes on from there" in interrupted(kept)
-    assert "goes on from there" in interrupted(Namespace(command="envelope", out="x.nc"))
-    assert "goes on from there" in interrupted(Namespace(command="run", out=None))
+    run = Namespace(command="run", out=str(tmp_path), case="own.toml", quick=False)
+    envelope = Namespace(command="envelope", out=str(tmp_path / "x.nc"), case="own.toml")
+    modulus = Namespace(command="modulus", store=str(tmp_path / "s.db"), case="own.toml")
+    (tmp_path / "s.db").touch()
+    for kept in (run, envelope, modulus):
+        assert interrupted(kept) == "nothing was finished yet, so nothing is kept"
+    for kept, name in ((run, "modulus.nc"), (envelope, "x.partial.npz"), (modulus, "s.db")):
+        (tmp_path / name).write_text("some", encoding="utf-8")
+        place = tmp_path if kept is run else tmp_path / name
+        what = f"what was finished is kept in {place}, and the same command goes on from there"
+        assert interrupted(kept) == what
+        (tmp_path / name).unlink()
+    gone = Namespace(command="run", out=str(tmp_path / "none"), case="own.toml", quick=False)
+    assert "nothing is kept" in interrupted(gone)
 
 
 def test_enter_knows_the_program_by_its_name():

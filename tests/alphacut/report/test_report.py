@@ -11,6 +11,7 @@ import pytest
 from markupsafe import Markup
 
 from alphacut.entry import main
+from alphacut.io.provenance import door
 
 PAPER = Path(__file__).parents[3] / "cases" / "paper.toml"
 CHROMIUM = (
@@ -139,6 +140,11 @@ def test_a_folder_without_results_is_named(tmp_path, capfd):
     assert main(["report", str(tmp_path)]) == 2
     assert "summary.json is missing" in capfd.readouterr().err
     assert not list(tmp_path.iterdir())
+    (tmp_path / "envelope_all.nc").write_text("some", encoding="utf-8")
+    assert main(["report", str(tmp_path)]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert "the run here has not ended: summary.json is missing, and there are envelope_all" in line
+    assert line.endswith(f"{door()} run CASE.toml --out {tmp_path}")
 
 
 def test_a_certificate_is_told_with_its_gap_and_what_it_rests_on():

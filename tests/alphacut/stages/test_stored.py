@@ -15,7 +15,7 @@ import xarray
 from alphacut.entry import main
 from alphacut.io.netcdf import read_dataset, read_summary
 from alphacut.io.problem import BadInput
-from alphacut.io.provenance import FORMAT
+from alphacut.io.provenance import FORMAT, door
 from alphacut.stages.material.modulus import read_number
 
 OLD = Path(__file__).parent / "stored-v1"
@@ -96,7 +96,7 @@ def test_a_run_does_not_overwrite_newer_results_unasked(copy, capfd):
     before = (copy / "modulus.nc").read_bytes()
     arguments = ["run", str(case), "--out", str(copy), "--no-figures", "--quiet"]
     assert main(arguments) == 2
-    assert "alphacut run --fresh" in capfd.readouterr().err
+    assert f"{door()} run CASE.toml --fresh" in capfd.readouterr().err
     assert (copy / "modulus.nc").read_bytes() == before
     assert main([*arguments, "--fresh"]) == 0
     assert read_dataset(copy / "modulus.nc").attrs["format_version"] == FORMAT

@@ -130,7 +130,7 @@ def test_a_thousand_random_damages(tmp_path):
 
 
 def test_a_damaged_sample_is_named_with_what_to_do(tmp_path, capfd):
-    path = tmp_path / "s.db"
+    path = tmp_path / "my s.db"
     run(path)
     data = bytearray(path.read_bytes())
     place = data.find(b'{"a":0.3,"b":0.0}')
@@ -138,7 +138,7 @@ def test_a_damaged_sample_is_named_with_what_to_do(tmp_path, capfd):
     path.write_bytes(data)
     message = (
         r"s.db is damaged at 1 places, the first at byte \d+; among what is lost: the sample"
-        r" a = 0.3, b = 0.0: run `python -m alphacut repair .*s.db`"
+        r" a = 0.3, b = 0.0: run `python -m alphacut repair '.*my s.db'`"
     )
     with pytest.raises(StoreError, match=message):
         run(path)
