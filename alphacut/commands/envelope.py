@@ -55,7 +55,7 @@ KEYS = {
     "--alpha": KeyOption("envelope.alpha", "levels, as 0,0.5,1", "LIST"),
     "--method": KeyOption("envelope.method", ", ".join(ENVELOPE_METHODS), "CHOICE"),
     "--tolerance": KeyOption("envelope.tolerance", "error that must be kept", bare="m"),
-    "--certify": KeyOption("envelope.certify", "gap of proved bounds", bare="m"),
+    "--certify": KeyOption("envelope.certify", "gap of bounds, proved if possible", bare="m"),
 }
 READ = ("frame", "field", "pendulum", "tower", "envelope", "exceedance")
 GIVEN = ("modulus.value", "modulus.file", "modulus.measured")

@@ -71,8 +71,8 @@ def text(found: Tolerances) -> str:
     if scale.safe is None:
         return f"{' and '.join(kept)} does not hold at the nominal values: no tolerance is safe\n"
     lines = [
-        f"{' and '.join(kept)} at all nodes for supports scaled by up to {scale.safe:.4g}"
-        f" ({scale.nature}{f': {scale.reason}' if scale.reason else ''})"
+        f"{' and '.join(kept)} at all nodes, motion between them not included, for supports scaled"
+        f" by up to {scale.safe:.4g} ({scale.nature}{f': {scale.reason}' if scale.reason else ''})"
     ]
     lines += [f"  {name}: {low:.6g} … {high:.6g}" for name, (low, high) in found.intervals.items()]
     if scale.witness is None:

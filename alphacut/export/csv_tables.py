@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,11 +10,18 @@ from typing import TYPE_CHECKING
 from alphacut.frame.outputs import output_unit
 from alphacut.io.files import write_text
 from alphacut.io.netcdf import read_dataset
+from alphacut.stages.material.modulus import listed
+from alphacut.stages.vibration.decision import decision_document
+from alphacut.stages.vibration.exceedance import each_event, exceedances_document
 
 if TYPE_CHECKING:
     import xarray
 
 BY_OUTPUT = "SI, by output"
+LIMIT = {"limit value": "limit", "limit unit": "unit"}
+OF_LIMIT = LIMIT | {"verdict": "verdict", "nature": "nature", "between nodes": "between_nodes"}
+OF_EVENT = {"output": "output", **LIMIT, "more between nodes (estimated)": "between_nodes"}
+"""Columns of an event or a limit, and the names of their values in its document."""
 
 
 def write_tables(results: Path, folder: Path) -> list[Path]:
@@ -21,7 +29,8 @@ def write_tables(results: Path, folder: Path) -> list[Path]:
 
     An envelope gives a file for each output, a row for each node, and all envelopes together one
     of peaks. Of other results variables over the same axes share a file. Every column is named with
-    its unit, or a column `unit` has it. Numbers have all their digits.
+    its unit, or a column `unit` has it, and one says what the numbers are worth (`nature`). Numbers
+    have all their digits.
 
     Args:
         results: Folder of a run.
@@ -31,39 +40,52 @@ def write_tables(results: Path, folder: Path) -> list[Path]:
         The files.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    made, peaks = [], [",".join(PEAKS)]
+    tables, peaks = dict[str, str](), [PEAKS]
     for path in sorted(results.glob("*.nc")):
-        dataset = read_dataset(path)
+        dataset = with_worth(read_dataset(path))
         if path.stem.startswith("envelope_") and "output" in dataset.dims:
-            tables = dict(_by_output(dataset))
-            tables["attained"] = _csv(dataset[["lower_at", "upper_at"]])
+            tables |= {f"{path.stem}-{name}": text for name, text in _by_output(dataset)}
+            tables[f"{path.stem}-attained"] = _csv(dataset[["lower_at", "upper_at"]])
             peaks += _peaks(path.stem.removeprefix("envelope_"), dataset)
-            for name, text in tables.items():
-                made.append(folder / f"{path.stem}-{name}.csv")
-                write_text(made[-1], text)
             continue
         for axes, part in _by_axes(dataset):
-            name = "-".join([path.stem, *([] if axes == _widest(dataset) else ["by", *axes])])
-            file = folder / f"{name}.csv"
-            write_text(file, _csv(part))
-            made.append(file)
+            own = [] if axes == _widest(dataset) else ["by", *axes]
+            tables["-".join([path.stem, *own])] = _csv(part)
     if len(peaks) > 1:
-        made.append(folder / "peaks.csv")
-        write_text(made[-1], "\n".join([*peaks, ""]))
-    return made
+        tables["peaks"] = "\n".join([*peaks, ""])
+    made = {folder / f"{name}.csv": text for name, text in tables.items()}
+    for file, text in made.items():
+        write_text(file, text)
+    return list(made)
 
 
 PEAKS = (
-    "study",
-    "output",
-    "unit",
-    "alpha",
-    "least peak at nodes (bound)",
-    "least peak at nodes (tried)",
-    "greatest peak at nodes",
-    "error and what lies between nodes",
+    "study,output,unit,alpha,least peak at nodes (bound),least peak at nodes (tried),greatest peak"
+    " at nodes,error and what lies between nodes,nature"
 )
 BANDS = ("lower", "upper", "error", "inner_lower", "inner_upper", "proved_lower", "proved_upper")
+
+
+def with_worth(dataset: xarray.Dataset) -> xarray.Dataset:
+    """The dataset with coordinates, columns later, that say what its numbers are worth."""
+    facts, count = dataset.attrs, dataset.sizes.get("alpha", 0)
+    told: dict[str, tuple[str, list[object]]] = {}
+    if "possibility" in dataset:
+        found = decision_document(dataset)
+        told["nature of peaks"] = "alpha", [found["peaks"]] * count
+        rows = [{**found["margins"].get(x, {}), **one} for x, one in found["limits"].items()]
+        told |= {x: ("limit", [row.get(key, "") for row in rows]) for x, key in OF_LIMIT.items()}
+    elif "nature" in facts:
+        own = json.loads(facts["document"])["cuts"] if "document" in facts else {}
+        told["nature"] = "alpha", own.get("nature", [facts["nature"]] * count)
+    if "exceedance" in dataset:
+        rows, several = each_event(exceedances_document(dataset)), "event" in dataset.dims
+        over, rows = ("event", rows) if several else ("alpha", rows * count)
+        told |= {x: (over, [row[key] for row in rows]) for x, key in OF_EVENT.items()}
+    if "error_name" in dataset.dims:
+        error = sum(listed(dataset, "error").values())
+        told["declared relative error of E"] = "alpha", [error] * count
+    return dataset.assign_coords(told)
 
 
 def _by_output(dataset: xarray.Dataset) -> Iterator[tuple[str, str]]:
@@ -78,8 +100,9 @@ def _by_output(dataset: xarray.Dataset) -> Iterator[tuple[str, str]]:
         if "between" in one:
             columns[f"between [{unit}]"] = one["between"].values
         rows = zip(*columns.values(), strict=True)
-        lines = [",".join(repr(float(x)) for x in row) for row in rows]
-        yield name, "\n".join([",".join(columns), *lines, ""])
+        nature = f"{dataset.attrs.get('nature', '')}"
+        lines = [",".join([*(repr(float(x)) for x in row), nature]) for row in rows]
+        yield name, "\n".join([",".join([*columns, "nature"]), *lines, ""])
 
 
 def _peaks(study: str, dataset: xarray.Dataset) -> Iterator[str]:
@@ -94,7 +117,8 @@ def _peaks(study: str, dataset: xarray.Dataset) -> Iterator[str]:
             more = [float(at[x]) if x in at else None for x in ("peak_tried", "peak_error")]
             numbers = (float(level), low, more[0], high, more[1])
             cells = ["" if x is None else repr(x) for x in numbers]
-            yield ",".join([study, name, output_unit(name), *cells])
+            nature = str(dataset.attrs.get("nature", ""))
+            yield ",".join([study, name, output_unit(name), *cells, nature])
 
 
 def _by_axes(dataset: xarray.Dataset) -> Iterator[tuple[tuple[str, ...], xarray.Dataset]]:
@@ -123,6 +147,7 @@ def _csv(part: xarray.Dataset) -> str:
     if mixed and outputs is not None:
         table["unit"] = [output_unit(str(name)) for name in outputs]
         names.append("unit")
+    names += [str(name) for name in part.coords if name not in names]
     units = {name: part[name].attrs.get("units", "") if name in part else "" for name in names}
     kept = table[[name for name in names if name in table]]
     bare = ("", "1", *((BY_OUTPUT,) if "unit" in table else ()))

@@ -10,6 +10,7 @@ from markupsafe import Markup
 from alphacut.figures.captions import caption, in_words
 from alphacut.io.files import Document
 from alphacut.io.units import engineering
+from alphacut.report.envelopes import between
 from alphacut.report.figures import listed, picture
 from alphacut.report.tables import paragraphs, section, sentence, table
 from alphacut.stages.vibration import decision, joint, update
@@ -51,21 +52,16 @@ def decided(summary: Document, folder: Path) -> Markup:
         if (margin := found["margins"].get(name)) is not None:
             unit, largest = margin["unit"], float(margin["limit"])
             allowed, of = engineering(largest, unit), margin.get("output", name)
-            margins = [
-                " … ".join(
-                    engineering(margin[side][level], unit, beside=largest)
-                    for side in ("lower", "upper")
-                )
-                for level in (0, -1)
-            ]
+            low, high = margin["lower"], margin["upper"]
+            margins = [between(low[k], high[k], unit, largest) for k in (0, -1)]
         degrees = (decision.degree(*one[kind]) for kind in ("possibility", "necessity"))
-        rows.append((of, allowed, *degrees, one["verdict"], *margins))
+        verdict = f"{one['verdict']} ({decision.worth(found, name)})"
+        rows.append((of, allowed, *degrees, verdict, *margins))
     levels = (f"margin at α = {found['alpha'][level]:g}" for level in (0, -1))
     head = ("magnitude of", "limit", "possibly exceeded", "necessarily", "verdict", *levels)
     meaning = (
         "Exceeding a limit at any node is possible to the degree of the highest α-cut that holds"
         " such a motion, and necessary to one less the degree to which keeping it is possible."
-        ""
     )
     drawn = listed(summary, folder, "decision")
     return section("Decision", paragraphs(meaning), table(head, rows), drawn, paragraphs(*words))

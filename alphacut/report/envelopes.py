@@ -101,8 +101,9 @@ def peaks(summary: Document) -> Markup:
         "The peak is the largest magnitude of an output over the motion. The least peak on the"
         " lowest level lies between two values: a bound, and the least one among some motions"
         f" tried. All are peaks at the nodes{each_step(summary)}: at these no motion peaks higher"
-        " than the greatest. A motion may peak between two nodes; what it adds there at most is the"
-        " last column but one, which falls with the square of the step."
+        " than the greatest where the bounds are guaranteed; others are worth what their nature"
+        " says. What a peak between two nodes may add is the last column but one, which falls with"
+        " the square of the step."
     )
     limit = Markup("")
     if "exceedance" in summary:

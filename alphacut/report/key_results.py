@@ -9,9 +9,10 @@ from markupsafe import Markup
 from alphacut.figures.captions import core
 from alphacut.io.files import Document
 from alphacut.io.units import engineering, largest_by_unit
+from alphacut.report import envelopes
 from alphacut.report.tables import section, table
 from alphacut.stages.vibration import exceedance as outcomes
-from alphacut.stages.vibration.decision import degree
+from alphacut.stages.vibration.decision import degree, worth
 
 Line = tuple[str, str, str, str]
 HEAD = ("quantity", "most plausible", "whole range", "nature of the range")
@@ -87,14 +88,10 @@ def peaks(summary: Document) -> Iterator[Line]:
     for name, of in found.items():
         unit = output_unit(name)
         likely, whole = (
-            dict.fromkeys(
-                engineering(of[side][level], unit, beside=largest[unit])
-                for side in ("lower", "upper")
-            )
-            for level in (-1, 0)
+            envelopes.between(of["lower"][k], of["upper"][k], unit, largest[unit]) for k in (-1, 0)
         )
         kind = f"Peak of |{name}| at the nodes{every(study)}"
-        yield kind, " … ".join(likely), " … ".join(whole), f"{study['nature']}{beyond(of, unit)}"
+        yield kind, likely, whole, f"{study['nature']}{beyond(of, unit)}"
 
 
 def every(study: Document) -> str:
@@ -113,15 +110,16 @@ def beyond(of: Document, unit: str) -> str:
 def exceeded(summary: Document) -> Iterator[Line]:
     """Probability that an output exceeds its limit."""
     for found in outcomes.each_event(summary["exceedance"]) if "exceedance" in summary else ():
-        ends = [
+        likely, whole = (
             "undecided"
             if (found["lower"][k], found["upper"][k]) == (0, 1)
             else " … ".join(dict.fromkeys(f"{found[side][k]:.2g}" for side in ("lower", "upper")))
             for k in (-1, 0)
-        ]
+        )
         limit = f" exceeds {engineering(found['limit'], found['unit'])}"
         name = f"Probability of {outcomes.event_words(found['output'], limit)}"
-        yield name, *ends, found["nature"].split(":")[0]
+        nature = f"{found['nature'].split(':')[0]}{outcomes.nodes(found)}"
+        yield name, likely, whole, nature
 
 
 def decisions(summary: Document) -> Iterator[Line]:
@@ -132,4 +130,4 @@ def decisions(summary: Document) -> Iterator[Line]:
         if (margin := found["margins"].get(name)) is not None:
             limit = engineering(margin["limit"], margin["unit"])
             of = f"|{margin.get('output', name)}| beyond {limit}"
-        yield of, one["verdict"], possible, one["nature"]
+        yield of, one["verdict"], possible, worth(found, name)

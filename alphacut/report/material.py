@@ -108,26 +108,17 @@ def modulus(found: Document, drawn: Markup) -> Markup:
         isotropy(found),
         sentence(found.get("shape", "")),
     )
-    budget = [(in_words(name), f"{value:.2g}") for name, value in found.get("error", {}).items()]
-    checks = [(in_words(name), f"{value:.2g}") for name, value in found.get("checks", {}).items()]
-    return section(
-        "Fuzzy modulus",
-        words + paragraphs(*told),
-        drawn,
-        table(head, rows),
-        (
-            Markup("<h3>Error budget</h3>")
-            + table(("source", "estimated relative error of E"), budget)
-            if budget
-            else Markup("")
-        ),
-        (
-            Markup("<h3>Certificate</h3>")
-            + table(("property", "measured violation, largest of all samples"), checks)
-            if checks
-            else Markup("")
-        ),
+    each = (
+        ("Error budget", "source", "estimated relative error of E", "error"),
+        ("Certificate", "property", "measured violation, largest of all samples", "checks"),
     )
+    more = (
+        Markup(f"<h3>{title}</h3>")
+        + table(names, [(in_words(x), f"{value:.2g}") for x, value in found[key].items()])
+        for title, *names, key in each
+        if found.get(key)
+    )
+    return section("Fuzzy modulus", words + paragraphs(*told), drawn, table(head, rows), *more)
 
 
 def given(found: Document) -> Markup:

@@ -16,28 +16,14 @@ def methods(summary: Document) -> Markup:
     """Method and cost of each stage."""
     rows: list[tuple[object, ...]] = []
     if cell := summary.get("modulus"):
-        rows.append(
-            (
-                "fuzzy modulus",
-                f"{cell['method']}, plan {cell['plan']}",
-                cell["nature"],
-                f"{cell['samples']} samples",
-                f"{cell['seconds']:.1f}",
-            )
-        )
+        how, cost = f"{cell['method']}, plan {cell['plan']}", f"{cell['samples']} samples"
+        rows.append(("fuzzy modulus", how, cell["nature"], cost, f"{cell['seconds']:.1f}"))
     if picture := summary.get("image"):
         cost = f"{picture['iterations']} iterations"
         rows.append(("image", "trial fields", picture["nature"], cost, f"{picture['seconds']:.1f}"))
     for name, study in summary.get("envelopes", {}).items():
-        rows.append(
-            (
-                f"envelope {name}",
-                study["method"],
-                study["nature"],
-                effort(study),
-                f"{study['seconds']:.1f}",
-            )
-        )
+        how, seconds = study["method"], f"{study['seconds']:.1f}"
+        rows.append((f"envelope {name}", how, study["nature"], effort(study), seconds))
     words = paragraphs(*explained(rows), *proofs(summary))
     return section(
         "Methods and cost",

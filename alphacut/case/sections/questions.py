@@ -10,9 +10,9 @@ from alphacut.case.key import MEMBERSHIP, NOT_NEGATIVE, POSITIVE, UNIT, Key, Ran
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Decision(Section):
-    """Possibility and necessity, proved, that a storey frame exceeds limits at any time.
+    """Possibility and necessity that a storey frame exceeds limits at any node, proved if possible.
 
-    The inputs and the duration are those of [envelope], the levels begin with its lowest.
+    Inputs, duration and nodes are those of [envelope], the levels begin with its lowest.
     """
 
     limits: Annotated[

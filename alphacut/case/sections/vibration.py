@@ -99,9 +99,9 @@ class Envelope(Section):
         float | None,
         Key(
             "gap within which the bounds of displacements of a linear structure, up to"
-            " six inputs fuzzy, are enclosed and proved; for outputs of other units the"
-            " same share of their peaks as of the first displacement's; if left out,"
-            " method auto proves its tolerance",
+            " six inputs fuzzy, are enclosed, and proved unless the result says verified by"
+            " sampling; for outputs of other units the same share of their peaks as of the first"
+            " displacement's; if left out, method auto proves its tolerance",
             "m",
             allowed=POSITIVE,
         ),

@@ -212,7 +212,26 @@ def decision_document(found: xarray.Dataset) -> Document:
             **{side: found["margin"].sel(output=name, bound=side).values for side in SIDES},
         }
     facts = {key: found.attrs[key] for key in ("reason", "claim", "step", "peaks")}
-    return {"limits": limits, "alpha": found["alpha"].values, "margins": margins, **facts}
+    whole = {"limits": limits, "alpha": found["alpha"].values, "margins": margins, **facts}
+    for name in limits:
+        limits[name]["between_nodes"] = between_nodes(whole, name)
+    return whole
+
+
+def between_nodes(found: Document, name: str) -> str:
+    """What a verdict, which is on the motion at nodes, says of that between them."""
+    if found["limits"][name]["verdict"].startswith(("unsafe", "exceeded")):
+        return "exceeded there, so over time, too"
+    if all(one["lower"][0] > 0 for x, one in found["margins"].items() if name in (x, ANY)):
+        return f"between them kept by the {found['peaks']} envelope, see the margin"
+    return "the motion between them is not included"
+
+
+def worth(found: Document, name: str) -> str:
+    """Nature of a verdict, the nodes that it is on, and what it says of the motion between."""
+    one, nodes = found["limits"][name], f"at nodes every {found['step']:g} s"
+    of = "" if one["verdict"] in ("safe", "unsafe") else "degrees "
+    return f"{of}{one['nature']}, {nodes}: {between_nodes(found, name)}"
 
 
 SIDES = ("lower", "upper")
@@ -251,8 +270,7 @@ def sentences(found: Document) -> Iterator[str]:
             of = f"|{margin.get('output', name)}| > {engineering(margin['limit'], margin['unit'])}"
         (a, b), (c, d) = one["possibility"], one["necessity"]
         degrees = f"possible to {degree(a, b)}, necessary to {degree(c, d)}"
-        worth = f"{one['nature']}, at nodes every {found['step']:g} s"
-        yield f"{of}: {degrees}: {one['verdict']} ({worth}){why(one)}"
+        yield f"{of}: {degrees}: {one['verdict']} ({worth(found, name)}){why(one)}"
     for name, margin in found["margins"].items():
         ends = (engineering(float(margin[side][0]), margin["unit"], digits=3) for side in SIDES)
         level = f"α = {found['alpha'][0]:g}"

@@ -187,7 +187,7 @@ def keep_tolerance(case: Case, dataset: xarray.Dataset, *, best_effort: bool) ->
         keep(
             float(dataset.attrs["gap"]),
             gap,
-            of=f"the gap of the proved bounds of {dataset.attrs['gap_output']}, in m,",
+            of="the gap of the {nature} bounds of {gap_output}, in m,".format(**dataset.attrs),
             cure="narrower supports or fewer inputs reach it",
             best_effort=best_effort,
         )

@@ -58,26 +58,20 @@ def with_peaks(found: Envelope, wanted: Structure, task: EnvelopeTask) -> xarray
         ),
         cuts,
     )
-    words = {
-        "units": "SI, by output",
-        "long_name": "largest magnitude at the nodes; the lower end is a bound from below",
-    }
-    dataset = found.to_dataset().assign(
-        peak=(("alpha", "bound", "output"), np.stack([of.lower, of.upper], axis=1), words)
+
+    def words(what: str) -> dict[str, str]:
+        return {"units": "SI, by output", "long_name": what}
+
+    about = words("largest magnitude at the nodes; the lower end is a bound from below")
+    ends = np.stack([of.lower, of.upper], axis=1)
+    dataset = found.to_dataset().assign(peak=(("alpha", "bound", "output"), ends, about))
+    least = words(
+        "least peak at the nodes among trajectories tried; the true one lies between the bound and"
+        " this"
     )
-    least = {
-        "units": "SI, by output",
-        "long_name": (
-            "least peak at the nodes among trajectories tried; the true one lies between the"
-            " bound and this"
-        ),
-    }
     for name, error, side in (("error", of.error, "outside"), ("below", of.below, "below")):
         if error is not None:
-            beyond = {
-                "units": "SI, by output",
-                "long_name": f"what a peak may lie {side} its bounds by",
-            }
+            beyond = words(f"what a peak may lie {side} its bounds by")
             dataset = dataset.assign({f"peak_{name}": (("alpha", "output"), error, beyond)})
     worst = reached(found, wanted, task)
     return (
@@ -342,9 +336,6 @@ def sentence(found: Document) -> str:
     levels = dict.fromkeys((0, len(found["alpha"]) - 1))
     cuts = (f"{cut(found, k)} at α = {found['alpha'][k]:g}" for k in levels)
     random = f" with random {found['random']}" if found["random"] else ""
-    nodes = f", at nodes every {found['step']:g} s" if "step" in found else ""
-    if "between_nodes" in found:
-        nodes += f", up to {found['between_nodes']:.2g} more with peaks between them"
     drawn = (
         f"{found['samples']} random draws at each fuzzy point tried"
         if "samples" in found
@@ -353,11 +344,19 @@ def sentence(found: Document) -> str:
     scatter = (
         f": {drawn}; standard deviation up to {found['deviation']:.2g}" if found["random"] else ""
     )
-    worth = f" (inner bounds{nodes}{scatter})"
+    worth = f" (inner bounds{nodes(found)}{scatter})"
     limit = f" > {engineering(found['limit'], found['unit'])}"
     return (
         f"probability of {event_words(found['output'], limit)}{random}: {', '.join(cuts)}{worth}\n"
     )
+
+
+def nodes(found: Document) -> str:
+    """Words on the nodes that a probability is of, and on the motion between, left out of it."""
+    if "step" not in found or "between_nodes" not in found:
+        return ""
+    more = f"the motion between them may add up to {found['between_nodes']:.2g}, estimated"
+    return f", at nodes every {found['step']:g} s: {more}"
 
 
 def cut(found: Document, level: int) -> str:

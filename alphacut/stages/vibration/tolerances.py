@@ -96,6 +96,7 @@ class Tolerances:
             "nominal_share": found.nominal_share,
             "nature": found.nature,
             "reason": found.reason,
+            "between_nodes": "the motion between nodes is not included",
             "boxes": found.boxes,
             "seconds": found.seconds,
         }

@@ -44,6 +44,7 @@ def test_the_safe_supports_are_told_and_a_witness(tmp_path, capfd):
     assert told(tmp_path, "44 mm", "--json", "-") == 0
     found = json.loads(capfd.readouterr().out)
     assert found["nature"] == "guaranteed"
+    assert found["between_nodes"] == "the motion between nodes is not included"
     assert 0 < found["safe_scale"] < found["unsafe_scale"] < 2
     assert found["gap"] <= 0.01
     low, high = found["safe"]["E"]

@@ -54,6 +54,7 @@ def test_the_report_writes_them_on_demand(tmp_path, capfd):
     name = str(stored["output"].values[-1])
     with (folder / f"envelope_all-{name}.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
+    assert {row["nature"] for row in rows} == {str(stored.attrs["nature"])}
     assert list(rows[0])[:3] == ["time [s]", "lower at alpha 0 [N]", "upper at alpha 0 [N]"]
     upper = stored["upper"].sel(output=name, alpha=0.0).values
     assert [float(row["upper at alpha 0 [N]"]) for row in rows] == upper.tolist()
@@ -61,6 +62,7 @@ def test_the_report_writes_them_on_demand(tmp_path, capfd):
         peaks = list(csv.DictReader(file))
     assert len(peaks) == stored["output"].size * stored["alpha"].size
     assert {row["unit"] for row in peaks} == {"N"}
+    assert {row["nature"] for row in peaks} == {str(stored.attrs["nature"])}
     last = stored["peak"].sel(output=name, alpha=1.0, bound="upper")
     assert float(peaks[-1]["greatest peak at nodes"]) == float(last)
     error = "error and what lies between nodes"
@@ -80,3 +82,32 @@ def test_values_of_several_units_have_theirs_in_a_column(tmp_path):
     (made,) = write_tables(tmp_path, tmp_path / "tables")
     lines = made.read_text(encoding="utf-8").splitlines()
     assert lines == ["alpha,output,margin,unit", "0.0,drift1,1.0,m", "0.0,a2,1.0,m/s^2"]
+
+
+def table(folder: Path, name: str, data: xarray.Dataset) -> list[dict[str, str]]:
+    """Rows of the CSV file of a dataset."""
+    folder.mkdir()
+    data.assign_attrs(format_version=2).to_netcdf(folder / f"{name}.nc")
+    write_tables(folder, folder / "tables")
+    with (folder / "tables" / f"{name}.csv").open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_numbers_carry_their_nature_error_and_limit(tmp_path):
+    cuts = (("alpha", "bound"), np.ones((2, 2)))
+    axes = {"alpha": [0.0, 1.0], "bound": ["lower", "upper"]}
+    errors = {"error": ("error_name", [1e-4, 2e-4])}
+    named = axes | {"error_name": ["mesh", "layers"]}
+    modulus = xarray.Dataset({"E": cuts, **errors}, named, {"nature": "guaranteed"})
+    for row in table(tmp_path / "modulus", "modulus", modulus):
+        assert row["nature"] == "guaranteed"
+        assert float(row["declared relative error of E"]) == pytest.approx(3e-4)
+    each = json.dumps({"cuts": {"nature": ["guaranteed enclosure", "guaranteed"]}})
+    image = xarray.Dataset({"E": cuts}, axes, {"nature": "guaranteed", "document": each})
+    natures = [row["nature"] for row in table(tmp_path / "image", "image", image)]
+    assert natures == ["guaranteed enclosure"] * 2 + ["guaranteed"] * 2
+    facts = {"output": "q1", "limit": 0.04, "between_nodes": 0.02, "nature": "inner: attained"}
+    found = xarray.Dataset({"exceedance": cuts}, axes, facts)
+    for row in table(tmp_path / "one", "exceedance", found):
+        assert (row["output"], row["limit value"], row["limit unit"]) == ("q1", "0.04", "m")
+        assert (row["nature"], row["more between nodes (estimated)"]) == ("inner: attained", "0.02")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -72,9 +74,43 @@ def test_a_safe_limit_and_a_sure_failure(
     path = written(tmp_path, ["q1 <= 1 m"])
     asked = ["--out", str(tmp_path / "out"), "--no-figures"]
     assert main(["run", str(path), *asked]) == 0
-    assert "|q1| > 1.000 m: possible to 0, necessary to 0: safe" in capsys.readouterr().out
+    kept = "safe (guaranteed, at nodes every 0.001 s: between them kept by the guaranteed envelope"
+    told = capsys.readouterr().out
+    assert f"|q1| > 1.000 m: possible to 0, necessary to 0: {kept}, see the margin)" in told
     assert main(["run", str(path), *asked, "--set", "decision.limits=['q1 <= 1 mm']"]) == 0
-    assert "possible to 1, necessary to 1: unsafe" in capsys.readouterr().out
+    over = "unsafe (guaranteed, at nodes every 0.001 s: exceeded there, so over time, too)"
+    assert f"possible to 1, necessary to 1: {over}" in capsys.readouterr().out
+
+
+def test_a_verdict_tells_that_motion_between_nodes_is_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """No motion passes the limit at a node half a second apart, and some do between two."""
+    out = tmp_path / "out"
+    path = written(tmp_path, [f"q1 <= {0.999 * peak(1200)} m", "q1 <= 1 m"])
+    asked = ["--out", str(out), "--set", "envelope.step=0.5 s"]
+    assert main(["run", str(path), *asked, "--no-figures"]) == 0
+    left = "the motion between them is not included"
+    assert f"safe (guaranteed, at nodes every 0.5 s: {left})" in capsys.readouterr().out
+    found = json.loads((out / "summary.json").read_text(encoding="utf-8"))["decision"]
+    each = [one["between_nodes"] for one in found["limits"].values()]
+    kept = f"between them kept by the {found['peaks']} envelope, see the margin"
+    assert each == [left, kept, left]
+    assert main(["report", str(out), "--quiet", "--csv", str(out / "tables")]) == 0
+    with (out / "tables" / "decision.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    columns = ("limit value", "limit unit", "verdict", "nature", "between nodes")
+    first, last = (tuple(rows[k][name] for name in columns) for k in (0, -1))
+    limit = str(next(iter(found["margins"].values()))["limit"])
+    assert first == (limit, "m", "safe", "guaranteed", left)
+    assert last == ("", "", "safe", "guaranteed", left)
+    (name,) = (out / "tables").glob("decision-by-alpha*")
+    with name.open(encoding="utf-8") as file:
+        margins = list(csv.DictReader(file))
+    assert {row["nature of peaks"] for row in margins} == {found["peaks"]}
+    page = (out / "report.html").read_text(encoding="utf-8")
+    text = re.sub("<[^>]*>", "", page)
+    assert text.count(f"at nodes every 0.5 s: {left}") >= 4  # key results and decisions
 
 
 def test_two_limits_on_one_output_are_two_decisions(

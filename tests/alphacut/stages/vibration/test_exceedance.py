@@ -3,6 +3,7 @@ and stand in every result.
 """
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -104,6 +105,8 @@ def test_a_run_keeps_peaks_and_probability(tmp_path, capfd):
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert summary["exceedance"]["limit"] == pytest.approx(0.09)
     assert summary["exceedance"]["random"] == "E"
+    told, more = outcomes.sentences(summary["exceedance"]), "the motion between them may add up to"
+    assert re.search(rf"\(inner bounds, at nodes every [\d.]+ s: {more} [\d.e-]+, estimated", told)
     study = summary["envelopes"]["E-5s"]
     assert study["peak"]["q1"]["upper"][0] == pytest.approx(
         max(-study["min"]["q1"], study["max"]["q1"])
