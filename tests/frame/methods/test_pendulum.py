@@ -67,6 +67,6 @@ def test_envelopes_are_within_two_hundredths_of_a_newton_at_every_node(support: 
 
 def test_auto_refuses_where_the_midpoint_rule_alone_passes_the_tolerance() -> None:
     with pytest.raises(
-        ToleranceError, match=r"time stepping, 0\.\d+, is above the tolerance 0\.02"
+        ToleranceError, match=r"time stepping, 0\.\d+ N, is above the tolerance 0\.02 N"
     ):
         frame_pendulum.computed("narrow", "auto", tolerance=0.02)
