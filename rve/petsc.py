@@ -5,29 +5,28 @@ before either. Open MPI's transport for one-sided messages over fabrics, which n
 takes a second to look for a fabric when MPI starts; it is left out unless the caller names
 transports. UCX rewrites the process's functions of memory to watch them, which takes 0.05 s and
 serves fabrics alone; it does not unless the caller asks for it. Options stand under the project's
-prefix; what PETSc does not use is an error. Ctrl-C waits for PETSc's end.
+prefix; what PETSc does not use is an error.
 """
 
 from __future__ import annotations
 
 import ctypes
 import os
-import signal
-import threading
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from alphacut.rve.interruption import uninterrupted
 from alphacut.rve.solver.options import PREFIX, OptionError
 
 os.environ.setdefault("OMPI_MCA_btl", "^ofi")
 os.environ.setdefault("UCX_MEM_EVENTS", "n")
 
-import petsc4py
+with uninterrupted():
+    import petsc4py
 
-petsc4py.init(["alphacut", "-skip_petscrc"])
-
-from petsc4py import PETSc as PETSc  # noqa: E402
+    petsc4py.init(["alphacut", "-skip_petscrc"])
+    from petsc4py import PETSc as PETSc
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -41,22 +40,6 @@ def clean(comm: MPI.Comm | None) -> None:
     """Free what ranks shared and nothing refers to any more; petsc4py keeps it until all ask."""
     if comm is not None:
         PETSc.garbage_cleanup(comm)
-
-
-@contextmanager
-def uninterrupted() -> Iterator[None]:
-    """Hold Ctrl-C back to the end of the block; PETSc loses what Python raises below it."""
-    before, held = signal.getsignal(signal.SIGINT), list[int]()
-    if threading.current_thread() is not threading.main_thread() or not callable(before):
-        yield
-        return
-    signal.signal(signal.SIGINT, lambda number, _: held.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-        if held:
-            before(held[0], None)
 
 
 @contextmanager

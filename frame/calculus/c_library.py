@@ -22,8 +22,8 @@ SECONDS = 60
 
 
 @lru_cache(64)
-def c_library(source: str) -> ctypes.CDLL | None:
-    """The compiled `source`, kept for other runs.
+def c_library(source: str, flags: tuple[str, ...] = FLAGS) -> ctypes.CDLL | None:
+    """The compiled `source`, kept for other runs; `flags` are the compiler's.
 
     Returns:
         The library; None without a compiler, where it fails, or where the environment variable
@@ -32,24 +32,24 @@ def c_library(source: str) -> ctypes.CDLL | None:
     compiler = shutil.which("cc") or shutil.which("gcc")
     if compiler is None or os.environ.get("ALPHACUT_KERNEL") == "numpy":
         return None
-    content = "\n".join([*FLAGS, source, platform.machine(), _processor()])
+    content = "\n".join([*flags, source, platform.machine(), _processor()])
     key = hashlib.sha256(content.encode()).hexdigest()[:16]
     folder = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "alphacut" / "kernels"
     made = folder / f"{key}.so"
     try:
         if not made.exists():
-            _compile(compiler, source, made)
+            _compile(compiler, flags, source, made)
         return ctypes.CDLL(str(made))
     except (OSError, subprocess.SubprocessError):
         return None
 
 
-def _compile(compiler: str, source: str, made: Path) -> None:
+def _compile(compiler: str, flags: tuple[str, ...], source: str, made: Path) -> None:
     made.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=made.parent) as work:
         text, fresh = Path(work) / "source.c", Path(work) / made.name
         text.write_text(source, encoding="utf-8")
-        command = [compiler, *FLAGS, str(text), "-o", str(fresh), "-lm"]
+        command = [compiler, *flags, str(text), "-o", str(fresh), "-lm"]
         subprocess.run(command, check=True, capture_output=True, timeout=SECONDS)
         fresh.replace(made)
 

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import ctypes
-import hashlib
-import os
-import platform
-import shutil
-import subprocess
-import tempfile
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 
+from alphacut.frame.calculus.c_library import c_library
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.certificate.numpy_kernel import examine
 from alphacut.frame.certificate.piece import Piece, Problems
@@ -28,41 +23,10 @@ Examine = Callable[[Piece, Problems], tuple[Array, Array]]
 @cache
 def examination() -> tuple[str, Examine]:
     """The fastest kernel there is, and its name."""
-    library = None if os.environ.get("ALPHACUT_KERNEL") == "numpy" else _library()
+    library = c_library(SOURCE.read_text(encoding="utf-8"), FLAGS)
     if library is None:
         return "NumPy", examine
     return "C", lambda piece, problems: _compiled(library, piece, problems)
-
-
-def _library() -> ctypes.CDLL | None:
-    """The compiled kernel, made on first use; None without a compiler."""
-    compiler = shutil.which("cc") or shutil.which("gcc")
-    if compiler is None:
-        return None
-    content = (*FLAGS, SOURCE.read_text(encoding="utf-8"), platform.machine(), _processor())
-    key = hashlib.sha256("\n".join(content).encode()).hexdigest()[:16]
-    folder = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "alphacut" / "kernels"
-    made = folder / f"{key}.so"
-    try:
-        if not made.exists():
-            folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryDirectory(dir=folder) as work:
-                fresh = Path(work) / made.name
-                command = [compiler, *FLAGS, str(SOURCE), "-o", str(fresh), "-lm"]
-                subprocess.run(command, check=True, capture_output=True, timeout=60)
-                fresh.replace(made)
-        return ctypes.CDLL(str(made))
-    except (OSError, subprocess.SubprocessError):
-        return None
-
-
-def _processor() -> str:
-    """Abilities of the processor, for which code is compiled."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return platform.processor()
-    return next((line for line in lines if line.startswith(("flags", "Features"))), "")
 
 
 def _compiled(library: ctypes.CDLL, piece: Piece, problems: Problems) -> tuple[Array, Array]:

@@ -13,7 +13,8 @@ import numpy as np
 
 from alphacut.rve.image.fields.solver import ConvergenceError, Solution, Solver
 from alphacut.rve.image.fields.system import Linear, System
-from alphacut.rve.petsc import PETSc, in_database, uninterrupted
+from alphacut.rve.interruption import uninterrupted
+from alphacut.rve.petsc import PETSc, in_database
 from alphacut.rve.solver.options import PREFIX, OptionError
 
 DEFAULTS = {"ksp_type": "cg", "ksp_norm_type": "natural", "pc_type": "python", "ksp_max_it": "2000"}

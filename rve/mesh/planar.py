@@ -5,15 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import hypot
 
-import basix
 import gmsh
 import numpy as np
 from numpy.typing import NDArray
 
+from alphacut.rve.interruption import uninterrupted
 from alphacut.rve.mesh.geometry import PeriodicSquare
 from alphacut.rve.mesh.triangulation import Integers
 from alphacut.rve.settings import require_mesh_size, require_radius
 from alphacut.stochastic.theta.truncated_normal import Array
+
+with uninterrupted():
+    import basix
 
 EDGES = ((1, 2), (0, 2), (0, 1))  # of a triangle, in the order of Basix
 _TOUCH = 1e-6

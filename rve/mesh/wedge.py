@@ -9,11 +9,14 @@ from __future__ import annotations
 
 from functools import cache
 
-import basix
-import basix.ufl
 import numpy as np
 
+from alphacut.rve.interruption import uninterrupted
 from alphacut.stochastic.theta.truncated_normal import Array
+
+with uninterrupted():
+    import basix
+    import basix.ufl
 
 NODES = 15
 PRISM = basix.CellType.prism

@@ -8,14 +8,16 @@ from functools import cached_property
 from time import perf_counter
 
 import alphacut.rve.petsc  # noqa: F401
+from alphacut.rve.interruption import uninterrupted
 
-# isort: split
-import basix.ufl
-import dolfinx
+with uninterrupted():
+    import basix.ufl
+    import dolfinx
+    from dolfinx import fem
+
 import numpy as np
 import scipy.sparse as sp
 import ufl
-from dolfinx import fem
 from mpi4py import MPI
 
 from alphacut.rve.cell import Phase

@@ -10,15 +10,17 @@ from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
 
+from alphacut.rve.interruption import uninterrupted
 from alphacut.rve.petsc import PETSc
 
-# isort: split
-import basix.ufl
-import dolfinx
+with uninterrupted():
+    import basix.ufl
+    import dolfinx
+    from dolfinx import fem
+    from dolfinx.fem import petsc
+
 import numpy as np
 import ufl
-from dolfinx import fem
-from dolfinx.fem import petsc
 from mpi4py import MPI
 
 from alphacut.rve.cell import Phase

@@ -10,12 +10,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 
-import basix
 import numpy as np
 
 from alphacut.rve.cell import Phase
+from alphacut.rve.interruption import uninterrupted
 from alphacut.rve.solver.level_stiffness import gradients
 from alphacut.stochastic.theta.truncated_normal import Array
+
+with uninterrupted():
+    import basix
 
 NEARLY_INCOMPRESSIBLE = 0.45  # Poisson's ratio above which the mixed element is taken
 _AUGMENTED = 2.5  # share of the bulk modulus that stays with the displacements, over μ

@@ -8,7 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
-from alphacut.rve.petsc import PETSc, in_database, uninterrupted
+from alphacut.rve.interruption import uninterrupted
+from alphacut.rve.petsc import PETSc, in_database
 from alphacut.rve.solver.options import PREFIX, SolverOptions
 from alphacut.rve.solver.saddle import Saddle
 from alphacut.stochastic.theta.truncated_normal import Array

@@ -7,7 +7,8 @@ import threading
 import numpy as np
 import pytest
 
-from alphacut.rve.petsc import PETSc, uninterrupted
+from alphacut.rve.interruption import uninterrupted
+from alphacut.rve.petsc import PETSc
 from alphacut.rve.solver.krylov import LinearSolver
 from alphacut.rve.solver.options import SolverOptions
 

@@ -10,10 +10,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from dolfinx import fem
 from numpy.typing import NDArray
 
+from alphacut.rve.interruption import uninterrupted
 from alphacut.stochastic.theta.truncated_normal import Array
+
+with uninterrupted():
+    from dolfinx import fem
 
 Faces = Mapping[tuple[int, int], Mapping[int, float]]
 """Face (axis, side) → displacement components given there, and their value at unit strain."""

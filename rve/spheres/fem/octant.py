@@ -6,13 +6,16 @@ from itertools import product
 
 import gmsh
 import numpy as np
-from dolfinx.io import gmshio
 from mpi4py import MPI
 
+from alphacut.rve.interruption import uninterrupted
 from alphacut.rve.mesh.planar import TouchingError
 from alphacut.rve.ranks import Ranks
 from alphacut.rve.settings import require_mesh_size, require_radius
 from alphacut.stochastic.theta.truncated_normal import Array
+
+with uninterrupted():
+    from dolfinx.io import gmshio
 
 _CLOSEST = 0.97
 _FINER = (1.0, 0.8, 0.65, 0.5, 0.4, 0.3, 0.2)

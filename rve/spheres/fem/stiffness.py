@@ -11,12 +11,14 @@ from dataclasses import dataclass, field
 from time import perf_counter
 
 import alphacut.rve.petsc  # noqa: F401
+from alphacut.rve.interruption import uninterrupted
 
-# isort: split
+with uninterrupted():
+    from dolfinx import fem
+    from dolfinx.fem import petsc
+
 import numpy as np
 import ufl
-from dolfinx import fem
-from dolfinx.fem import petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 

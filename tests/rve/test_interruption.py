@@ -1,0 +1,62 @@
+"""Ctrl-C while basix and DOLFINx are imported waits for their end, and is one line then."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PROGRAM = """
+import os, signal, sys
+from alphacut.entry import main
+
+class Pressed:
+    def find_spec(self, name, path, target=None):
+        if name == "{at}" and self in sys.meta_path:
+            sys.meta_path.remove(self)
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, Pressed())
+status = main(["cell", "cases/paper.toml", "--method", "{method}"])
+print(status, "{last}" in sys.modules)
+"""
+
+
+@pytest.mark.parametrize(
+    ("at", "method", "last"),
+    [
+        ("basix._basixcpp", "prism", "basix.quadrature"),
+        ("dolfinx.cpp", "slices", "dolfinx.fem"),
+        ("dolfinx.cpp", "prism", "dolfinx.fem.petsc"),
+        ("petsc4py.lib", "slices", "petsc4py.PETSc"),
+    ],
+)
+def test_it_ends_with_the_usual_status_once_the_import_is_done(at, method, last):
+    program = PROGRAM.format(at=at, method=method, last=last)
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT, check=False
+    )
+    assert (done.returncode, done.stdout) == (0, "130 True\n")
+    assert done.stderr == "alphacut: interrupted; nothing is kept\n"
+
+
+def imported_at_once(tree):
+    """Names that a module imports outside a block of `uninterrupted`."""
+    for node in tree.body:
+        if isinstance(node, ast.Import):
+            yield from (name.name for name in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module
+
+
+def test_no_module_imports_them_without_holding_it_back():
+    files = [file for room in ("rve", "alphacut") for file in (ROOT / room).rglob("*.py")]
+    bare = [
+        f"{file.relative_to(ROOT)}: {name}"
+        for file in files
+        for name in imported_at_once(ast.parse(file.read_text(encoding="utf-8")))
+        if name.split(".")[0] in ("basix", "dolfinx")
+    ]
+    assert bare == []
