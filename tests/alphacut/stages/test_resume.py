@@ -6,7 +6,9 @@ import json
 import shutil
 from pathlib import Path
 
+from alphacut.case.load import load
 from alphacut.entry import main
+from alphacut.stages.material.campaign import campaign, identity
 
 PAPER = str(Path(__file__).parents[3] / "cases" / "paper.toml")
 SERIES = ["modulus", PAPER, "--method", "series"]
@@ -71,3 +73,16 @@ def test_another_record_of_the_same_name_makes_the_shares_anew(tmp_path, capfd):
     assert "modulus.nc is up to date" in err
     assert main(asked) == 0
     assert "shares.nc is up to date" in capfd.readouterr().err
+
+
+def test_a_stored_sample_is_of_one_tolerance():
+    def known(method, *changes):
+        wanted = campaign(load(PAPER, [f"modulus.method={method}", *changes]))
+        return identity(wanted.task)
+
+    asked = {None: [], 1e-3: ["modulus.tolerance=1e-3"], 1e-4: ["modulus.tolerance=1e-4"]}
+    found = [known("table", *changes) for changes in asked.values()]
+    assert [one["choice"].pop("tolerance") for one in found] == list(asked)
+    assert found[1] == found[2]  # nothing else parts them
+    curves = [known("auto", *changes) for changes in asked.values()]  # beside [response]
+    assert [one["choice"]["tolerance"] for one in curves] == [1e-9] * 3
