@@ -62,6 +62,7 @@ def test_a_frame_under_an_earthquake_has_shares_and_its_report_names_periods(tmp
     assert page.count(">error up to<") == 1  # of the extremes
     assert ">between nodes and by error, up to<" in page
     assert "All are peaks at the nodes, " in page
+    assert "no motion peaks higher than the greatest where the bounds are" in page
     assert "; between nodes at most " in page
 
 
