@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager, nullcontext
@@ -79,7 +80,8 @@ def propagate(
             cannot see that the function changed: say so here, by a version or a hash of its text.
         spot_check: Time for running samples from the store again, as a share of the time that they
             took: the modal point (or another, if it is not stored) in any case, then random ones.
-            The store is refused if one gives something else; 0 runs none.
+            The store is refused if one gives something else; 0 runs none. Without store and budget
+            the first of 20 samples or more is run again: random functions are warned of.
         progress: Called with the share done, 0 … 1; of a plan that goes on from its samples a
             guess that never falls. If not given, a bar appears on a terminal or in a notebook after
             a second; False shows none.
@@ -113,10 +115,14 @@ def propagate(
         )
         with kept_on_interrupt(campaign, store):
             result = plan.run(campaign, domain)
+            within = store is None and not (isinstance(plan, Automatic) and plan.budget)
+            doubt = campaign.randomness() if within else ""
         result = result.confronted(known.stated(domain.names, result.outputs))
         campaign.report(1.0)
-    torn = (TORN,) if samples is not None and samples.torn else ()
-    result = replace(result, notes=(*result.notes, *shared_numbers(domain), *torn))
+    if doubt:
+        warnings.warn(doubt, stacklevel=2)
+    own = filter(None, (TORN if samples is not None and samples.torn else "", doubt))
+    result = replace(result, notes=(*result.notes, *shared_numbers(domain), *own))
     return result.charged(
         calls=campaign.calls, reused=campaign.reused, seconds=perf_counter() - start
     )

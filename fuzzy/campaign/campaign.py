@@ -13,7 +13,8 @@ from alphacut.fuzzy.campaign.call import Call, Failure, Outcome, Sample, named_p
 from alphacut.fuzzy.campaign.dispatch import Task, completed
 from alphacut.fuzzy.campaign.memory_check import require
 from alphacut.fuzzy.campaign.sample_store import Shelf
-from alphacut.fuzzy.campaign.spot_check import SpotCheck
+from alphacut.fuzzy.campaign.spot_check import RANDOM, SpotCheck, require_same
+from alphacut.fuzzy.campaign.workers import submitted
 from alphacut.fuzzy.counted import counted
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.samples.model import Layout, Values
@@ -99,6 +100,7 @@ class Campaign:
     stepwise: bool = False
     layout: Layout = ()
     spot_check: SpotCheck | None = None
+    _first: tuple[Array, Sample] | None = field(default=None, repr=False)
     _before: float = field(default=0.0, repr=False)
     _told: float = field(default=0.0, repr=False)
 
@@ -119,6 +121,22 @@ class Campaign:
             ]
             raise CampaignError(failed, len(points))
         return Values(self.layout, batch.array)
+
+    def randomness(self) -> str:
+        """What the first sample gives when run again, if it differs: words, else nothing.
+
+        One run more, which `calls` does not count, where it is within the spot check's share.
+        """
+        check = self.spot_check
+        if self._first is None or check is None or self.runs * check.share < 1:
+            return ""
+        point, before = self._first
+        fresh = submitted(self.executor, self.call, point[None]).result()[0]
+        try:
+            require_same(before, fresh, self.call.names, point, "one call gave", RANDOM)
+        except ValueError as error:
+            return str(error)
+        return ""
 
     def report(self, share: float, *, last: bool = False) -> None:
         """Report the completed fraction, which never falls; `last` fills the rest."""
@@ -205,6 +223,8 @@ class _Batch:
         for row, outcome in zip(rows, map(self._aligned, outcomes), strict=True):
             if shelf:
                 shelf.gather(shelf.key(self.points[row]), outcome)
+            if self.campaign._first is None and isinstance(outcome, Sample):
+                self.campaign._first = self.points[row].copy(), outcome
             self._take(row, outcome)
         if shelf:
             shelf.write()

@@ -16,6 +16,7 @@ from alphacut.fuzzy.sets.numbers import Array
 _SAME = 1e-6  # of each output: solvers need not repeat themselves closer
 _NOTHING = 1e-9  # differences of less, in a unit of the outputs, are those of residuals
 _CURE = "a function that changed needs another identity"
+RANDOM = "a random function has no bounds: give it a fixed seed"
 
 
 @dataclass
@@ -76,7 +77,14 @@ class SpotCheck:
             require_same(stored(int(row)), fresh, call.names, points[row])
 
 
-def require_same(stored: Sample, fresh: Outcome, names: Sequence[str], point: Array) -> None:
+def require_same(
+    stored: Sample,
+    fresh: Outcome,
+    names: Sequence[str],
+    point: Array,
+    holder: str = "the store holds",
+    cure: str = _CURE,
+) -> None:
     """A stored sample is what the function gives now, at a point (inputs,).
 
     Raises:
@@ -85,24 +93,23 @@ def require_same(stored: Sample, fresh: Outcome, names: Sequence[str], point: Ar
     place = ", ".join(f"{name} = {x:.6g}" for name, x in zip(names, point, strict=True))
     if isinstance(fresh, Failure):
         raise ValueError(
-            f"the store holds a sample at {place} where the function now fails ({fresh.error});"
-            f" {_CURE}"
+            f"{holder} a sample at {place} where the function now fails ({fresh.error}); {cure}"
         )
     old, new = (Values(sample.layout, sample.row[None]) for sample in (stored, fresh))
     if sorted(old.columns) != sorted(new.columns):
         raise ValueError(
-            f"the store holds the outputs {', '.join(old.columns)}, the function gives"
-            f" {', '.join(new.columns)}; {_CURE}"
+            f"{holder} the outputs {', '.join(old.columns)}, the function gives"
+            f" {', '.join(new.columns)}; {cure}"
         )
     values = new.select(old.columns)[0]
     excess = np.abs(values - stored.row) - _allowed(old)
     if (excess > 0).any():
         i = int(excess.argmax())
         found = (
-            f"the store holds {old.columns[i]} = {stored.row[i]:.6g} at {place} where the function"
+            f"{holder} {old.columns[i]} = {stored.row[i]:.6g} at {place} where the function"
             f" gives {values[i]:.6g}"
         )
-        raise ValueError(f"{found}; {_CURE}")
+        raise ValueError(f"{found}; {cure}")
 
 
 def _allowed(values: Values) -> Array:

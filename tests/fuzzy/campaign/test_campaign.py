@@ -1,5 +1,6 @@
 """Campaigns: grouping, workers, failures, outputs."""
 
+import warnings
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import numpy as np
@@ -270,3 +271,16 @@ def test_a_number_that_stands_for_two_inputs_is_noted():
 def test_notes_tell_outputs_from_inputs_of_the_same_name():
     result = propagate(lambda y: (y - 1) ** 2, {"y": Interval(0, 3)}, Signed())
     assert result.notes[0].startswith("output y is not monotone in input y")
+
+
+def test_a_random_function_is_warned_of():
+    draw = np.random.default_rng(1).normal
+    inputs = {"a": Triangular(1, 2, 3), "b": Triangular(1, 2, 3)}
+    told = r"one call gave y = .* at a = .* where the function gives .*; a random function has no"
+    with pytest.warns(UserWarning, match=told):
+        found = propagate(lambda a, b: {"y": a + b + draw()}, inputs, General())
+    assert "a fixed seed" in str(found.notes[-1])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        propagate(lambda a, b: a + b, inputs, General())
+        propagate(lambda a, b: a + b + draw(), inputs, General(), spot_check=0)
