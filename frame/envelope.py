@@ -145,9 +145,22 @@ class Envelope:
         count = (
             f"{self.trajectories} {'eigen-analyses' if self.method == 'modal' else 'trajectories'}"
         )
-        cost = f"  {self.method}: {count}, {self.seconds:.2g} s, bounds {self.nature}"
+        cost = f"  {self.method}: {count}, {self.seconds:.2g} s, {self._natured()}"
         claim = [f"  {self.facts['claim']}"] if "claim" in self.facts else []
         return "\n".join([*lines, cost, *claim])
+
+    def _natured(self) -> str:
+        """Nature of the bounds, where they hold, and what the steps between may add."""
+        said = f"bounds {self.nature} at nodes every {self.time[1] - self.time[0]:.6g} s"
+        more = [] if self.between is None else self.between.max(0).tolist()
+        peak = 0.01 * np.maximum(self.maximum, -self.minimum).max(0)
+        least = peak if self.error is None else np.maximum(peak, self.error.max((0, 1)))
+        told = [
+            f"{high:.3g}{_unit(name)} more" + (f" ({name})" if len(self.outputs) > 1 else "")
+            for name, high, counts in zip(self.outputs, more, least, strict=False)
+            if high > counts
+        ]
+        return said + ("; between them up to " + ", ".join(told) if told else "")
 
     def _repr_html_(self) -> str:
         """Extremes over time of every output and level as a table, for notebooks."""
@@ -181,7 +194,7 @@ class Envelope:
         draw_bands(axes, self.time, self.alpha, self.lower[..., k], self.upper[..., k])
         unit = _unit(output)
         axes.set(xlabel="time in s", ylabel=f"{output} in{unit}" if unit else output)
-        axes.set_title(f"bounds {self.nature}", fontsize="medium")
+        axes.set_title(f"bounds {self.nature} at nodes", fontsize="medium")
         return axes
 
     def on_levels(self, alpha: Array, which: Array) -> Envelope:

@@ -26,12 +26,28 @@ def test_an_envelope_prints_as_a_few_lines() -> None:
     assert re.fullmatch(
         r"  base_shear: -?[\d.e-]+ … [\d.]+ N at α = 0, error up to [\d.e-]+ N", lines[2]
     )
-    assert re.fullmatch(r"  modal: \d+ eigen-analyses, [\d.]+ s, bounds guaranteed", lines[3])
+    assert re.fullmatch(
+        r"  modal: \d+ eigen-analyses, [\d.]+ s, bounds guaranteed at nodes.*", lines[3]
+    )
     inner = envelope(
         FRAME, INPUTS, duration=1.0, step=0.05, alpha=(0, 1), method="vertex", integrator="exact"
     )
     assert "error" not in repr(inner)
     assert "trajectories" in repr(inner)
+
+
+def test_an_envelope_says_what_may_lie_between_its_nodes() -> None:
+    """A step of most of a period hides a peak that bounds at nodes do not hold."""
+    common = {"inputs": INPUTS, "duration": 20, "alpha": (0,)}
+    one = StoreyFrame((2e4,), (3.0,), 25e9, 1e-6, q0=(0.01,), outputs=("q1",))
+    coarse, fine = (envelope(one, step=step, **common) for step in (2, 0.01))  # type: ignore[arg-type]
+    more = float(coarse.facts["between_nodes"])
+    words = f"bounds guaranteed at nodes every 2 s; between them up to {more:.3g} m more"
+    assert words in repr(coarse)
+    assert words in coarse._repr_html_()
+    assert "guaranteed at nodes every 0.01 s\n" in repr(fine)
+    both = repr(envelope(FRAME, step=2, **common))  # type: ignore[arg-type]
+    assert re.search(r"up to [\d.e-]+ m more \(q2\), [\d.e+]+ N more \(base_shear\)\n", both)
 
 
 def test_outputs_without_a_known_unit_have_none() -> None:
