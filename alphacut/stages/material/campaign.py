@@ -108,13 +108,17 @@ class CellTask:
         return between_nodes(nodes, stress, theta_shown(self.family.law))
 
 
+SHOWN_OUTPUTS = ("E", "nu")
+"""Outputs whose bounds are printed; curves and errors are read off at their samples."""
+
+
 def plan_of(case: Case) -> Plan:
     """The plan that a case asks for."""
     plans: dict[str, Plan] = {
         "general": General(),
         "reduced": Reduced(),
-        "extended": Extended(outputs=("E",)),
-        "signed": Signed(outputs=("E",)),
+        "extended": Extended(outputs=SHOWN_OUTPUTS),
+        "signed": Signed(outputs=SHOWN_OUTPUTS),
     }
     return plans[case.modulus.plan]
 

@@ -102,19 +102,14 @@ class FuzzyModulus:
     def worth(self) -> str:
         """Line on the worth of E's bounds, and the model's error beside them."""
         parts = ", ".join(f"{name} {value:.1e}" for name, value in self.error.items())
-        whose = (
-            "modal sample"
-            if self.judged and not self.largest("error")
-            else "largest of all samples"
-        )
-        error = (
-            f"estimated at {sum(self.error.values()):.1e} of E ({parts}; {whose})"
-            if parts
-            else "not estimated"
-        )
+        one = self.judged and not self.largest("error")
+        whose = "modal sample" if one else "largest of all samples"
+        told = f"estimated at {sum(self.error.values()):.1e} of E ({parts}; {whose})"
+        base = self.result.base
+        nu = "" if self.nature == str(base) else f"; bounds of nu are {base}"
         return (
-            f"bounds {self.nature}: {self.meaning}; the error of the cell's model"
-            f" comes on top, {error}"
+            f"bounds {self.nature}: {self.meaning}{nu}; the error of the cell's model"
+            f" comes on top, {told if parts else 'not estimated'}"
         )
 
     @property

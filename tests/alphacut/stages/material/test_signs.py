@@ -4,9 +4,11 @@ is not said where it does not.
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from alphacut.case.load import load
+from alphacut.stages.material import modulus
 from alphacut.stages.material.campaign import campaign
 
 CASES = Path(__file__).parents[4] / "cases"
@@ -49,3 +51,18 @@ def test_nothing_is_stated_where_nothing_is_proved(change):
 
 def test_nothing_is_stated_of_the_discretised_product_space():
     assert not campaign(load(CASES / "paper.toml")).known.signs
+
+
+@pytest.mark.parametrize("plan", ["signed", "extended"])
+def test_every_plan_bounds_poissons_ratio_by_its_own_corners(plan):
+    """Where ν of the matrix is fuzzy, other corners bound ν than those that bound E."""
+    changes = (
+        *("cell.matrix_poisson=[0.33, 0.35, 0.37]", "cell.inclusion_poisson=[0.2, 0.22, 0.24]"),
+        *("modulus.alpha=[0, 1]", "modulus.method=series"),
+    )
+    cases = [
+        load(CASES / "paper.toml", [f"modulus.plan={name}", *changes]) for name in (plan, "general")
+    ]
+    own, general = (modulus.compute(campaign(case)).result for case in cases)
+    for name in ("E", "nu"):
+        assert np.allclose(own.bounds(name), general.bounds(name), rtol=1e-9, atol=0)
