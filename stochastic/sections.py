@@ -31,6 +31,7 @@ class Section:
         rejected: What was left out of measured data: row or label to reason.
         phase_fraction: Area fraction of the particles in the image that was read, if one was.
         misfit: Share of the particles' pixels outside the circles that stand for them.
+        unevenness: Difference of the matrix's brightness over the image, a share of the contrast.
     """
 
     diagram: Apollonius
@@ -38,6 +39,7 @@ class Section:
     rejected: dict[int, str] = field(default_factory=dict)
     phase_fraction: float | None = None
     misfit: float = 0.0
+    unevenness: float = 0.0
 
     @property
     def discs(self) -> Discs:
@@ -101,6 +103,7 @@ class Measured:
             _section(circles.discs, circles.rejected),
             phase_fraction=circles.phase_fraction,
             misfit=circles.misfit,
+            unevenness=circles.unevenness,
         )
         if progress:
             progress(1.0)

@@ -56,10 +56,7 @@ class PBox:
         low, high = self.bounds(grid)
         share = self.fit.distribution.cdf(grid)
         # bounds of the distribution function
-        least, greatest = (
-            np.interp(values, high, share),
-            np.interp(values, low, share),
-        )
+        least, greatest = (np.interp(values, high, share), np.interp(values, low, share))
         return float(max((least - before).max(), (after - greatest).max(), 0.0))
 
     def contains(self, sample: AreaWeighted, band: float) -> bool:

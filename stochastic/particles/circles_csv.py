@@ -141,6 +141,7 @@ class MeasuredCircles:
         phase_fraction: Area fraction of the particles in the whole image; None without an image.
         lost: Share of that area which lies in particles left out inside the image.
         misfit: Share of the particles' pixels outside the circle of their own piece.
+        unevenness: Difference of the matrix's brightness over the image, a share of the contrast.
     """
 
     discs: Discs
@@ -148,3 +149,4 @@ class MeasuredCircles:
     phase_fraction: float | None = None
     lost: float = 0.0
     misfit: float = 0.0
+    unevenness: float = 0.0

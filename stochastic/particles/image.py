@@ -44,7 +44,8 @@ CUT = 1.2
 CUT_OFF = "is cut by the image's edge"
 LOST = 0.02  # share of the particles' area that may be left out
 MISFIT = 0.09  # share of the particles' pixels that may lie outside the circle of their piece
-UNEVEN = 1 / 3  # of the contrast, by which the brightness of the image's quarters may differ
+UNEVEN = 1 / 3  # of the contrast, by which the brightness of the matrix may differ over the image
+TILES = 4  # along each side of the image, over which that brightness is compared
 FLATTENED = 0.45  # roundness of a disc that several neighbours overlap
 DROP = "[microstructure.image] drop = true"
 PARTICLES = ("auto", "bright", "dark")
@@ -144,7 +145,7 @@ class SectionImage:
         if not found:
             raise ValueError(
                 f"{self.path} shows no round particle of {self.smallest:g} pixels or more in radius"
-                f" ({_counted(rejected)}); {self._cure(picture, share, '')}"
+                f" ({_counted(rejected)}); {self._cure(picture, (share, labels), '')}"
             )
         fraction = float(share.mean())
         missing = lost / share.sum()
@@ -152,24 +153,26 @@ class SectionImage:
             raise ValueError(
                 f"{self.path} shows particles on {fraction:.4f} of its area, and {missing:.1%} of"
                 f" that lies in pieces that were left out ({_counted(rejected)});"
-                f" {self._cure(picture, share, ', or drop them: ' + DROP)}"
+                f" {self._cure(picture, (share, labels), ', or drop them: ' + DROP)}"
             )
         if misfit > MISFIT and not self.drop:
             raise ValueError(
                 f"{self.path} shows particles on {fraction:.4f} of its area, and {misfit:.1%} of"
                 f" that lies outside the circles that would stand for them, where discs that touch"
                 f" leave less than {MISFIT:.0%}: the particles are not round;"
-                f" {self._cure(picture, share, ', or go on with the circles: ' + DROP)}"
+                f" {self._cure(picture, (share, labels), ', or go on with the circles: ' + DROP)}"
             )
         (row, column, radius), (height, width) = np.array(found).T, picture.shape
         centres = np.stack([column + 0.5, height - row - 0.5], axis=1)
         centres = pushed_apart(centres, radius) * self.pixel
         size = np.array([width, height]) * self.pixel
         discs = Discs(centres, radius * self.pixel, size, periodic=False)
-        return MeasuredCircles(discs, rejected, fraction, missing, misfit)
+        light = self._unevenness(share, labels)
+        return MeasuredCircles(discs, rejected, fraction, missing, misfit, light)
 
-    def _cure(self, picture: Array, share: Array, besides: str) -> str:
+    def _cure(self, picture: Array, segmented: tuple[Array, Labels], besides: str) -> str:
         """What helps where pieces are not round: other phase, even light, the image as the cell."""
+        share = segmented[0]
         other = "dark" if np.vdot(share - share.mean(), picture) > 0 else "bright"
         turned = replace(self, particles=other)
         seen = turned._segmented(picture)
@@ -177,12 +180,8 @@ class SectionImage:
         if found and lost <= LOST * seen[0].sum() and misfit <= MISFIT:
             key = f'[microstructure.image] particles = "{other}"'
             return f"the {other} phase is round: take it as the particles ({key})"
-        halves = [half for rows in np.array_split(share, 2) for half in np.array_split(rows, 2, 1)]
-        if (apart := float(np.ptp([quarter.mean() for quarter in halves]))) > UNEVEN:
-            return (
-                f"the light is uneven, the quarters' brightness is {apart:.2f} of the contrast"
-                " apart: subtract the background in the program that makes the image"
-            )
+        if (apart := self._unevenness(*segmented)) > UNEVEN:
+            return uneven_in_words(apart)
         cell = "particles that are not round need the image itself as the cell ([cell] image)"
         return cell + besides
 
@@ -224,13 +223,22 @@ class SectionImage:
         least = FLATTENED if touches else self.roundness
         return "is not round" if roundness(*region.coords.T) < least else ""
 
-    def _plateau(self, smooth: Array, mask: NDArray[np.bool_]) -> float:
-        """Grey of one phase away from the smoothed edge, or as far from it as pixels lie."""
+    def _core(self, phase: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Pixels of one phase away from the smoothed edge, or as far from it as pixels lie."""
         from scipy import ndimage
 
-        depth = ndimage.distance_transform_edt(mask)
-        enough = min(3 * self.smoothing + 1, float(np.quantile(depth[mask], 0.8)))
-        return float(np.median(smooth[depth >= enough]))
+        depth = ndimage.distance_transform_edt(phase)
+        inside: NDArray[np.bool_] = depth >= min(
+            3 * self.smoothing + 1, float(np.quantile(depth[phase], 0.8))
+        )
+        return inside
+
+    def _unevenness(self, share: Array, labels: Labels) -> float:
+        """Greatest difference of the matrix's brightness between tiles, over the contrast."""
+        matrix = np.where(self._core(labels == 0), share, np.nan)
+        rows = np.array_split(matrix, TILES)
+        tiles = [tile[~np.isnan(tile)] for row in rows for tile in np.array_split(row, TILES, 1)]
+        return float(np.ptp([np.median(tile) for tile in tiles if len(tile) >= 16] or [0.0]))
 
     def _segmented(self, picture: Array) -> tuple[Array, Labels]:
         """Particle's share of each pixel, in [0, 1], and labels of the particles."""
@@ -244,7 +252,7 @@ class SectionImage:
         mask = smooth > threshold
         if self.particles == "dark" or (self.particles == "auto" and not self._are_bright(mask)):
             mask = ~mask
-        within, without = self._plateau(smooth, mask), self._plateau(smooth, ~mask)
+        within, without = (float(np.median(smooth[self._core(one)])) for one in (mask, ~mask))
         share = (smooth - without) / (within - without)  # noise beyond 0 and 1 cancels in sums
         return share, _rounder(self._pieces(mask), self.roundness, np.pi * self.smallest**2)
 
@@ -273,6 +281,14 @@ class SectionImage:
         large = [piece for piece in pieces if piece.area >= np.pi * self.smallest**2]
         hulls = sum(piece.area_convex for piece in large)
         return sum(piece.area for piece in large) / hulls if hulls else 0.0
+
+
+def uneven_in_words(apart: float) -> str:
+    """Uneven light and its cure; `apart` is a share of the contrast."""
+    return (
+        f"the light is uneven, the matrix's brightness differs by {apart:.2f} of the contrast over"
+        " the image: subtract the background in the program that makes the image"
+    )
 
 
 def _counted(rejected: Mapping[int, str]) -> str:

@@ -2,11 +2,14 @@
 their circles leave uncovered.
 """
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from alphacut.stages.material.micrograph import fractions
 from alphacut.stochastic.particles.annotation import cropped, rectangles
-from alphacut.stochastic.particles.image import MISFIT, SectionImage
+from alphacut.stochastic.particles.image import MISFIT, UNEVEN, SectionImage
 
 SIDE = 300
 
@@ -90,3 +93,42 @@ def test_uneven_light_is_named_and_evening_it_ends_the_refusal():
             SectionImage("light.png", 1.0, "bright").circles(grey + light)
         assert "drop" not in str(told.value)
     assert len(SectionImage("light.png", 1.0, "bright").circles(grey).discs) == 5
+
+
+LIGHTS = {
+    "ramp": lambda x, y: x,
+    "vignette": lambda x, y: -2 * (x**2 + y**2 - x - y),
+    "valley": lambda x, y: (2 * x - 1) ** 2,
+}
+
+
+@pytest.mark.parametrize("light", LIGHTS)
+@pytest.mark.parametrize("strength", [0.8, 2.0])
+def test_light_is_measured_over_the_matrix_whatever_its_shape(light, strength):
+    generator = np.random.default_rng()
+    picture = section(generator, count=25) / 90  # in units of the contrast
+    y, x = np.mgrid[:SIDE, :SIDE] / SIDE
+    read = SectionImage("light.png", 1.0, "bright", drop=True)
+    uneven = picture + strength * LIGHTS[light](x, y)
+    assert read._unevenness(*read._segmented(uneven)) > UNEVEN
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_even_light_is_not_taken_for_uneven(dark):
+    generator = np.random.default_rng()
+    count, noise = int(generator.integers(20, 90)), generator.uniform(0, 18)
+    picture = section(generator, count=count, noise=noise, dark=dark)
+    read = SectionImage("even.png", 1.0, "dark" if dark else "bright", drop=True)
+    assert read.circles(picture).unevenness < 0.5 * UNEVEN
+
+
+def test_an_accepted_image_warns_of_uneven_light():
+    def told(unevenness):
+        seen = SimpleNamespace(discs=range(9), misfit=0.0, unevenness=unevenness)
+        sample = SimpleNamespace(values=range(4))
+        found = SimpleNamespace(fraction_of_map=0.4, sample=sample, sections=[seen])
+        return "\n".join(fractions(found, 0.4))
+
+    assert "warning" not in told(0.9 * UNEVEN)
+    assert "warning: the light is uneven, the matrix's brightness differs by 0.56" in told(0.56)
+    assert "subtract the background" in told(0.56)

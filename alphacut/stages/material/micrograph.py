@@ -36,7 +36,7 @@ def crop_of(case: Case) -> tuple[int, int, int, int] | None:
 
 def fractions(found: Microstructure, fraction: float) -> Iterator[str]:
     """The one area fraction to compare with, what E takes of it, and what is lost between."""
-    from alphacut.stochastic.particles.image import MISFIT
+    from alphacut.stochastic.particles.image import MISFIT, UNEVEN, uneven_in_words
 
     taken, cells = found.fraction_of_map, len(found.sample.values)
     count = sum(len(section.discs) for section in found.sections)
@@ -56,3 +56,6 @@ def fractions(found: Microstructure, fraction: float) -> Iterator[str]:
             f"warning: {misfit:.1%} of the particles' area lies outside the circles that stand for"
             f" them, where discs that touch leave less than {MISFIT:.0%}: they are not round"
         )
+    if (apart := found.sections[0].unevenness) > UNEVEN:
+        told = "circles may be missing, false or of a wrong radius"
+        yield f"warning: {uneven_in_words(apart)}, and read it again; {told}"

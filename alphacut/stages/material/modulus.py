@@ -30,10 +30,7 @@ if TYPE_CHECKING:
 
     from alphacut.rve.result import Homogenised
 
-QUANTITIES = {
-    "E": ("Pa", "effective Young's modulus"),
-    "nu": ("1", "effective Poisson's ratio"),
-}
+QUANTITIES = {"E": ("Pa", "effective Young's modulus"), "nu": ("1", "effective Poisson's ratio")}
 STRESSES = {
     "s11": ("Pa", "mean homogenised stress 11 under ε11 = ε22 = 0.01"),
     "s12": ("Pa", "mean homogenised stress 12 under ε12 = 0.01"),

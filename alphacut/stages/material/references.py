@@ -207,11 +207,7 @@ def _average(modulus: float, poisson: float, ratio: float) -> Array:
 
 
 def beside(
-    case: Case,
-    modulus: float,
-    poisson: float,
-    ratio: float | None,
-    cuts: Cuts | None = None,
+    case: Case, modulus: float, poisson: float, ratio: float | None, cuts: Cuts | None = None
 ) -> Document:
     """References at the modal values of a case's cell, over its α-cuts, and what they say of E.
 
