@@ -21,6 +21,10 @@ from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.given import require_fields
 from alphacut.fuzzy.sets.numbers import Array, Interval, Rows
 
+TAUGHT = (
+    "the metamodel missed its teacher's bounds of held-out boxes by up to {:.3g}; what the teacher"
+    " misses, as corners alone miss extremes inside, is not in its error"
+)
 _SAFETY = 2  # the error elsewhere may be larger than on the boxes that were held out
 
 
@@ -177,5 +181,5 @@ class TrainedBounds:
             error=np.broadcast_to(_SAFETY * self.missed, least.shape).copy(),
             proved=np.zeros(least.shape, bool),
             enforced=(nested[0] < least) | (nested[1] > most),
-            notes=(f"the metamodel missed held-out boxes by up to {float(self.missed.max()):.3g}",),
+            notes=(TAUGHT.format(float(self.missed.max())),),
         )

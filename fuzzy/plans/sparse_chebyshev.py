@@ -20,6 +20,8 @@ from alphacut.fuzzy.surrogates.chebyshev_polynomial import Polynomial
 
 _SEARCHES = 20_000  # searches of the surface at most
 _SAFETY = 2  # the surface may miss other places by more than the samples that were held out
+_TINY = np.finfo(float).tiny
+_ROUGH = 3  # the same of a surface that ended at its budget, as one about kinks does
 
 
 class _Ends(NamedTuple):
@@ -38,9 +40,9 @@ class Chebyshev:
             ends.
         budget: Samples at which it ends at the latest (the last step may pass it).
         confirm: Run the model where the surface has its extremes. The bounds are then attained
-            (inner), their error the disagreement there and twice that at held-out samples;
-            otherwise they are the surface's (estimated), their error twice that at held-out
-            samples.
+            (inner), their error the disagreement there and twice that at held-out samples (three
+            times where the budget ended it); otherwise they are the surface's (estimated), their
+            error the latter alone.
         outputs: Outputs whose bounds matter; all if none is named.
 
     Raises:
@@ -74,7 +76,8 @@ class Chebyshev:
         _require_few(self.outputs or primary(columns, model.known), domain)
         grid = SparseGrid(memo, *(ends[0] for ends in domain.boxes))
         missed, met = grid.refine(self.tolerance, self.budget)
-        missed = _SAFETY * missed
+        left = float((missed / np.maximum(np.ptp(memo.values.array, axis=0), _TINY)).max())
+        missed = (_SAFETY if met else _ROUGH) * missed
         chosen = np.array(
             [memo.values.column(name) for name in self.outputs or primary(columns, model.known)]
         )
@@ -85,23 +88,8 @@ class Chebyshev:
         result = Design.from_samples(domain, memo.points).bounds(memo.values, plan="chebyshev")
         table = np.broadcast_to(missed, result.lower.shape).copy()
         table[:, chosen] = error
-        left = float(
-            (
-                missed
-                / _SAFETY
-                / np.maximum(np.ptp(memo.values.array, axis=0), np.finfo(float).tiny)
-            ).max()
-        )
-        notes = (
-            ()
-            if met
-            else (
-                (
-                    f"the surface ended at its budget of {self.budget} samples with {left:.1e} of"
-                    " the range missed"
-                ),
-            )
-        )
+        ended = f"the surface ended at its budget of {self.budget} samples with {left:.1e} of"
+        notes = () if met else (f"{ended} the range missed",)
         result = replace(result, error=table, notes=notes)
         return result if self.confirm else _estimated(result, ends, chosen)
 

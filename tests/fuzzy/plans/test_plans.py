@@ -16,6 +16,7 @@ from alphacut.fuzzy import (
     QuasiMonteCarlo,
     Reduced,
     Signed,
+    Trapezoidal,
     Triangular,
     levels,
     propagate,
@@ -329,3 +330,29 @@ def test_a_result_prints_a_line_for_each_level_and_what_they_are_worth():
         "y, α = 1: 4 … 4",
         "a: opinions, so that no level has a probability",
     ]
+
+
+def test_the_error_of_a_surface_that_kinks_ended_at_its_budget_covers():
+    def kinked(a, b, c, d, e):
+        return abs(a - 0.31) * b + np.maximum(c - 0.62, d) * (1 + e) + abs(a + b - 1.43)
+
+    inputs = {
+        "a": Interval(-0.15, 0.6),
+        "b": Interval(0.8, 1.3),
+        "c": Interval(0.25, 0.85),
+        "d": Interval(-0.1, 0.25),
+        "e": Interval(-0.4, 0.35),
+    }
+    wide = {
+        "a": Triangular(-0.5, 0.2, 1.0),
+        "b": Interval(0.8, 1.3),
+        "c": Trapezoidal(0.0, 0.5, 0.7, 1.0),
+        "d": Triangular(-0.3, 0.1, 0.4),
+        "e": Triangular(-1.0, 0.2, 0.5),
+    }
+    found = propagate(kinked, wide, Chebyshev(), alpha=[0, 0.5, 1], vectorised=True)
+    assert "ended at its budget" in found.notes[0]
+    proved = propagate(kinked, inputs, Optimisation(starts=16), vectorised=True, alpha=[0])
+    missed = found.bounds()[0][1] - proved.bounds()[0][0]
+    assert missed <= found.error[1, 0]
+    assert missed > 2 / 3 * found.error[1, 0]
