@@ -178,7 +178,7 @@ def _prepared(
     else:
         flow = LinearFlow(model, cuts.names, duration, step, _integrator(integrator, method))
         scheme = flow.integrator.name
-    require_admissible(model, cuts)
+    require_admissible(model, cuts, duration)
     require_stable(flow, cuts)
     return method, way, UnitFlow(flow, cuts, relative), scheme
 

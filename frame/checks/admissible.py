@@ -17,6 +17,7 @@ from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.frame.structures.storey import StoreyFrame
 
 OTHER_UNITS = 500  # from so many times the structure's own value on, or that part of it
+SLOW = 100  # periods longer than so many durations are warned of
 POSITIVE, NOT_NEGATIVE, RATIO = (
     "positive",
     "0 or greater",
@@ -46,12 +47,15 @@ def _(system: MatrixStructure, name: str) -> str | None:
     return RATIO if name in [ratio for ratio in system.ratios if isinstance(ratio, str)] else None
 
 
-def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> None:
+def require_admissible(
+    system: LinearSystem | LagrangianSystem, cuts: Boxes, duration: float
+) -> None:
     """Refuses supports that reach values without a meaning.
 
     Args:
         system: The structure.
         cuts: Its uncertain parameters.
+        duration: Length of the simulation, in s.
 
     Raises:
         ValueError: A support is not finite or reaches what its parameter must not be, or is of
@@ -60,7 +64,8 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
             corner, or nothing moves it, or the weight may buckle a storey.
 
     Warns:
-        UserWarning: A stiffness or damping has a negative eigenvalue there.
+        UserWarning: A stiffness or damping has a negative eigenvalue there, or all periods are
+            long beside the duration.
     """
     for name, low, high in zip(cuts.names, cuts.lower.min(0), cuts.upper.max(0), strict=True):
         rule = wanted(system, name)
@@ -79,7 +84,7 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
         ends = zip(cuts.lower.min(0).tolist(), cuts.upper.max(0).tolist(), strict=True)
         system.require_standing(dict(zip(cuts.names, ends, strict=True)))
     if not isinstance(system, LagrangianSystem):
-        _require_motion(system, cuts)
+        require_motion(system, cuts.names, probes(cuts), duration)
 
 
 def _require_size(name: str, own: float, support: Array) -> None:
@@ -93,14 +98,17 @@ def _require_size(name: str, own: float, support: Array) -> None:
         )
 
 
-def _require_motion(system: LinearSystem, cuts: Boxes) -> None:
-    """Refuse a mass matrix that is not positive, and a structure that stays at rest."""
+def require_motion(
+    system: LinearSystem, names: tuple[str, ...], points: Array, duration: float
+) -> None:
+    """As `require_admissible`, at parameters `points` (S, d) of a linear structure."""
+    period = np.inf  # the longest natural one, where that is shortest
     moved = system.ground is not None and np.any(system.ground.acceleration)
     growing: dict[str, str] = {}
-    for point in probes(cuts):
-        at = ", ".join(f"{name} = {x:g}" for name, x in zip(cuts.names, point, strict=True))
+    for point in points:
+        at = ", ".join(f"{name} = {x:g}" for name, x in zip(names, point, strict=True))
         try:
-            found = evaluate(system, cuts.names, point[None], derivatives=False)[0]
+            found = evaluate(system, names, point[None], derivatives=False)[0]
             positive = bool(np.linalg.eigvalsh(found.mass.value).min() > 0)
         except np.linalg.LinAlgError:  # from damping by ratios, which divides by the mass
             positive = False
@@ -109,6 +117,7 @@ def _require_motion(system: LinearSystem, cuts: Boxes) -> None:
                 f"mass: the matrix is not positive definite at {at}; narrow the supports to where"
                 " every unknown has a mass"
             )
+        period = min(period, _longest_period(found.mass.value[0], found.stiffness.value[0]))
         moved = moved or found.q0.value.any() or found.v0.value.any()
         for kind, jet in (("stiffness", found.stiffness), ("damping", found.damping)):
             rates = np.linalg.eigvalsh((jet.value[0] + jet.value[0].T) / 2)
@@ -125,3 +134,16 @@ def _require_motion(system: LinearSystem, cuts: Boxes) -> None:
             " without end; check its entries and their signs",
             stacklevel=4,
         )
+    if period > SLOW * duration:
+        warnings.warn(
+            f"the longest natural period is {period:.3g} s beside a duration of {duration:g} s: the"
+            " structure hardly moves; check the units, which are SI (Pa, kg, m, s, N)",
+            stacklevel=4,
+        )
+
+
+def _longest_period(mass: Array, stiffness: Array) -> float:
+    """Longest natural period in s; 0 where nothing swings."""
+    squares = np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real
+    swinging = squares[squares > 1e-9 * np.abs(squares).max()]
+    return float(2 * np.pi / np.sqrt(swinging.min())) if len(swinging) else 0.0

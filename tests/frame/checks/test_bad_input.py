@@ -4,6 +4,8 @@ what is allowed and the cure.
 
 from __future__ import annotations
 
+import warnings
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -204,3 +206,17 @@ def test_every_method_names_its_options(method: str) -> None:
     assert ("tolerance" in names) == (
         method in ("auto", "modal", "graph-follower", "improved-graph-follower")
     )
+
+
+@pytest.mark.parametrize("wrong", [{"modulus": 25.0}, {"lengths": (3000.0, 3000.0)}])
+def test_a_frame_in_other_units_hardly_moves_and_is_warned_of(wrong: dict[str, Any]) -> None:
+    """Its bounds would be narrow and guaranteed, and say nothing of the structure meant."""
+    told = r"the longest natural period is \d.* s beside a duration of 1 s: .* check the units"
+    value = wrong.get("modulus", FRAME.modulus)
+    inputs = {"E": Triangular(0.96 * value, value, 1.04 * value)}
+    with pytest.warns(UserWarning, match=told) as seen:
+        computed(inputs, replace(FRAME, **wrong))
+    assert len(seen) == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        computed()
