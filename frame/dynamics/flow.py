@@ -15,12 +15,7 @@ from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint
 from alphacut.frame.dynamics.record_load import linear_load
 from alphacut.frame.dynamics.spectral import LARGE, NearlyCriticalError, spectral_trajectory
 from alphacut.frame.dynamics.transfer_powers import exact_response, trajectory
-from alphacut.frame.structures.linear import (
-    LinearSystem,
-    check_names,
-    evaluate,
-    relative_to_ground,
-)
+from alphacut.frame.structures.linear import LinearSystem, check_names, evaluate, relative_to_ground
 
 
 class Flow(Protocol):

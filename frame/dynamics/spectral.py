@@ -113,11 +113,7 @@ def _summed(rate: Jet, share: Jet, waves: list[Array]) -> Jet:
     bent = share.value * rate.second[..., None] + mixed + mixed.swapaxes(0, 1)
     columns = [  # what stands before w, w' and w'' in the value, the gradient and the Hessian
         [share.value, *share.first, *share.second.reshape(d * d, *share.value.shape)],
-        [
-            nothing,
-            *(share.value * slope),
-            *bent.reshape(d * d, *nothing.shape),
-        ],
+        [nothing, *(share.value * slope), *bent.reshape(d * d, *nothing.shape)],
         [nothing] * (1 + d) + [*(share.value * pair).reshape(d * d, *nothing.shape)],
     ]
     factors = np.concatenate([np.concatenate(row, -1) for row in columns], 1)

@@ -84,11 +84,7 @@ class BatchFollower:
         )
         promised = np.maximum(found.correction, found.open_gain).max(-1)
         error = SAFETY * (promised + self.tolerance / 2 * flow.scale) + missed[:, None]
-        facts: dict[str, float | str] = {
-            "gain": self.tolerance,
-            "order": 2,
-            "corners": corners,
-        }
+        facts: dict[str, float | str] = {"gain": self.tolerance, "order": 2, "corners": corners}
         if found.open_gain.any():
             facts["reason"] = (
                 f"stopped at the budget of {self.budget} trajectories; models promise"

@@ -159,11 +159,7 @@ class ModalModel:
         return [[Polynomial(x.index, x.coefficients[:, o::m]) for x in given] for o in range(m)]
 
     def _quadratic(
-        self,
-        shares: Sequence[Polynomial],
-        unit: Array,
-        slopes: tuple[Array, Array],
-        waves: Waves,
+        self, shares: Sequence[Polynomial], unit: Array, slopes: tuple[Array, Array], waves: Waves
     ) -> tuple[Array, Array, Array]:
         """As `_taylor`, for degree 2, whose second derivatives are the same everywhere."""
         slope, bent = slopes

@@ -113,13 +113,7 @@ class ProportionalResponse(ExactResponse):
         return scaled
 
     def _waves(
-        self,
-        physical: Array,
-        matrices: Matrices,
-        own: Array,
-        node: Array,
-        *,
-        started: bool = False,
+        self, physical: Array, matrices: Matrices, own: Array, node: Array, *, started: bool = False
     ) -> _Waves | None:
         """Modes of N problems and what excites them; None where one does not oscillate."""
         M, K = matrices.mass.value, matrices.stiffness.value

@@ -12,21 +12,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 SMOOTH = "use arithmetic and frame.jet.sin, cos and exp, which are smooth and take symbols"
-ROUGH = (
-    "Abs",
-    "sign",
-    "Max",
-    "Min",
-    "Heaviside",
-    "DiracDelta",
-    "Piecewise",
-    "floor",
-    "ceiling",
-    "Mod",
-    "arg",
-    "re",
-    "im",
-)
+ROUGH = {"Abs", "sign", "Max", "Min", "Heaviside", "DiracDelta", "Piecewise", "floor", "ceiling"}
+ROUGH |= {"Mod", "arg", "re", "im"}
 """Functions of SymPy that have no second derivative everywhere."""
 
 
@@ -107,7 +94,7 @@ def expression(name: str, given: object) -> Expr:
         found = sympy.sympify(given)
     except sympy.SympifyError:
         raise ValueError(f"{name}: {given!r} is no expression; {SMOOTH}") from None
-    rough = sorted({type(part).__name__ for part in sympy.preorder_traversal(found)} & set(ROUGH))
+    rough = sorted({type(part).__name__ for part in sympy.preorder_traversal(found)} & ROUGH)
     if rough or not isinstance(found, sympy.Expr):
         raise ValueError(f"{name}: {rough[0] if rough else given} is not allowed; {SMOOTH}")
     return found

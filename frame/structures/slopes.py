@@ -35,12 +35,7 @@ class Slopes:
 
     @classmethod
     def of(
-        cls,
-        system: LinearSystem,
-        names: Sequence[str],
-        points: Array,
-        *,
-        observed: bool = True,
+        cls, system: LinearSystem, names: Sequence[str], points: Array, *, observed: bool = True
     ) -> Slopes:
         """Of `system` at `points` (S, d), the values of `names`; others keep modal values.
 
