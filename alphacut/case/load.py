@@ -164,11 +164,7 @@ def flattened(raw: Raw) -> Raw:
 
 
 def checked_table(
-    name: str,
-    section: type[Section],
-    table: object,
-    tables: Tables,
-    written: dict[str, object],
+    name: str, section: type[Section], table: object, tables: Tables, written: dict[str, object]
 ) -> Iterator[Problem]:
     """Check ``[name]``, or every ``[[name]]``."""
     entries = table if section.repeated and isinstance(table, list) else [table]

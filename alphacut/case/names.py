@@ -26,10 +26,7 @@ OTHERS = {  # structures beside the storey frame, and their inputs
     "tower": ("E_columns", "E_columns_top", "E_beams", "mass", "zeta", *RAYLEIGH),
 }
 # of structures beside the storey frame
-OUTPUTS = {
-    "pendulum": ("force",),
-    "tower": ("roof", "drift"),
-}
+OUTPUTS = {"pendulum": ("force",), "tower": ("roof", "drift")}
 
 
 def floors(case: Case) -> Iterator[Problem]:

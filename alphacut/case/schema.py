@@ -49,10 +49,7 @@ NEEDED = {
     "envelope": ("envelope",),
 }
 # sections that hold their defaults where they are left out and the other one is there
-IMPLIED = {
-    "mesh": "cell",
-    "modulus": "cell",
-}
+IMPLIED = {"mesh": "cell", "modulus": "cell"}
 
 
 def dotted(section: str, key: str) -> str:

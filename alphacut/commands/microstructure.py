@@ -54,12 +54,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
             figures=not options.no_figures,
         )
     section = fragment(found)
-    document = {
-        **summary(found),
-        "fragment": section,
-        "files": written,
-        "versions": versions(),
-    }
+    document = {**summary(found), "fragment": section, "files": written, "versions": versions()}
     for remark in microstructure.left_out(found):
         say(remark)
     if answer(options, document, out, section):

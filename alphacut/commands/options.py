@@ -104,11 +104,7 @@ def add_best_effort(parser: argparse.ArgumentParser) -> None:
 def add_workers(parser: argparse.ArgumentParser, what: str = "the samples") -> None:
     """``--workers``."""
     parser.add_argument(
-        "--workers",
-        metavar="N",
-        type=int,
-        default=1,
-        help=f"processes for {what} (default 1)",
+        "--workers", metavar="N", type=int, default=1, help=f"processes for {what} (default 1)"
     )
 
 

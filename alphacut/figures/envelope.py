@@ -149,10 +149,7 @@ def spectrum(found: Sequence[ResponseSpectrum]) -> Figure:
         name = f"ζ = {100 * one.damping:.3g} %"
         above.plot(one.periods, one.pseudo_acceleration, dash, color=colour, label=name)
         below.plot(one.periods, one.displacement, dash, color=colour, label=name)
-    for axes, label, si in (
-        (above, "pseudo-acceleration", "m/s^2"),
-        (below, "displacement", "m"),
-    ):
+    for axes, label, si in ((above, "pseudo-acceleration", "m/s^2"), (below, "displacement", "m")):
         axes.set_xscale("log")
         axes.set_ylim(bottom=0)
         axes.grid(visible=True, which="both", alpha=0.3)

@@ -100,12 +100,7 @@ PRINTED = r"pixel|px\b|\b(pel|dot|pt)s?\b|pica|point|didot|cicero|\b[pb]p\b"
 """Units of print and screens, which Pint takes for 1/96 inch, 1/72 inch and the like."""
 
 # units that are others than were meant
-MEANT = {
-    ("m/s^2", "G"): "g",
-    ("s", "m"): "min",
-    ("kg", "T"): "t",
-    ("Pa", "g"): "GPa",
-}
+MEANT = {("m/s^2", "G"): "g", ("s", "m"): "min", ("kg", "T"): "t", ("Pa", "g"): "GPa"}
 
 
 @cache

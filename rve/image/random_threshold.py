@@ -149,10 +149,7 @@ class ThresholdResponse:
     def _weights(self, law: NormalThreshold) -> tuple[Array, Array]:
         """Probabilities between the nodes, for the lower and for the upper mean, (n + 1,)."""
         least, greatest = self._law(law).probability(self.argument)
-        return (
-            np.diff(least, prepend=0.0, append=1.0),
-            np.diff(greatest, prepend=0.0, append=1.0),
-        )
+        return (np.diff(least, prepend=0.0, append=1.0), np.diff(greatest, prepend=0.0, append=1.0))
 
     def _law(self, law: NormalThreshold) -> NormalThreshold:
         return law if self.sign > 0 else law.mirrored

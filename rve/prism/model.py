@@ -259,10 +259,7 @@ class PrismModel:
         with task.watch("solve"):
             means = system.means(solved.total, phases, solved.pressure)
             apart = mismatch(system.positions, solved.total - solved.affine)
-            certificate = {
-                "residual": solved.residual,
-                "periodicity": max(system.ranks.all(apart)),
-            }
+            certificate = {"residual": solved.residual, "periodicity": max(system.ranks.all(apart))}
             result = self._result(task, means, phases, certificate)
             return replace(result, iterations=solved.iterations), solved
 
@@ -323,11 +320,7 @@ def certify(means: SliceMeans, phases: tuple[Phase, Phase], loads: Array) -> dic
 
 @lru_cache(maxsize=4)
 def _system(
-    mesh_size: float,
-    layers: int,
-    radius: float,
-    parallel: bool,
-    plane: Triangulation | None = None,
+    mesh_size: float, layers: int, radius: float, parallel: bool, plane: Triangulation | None = None
 ) -> PrismSystem:
     """Topology, forms and numbering: they do not depend on the map, only on these numbers."""
     plane = plane or triangulate(size=mesh_size, radius=radius)

@@ -144,10 +144,7 @@ class LevelNumbering:
             self.periodicity.unknown,
             self.periodicity.unknown[: self.grid.plane.vertices],
         )
-        level, middle = (
-            np.arange(span.start, span.stop + 1)[:, None],
-            np.array(span)[:, None],
-        )
+        level, middle = (np.arange(span.start, span.stop + 1)[:, None], np.array(span)[:, None])
         full = np.where(planar >= 0, 2 * planar + level * self.stride, -1)
         half = np.where(
             vertices >= 0, 2 * (vertices + self.periodicity.count) + middle * self.stride, -1

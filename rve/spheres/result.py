@@ -15,12 +15,7 @@ import numpy as np
 from alphacut.rve.cell import Cell, Phase
 from alphacut.rve.certificate import ROUND_OFF, Limits, require
 from alphacut.rve.result import Homogenised, spread
-from alphacut.rve.spheres.bounds import (
-    hashin_shtrikman,
-    reuss,
-    shear_against_trace_bounds,
-    voigt,
-)
+from alphacut.rve.spheres.bounds import hashin_shtrikman, reuss, shear_against_trace_bounds, voigt
 from alphacut.rve.spheres.cubic import cubic_moduli, hill_average
 from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.truncated_normal import Array

@@ -62,14 +62,12 @@ class Picture(Section):
         ),
     ] = 256
     threshold: Annotated[
-        tuple[FuzzyNumber, ...] | None,
-        Key("grey value from which on a pixel is of the next phase"),
+        tuple[FuzzyNumber, ...] | None, Key("grey value from which on a pixel is of the next phase")
     ] = None
     threshold_deviation: Annotated[
         FuzzyNumber | None,
         Key(
-            "standard deviation of a random threshold, normal about threshold",
-            allowed=NOT_NEGATIVE,
+            "standard deviation of a random threshold, normal about threshold", allowed=NOT_NEGATIVE
         ),
     ] = None
     quantiles: Annotated[

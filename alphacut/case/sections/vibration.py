@@ -107,8 +107,7 @@ class Envelope(Section):
         ),
     ] = None
     shares: Annotated[
-        bool,
-        Key("whether run tells what drives the width: an envelope more for each fuzzy input"),
+        bool, Key("whether run tells what drives the width: an envelope more for each fuzzy input")
     ] = True
     duration: Annotated[float, Key("length of the simulation", "s", allowed=POSITIVE)]
     step: Annotated[float, Key("time step", "s", allowed=POSITIVE)]

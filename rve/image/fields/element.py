@@ -113,12 +113,7 @@ def displacement_element(aspect: float = 1.0) -> Element:
 def airy_element(aspect: float = 1.0) -> Element:
     """Bicubic Airy function on a pixel `aspect` times as high as wide; slopes are per pixel."""
     # value and slope at 0, value and slope at 1
-    basis = (
-        (1, 0, -3, 2),
-        (0, 1, -2, 1),
-        (0, 0, 3, -2),
-        (0, 0, -1, 1),
-    )
+    basis = ((1, 0, -3, 2), (0, 1, -2, 1), (0, 0, 3, -2), (0, 0, -1, 1))
     table = _tables(basis, degree=3)
     places = list(product(range(2), range(2), range(2), range(2)))  # y, slope in y, x, slope in x
     first = np.kron(table[2], table[0]) / aspect**2

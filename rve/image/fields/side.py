@@ -8,11 +8,7 @@ from time import perf_counter
 
 import numpy as np
 
-from alphacut.rve.image.fields.clamped import (
-    ClampedOperator,
-    ClampedPreconditioner,
-    free_unknowns,
-)
+from alphacut.rve.image.fields.clamped import ClampedOperator, ClampedPreconditioner, free_unknowns
 from alphacut.rve.image.fields.division import divided, prolonged
 from alphacut.rve.image.fields.element import Element, airy_element, displacement_element
 from alphacut.rve.image.fields.energy import Energy, energy

@@ -66,9 +66,6 @@ def _on_sphere(degree: Array, poisson: float) -> tuple[Array, Array]:
     dilating = -4 * nu * (d + 1) * (2 * d + 3)  # λ/μ div u
     moved = np.array([[d, radial], [one, alpha]])
     pulled = np.array(
-        [
-            [2 * (d - 1) * d, dilating + (2 * d + 2) * radial],
-            [2 * (d - 1), radial + d * alpha],
-        ]
+        [[2 * (d - 1) * d, dilating + (2 * d + 2) * radial], [2 * (d - 1), radial + d * alpha]]
     )
     return np.moveaxis(moved, -1, 0), np.moveaxis(pulled, -1, 0)

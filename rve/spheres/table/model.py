@@ -20,12 +20,7 @@ from alphacut.rve.spheres.result import HomogenisedSpheres, certified_spheres, v
 from alphacut.rve.table.build import TableError
 from alphacut.rve.table.cache import stored_table
 from alphacut.rve.table.interpolant import Table, TableRange
-from alphacut.rve.table.model import (
-    each_poisson,
-    rounded_moduli,
-    rounded_radii,
-    table_in_words,
-)
+from alphacut.rve.table.model import each_poisson, rounded_moduli, rounded_radii, table_in_words
 from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.truncated_normal import Array
 
