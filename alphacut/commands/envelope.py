@@ -42,6 +42,7 @@ from alphacut.stages.vibration import decision, envelope
 from alphacut.stages.vibration import exceedance as outcomes
 from alphacut.stages.vibration.envelope_task import EnvelopeTask, task_of
 from alphacut.stages.vibration.structure import Structure, structure
+from alphacut.stages.vibration.studies import fixed_line, left_out
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
@@ -116,14 +117,17 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     limit = exceeded(options, case, wanted)
     tried = dataset["peak_tried"].values
     contract = {"asked": task.tolerance, "reached": dataset.attrs.get("reached")}
+    fixed = left_out(wanted, [task])
     document = {
         **envelope.document(found, tried),
+        "fixed": fixed,
         "duration": task.duration,
         "step": task.step,
         "tolerance": contract,
         **({"exceedance": limit} if limit else {}),
     }
-    text = summary(found, tried[0]) + (outcomes.sentences(limit) if limit else "")
+    text = summary(found, tried[0]) + "".join(f"{line}\n" for line in fixed_line(fixed))
+    text += outcomes.sentences(limit) if limit else ""
     answer(options, document, out, text)
     return 0
 

@@ -37,6 +37,7 @@ from alphacut.stages.pipeline import Chain
 from alphacut.stages.readiness import ready
 from alphacut.stages.vibration import decision, joint, update
 from alphacut.stages.vibration import exceedance as outcomes
+from alphacut.stages.vibration.studies import fixed_line
 
 ABOUT = (
     "run every stage of a case: files, figures, summary, and the comparison with the paper where"
@@ -199,6 +200,7 @@ def main_numbers(found: Document) -> str:
     lines = [*modulus_lines(found), *image_lines(found)]
     for name, study in found.get("envelopes", {}).items():
         lines += envelope_lines(name, study)
+    lines += fixed_line(found.get("structure", {}).get("words", {}).get("fixed", ()))
     lines += update.sentences(found["update"]) if "update" in found else []
     lines += decision.sentences(found["decision"]) if "decision" in found else []
     lines += [joint.sentence(found["joint"])] if "joint" in found else []

@@ -10,9 +10,10 @@ from alphacut.figures.captions import core
 from alphacut.io.files import Document
 from alphacut.io.units import engineering, largest_by_unit
 from alphacut.report import envelopes
-from alphacut.report.tables import section, table
+from alphacut.report.tables import paragraphs, section, sentence, table
 from alphacut.stages.vibration import exceedance as outcomes
 from alphacut.stages.vibration.decision import degree, worth
+from alphacut.stages.vibration.studies import fixed_line
 
 Line = tuple[str, str, str, str]
 HEAD = ("quantity", "most plausible", "whole range", "nature of the range")
@@ -21,7 +22,9 @@ HEAD = ("quantity", "most plausible", "whole range", "nature of the range")
 def key_results(summary: Document) -> Markup:
     """Most plausible value, whole range and its worth of each result; empty without any."""
     rows = [*moduli(summary), *peaks(summary), *exceeded(summary), *decisions(summary)]
-    return section("Key results", table(HEAD, rows)) if rows else Markup("")
+    held = fixed_line(summary.get("structure", {}).get("words", {}).get("fixed", ()))
+    below = paragraphs(*map(sentence, held))
+    return section("Key results", table(HEAD, rows), below) if rows else Markup("")
 
 
 def moduli(summary: Document) -> Iterator[Line]:

@@ -23,7 +23,7 @@ from alphacut.stages.vibration.envelope_task import task_of
 from alphacut.stages.vibration.provable import estimated_reason, too_many, unproved_reason
 from alphacut.stages.vibration.resolution_checks import rough
 from alphacut.stages.vibration.structure import Structure, structure
-from alphacut.stages.vibration.studies import studies
+from alphacut.stages.vibration.studies import fixed_line, left_out, studies
 
 if TYPE_CHECKING:
     from alphacut.frame import Accelerogram
@@ -283,9 +283,7 @@ def motion(case: Case, wanted: Structure) -> Iterator[str]:
     """Lines on the inputs that the motion takes, on its levels, and on its record."""
     tasks = [study.task for study in studies(case)]
     named = {name: number for task in tasks for name, number in wanted.inputs(task.fuzzy).items()}
-    fuzzy = (name for name, number in wanted.numbers.items() if number.support.width > 0)
-    if fixed := [name for name in fuzzy if name not in named]:
-        yield f"fixed at the middle of the top cut, since no study names them: {', '.join(fixed)}"
+    yield from fixed_line(left_out(wanted, tasks))
     for reason in dict.fromkeys(estimated_reason(wanted, task) for task in tasks):
         if reason:
             yield f"envelope: bounds will be estimated, with their error: {reason}"

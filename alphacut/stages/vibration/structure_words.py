@@ -10,10 +10,11 @@ import numpy as np
 from alphacut.case.case import Case
 from alphacut.case.names import OTHERS
 from alphacut.case.sections.structures import Frame
-from alphacut.fuzzy import FuzzyNumber, PiecewiseLinear
+from alphacut.fuzzy import Crisp, FuzzyNumber, PiecewiseLinear
 from alphacut.io.files import Document
 from alphacut.io.units import MINUS, shown
 from alphacut.stages.vibration.structure import Structure, per_floor
+from alphacut.stages.vibration.studies import fixed_line, left_out, studies
 
 if TYPE_CHECKING:
     from alphacut.frame.structures.linear import Accelerogram
@@ -34,6 +35,9 @@ COLUMNS = {
     "displacements": "displacement",
     "velocities": "velocity",
 }
+
+
+SYMBOLS = dict(zip(UNITS, ("m{}", "l{}", "d{}", "q{}_0", "v{}_0"), strict=True))
 
 
 def in_unit(number: FuzzyNumber, unit: str, si: str) -> str:
@@ -60,17 +64,21 @@ def in_unit(number: FuzzyNumber, unit: str, si: str) -> str:
 
 def structure_words(case: Case, wanted: Structure) -> Document:
     """Sentences on the structure, and head and rows of a table of its floors."""
+    fixed = left_out(wanted, (study.task for study in studies(case)))
+    told = [f"F{line[1:]}." for line in fixed_line(fixed)]
     if wanted.frame is not None:
         return {
-            "sentences": list(frame_sentences(case.frame, wanted)),
-            **floors(case.frame, wanted),
+            "sentences": [*frame_sentences(case.frame, wanted), *told],
+            **floors(case.frame, wanted, fixed),
+            "fixed": fixed,
         }
     ground = None if wanted.linear is None else wanted.linear.ground
     sentences = [motion(case.tower.accelerogram, ground)] if ground is not None else []
     return {
-        "sentences": sentences,
+        "sentences": [*sentences, *told],
         "head": ["input", "what it is", "value"],
         "rows": list(inputs(case)),
+        "fixed": fixed,
     }
 
 
@@ -200,7 +208,7 @@ def moves(given: Frame) -> list[str]:
     ]
 
 
-def floors(given: Frame, wanted: Structure) -> Document:
+def floors(given: Frame, wanted: Structure, fixed: Sequence[str]) -> Document:
     """Row for each floor, from the ground up: mass, height and what is not zero."""
     kinds: Sequence[str] = [
         "masses",
@@ -209,18 +217,18 @@ def floors(given: Frame, wanted: Structure) -> Document:
         *moves(given),
     ]
     columns = [
-        [in_unit(number, *UNITS[kind]) for number in per_floor(given, getattr(given, kind))]
+        column(per_floor(given, getattr(given, kind)), SYMBOLS[kind], UNITS[kind], fixed)
         for kind in kinds
     ]
     head = ["floor", *(COLUMNS[kind] for kind in kinds)]
-    for name, unit, entries in (
-        ("columns c", "", given.columns),
-        ("second moment", "m^4", given.second_moment or ()),
+    for name, unit, symbol, entries in (
+        ("columns c", "", "c{}", given.columns),
+        ("second moment", "m^4", "I{}", given.second_moment or ()),
     ):
         if len(entries) > 1:
-            told = [in_unit(x, unit, unit) for x in entries]
+            told = column(entries, symbol, (unit, unit), fixed)
             head, columns = [*head, name], [*columns, told]
-    head, columns = [*head, "stiffness"], [*columns, stiffnesses(given, wanted)]
+    head, columns = [*head, "stiffness"], [*columns, stiffnesses(given, wanted, fixed)]
     if wanted.frame is not None and wanted.frame.gravity:
         taken = [
             f"{-soft / 1e6:.4g} MN/m".replace("-", MINUS) for soft in springs_at_modal(wanted)[1]
@@ -234,8 +242,20 @@ def floors(given: Frame, wanted: Structure) -> Document:
     }
 
 
-def stiffnesses(given: Frame, wanted: Structure) -> list[str]:
+def column(
+    numbers: Sequence[FuzzyNumber], symbol: str, units: tuple[str, str], fixed: Sequence[str]
+) -> list[str]:
+    """Values of all floors, each that does not vary with the value at which it is fixed."""
+    return [
+        in_unit(number, *units)
+        + (f", fixed at {in_unit(Crisp(number.modal), *units)}" if name in fixed else "")
+        for floor, number in enumerate(numbers, start=1)
+        for name in [symbol.format(floor)]
+    ]
+
+
+def stiffnesses(given: Frame, wanted: Structure, fixed: Sequence[str]) -> list[str]:
     """Stiffness of each storey in MN/m, as given or 12 c E I / l³ at the modal values."""
     if given.stiffness is not None:
-        return [in_unit(k, "MN/m", "N/m") for k in per_floor(given, given.stiffness)]
+        return column(per_floor(given, given.stiffness), "k{}", ("MN/m", "N/m"), fixed)
     return [f"{k / 1e6:.4g} MN/m" for k in springs_at_modal(wanted)[0]]

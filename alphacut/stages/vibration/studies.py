@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -53,6 +53,20 @@ def studies(case: Case) -> tuple[Study, ...]:
         )
         for study in given
     ) or (Study("all", task_of(case)),)
+
+
+def left_out(wanted: Structure, tasks: Iterable[EnvelopeTask]) -> list[str]:
+    """Fuzzy inputs that none of the tasks names: their values do not vary."""
+    named = {name for task in tasks for name in wanted.inputs(task.fuzzy)}
+    spread = (name for name, number in wanted.numbers.items() if number.support.width > 0)
+    return [name for name in spread if name not in named]
+
+
+def fixed_line(names: Iterable[str]) -> list[str]:
+    """A line on inputs that are left out; none where every fuzzy input varies."""
+    told = ", ".join(names)
+    what = "fixed at the middle of the top cut, since no study names them"
+    return [f"{what}: {told}"] if told else []
 
 
 def envelope_of(

@@ -12,6 +12,7 @@ from markupsafe import Markup
 
 from alphacut.entry import main
 from alphacut.io.provenance import door
+from tests.alphacut.one_floor import one_floor
 
 PAPER = Path(__file__).parents[3] / "cases" / "paper.toml"
 CHROMIUM = (
@@ -232,3 +233,19 @@ def test_text_is_escaped_wherever_it_stands():
     for piece in pieces:
         assert "<script>" not in piece
         assert "&lt;script&gt;alert(&#39;&amp;&#39;)" in piece
+
+
+def test_an_input_that_no_study_names_is_told_as_fixed(tmp_path, capfd):
+    text = one_floor(fuzzy='["m1"]', duration=1, step=0.01, mass="1 t ± 5 %", moved="10 mm ± 1 mm")
+    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
+    told = "ixed at the middle of the top cut, since no study names them: q1_0"
+    for command in (["run", "--no-figures", "--out", str(tmp_path / "out")], ["envelope"]):
+        assert main([command[0], str(tmp_path / "case.toml"), *command[1:]]) == 0
+        assert f"f{told}\n" in capfd.readouterr().out
+    assert main(["report", str(tmp_path / "out"), "--quiet"]) == 0
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    results, rest = page.split("<h2>Structure</h2>")
+    assert f"F{told}." in results
+    assert f"F{told}." in rest
+    assert "<td>[9, 11] mm, fixed at 10 mm</td>" in re.sub("<td[^>]*>", "<td>", rest)
+    assert "t, fixed at" not in rest
