@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
@@ -25,6 +25,7 @@ html_title = "alphacut"
 html_theme_options = {"source_repository": "", "navigation_with_keys": True}
 html_static_path = ["static"]
 html_css_files = ["pages.css"]
+html_js_files = ["pages.js"]
 # formulas are drawn without a network, by Debian's copy of MathJax 2
 MATHJAX = Path("/usr/share/javascript/mathjax")
 MATHJAX_PARTS = ("MathJax.js", "extensions", "jax/element", "jax/input/TeX", "jax/output/SVG")
@@ -59,6 +60,15 @@ def copy_mathjax(app: Sphinx) -> None:
             shutil.copyfile(source, target)
 
 
+def without_modules(
+    _app: Sphinx, _page: str, _template: str, context: dict[str, Any], _doctree: object
+) -> None:
+    """Leave the theme's script out, which browsers refuse to pages that are opened from a disk."""
+    scripts = context["script_files"]
+    context["script_files"] = [one for one in scripts if "scripts/furo.js" not in str(one)]
+
+
 def setup(app: Sphinx) -> None:
     """Hook into the build."""
     app.connect("builder-inited", copy_mathjax)
+    app.connect("html-page-context", without_modules, priority=900)

@@ -33,6 +33,12 @@ def test_no_page_asks_a_network(built):
             assert (page.parent / target.partition("?")[0]).is_file(), f"{page.name}: {target}"
 
 
+def test_no_page_needs_a_server(built):
+    """Browsers refuse modules to pages that are opened from a disk."""
+    for page in built.rglob("*.html"):
+        assert 'type="module"' not in page.read_text(encoding="utf-8"), page.name
+
+
 def test_formulas_have_what_draws_them(built):
     theory = (built / "theory.html").read_text(encoding="utf-8")
     assert r"\(r_n = r/a\)" in theory
