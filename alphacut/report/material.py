@@ -8,6 +8,7 @@ from alphacut.figures.captions import core, in_words
 from alphacut.io.files import Document
 from alphacut.report.tables import code, paragraphs, section, sentence, table
 from alphacut.stages.material import response
+from alphacut.stages.material.micrograph import compared
 from alphacut.stages.material.microstructure import crystalline
 from alphacut.stages.material.references import lines
 
@@ -39,9 +40,11 @@ CELLS = {"discs": "area", "spheres": "volume"}
 
 def discs(found: Document) -> str:
     """Discs and their area fractions."""
+    whole = found.get("area_fraction_of_image")
+    image = "" if whole is None else f". The {compared(whole)}"
     return (
         f"{found['discs']} discs in {found['packings']} sections, area fraction"
-        f" {found['area_fraction']:.4f}{of_map(found)}"
+        f" {found['area_fraction']:.4f}{of_map(found)}{image}"
     )
 
 

@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from alphacut.stages.material.micrograph import fractions
+from alphacut.report.material import discs
+from alphacut.stages.material.micrograph import compared, fractions
 from alphacut.stochastic.particles.annotation import cropped, rectangles
 from alphacut.stochastic.particles.image import MISFIT, UNEVEN, SectionImage
 
@@ -62,8 +63,8 @@ def test_a_part_outside_the_image_is_refused():
 def test_discs_that_touch_are_covered_by_their_circles_and_ellipses_are_not(dark):
     generator = np.random.default_rng()
     kind = "dark" if dark else "bright"
-    discs = SectionImage("d.png", 1.0, kind).circles(section(generator, dark=dark))
-    assert discs.misfit < 0.7 * MISFIT
+    read = SectionImage("d.png", 1.0, kind).circles(section(generator, dark=dark))
+    assert read.misfit < 0.7 * MISFIT
     picture = section(generator, aspect=1.8, dark=dark)
     with pytest.raises(ValueError, match=r"not round"):
         SectionImage("e.png", 1.0, kind).circles(picture)
@@ -132,3 +133,10 @@ def test_an_accepted_image_warns_of_uneven_light():
     assert "warning" not in told(0.9 * UNEVEN)
     assert "warning: the light is uneven, the matrix's brightness differs by 0.56" in told(0.56)
     assert "subtract the background" in told(0.56)
+
+
+def test_the_report_tells_the_fraction_of_the_image_as_the_terminal_does():
+    found = {"discs": 9, "packings": 1, "area_fraction": 0.3688, "area_fraction_of_image": 0.3925}
+    assert compared(0.3925) in discs(found)
+    assert "to compare with others: 0.3925" in compared(0.3925)
+    assert "compare" not in discs({**found, "area_fraction_of_image": None})

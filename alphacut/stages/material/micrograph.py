@@ -34,6 +34,12 @@ def crop_of(case: Case) -> tuple[int, int, int, int] | None:
     return left, top, right, bottom
 
 
+def compared(fraction: float) -> str:
+    """The phase's own area fraction of the image, in words."""
+    told = "the particles' share of the whole image"
+    return f"area fraction to compare with others: {fraction:.4f}, {told}"
+
+
 def fractions(found: Microstructure, fraction: float) -> Iterator[str]:
     """The one area fraction to compare with, what E takes of it, and what is lost between."""
     from alphacut.stochastic.particles.image import MISFIT, UNEVEN, uneven_in_words
@@ -41,9 +47,8 @@ def fractions(found: Microstructure, fraction: float) -> Iterator[str]:
     taken, cells = found.fraction_of_map, len(found.sample.values)
     count = sum(len(section.discs) for section in found.sections)
     yield (
-        f"area fraction to compare with others: {fraction:.4f}, the particles' share of the whole"
-        f" image; E takes {taken:.4f}, from the {cells} of {count} circles whose cells the image's"
-        " edge cannot change"
+        f"{compared(fraction)}; E takes {taken:.4f}, from the {cells} of {count} circles whose"
+        " cells the image's edge cannot change"
     )
     if abs(taken / fraction - 1) > FALLEN:
         yield (
