@@ -36,6 +36,7 @@ Row = dict[str, Any]
 # attributes of an envelope
 COST = ("trajectories", "seconds", "method", "nature")
 GAP = ("gap", "gap_output", "between_nodes", "proof")
+LEFT_OUT = 0.25  # share of the spheres' volume without a cell, above which E is not to be published
 CLAIM = ("claim", "unproved")
 
 
@@ -49,6 +50,10 @@ def summary(results: Results) -> Document:
         **motion_numbers(results),
         **question_numbers(results),
     }
+    beyond = found.get("microstructure", {}).get("share_beyond_limit", 0.0)
+    if "modulus" in found and beyond > LEFT_OUT:
+        told = f"E leaves out {beyond:.0%} of the volume, in cells too tight for a cubic one."
+        found["modulus"] |= {"publish": f"Not to be published: {told}"}
     return {**found, "paper": comparison(quoted, found) if quoted else []}
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from alphacut.rve.cell import Cell, Phase, square_moduli
 from alphacut.rve.fibre_constants import across_fibres, fibre_constants
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres import bounds as space
+from alphacut.stages import summary
 from alphacut.stages.material.cell import cell_inputs, modal_parts, parts
 from alphacut.stages.material.modulus import read_number
 from alphacut.stages.material.references import beside, bounds_over_cuts, lines, references
@@ -257,6 +259,20 @@ def test_a_fuzzy_e_below_the_bound_of_spheres_is_flagged_wherever_it_goes(
 def test_one_e_is_named_to_be_published(tmp_path: Path, change: list[str], words: str) -> None:
     case = load(polymer(tmp_path, "fibres"), change)
     assert words in beside(case, 4.6e9, 0.37, 1.35)["publish"]
+
+
+@pytest.mark.parametrize(
+    ("beyond", "words"), [(0.57, "Not to be published: E leaves out 57%"), (0.2, "To")]
+)
+def test_an_e_without_much_of_the_volume_is_not_to_be_published(beyond, words, monkeypatch):
+    numbers = {"modulus": {"publish": "To publish: this E"}}
+    seen = {"microstructure": {"share_beyond_limit": beyond}}
+    found = {"inputs": seen, "material": numbers, "motion": {}, "question": {}}
+    for name, part in found.items():
+        monkeypatch.setattr(summary, f"{name}_numbers", lambda results, part=part: part)
+    monkeypatch.setattr(summary, "origin", lambda case: {})
+    results = SimpleNamespace(case=SimpleNamespace(quoted=None))
+    assert summary.summary(results)["modulus"]["publish"].startswith(words)
 
 
 def test_measured_particles_of_spheres_are_warned_of_before_the_run(tmp_path: Path) -> None:
