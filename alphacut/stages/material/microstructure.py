@@ -199,6 +199,7 @@ def require_readable(case: Case) -> Study:
 
 def plan(case: Case) -> Iterator[str]:
     """Lines on the sizes that were read, and on what the stage will do with spheres."""
+    from alphacut.stochastic.particles.image import SectionImage
     from alphacut.stochastic.particles.radius_laws import MeasuredRadii
     from alphacut.stochastic.sections import Measured
     from alphacut.stochastic.spheres.packing import SpherePackings
@@ -211,6 +212,10 @@ def plan(case: Case) -> Iterator[str]:
         if given.circles:
             radii = wanted.file.read().discs.radii
             yield f"microstructure.circles.file: {len(radii)} circles, {diameters(radii)}"
+        elif isinstance(wanted.file, SectionImage):
+            sides = wanted.file.pixel * np.array(wanted.file.material().shape)
+            told = " × ".join(engineering(float(side), "m") for side in sides[::-1])
+            yield f"microstructure.image: the image shows a section of {told}; check pixel"
         return
     law, packed = wanted.packing.radii, given.packing or given.spheres
     if packed is not None and packed.file:

@@ -116,3 +116,17 @@ def test_a_refusal_names_a_cure_that_the_case_has(changes, told, section, capfd)
     ]
     assert main(["microstructure", str(section), *words]) in (1, 2)
     assert re.search(told, capfd.readouterr().err)
+
+
+def test_check_tells_the_size_of_an_image(section, capfd):
+    from skimage import io
+
+    grey = np.random.default_rng(0).integers(0, 255, (30, 40)).astype(np.uint8)
+    io.imsave(section.parent / "seen.png", grey, check_contrast=False)
+    text = section.read_text(encoding="utf-8")
+    image = '[microstructure.image]\nfile = "seen.png"\npixel = "0.5 mm"\n'
+    text = re.sub(r"\[microstructure\.circles\].*?(?=\n\[cell\])", image, text, flags=re.DOTALL)
+    case = section.parent / "image.toml"
+    case.write_text(text, encoding="utf-8")
+    assert main(["check", str(case)]) == 0
+    assert "shows a section of 20.00 mm × 15.00 mm; check pixel" in capfd.readouterr().out
