@@ -37,6 +37,7 @@ from alphacut.stages.contract import contract, keep_modulus, require_choice
 from alphacut.stages.material import cell, spheres
 from alphacut.stages.material.cell_models import cell_model, started
 from alphacut.stages.material.references import beside, text_of
+from alphacut.stages.readiness import say_unlikely_material
 
 ABOUT = "homogenise the cell at crisp values; a fuzzy input takes its modal value"
 
@@ -101,6 +102,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     require_read(case, READ, "cell")
     if options.export:
         check_format(options.export)
+    say_unlikely_material(case)
     pair = named_pair(options.cross_check)
     models = pair or (case.modulus.method,)
     require_effect(options, case, models)

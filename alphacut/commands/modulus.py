@@ -35,6 +35,7 @@ from alphacut.stages.material import modulus, response
 from alphacut.stages.material.campaign import Campaign, campaign
 from alphacut.stages.material.cell import GPA
 from alphacut.stages.material.references import of_modulus, text_of
+from alphacut.stages.readiness import say_unlikely_material
 
 ABOUT = "fuzzy effective modulus by the transformation method over all fuzzy inputs of the cell"
 KEYS = {
@@ -71,6 +72,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Compute and report."""
     case = asked(options)
+    say_unlikely_material(case)
     exclude = named_models("--exclude", options.exclude)
     wanted = campaign(case, petsc=petsc, exclude=exclude, store=store_of(options, case))
     if options.explain:

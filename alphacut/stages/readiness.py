@@ -13,6 +13,7 @@ from alphacut.case.limits import storey_height
 from alphacut.case.names import named_inputs
 from alphacut.case.readings import limits, readings
 from alphacut.fuzzy import FuzzyNumber, Interval, Triangular
+from alphacut.io.files import say
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.units import STANDARD_GRAVITY, engineering
 from alphacut.stages.image.reading import expected_modulus, study_of
@@ -208,6 +209,12 @@ def unlikely_material(case: Case) -> Iterator[str]:
             )
     if (radius := case.sections.radius) and radius.a1.modal > radius.a3.modal:
         yield "radius: a1 is greater than a3, so the radius falls where θ rises; is that meant?"
+
+
+def say_unlikely_material(case: Case) -> None:
+    """The remarks on material that `check` prints, where a command computes that alone."""
+    for remark in unlikely_material(case):
+        say(f"warning: {remark}")
 
 
 def record_key(case: Case) -> str:

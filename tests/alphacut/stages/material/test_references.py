@@ -275,6 +275,14 @@ def test_an_e_without_much_of_the_volume_is_not_to_be_published(beyond, words, m
     assert summary.summary(results)["modulus"]["publish"].startswith(words)
 
 
+@pytest.mark.parametrize("command", ["cell", "modulus"])
+def test_commands_of_the_material_remark_on_it_as_check_does(command, tmp_path, capfd):
+    case = str(polymer(tmp_path, "fibres"))
+    changes = ["--set", "cell.matrix_modulus=3 kPa", "--set", "modulus.method=series"]
+    assert main([command, case, *changes]) == 0
+    assert "warning: cell: the particle's modulus is" in capfd.readouterr().err
+
+
 def test_measured_particles_of_spheres_are_warned_of_before_the_run(tmp_path: Path) -> None:
     (told,) = unmeasured(load(polymer(tmp_path)))
     assert "whose E is lower than that of stiffer spheres" in told
