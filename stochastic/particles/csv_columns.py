@@ -103,6 +103,7 @@ def share_column(path: Path, name: str) -> Array | None:
     return np.asarray(shares)
 
 
+BY_AREA = ": in a table of areas add a column 'd [unit]' of 2·√(Area/π)"
 HEADER = r"\s*(\w+)\s*(?:[\[(]\s*([^\])]+?)\s*[\])])?\s*"
 """Name of a column, and its unit in brackets."""
 PRINTED = r"pixel|px\b|\b(pel|dot|pt)s?\b|pica|point|didot|cicero|\b[pb]p\b"
@@ -248,6 +249,7 @@ def _places(
         wanted = ", ".join(f"{name} [mm]" for name in columns)
         raise ValueError(
             f"{path}: the {told}; it needs '{wanted}', units in the header; d may stand for r"
+            + (BY_AREA if "r" in missing and {"area", "feret"} & {*map(_name, header)} else "")
         )
     return [named[name] for name in columns]
 

@@ -174,6 +174,7 @@ def test_origin_of_the_section(tmp_path):
         (GOOD.replace("[mm]", ""), "has no unit"),
         (GOOD.replace("[mm]", "[kg]"), "not a length"),
         (GOOD.replace("r [mm]", "q [mm]"), "has no column r"),
+        (GOOD.replace("r [mm]", "Area"), r"no column r; .*add a column 'd \[unit\]' of 2·√"),
         ("x [mm],y [mm],r [mm],count\n10,10,4,3\n", "'count' is not read"),
         ("", "is empty"),
         ("x [mm],y [mm],r [mm]\n", "no row holds a circle"),
