@@ -22,6 +22,7 @@ from alphacut.io.files import as_json, write_text
 from alphacut.io.output_paths import unwritable
 from alphacut.io.problem import BadInput
 from alphacut.io.progress import progress
+from alphacut.io.units import engineering
 from alphacut.stages.material.modulus import stand_in
 from alphacut.stages.measure_next import advice_document, measure_next
 
@@ -30,18 +31,8 @@ KEYS = {
     "--fuzzy": KeyOption("envelope.fuzzy", "inputs that may be measured, as E,m", "NAMES"),
     "--duration": KeyOption("envelope.duration", "length of the simulation", bare="s"),
 }
-READ = (
-    "stages",
-    "frame",
-    "field",
-    "tower",
-    "envelope",
-    "update",
-    "radius",
-    "cell",
-    "mesh",
-    "modulus",
-)
+OF_CELL = ("radius", "cell", "mesh", "modulus")
+READ = ("stages", "frame", "field", "tower", "envelope", "update", *OF_CELL)
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -77,5 +68,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         with style():
             save(gains(document), folder / "figures" / "measure-next")
         write_text(folder / "measure-next.json", as_json(document, indent=2))
-    answer(options, document, out, f"{name}: {found}\n")
+    width = engineering(found.width, document["unit"], digits=6)
+    of = "width" if name == "E" else "mean width over time"
+    answer(options, document, out, f"{name}: {found.told(f'{of} {width}')}\n")
     return 0

@@ -23,7 +23,7 @@ from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import progress
 from alphacut.io.units import engineering
 from alphacut.stages.material.modulus import stand_in
-from alphacut.stages.vibration.tolerances import Tolerances, tolerances
+from alphacut.stages.vibration.tolerances import Tolerances, input_unit, tolerances
 
 ABOUT = "largest supports for which the limit provably holds"
 KEYS = {
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
 
 
 def text(found: Tolerances) -> str:
-    """The safe scale, the safe intervals and the witness, in SI, a line each."""
+    """The safe scale, the safe intervals and the witness, with their units, a line each."""
     from alphacut.frame.outputs import output_unit
 
     scale = found.found
@@ -74,11 +74,15 @@ def text(found: Tolerances) -> str:
         f"{' and '.join(kept)} at all nodes, motion between them not included, for supports scaled"
         f" by up to {scale.safe:.4g} ({scale.nature}{f': {scale.reason}' if scale.reason else ''})"
     ]
-    lines += [f"  {name}: {low:.6g} … {high:.6g}" for name, (low, high) in found.intervals.items()]
+    lines += [
+        f"  {name}: {' … '.join(engineering(end, input_unit(name), digits=6) for end in ends)}"
+        for name, ends in found.intervals.items()
+    ]
     if scale.witness is None:
         return "\n".join([*lines, f"nothing unsafe found up to {scale.safe:.4g}", ""])
     point = ", ".join(
-        f"{name} = {x:.6g}" for name, x in zip(scale.names, scale.witness, strict=True)
+        f"{name} = {engineering(float(x), input_unit(name), digits=6)}"
+        for name, x in zip(scale.names, scale.witness, strict=True)
     )
     lines.append(f"unsafe at {scale.unsafe:.4g} ({100 * scale.gap:.2g} % more): {point}")
     what = f"|{next(iter(found.limits))}|" if len(kept) == 1 else "the worst of them"

@@ -140,9 +140,12 @@ def _advice(
 
 def advice_document(found: Advice, answer: str) -> Document:
     """The advice as it is printed with ``--json``; gains as shares of the width."""
+    from alphacut.frame.outputs import output_unit
+
     unit = 1 / found.width if found.width > 0 else 0.0
     return {
         "answer": answer,
+        "unit": "Pa" if answer == "E" else output_unit(answer),
         "width": found.width,
         "error": found.error,
         "alpha": found.alpha,

@@ -75,9 +75,13 @@ class Advice:
 
     def __str__(self) -> str:
         """A line for each input, then what cannot be said."""
+        return self.told(f"width {self.width:.6g}")
+
+    def told(self, width: str) -> str:
+        """The same with the width in other words, such as with its unit."""
         unit = 100 / self.width if self.width > 0 else 0.0
         lines = [
-            f"width {self.width:.6g} at α = {self.alpha:g}, less by, known twice as well (at"
+            f"{width} at α = {self.alpha:g}, less by, known twice as well (at"
             " least) and exactly (at least):"
         ]
         lines += [

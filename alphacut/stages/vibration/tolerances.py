@@ -6,6 +6,7 @@ are scaled with the others, and the frame gets the range of E over them.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -29,6 +30,18 @@ if TYPE_CHECKING:
 Range = Callable[[float], tuple[float, float]]
 SCALES = 13
 """Scales at which the range of the cell's modulus is computed; between them it is interpolated."""
+
+
+UNITS = {
+    **{"E": "Pa", "matrix_modulus": "Pa", "inclusion_modulus": "Pa", "I": "m^4", "k": "N/m"},
+    **{"m": "kg", "l": "m", "q": "m", "v": "m/s", "d": "N*s/m"},
+    **{"rayleigh_mass": "1/s", "rayleigh_stiffness": "s"},
+}
+
+
+def input_unit(name: str) -> str:
+    """SI unit of an input of the cell or of a storey frame; none of directions of a field."""
+    return UNITS.get(re.sub(r"\d+(_0)?$", "", name), "")
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +42,14 @@ def test_gains_of_a_linear_motion(case: Path, tmp_path: Path, output: str) -> No
         assert gain["half"] == pytest.approx(share / 2, rel=5e-3)
         assert gain["half_least"] == pytest.approx(share / 2, rel=5e-3)
         assert gain["exact"] == pytest.approx(share, rel=5e-3)
+
+
+def test_the_width_is_told_with_its_unit_and_what_it_is(
+    case: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["measure-next", str(case)]) == 0
+    told = capsys.readouterr().out
+    assert re.match(r"q1: mean width over time [\d.]+ mm at α = 0, less by", told), told
 
 
 def test_the_report_of_the_folder_shows_it(case: Path, tmp_path: Path) -> None:

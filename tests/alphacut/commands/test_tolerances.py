@@ -1,6 +1,7 @@
 """Command tolerances: the largest scaling of supports that keeps a limit."""
 
 import json
+import re
 
 import pytest
 
@@ -34,6 +35,12 @@ limit = "LIMIT"
 """
 
 
+def written(tmp_path):
+    path = tmp_path / "two.toml"
+    path.write_text(CASE.replace("LIMIT", "44 mm"), encoding="utf-8")
+    return path
+
+
 def told(tmp_path, limit, *more, text=CASE):
     path = tmp_path / "two.toml"
     path.write_text(text.replace("LIMIT", limit), encoding="utf-8")
@@ -53,6 +60,13 @@ def test_the_safe_supports_are_told_and_a_witness(tmp_path, capfd):
     assert found["witness_share"] > 1
 
 
+def test_safe_supports_are_printed_with_their_units(tmp_path, capfd):
+    assert main(["tolerances", str(written(tmp_path))]) == 0
+    told = capfd.readouterr().out
+    assert re.search(r"\n  E: 2\d\.\d+ GPa … 2\d\.\d+ GPa\n  m1: [\d.]+ kg … [\d.]+ kg\n", told)
+    assert re.search(r"unsafe at .*: E = [\d.]+ GPa, m1 = [\d.]+ kg\n", told)
+
+
 def test_a_limit_below_the_nominal_motion_leaves_no_tolerance(tmp_path, capfd):
     assert told(tmp_path, "1 mm", "--json", "-") == 0
     assert json.loads(capfd.readouterr().out)["safe_scale"] is None
@@ -67,8 +81,6 @@ def test_a_limit_below_the_nominal_motion_leaves_no_tolerance(tmp_path, capfd):
     ],
 )
 def test_bad_input_is_told_in_one_line(more, text, message, tmp_path, capfd):
-    import re
-
     assert told(tmp_path, "44 mm", *more, text=text) == 2
     error = capfd.readouterr().err
     assert re.search(message, error), error
