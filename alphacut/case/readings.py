@@ -24,7 +24,7 @@ class Reading:
     Args:
         key: Full name of its key; of a list with the numbers of the entries, from 1; of a limit
             with its output.
-        shape: crisp, interval, triangle, trapezoid, or limit.
+        shape: crisp, interval, triangle, trapezoid, limit, or flag without values.
         values: Its one to four values, rising, in SI.
         unit: SI unit.
         beside: What else a limit amounts to, in words.
@@ -44,7 +44,7 @@ class Reading:
 
 
 def readings(case: Case) -> Iterator[Reading]:
-    """Every quantity that stands in the file, and every limit."""
+    """Every quantity that stands in the file, defaults of a frame's stiffness, every limit."""
     from alphacut.frame.outputs import output_unit
 
     for entry in fields(case.sections):
@@ -68,14 +68,18 @@ def limits(case: Case) -> Iterator[tuple[str, str, float]]:
 def _of(section: Section, name: str, case: Case) -> Iterator[Reading]:
     for key, about in keys_of(type(section)).items():
         fuzzy = about.kind.startswith("fuzzy")
-        if f"{name}.{key}" not in case.written or not (fuzzy or about.unit):
+        given = f"{name}.{key}" in case.written
+        if key == "p_delta" and not given:
+            yield Reading(f"{name}.{key}", "flag", (), "", "false (default)")
+        assumed = key == "columns" and case.frame.stiffness is None
+        if not (given or assumed) or not (fuzzy or about.unit):
             continue
         value = getattr(section, key, None)
         listed = value if isinstance(value, tuple) else (value,)
         for one, places in _alike(listed):
             more = f" to {places[-1]}" if len(places) > 1 else ""
             full = f"{name}.{key}" + (f" {places[0]}{more}" if len(listed) > 1 else "")
-            yield Reading(full, *_shape(one), about.unit)
+            yield Reading(full, *_shape(one), about.unit, "" if given else " (default)")
 
 
 def _alike(listed: Sequence[object]) -> Iterator[tuple[FuzzyNumber, Sequence[int]]]:

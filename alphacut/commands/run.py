@@ -153,22 +153,12 @@ def words(found: Document) -> str:
     return text + main_numbers(found)
 
 
+ASKED = ("update", "exceedance", "decision", "joint", "modulus")
 PARTS = {
     "microstructure": ("microstructure",),
     "modulus": ("radius", "cell", "mesh", "modulus", "response"),
     "image": ("cell", "modulus.alpha"),
-    "envelope": (
-        "frame",
-        "field",
-        "pendulum",
-        "tower",
-        "envelope",
-        "update",
-        "exceedance",
-        "decision",
-        "joint",
-        "modulus",
-    ),
+    "envelope": ("frame", "field", "pendulum", "tower", "envelope", *ASKED),
 }
 """Sections that a stage reads."""
 

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from statistics import median_low
 from typing import TYPE_CHECKING
 
 from alphacut.case.case import Case
@@ -29,7 +30,10 @@ from alphacut.stages.vibration.studies import fixed_line, left_out, studies
 if TYPE_CHECKING:
     from alphacut.frame import Accelerogram
 
-PERIODS = (0.02, 30.0)  # s, from a stiff machine frame to the slenderest towers
+PERIODS = (0.05, 15.0)  # s, from a stiff machine frame to the slenderest towers
+STOREYS = {"masses": "kg", "lengths": "m", "second_moment": "m^4", "stiffness": "N/m"}
+APART = 100.0  # of a storey's value from the median of all
+DAMPED = (0.001, 0.2)  # of the critical damping
 MODULI = (1e5, 2e12)  # Pa, from soft gels to diamond
 BUILT = (1e9, 1e12)  # Pa, of what frames are made of
 CONTRAST = 1000.0  # between the phases
@@ -101,6 +105,7 @@ def ready(case: Case) -> Readiness:
         *outlasted(case, ground),
         *unlikely(case, ground, period),
         *odd(case),
+        *strangers(case),
         *unproved(case, wanted),
     )
     return Readiness(remarks, tuple(found), period, wanted)
@@ -177,10 +182,25 @@ def odd(case: Case) -> Iterator[str]:
     for one in readings(case):
         if one.unit == "Pa" and one.key.startswith(("frame.", "tower.")):
             yield from unlike(one.key, one.values[0], one.unit, BUILT, "a frame")
+        for end in one.values[:: len(one.values) - 1 or 1] if "damping_ratio" in one.key else ():
+            if one.values[-1] > 0:  # 0 leaves a structure undamped
+                yield from unlike(one.key, end, "", DAMPED, "a damping ratio")
     for section, output, value in limits(case):
         height, unit = storey_height(case, output), output_unit(output)
         usual = (DRIFTS[0] * height, DRIFTS[1] * height) if height else LIMITS.get(unit, ANY)
         yield from unlike(f"{section}: the limit of {output}", value, unit, usual, "one")
+
+
+def strangers(case: Case) -> Iterator[str]:
+    """Remarks on values of one storey that are of another order than those of the others."""
+    given = case.sections.frame
+    for name, unit in STOREYS.items() if given else ():
+        values = [number.modal for number in getattr(given, name) or ()]
+        for storey, value in enumerate(values, start=1):
+            middle = median_low(values)
+            if not 1 / APART < value / middle < APART:
+                told = f"{engineering(value, unit)} is {value / middle:.3g} times the median of"
+                yield f"frame.{name} {storey}: {told} all storeys; check its unit"
 
 
 def unlike(key: str, value: float, unit: str, usual: tuple[float, float], of: str) -> Iterator[str]:

@@ -102,7 +102,7 @@ def steel(folder, *changes, peak="2.5", capfd):
     text = FRAME
     for old, new in changes:
         assert old in text
-        text = text.replace(old, new)
+        text = text.replace(old, new, 1)
     record = f"time [s],acceleration [m/s^2]\n0,0\n0.05,{peak}\n0.1,0\n"
     (folder / "r.csv").write_text(record, encoding="utf-8")
     (folder / "steel.toml").write_text(text, encoding="utf-8")
@@ -120,6 +120,7 @@ def test_check_prints_crisp_values_and_limits_as_they_were_read(tmp_path, capfd)
         "frame.modulus: 210.0 GPa",
         "frame.damping_ratio: interval 0.02 … 0.04",
         "envelope.step: 10.00 ms",
+        "frame.p_delta: false (default)",
         "decision limit of drift1: 17.50 mm, 0.5 % of the storey's height",
         "decision limit of a2: 9.807 m/s^2",
     ):
@@ -149,3 +150,39 @@ def test_a_limit_of_exceedance_is_told_too(tmp_path, capfd):
 )
 def test_what_a_unit_most_likely_spoilt_is_remarked_on(change, peak, remark, tmp_path, capfd):
     assert re.search(remark, steel(tmp_path, change, peak=peak, capfd=capfd))
+
+
+def test_a_default_that_changes_the_stiffness_is_told(tmp_path, capfd):
+    assert "\nframe.columns: 2 (default)\n" in steel(tmp_path, ("columns = 8\n", ""), capfd=capfd)
+    assert "is unusual" not in steel(tmp_path, ("columns = 8\n", "p_delta = true\n"), capfd=capfd)
+
+
+SIX = 'masses = ["60 t", "60 t", "60 t", "60 t", "60 t", "60 t"]'
+HIGH = '["3.5 m", "3.5 m", "3.5 m", "3.5 m", "3.5 m", "3.5 m"]'
+
+
+@pytest.mark.parametrize(
+    ("more", "remark"),
+    [
+        (("60 t", "60 kg"), "warning: frame.masses 1: 60 kg is 0.001 times the median of all stor"),
+        (("60 t", "61000 t"), "frame.masses 1: 6.1e+07 kg is 1.02e+03 times the median"),
+        (("3.5 m", "20 mm"), "frame.lengths 1: 20.00 mm is 0.00571 times the median of all stor"),
+        (
+            ("[2, 4] %", "[0.05, 4] %"),
+            "frame.damping_ratio: 0.0005 is unusual for a damping ratio; check its",
+        ),
+        (("[2, 4] %", "[2, 21] %"), "frame.damping_ratio: 0.21 is unusual for a damping ratio"),
+    ],
+)
+def test_one_storey_of_another_order_and_odd_damping_are_remarked_on(more, remark, tmp_path, capfd):
+    six = ('masses = ["20 t", "20 t"]', SIX), ('["3.5 m"]', HIGH)
+    assert "the median" not in steel(tmp_path, *six, capfd=capfd)
+    assert remark in steel(tmp_path, *six, more, capfd=capfd).replace(HIGH, "")
+
+
+@pytest.mark.parametrize("mass", ["400e3 t", "1 t"])
+def test_masses_of_a_frame_in_another_unit_give_an_unusual_period(mass, tmp_path, capfd):
+    told = steel(
+        tmp_path, ('masses = ["20 t", "20 t"]', f'masses = ["{mass}", "{mass}"]'), capfd=capfd
+    )
+    assert "is unusual for a structure; check the units of masses" in told
