@@ -15,7 +15,7 @@ from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.given import require_fields
 from alphacut.fuzzy.sets.interaction import pulled
 from alphacut.fuzzy.sets.numbers import Array
-from alphacut.fuzzy.surrogates.chebyshev_polynomial import corners
+from alphacut.fuzzy.surrogates.chebyshev_polynomial import corners, dividing
 
 Method = Literal["multistart", "differential_evolution", "shgo", "direct", "dual_annealing"]
 _DIFFERENCE = 1e-6  # step of a derivative, as a share of the width of the cut
@@ -146,7 +146,7 @@ class LevelSearch:
     def scale(self, output: str) -> float:
         """Unit of an output for optimisers: its range over all samples, or its size."""
         seen = self.memo.values.select([output])
-        return float(np.ptp(seen)) or float(np.abs(seen).max()) or 1.0
+        return dividing(np.ptp(seen), np.abs(seen).max())
 
     def look(self, per_input: int, seed: int) -> Array:
         """Run the model at the corners and at spread points; the latter that are in the cut."""

@@ -89,7 +89,7 @@ class Polynomial:
             scan = allowed
         values = sign * (self.basis(scan) @ self.coefficients[:, output])
         starts = scan[np.argsort(values)[:_STARTS]]
-        scale = float(np.ptp(values)) or 1.0
+        scale = dividing(np.ptp(values))
         search = _Search(self, lower, upper, output=output, sign=sign, scale=scale, slack=slack)
         place, least = min((search.descend(start) for start in starts), key=lambda found: found[1])
         return place, sign * least
@@ -148,6 +148,11 @@ class _Search:
 
     def _span(self) -> Array:
         return np.where(self.upper > self.lower, self.upper - self.lower, 1.0)
+
+
+def dividing(*sizes: float) -> float:
+    """The first size that outputs can be divided by, else 1: by a subnormal one they overflow."""
+    return next((float(size) for size in sizes if size >= np.finfo(float).tiny), 1.0)
 
 
 def basis(x: Array, degrees: NDArray[np.intp], *, derivative: int | None = None) -> Array:

@@ -5,7 +5,16 @@ import datetime
 import numpy as np
 import pytest
 
-from alphacut.fuzzy import CampaignError, Interval, Triangular, levels, propagate
+from alphacut.fuzzy import (
+    Automatic,
+    CampaignError,
+    Chebyshev,
+    Interval,
+    Optimisation,
+    Triangular,
+    levels,
+    propagate,
+)
 
 INPUT = {"x": Interval(1, 2)}
 
@@ -51,3 +60,18 @@ def test_a_fuzzy_number_takes_whole_powers_only(exponent):
 def test_the_number_of_levels_is_bounded(steps):
     with pytest.raises(ValueError, match="whole number from 1 to 10,000"):
         levels(steps)
+
+
+@pytest.mark.parametrize("plan", [Automatic(), Optimisation(), Chebyshev()])
+def test_no_plan_asks_for_what_is_no_number_where_outputs_are_subnormal(plan):
+    """A search that divides by a range of 1e-310 goes to infinity."""
+    asked = []
+
+    def tiny(x, y):
+        asked.append((x, y))
+        return x * 1e-310 + 0 * y
+
+    inputs = {"x": Triangular(1, 2, 3), "y": Interval(0, 1)}
+    found = propagate(tiny, inputs, plan, alpha=[0, 1])
+    assert np.isfinite(asked).all()
+    assert found.bounds("y")[0][0] <= 1.0001e-310
