@@ -24,7 +24,8 @@ def html_table(header: Sequence[str], rows: Iterable[Sequence[str]], *, below: s
         f"<tr>{''.join(f'<td>{escape(text)}</td>' for text in cells)}</tr>" for cells in rows
     )
     notes = "<br>".join(escape(line) for line in below.splitlines())
-    return f"<table><thead><tr>{titles}</tr></thead><tbody>{body}</tbody></table><p>{notes}</p>"
+    under = f"<p>{notes}</p>" if notes else ""
+    return f"<table><thead><tr>{titles}</tr></thead><tbody>{body}</tbody></table>{under}"
 
 
 def membership_svg(alpha: ArrayLike, lower: ArrayLike, upper: ArrayLike) -> str:

@@ -27,9 +27,9 @@ Function = Callable[[Symbols, Symbols, Named], Any]
 class LagrangianSystem:
     """A system with n coordinates, given by plain Python functions of (q, v, p).
 
-    The functions must use arithmetic and `frame.jet.sin`, `cos`, `exp` only: they are called with
-    symbols. Whole and fractional powers are arithmetic; other functions of SymPy go where they are
-    smooth (`sympy.tan`, `sympy.log`); those of `math` and NumPy do not.
+    The functions must use arithmetic and `sin`, `cos`, `exp` of `alphacut.frame.calculus.jet` only:
+    they are called with symbols. Whole and fractional powers are arithmetic; other functions of
+    SymPy go where they are smooth (`sympy.tan`, `sympy.log`); those of `math` and NumPy do not.
 
     Args:
         coordinates: Number of coordinates n.

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from sympy import Expr
 
 T = TypeVar("T")
-SMOOTH = "use arithmetic and frame.jet.sin, cos and exp, which are smooth and take symbols"
+SMOOTH = "use arithmetic and the smooth sin, cos and exp of alphacut.frame.calculus.jet"
 ROUGH = {"Abs", "sign", "Max", "Min", "Heaviside", "DiracDelta", "Piecewise", "floor", "ceiling"}
 ROUGH |= {"Mod", "arg", "re", "im"}
 """Functions of SymPy that have no second derivative everywhere."""

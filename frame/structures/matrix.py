@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -63,7 +64,7 @@ def _require_smooth(kind: str, factor: Any, parameters: Mapping[str, float]) -> 
             f" {', '.join(parameters)}"
         ) from None
     except (TypeError, AttributeError, ValueError) as failure:
-        cure = "use plain arithmetic, such as p['k'] ** 0.5, and frame.jet.sin, cos and exp"
+        cure = "use arithmetic, as p['k'] ** 0.5, and sin, cos, exp of alphacut.frame.calculus.jet"
         raise ValueError(
             f"{kind}: a factor cannot take parameters with derivatives ({failure}); {cure}"
         ) from None
@@ -151,7 +152,7 @@ class MatrixStructure:
                 "mass, stiffness and observed: each needs at least one entry, observed by name, as"
                 " {'q1': row}"
             )
-        n = max((1, *np.shape(self.mass[0][1])))
+        n = self._usual_size()
         object.__setattr__(self, "size", n)
         for kind in ("mass", "damping", "stiffness"):
             even = tuple((factor, _symmetric(kind, a, n)) for factor, a in getattr(self, kind))
@@ -159,6 +160,13 @@ class MatrixStructure:
         self._check_vectors()
         self._check_ratios()
         self._check_mass()
+
+    def _usual_size(self) -> int:
+        """The size that most arrays have, with one row's vote, so that the odd one is refused."""
+        terms = (*self.mass, *self.damping, *self.stiffness)
+        sizes = [max((1, *np.shape(array))) for _, array in terms]
+        row = max((0, *np.shape(next(iter(self.observed.values())))))
+        return Counter([*sizes, row if row in sizes else row // 2]).most_common(1)[0][0]
 
     def _check_vectors(self) -> None:
         n = self.size

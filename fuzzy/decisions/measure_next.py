@@ -255,6 +255,11 @@ def _note(gains: list[Gain], width: float, error: float) -> str:
     if not np.isfinite([width, error]).all():
         return "the width is not finite: nothing can be said"
     share = 100 * error / width if width > 0 else 0.0
+    if error > width > 0:
+        return (
+            f"no input can be named: the plan's error of a difference is {share:.3g} % of the"
+            " width, too large to tell; take another, as plan=Optimisation() or BranchAndBound()"
+        )
     if gains[0].half <= error:
         least = f"the error of a difference, {share:.3g} % of the width"
         return f"no input can be named: no gain is above {least}; try measuring two of them"

@@ -18,6 +18,7 @@ from alphacut.fuzzy import (
     width_shares,
 )
 from alphacut.fuzzy.decisions.measure_next import measure_next
+from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.plans.interval_quasi_monte_carlo import IntervalResponse
 from alphacut.fuzzy.random_response import RandomResponse
 from alphacut.fuzzy.samples.model import Values
@@ -136,3 +137,8 @@ def test_results_with_arrays_are_compared_and_hashed_as_objects():
         assert kind.__eq__ is object.__eq__
     for kind in (Envelope, Homogenised, StressCurve, StiffnessBounds, ThresholdResponse):
         assert kind.__eq__ is object.__eq__
+
+
+def test_a_table_without_notes_has_no_empty_paragraph():
+    assert html_table(("a",), [("1",)]).endswith("</table>")
+    assert html_table(("a",), [("1",)], below="x\ny").endswith("</table><p>x<br>y</p>")

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
+from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +13,7 @@ import pytest
 
 from alphacut.frame import LagrangianSystem, envelope
 from alphacut.frame.calculus.jet import exp
+from alphacut.frame.structures import matrix
 from alphacut.fuzzy import Interval
 
 GIVEN: dict[str, Any] = {
@@ -34,15 +38,15 @@ GIVEN: dict[str, Any] = {
         ),
         (
             {"lagrangian": lambda q, v, p: v[0] ** 2 - abs(q[0])},
-            "lagrangian: Abs is not allowed; use arithmetic and frame.jet",
+            "lagrangian: Abs is not allowed; use arithmetic and the smooth sin, cos and exp of alpha",
         ),
         (
             {"lagrangian": lambda q, v, p: v[0] ** 2 - np.cos(q[0])},
-            "cannot be called with symbols .*; use arithmetic and frame.jet",
+            "cannot be called with symbols .*; use arithmetic and the smooth sin, cos and exp of alpha",
         ),
         (
             {"lagrangian": lambda q, v, p: v[0] ** 2 - math.cos(q[0])},
-            "cannot be called with symbols .*; use arithmetic and frame.jet",
+            "cannot be called with symbols .*; use arithmetic and the smooth sin, cos and exp of alpha",
         ),
         (
             {"lagrangian": lambda q, v, p: v[0] ** 2 - (1 if q[0] > 0 else 0)},
@@ -113,3 +117,12 @@ def test_smooth_functions_beyond_arithmetic_go() -> None:
         system, {"k": Interval(1, 2)}, duration=1.0, step=0.1, alpha=(0,), method="vertex"
     )
     assert np.isfinite(found.upper).all()
+
+
+@pytest.mark.parametrize("file", ["lagrangian_check.py", "lagrangian.py", "matrix.py"])
+def test_functions_named_in_hints_can_be_imported(file: str) -> None:
+    text = Path(matrix.__file__).with_name(file).read_text(encoding="utf-8")
+    named = re.findall(r"of `?(alphacut[.a-z]+[a-z])", text)
+    assert named
+    assert all(callable(import_module(one).exp) for one in named)
+    assert "frame.jet" not in text

@@ -126,6 +126,13 @@ def test_it_says_when_it_cannot_rank() -> None:
         measure_next(lambda a: {"x": a, "y": a}, {"a": Interval(0, 1)}, Reduced())
 
 
+def test_an_error_above_the_width_is_the_plan_s_and_says_what_to_take() -> None:
+    """Measuring two inputs instead would help as little."""
+    found = advice(lambda inputs: (1.0, 1.64), {"a": Interval(0, 1)})
+    assert "error of a difference is 328 % of the width, too large to tell" in found.note
+    assert "take another, as plan=Optimisation() or BranchAndBound()" in found.note
+
+
 def test_claims_are_joined_before_they_are_cut() -> None:
     rng = np.random.default_rng(3)
     inputs = {name: from_data(rng.normal(size=20), "mean", law="normal") for name in "ab"}
