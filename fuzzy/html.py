@@ -23,8 +23,7 @@ def html_table(header: Sequence[str], rows: Iterable[Sequence[str]], *, below: s
     body = "".join(
         f"<tr>{''.join(f'<td>{escape(text)}</td>' for text in cells)}</tr>" for cells in rows
     )
-    notes = "<br>".join(escape(line) for line in below.splitlines())
-    under = f"<p>{notes}</p>" if notes else ""
+    under = f"<p>{'<br>'.join(map(escape, below.splitlines()))}</p>" if below else ""
     return f"<table><thead><tr>{titles}</tr></thead><tbody>{body}</tbody></table>{under}"
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -104,8 +103,7 @@ class MatrixStructure:
     """M(p) q̈ + D(p) q̇ + K(p) q = −M(p) ι a(t) with M(p) = Σ_i f_i(p) M_i, likewise D and K.
 
     A factor is a number, the name of a parameter, or a function of all parameters in plain
-    arithmetic, such as
-    `lambda p: p["E"] * p["l"] ** -3`.
+    arithmetic, such as `lambda p: p["E"] * p["l"] ** -3`.
 
     Args:
         parameters: All parameters with their modal values, in SI units.
@@ -152,7 +150,7 @@ class MatrixStructure:
                 "mass, stiffness and observed: each needs at least one entry, observed by name, as"
                 " {'q1': row}"
             )
-        n = self._usual_size()
+        n = max((1, *np.shape(self.mass[0][1])))
         object.__setattr__(self, "size", n)
         for kind in ("mass", "damping", "stiffness"):
             even = tuple((factor, _symmetric(kind, a, n)) for factor, a in getattr(self, kind))
@@ -160,13 +158,6 @@ class MatrixStructure:
         self._check_vectors()
         self._check_ratios()
         self._check_mass()
-
-    def _usual_size(self) -> int:
-        """The size that most arrays have, with one row's vote, so that the odd one is refused."""
-        terms = (*self.mass, *self.damping, *self.stiffness)
-        sizes = [max((1, *np.shape(array))) for _, array in terms]
-        row = max((0, *np.shape(next(iter(self.observed.values())))))
-        return Counter([*sizes, row if row in sizes else row // 2]).most_common(1)[0][0]
 
     def _check_vectors(self) -> None:
         n = self.size

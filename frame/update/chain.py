@@ -1,9 +1,8 @@
 """Storey frame as a chain whose stiffnesses and masses are products of powers of parameters.
 
 Logarithms of stiffnesses and masses are linear in those of the parameters: k_z = 12 c_z E I / l_z³,
-or k_z itself is one.
-Natural frequencies rise with every stiffness and fall with every mass (Courant and Fischer), so
-their ranges over a box are exact.
+or k_z itself is one. Natural frequencies rise with every stiffness and fall with every mass
+(Courant and Fischer), so their ranges over a box are exact.
 """
 
 from __future__ import annotations

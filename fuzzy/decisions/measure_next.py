@@ -255,14 +255,13 @@ def _note(gains: list[Gain], width: float, error: float) -> str:
     if not np.isfinite([width, error]).all():
         return "the width is not finite: nothing can be said"
     share = 100 * error / width if width > 0 else 0.0
-    if error > width > 0:
-        return (
-            f"no input can be named: the plan's error of a difference is {share:.3g} % of the"
-            " width, too large to tell; take another, as plan=Optimisation() or BranchAndBound()"
-        )
     if gains[0].half <= error:
         least = f"the error of a difference, {share:.3g} % of the width"
-        return f"no input can be named: no gain is above {least}; try measuring two of them"
+        other = (
+            "the plan's error is too large to tell, take plan=Optimisation() or BranchAndBound()"
+        )
+        cure = other if error > width else "try measuring two of them"
+        return f"no input can be named: no gain is above {least}; {cure}"
     tied = [x.name for x in gains[1:] if gains[0].half - x.half <= error]
     return (
         f"{gains[0].name} cannot be told from {', '.join(tied)}: their gains differ by less than"

@@ -1,9 +1,8 @@
 """The linear solvers of the product-space cell by name: PETSc options, readable in one place.
 
 `theta` is the default: conjugate gradients with this project's preconditioner
-(`rve.theta_preconditioner`). The others are there to compare with. `pc_type python` stands for
-that preconditioner. Options given under the prefix `-rve_` on the command line
-override a named set.
+(`rve.theta_preconditioner`). The others are there to compare with. `pc_type python` stands for that
+preconditioner. Options given under the prefix `-rve_` on the command line override a named set.
 """
 
 from __future__ import annotations
