@@ -133,7 +133,7 @@ def exceedance(
     limit: float,
     duration: float,
     step: float,
-    output: int = 0,
+    output: int | str = 0,
     alpha: Sequence[float] = ALPHA,
     samples: int = 200,
     spread: int = 64,
@@ -143,9 +143,8 @@ def exceedance(
     """Fuzzy probability of exceeding a limit when some inputs are random and others fuzzy.
 
     The same random draws serve every fuzzy point (common random numbers), so differences between
-    points are not noise. The bounds
-    are attained at the points tried: corners and a spread of points of each box, from the narrowest
-        to the widest.
+    points are not noise. The bounds are attained at the points tried: corners and a spread of
+    points of each box, from the narrowest to the widest.
 
     Args:
         system: A linear structure, by the exact propagator, or a general system, by the midpoint
@@ -156,7 +155,7 @@ def exceedance(
         limit: Magnitude of the output that must not be exceeded, in its unit.
         duration: Length of the simulation, in s.
         step: Distance of nodes, in s.
-        output: Index of the output.
+        output: Name or index of the output.
         alpha: Levels.
         samples: Random draws.
         spread: Points of the box besides its corners, per level.
@@ -166,7 +165,7 @@ def exceedance(
     Raises:
         ValueError: A parameter is both fuzzy and random, or the limit is not positive.
     """
-    name = system.outputs[output]
+    name = output if isinstance(output, str) else system.outputs[output]
     return exceedances(
         system,
         inputs,

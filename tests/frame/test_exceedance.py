@@ -140,3 +140,11 @@ def test_an_exceedance_counts_peaks_between_nodes() -> None:
     assert exceeded.error[0] == 1
     below = exceedance(swing, inputs, {}, limit=1.5, duration=2.8, step=0.7, alpha=(0,))
     assert below.error[0] == 0
+
+
+def test_an_exceedance_takes_the_name_of_an_output() -> None:
+    asked = {"limit": 0.2, "duration": 1, "step": 0.1, "alpha": (0,), "spread": 2}
+    named, counted = (exceedance(FRAME, INPUTS, {}, output=x, **asked) for x in ("drift2", 1))  # type: ignore[arg-type]
+    assert (named.curve_upper == counted.curve_upper).all()
+    with pytest.raises(ValueError, match="there is no output 'q9'; known are q1, drift2"):
+        exceedance(FRAME, INPUTS, {}, output="q9", **asked)  # type: ignore[arg-type]
