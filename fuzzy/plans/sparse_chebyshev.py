@@ -21,7 +21,7 @@ from alphacut.fuzzy.surrogates.chebyshev_polynomial import Polynomial
 _SEARCHES = 20_000  # searches of the surface at most
 _SAFETY = 2  # the surface may miss other places by more than the samples that were held out
 _TINY = np.finfo(float).tiny
-_ROUGH = 3  # the same of a surface that ended at its budget, as one about kinks does
+_ROUGH = 3  # the same of several inputs where the budget ended the surface, as about kinks
 
 
 class _Ends(NamedTuple):
@@ -41,8 +41,8 @@ class Chebyshev:
         budget: Samples at which it ends at the latest (the last step may pass it).
         confirm: Run the model where the surface has its extremes. The bounds are then attained
             (inner), their error the disagreement there and twice that at held-out samples (three
-            times where the budget ended it); otherwise they are the surface's (estimated), their
-            error the latter alone.
+            times where the budget ended it for several inputs); otherwise they are the surface's
+            (estimated), their error the latter alone.
         outputs: Outputs whose bounds matter; all if none is named.
 
     Raises:
@@ -77,7 +77,7 @@ class Chebyshev:
         grid = SparseGrid(memo, *(ends[0] for ends in domain.boxes))
         missed, met = grid.refine(self.tolerance, self.budget)
         left = float((missed / np.maximum(np.ptp(memo.values.array, axis=0), _TINY)).max())
-        missed = (_SAFETY if met else _ROUGH) * missed
+        missed = (_SAFETY if met or len(domain.names) == 1 else _ROUGH) * missed
         chosen = np.array(
             [memo.values.column(name) for name in self.outputs or primary(columns, model.known)]
         )
