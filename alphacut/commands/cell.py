@@ -11,19 +11,7 @@ from alphacut.case.case import Case
 from alphacut.case.idle import idle_mesh, require_read
 from alphacut.case.load import load
 from alphacut.case.sections.material import CELL_METHODS, SPHERE_METHODS
-from alphacut.commands.options import (
-    MESH,
-    MODEL,
-    SAMPLE,
-    add_common,
-    add_exclude,
-    add_keys,
-    add_radius,
-    answer,
-    changes,
-    one_radius,
-    refuse_beside,
-)
+from alphacut.commands import options as common
 from alphacut.export.material_card import check_format, export
 from alphacut.io.files import ranks, say
 from alphacut.io.problem import BadInput, Problem
@@ -37,21 +25,21 @@ from alphacut.stages.contract import contract, keep_modulus, require_choice
 from alphacut.stages.material import cell, spheres
 from alphacut.stages.material.cell_models import cell_model, started
 from alphacut.stages.material.references import beside, text_of
-from alphacut.stages.readiness import say_unlikely_material
+from alphacut.stages.plausible import say_unlikely_material
 
 ABOUT = "homogenise the cell at crisp values; a fuzzy input takes its modal value"
 
 
-KEYS = {**SAMPLE, **MESH, **MODEL}
+KEYS = {**common.SAMPLE, **common.MESH, **common.MODEL}
 READ = ("radius", "cell", "mesh", "modulus.method", "modulus.tolerance", "modulus.average")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    add_common(parser)
-    add_keys(parser, KEYS)
-    add_exclude(parser, ", ".join(ORDER))
-    add_radius(parser)
+    common.add_common(parser)
+    common.add_keys(parser, KEYS)
+    common.add_exclude(parser, ", ".join(ORDER))
+    common.add_radius(parser)
     parser.add_argument(
         "--stiffness",
         action="store_true",
@@ -98,7 +86,9 @@ def named_pair(text: str) -> tuple[str, ...]:
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Solve and report."""
-    case = load(options.case, [*changes(options, KEYS), *one_radius(options)], modal=True)
+    case = load(
+        options.case, [*common.changes(options, KEYS), *common.one_radius(options)], modal=True
+    )
     require_read(case, READ, "cell")
     if options.export:
         check_format(options.export)
@@ -130,7 +120,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     particles = case.cell.particles
     ratio = cell.anisotropy(*cell.modal_parts(case), particles)
     found |= beside(case, result.modulus, result.poisson, ratio and ratio[0])
-    if answer(options, found, out, summary(result)):
+    if common.answer(options, found, out, summary(result)):
         out.write(agreement(pair, difference, allowed_difference(case)))
         out.write(remark(ratio, choice.meaning) + text_of(case, found))
     return 0
@@ -158,7 +148,7 @@ def require_effect(options: argparse.Namespace, case: Case, models: Sequence[str
     if problems:
         raise BadInput(problems)
     if options.cross_check:
-        refuse_beside(options, "--cross-check", {"--best-effort": ""})
+        common.refuse_beside(options, "--cross-check", {"--best-effort": ""})
     elif options.best_effort:
         require_choice(case, modulus=True, envelope=False)
 

@@ -16,19 +16,7 @@ from alphacut.case.idle import changed_moduli, require_read
 from alphacut.case.load import load
 from alphacut.case.sections.vibration import ENVELOPE_METHODS
 from alphacut.case.values import nearest
-from alphacut.commands.options import (
-    KeyOption,
-    add_common,
-    add_exclude,
-    add_keys,
-    add_modulus,
-    add_workers,
-    answer,
-    changes,
-    check_workers,
-    given_modulus,
-    refuse_beside,
-)
+from alphacut.commands import options as common
 from alphacut.io.files import Document
 from alphacut.io.kept_arrays import KeptArrays
 from alphacut.io.problem import BadInput, Problem
@@ -50,13 +38,15 @@ if TYPE_CHECKING:
 
 ABOUT = "envelopes of the structure's vibration on every α-cut"
 KEYS = {
-    "--fuzzy": KeyOption("envelope.fuzzy", "inputs that are fuzzy, as E,m", "NAMES"),
-    "--duration": KeyOption("envelope.duration", "length of the simulation", bare="s"),
-    "--step": KeyOption("envelope.step", "time step", bare="s"),
-    "--alpha": KeyOption("envelope.alpha", "levels, as 0,0.5,1", "LIST"),
-    "--method": KeyOption("envelope.method", ", ".join(ENVELOPE_METHODS), "CHOICE"),
-    "--tolerance": KeyOption("envelope.tolerance", "error that must be kept", bare="m"),
-    "--certify": KeyOption("envelope.certify", "gap of bounds, proved if possible", bare="m"),
+    "--fuzzy": common.KeyOption("envelope.fuzzy", "inputs that are fuzzy, as E,m", "NAMES"),
+    "--duration": common.KeyOption("envelope.duration", "length of the simulation", bare="s"),
+    "--step": common.KeyOption("envelope.step", "time step", bare="s"),
+    "--alpha": common.KeyOption("envelope.alpha", "levels, as 0,0.5,1", "LIST"),
+    "--method": common.KeyOption("envelope.method", ", ".join(ENVELOPE_METHODS), "CHOICE"),
+    "--tolerance": common.KeyOption("envelope.tolerance", "error that must be kept", bare="m"),
+    "--certify": common.KeyOption(
+        "envelope.certify", "gap of bounds, proved if possible", bare="m"
+    ),
 }
 READ = ("frame", "field", "pendulum", "tower", "envelope", "exceedance")
 GIVEN = ("modulus.value", "modulus.file", "modulus.measured")
@@ -66,11 +56,11 @@ OF_AUTO = ("modal", "improved-graph-follower")
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    add_common(parser)
-    add_keys(parser, KEYS)
-    add_modulus(parser)
-    add_exclude(parser, " or ".join(OF_AUTO))
-    add_workers(parser, "the proof of --certify")
+    common.add_common(parser)
+    common.add_keys(parser, KEYS)
+    common.add_modulus(parser)
+    common.add_exclude(parser, " or ".join(OF_AUTO))
+    common.add_workers(parser, "the proof of --certify")
     parser.add_argument(
         "--strict", action="store_true", help="refuse a step or tolerance too coarse for the motion"
     )
@@ -82,23 +72,23 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Compute and report."""
-    check_workers(options.workers)
+    common.check_workers(options.workers)
     if options.certify is not None and options.method is None:
         options.method = "modal"  # the one that can
-    case = load(options.case, changes(options, KEYS), without=replaced(options))
+    case = load(options.case, common.changes(options, KEYS), without=replaced(options))
     require_read(case, (*READ, *GIVEN), "envelope")
-    handed = given_modulus(options.modulus) or stand_in(case)
+    handed = common.given_modulus(options.modulus) or stand_in(case)
     task = replace(task_of(case), exclude=excluded(options.exclude))
     contradictions(options, case, task)
     wanted = structure(case, handed)
     if case.sections.exceedance:
         outcomes.require_random(case, wanted)  # before anything is computed
     if options.explain:
-        refuse_beside(options, "--explain", UNEXPLAINED)
+        common.refuse_beside(options, "--explain", UNEXPLAINED)
         plan = envelope.explain(wanted, task)
         plan += width_shares.explained(wanted, task) if case.envelope.shares else []
         plan += decision.explained(case, wanted, task) if case.sections.decision else []
-        answer(options, {"plan": plan}, out, "".join(f"{line}\n" for line in plan))
+        common.answer(options, {"plan": plan}, out, "".join(f"{line}\n" for line in plan))
         return 0
     content = {"case": case.sections, "task": task, "modulus": handed}
     content["files"] = case.digests(*case.sections.files)
@@ -128,7 +118,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     }
     text = summary(found, tried[0]) + "".join(f"{line}\n" for line in fixed_line(fixed))
     text += outcomes.sentences(limit) if limit else ""
-    answer(options, document, out, text)
+    common.answer(options, document, out, text)
     return 0
 
 

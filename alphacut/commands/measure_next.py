@@ -9,15 +9,7 @@ from typing import TextIO
 
 from alphacut.case.idle import require_read
 from alphacut.case.load import load
-from alphacut.commands.options import (
-    KeyOption,
-    add_common,
-    add_keys,
-    add_modulus,
-    answer,
-    changes,
-    given_modulus,
-)
+from alphacut.commands import options as common
 from alphacut.io.files import as_json, write_text
 from alphacut.io.output_paths import unwritable
 from alphacut.io.problem import BadInput
@@ -28,8 +20,8 @@ from alphacut.stages.measure_next import advice_document, measure_next
 
 ABOUT = "by how much the answer narrows if an input is known better"
 KEYS = {
-    "--fuzzy": KeyOption("envelope.fuzzy", "inputs that may be measured, as E,m", "NAMES"),
-    "--duration": KeyOption("envelope.duration", "length of the simulation", bare="s"),
+    "--fuzzy": common.KeyOption("envelope.fuzzy", "inputs that may be measured, as E,m", "NAMES"),
+    "--duration": common.KeyOption("envelope.duration", "length of the simulation", bare="s"),
 }
 OF_CELL = ("radius", "cell", "mesh", "modulus")
 READ = ("stages", "frame", "field", "tower", "envelope", "update", *OF_CELL)
@@ -37,9 +29,9 @@ READ = ("stages", "frame", "field", "tower", "envelope", "update", *OF_CELL)
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    add_common(parser)
-    add_keys(parser, KEYS)
-    add_modulus(parser)
+    common.add_common(parser)
+    common.add_keys(parser, KEYS)
+    common.add_modulus(parser)
     parser.add_argument(
         "--output", metavar="NAME", help="output whose width is compared (default: the first)"
     )
@@ -52,12 +44,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Compute again for every input, and report."""
-    case = load(options.case, changes(options, KEYS))
+    case = load(options.case, common.changes(options, KEYS))
     require_read(case, READ, "measure-next")
     folder = Path(options.out) if options.out else None
     if folder is not None and (problems := list(unwritable("--out", folder, folder=True))):
         raise BadInput(problems)
-    handed = given_modulus(options.modulus) or stand_in(case)
+    handed = common.given_modulus(options.modulus) or stand_in(case)
     with progress("Measure next", quiet=options.quiet) as tick:
         name, found = measure_next(case, handed, options.output, tick)
     document = advice_document(found, name)
@@ -70,5 +62,5 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         write_text(folder / "measure-next.json", as_json(document, indent=2))
     width = engineering(found.width, document["unit"], digits=6)
     of = "width" if name == "E" else "mean width over time"
-    answer(options, document, out, f"{name}: {found.told(f'{of} {width}')}\n")
+    common.answer(options, document, out, f"{name}: {found.told(f'{of} {width}')}\n")
     return 0

@@ -10,15 +10,7 @@ from typing import TextIO
 from alphacut.case.case import Case
 from alphacut.case.idle import require_read
 from alphacut.case.load import load
-from alphacut.commands.options import (
-    MESH,
-    add_common,
-    add_keys,
-    add_radius,
-    answer,
-    changes,
-    one_radius,
-)
+from alphacut.commands import options as common
 from alphacut.export.fields import cell_fields
 from alphacut.export.prism_mesh import check_ending, prism_mesh, sphere_mesh, write_mesh
 from alphacut.io.problem import BadInput, Problem
@@ -33,9 +25,9 @@ READ = ("radius", "cell", "mesh")
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    add_common(parser)
-    add_keys(parser, MESH)
-    add_radius(parser)
+    common.add_common(parser)
+    common.add_keys(parser, common.MESH)
+    common.add_radius(parser)
     parser.add_argument(
         "--fields",
         action="store_true",
@@ -51,7 +43,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Mesh and write."""
-    case = load(options.case, [*changes(options, MESH), *one_radius(options)], modal=True)
+    case = load(
+        options.case,
+        [*common.changes(options, common.MESH), *common.one_radius(options)],
+        modal=True,
+    )
     spheres = case.sections.cell is not None and case.cell.particles == "spheres"
     require_effect(options, case, spheres=spheres)
     check_ending(Path(options.out), fields=options.fields)
@@ -72,7 +68,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         counts["declared_error"] = mesh.info or None
         errors = ", ".join(f"{name} {error:.1e}" for name, error in (mesh.info or {}).items())
         text += f"relative errors in L²: {errors or 'not known, particles nearly touch'}\n"
-    answer(options, counts, out, text)
+    common.answer(options, counts, out, text)
     return 0
 
 

@@ -11,19 +11,8 @@ from alphacut.case.case import Case
 from alphacut.case.idle import idle_mesh, require_read
 from alphacut.case.load import load
 from alphacut.case.sections.material import PLANS
+from alphacut.commands import options as common
 from alphacut.commands.cell import named_models, remark
-from alphacut.commands.options import (
-    MODEL,
-    KeyOption,
-    add_common,
-    add_exclude,
-    add_keys,
-    add_workers,
-    answer,
-    changes,
-    check_workers,
-    refuse_beside,
-)
 from alphacut.fuzzy import Store
 from alphacut.io.files import Document, say
 from alphacut.io.problem import BadInput, Problem
@@ -35,13 +24,13 @@ from alphacut.stages.material import modulus, response
 from alphacut.stages.material.campaign import Campaign, campaign
 from alphacut.stages.material.cell import GPA
 from alphacut.stages.material.references import of_modulus, text_of
-from alphacut.stages.readiness import say_unlikely_material
+from alphacut.stages.plausible import say_unlikely_material
 
 ABOUT = "fuzzy effective modulus by the transformation method over all fuzzy inputs of the cell"
 KEYS = {
-    **MODEL,
-    "--plan": KeyOption("modulus.plan", ", ".join(PLANS), "CHOICE"),
-    "--alpha": KeyOption("modulus.alpha", "levels, as 0,0.5,1", "LIST"),
+    **common.MODEL,
+    "--plan": common.KeyOption("modulus.plan", ", ".join(PLANS), "CHOICE"),
+    "--alpha": common.KeyOption("modulus.alpha", "levels, as 0,0.5,1", "LIST"),
 }
 READ = ("radius", "cell", "mesh", "modulus", "response")
 UNEXPLAINED = {"--out": "", "--workers": "1", "--best-effort": ""}
@@ -50,10 +39,10 @@ UNEXPLAINED = {"--out": "", "--workers": "1", "--best-effort": ""}
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    add_common(parser)
-    add_keys(parser, KEYS)
-    add_exclude(parser, ", ".join(ORDER))
-    add_workers(parser)
+    common.add_common(parser)
+    common.add_keys(parser, KEYS)
+    common.add_exclude(parser, ", ".join(ORDER))
+    common.add_workers(parser)
     parser.add_argument("--out", metavar="FILE.nc", help="write α-cuts and samples as NetCDF")
     place = parser.add_mutually_exclusive_group()
     place.add_argument(
@@ -77,7 +66,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     wanted = campaign(case, petsc=petsc, exclude=exclude, store=store_of(options, case))
     if options.explain:
         words = explained(wanted)
-        answer(options, {"explanation": words}, out, f"{words}\n")
+        common.answer(options, {"explanation": words}, out, f"{words}\n")
         return 0
     with progress("Fuzzy modulus", quiet=options.quiet) as tick:
         found = modulus.compute(wanted, workers=options.workers, progress=tick)
@@ -89,7 +78,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         modulus.write(
             found, options.out, case_text=case.text_of_file, key=key, outside=others["outside"]
         )
-    if answer(options, document, out, text) and not options.out:
+    if common.answer(options, document, out, text) and not options.out:
         say(
             "to keep this and hand it on: the same command with --out modulus.nc, then"
             f" {door('envelope', options.case)} --modulus modulus.nc"
@@ -103,13 +92,13 @@ def asked(options: argparse.Namespace) -> Case:
     Raises:
         BadInput: They do not.
     """
-    check_workers(options.workers)
-    case = load(options.case, changes(options, KEYS))
+    common.check_workers(options.workers)
+    case = load(options.case, common.changes(options, KEYS))
     require_read(case, READ, "modulus")
     if problems := list(idle_mesh(case, (case.modulus.method,))):
         raise BadInput(problems)
     if options.explain:
-        refuse_beside(options, "--explain", UNEXPLAINED)
+        common.refuse_beside(options, "--explain", UNEXPLAINED)
     elif options.best_effort:
         require_choice(case, modulus=True, envelope=False)
     return case

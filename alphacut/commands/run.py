@@ -13,14 +13,7 @@ from alphacut.case.case import Case
 from alphacut.case.idle import idle_mesh, require_read
 from alphacut.case.load import load
 from alphacut.case.quick import banner, quick, settings
-from alphacut.commands.options import (
-    add_best_effort,
-    add_common,
-    add_workers,
-    answer,
-    check_workers,
-    refuse_beside,
-)
+from alphacut.commands import options as common
 from alphacut.figures.captions import core
 from alphacut.figures.showing import Showing
 from alphacut.fuzzy.campaign.workers import pool
@@ -47,8 +40,8 @@ ABOUT = (
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    add_common(parser)
-    add_workers(parser)
+    common.add_common(parser)
+    common.add_workers(parser)
     parser.add_argument(
         "--out", metavar="FOLDER", help="where results go (default: results/NAME-OF-THE-CASE)"
     )
@@ -66,7 +59,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--strict", action="store_true", help="refuse a step or tolerance too coarse for the motion"
     )
-    add_best_effort(parser)
+    common.add_best_effort(parser)
     parser.add_argument(
         "--quick", action="store_true", help="all stages in seconds, coarse: numbers mean nothing"
     )
@@ -90,7 +83,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         "seconds": time.perf_counter() - start,
     }
     write_text(chain.file("summary.json"), as_json(found, indent=2))
-    if answer(options, found, out, words(found)):
+    if common.answer(options, found, out, words(found)):
         told = f"{len(drawn)} figures among them, after {found['seconds']:.0f} s"
         say(f"results are in {chain.folder}, {told}")
         say(f"next: {door('report', chain.folder)}")
@@ -129,7 +122,7 @@ def asked(options: argparse.Namespace) -> tuple[Case, Path]:
     Raises:
         BadInput: The case or the options cannot be used.
     """
-    check_workers(options.workers)
+    common.check_workers(options.workers)
     case = load(options.case, options.set)
     require_read(case, read_by(case), "run")
     require_effect(options, case)
@@ -180,7 +173,7 @@ def require_effect(options: argparse.Namespace, case: Case) -> None:
     if computed and (problems := list(idle_mesh(case, models))):
         raise BadInput(problems)
     if options.quick:
-        refuse_beside(options, "--quick", {"--best-effort": ""})
+        common.refuse_beside(options, "--quick", {"--best-effort": ""})
     if options.best_effort:
         require_choice(case, modulus=computed, envelope="envelope" in case.stages)
 

@@ -8,17 +8,7 @@ from typing import TextIO
 
 from alphacut.case.idle import require_read
 from alphacut.case.load import load
-from alphacut.commands.options import (
-    KeyOption,
-    add_common,
-    add_keys,
-    add_modulus,
-    add_workers,
-    answer,
-    changes,
-    check_workers,
-    given_modulus,
-)
+from alphacut.commands import options as common
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import progress
 from alphacut.io.units import engineering
@@ -27,35 +17,37 @@ from alphacut.stages.vibration.tolerances import Tolerances, input_unit, toleran
 
 ABOUT = "largest supports for which the limit provably holds"
 KEYS = {
-    "--fuzzy": KeyOption("envelope.fuzzy", "inputs whose supports are scaled, as E,m", "NAMES"),
-    "--duration": KeyOption("envelope.duration", "length of the simulation", bare="s"),
-    "--step": KeyOption("envelope.step", "time step", bare="s"),
+    "--fuzzy": common.KeyOption(
+        "envelope.fuzzy", "inputs whose supports are scaled, as E,m", "NAMES"
+    ),
+    "--duration": common.KeyOption("envelope.duration", "length of the simulation", bare="s"),
+    "--step": common.KeyOption("envelope.step", "time step", bare="s"),
 }
 READ = ("frame", "field", "envelope", "exceedance", "radius", "cell", "mesh", "modulus")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
-    add_common(parser)
-    add_keys(parser, KEYS)
-    add_modulus(parser)
+    common.add_common(parser)
+    common.add_keys(parser, KEYS)
+    common.add_modulus(parser)
     parser.add_argument(
         "--most", type=float, default=2.0, metavar="X", help="largest scaling asked for (default 2)"
     )
-    add_workers(parser, "the proof")
+    common.add_workers(parser, "the proof")
 
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Compute and report."""
-    check_workers(options.workers)
+    common.check_workers(options.workers)
     if not options.most > 0:
         raise BadInput(Problem("--most", "out of range", f"{options.most:g}", "greater than 0"))
-    case = load(options.case, changes(options, KEYS))
+    case = load(options.case, common.changes(options, KEYS))
     require_read(case, READ, "tolerances")
-    handed = given_modulus(options.modulus) or stand_in(case)
+    handed = common.given_modulus(options.modulus) or stand_in(case)
     with progress("Tolerances", quiet=options.quiet) as tick:
         found = tolerances(case, handed, most=options.most, workers=options.workers, progress=tick)
-    answer(options, found.document(), out, text(found))
+    common.answer(options, found.document(), out, text(found))
     return 0
 
 

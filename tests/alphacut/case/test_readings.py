@@ -186,3 +186,21 @@ def test_masses_of_a_frame_in_another_unit_give_an_unusual_period(mass, tmp_path
         tmp_path, ('masses = ["20 t", "20 t"]', f'masses = ["{mass}", "{mass}"]'), capfd=capfd
     )
     assert "is unusual for a structure; check the units of masses" in told
+
+
+def test_a_slip_that_may_have_made_the_step_too_coarse_is_told_before_it(tmp_path, capfd):
+    text = FRAME.replace('lengths = ["3.5 m"]', 'lengths = ["3.5 m", "1.5 mm"]')
+    assert text != FRAME
+    (tmp_path / "r.csv").write_text("time [s],acceleration [m/s^2]\n0,0\n0.05,2\n0.1,0\n")
+    (tmp_path / "low.toml").write_text(text, encoding="utf-8")
+    assert main(["check", str(tmp_path / "low.toml"), "--set", "envelope.step=20 ms"]) == 2
+    height, step = capfd.readouterr().err.splitlines()
+    assert re.search(r"low.toml:\d+: frame.lengths 1: 3.500 m is 2.33e\+03 times the med", height)
+    assert re.search(r"envelope.step: 0.02 s with motions as fast as .* take a step", step)
+
+
+def test_steps_without_need_are_counted_and_a_longer_one_is_named(tmp_path, capfd):
+    short = ('step = "10 ms"', 'step = "1 us"')
+    told = steel(tmp_path, short, capfd=capfd)
+    assert re.search(r"envelope.step: 1.00 µs makes [\d,]+ steps, [\d,]+ of them in the s", told)
+    assert re.search(r"shortest natural period; [\d.]+ .s is fine enough", told)

@@ -1,0 +1,118 @@
+"""Values of a case that most likely have the wrong unit."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from statistics import median_low
+from typing import TYPE_CHECKING
+
+from alphacut.case.case import Case
+from alphacut.case.limits import storey_height
+from alphacut.case.names import structures
+from alphacut.case.readings import limits, readings
+from alphacut.io.files import say
+from alphacut.io.units import engineering
+
+if TYPE_CHECKING:
+    from alphacut.frame import Accelerogram
+
+PERIODS = (0.05, 15.0)  # s, from a stiff machine frame to the slenderest towers
+STOREYS = {"masses": "kg", "lengths": "m", "second_moment": "m^4", "stiffness": "N/m"}
+APART = 100.0  # of a storey's value from the median of all
+DAMPED = (0.001, 0.2)  # of the critical damping
+MODULI = (1e5, 2e12)  # Pa, from soft gels to diamond
+BUILT = (1e9, 1e12)  # Pa, of what frames are made of
+CONTRAST = 1000.0  # between the phases
+DRIFTS = (1e-5, 0.2)  # of the storey's height
+ANY = (0.0, math.inf)
+LIMITS = {"m": (1e-6, 20.0), "m/s": (1e-4, 50.0), "m/s^2": (1e-3, 500.0), "N": (1.0, 1e9)}
+DESIGNED = (0.5, 15.0)  # m/s², of records that structures are designed for
+PEAKS = (0.003, 30.0)  # m/s², of the ground, from the weakest record to the strongest
+
+
+def unlikely(case: Case, ground: Accelerogram | None, period: float | None) -> Iterator[str]:
+    """Remarks on values of which one has most likely the wrong unit."""
+    if period is not None and not PERIODS[0] <= period <= PERIODS[1]:
+        yield (
+            f"{part(case)}: a first natural period of {period:.3g} s is unusual for a structure;"
+            " check the units of masses, lengths and moduli"
+        )
+    if ground is not None:
+        peak = float(abs(ground.acceleration).max())
+        if not PEAKS[0] <= peak <= PEAKS[1]:
+            told = f"a peak of {peak:.3g} m/s² is unusual for the ground"
+            yield f"{record_key(case)}: {told}; check the unit in its header"
+
+
+def odd(case: Case) -> Iterator[str]:
+    """Remarks on moduli of a structure and on limits that most likely have the wrong unit."""
+    from alphacut.frame.outputs import output_unit
+
+    for one in readings(case):
+        if one.unit == "Pa" and one.key.startswith(("frame.", "tower.")):
+            yield from unlike(one.key, one.values[0], one.unit, BUILT, "a frame")
+        for end in one.values[:: len(one.values) - 1 or 1] if "damping_ratio" in one.key else ():
+            if one.values[-1] > 0:  # 0 leaves a structure undamped
+                yield from unlike(one.key, end, "", DAMPED, "a damping ratio")
+    for section, output, value in limits(case):
+        height, unit = storey_height(case, output), output_unit(output)
+        usual = (DRIFTS[0] * height, DRIFTS[1] * height) if height else LIMITS.get(unit, ANY)
+        yield from unlike(f"{section}: the limit of {output}", value, unit, usual, "one")
+
+
+def strangers(case: Case) -> Iterator[str]:
+    """Remarks on values of one storey that are of another order than those of the others."""
+    given = case.sections.frame
+    for name, unit in STOREYS.items() if given else ():
+        values = [number.modal for number in getattr(given, name) or ()]
+        for storey, value in enumerate(values, start=1):
+            middle = median_low(values)
+            if not 1 / APART < value / middle < APART:
+                told = f"{engineering(value, unit)} is {value / middle:.3g} times the median of"
+                yield f"frame.{name} {storey}: {told} all storeys; check its unit"
+
+
+def unlike(key: str, value: float, unit: str, usual: tuple[float, float], of: str) -> Iterator[str]:
+    """A remark on a value outside what is usual."""
+    if not usual[0] <= value <= usual[1]:
+        yield f"{key}: {engineering(value, unit)} is unusual for {of}; check its unit"
+
+
+def unlikely_material(case: Case) -> Iterator[str]:
+    """Remarks on phases and radii of which one is most likely a slip of the pen."""
+    if phases := case.sections.cell:
+        named = {"matrix": phases.matrix_modulus, "inclusion": phases.inclusion_modulus}
+        for name, modulus in named.items():
+            yield from unlike(f"cell.{name}_modulus", modulus.modal, "Pa", MODULI, "a solid")
+        ratios = {"matrix": phases.matrix_poisson, "inclusion": phases.inclusion_poisson}
+        for name, poisson in ratios.items():
+            if poisson.modal < 0:
+                told = f"{poisson.modal:g} is unusual for a solid"
+                yield f"cell.{name}_poisson: {told}; check its sign"
+        ratio = phases.inclusion_modulus.modal / phases.matrix_modulus.modal
+        meant = re.search(r"(?i)\b(pore|void|hole|rigid)", case.text_of_file)
+        if not 1 / CONTRAST <= ratio <= CONTRAST and not meant:
+            yield (
+                f"cell: the particle's modulus is {ratio:.3g} times the matrix's; check the units"
+                " of both, or name pores or rigid particles in the case's text"
+            )
+    if (radius := case.sections.radius) and radius.a1.modal > radius.a3.modal:
+        yield "radius: a1 is greater than a3, so the radius falls where θ rises; is that meant?"
+
+
+def say_unlikely_material(case: Case) -> None:
+    """The remarks on material that `check` prints, where a command computes that alone."""
+    for remark in unlikely_material(case):
+        say(f"warning: {remark}")
+
+
+def record_key(case: Case) -> str:
+    """Key of the record of the ground's motion."""
+    return f"{part(case)}.accelerogram"
+
+
+def part(case: Case) -> str:
+    """Section of the structure."""
+    return next(iter(structures(case)))
