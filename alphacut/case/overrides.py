@@ -40,6 +40,22 @@ def apply_change(raw: Raw, change: str) -> str:
     name = name.strip().replace("-", "_")
     known = every_key()
     full = [name] if name in known else [key for key in known if key.rpartition(".")[2] == name]
+    _require_sense(name, equals, change)
+    if not full:
+        raise BadInput(no_key(name, change, raw))
+    place = _place(raw, full)
+    if place is None:
+        raise BadInput(
+            Problem("--set", f"the key {name} is not clear", change, "one of " + ", ".join(full))
+        )
+    section, _, key = place.rpartition(".")
+    table = table_of(raw, section, make=True)
+    if table is not None:
+        table[key] = toml_or_text(value.strip(), known[place])
+    return place
+
+
+def _require_sense(name: str, equals: str, change: str) -> None:
     if not equals:
         raise BadInput(
             Problem(
@@ -58,27 +74,18 @@ def apply_change(raw: Raw, change: str) -> str:
                 "keys of the other sections",
             )
         )
-    if not full:
-        raise BadInput(no_key(name, change, raw))
-    present = (
-        [
-            key
-            for key in full
-            if key.rpartition(".")[2] in (table_of(raw, key.rpartition(".")[0]) or {})
-        ]
-        if len(full) > 1
-        else full
-    )
+
+
+def _place(raw: Raw, full: Sequence[str]) -> str | None:
+    """The one key meant: of several with the name, the one that the case has already."""
+
+    def given(key: str) -> bool:
+        section, _, last = key.rpartition(".")
+        return last in (table_of(raw, section) or {})
+
+    present = [key for key in full if len(full) == 1 or given(key)]
     present = [key for key in present if not key.startswith("study.")]
-    if len(present) != 1:
-        raise BadInput(
-            Problem("--set", f"the key {name} is not clear", change, "one of " + ", ".join(full))
-        )
-    section, _, key = present[0].rpartition(".")
-    table = table_of(raw, section, make=True)
-    if table is not None:
-        table[key] = toml_or_text(value.strip(), known[present[0]])
-    return present[0]
+    return present[0] if len(present) == 1 else None
 
 
 def no_key(name: str, change: str, raw: Raw) -> Problem:

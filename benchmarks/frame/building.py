@@ -76,17 +76,7 @@ def measured(
     peak = np.maximum(np.abs(found.lower), np.abs(found.upper)).max((0, 1))
     d, rng = len(INPUTS), np.random.default_rng(7)
     unit = np.vstack([corners(-np.ones(d), np.ones(d)), rng.uniform(-1, 1, (trajectories, d))])
-    top = np.full(found.upper[0].shape, -np.inf)
-    best = np.zeros((*top.shape, d))
-    outside = 0.0
-    for chunk in np.array_split(unit, -(-len(unit) // 64)):
-        values = flow.values(chunk)
-        outside = max(
-            outside,
-            float((np.maximum(values - found.upper[0], found.lower[0] - values) / peak).max()),
-        )
-        pick, high = values.argmax(0), values.max(0)
-        best[high > top], top = chunk[pick][high > top], np.maximum(high, top)
+    best, outside = _highest(flow, found, unit, peak)
     outside, wrong = _climbed(
         flow,
         found,
@@ -102,6 +92,20 @@ def measured(
         "outside": outside,
         "at_bounds": wrong,
     }
+
+
+def _highest(flow: UnitFlow, found: Envelope, unit: Array, peak: Array) -> tuple[Array, float]:
+    """Points of the highest values, and by how much any value leaves the envelope."""
+    top = np.full(found.upper[0].shape, -np.inf)
+    best = np.zeros((*top.shape, unit.shape[1]))
+    outside = 0.0
+    for chunk in np.array_split(unit, -(-len(unit) // 64)):
+        values = flow.values(chunk)
+        beyond = np.maximum(values - found.upper[0], found.lower[0] - values) / peak
+        outside = max(outside, float(beyond.max()))
+        pick, high = values.argmax(0), values.max(0)
+        best[high > top], top = chunk[pick][high > top], np.maximum(high, top)
+    return best, outside
 
 
 def _climbed(

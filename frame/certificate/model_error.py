@@ -83,15 +83,22 @@ def proved_error(model: ModalModel, *, patient: bool = True) -> Array:
             * part.waves[0]
             @ (np.abs(defect["outputs"]).sum(0) + part.left_out[:, None] * largest)
         )
+    bound: Array = deviation[:, None] * _reading(structure["rows"], stiffness, mass, ratio) + own
+    return bound
+
+
+def _reading(
+    rows: Array, stiffness: Comparison, mass: Comparison, ratio: RatioDamping | None
+) -> Array:
+    """What each output reads of a deviation of unit energy, shape (m,)."""
     size = len(stiffness.factor)
-    rows = np.moveaxis(structure["rows"], 1, 0)  # (m, J, 2N)
+    rows = np.moveaxis(rows, 1, 0)  # (m, J, 2N)
     moved = np.array([stiffness.sup_dual(row[:, :size]) for row in rows])
     speeding = np.array([mass.sup_dual(row[:, size:]) for row in rows])
     if ratio is not None:
         speeding = speeding + ratio.read(stiffness, mass)
-    reading = np.hypot(moved, speeding)
-    bound: Array = deviation[:, None] * reading + own
-    return bound
+    reading: Array = np.hypot(moved, speeding)
+    return reading
 
 
 def _grids(model: ModalModel) -> tuple[ChebyshevGrid, LowerGrid]:

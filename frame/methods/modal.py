@@ -11,7 +11,7 @@ import numpy as np
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.threads import threads
-from alphacut.frame.certificate.certificate import certify
+from alphacut.frame.certificate.certificate import Certificate, certify
 from alphacut.frame.certificate.model_error import proved_error
 from alphacut.frame.certificate.remainder import MOST_PARAMETERS, require_certifiable
 from alphacut.frame.dynamics.flow import LinearFlow
@@ -261,6 +261,24 @@ def _certified(
         progress=progress,
         told=flow.told,
     )
+    envelope = signed_envelope(
+        flow,
+        proof.outer,
+        proof.at,
+        method="modal",
+        nature="verified by sampling" if unproved else "guaranteed",
+        error=(proof.outer - proof.bounds).max(-1),
+        between=proof.between,
+        trajectories=model.analyses,
+        seconds=time.perf_counter() - begun,
+        facts=_proof_facts(flow, model, error, proof, unproved),
+    )
+    return replace(envelope, inner_lower=-proof.bounds[..., 0], inner_upper=proof.bounds[..., 1])
+
+
+def _proof_facts(
+    flow: UnitFlow, model: ModalModel, error: Array, proof: Certificate, unproved: str
+) -> dict[str, float | str]:
     facts: dict[str, float | str] = {
         "model_error": float((error / flow.scale).max()),
         "degree": model.degree,
@@ -276,19 +294,7 @@ def _certified(
         facts["proof"] = (
             f"the branch and bound is rigorous for the modal model; {SAMPLED}: {unproved}"
         )
-    envelope = signed_envelope(
-        flow,
-        proof.outer,
-        proof.at,
-        method="modal",
-        nature="verified by sampling" if unproved else "guaranteed",
-        error=(proof.outer - proof.bounds).max(-1),
-        between=proof.between,
-        trajectories=model.analyses,
-        seconds=time.perf_counter() - begun,
-        facts=facts,
-    )
-    return replace(envelope, inner_lower=-proof.bounds[..., 0], inner_upper=proof.bounds[..., 1])
+    return facts
 
 
 def model_with_error(
