@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -150,7 +151,7 @@ class MatrixStructure:
                 "mass, stiffness and observed: each needs at least one entry, observed by name, as"
                 " {'q1': row}"
             )
-        n = max((1, *np.shape(self.mass[0][1])))
+        n = self._usual_size()
         object.__setattr__(self, "size", n)
         for kind in ("mass", "damping", "stiffness"):
             even = tuple((factor, _symmetric(kind, a, n)) for factor, a in getattr(self, kind))
@@ -158,6 +159,13 @@ class MatrixStructure:
         self._check_vectors()
         self._check_ratios()
         self._check_mass()
+
+    def _usual_size(self) -> int:
+        """The size that most arrays have, with one row's vote, so that the odd one is refused."""
+        terms = (*self.mass, *self.damping, *self.stiffness)
+        sizes = [max((1, *np.shape(array))) for _, array in terms]
+        row = max((0, *np.shape(next(iter(self.observed.values())))))
+        return Counter([*sizes, row if row in sizes else row // 2]).most_common(1)[0][0]
 
     def _check_vectors(self) -> None:
         n = self.size

@@ -149,7 +149,7 @@ def test_frames_without_a_meaning(changes: dict[str, Any], message: str) -> None
         ),
         ({"mass": csr_array(EYE)}, "mass: csr_array is no list of terms"),
         ({"mass": [(csr_array(EYE), 1.0)]}, "mass: factor csr_array is not allowed"),
-        ({"mass": [("m", 1.0)]}, r"mass: an array has shape \(\); all must be \(1, 1\)"),
+        ({"mass": [("m", 1.0)]}, r"mass: an array has shape \(\); all must be \(2, 2\)"),
         ({"observed": EYE}, "observed by name, as {'q1': row}"),
         ({"stiffness": [("x", EYE)]}, "stiffness: factor 'x' is no parameter; known are m, k, z"),
         ({"stiffness": [(np.nan, EYE)]}, "stiffness: factor nan is not allowed"),

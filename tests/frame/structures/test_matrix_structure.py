@@ -120,3 +120,10 @@ def test_motions_that_may_grow_are_warned_of(kind: str, least: str) -> None:
 def test_a_structure_at_rest_is_refused(model: Any) -> None:
     with pytest.raises(ValueError, match=r"nothing moves the structure: .*; give q0 or v0"):
         envelope(model, {"E": Triangular(4.8, 5, 5.2)}, duration=0.2, step=0.1)
+
+
+def test_the_odd_one_among_arrays_is_named() -> None:
+    with pytest.raises(
+        ValueError, match=r"mass: an array has shape \(3, 3\); all must be \(2, 2\)"
+    ):
+        replace(MATRIX, mass=[(1.0, np.eye(3))])
