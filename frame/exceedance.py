@@ -4,20 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
+from alphacut.frame.calculus.numbers import require_count
+from alphacut.frame.checks.admissible import require_motion
 from alphacut.frame.checks.between_nodes import stray
 from alphacut.frame.dynamics.flow import Flow, LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Envelope
+from alphacut.frame.outputs import output_unit
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy.counted import counted
 from alphacut.fuzzy.progress_bar import Progress, told
 from alphacut.fuzzy.sets.given import positive
 
@@ -27,7 +32,17 @@ LOOKED_AT = 4
 """Fuzzy points, and draws of each, whose motion between nodes is looked at."""
 
 
-@dataclass(frozen=True, eq=False)
+class Distribution(Protocol):
+    """A frozen distribution of `scipy.stats`."""
+
+    def rvs(self, *, size: int, random_state: np.random.Generator) -> Array:
+        """Values drawn from it, shape (size,)."""
+
+
+Sampler = Callable[[np.random.Generator, int], Array] | Distribution
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class FuzzyPeaks:
     """Largest magnitude of each output over time, as intervals by level.
 
@@ -39,6 +54,7 @@ class FuzzyPeaks:
             guaranteed, by its own error; shape (A, m). None where the envelope has no estimate.
         below: The part of it that the lower ends may lie too high by: a peak over time is no less
             than one at the nodes, so steps between them have none; shape (A, m), or None.
+        outputs: Their names, shape (m,).
     """
 
     alpha: Array
@@ -46,6 +62,18 @@ class FuzzyPeaks:
     upper: Array
     error: Array | None = None
     below: Array | None = None
+    outputs: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """A line for each output: its peak at the lowest level, and the error of that."""
+        lines = [f"fuzzy peaks on {counted(len(self.alpha), 'level')}"]
+        for k, (low, high) in enumerate(zip(self.lower[0], self.upper[0], strict=True)):
+            name = self.outputs[k] if self.outputs else f"output {k}"
+            unit = f" {output_unit(name)}" if self.outputs else ""
+            error = "not estimated" if self.error is None else f"{self.error[0, k]:.2g}{unit}"
+            cut = f"{low:.6g} … {high:.6g}{unit} at α = {self.alpha[0]:g}"
+            lines.append(f"  {name}: {cut}, error {error}")
+        return "\n".join(lines)
 
 
 def peaks(envelope: Envelope) -> FuzzyPeaks:
@@ -58,11 +86,12 @@ def peaks(envelope: Envelope) -> FuzzyPeaks:
     least = np.maximum(np.maximum(envelope.lower, -envelope.upper), 0.0)
     upper, lower = size.max(1), least.max(1)
     if envelope.between is None:
-        return FuzzyPeaks(envelope.alpha, lower, upper)
+        return FuzzyPeaks(envelope.alpha, lower, upper, outputs=envelope.outputs)
     own = 0.0 if envelope.inner_lower is not None or envelope.error is None else envelope.error
     above = within_steps(size + own, envelope.between).max(1) - upper
     below = lower - np.maximum(least - own, 0.0).max(1)
-    return FuzzyPeaks(envelope.alpha, lower, upper, np.maximum(above, below), below)
+    error = np.maximum(above, below)
+    return FuzzyPeaks(envelope.alpha, lower, upper, error, below, envelope.outputs)
 
 
 def within_steps(size: Array, between: Array) -> Array:
@@ -128,7 +157,7 @@ class FuzzyProbability:
 def exceedance(
     system: LinearSystem | LagrangianSystem,
     inputs: Mapping[str, FuzzyNumber],
-    random: Mapping[str, Callable[[np.random.Generator, int], Array]],
+    random: Mapping[str, Sampler],
     *,
     limit: float,
     duration: float,
@@ -151,7 +180,7 @@ def exceedance(
             rule.
         inputs: Fuzzy parameters.
         random: Random parameters by name, each a sampler (generator, count) to values of shape
-            (count,).
+            (count,), or a frozen distribution of `scipy.stats`.
         limit: Magnitude of the output that must not be exceeded, in its unit.
         duration: Length of the simulation, in s.
         step: Distance of nodes, in s.
@@ -163,9 +192,17 @@ def exceedance(
         progress: As for `envelope`.
 
     Raises:
-        ValueError: A parameter is both fuzzy and random, or the limit is not positive.
+        ValueError: A parameter is both fuzzy and random, the limit is not positive, there is no
+            such output, or a random parameter gives no `samples` numbers, or such as have no
+            meaning.
+
+    Warns:
+        UserWarning: As `envelope`, of motions that may grow without end or hardly move.
     """
-    name = output if isinstance(output, str) else system.outputs[output]
+    try:
+        name = output if isinstance(output, str) else system.outputs[output]
+    except (IndexError, TypeError):
+        name = str(output)  # which is refused as others that are none
     return exceedances(
         system,
         inputs,
@@ -188,7 +225,7 @@ ANY = "any of them"
 def exceedances(
     system: LinearSystem | LagrangianSystem,
     inputs: Mapping[str, FuzzyNumber],
-    random: Mapping[str, Callable[[np.random.Generator, int], Array]],
+    random: Mapping[str, Sampler],
     *,
     limits: Mapping[str, float],
     duration: float,
@@ -211,14 +248,16 @@ def exceedances(
         ValueError: A parameter is both fuzzy and random, or a limit is not positive.
     """
     sizes, columns = _limits_of(system, limits, set(inputs) & set(random))
+    require_count("samples", samples, 1)
+    require_count("spread", spread, 1)
     rng = rng or np.random.default_rng(0)
     cuts = boxes(inputs, alpha)
-    draws = (
-        np.column_stack([sampler(rng, samples) for sampler in random.values()])
-        if random
-        else np.zeros((1, 0))
-    )
+    drawn = [_drawn(name, random[name], rng, samples) for name in random]
+    draws = np.column_stack(drawn) if random else np.zeros((1, 0))
     flow = _flow(system, (*cuts.names, *random), duration, step)
+    if not isinstance(system, LagrangianSystem):
+        middle = np.tile(cuts.modal, (len(draws), 1))
+        require_motion(system, flow.names, np.hstack([middle, draws]), duration)
     tried = [_tried(cuts, level, spread) for level in range(len(cuts.alpha))]
     total = sum(map(len, tried))
     found: list[Array] = []
@@ -243,6 +282,24 @@ def exceedances(
         parts = peak.max(-1), more.max(-1)
         each.append(_probability(*parts, of, 1.0, random=bool(random), alpha=cuts.alpha))
     return dict(zip((*limits, ANY), each, strict=False))
+
+
+def _drawn(name: str, given: Sampler, rng: np.random.Generator, samples: int) -> Array:
+    """Values of a random parameter, shape (samples,)."""
+    try:
+        draw = given if callable(given) else lambda rng, n: given.rvs(size=n, random_state=rng)
+        values = np.asarray(draw(rng, samples), float)
+    except (TypeError, AttributeError) as failure:
+        raise ValueError(
+            f"exceedance: random {name!r} is {given!r}; it must be a function of a generator and a"
+            f" count, or a frozen distribution such as scipy.stats.norm(100, 8) ({failure})"
+        ) from None
+    if values.shape != (samples,) or not np.isfinite(values).all():
+        raise ValueError(
+            f"exceedance: random {name!r} gives values of shape {values.shape}; they must be"
+            f" {samples} finite numbers, one for each sample"
+        )
+    return values
 
 
 def _limits_of(

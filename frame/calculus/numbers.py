@@ -38,3 +38,11 @@ def require_numbers(name: str, values: object, unit: str) -> None:
         require_number(name, value, unit)
         if not np.isfinite(value):
             raise ValueError(f"{name}: {value:g} is not allowed; every value must be finite")
+
+
+def require_count(name: str, value: object, least: int | None) -> None:
+    """Refuses what is no whole number from `least` on; any value where that is None."""
+    if least is not None and (not isinstance(value, int | np.integer) or value < least):
+        raise ValueError(
+            f"{name}: {value!r} is not allowed; it must be a whole number, {least} or greater"
+        )

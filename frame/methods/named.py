@@ -7,7 +7,7 @@ from dataclasses import fields
 from typing import Protocol
 
 from alphacut.frame.boxes import UnitFlow
-from alphacut.frame.calculus.numbers import require_number
+from alphacut.frame.calculus.numbers import require_count, require_number
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.auto import Auto
 from alphacut.frame.methods.batch_graph_follower import BatchFollower
@@ -62,14 +62,5 @@ def named(name: str, options: Mapping[str, object]) -> Method:
             )
         if option != "exclude" and value is not None:
             require_number(f"option {option}", value, "")
-            _require_count(option, value)
+            require_count(f"option {option}", value, COUNTS.get(option))
     return METHODS[name](**options)
-
-
-def _require_count(name: str, value: object) -> None:
-    least = COUNTS.get(name)
-    if least is not None and (not isinstance(value, int) or value < least):
-        raise ValueError(
-            f"option {name}: {value!r} is not allowed; it must be a whole number, {least} or"
-            " greater"
-        )

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
+import scipy.stats
 
 from alphacut.frame import Accelerogram, LinearFlow, StoreyFrame, envelope
 from alphacut.frame.boxes import boxes
@@ -142,9 +146,64 @@ def test_an_exceedance_counts_peaks_between_nodes() -> None:
     assert below.error[0] == 0
 
 
-def test_an_exceedance_takes_the_name_of_an_output() -> None:
-    asked = {"limit": 0.2, "duration": 1, "step": 0.1, "alpha": (0,), "spread": 2}
-    named, counted = (exceedance(FRAME, INPUTS, {}, output=x, **asked) for x in ("drift2", 1))  # type: ignore[arg-type]
-    assert (named.curve_upper == counted.curve_upper).all()
-    with pytest.raises(ValueError, match="there is no output 'q9'; known are q1, drift2"):
-        exceedance(FRAME, INPUTS, {}, output="q9", **asked)  # type: ignore[arg-type]
+def asked(random: Any, **changed: Any) -> Any:
+    given = {"limit": 0.2, "duration": 1, "step": 0.1, "alpha": (0,), "spread": 2, "samples": 4}
+    return exceedance(FRAME, INPUTS, random, **{**given, **changed})
+
+
+@pytest.mark.parametrize(
+    ("random", "changed", "told"),
+    [
+        ({}, {"output": "q9"}, "there is no output 'q9'; known are q1, drift2, base_shear"),
+        ({}, {"output": 3}, "there is no output '3'; known are q1"),
+        ({}, {"output": [1]}, "there is no output"),
+        ({}, {"samples": "5"}, "samples: '5' is not allowed; it must be a whole number, 1 or"),
+        ({"m1": 100.0}, {}, r"random 'm1' is 100.0; .* such as scipy.stats.norm\(100, 8\)"),
+        (
+            {"m1": scipy.stats.norm},
+            {},
+            "'m1' is <.*; it must be a function of a generator and a count",
+        ),
+        (
+            {"m1": lambda count: [1.0]},
+            {},
+            "'m1' is <.*; it must be a function of a generator and a count",
+        ),
+        ({"m1": lambda rng, count: np.ones((count, 1))}, {}, r"of shape \(4, 1\); .* 4 finite num"),
+        ({"m1": lambda rng, count: np.full(count, np.nan)}, {}, "must be 4 finite numbers"),
+        ({"m1": scipy.stats.norm(0, 1)}, {}, "mass: the matrix is not positive definite at E"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused_in_a_line(random: Any, changed: Any, told: str) -> None:
+    with pytest.raises(ValueError, match=told) as refused:
+        asked(random, **changed)
+    assert "\n" not in str(refused.value)
+
+
+def test_distributions_and_names_of_outputs_are_taken() -> None:
+    frozen = asked({"v2_0": scipy.stats.norm(0.4, 0.1)}, output="drift2")
+    drawn = asked({"v2_0": lambda rng, count: rng.normal(0.4, 0.1, count)}, output=1)
+    assert (frozen.curve_upper == drawn.curve_upper).all()
+
+
+def test_draws_with_which_motions_may_grow_are_warned_of() -> None:
+    with pytest.warns(UserWarning, match="stiffness: the matrix has the negative eigenvalue"):
+        exceedance(
+            StoreyFrame((1.0,), stiffness=(9.0,), q0=(0.1,)),
+            {"m1": Interval(1, 2)},
+            {"k1": lambda rng, count: np.linspace(-1, 9, count)},
+            **{"limit": 1, "duration": 1, "step": 0.1, "alpha": (0,), "samples": 3},
+        )
+
+
+def test_peaks_show_themselves_in_lines_with_units_and_errors() -> None:
+    found = peaks(envelope(FRAME, INPUTS, duration=1, step=0.1, alpha=(0, 1)))
+    first, *lines = repr(found).splitlines()
+    assert first == "fuzzy peaks on 2 levels"
+    assert lines[1].startswith(
+        f"  drift2: {found.lower[0, 1]:.6g} … {found.upper[0, 1]:.6g} m at α"
+    )
+    assert found.error is not None
+    assert lines[1].endswith(f", error {found.error[0, 1]:.2g} m")
+    assert len(lines) == 3
+    assert repr(replace(found, error=None, outputs=())).endswith(" at α = 0, error not estimated")
