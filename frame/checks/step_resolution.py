@@ -12,7 +12,7 @@ LIMIT = 0.5
 """Largest ω_max h that passes without a warning."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class StepGuard:
     """Resolution of the fastest mode by a midpoint step.
 
@@ -62,6 +62,9 @@ class StepGuard:
             " and stiffness"
         )
         return f"{found}above {LIMIT:g} the fastest mode {lag}; {cure}"
+
+    def __repr__(self) -> str:
+        return self.message
 
 
 def guard(system: LinearSystem, step: float, duration: float) -> StepGuard:

@@ -33,7 +33,7 @@ GRAPHS = 1500
 """Trajectories that the Graph Follower takes on all levels, where its budget does not end it."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Candidate:
     """A way to the envelope, and what it is expected to cost.
 
@@ -56,6 +56,8 @@ class Candidate:
             else "not possible"
         )
         return f"{self.name}: {cost}; {self.words}"
+
+    __repr__ = __str__
 
 
 def candidates(flow: UnitFlow, budget: int) -> tuple[Candidate, ...]:

@@ -239,9 +239,8 @@ def _width(found: FuzzyResult, output: str | None) -> tuple[float, float]:
         raise ValueError(f"there are the outputs {', '.join(found.outputs)}; name one: output=")
     column = 0 if output is None else found.column(output)
     width = float(found.upper[0, column] - found.lower[0, column])
-    error = float(found.error[0, column]) if found.error.size else 0.0
-    proved = bool(found.proved[0, column]) if found.proved.size else False
-    return width, 2 * error if error or proved else INNER * width
+    error, proved = float(found.error[0, column]), bool(found.proved[0, column])
+    return width, 2 * error if error > 0 or proved else INNER * width
 
 
 def _between(low: float, high: float) -> FuzzyNumber:

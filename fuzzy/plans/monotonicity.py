@@ -230,6 +230,7 @@ def verified(result: FuzzyResult, memo: Memo, effects: Effects) -> FuzzyResult:
     return replace(
         every,
         proved=proved,
+        error=np.where(proved, 0.0, every.error),
         given=memo.known.words,
         runs=result.runs,
         verification_runs=spent,

@@ -25,7 +25,6 @@ from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.claimed import Claimed
 from alphacut.fuzzy.sets.numbers import Array, Mask, PiecewiseLinear
 from alphacut.fuzzy.sets.stepwise import Stepwise, outer_steps
-from alphacut.fuzzy.surrogates.response_surface import ResponseSurface
 
 if TYPE_CHECKING:
     import xarray
@@ -33,6 +32,13 @@ if TYPE_CHECKING:
 
 
 _ROWS = 25  # that are printed, a level each
+
+
+def _crisp(domain: Domain) -> Mask:
+    """Levels whose cut is one point, shape (levels,)."""
+    lower, upper = domain.boxes
+    crisp: Mask = (lower == upper).all(axis=1)
+    return crisp
 
 
 def _shown(value: float) -> str:
@@ -55,7 +61,8 @@ class FuzzyResult:
         plan: Name of the plan.
         runs: Samples of the model that the bounds took.
         verification_runs: Samples spent on verifying the plan's assumption, counted apart.
-        error: Estimated error of the bounds, shape (levels, outputs); zero where attained.
+        error: Estimated error of the bounds, shape (levels, outputs); NaN where nothing estimates
+            it, 0 where there is none: of crisp cuts, and of proved bounds that are attained.
         proved: Where the true range is proved to lie inside the bounds, shape (levels, outputs).
         enforced: Where nesting had to be enforced, shape (levels, outputs).
         given: Facts that the proof rests on and nobody proved, one sentence each.
@@ -122,7 +129,7 @@ class FuzzyResult:
             base=Nature.INNER,
             plan=plan,
             runs=len(points),
-            error=np.zeros(lowest.shape),
+            error=np.where(_crisp(domain)[:, None], 0.0, np.full(lowest.shape, np.nan)),
             proved=np.zeros(lowest.shape, bool),
             enforced=enforced,
             points=points,
@@ -134,6 +141,7 @@ class FuzzyResult:
     ) -> FuzzyResult:
         """The same bounds, proved where `holds`, shape (levels, outputs), and samples agree."""
         proved = holds(self)
+        sound = proved & ~self.enforced.any(axis=0)
         refuted = [
             self.outputs[column] for column in np.flatnonzero((proved & self.enforced).any(axis=0))
         ]
@@ -143,7 +151,8 @@ class FuzzyResult:
         )
         return replace(
             self,
-            proved=self.proved | (proved & ~self.enforced.any(axis=0)),
+            proved=self.proved | sound,
+            error=np.where(sound, 0.0, self.error),
             given=given,
             notes=(*self.notes, *notes),
         )
@@ -157,7 +166,9 @@ class FuzzyResult:
             for i, against in found.items()
         )
         kept = self.proved & ~np.isin(np.arange(len(self.outputs)), list(found))
-        return replace(self, proved=kept, notes=(*self.notes, *notes)) if found else self
+        error = np.where(self.proved & ~kept & (self.error == 0), np.nan, self.error)
+        more = (*self.notes, *notes)
+        return replace(self, proved=kept, error=error, notes=more) if found else self
 
     def __str__(self) -> str:
         """Bounds of the first outputs, a line for each level, with nature and cost."""
@@ -165,6 +176,7 @@ class FuzzyResult:
         runs = f"{self.runs} runs"
         if self.verification_runs:
             runs += f" and {self.verification_runs} more that looked for what they missed"
+        runs += "; their error is not estimated" if np.isnan(self.error).any() else ""
         lines = [f"{self.nature} bounds{given} by the plan {self.plan}, {runs}"]
         for column, name in enumerate(self.outputs[: self._printed]):
             cuts = zip(self.domain.alpha, self.lower[:, column], self.upper[:, column], strict=True)
@@ -315,10 +327,6 @@ class FuzzyResult:
             return outer_steps(self.alpha, lower, upper)
         return PiecewiseLinear(tuple(self.alpha), tuple(lower), tuple(upper))
 
-    def surface(self, output: str = "y") -> ResponseSurface:
-        """Response surface of one output through the samples of the model."""
-        return ResponseSurface.fit(self.points, self.values.array[:, [self.column(output)]])
-
     def charged(self, *, calls: int, reused: int, seconds: float) -> FuzzyResult:
         """The same result with what it cost."""
         return replace(self, calls=calls, reused=reused, seconds=seconds)
@@ -326,8 +334,8 @@ class FuzzyResult:
     def to_csv(self, path: str | Path) -> None:
         """Write a CSV file with a row for each output and level.
 
-        Its columns are output, alpha, lower, upper, error, then for each input where the bounds are
-        reached: `NAME at lower`, `NAME at upper`.
+        Its columns are output, alpha, lower, upper, error (empty where it is not estimated), then
+        for each input where the bounds are reached: `NAME at lower`, `NAME at upper`.
 
         Args:
             path: The file; one that is there is replaced.
@@ -338,15 +346,19 @@ class FuzzyResult:
         places = [f"{name} at {end}" for end in ("lower", "upper") for name in self.inputs]
         tables = self.lower[..., None], self.upper[..., None], self.error[..., None]
         numbers = np.concatenate([*tables, self.lower_at, self.upper_at], axis=2)
+        cells = np.where(np.isnan(numbers), "", numbers.astype(object))
         rows = (
-            (name, alpha, *numbers[level, column].tolist())
+            (name, alpha, *cells[level, column])
             for column, name in enumerate(self.outputs)
             for level, alpha in enumerate(self.domain.alpha)
         )
         write_csv(path, ("output", "alpha", "lower", "upper", "error", *places), rows)
 
     def to_dataset(self) -> xarray.Dataset:
-        """Bounds over (alpha, output), where they are reached over (alpha, output, parameter)."""
+        """Bounds over (alpha, output), where they are reached over (alpha, output, parameter).
+
+        Their `error` is NaN where it is not estimated.
+        """
         import xarray
 
         names = {"lower": 2, "upper": 2, "error": 2, "lower_at": 3, "upper_at": 3}

@@ -5,10 +5,17 @@ import csv
 import numpy as np
 import pytest
 
-from alphacut.frame import Envelope, StoreyFrame, envelope
+from alphacut.frame import Envelope, StoreyFrame, envelope, guard, plan
 from alphacut.fuzzy import (
+    Crisp,
+    Extended,
+    General,
     Interval,
+    Known,
+    MonteCarlo,
+    Optimisation,
     Reduced,
+    Signed,
     Triangular,
     decide,
     explain,
@@ -23,7 +30,6 @@ from alphacut.fuzzy.plans.interval_quasi_monte_carlo import IntervalResponse
 from alphacut.fuzzy.random_response import RandomResponse
 from alphacut.fuzzy.samples.model import Values
 from alphacut.fuzzy.samples.result import FuzzyResult
-from alphacut.fuzzy.surrogates.response_surface import ResponseSurface
 from alphacut.rve.image.bounds import StiffnessBounds
 from alphacut.rve.image.random_threshold import ThresholdResponse
 from alphacut.rve.result import Homogenised, StressCurve
@@ -68,6 +74,14 @@ def test_what_is_found_shows_itself_as_lines_and_as_a_table(name):
     assert page.startswith("<table>")
 
 
+def test_a_plan_of_an_envelope_and_a_guard_show_themselves_in_a_line_each():
+    frame = StoreyFrame(masses=[2e4], lengths=[3.0], modulus=25e9, second_moment=1e-6, q0=[0.01])
+    (first, *_) = plan(frame, {"E": Interval(24e9, 26e9)}, duration=0.4, step=0.2)
+    assert repr((first,)) == f"({first},)"
+    assert str(first).startswith(f"{first.name}: ")
+    assert repr(guard(frame, 0.2, 0.4)) == guard(frame, 0.2, 0.4).message
+
+
 def test_a_number_from_data_says_its_claim_and_its_widest_cut():
     number = from_data([1.0, 2.0, 3.0], "median", bounds=(0, 9))
     assert f"{[number]}" == "[Claimed(median: 0 … 9 at α = 0)]"
@@ -92,6 +106,40 @@ def test_bounds_go_into_a_csv_file_with_all_digits_and_where_they_are_reached(tm
         assert float(row["y at upper"]) == found.upper_at[level, column, 1]
     found.to_csv(str(tmp_path / "found.csv"))
     assert [path.name for path in tmp_path.iterdir()] == ["found.csv"]
+
+
+PLANS = (Reduced(), General(), Extended(), Signed(), MonteCarlo(9), Optimisation())
+
+
+@pytest.mark.parametrize("way", PLANS, ids=lambda way: type(way).__name__)
+def test_an_error_that_nothing_estimates_is_told_as_such(way, tmp_path):
+    inputs = {"x": Triangular(0, 1, 2), "y": Triangular(1, 2, 4)}
+    found = propagate(product, inputs, way, alpha=[0, 1])
+    assert np.isnan(found.error[0, 0])
+    assert found.error[1, 0] == 0  # of one point
+    assert str(found).splitlines()[0].endswith("; their error is not estimated")
+    assert "not estimated" in found._repr_html_()
+    found.to_csv(tmp_path / "found.csv")
+    assert [row["error"] for row in table(tmp_path / "found.csv")] == ["", "0.0"]
+    assert np.isnan(found.to_dataset().error[0, 0])
+
+
+def test_an_error_is_known_where_bounds_are_proved_and_attained_or_inputs_are_crisp():
+    for way in PLANS[:4]:
+        known = Known(signs={"x": 1, "y": 1})
+        found = propagate(product, X, way, alpha=[0, 1], known=known)
+        assert found.error.tolist() == [[0], [0]]
+        assert "error" not in str(found)
+    crisp = propagate(product, {"x": Crisp(2), "y": 3}, General(), alpha=[0, 1])
+    assert not crisp.error.any()
+    wrong = Known(monotone=("x", "y"))
+    refuted = propagate(lambda x, y: (x - 1) ** 2 + y, X, Reduced(), alpha=[0, 1], known=wrong)
+    assert np.isnan(refuted.error[0, 0])
+
+
+def test_gains_of_bounds_without_an_error_are_told_apart_by_a_share_of_the_width():
+    found = measure_next(product, X, Reduced())
+    assert found.error == pytest.approx(2 * 0.02 * found.width)
 
 
 def test_an_envelope_goes_into_a_csv_file_with_its_units(tmp_path):
@@ -133,7 +181,7 @@ def test_results_with_arrays_are_compared_and_hashed_as_objects():
     assert found == found
     assert found != again
     assert len({found, again}) == 2
-    for kind in (FuzzyResult, Values, ResponseSurface, RandomResponse, IntervalResponse):
+    for kind in (FuzzyResult, Values, RandomResponse, IntervalResponse):
         assert kind.__eq__ is object.__eq__
     for kind in (Envelope, Homogenised, StressCurve, StiffnessBounds, ThresholdResponse):
         assert kind.__eq__ is object.__eq__

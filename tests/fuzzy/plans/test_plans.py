@@ -324,7 +324,7 @@ def test_a_campaign_beyond_memory_is_refused_before_it_starts():
 def test_a_result_prints_a_line_for_each_level_and_what_they_are_worth():
     found = propagate(lambda a: 2 * a, {"a": Triangular(1, 2, 4)}, General(), alpha=[0.0, 0.5, 1.0])
     assert str(found).splitlines() == [
-        f"inner bounds by the plan general, {found.runs} runs",
+        f"inner bounds by the plan general, {found.runs} runs; their error is not estimated",
         "y, α = 0: 2 … 8",
         "y, α = 0.5: 3 … 6",
         "y, α = 1: 4 … 4",
