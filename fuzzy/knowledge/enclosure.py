@@ -16,11 +16,11 @@ import numpy as np
 
 from alphacut.fuzzy.knowledge.interval_arithmetic import Pair
 from alphacut.fuzzy.knowledge.trace import Trace, asks_for_types, path, same_path
-from alphacut.fuzzy.knowledge.tracer import Tracer
+from alphacut.fuzzy.knowledge.tracer import KNOWN, Tracer
 from alphacut.fuzzy.sets.numbers import Array
 
 Function = Callable[..., object]
-_CURE = "write it in arithmetic and numpy's functions"
+_CURE = f"write it in arithmetic and numpy's {', '.join(sorted(KNOWN))} and clip, without branches"
 
 
 class Enclosure(NamedTuple):

@@ -159,8 +159,7 @@ class Tracer:
     ) -> Any:
         """Let numpy's functions take tracers, alone or beside arrays, entry by entry."""
         if method != "__call__" or options or ufunc.__name__ not in KNOWN:
-            names = ", ".join(sorted(KNOWN))
-            self._trace.refuse(f"numpy.{ufunc.__name__} has no enclosure; there are {names}")
+            self._trace.refuse(f"numpy.{ufunc.__name__} has no enclosure")
         function = KNOWN[ufunc.__name__]
         if any(map(_is_array, inputs)):
             return np.frompyfunc(function, ufunc.nin, 1)(
@@ -276,6 +275,7 @@ KNOWN: dict[str, Callable[..., Tracer]] = {
     "exp": lambda a: a._chain("exp", interval.exponential, interval.exponential),
     "exp2": lambda a: 2.0**a,
     "log": lambda a: a._chain("log", interval.logarithm, interval.reciprocal),
+    "hypot": lambda a, b: KNOWN["sqrt"](a**2 + a._operand(b) ** 2).greatest(abs(a)),
     "sqrt": lambda a: a._chain(
         "sqrt",
         interval.root,

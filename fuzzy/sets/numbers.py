@@ -7,6 +7,7 @@ import math
 from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -110,10 +111,11 @@ class FuzzyNumber(ABC):
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: object) -> object:
         """NumPy's signs act as the number's own; its functions are refused with what does them."""
         if method == "__call__" and len(inputs) == 2:
-            return ufunc(*map(_boxed, inputs))
+            with suppress(AttributeError):  # of functions that are no sign, such as numpy.hypot
+                return ufunc(*map(_boxed, inputs))
         raise TypeError(
-            f"numpy.{ufunc.__name__} takes no fuzzy number; take"
-            f" fuzzy.apply(numpy.{ufunc.__name__}, number) or propagate"
+            f"numpy.{ufunc.__name__} takes no fuzzy number; take propagate or, of one number,"
+            f" fuzzy.apply(numpy.{ufunc.__name__}, number)"
         )
 
     def __add__(self, other: FuzzyNumber | float) -> FuzzyNumber:

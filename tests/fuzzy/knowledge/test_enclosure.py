@@ -210,6 +210,7 @@ def test_a_constant_is_enclosed():
 TABLE = functools.cache(lambda: np.linspace(0, 1, 3))
 ADDED = {
     "abs": lambda x, y: abs(x - y) + np.fabs(x * y),
+    "hypot": lambda x, y: np.hypot(x, y - 0.3) + np.hypot(x, 2.0),
     "greatest": lambda x, y: np.maximum(x, y**2) + np.minimum(x, 0.3) * np.maximum(0.2, y),
     "clip": lambda x, y: np.clip(x * y, -0.5, 0.7) + y,
     "exponentials": lambda x, y: 2**x + 0.5 ** (x * y) + np.exp2(y) + (4 + y) ** (x / 2),
@@ -256,6 +257,24 @@ def test_branch_and_bound_proves_kinks():
     values = function(x, y)
     assert result.lower[0, 0] <= values.min() <= result.lower[0, 0] + 2e-3
     assert result.upper[0, 0] - 2e-3 <= values.max() <= result.upper[0, 0]
+
+
+def test_a_length_through_zero_is_bounded():
+    def function(x, y):
+        return np.hypot(x, y)
+
+    inputs = {"x": Interval(-3, 2), "y": Interval(-4, 1)}
+    result = propagate(function, inputs, BranchAndBound(function), alpha=(0.0,))
+    assert result.lower[0, 0] == pytest.approx(0, abs=1e-2)
+    assert result.upper[0, 0] == pytest.approx(5)
+
+
+@pytest.mark.parametrize("function", [lambda x: np.where(x > 0, x, 1), lambda x: np.floor(x)])
+def test_a_refusal_names_the_functions_that_are_enclosed(function):
+    with pytest.raises(
+        ValueError, match=r"has no enclosure\); .* numpy's absolute, .*, hypot, .* and"
+    ):
+        Enclosed(function, ("x",))(LOW, HIGH)
 
 
 def test_a_reciprocal_across_zero_has_no_bounds():
