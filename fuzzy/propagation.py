@@ -76,8 +76,8 @@ def propagate(
         store: Where samples are kept (or its path): a campaign that was stopped, however, resumes
             from it.
         identity: What a sample depends on besides its inputs (case, options, versions), as JSON can
-            say it; a store needs it. The store
-            cannot see that the function changed: say so here, by a version or a hash of its text.
+            say it; a store needs it, not empty. The store cannot see that the function changed: say
+            so here, by a version or a hash of its text.
         spot_check: Time for running samples from the store again, as a share of the time that they
             took: the modal point (or another, if it is not stored) in any case, then random ones.
             The store is refused if one gives something else; 0 runs none. Without store and budget

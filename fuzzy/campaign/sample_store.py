@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, nullcontext
 from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
@@ -233,19 +233,19 @@ def shelf(
     if store is None:
         yield None
         return
-    if identity is None:
+    if identity is None or identity == {}:
+        said = "without an identity" if identity is None else "with an empty identity"
         raise ValueError(
-            "a store comes without an identity; say what a sample depends on besides its inputs:"
-            " identity={...}"
+            f"a store comes {said}; say what a sample depends on besides its inputs, as"
+            " identity={'version': 1}"
         )
     if not isinstance(identity, Mapping):
         raise ValueError(
             f"the identity is {identity!r}; it must map names to what a sample depends on, as"
             " identity={'version': 1}"
         )
-    if isinstance(store, Store):
-        with closing(Shelf(store, identity, names)) as samples:
-            yield samples
-        return
-    with Store(store) as opened, closing(Shelf(opened, identity, names)) as samples:
+    with (
+        nullcontext(store) if isinstance(store, Store) else Store(store) as opened,
+        closing(Shelf(opened, identity, names)) as samples,
+    ):
         yield samples

@@ -36,6 +36,7 @@ from alphacut.fuzzy.decisions.measure_next import measure_next
 X = {"x": Triangular(0, 1, 2), "y": Triangular(1, 2, 4)}
 PLANS = (
     *(Automatic(), Chebyshev(), Extended(), General(), Metamodel(), Optimisation()),
+    *(Optimisation(way, budget=50) for way in ("shgo", "direct")),
     *(QuasiMonteCarlo(8), Reduced(), Signed()),
 )
 

@@ -235,13 +235,13 @@ def test_store_gives_the_bits_back(tmp_path):
         lambda a: {"v": values * (a + 0.1)},
         {"a": Interval(0, 1 / 3)},
         store=tmp_path / "s.db",
-        identity={},
+        identity={"v": 1},
     )
     second = propagate(
         lambda a: 1 / 0,
         {"a": Interval(0, 1 / 3)},
         store=tmp_path / "s.db",
-        identity={},
+        identity={"v": 1},
         spot_check=0,
     )
     assert (first.values.array == second.values.array).all()
@@ -310,6 +310,11 @@ def test_foreign_and_future_files_are_refused(tmp_path):
 def test_identity_is_needed_and_must_be_plain(tmp_path):
     with pytest.raises(ValueError, match="store comes without an identity"):
         propagate(model, INPUTS, store=tmp_path / "s.db")
+    with pytest.raises(
+        ValueError, match=r"with an empty identity; say .*, as identity=\{'version'"
+    ):
+        propagate(model, INPUTS, store=tmp_path / "s.db", identity={})
+    assert not (tmp_path / "s.db").exists()
     with pytest.raises(ValueError, match="holds what JSON does not"):
         propagate(model, INPUTS, store=tmp_path / "s.db", identity={"mesh": object()})
     assert canonical({"b": 1, "a": [1.5]}) == canonical({"a": [1.5], "b": 1})
