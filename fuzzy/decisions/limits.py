@@ -91,11 +91,12 @@ class Decision:
     """How possible and how necessary it is that a limit is exceeded.
 
     Args:
-        possibility: Proved lower and upper bound.
-        necessity: Proved lower and upper bound.
-        margin: Limit less output at each level, lower and upper ends by output, over `alpha`.
-        alpha: Levels of the margin.
-        witness: The most possible inputs found that exceed a limit; None where none do.
+        possibility: Proved lower and upper bound, two numbers from 0 to 1.
+        necessity: Proved lower and upper bound, likewise.
+        margin: Limit less output by name of the output, in its unit: lower and upper ends, two
+            arrays of shape (levels,).
+        alpha: Levels of the margin, rising.
+        witness: The most possible inputs found that exceed a limit, by name; None where none do.
         claim: What the cuts of the inputs claim.
         runs: Samples of the function; its enclosures over boxes are not among them.
     """

@@ -53,16 +53,18 @@ class FuzzyResult:
     Args:
         domain: Inputs and levels.
         outputs: Name of each output column.
-        lower: Lower ends, shape (levels, outputs).
-        upper: Upper ends, shape (levels, outputs).
-        lower_at: Inputs that reach the lower ends, shape (levels, outputs, inputs).
-        upper_at: Inputs that reach the upper ends, shape (levels, outputs, inputs).
+        lower: Lower ends, in the function's own units, shape (levels, outputs).
+        upper: Upper ends, in the same units, shape (levels, outputs).
+        lower_at: Inputs that reach the lower ends, in their own units, shape (levels, outputs,
+            inputs).
+        upper_at: Inputs that reach the upper ends, likewise, shape (levels, outputs, inputs).
         base: What the bounds are worth where they are not proved.
         plan: Name of the plan.
         runs: Samples of the model that the bounds took.
         verification_runs: Samples spent on verifying the plan's assumption, counted apart.
-        error: Estimated error of the bounds, shape (levels, outputs); NaN where nothing estimates
-            it, 0 where there is none: of crisp cuts, and of proved bounds that are attained.
+        error: Estimated error of the bounds, in their units, shape (levels, outputs); NaN where
+            nothing estimates it, 0 where there is none: of crisp cuts, and of proved bounds that
+            are attained.
         proved: Where the true range is proved to lie inside the bounds, shape (levels, outputs).
         enforced: Where nesting had to be enforced, shape (levels, outputs).
         given: Facts that the proof rests on and nobody proved, one sentence each.
@@ -71,7 +73,7 @@ class FuzzyResult:
         values: Outputs at `points`.
         calls: Calls of the model, each for the samples that share a set-up.
         reused: Of all `samples`, those taken from a store instead of being run.
-        seconds: Wall time of the whole propagation.
+        seconds: Wall time of the whole propagation, in s.
     """
 
     domain: Domain
@@ -187,7 +189,7 @@ class FuzzyResult:
         hidden = len(self.outputs) - self._printed
         what = f"… and {counted(hidden, 'output')} more: bounds(NAME) has them"
         more = [what] if hidden > 0 else []
-        said = [str(self.claim)] if str(self.claim) else []
+        said = [self.claim.brief] if self.claim.brief else []
         return "\n".join([*lines, *more, *self.notes, *said])
 
     __repr__ = __str__

@@ -7,6 +7,7 @@ import re
 import shlex
 import subprocess
 import sys
+from dataclasses import fields
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,6 +18,8 @@ from alphacut.commands.parser import split_petsc
 from alphacut.docs import library_page
 from alphacut.docs.case_format import commands, page
 from alphacut.entry import COMMANDS, main, parsers
+from alphacut.fuzzy.decisions.limits import Decision
+from alphacut.fuzzy.samples.result import FuzzyResult
 
 ROOT = Path(__file__).parents[3]
 PAGES = sorted(
@@ -203,6 +206,9 @@ def test_generated_pages_are_up_to_date():
     assert text == library_page.page(), (
         "make it anew: python -m alphacut.docs.library_page > docs/library.md"
     )
+    for kind in (FuzzyResult, Decision):
+        rows = text.partition(f"\n## {kind.__name__}\n")[2].partition("\n## ")[0]
+        assert {one.name for one in fields(kind)} <= set(re.findall(r"^\| `(\w+)`", rows, re.M))
     names = [
         name
         for package in ("fuzzy", "stochastic", "rve", "frame")

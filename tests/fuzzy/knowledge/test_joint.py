@@ -74,9 +74,9 @@ def test_a_proved_result_rests_on_no_bounds_and_interactions_are_a_condition():
 
 
 def test_opinions_are_said_to_be_opinions():
-    assert str(propagate(total, {"x": Triangular(0, 1, 2), "y": 1})).endswith(
-        "x: opinions, so that no level has a probability"
-    )
+    found = propagate(total, {"x": Triangular(0, 1, 2), "y": 1})
+    assert str(found).endswith("\nopinions: x")
+    assert str(found.claim) == "x: opinions, so that no level has a probability"
     assert not JointClaim.of({"x": Crisp(1.0)}).opinions
 
 

@@ -328,7 +328,7 @@ def test_a_result_prints_a_line_for_each_level_and_what_they_are_worth():
         "y, α = 0: 2 … 8",
         "y, α = 0.5: 3 … 6",
         "y, α = 1: 4 … 4",
-        "a: opinions, so that no level has a probability",
+        "opinions: a",
     ]
 
 
