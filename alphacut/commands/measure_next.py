@@ -17,6 +17,7 @@ from alphacut.io.progress import progress
 from alphacut.io.units import engineering
 from alphacut.stages.material.modulus import stand_in
 from alphacut.stages.measure_next import advice_document, measure_next
+from alphacut.stages.vibration.studies import fixed_line
 
 ABOUT = "by how much the answer narrows if an input is known better"
 KEYS = {
@@ -51,8 +52,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         raise BadInput(problems)
     handed = common.given_modulus(options.modulus) or stand_in(case)
     with progress("Measure next", quiet=options.quiet) as tick:
-        name, found = measure_next(case, handed, options.output, tick)
-    document = advice_document(found, name)
+        name, found, fixed = measure_next(case, handed, options.output, tick)
+    document = advice_document(found, name, fixed)
     if folder is not None:
         from alphacut.figures.questions import gains
         from alphacut.figures.style import save, style
@@ -62,5 +63,6 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         write_text(folder / "measure-next.json", as_json(document, indent=2))
     width = engineering(found.width, document["unit"], digits=6)
     of = "width" if name == "E" else "mean width over time"
-    common.answer(options, document, out, f"{name}: {found.told(f'{of} {width}')}\n")
+    lines = [f"{name}: {found.told(f'{of} {width}')}", *fixed_line(fixed)]
+    common.answer(options, document, out, "".join(f"{line}\n" for line in lines))
     return 0

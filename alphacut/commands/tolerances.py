@@ -13,6 +13,7 @@ from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import progress
 from alphacut.io.units import engineering
 from alphacut.stages.material.modulus import stand_in
+from alphacut.stages.vibration.studies import fixed_line
 from alphacut.stages.vibration.tolerances import Tolerances, input_unit, tolerances
 
 ABOUT = "largest supports for which the limit provably holds"
@@ -70,6 +71,7 @@ def text(found: Tolerances) -> str:
         f"  {name}: {' … '.join(engineering(end, input_unit(name), digits=6) for end in ends)}"
         for name, ends in found.intervals.items()
     ]
+    lines += fixed_line(found.fixed)
     if scale.witness is None:
         return "\n".join([*lines, f"nothing unsafe found up to {scale.safe:.4g}", ""])
     point = ", ".join(

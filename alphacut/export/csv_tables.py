@@ -11,8 +11,8 @@ from alphacut.frame.outputs import output_unit
 from alphacut.io.files import write_text
 from alphacut.io.netcdf import read_dataset
 from alphacut.stages.material.modulus import listed
+from alphacut.stages.vibration import exceedance as outcomes
 from alphacut.stages.vibration.decision import decision_document
-from alphacut.stages.vibration.exceedance import each_event, exceedances_document
 
 if TYPE_CHECKING:
     import xarray
@@ -48,6 +48,9 @@ def write_tables(results: Path, folder: Path) -> list[Path]:
             tables[f"{path.stem}-attained"] = _csv(dataset[["lower_at", "upper_at"]])
             peaks += _peaks(path.stem.removeprefix("envelope_"), dataset)
             continue
+        if "curve" in dataset:
+            tables[f"{path.stem}-curve"] = _curves(dataset)
+            dataset = dataset.drop_vars([x for x in ("curve", "limits") if x in dataset])
         for axes, part in _by_axes(dataset):
             own = [] if axes == _widest(dataset) else ["by", *axes]
             tables["-".join([path.stem, *own])] = _csv(part)
@@ -79,7 +82,10 @@ def with_worth(dataset: xarray.Dataset) -> xarray.Dataset:
         own = json.loads(facts["document"])["cuts"] if "document" in facts else {}
         told["nature"] = "alpha", own.get("nature", [facts["nature"]] * count)
     if "exceedance" in dataset:
-        rows, several = each_event(exceedances_document(dataset)), "event" in dataset.dims
+        rows, several = (
+            outcomes.each_event(outcomes.exceedances_document(dataset)),
+            "event" in dataset.dims,
+        )
         over, rows = ("event", rows) if several else ("alpha", rows * count)
         told |= {x: (over, [row[key] for row in rows]) for x, key in OF_EVENT.items()}
     if "error_name" in dataset.dims:
@@ -119,6 +125,21 @@ def _peaks(study: str, dataset: xarray.Dataset) -> Iterator[str]:
             cells = ["" if x is None else repr(x) for x in numbers]
             nature = str(dataset.attrs.get("nature", ""))
             yield ",".join([study, name, output_unit(name), *cells, nature])
+
+
+def _curves(dataset: xarray.Dataset) -> str:
+    """Probabilities over the limit, a row for each event, limit and level."""
+    rows = ["place,output,limit,unit,alpha,lower,upper,nature"]
+    for one in outcomes.events(dataset):
+        output, nature = one.attrs["output"], one.attrs.get("nature", "")
+        curve = one["curve"].transpose("limit", "alpha", "bound").values
+        for place, limit in enumerate(one["limit"].values):
+            for level, ends in zip(one["alpha"].values, curve[place], strict=True):
+                numbers = [repr(float(x)) for x in (level, *ends)]
+                unit = outcomes.event_unit(output)
+                row = [str(place), output, repr(float(limit)), unit, *numbers, f'"{nature}"']
+                rows.append(",".join(row))
+    return "\n".join([*rows, ""])
 
 
 def _by_axes(dataset: xarray.Dataset) -> Iterator[tuple[tuple[str, ...], xarray.Dataset]]:

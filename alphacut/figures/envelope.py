@@ -9,17 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.figures.style import (
-    BLUE,
-    GREY,
-    INK,
-    ORANGE,
-    PURPLE,
-    alpha_legend,
-    colours,
-    figure,
-    prefix_axis,
-)
+from alphacut.figures import style as look
 from alphacut.io.units import MINUS, axis_prefix, engineering
 from alphacut.stages.vibration.exceedance import event_unit, event_words
 from alphacut.stages.vibration.studies import Study
@@ -68,39 +58,39 @@ def envelope(dataset: xarray.Dataset, output: str, study: Study) -> Figure:
     """Nested bands between lower and upper envelope, and the modal trajectory."""
     from alphacut.frame.outputs import output_unit, output_words
 
-    drawn, axes = figure(7.2, 3.6)
+    drawn, axes = look.figure(7.2, 3.6)
     shown = dataset.sel(output=output)
     alpha, time = dataset["alpha"].values, dataset["time"].values
-    for level, shade in enumerate(colours(alpha)[:-1]):
+    for level, shade in enumerate(look.colours(alpha)[:-1]):
         band = shown.isel(alpha=level)
         axes.fill_between(time, band["lower"], band["upper"], color=shade, lw=0)
     for side in ("lower", "upper"):
-        axes.plot(time, shown.isel(alpha=-1)[side], color=INK, lw=0.8)
-        axes.plot(time, shown.isel(alpha=0)[side], color=INK, lw=0.3)
+        axes.plot(time, shown.isel(alpha=-1)[side], color=look.INK, lw=0.8)
+        axes.plot(time, shown.isel(alpha=0)[side], color=look.INK, lw=0.3)
     axes.set_xlabel("time t, s")
-    prefix_axis(axes, output, output_unit(output))
+    look.prefix_axis(axes, output, output_unit(output))
     axes.set_xlim(time[0], time[-1])
     # letters mean something else in a pendulum
     known = WORDS if output.startswith(("q", "v", "a", "drift", "shear", "base", "roof")) else {}
     words = ", ".join(known.get(name, name) for name in study.task.fuzzy)
     title = f"{output_words(output)}; fuzzy: {words}"
     axes.set_title(fill(title, 84), loc="left", fontsize=10)
-    alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    look.alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return drawn
 
 
 def exceedance(found: xarray.Dataset) -> Figure:
     """The probability between its bounds on each level, and the case's limit."""
-    drawn, axes = figure(7.2, 3.6)
+    drawn, axes = look.figure(7.2, 3.6)
     alpha, limits = found["alpha"].values, found["limit"].values
     curves = found["curve"].transpose("alpha", "bound", "limit").values
-    for (lower, upper), shade in zip(curves[:-1], colours(alpha), strict=False):
+    for (lower, upper), shade in zip(curves[:-1], look.colours(alpha), strict=False):
         axes.fill_between(limits, lower, upper, color=shade, lw=0)
-    axes.plot(limits, curves[-1].T, color=INK, lw=1)
+    axes.plot(limits, curves[-1].T, color=look.INK, lw=1)
     output = str(found.attrs["output"])
     limit, unit = float(found.attrs["limit"]), event_unit(output)
     if limit <= 2 * limits[-1]:
-        axes.axvline(limit, color=ORANGE, lw=1.2, ls="--")
+        axes.axvline(limit, color=look.ORANGE, lw=1.2, ls="--")
     axes.set_title(
         (
             f"limit {engineering(limit, unit)} (dashed)"
@@ -116,17 +106,17 @@ def exceedance(found: xarray.Dataset) -> Figure:
     axes.set_xlabel(words.replace("^2", "²"))
     axes.set_ylabel("probability of exceeding it")
     axes.set_ylim(0, 1.02)
-    alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    look.alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return drawn
 
 
 def record(ground: Accelerogram) -> Figure:
     """The record as it is read, its peak marked."""
-    drawn, axes = figure(7.2, 2.4)
+    drawn, axes = look.figure(7.2, 2.4)
     acceleration = np.asarray(ground.acceleration)
     time, peak = np.arange(len(acceleration)) * ground.step, int(np.abs(acceleration).argmax())
-    axes.plot(time, acceleration, color=INK, lw=0.7)
-    axes.plot(time[peak], acceleration[peak], "o", color=ORANGE, ms=4)
+    axes.plot(time, acceleration, color=look.INK, lw=0.7)
+    axes.plot(time[peak], acceleration[peak], "o", color=look.ORANGE, ms=4)
     strongest = engineering(float(acceleration[peak]), "m/s^2", digits=3).replace("^2", "²")
     axes.set_title(f"peak {strongest} at {time[peak]:.4g} s", loc="left", fontsize=10)
     axes.set_xlabel("time t, s")
@@ -136,7 +126,9 @@ def record(ground: Accelerogram) -> Figure:
 
 
 SPECTRUM_LINES = [
-    (colour, dash) for dash in ("-", "--", ":") for colour in (INK, BLUE, ORANGE, PURPLE, GREY)
+    (colour, dash)
+    for dash in ("-", "--", ":")
+    for colour in (look.INK, look.BLUE, look.ORANGE, look.PURPLE, look.GREY)
 ]
 
 
@@ -153,7 +145,7 @@ def spectrum(found: Sequence[ResponseSpectrum]) -> Figure:
         axes.set_xscale("log")
         axes.set_ylim(bottom=0)
         axes.grid(visible=True, which="both", alpha=0.3)
-        prefix_axis(axes, label, si)
+        look.prefix_axis(axes, label, si)
     ticks = [t for t in TICKS if found[0].periods[0] <= t <= found[0].periods[-1]]
     below.set_xticks(ticks, [f"{t:g}" for t in ticks])
     below.minorticks_off()

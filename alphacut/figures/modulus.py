@@ -7,18 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.case.case import Case
-from alphacut.figures.style import (
-    BLUE,
-    HEIGHT,
-    INK,
-    ORANGE,
-    WIDTH,
-    alpha_legend,
-    colours,
-    figure,
-    membership_axes,
-    shaded_cuts,
-)
+from alphacut.figures import style as look
 from alphacut.stages.material.cell import GPA
 from alphacut.stages.material.modulus import AVERAGE
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -47,9 +36,9 @@ def levels_of_samples(dataset: xarray.Dataset) -> Array:
 
 def stress_curves(dataset: xarray.Dataset) -> Figure:
     """Fig. 16: homogenised stress 11 over θ, a curve for each fuzzy sample."""
-    drawn, axes = figure()
+    drawn, axes = look.figure()
     alpha = dataset["alpha"].values
-    shades = dict(zip(alpha, colours(alpha), strict=True))
+    shades = dict(zip(alpha, look.colours(alpha), strict=True))
     membership = levels_of_samples(dataset)
     theta, curves = dataset["theta"].values, dataset["curve11"].values / GPA
     for sample in np.argsort(membership, kind="stable"):
@@ -57,31 +46,33 @@ def stress_curves(dataset: xarray.Dataset) -> Figure:
         axes.plot(
             theta,
             curves[sample],
-            color=INK if top else shades[membership[sample]],
+            color=look.INK if top else shades[membership[sample]],
             lw=1.2 if top else 0.7,
         )
     axes.set_xlabel("θ")
     axes.set_ylabel("homogenised σ$_{11}$(ε$^{(1)}$), GPa")
     axes.set_title(f"{len(curves)} samples", loc="left", fontsize=10)
-    alpha_legend(axes, alpha, loc="upper left" if curves[0, -1] > curves[0, 0] else "lower left")
+    look.alpha_legend(
+        axes, alpha, loc="upper left" if curves[0, -1] > curves[0, 0] else "lower left"
+    )
     return drawn
 
 
 def mean_stress(dataset: xarray.Dataset) -> Figure:
     """Fig. 17: mean homogenised stress 11 of every sample, rearranged into α-cuts."""
-    drawn, axes = figure()
+    drawn, axes = look.figure()
     alpha, ends = dataset["alpha"].values, dataset["s11"].values / GPA
     axes.plot(
         dataset["s11_sample"].values / GPA,
         levels_of_samples(dataset),
         ".",
-        color=ORANGE,
+        color=look.ORANGE,
         ms=4,
         zorder=4,
         label="samples",
     )
-    shaded_cuts(axes, alpha, ends[:, 0], ends[:, 1])
-    membership_axes(axes, "mean homogenised σ$_{11}$(ε$^{(1)}$), GPa")
+    look.shaded_cuts(axes, alpha, ends[:, 0], ends[:, 1])
+    look.membership_axes(axes, "mean homogenised σ$_{11}$(ε$^{(1)}$), GPa")
     axes.legend(loc="upper left")
     return drawn
 
@@ -91,19 +82,19 @@ def fuzzy_modulus(dataset: xarray.Dataset, case: Case) -> Figure:
     import matplotlib.pyplot as plt
 
     drawn, (axes, below) = plt.subplots(
-        2, 1, figsize=(WIDTH, 1.75 * HEIGHT), height_ratios=(3, 2), layout="constrained"
+        2, 1, figsize=(look.WIDTH, 1.75 * look.HEIGHT), height_ratios=(3, 2), layout="constrained"
     )
     alpha, ends = dataset["alpha"].values, dataset["E"].values / GPA
-    shaded_cuts(axes, alpha, ends[:, 0], ends[:, 1])
+    look.shaded_cuts(axes, alpha, ends[:, 0], ends[:, 1])
     quoted = case.frame.modulus if case.sections.frame else None
     if quoted is not None:
         left, right = zip(*(quoted.cut(level) for level in (0.0, 1.0)), strict=True)
         x = np.array([*left, *right[::-1]]) / GPA
-        axes.plot(x, [0, 1, 1, 0], color=BLUE, lw=1.2, ls="--", label="quoted in the case")
-        axes.plot([], [], color=INK, marker="o", ms=3.5, lw=1.2, label="computed here")
+        axes.plot(x, [0, 1, 1, 0], color=look.BLUE, lw=1.2, ls="--", label="quoted in the case")
+        axes.plot([], [], color=look.INK, marker="o", ms=3.5, lw=1.2, label="computed here")
         axes.legend(loc="upper left")
     meaning = dataset.attrs.get("average", dataset.attrs.get("particles", "cylinders"))
-    membership_axes(axes, f"effective Young's modulus E ({AVERAGE[meaning]}), GPa")
-    shaded_cuts(below, alpha, *dataset["nu"].transpose("bound", "alpha").values)
-    membership_axes(below, "effective Poisson's ratio ν of the same")
+    look.membership_axes(axes, f"effective Young's modulus E ({AVERAGE[meaning]}), GPa")
+    look.shaded_cuts(below, alpha, *dataset["nu"].transpose("bound", "alpha").values)
+    look.membership_axes(below, "effective Poisson's ratio ν of the same")
     return drawn

@@ -6,16 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.figures.style import (
-    BLUE,
-    INK,
-    ORANGE,
-    PURPLE,
-    WIDTH,
-    alpha_legend,
-    colours,
-    membership_axes,
-)
+from alphacut.figures import style as look
 from alphacut.stages.material.cell import GPA
 
 if TYPE_CHECKING:
@@ -23,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MARKS = (BLUE, ORANGE, PURPLE, INK)
+MARKS = (look.BLUE, look.ORANGE, look.PURPLE, look.INK)
 UNSEEN = 0.004  # width of a band, in probability, that hides behind the line of the highest level
 NAMES = {"s11": "σ$_{11}$(ε$^{(1)}$)", "s12": "σ$_{12}$(ε$^{(2)}$)"}
 
@@ -32,12 +23,12 @@ def response(found: xarray.Dataset) -> Figure:
     """p-boxes to the left, membership functions of the quantiles to the right."""
     import matplotlib.pyplot as plt
 
-    drawn, (left, right) = plt.subplots(1, 2, figsize=(1.5 * WIDTH, 3.6))
+    drawn, (left, right) = plt.subplots(1, 2, figsize=(1.5 * look.WIDTH, 3.6))
     name = NAMES[str(found.attrs["quantity"])]
     boxes(left, found)
     left.set_xlabel(f"homogenised {name}, GPa")
     quantiles(right, found)
-    membership_axes(right, f"quantile of {name}, GPa")
+    look.membership_axes(right, f"quantile of {name}, GPa")
     right.legend(
         title="probability",
         fontsize=8,
@@ -52,18 +43,18 @@ def boxes(axes: Axes, found: xarray.Dataset) -> None:
     """The distribution function between its bounds, each level inside the one below."""
     alpha, stress = found["alpha"].values, found["stress"].values / GPA
     cdf = found["cdf"].transpose("alpha", "bound", "stress").values
-    for (lower, upper), shade in zip(cdf[:-1], colours(alpha), strict=False):
+    for (lower, upper), shade in zip(cdf[:-1], look.colours(alpha), strict=False):
         axes.fill_between(stress, lower, upper, color=shade, lw=0)
-    axes.plot(stress, cdf[-1].T, color=INK, lw=1)
+    axes.plot(stress, cdf[-1].T, color=look.INK, lw=1)
     if "exceedance" in found:
         limit = found["exceedance"].attrs["limit"] / GPA
-        axes.axvline(limit, color=ORANGE, lw=1.2, ls="--")
+        axes.axvline(limit, color=look.ORANGE, lw=1.2, ls="--")
         place = axes.get_xaxis_transform()  # above the axes, where no curve goes
         axes.text(
             limit,
             1.02,
             f"limit {limit:g} GPa",
-            color=ORANGE,
+            color=look.ORANGE,
             fontsize=8,
             ha="center",
             transform=place,
@@ -71,7 +62,7 @@ def boxes(axes: Axes, found: xarray.Dataset) -> None:
     axes.set_ylabel("distribution function")
     axes.set_ylim(0, 1)
     seen = np.append((cdf[:-1, 1] - cdf[:-1, 0]).max(axis=1) > UNSEEN, True)
-    alpha_legend(axes, alpha[seen], loc="lower right", bbox_to_anchor=(1.0, 0.12))
+    look.alpha_legend(axes, alpha[seen], loc="lower right", bbox_to_anchor=(1.0, 0.12))
 
 
 def quantiles(axes: Axes, found: xarray.Dataset) -> None:

@@ -107,8 +107,8 @@ def peaks(summary: Document) -> Markup:
     )
     limit = Markup("")
     if "exceedance" in summary:
-        lines = map(outcomes.sentence, outcomes.each_event(summary["exceedance"]))
-        limit = paragraphs(*(f"P{line[1:].rstrip()}." for line in lines))
+        lines = outcomes.sentences(summary["exceedance"]).splitlines()
+        limit = paragraphs(*(f"{line[0].upper()}{line[1:]}." for line in lines))
     study = next(iter(summary["envelopes"].values()))
     low, high = (f"at α = {study['alpha'][level]:g}" for level in (0, -1))
     head = (

@@ -6,7 +6,7 @@ structure it is the width of E. Where the cell gives E, its own inputs stand in 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +21,7 @@ from alphacut.io.progress import Tick
 from alphacut.stages.material.campaign import Campaign, campaign
 from alphacut.stages.vibration.envelope_task import EnvelopeTask, task_of
 from alphacut.stages.vibration.structure import Structure, structure
+from alphacut.stages.vibration.studies import left_out
 from alphacut.stages.vibration.update import learned
 from alphacut.stages.width_shares import cell_range, thinned
 
@@ -30,8 +31,8 @@ TOLERANCE = 1e-3
 
 def measure_next(
     case: Case, handed: FuzzyNumber | None, output: str | None = None, progress: Tick | None = None
-) -> tuple[str, Advice]:
-    """The answer's name, and gains of knowing each input of [envelope] fuzzy better.
+) -> tuple[str, Advice, list[str]]:
+    """The answer's name, gains of knowing each input of [envelope] fuzzy better, and those fixed.
 
     Args:
         case: With a linear structure and [envelope], or with a cell.
@@ -46,7 +47,7 @@ def measure_next(
     if "envelope" not in case.stages:
         if cell is None or output is not None:
             raise BadInput(Problem("stages", "there is no envelope", allowed="stage envelope"))
-        return "E", _advice(lambda x: _moduli(cell, x), cell.inputs, 0.0, progress)
+        return "E", _advice(lambda x: _moduli(cell, x), cell.inputs, 0.0, progress), []
     wanted, task = structure(case, handed or _expected(case, cell)), task_of(case)
     if case.sections.update is not None:
         wanted = learned(case, wanted).structure
@@ -64,7 +65,7 @@ def measure_next(
         return _width(wanted, task, own, column)
 
     found = _advice(answer, {**of_cell, **inputs}, task.alpha[0], progress)
-    return wanted.outputs[column], found
+    return wanted.outputs[column], found, left_out(wanted, [task])
 
 
 def _expected(case: Case, cell: Campaign | None) -> FuzzyNumber | None:
@@ -138,7 +139,7 @@ def _advice(
     return advice(told, numbers, alpha=alpha)
 
 
-def advice_document(found: Advice, answer: str) -> Document:
+def advice_document(found: Advice, answer: str, fixed: Sequence[str] = ()) -> Document:
     """The advice as it is printed with ``--json``; gains as shares of the width."""
     from alphacut.frame.outputs import output_unit
 
@@ -158,5 +159,6 @@ def advice_document(found: Advice, answer: str) -> Document:
             }
             for x in found.gains
         },
+        "fixed": list(fixed),
         "note": found.note,
     }

@@ -12,17 +12,10 @@ from alphacut.case.names import named_inputs
 from alphacut.fuzzy import FuzzyNumber, Interval, Triangular
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.units import STANDARD_GRAVITY, engineering
+from alphacut.stages import plausible
 from alphacut.stages.image.reading import expected_modulus, study_of
 from alphacut.stages.material import modulus, spheres
 from alphacut.stages.material.cell import cell_phases, modal_parts, phases_of
-from alphacut.stages.plausible import (
-    DESIGNED,
-    odd,
-    record_key,
-    strangers,
-    unlikely,
-    unlikely_material,
-)
 from alphacut.stages.vibration import update
 from alphacut.stages.vibration.envelope_task import task_of
 from alphacut.stages.vibration.provable import estimated_reason, too_many, unproved_reason
@@ -41,13 +34,8 @@ MANY_STEPS = 50_000  # fewer cost little
 class Readiness:
     """Remarks on a case that can be run.
 
-    Args:
-        warnings: Remarks.
-        rough: A step or tolerance that is coarse beside the motion: refused where it is meant
-            strictly.
-        period: First natural period at the modal values, in s; None where no linear structure
-            vibrates.
-        structure: The structure, with the modulus expected; None where none vibrates.
+    What is `rough` beside the motion is refused where it is meant strictly. The first natural
+    period (s) and the structure are those at the modal values, None where none vibrates.
     """
 
     warnings: tuple[str, ...] = ()
@@ -77,7 +65,7 @@ def ready(case: Case) -> Readiness:
             what = f"there is nothing to compute: {given} stands in for stage modulus"
             cure = 'stages = ["modulus", "envelope"], with a structure'
             raise BadInput(Problem("stages", what, str(list(case.stages)), cure))
-        return Readiness((*shape(case), *dense, *unlikely_material(case)))
+        return Readiness((*shape(case), *dense, *plausible.unlikely_material(case)))
     if problems := list(lacking(case)):
         raise BadInput(problems)
     wanted = structure(case, stand_in or expected(case))
@@ -88,12 +76,16 @@ def ready(case: Case) -> Readiness:
     update.require_readable(case, wanted.frame)
     period = first_period(wanted)
     ground = None if wanted.linear is None else wanted.linear.ground
-    slips = (*unlikely(case, ground, period), *odd(case), *strangers(case))
+    slips = (
+        *plausible.unlikely(case, ground, period),
+        *plausible.odd(case),
+        *plausible.strangers(case),
+    )
     found = coarse(case, wanted, slips)
     remarks = (
         *shape(case),
         *dense,
-        *unlikely_material(case),
+        *plausible.unlikely_material(case),
         *outlasted(case, ground),
         *slips,
         *fine_steps(case, wanted),
@@ -243,8 +235,8 @@ def outlasted(case: Case, record: Accelerogram | None) -> Iterator[str]:
     longest = max(study.task.duration for study in studies(case))
     if longest > end + 0.5 * record.step:
         yield (
-            f"{record_key(case)}: the record ends at {end:g} s and the simulation at {longest:g} s;"
-            " afterwards the ground is at rest"
+            f"{plausible.record_key(case)}: the record ends at {end:g} s and the simulation at"
+            f" {longest:g} s; afterwards the ground is at rest"
         )
 
 
@@ -264,12 +256,13 @@ def motion(case: Case, wanted: Structure) -> Iterator[str]:
             " enough, and faster"
         )
     if (ground := None if wanted.linear is None else wanted.linear.ground) is not None:
-        values, peak = ground.acceleration, float(abs(ground.acceleration).max())
+        key, values = plausible.record_key(case), ground.acceleration
+        peak = float(abs(values).max())
         end = "" if values[-1] == 0 else f"; ends on {values[-1]:.3g} m/s², then the ground rests"
-        if not DESIGNED[0] <= peak <= DESIGNED[1]:
+        if not plausible.DESIGNED[0] <= peak <= plausible.DESIGNED[1]:
             end += f"; {'weak' if peak < 1 else 'strong'}: is the unit in its header right?"
         yield (
-            f"{record_key(case)}: {len(values)} values every {ground.step:g} s, to"
+            f"{key}: {len(values)} values every {ground.step:g} s, to"
             f" {(len(values) - 1) * ground.step:g} s, peak {peak:.3g} m/s²"
             f" ({peak / float(STANDARD_GRAVITY):.3g} g){end}"
         )

@@ -230,7 +230,7 @@ def between_nodes(found: Document, name: str) -> str:
 def worth(found: Document, name: str) -> str:
     """Nature of a verdict, the nodes that it is on, and what it says of the motion between."""
     one, nodes = found["limits"][name], f"at nodes every {found['step']:g} s"
-    of = "" if one["verdict"] in ("safe", "unsafe") else "degrees "
+    of = "" if one["verdict"] in ("safe", "unsafe") else "both degrees "
     return f"{of}{one['nature']}, {nodes}: {between_nodes(found, name)}"
 
 
@@ -270,7 +270,10 @@ def sentences(found: Document) -> Iterator[str]:
             of = f"|{margin.get('output', name)}| > {engineering(margin['limit'], margin['unit'])}"
         (a, b), (c, d) = one["possibility"], one["necessity"]
         degrees = f"possible to {degree(a, b)}, necessary to {degree(c, d)}"
-        yield f"{of}: {degrees}: {one['verdict']} ({worth(found, name)}){why(one)}"
+        if one["verdict"] in ("safe", "unsafe"):
+            yield f"{of}: {degrees}: {one['verdict']} ({worth(found, name)})"
+        else:
+            yield f"{of}: {one['verdict']}{why(one)}. It is {degrees}, {worth(found, name)}"
     for name, margin in found["margins"].items():
         ends = (engineering(float(margin[side][0]), margin["unit"], digits=3) for side in SIDES)
         level = f"α = {found['alpha'][0]:g}"

@@ -316,8 +316,14 @@ def each_event(found: Document) -> list[Document]:
 
 
 def sentences(found: Document) -> str:
-    """A line for each event."""
-    return "".join(map(sentence, each_event(found)))
+    """A line for each event, and one on what all of them are worth where there are several."""
+    each = each_event(found)
+    if len(each) == 1:
+        return sentence(each[0], f"inner bounds{nodes(each[0])}{scatter(each[0])}")
+    lines = "".join(sentence(one, own_errors(one)) for one in each)
+    at = f" at nodes every {each[0]['step']:g} s" if "step" in each[0] else ""
+    drawn = f", from {draws(each[0])}" if each[0]["random"] else ""
+    return f"{lines}these are inner bounds{at}{drawn}; what is added between nodes is estimated\n"
 
 
 def exceedance_document(found: xarray.Dataset) -> Document:
@@ -331,24 +337,32 @@ def exceedance_document(found: xarray.Dataset) -> Document:
     }
 
 
-def sentence(found: Document) -> str:
-    """The probability in words, at the lowest and the highest level."""
+def sentence(found: Document, worth: str) -> str:
+    """The probability in words, at the lowest and the highest level, and what it is worth."""
     levels = dict.fromkeys((0, len(found["alpha"]) - 1))
-    cuts = (f"{cut(found, k)} at α = {found['alpha'][k]:g}" for k in levels)
+    cuts = ", ".join(f"{cut(found, k)} at α = {found['alpha'][k]:g}" for k in levels)
     random = f" with random {found['random']}" if found["random"] else ""
-    drawn = (
-        f"{found['samples']} random draws at each fuzzy point tried"
-        if "samples" in found
-        else "random draws"
-    )
-    scatter = (
-        f": {drawn}; standard deviation up to {found['deviation']:.2g}" if found["random"] else ""
-    )
-    worth = f" (inner bounds{nodes(found)}{scatter})"
     limit = f" > {engineering(found['limit'], found['unit'])}"
-    return (
-        f"probability of {event_words(found['output'], limit)}{random}: {', '.join(cuts)}{worth}\n"
-    )
+    return f"probability of {event_words(found['output'], limit)}{random}: {cuts} ({worth})\n"
+
+
+def draws(found: Document) -> str:
+    """Words on the random draws."""
+    many = "samples" in found
+    return f"{found['samples']} random draws at each fuzzy point tried" if many else "random draws"
+
+
+def scatter(found: Document) -> str:
+    """Words on how far the probability scatters; empty where nothing is random."""
+    if not found["random"]:
+        return ""
+    return f": {draws(found)}; standard deviation up to {found['deviation']:.2g}"
+
+
+def own_errors(found: Document) -> str:
+    """What is added between nodes, and the scatter, of one of several events."""
+    more = [f"between nodes up to {found['between_nodes']:.2g} more"]
+    return ", ".join(more + [f"scatter {found['deviation']:.2g}"] * bool(found["random"]))
 
 
 def nodes(found: Document) -> str:

@@ -7,7 +7,7 @@ are scaled with the others, and the frame gets the range of E over them.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -20,7 +20,9 @@ from alphacut.io.files import Document
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
 from alphacut.stages.material.campaign import Campaign, campaign
+from alphacut.stages.vibration.envelope_task import task_of
 from alphacut.stages.vibration.structure import Structure, structure
+from alphacut.stages.vibration.studies import left_out
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
@@ -46,11 +48,7 @@ def input_unit(name: str) -> str:
 
 @dataclass(frozen=True)
 class Supports:
-    """Nominal values and supports of inputs.
-
-    Args:
-        numbers: Fuzzy numbers by name, in SI.
-    """
+    """Nominal values and supports of inputs: fuzzy numbers by name, in SI."""
 
     numbers: dict[str, FuzzyNumber]
 
@@ -73,12 +71,14 @@ class Tolerances:
         limits: Largest magnitude of each limited output, in SI.
         frame: Supports of the frame's parameters; without E where the cell gives it.
         cell: Supports of the cell's inputs; empty where the modulus is given.
+        fixed: Fuzzy inputs that are held fixed.
     """
 
     found: SafeScale
     limits: Mapping[str, float]
     frame: Supports
     cell: Supports
+    fixed: Sequence[str] = ()
 
     @property
     def intervals(self) -> dict[str, tuple[float, float]]:
@@ -104,6 +104,8 @@ class Tolerances:
             "unsafe_scale": None if np.isinf(found.unsafe) else found.unsafe,
             "gap": None if np.isinf(found.gap) else found.gap,
             "safe": {name: list(ends) for name, ends in self.intervals.items()},
+            "units": {name: input_unit(name) for name in (*self.intervals, *found.names)},
+            "fixed": list(self.fixed),
             "witness": witness,
             "witness_share": found.share,
             "nominal_share": found.nominal_share,
@@ -169,7 +171,8 @@ def tolerances(
     )
     if cell is not None and found.safe and "E" in inputs:
         found = _within_cell(found, cell, list(inputs).index("E"))
-    return Tolerances(found, limits, frame, Supports(dict(cell.inputs) if cell else {}))
+    fixed = left_out(wanted, [task_of(case)])
+    return Tolerances(found, limits, frame, Supports(dict(cell.inputs) if cell else {}), fixed)
 
 
 def _limited(wanted: Structure, outputs: tuple[str, ...], case: Case) -> StoreyFrame:

@@ -96,3 +96,11 @@ def test_a_pendulum_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     path = Path(__file__).parents[3] / "cases" / "pendulum.toml"
     assert main(["measure-next", str(path)]) == 2
     assert "linear structures" in capsys.readouterr().err
+
+
+def test_fuzzy_inputs_that_are_held_fixed_are_told(
+    case: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["measure-next", str(case), "--fuzzy", "v0"]) == 0
+    out = capfd.readouterr().out
+    assert out.endswith("fixed at the middle of the top cut, since no study names them: q1_0\n")

@@ -58,6 +58,7 @@ def test_the_safe_supports_are_told_and_a_witness(tmp_path, capfd):
     assert low == pytest.approx(25e9 - found["safe_scale"] * 3e9)
     assert high == pytest.approx(25e9 + found["safe_scale"] * 2e9)
     assert found["witness_share"] > 1
+    assert found["units"] == {"E": "Pa", "m1": "kg"}
 
 
 def test_safe_supports_are_printed_with_their_units(tmp_path, capfd):
@@ -85,3 +86,13 @@ def test_bad_input_is_told_in_one_line(more, text, message, tmp_path, capfd):
     error = capfd.readouterr().err
     assert re.search(message, error), error
     assert "Traceback" not in error
+
+
+def test_fuzzy_inputs_that_are_held_fixed_are_told(tmp_path, capfd):
+    path = written(tmp_path)
+    path.write_text(path.read_text(encoding="utf-8").replace('["E", "m1"]', '["E"]'))
+    assert main(["tolerances", str(path)]) == 0
+    fixed = "\nfixed at the middle of the top cut, since no study names them: m1\n"
+    assert fixed in capfd.readouterr().out
+    assert main(["tolerances", str(path), "--json", "-"]) == 0
+    assert json.loads(capfd.readouterr().out)["fixed"] == ["m1"]

@@ -143,6 +143,9 @@ def test_the_bounds_of_the_stated_nature_are_printed():
     at, ends = np.zeros((2, 2, 1, 1)), np.array([0.0, 1.0])
     found = Envelope(ends, ends, ("q1",), ("E",), low, high, at, at, "modal", "inner", 7, 0.1)
     assert "−200.0 mm      300.0 mm" in summary(found)
+    told = summary(found, np.array([0.25]))
+    assert "300.0 mm, least in motions tried 250.0 mm" in told
+    assert "…" not in told
     certified = replace(
         found,
         lower=low - 1e-3,

@@ -111,3 +111,20 @@ def test_numbers_carry_their_nature_error_and_limit(tmp_path):
     for row in table(tmp_path / "one", "exceedance", found):
         assert (row["output"], row["limit value"], row["limit unit"]) == ("q1", "0.04", "m")
         assert (row["nature"], row["more between nodes (estimated)"]) == ("inner: attained", "0.02")
+
+
+def test_a_row_of_a_curve_of_probabilities_says_of_which_limit_it_is(tmp_path):
+    axes = {"alpha": [0.0, 1.0], "bound": ["lower", "upper"], "event": ["q1", "a2"]}
+    ends = np.array([[[[0.5, 0.25, 0.0], [0.75, 0.5, 0.25]]] * 2] * 2)
+    limits = (("event", "place"), [[0.01, 0.02, 0.03], [1.0, 2.0, 3.0]])
+    own = {"output": ["q1", "a2"], "limit": [0.02, 2.0], "deviation": [0.0] * 2}
+    of = {f"of_{name}": ("event", x) for name, x in (own | {"between_nodes": [0.0] * 2}).items()}
+    curves = {"curve": (("event", "alpha", "bound", "place"), ends), "limits": limits, **of}
+    whole = {"exceedance": (("event", "alpha", "bound"), ends[..., 1]), **curves}
+    found = xarray.Dataset(whole, axes, {"nature": "inner: attained, at draws"})
+    assert len(table(tmp_path / "two", "exceedance", found)) == 8
+    with (tmp_path / "two" / "tables" / "exceedance-curve.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    told = ["2", "a2", "3.0", "m/s^2", "1.0", "0.0", "0.25", "inner: attained, at draws"]
+    assert len(rows) == 12
+    assert list(rows[-1].values()) == told

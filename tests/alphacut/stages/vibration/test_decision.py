@@ -283,3 +283,14 @@ def test_quick_keeps_one_level_alone(tmp_path: Path) -> None:
     case = load(str(path), ["envelope.alpha=[0]"])
     assert quick(case).envelope.alpha == (0.0,)
     assert quick(load(str(path), ["envelope.alpha=[0, 0.5, 1]"])).envelope.alpha == (0.0, 1.0)
+
+
+def test_an_undecided_limit_is_told_with_its_reason_before_its_degrees(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = written(tmp_path, [f"q1 <= {peak(1100)} m"])
+    assert main(["run", str(path), "--out", str(tmp_path / "out"), "--no-figures"]) == 0
+    why = "undecided, since some of the motions exceed it and some do not; narrower inputs decide"
+    told = capsys.readouterr().out
+    assert f"mm: {why}. It is possible to 0.4998" in told
+    assert ", both degrees guaranteed, at nodes every 0.001 s: the motion between" in told

@@ -258,9 +258,7 @@ def test_several_limits_in_one_run_are_what_each_is_alone(tmp_path, capfd):
     path.write_text(SIX.replace("LIMITS", json.dumps(told)), encoding="utf-8")
     out = tmp_path / "out"
     arguments = ["run", str(path), "--quiet", "--out", str(out)]
-    assert main([*arguments, "--set", "exceedance.random=k1", "--no-figures"]) == 0, (
-        capfd.readouterr().err
-    )
+    assert main([*arguments, "--set", "exceedance.random=k1", "--no-figures"]) == 0
     events = json.loads((out / "summary.json").read_text(encoding="utf-8"))["exceedance"]["events"]
     assert [event["output"] for event in events] == [*limits, "any of them"]
     wanted = structure(load(path), None)
@@ -281,9 +279,19 @@ def test_several_limits_in_one_run_are_what_each_is_alone(tmp_path, capfd):
     assert main(["tolerances", str(path), "--set", 'exceedance.limits=["drift1 <= 0.2 %"]']) == 0
 
 
+def test_what_all_probabilities_are_worth_is_told_once():
+    both = {"alpha": [0.0], "lower": [0.1], "upper": [0.2], "unit": "m", "samples": 20}
+    one = {**both, "step": 0.01, "limit": 1.0, "random": "E", "deviation": 0.1}
+    each = [one | {"output": f"q{k}", "between_nodes": k / 100} for k in (1, 2)]
+    told = outcomes.sentences({"events": each})
+    assert told.count("draws") == told.count("inner") == told.count("every 0.01 s") == 1
+    assert "[0.1, 0.2] at α = 0 (between nodes up to 0.02 more, scatter 0.1)\n" in told
+    assert "\nthese are inner bounds at nodes every 0.01 s, from 20 random draws at each" in told
+
+
 def test_a_probability_between_zero_and_one_is_called_undecided():
     words = {"output": "q1", "limit": 0.1, "unit": "m", "random": "", "alpha": [0.0, 1.0]}
-    told = outcomes.sentence({**words, "lower": [0.0, 0.0], "upper": [1.0, 0.4]})
+    told = outcomes.sentences({**words, "lower": [0.0, 0.0], "upper": [1.0, 0.4]})
     assert "undecided, [0, 1] at α = 0, [0, 0.4] at α = 1" in told
 
 
