@@ -34,6 +34,8 @@ Answer = Callable[[Mapping[str, FuzzyNumber]], tuple[float, float]]
 """From inputs to the width of the answer and its error."""
 INNER = 0.02
 """Share of a width that counts as its error where the bounds are attained ones without estimate."""
+ROUND_OFF = 1e-12
+"""The least share that does."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ class Advice:
     Args:
         gains: One for each fuzzy input.
         width: Width of the answer now.
-        error: Error of a difference of widths.
+        error: Error of a difference of any two widths: the sum of the two largest errors.
         alpha: The level.
         note: Why no input can be named; empty where one can.
     """
@@ -125,7 +127,7 @@ def advice(answer: Answer, inputs: Mapping[str, FuzzyNumber], *, alpha: float = 
     cuts = {name: number.cut(alpha) for name, number in inputs.items()}
     whole: dict[str, FuzzyNumber] = {name: _between(*cut) for name, cut in cuts.items()}
     width, error = answer(whole)
-    worst, gains = error, []
+    errors, gains, own = [error], [], {}
     for name, number in inputs.items():
         low, high = cuts[name]
         if low == high:
@@ -135,11 +137,13 @@ def advice(answer: Answer, inputs: Mapping[str, FuzzyNumber], *, alpha: float = 
             for share in (0.5, 0.0):
                 narrow = _between(at + share * (low - at), at + share * (high - at))
                 less, error = answer({**whole, name: narrow})
-                worst = max(worst, error)
+                errors.append(error)
                 lost.append(width - less)
+        own[name] = errors[-_ANSWERS]
         gains.append(Gain(name, lost[0], min(lost[0::2]), lost[1], min(lost[1::2])))
     gains.sort(key=lambda x: -x.half)
-    return Advice(tuple(gains), width, 2 * worst, alpha, _note(gains, width, 2 * worst))
+    note = _note(gains, width, errors[0], own)
+    return Advice(tuple(gains), width, sum(sorted(errors)[-2:]), alpha, note)
 
 
 def measure_next(
@@ -239,32 +243,42 @@ def _width(found: FuzzyResult, output: str | None) -> tuple[float, float]:
         raise ValueError(f"there are the outputs {', '.join(found.outputs)}; name one: output=")
     column = 0 if output is None else found.column(output)
     width = float(found.upper[0, column] - found.lower[0, column])
-    error, proved = float(found.error[0, column]), bool(found.proved[0, column])
-    return width, 2 * error if error > 0 or proved else INNER * width
+    error = float(found.error[0, column])
+    return width, INNER * width if np.isnan(error) else max(2 * error, ROUND_OFF * width)
 
 
 def _between(low: float, high: float) -> FuzzyNumber:
     return Interval(*Cut(low, high)) if high > low else Crisp(low)
 
 
-def _note(gains: list[Gain], width: float, error: float) -> str:
-    """Why no input can be named as the one to measure next."""
+def _note(gains: list[Gain], width: float, whole: float, own: Mapping[str, float]) -> str:
+    """Why no input can be named as the one to measure next.
+
+    Args:
+        gains: The gains, the largest first.
+        width: Width of the answer.
+        whole: Its error.
+        own: Error of the width with each input's cut halved about its modal value.
+    """
     if not gains:
         return "no input is fuzzy at this level: there is nothing to measure"
-    if not np.isfinite([width, error]).all():
+    first = gains[0]
+    error = whole + own[first.name]
+    if not np.isfinite([width, whole, *own.values()]).all():
         return "the width is not finite: nothing can be said"
-    share = 100 * error / width if width > 0 else 0.0
-    if gains[0].half <= error:
-        least = f"the error of a difference, {share:.3g} % of the width"
+    unit = 100 / width if width > 0 else 0.0
+    if first.half <= error:
+        least = f"the error of a difference, {unit * error:.3g} % of the width"
         other = (
             "the plan's error is too large to tell, take plan=Optimisation() or BranchAndBound()"
         )
         cure = other if error > width else "try measuring two of them"
         return f"no input can be named: no gain is above {least}; {cure}"
-    tied = [x.name for x in gains[1:] if gains[0].half - x.half <= error]
+    apart = {x.name: own[first.name] + own[x.name] for x in gains[1:]}
+    tied = [x.name for x in gains[1:] if first.half - x.half <= apart[x.name]]
     return (
-        f"{gains[0].name} cannot be told from {', '.join(tied)}: their gains differ by less than"
-        f" the error, {share:.3g} % of the width"
+        f"{first.name} cannot be told from {', '.join(tied)}: their gains differ by less than"
+        f" the error, {unit * max(apart[name] for name in tied):.3g} % of the width"
         if tied
         else ""
     )
