@@ -37,11 +37,11 @@ def summary(found: Microstructure | SphereMicrostructure) -> dict[str, object]:
         "rejected": {
             str(row): reason
             for section in found.sections
-            for row, reason in section.rejected.items()
+            for row, reason in section.read.rejected.items()
         },
         "area_fraction": float(np.mean([one.area_fraction for one in discs])),
         "area_fraction_of_cells": found.sample.area_fraction,
-        "area_fraction_of_image": found.sections[0].phase_fraction,
+        "area_fraction_of_image": found.sections[0].read.phase_fraction,
         "smallest_radius": float(radii.min()),
         "largest_radius": float(radii.max()),
         "cell_areas_sum_error": max(

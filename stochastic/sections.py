@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Executor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from alphacut.stochastic.errors import RefusedError
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
-from alphacut.stochastic.particles.circles_csv import CircleFile
+from alphacut.stochastic.particles.circles_csv import CircleFile, MeasuredCircles
 from alphacut.stochastic.particles.discs import Discs
 from alphacut.stochastic.particles.image import SectionImage
 from alphacut.stochastic.particles.packing import Packing, packing_seeds
@@ -28,18 +28,12 @@ class Section:
     Args:
         diagram: Apollonius cells.
         whole: Cells that count, and their weights.
-        rejected: What was left out of measured data: row or label to reason.
-        phase_fraction: Area fraction of the particles in the image that was read, if one was.
-        misfit: Share of the particles' pixels outside the circles that stand for them.
-        unevenness: Difference of the matrix's brightness over the image, a share of the contrast.
+        read: What was read of a file; nothing of a packing.
     """
 
     diagram: Apollonius
     whole: WholeCells
-    rejected: dict[int, str] = field(default_factory=dict)
-    phase_fraction: float | None = None
-    misfit: float = 0.0
-    unevenness: float = 0.0
+    read: MeasuredCircles
 
     @property
     def discs(self) -> Discs:
@@ -98,13 +92,7 @@ class Measured:
         self, seed: int, *, executor: Executor | None = None, progress: Progress | None = None
     ) -> list[Section]:
         """The section with its cells; `seed` and `executor` do nothing here."""
-        circles = self.file.read()
-        section = replace(
-            _section(circles.discs, circles.rejected),
-            phase_fraction=circles.phase_fraction,
-            misfit=circles.misfit,
-            unevenness=circles.unevenness,
-        )
+        section = _section(self.file.read())
         if progress:
             progress(1.0)
         return [section]
@@ -137,9 +125,9 @@ def reduced_radii(sections: list[Section]) -> AreaWeighted:
 
 
 def _packed(packing: Packing, seed: np.random.SeedSequence) -> Section:
-    return _section(packing.make(np.random.default_rng(seed)))
+    return _section(MeasuredCircles(packing.make(np.random.default_rng(seed))))
 
 
-def _section(discs: Discs, rejected: dict[int, str] | None = None) -> Section:
-    diagram = apollonius(discs)
-    return Section(diagram, whole_cells(diagram), rejected or {})
+def _section(read: MeasuredCircles) -> Section:
+    diagram = apollonius(read.discs)
+    return Section(diagram, whole_cells(diagram), read)

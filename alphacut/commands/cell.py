@@ -121,7 +121,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     ratio = cell.anisotropy(*cell.modal_parts(case), particles)
     found |= beside(case, result.modulus, result.poisson, ratio and ratio[0])
     if common.answer(options, found, out, summary(result)):
-        out.write(agreement(pair, difference, allowed_difference(case)))
+        out.write(agreement(pair, difference, case.modulus.tolerance))
         out.write(remark(ratio, choice.meaning) + text_of(case, found))
     return 0
 
@@ -153,11 +153,6 @@ def require_effect(options: argparse.Namespace, case: Case, models: Sequence[str
         require_choice(case, modulus=True, envelope=False)
 
 
-def allowed_difference(case: Case) -> float:
-    """The relative difference of E that ``--cross-check`` allows."""
-    return case.modulus.tolerance
-
-
 def compared(case: Case, choice: cell.CellChoice, pair: Sequence[str]) -> tuple[Homogenised, float]:
     """The first model's result, and its relative difference in E from the second's.
 
@@ -186,7 +181,7 @@ def compared(case: Case, choice: cell.CellChoice, pair: Sequence[str]) -> tuple[
         what = f"method auto takes {first.method} here, so both are one model"
         cure = f"auto with --exclude {first.method}, or two names of {', '.join(ORDER)}"
         raise BadInput(Problem("--cross-check", what, ",".join(pair), cure))
-    return first, cross_check([first], [second], tolerance=allowed_difference(case))
+    return first, cross_check([first], [second], tolerance=case.modulus.tolerance)
 
 
 def agreement(pair: Sequence[str], difference: float | None, allowed: float) -> str:

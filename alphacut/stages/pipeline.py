@@ -141,7 +141,7 @@ class Chain:
 
         self.stored("microstructure.nc", key, compute)
         return microstructure.with_radius(
-            self.case, microstructure.read_fragment(self.file("radius.toml"))
+            self.case, self.file("radius.toml").read_text(encoding="utf-8")
         )
 
     def modulus(self) -> xarray.Dataset:

@@ -16,6 +16,7 @@ from alphacut.stages import plausible
 from alphacut.stages.image.reading import expected_modulus, study_of
 from alphacut.stages.material import modulus, spheres
 from alphacut.stages.material.cell import cell_phases, modal_parts, phases_of
+from alphacut.stages.material.references import mean_share
 from alphacut.stages.vibration import update
 from alphacut.stages.vibration.envelope_task import task_of
 from alphacut.stages.vibration.provable import estimated_reason, too_many, unproved_reason
@@ -140,7 +141,7 @@ def shape(case: Case) -> Iterator[str]:
         phases = phases_of(values)
     else:
         radius, *both = modal_parts(case)
-        share, phases = spheres.area_share(radius), (both[0], both[1])
+        share, phases = mean_share(radius, "cylinders"), (both[0], both[1])
     if told := spheres.remark(case, share, *phases):
         yield told
 

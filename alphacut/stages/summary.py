@@ -13,18 +13,16 @@ import numpy as np
 from alphacut.case.case import Case
 from alphacut.io.files import Document
 from alphacut.io.provenance import FORMAT, command, versions
-from alphacut.rve.cell import Phase
 from alphacut.rve.spheres.result import volume_fraction
 from alphacut.stages.material import modulus, response, spheres
 from alphacut.stages.material.cell import GPA, modal_parts
-from alphacut.stages.material.references import beside
+from alphacut.stages.material.references import beside, mean_share
 from alphacut.stages.pipeline import Results
 from alphacut.stages.vibration import exceedance as outcomes
 from alphacut.stages.vibration.decision import decision_document
 from alphacut.stages.vibration.joint import joint_document
 from alphacut.stages.vibration.structure_words import structure_words
 from alphacut.stages.vibration.update import narrower
-from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
@@ -98,8 +96,8 @@ def material_numbers(results: Results) -> Document:
 def cell_numbers(results: Results, dataset: xarray.Dataset) -> Document:
     """The fuzzy modulus beside its references."""
     case = results.case
-    radius, *phases = _cell(results)
-    of_shape = spheres.remark(case, spheres.area_share(radius), *phases) or ""
+    radius, *phases = modal_parts(case)
+    of_shape = spheres.remark(case, mean_share(radius, "cylinders"), *phases) or ""
     numbers = {**modulus_numbers(dataset), "shape": of_shape}
     modal = float(numbers["modal_GPa"]) * GPA, float(numbers["nu"])
     low, high = (GPA * np.asarray(numbers["E_GPa"][side]) for side in ("lower", "upper"))
@@ -147,16 +145,11 @@ def fraction(results: Results) -> Document:
     from alphacut.stochastic import gauss_rule
 
     case = results.case
-    radius, _, _ = _cell(results)
+    radius, _, _ = modal_parts(case)
     rule = gauss_rule(radius.distribution, points=20)
     if case.cell.particles == "spheres":
         return {"volume_fraction": float(rule.mean(volume_fraction(radius(rule.nodes))))}
     return {"area_fraction": float(rule.mean(np.pi / 4 * radius(rule.nodes) ** 2))}
-
-
-def _cell(results: Results) -> tuple[RadiusMap, Phase, Phase]:
-    """The modal map, matrix and particle."""
-    return modal_parts(results.case)
 
 
 def modulus_numbers(dataset: xarray.Dataset) -> Document:

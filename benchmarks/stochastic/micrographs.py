@@ -122,7 +122,7 @@ def chain(folder: Path) -> tuple[float, dict[str, tuple[float, float]]]:
         own = microstructure.with_radius(own, fragment(found))
         low, high = modulus.compute(campaign(own)).result.bounds("E")
         supports[average] = (float(low[0]) / GPA, float(high[0]) / GPA)
-    return float(found.sections[0].phase_fraction or 0.0), supports
+    return float(found.sections[0].read.phase_fraction or 0.0), supports
 
 
 def judged(number: int, of: int, seed: int, fine: int) -> Row:

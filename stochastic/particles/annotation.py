@@ -14,6 +14,8 @@ LEAST_SIDE = 8  # pixels
 LEAST_SHARE = 1e-3  # of the image
 FLAT = 0.02  # of the picture's range, by which neighbours of one grey may differ
 
+FRAMING = 0.05  # share of the pixels within a frame that may have its grey
+
 Crop = tuple[int, int, int, int]
 """Left, top, right and bottom in pixels from the upper left corner; right and bottom excluded."""
 
@@ -77,6 +79,18 @@ def best_crop(shape: tuple[int, ...], found: list[Rectangle]) -> Crop:
     return max(parts, key=lambda one: (one[2] - one[0]) * (one[3] - one[1]))
 
 
+def framed(picture: Array) -> Crop | None:
+    """The part within a frame of one grey, which the pixels within it hardly have; None without."""
+    ink = np.abs(picture - picture[0, 0]) <= FLAT * np.ptp(picture)
+    rows, columns = (np.flatnonzero(~ink.all(axis=axis)) for axis in (1, 0))
+    if not rows.size or min(rows[0], columns[0]) == 0:
+        return None
+    box = (int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1)
+    inside = ink[box[1] : box[3], box[0] : box[2]]
+    ends = box[2] < picture.shape[1] and box[3] < picture.shape[0]
+    return box if ends and inside.mean() < FRAMING else None
+
+
 def cropped(picture: Array, crop: Crop | None, path: Path) -> Array:
     """The part of a picture, shape (rows, columns), that is material.
 
@@ -86,7 +100,7 @@ def cropped(picture: Array, crop: Crop | None, path: Path) -> Array:
         path: Its file, for the message.
 
     Raises:
-        ValueError: The part does not lie in the picture, or has a rectangle of one grey.
+        ValueError: The part does not lie in the picture, or has a frame or rectangle of one grey.
     """
     rows, columns = picture.shape
     left, top, right, bottom = crop or (0, 0, columns, rows)
@@ -96,7 +110,15 @@ def cropped(picture: Array, crop: Crop | None, path: Path) -> Array:
             f" in its {columns} × {rows} pixels"
         )
     part = picture[top:bottom, left:right]
-    if crop == (0, 0, columns, rows) or not (found := rectangles(part)):
+    if crop == (0, 0, columns, rows):
+        return part
+    if within := framed(part):
+        inside = [x + shift for x, shift in zip(within, 2 * (left, top), strict=True)]
+        raise ValueError(
+            f"{path} has a frame of one grey around it, which would be read as material: crop ="
+            f" {inside} cuts it off (left, top, right, bottom in pixels)"
+        )
+    if not (found := rectangles(part)):
         return part
     first = found[0].box
     best = best_crop(part.shape, found)

@@ -142,6 +142,8 @@ class MeasuredCircles:
         lost: Share of that area which lies in particles left out inside the image.
         misfit: Share of the particles' pixels outside the circle of their own piece.
         unevenness: Difference of the matrix's brightness over the image, a share of the contrast.
+        light: Slow light that was taken out before, a share of the contrast too.
+        strange: Share of the pixels that are much brighter or darker than both phases.
     """
 
     discs: Discs
@@ -150,3 +152,5 @@ class MeasuredCircles:
     lost: float = 0.0
     misfit: float = 0.0
     unevenness: float = 0.0
+    light: float = 0.0
+    strange: float = 0.0

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from alphacut.stochastic.particles.annotation import Crop, cropped
 from alphacut.stochastic.particles.circles_csv import MeasuredCircles
 from alphacut.stochastic.particles.discs import Discs
+from alphacut.stochastic.particles.light import evened
 from alphacut.stochastic.particles.touching import (
     CONVEX,
     Labels,
@@ -44,8 +45,13 @@ CUT = 1.2
 CUT_OFF = "is cut by the image's edge"
 LOST = 0.02  # share of the particles' area that may be left out
 MISFIT = 0.09  # share of the particles' pixels that may lie outside the circle of their piece
-UNEVEN = 1 / 3  # of the contrast, by which the brightness of the matrix may differ over the image
-TILES = 4  # along each side of the image, over which that brightness is compared
+LIT = 0.08  # of the contrast, by which slow light differs over the image before it is evened
+LIGHT = 1.0  # of the contrast, to which evening is tested
+UNEVEN = 0.2  # of the contrast, by which the brightness of the matrix may differ when evened
+TILES = 8  # along each side of the image, over which that brightness is compared
+STRANGE = 0.4  # of the contrast, by which a pixel lies beyond both phases and is of neither
+STRANGERS = 5e-4  # share of such pixels that is warned of
+INK = 5.0  # times as many pixels have a drawn grey as the next three greys together
 FLATTENED = 0.45  # roundness of a disc that several neighbours overlap
 DROP = "[microstructure.image] drop = true"
 PARTICLES = ("auto", "bright", "dark")
@@ -140,12 +146,13 @@ class SectionImage:
             ValueError: The image has no contrast or no particle, or more than `LOST` of the
                 particles' area lies in pieces that are no round particles, unless `drop` is set.
         """
-        share, labels = self._segmented(picture)
+        segmented = self._segmented(picture)
+        share, labels, light = segmented
         found, rejected, lost, misfit = self._sorted(share, labels)
         if not found:
             raise ValueError(
                 f"{self.path} shows no round particle of {self.smallest:g} pixels or more in radius"
-                f" ({_counted(rejected)}); {self._cure(picture, (share, labels), '')}"
+                f" ({_counted(rejected)}); {self._cure(picture, segmented, '')}"
             )
         fraction = float(share.mean())
         missing = lost / share.sum()
@@ -153,30 +160,31 @@ class SectionImage:
             raise ValueError(
                 f"{self.path} shows particles on {fraction:.4f} of its area, and {missing:.1%} of"
                 f" that lies in pieces that were left out ({_counted(rejected)});"
-                f" {self._cure(picture, (share, labels), ', or drop them: ' + DROP)}"
+                f" {self._cure(picture, segmented, ', or drop them: ' + DROP)}"
             )
         if misfit > MISFIT and not self.drop:
             raise ValueError(
                 f"{self.path} shows particles on {fraction:.4f} of its area, and {misfit:.1%} of"
                 f" that lies outside the circles that would stand for them, where discs that touch"
                 f" leave less than {MISFIT:.0%}: the particles are not round;"
-                f" {self._cure(picture, (share, labels), ', or go on with the circles: ' + DROP)}"
+                f" {self._cure(picture, segmented, ', or go on with the circles: ' + DROP)}"
             )
         (row, column, radius), (height, width) = np.array(found).T, picture.shape
         centres = np.stack([column + 0.5, height - row - 0.5], axis=1)
         centres = pushed_apart(centres, radius) * self.pixel
         size = np.array([width, height]) * self.pixel
         discs = Discs(centres, radius * self.pixel, size, periodic=False)
-        light = self._unevenness(share, labels)
-        return MeasuredCircles(discs, rejected, fraction, missing, misfit, light)
+        apart = self._unevenness(share, labels, light)
+        strange = _strange(picture, share)
+        return MeasuredCircles(discs, rejected, fraction, missing, misfit, apart, light, strange)
 
-    def _cure(self, picture: Array, segmented: tuple[Array, Labels], besides: str) -> str:
+    def _cure(self, picture: Array, segmented: tuple[Array, Labels, float], besides: str) -> str:
         """What helps where pieces are not round: other phase, even light, the image as the cell."""
         share = segmented[0]
         other = "dark" if np.vdot(share - share.mean(), picture) > 0 else "bright"
         turned = replace(self, particles=other)
         seen = turned._segmented(picture)
-        found, _, lost, misfit = turned._sorted(*seen)
+        found, _, lost, misfit = turned._sorted(*seen[:2])
         if found and lost <= LOST * seen[0].sum() and misfit <= MISFIT:
             key = f'[microstructure.image] particles = "{other}"'
             return f"the {other} phase is round: take it as the particles ({key})"
@@ -233,15 +241,17 @@ class SectionImage:
         )
         return inside
 
-    def _unevenness(self, share: Array, labels: Labels) -> float:
+    def _unevenness(self, share: Array, labels: Labels, light: float) -> float:
         """Greatest difference of the matrix's brightness between tiles, over the contrast."""
+        if light > LIGHT:  # whatever evening seems to have left
+            return light
         matrix = np.where(self._core(labels == 0), share, np.nan)
         rows = np.array_split(matrix, TILES)
         tiles = [tile[~np.isnan(tile)] for row in rows for tile in np.array_split(row, TILES, 1)]
-        return float(np.ptp([np.median(tile) for tile in tiles if len(tile) >= 16] or [0.0]))
+        return float(np.ptp([np.median(tile) for tile in tiles if len(tile) >= 64] or [0.0]))
 
-    def _segmented(self, picture: Array) -> tuple[Array, Labels]:
-        """Particle's share of each pixel, in [0, 1], and labels of the particles."""
+    def _segmented(self, picture: Array) -> tuple[Array, Labels, float]:
+        """Particle's share of each pixel, labels of particles, light over contrast if evened."""
         from scipy import ndimage
         from skimage import filters
 
@@ -249,12 +259,18 @@ class SectionImage:
         if not np.ptp(smooth) > 0:
             raise ValueError(f"{self.path} is of one grey throughout; nothing can be told apart")
         threshold = filters.threshold_otsu(smooth)  # type: ignore[no-untyped-call]
+        flat, light = evened(smooth, smooth > threshold, self._core)
+        if light > LIT:
+            smooth, threshold = flat, 0.5
+        else:
+            light = 0.0
         mask = smooth > threshold
         if self.particles == "dark" or (self.particles == "auto" and not self._are_bright(mask)):
             mask = ~mask
         within, without = (float(np.median(smooth[self._core(one)])) for one in (mask, ~mask))
         share = (smooth - without) / (within - without)  # noise beyond 0 and 1 cancels in sums
-        return share, _rounder(self._pieces(mask), self.roundness, np.pi * self.smallest**2)
+        labels = _rounder(self._pieces(mask), self.roundness, np.pi * self.smallest**2)
+        return share, labels, light
 
     def _pieces(self, mask: NDArray[np.bool_]) -> Labels:
         """Watershed of the distance to the background."""
@@ -289,6 +305,18 @@ def uneven_in_words(apart: float) -> str:
         f"the light is uneven, the matrix's brightness differs by {apart:.2f} of the contrast over"
         " the image: subtract the background in the program that makes the image"
     )
+
+
+def _strange(picture: Array, share: Array) -> float:
+    """Share of the pixels far beyond both phases: broad ones, and all of one outermost grey."""
+    beyond = np.abs(share - 0.5) > 0.5 + STRANGE
+    low, high = sorted(float(np.median(picture[part])) for part in (share < 0.5, share >= 0.5))
+    values, counts = np.unique(picture, return_counts=True)
+    for end, near in ((0, slice(1, 4)), (-1, slice(-4, -1))):
+        far = max(low - values[end], values[end] - high) > STRANGE * (high - low)
+        if far and counts[end] > INK * counts[near].sum():
+            beyond |= picture == values[end]
+    return float(beyond.mean())
 
 
 def _counted(rejected: Mapping[int, str]) -> str:

@@ -42,8 +42,9 @@ def compared(fraction: float) -> str:
 
 def fractions(found: Microstructure, fraction: float) -> Iterator[str]:
     """The one area fraction to compare with, what E takes of it, and what is lost between."""
-    from alphacut.stochastic.particles.image import MISFIT, UNEVEN, uneven_in_words
+    from alphacut.stochastic.particles.image import MISFIT, STRANGERS, UNEVEN, uneven_in_words
 
+    read = found.sections[0].read
     taken, cells = found.fraction_of_map, len(found.sample.values)
     count = sum(len(section.discs) for section in found.sections)
     yield (
@@ -56,11 +57,22 @@ def fractions(found: Microstructure, fraction: float) -> Iterator[str]:
             f" image's {fraction:.4f}: particles were left out or are not round, or the image shows"
             " too few; the image itself as the cell ([cell] image) loses none"
         )
-    if (misfit := found.sections[0].misfit) > MISFIT:
+    if (misfit := read.misfit) > MISFIT:
         yield (
             f"warning: {misfit:.1%} of the particles' area lies outside the circles that stand for"
             f" them, where discs that touch leave less than {MISFIT:.0%}: they are not round"
         )
-    if (apart := found.sections[0].unevenness) > UNEVEN:
+    if light := read.light:
+        yield (
+            f"the light differed by {light:.2f} of the contrast over the image and was evened"
+            " (surfaces of degree 8); look at the circles drawn over the image"
+        )
+    if (apart := read.unevenness) > UNEVEN:
         told = "circles may be missing, false or of a wrong radius"
         yield f"warning: {uneven_in_words(apart)}, and read it again; {told}"
+    if (strange := read.strange) > STRANGERS:
+        yield (
+            f"warning: {strange:.2%} of the pixels are much brighter or darker than both phases, as"
+            " a label, a scale bar, a frame or a third phase; they count as matrix or particles:"
+            " crop them off ([microstructure.image] crop) or paint them over"
+        )

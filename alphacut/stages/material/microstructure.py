@@ -283,7 +283,7 @@ def left_out(found: Microstructure | SphereMicrostructure) -> Iterator[str]:
     if isinstance(found, SphereMicrostructure):
         yield from (f"warning: {remark}" for remark in found.remarks)
         return
-    reasons = [reason for section in found.sections for reason in section.rejected.values()]
+    reasons = [reason for section in found.sections for reason in section.read.rejected.values()]
     if reasons:
         told = "; ".join(kinds(reasons))
         taken = sum(len(section.discs) for section in found.sections)
@@ -296,8 +296,8 @@ def left_out(found: Microstructure | SphereMicrostructure) -> Iterator[str]:
         )
     if found.is_crystalline:
         yield f"warning: {crystalline(found.hexagonal_order)}"
-    if found.sections[0].phase_fraction is not None:
-        yield from fractions(found, found.sections[0].phase_fraction)
+    if found.sections[0].read.phase_fraction is not None:
+        yield from fractions(found, found.sections[0].read.phase_fraction)
 
 
 def crystalline(order: float) -> str:
@@ -360,11 +360,6 @@ def with_radius(case: Case, fragment: str) -> Case:
     return replace(case, sections=replace(case.sections, radius=radius))
 
 
-def read_fragment(path: Path) -> str:
-    """The fragment that a run has stored."""
-    return path.read_text(encoding="utf-8")
-
-
 def circles_of(found: Microstructure) -> str:
     """The circles seen in an image as a CSV file, lengths in m."""
     discs = found.sections[0].discs
@@ -390,7 +385,7 @@ def write(
     with whole_file(folder / "microstructure.nc") as partial:
         to_dataset(found).assign_attrs(said).to_netcdf(partial)
     names = ["microstructure.json", "microstructure.nc", "radius.toml"]
-    if isinstance(found, Microstructure) and found.sections[0].phase_fraction is not None:
+    if isinstance(found, Microstructure) and found.sections[0].read.phase_fraction is not None:
         write_text(folder / "circles.csv", circles_of(found))
         names.append("circles.csv")
     files = [*(folder / name for name in names), *(path for of in drawn.values() for path in of)]

@@ -16,7 +16,6 @@ from alphacut.rve.result import effective_modulus
 from alphacut.rve.spheres.bounds import mori_tanaka as of_spheres
 from alphacut.rve.spheres.cubic import cubic_voigt, hill_average, young_along
 from alphacut.rve.spheres.result import HomogenisedSpheres
-from alphacut.stochastic import RadiusMap, gauss_rule
 from alphacut.stochastic.theta.truncated_normal import Array
 
 GPA = 1e9
@@ -157,9 +156,3 @@ def says_spheres(case: Case) -> str | None:
     if given and given.packing and given.packing.file:
         return f"{given.packing.file} has sizes without places, as of particles that were sieved"
     return None
-
-
-def area_share(radius: RadiusMap) -> float:
-    """Mean area fraction of a cylinder over θ, E[π r²/4]."""
-    rule = gauss_rule(radius.distribution, points=40)
-    return float(rule.mean(np.pi / 4 * radius(rule.nodes) ** 2))

@@ -16,8 +16,7 @@ from alphacut.stages.material import modulus
 from alphacut.stages.material.campaign import campaign, identity
 from alphacut.stages.material.cell import modal_parts, solve
 from alphacut.stages.material.cell_models import cell_model
-from alphacut.stages.material.references import beside
-from alphacut.stages.material.spheres import area_share
+from alphacut.stages.material.references import beside, mean_share
 from alphacut.stochastic import Beta, ExponentialMap, HermiteMap
 
 PAPER = Path(__file__).parents[3] / "cases" / "paper.toml"
@@ -76,7 +75,7 @@ def test_cell_and_campaign_are_those_of_the_law(case):
     xi = stats.beta(2, 5).ppf((np.arange(100_000) + 0.5) / 100_000)
     radii = 0.25 * (0.8 / 0.25) ** xi
     radius = modal_parts(chosen)[0]
-    assert area_share(radius) == pytest.approx(np.mean(np.pi / 4 * radii**2), rel=1e-6)
+    assert mean_share(radius, "cylinders") == pytest.approx(np.mean(np.pi / 4 * radii**2), rel=1e-6)
     told = beside(chosen, 25e9, 0.3, 1.0)["beside"]
     assert told["fraction"] == pytest.approx(np.mean(np.pi / 4 * radii**2), rel=1e-6)
     assert volume_fraction(radii).mean() < told["fraction"]
