@@ -4,17 +4,17 @@ import pytest
 from alphacut.rve import Phase
 from alphacut.rve.certificate import CertificateError
 from alphacut.rve.spheres.bounds import hashin_shtrikman
-from alphacut.rve.spheres.many.material import (
+from alphacut.rve.spheres.many.random_cells import CellSample, RandomCells, smooth_odd
+from alphacut.stochastic.errors import RefusedError
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii
+from alphacut.stochastic.spheres.packing import SpherePacking
+from benchmarks.rve.many_material import (
     between_sizes,
     isotropic_bulk,
     isotropic_shear,
     isotropic_young,
     random_material,
 )
-from alphacut.rve.spheres.many.random_cells import CellSample, RandomCells, smooth_odd
-from alphacut.stochastic.errors import RefusedError
-from alphacut.stochastic.particles.radius_laws import LogNormalRadii
-from alphacut.stochastic.spheres.packing import SpherePacking
 
 MATRIX, STIFF = Phase(20e9), Phase(80e9)
 LAW = LogNormalRadii(1e-3, 1e-2)
