@@ -247,6 +247,9 @@ def exceedances(
     Raises:
         ValueError: A parameter is both fuzzy and random, or a limit is not positive.
     """
+    if not isinstance(random, Mapping):
+        what = "it must map names to samplers or laws, as {'m1': scipy.stats.norm(100, 8)}"
+        raise ValueError(f"exceedance: random is {random!r}; {what}")
     sizes, columns = _limits_of(system, limits, set(inputs) & set(random))
     require_count("samples", samples, 1)
     require_count("spread", spread, 1)
@@ -289,7 +292,7 @@ def _drawn(name: str, given: Sampler, rng: np.random.Generator, samples: int) ->
     try:
         draw = given if callable(given) else lambda rng, n: given.rvs(size=n, random_state=rng)
         values = np.asarray(draw(rng, samples), float)
-    except (TypeError, AttributeError) as failure:
+    except (TypeError, ValueError, AttributeError) as failure:
         raise ValueError(
             f"exceedance: random {name!r} is {given!r}; it must be a function of a generator and a"
             f" count, or a frozen distribution such as scipy.stats.norm(100, 8) ({failure})"

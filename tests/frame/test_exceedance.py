@@ -158,6 +158,7 @@ def asked(random: Any, **changed: Any) -> Any:
         ({}, {"output": 3}, "there is no output '3'; known are q1"),
         ({}, {"output": [1]}, "there is no output"),
         ({}, {"samples": "5"}, "samples: '5' is not allowed; it must be a whole number, 1 or"),
+        (scipy.stats.norm(100, 8), {}, "random is <.*; it must map names to samplers or laws, as"),
         ({"m1": 100.0}, {}, r"random 'm1' is 100.0; .* such as scipy.stats.norm\(100, 8\)"),
         (
             {"m1": scipy.stats.norm},
@@ -168,6 +169,11 @@ def asked(random: Any, **changed: Any) -> Any:
             {"m1": lambda count: [1.0]},
             {},
             "'m1' is <.*; it must be a function of a generator and a count",
+        ),
+        (
+            {"m1": lambda rng, count: ["a"] * count},
+            {},
+            "random 'm1' is <.*could not convert string to float",
         ),
         ({"m1": lambda rng, count: np.ones((count, 1))}, {}, r"of shape \(4, 1\); .* 4 finite num"),
         ({"m1": lambda rng, count: np.full(count, np.nan)}, {}, "must be 4 finite numbers"),
