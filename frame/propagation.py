@@ -19,9 +19,10 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import INTEGRATORS, Integrator
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Envelope
+from alphacut.frame.methods.foreseen import foreseen
 from alphacut.frame.methods.judged import judged
 from alphacut.frame.methods.named import Method, named, options_of
-from alphacut.frame.methods.plan import Candidate, planned
+from alphacut.frame.methods.plan import Candidate
 from alphacut.frame.modal.kept import Kept
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem, relative_to_ground
@@ -150,7 +151,7 @@ def plan(
     method, way, over, _ = _prepared(
         model, inputs, duration, step, alpha, method, integrator, relative, options
     )
-    return planned(method, way, replace(over, boxes=over.boxes.distinct()[0]))
+    return foreseen(method, way, replace(over, boxes=over.boxes.distinct()[0]))
 
 
 def _prepared(

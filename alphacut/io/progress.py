@@ -28,7 +28,7 @@ def progress(title: str, *, quiet: bool = False) -> Iterator[Tick | None]:
         yield None
         return
     if not sys.stderr.isatty():
-        yield lines(title)
+        yield Lines(title)
         return
     from rich.console import Console
     from rich.progress import (
@@ -58,16 +58,25 @@ def progress(title: str, *, quiet: bool = False) -> Iterator[Tick | None]:
         yield lambda done: bar.update(task, completed=done)
 
 
-def lines(title: str) -> Tick:
-    """What says the share done and the seconds left, every `EVERY` seconds that it is called."""
-    begun = told = time.monotonic()
+class Lines:
+    """Says the share done and the seconds left every `EVERY` seconds, and what is being done."""
 
-    def tick(done: float) -> None:
-        nonlocal told
+    def __init__(self, title: str) -> None:
+        self.title = self.doing = title
+        self.begun = self.told = self.since = time.monotonic()
+
+    def stage(self, what: str) -> None:
+        """What is being done from now on."""
+        self.doing, self.since = f"{self.title}, {what}", time.monotonic()
+
+    def __call__(self, done: float) -> None:
+        """Say it, if the last line is old enough."""
         now = time.monotonic()
-        if now - told >= EVERY:
-            told, spent = now, now - begun
-            left = f", some {spent * (1 - done) / done:.0f} s left" if done > 0 else ""
-            say(f"{title}: {done:.0%} done after {spent:.0f} s{left}")
-
-    return tick
+        if now - self.told < EVERY:
+            return
+        self.told, spent = now, now - self.begun
+        if done < 0.005:
+            say(f"{self.doing}: begun, {spent:.0f} s so far")
+            return
+        left = (now - self.since) * (1 - done) / done
+        say(f"{self.doing}: {done:.0%} done after {spent:.0f} s, some {left:.0f} s left")

@@ -130,7 +130,8 @@ def _grid(
     if not patient:
         raise UnprovedError(
             f"with {count} fuzzy inputs a proof takes minutes and is not tried unasked;"
-            " envelope.certify asks for one, and fewer fuzzy inputs are proved at once"
+            " envelope.certify asks for one, which with a wide gap may take less time than"
+            " estimated bounds, and fewer fuzzy inputs are proved at once"
         )
     if DEAR * len(few) * width > MOST_NUMBERS:
         raise UnprovedError(

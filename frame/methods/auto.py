@@ -14,6 +14,7 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.batch_graph_follower import BatchFollower
 from alphacut.frame.methods.modal import FINE, GapError, Modal, guaranteed
 from alphacut.frame.methods.plan import Candidate, candidates
+from alphacut.frame.modal.kept import stage
 from alphacut.frame.outputs import output_unit
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
@@ -103,10 +104,12 @@ class Auto:
         ]
         if "modal" in tried:
             try:
+                stage(progress, "proof")
                 proof, unproved = _proved(flow, left, progress, self.workers)
                 if proof is not None:
                     why = "modal: polynomials of the modes, whose bounds are proved"
                     return _reported(proof, flow, begun, why)
+                stage(progress, f"search, since unproved: {unproved}")
                 found = Modal(tolerance=left / FINE, seed=self.seed).run(flow, progress)
                 found = replace(found, facts={**found.facts, "unproved": unproved})
                 if _estimate(found, flow) <= left:

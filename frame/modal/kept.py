@@ -25,3 +25,9 @@ def share(progress: Progress | None, first: float, last: float) -> Progress:
     if progress is None:
         return lambda done: None
     return lambda done: progress(first + (last - first) * done)
+
+
+def stage(progress: Progress | None, what: str) -> None:
+    """Tell a progress that shows it what is being done from now on."""
+    if (tell := getattr(progress, "stage", None)) is not None:
+        tell(what)

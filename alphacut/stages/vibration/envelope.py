@@ -88,14 +88,7 @@ def explain(wanted: Structure, task: EnvelopeTask) -> list[str]:
         told += [str(one) for one in frame.plan(wanted.model, **arguments(wanted, task))]
     except ValueError as error:
         raise BadInput(Problem("envelope", str(error))) from None
-    asked = task.certify is not None or (task.method == "auto" and not estimated)
-    return [*told, PROOF] if asked and wanted.linear is not None else told
-
-
-PROOF = (
-    "proof: not counted above; from about as long again to some fifty times as long, longest with"
-    " narrow gaps, modal damping and records"
-)
+    return told
 
 
 def arguments(wanted: Structure, task: EnvelopeTask) -> Document:

@@ -39,7 +39,8 @@ def estimated_reason(wanted: Structure, task: EnvelopeTask) -> str:
         return ""
     return (
         f"a proof with {count} fuzzy inputs may take minutes and is then not tried unasked;"
-        " envelope.certify asks for one, and fewer fuzzy inputs are proved at once"
+        " envelope.certify asks for one, which with a wide gap may take less time than estimated"
+        " bounds, and fewer fuzzy inputs are proved at once"
     )
 
 

@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+from alphacut.frame.modal.kept import stage
 from alphacut.io import progress as told
 from alphacut.io.progress import progress
 
@@ -50,6 +51,18 @@ def test_off_a_terminal_a_line_every_ten_seconds_says_the_share_and_the_time_lef
         "25% done after 12 s, some 36 s left",
         "75% done after 24 s, some 8 s left",
     ]
+
+
+def test_a_line_says_what_is_done_and_no_share_of_nothing(monkeypatch):
+    shown, clock = io.StringIO(), iter([0.0, 100.0, 110.0, 130.0])
+    monkeypatch.setattr(sys, "stderr", shown)
+    monkeypatch.setattr(told.time, "monotonic", lambda: next(clock))
+    with progress("Envelopes") as tick:
+        stage(tick, "search")
+        tick(0.0)
+        tick(0.5)
+    assert "Envelopes, search: begun, 110 s so far\n" in shown.getvalue()
+    assert "Envelopes, search: 50% done after 130 s, some 30 s left\n" in shown.getvalue()
 
 
 def test_an_interrupted_command_says_what_is_kept_and_where(tmp_path):

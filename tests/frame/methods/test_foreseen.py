@@ -1,0 +1,43 @@
+"""Seconds that are told before anything is computed come near those that it then takes."""
+
+import time
+
+import numpy as np
+import pytest
+
+from alphacut.frame import StoreyFrame, envelope, plan
+from alphacut.frame.methods import foreseen
+from alphacut.fuzzy import Triangular
+
+FRAME = StoreyFrame(
+    (20e3, 20e3, 20e3),
+    (3.5, 3.5, 3.5),
+    30e9,
+    1e-3,
+    v0=(0.3, 0.3, 0.3),
+    damping_ratio=(0.05,),
+    outputs=("q3", "drift1"),
+)
+INPUTS = {"E": Triangular(28e9, 30e9, 32e9), "m1": Triangular(18e3, 20e3, 22e3)}
+MORE = {"m2": INPUTS["m1"], "m3": INPUTS["m1"]}
+
+
+@pytest.mark.parametrize(("inputs", "gap"), [(INPUTS, None), (INPUTS, 2e-3), (INPUTS | MORE, 2e-3)])
+def test_what_is_told_is_within_a_factor_of_what_it_takes(inputs, gap):
+    asked = {"duration": 10.0, "step": 0.01, "alpha": (0.0, 0.5)}
+    if gap is not None:
+        asked |= {"method": "modal", "certify": gap}
+    told, begun = plan(FRAME, inputs, **asked)[0], time.perf_counter()
+    envelope(FRAME, inputs, **asked, progress=False)
+    spent = time.perf_counter() - begun
+    assert "a proof is expected" in told.words
+    assert spent / 8 < told.seconds < 8 * spent + 2  # a busy machine
+
+
+def test_a_proof_that_its_boxes_do_not_end_is_told_with_the_search_after_it(monkeypatch):
+    monkeypatch.setattr(foreseen, "BOXES", 1.0)
+    (told, *_) = plan(FRAME, INPUTS | MORE, duration=4.0, step=0.01, alpha=(0.0,))
+    assert "for a proof that is expected to fail and" in told.words
+    light = plan(FRAME, INPUTS | MORE, duration=4.0, step=0.01, alpha=(0.0,), method="modal")[0]
+    assert "proof" not in light.words
+    assert np.isfinite(told.seconds)
