@@ -5,14 +5,8 @@ from __future__ import annotations
 from functools import cache
 
 from alphacut.case.key import Key, Section, keys_of
+from alphacut.case.sections import particles
 from alphacut.case.sections.material import CellTable, Mesh, Modulus, Radius, Response
-from alphacut.case.sections.particles import (
-    Circles,
-    Microstructure,
-    PackedSpheres,
-    Packing,
-    Photograph,
-)
 from alphacut.case.sections.questions import Decision, Field, Joint, Update
 from alphacut.case.sections.structures import Frame, Pendulum, Tower
 from alphacut.case.sections.top import Top
@@ -20,11 +14,11 @@ from alphacut.case.sections.vibration import Envelope, Exceedance, Study
 
 SECTIONS: dict[str, type[Section]] = {
     "": Top,
-    "microstructure": Microstructure,
-    "microstructure.packing": Packing,
-    "microstructure.circles": Circles,
-    "microstructure.image": Photograph,
-    "microstructure.spheres": PackedSpheres,
+    "microstructure": particles.Microstructure,
+    "microstructure.packing": particles.Packing,
+    "microstructure.circles": particles.Circles,
+    "microstructure.image": particles.Photograph,
+    "microstructure.spheres": particles.PackedSpheres,
     "radius": Radius,
     "cell": CellTable,
     "mesh": Mesh,

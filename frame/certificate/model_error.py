@@ -23,13 +23,8 @@ from alphacut.frame.certificate.wave_bounds import Part, parts
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.modal.fitting import fit_states
 from alphacut.frame.modal.model import ModalModel
+from alphacut.frame.structures import polynomial_dependence as dependence
 from alphacut.frame.structures.linear import evaluate
-from alphacut.frame.structures.polynomial_dependence import (
-    UnprovedError,
-    accelerations,
-    degrees,
-    without_ratio,
-)
 
 MOST_NUMBERS = 120_000_000
 """Values of the defects on their grid, at most: 1 GB."""
@@ -50,7 +45,7 @@ def proved_error(model: ModalModel, *, patient: bool = True) -> Array:
             bound cannot be computed.
     """
     if not isinstance(model.flow.integrator, Exact):
-        raise UnprovedError(
+        raise dependence.UnprovedError(
             f"the motion is that of the scheme '{model.flow.integrator.name}'; only the exact"
             " propagator is covered"
         )
@@ -110,7 +105,7 @@ def _grids(model: ModalModel) -> tuple[ChebyshevGrid, LowerGrid]:
             strict=True,
         )
     )
-    exponents = degrees(model.flow.system, box)
+    exponents = dependence.degrees(model.flow.system, box)
     own, more = tuple(exponents[name] for name in model.boxes.names), 2 * model.degree
     return ChebyshevGrid(tuple(more + degree for degree in own)), LowerGrid(own, more)
 
@@ -128,13 +123,13 @@ def _grid(
     if len(whole) * width <= MOST_NUMBERS:
         return whole
     if not patient:
-        raise UnprovedError(
+        raise dependence.UnprovedError(
             f"with {count} fuzzy inputs a proof takes minutes and is not tried unasked;"
             " envelope.certify asks for one, which with a wide gap may take less time than"
             " estimated bounds, and fewer fuzzy inputs are proved at once"
         )
     if DEAR * len(few) * width > MOST_NUMBERS:
-        raise UnprovedError(
+        raise dependence.UnprovedError(
             f"the error of the modes takes {len(few)} points of {count} fuzzy inputs, and"
             f" {MOST_NUMBERS // DEAR // width} are affordable; narrower or fewer inputs, or a wider"
             " gap, can be proved"
@@ -153,7 +148,7 @@ def _expanded(grid: ChebyshevGrid | LowerGrid, sample: Sample) -> dict[str, Arra
 
 def _structure(model: ModalModel, unit: Array) -> dict[str, Array]:
     """The matrices that measure what the motion misses."""
-    system = without_ratio(model.flow.system)  # whose damping is a polynomial
+    system = dependence.without_ratio(model.flow.system)  # whose damping is a polynomial
     points = model.boxes.to_physical(unit)
     matrices, rows = evaluate(system, model.flow.names, points, derivatives=False)
     return {"mass": matrices.mass.value, "stiffness": matrices.stiffness.value, "rows": rows.value}
@@ -164,7 +159,7 @@ def _defects(
 ) -> dict[str, Array]:
     """Defects at unit coordinates (S, d) of the start and of each mode's motion."""
     system, points = model.flow.system, model.boxes.to_physical(unit)
-    bare = system if ratio is None else without_ratio(system)
+    bare = system if ratio is None else dependence.without_ratio(system)
     matrices, rows = evaluate(bare, model.flow.names, points, derivatives=False)
     M, D, K, C = matrices.mass.value, matrices.damping.value, matrices.stiffness.value, rows.value
     q, v = (
@@ -185,6 +180,6 @@ def _defects(
     if ratio is not None:
         more, own = ratio.defects(unit, points, speed, M, K)
         defects |= {**own, "dynamic": defects["dynamic"] + more}
-        for place, floor in accelerations(system).items():
+        for place, floor in dependence.accelerations(system).items():
             defects["outputs"][..., place] += more[..., floor] / M[:, None, floor, floor]
     return defects

@@ -23,11 +23,7 @@ from alphacut.frame.calculus.polynomial import Polynomial, fit
 from alphacut.frame.modal.analyses import analyse
 from alphacut.frame.modal.fitting import fit_points
 from alphacut.frame.modal.model import ModalModel
-from alphacut.frame.structures.polynomial_dependence import (
-    UnprovedError,
-    accelerations,
-    common_ratio,
-)
+from alphacut.frame.structures import polynomial_dependence as dependence
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +50,13 @@ class Comparison:
         try:
             factor = np.linalg.cholesky(coefficients[0])
         except np.linalg.LinAlgError:
-            raise UnprovedError(
+            raise dependence.UnprovedError(
                 "the mean mass or stiffness matrix is not positive definite"
             ) from None
         inverse = np.linalg.inv(factor)
         spread = float(np.linalg.norm(np.abs(inverse @ coefficients[1:] @ inverse.T).sum(0), 2))
         if spread >= 1:
-            raise UnprovedError(
+            raise dependence.UnprovedError(
                 "the box is so wide that mass and stiffness are not shown to stay positive definite"
             )
         return cls(factor, 1 - spread, 1 + spread)
@@ -118,7 +114,7 @@ class RatioDamping:
         Raises:
             UnprovedError: Modes have ratios of their own.
         """
-        ratio = common_ratio(model.flow.system)
+        ratio = dependence.common_ratio(model.flow.system)
         if ratio is None:
             return None
         value = model.flow.system.parameters[ratio] if isinstance(ratio, str) else float(ratio)
@@ -165,14 +161,16 @@ class RatioDamping:
         """√m of the floor whose acceleration an output is, least over the box; else ∞, (m,)."""
         system, boxes = self.model.flow.system, self.model.boxes
         roots = np.full(len(self.model.outputs), np.inf)
-        for place, floor in accelerations(system).items():
+        for place, floor in dependence.accelerations(system).items():
             name = f"m{floor + 1}"
             least = system.parameters.get(name, np.nan)
             if name in boxes.names:
                 least = float(boxes.lower[0, boxes.names.index(name)])
             roots[place] = np.sqrt(least)
         if not (roots > 0).all():
-            raise UnprovedError("the masses of accelerated floors are not known one by one")
+            raise dependence.UnprovedError(
+                "the masses of accelerated floors are not known one by one"
+            )
         return roots
 
     def missed(
@@ -195,5 +193,7 @@ def _least(polynomial: Polynomial) -> Array:
     """
     least: Array = polynomial.coefficients[0] - np.abs(polynomial.coefficients[1:]).sum(0)
     if not (least > 0).all():
-        raise UnprovedError("the box is so wide that frequencies are not shown to stay positive")
+        raise dependence.UnprovedError(
+            "the box is so wide that frequencies are not shown to stay positive"
+        )
     return least

@@ -14,13 +14,8 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet, concatenate
 from alphacut.frame.dynamics.record_load import SAME, Segments
+from alphacut.frame.structures import modes as natural
 from alphacut.frame.structures.linear import Accelerogram, Matrices
-from alphacut.frame.structures.modes import (
-    ClassicalModes,
-    classical_modes,
-    eigenvectors,
-    state_matrix,
-)
 
 LARGE = 40
 """States from which on eigenvalues are cheaper than powers of the transfer matrix."""
@@ -55,10 +50,10 @@ def spectral_trajectory(
             coincide.
     """
     deep = matrices.mass.directions > 0
-    undamped = None if deep else classical_modes(matrices, rows)
+    undamped = None if deep else natural.classical_modes(matrices, rows)
     if undamped is not None:
         return _superposed(undamped, ground=ground, step=step, steps=steps)
-    rate, right, left = eigenvectors(state_matrix(matrices))
+    rate, right, left = natural.eigenvectors(natural.state_matrix(matrices))
     if (
         float((np.abs(right.value).sum(-2).max(-1) * np.abs(left.value).sum(-2).max(-1)).max())
         > CONDITION
@@ -89,7 +84,7 @@ def spectral_trajectory(
 
 
 def _superposed(
-    modes: ClassicalModes, *, ground: Accelerogram | None, step: float, steps: int
+    modes: natural.ClassicalModes, *, ground: Accelerogram | None, step: float, steps: int
 ) -> Jet:
     """As `spectral_trajectory`, from modes that damping does not couple."""
     out = np.zeros((len(modes.rate), steps + 1, modes.start.shape[-1]))

@@ -10,15 +10,8 @@ from alphacut.frame.calculus.threads import threads
 from alphacut.frame.certificate.certificate import certify
 from alphacut.frame.certificate.remainder import MOST_PARAMETERS
 from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.methods import modal
 from alphacut.frame.methods.auto import GAPS, Auto
-from alphacut.frame.methods.modal import (
-    BOXES,
-    FINE,
-    MOST_BOXES,
-    TOO_WIDE,
-    Modal,
-    model_with_error,
-)
 from alphacut.frame.methods.plan import Candidate, planned
 from alphacut.frame.modal.fitting import MANY, fit_modes
 from alphacut.frame.modal.levels import search_levels
@@ -31,13 +24,7 @@ DENSE = 0.6
 
 
 def foreseen(name: str, method: object, flow: UnitFlow) -> tuple[Candidate, ...]:
-    """What a method would do as `planned`, its proof and the search after it timed on some nodes.
-
-    Args:
-        name: Of the method.
-        method: The method.
-        flow: Trajectories.
-    """
+    """What a method would do as `planned`, its proof and then its search timed on some nodes."""
     found = planned(name, method, flow)
     if not isinstance(flow.flow, LinearFlow) or found[0].name != "modal":
         return found
@@ -47,11 +34,11 @@ def foreseen(name: str, method: object, flow: UnitFlow) -> tuple[Candidate, ...]
     try:
         if isinstance(method, Auto):
             first = _by_auto(first, *method.wanted(flow))
-        elif isinstance(method, Modal) and method.certify is not None:
+        elif isinstance(method, modal.Modal) and method.certify is not None:
             seconds, worth = _proof(flow, method, method.certify, patient=True)
             first = replace(first, seconds=seconds, words=f"{first.words}; {worth}")
     except ModalError:
-        pass  # told by what was planned
+        return found
     return (first, *found[1:])
 
 
@@ -59,14 +46,14 @@ def _by_auto(first: Candidate, flow: UnitFlow, wanted: float) -> Candidate:
     """What auto takes: the proof, and the search where none is found."""
     size, spent, worth = 2 * len(flow.outputs) * len(flow.time), 0.0, ""
     for share in GAPS:
-        method = Modal(boxes=min(BOXES, MOST_BOXES / size), workers=threads())
+        method = modal.Modal(boxes=min(modal.BOXES, modal.MOST_BOXES / size), workers=threads())
         seconds, worth = _proof(flow, method, share * wanted, patient=False)
         spent += seconds
         if worth == PROVED:
             return replace(first, seconds=spent, words=f"{first.words}; {worth}")
-        if not worth.startswith(TOO_WIDE):
+        if not worth.startswith(modal.TOO_WIDE):
             break
-    search = _search(flow, wanted / FINE)
+    search = _search(flow, wanted / modal.FINE)
     parts = [float(f"{x:.1g}") for x in (spent, search)]
     words = (
         f"{first.words}: some {parts[0]:g} s for a proof that is expected to fail and {parts[1]:g}"
@@ -79,23 +66,18 @@ def _by_auto(first: Candidate, flow: UnitFlow, wanted: float) -> Candidate:
 PROVED = "a proof is expected"
 
 
-def _proof(flow: UnitFlow, method: Modal, gap: float, *, patient: bool) -> tuple[float, str]:
+def _proof(flow: UnitFlow, way: modal.Modal, gap: float, *, patient: bool) -> tuple[float, str]:
     """Seconds of a proof, and `PROVED` or why none is expected."""
     thin, factor = _thinned(flow)
     assert isinstance(thin.flow, LinearFlow)
     begun = time.perf_counter()
-    model, error, unproved = model_with_error(thin.flow, thin, method, gap, patient=patient)
+    model, error, unproved = modal.model_with_error(thin.flow, thin, way, gap, patient=patient)
     fixed = time.perf_counter() - begun
     if unproved and not patient:
         return fixed, unproved
     begun = time.perf_counter()
     proof = certify(
-        model,
-        gap=gap,
-        model_error=error,
-        scale=thin.scale,
-        workers=method.workers,
-        budget=method.boxes,
+        model, gap=gap, model_error=error, scale=thin.scale, workers=way.workers, budget=way.boxes
     )
     seconds = fixed + factor * (time.perf_counter() - begun)
     ended = f"the boxes allowed are expected to leave a gap of {flow.told(proof.gap)}"
@@ -118,8 +100,7 @@ def _thinned(flow: UnitFlow) -> tuple[UnitFlow, float]:
     """The flow at `NODES` of its nodes, and by how much more all of them cost."""
     assert isinstance(flow.flow, LinearFlow)
     every = max(1, len(flow.time) // NODES)
-    step = every * flow.flow.step
-    count = (len(flow.time) - 1) // every
+    step, count = every * flow.flow.step, (len(flow.time) - 1) // every
     coarse = replace(flow.flow, step=step, duration=count * step)
     thin = replace(flow, flow=coarse, kept=None)
     return thin, max(1.0, DENSE * len(flow.time) / len(thin.time))

@@ -39,8 +39,7 @@ class Candidate:
 
     Args:
         name: Of the method.
-        seconds: Estimate of its processor time, seldom wrong by more than a factor of four;
-            infinite where the method cannot be applied.
+        seconds: Estimate, seldom wrong by a factor of four; infinite where it cannot be applied.
         words: What would be done, or why it cannot be.
     """
 
@@ -61,24 +60,13 @@ class Candidate:
 
 
 def candidates(flow: UnitFlow, budget: int) -> tuple[Candidate, ...]:
-    """What auto may take, in the order in which it tries them.
-
-    Args:
-        flow: Trajectories.
-        budget: Most trajectories of the Graph Follower.
-    """
+    """What auto may take in its order, given the most trajectories of the Graph Follower."""
     follower = _follower("improved-graph-follower", flow, budget)
     return (_modal(flow), follower) if isinstance(flow.flow, LinearFlow) else (follower,)
 
 
 def planned(name: str, method: object, flow: UnitFlow) -> tuple[Candidate, ...]:
-    """What a method would do; of auto each that it may take.
-
-    Args:
-        name: Of the method.
-        method: The method.
-        flow: Trajectories.
-    """
+    """What a method would do; of auto each that it may take."""
     if hasattr(method, "plan"):
         found: tuple[Candidate, ...] = method.plan(flow)
         return found

@@ -19,13 +19,8 @@ from alphacut.frame.modal.analyses import analyse
 from alphacut.frame.modal.fitting import fit_points
 from alphacut.frame.modal.ground_response import LoadTables
 from alphacut.frame.modal.model import ModalModel, Waves
+from alphacut.frame.structures import modes as natural
 from alphacut.frame.structures.linear import evaluate
-from alphacut.frame.structures.modes import (
-    ModalError,
-    ordered_eigenvectors,
-    oscillating,
-    state_matrix,
-)
 from alphacut.frame.structures.slopes import Slopes
 
 PIECE = 1000
@@ -99,7 +94,9 @@ class ExactResponse:
             physical = self.model.boxes.to_physical(points)
             matrices, seen = evaluate(flow.system, flow.names, physical, derivatives=False)
             state = np.concatenate([matrices.q0.value, matrices.v0.value], -2)
-            modes = _Modes.of(state_matrix(matrices).value, seen.value, state, matrices.rigid)
+            modes = _Modes.of(
+                natural.state_matrix(matrices).value, seen.value, state, matrices.rigid
+            )
             at = self._at(modes, own, node[rows], output[rows])
             out[rows] = (at.left * at.motion).real.sum(1)
 
@@ -127,7 +124,7 @@ class ExactResponse:
         first = Slopes.of(flow.system, flow.names, cuts.to_physical(points))
         matrices = first.matrices
         state = np.concatenate([matrices.q0.value, matrices.v0.value], -2)
-        modes = _Modes.of(state_matrix(matrices).value, first.rows, state, matrices.rigid)
+        modes = _Modes.of(natural.state_matrix(matrices).value, first.rows, state, matrices.rigid)
         at = self._at(modes, own, node, output)
         X, Y = modes.X[own], modes.Y[own]
         left = Y.swapaxes(1, 2) @ (at.left[..., None] * at.inner())
@@ -162,18 +159,20 @@ class _Modes:
 
     @classmethod
     def of(cls, A: Array, rows: Array, state: Array, rigid: Array) -> _Modes:
-        rate, X = ordered_eigenvectors(A)
+        rate, X = natural.ordered_eigenvectors(A)
         Y = np.linalg.inv(X)
         if not (np.abs(X).sum(-2).max(-1) * np.abs(Y).sum(-2).max(-1)).max() < CONDITION:
-            raise ModalError("modal: two modes nearly coincide at critical damping")
+            raise natural.ModalError("modal: two modes nearly coincide at critical damping")
         kick = np.concatenate([np.zeros_like(rigid), -rigid])
         return cls(rate, X, Y, rows @ X, (Y @ state)[..., 0], (Y @ kick)[..., 0])
 
     def require_pairs(self) -> int:
         """Number of conjugate pairs; raises ModalError where a mode does not oscillate."""
         half = self.rate.shape[1] // 2
-        if not oscillating(self.rate[:, :half]).all():
-            raise ModalError("modal: a mode under a record does not oscillate somewhere in the box")
+        if not natural.oscillating(self.rate[:, :half]).all():
+            raise natural.ModalError(
+                "modal: a mode under a record does not oscillate somewhere in the box"
+            )
         return half
 
 

@@ -15,15 +15,7 @@ from alphacut.fuzzy import Extended, FuzzyNumber, General, Known, Reduced, Signe
 from alphacut.fuzzy.plans.plan import Plan
 from alphacut.io.files import Document
 from alphacut.io.provenance import source_digest, versions
-from alphacut.stages.material.cell import (
-    SHARED,
-    CellChoice,
-    cell_choice,
-    cell_inputs,
-    modal_values,
-    parts,
-    phases_of,
-)
+from alphacut.stages.material import cell as of_cell
 from alphacut.stages.material.cell_models import cell_model
 from alphacut.stochastic import ThetaLaw
 from alphacut.stochastic.radius_map import MapFamily
@@ -60,15 +52,15 @@ class CellTask:
         family: Radius maps and the law of θ.
     """
 
-    choice: CellChoice
+    choice: of_cell.CellChoice
     crisp: Mapping[str, float]
     family: MapFamily
 
     def __call__(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float | Array]]:
         """Outputs of each point: E, nu, stresses, curves, systems, errors, certificate."""
         values = [{**self.crisp, **point} for point in points]
-        radius, matrix, _ = parts(values[0], self.family)
-        inclusions = [phases_of(value)[1] for value in values]
+        radius, matrix, _ = of_cell.parts(values[0], self.family)
+        inclusions = [of_cell.phases_of(value)[1] for value in values]
         results = cell_model(self.choice).solve(radius, matrix, inclusions)
         outputs: list[dict[str, float | Array]] = []
         for result in results:
@@ -99,7 +91,7 @@ class CellTask:
         """A sample once more with its error estimate or the reason of auto."""
         if self.choice.method not in JUDGED:
             return None
-        radius, matrix, inclusion = parts({**self.crisp, **point}, self.family)
+        radius, matrix, inclusion = of_cell.parts({**self.crisp, **point}, self.family)
         model = cell_model(replace(self.choice, estimate=True))
         return model.solve(radius, matrix, [inclusion])[0]
 
@@ -125,7 +117,7 @@ def plan_of(case: Case) -> Plan:
 
 def fuzzy_inputs(case: Case) -> dict[str, FuzzyNumber]:
     """The inputs of the cell that are fuzzy, by name, in SI."""
-    numbers = cell_inputs(case)
+    numbers = of_cell.cell_inputs(case)
     found = {name: number for name, number in numbers.items() if number.support.width > 0}
     return found or {"inclusion_modulus": numbers["inclusion_modulus"]}
 
@@ -174,9 +166,11 @@ def campaign(
         store: File that keeps every sample.
     """
     inputs = fuzzy_inputs(case)
-    crisp = {name: value for name, value in modal_values(case).items() if name not in inputs}
+    crisp = {
+        name: value for name, value in of_cell.modal_values(case).items() if name not in inputs
+    }
     support = case.cell.inclusion_modulus.cut(0.0)
-    choice = cell_choice(case, exclude=exclude, petsc=petsc)
+    choice = of_cell.cell_choice(case, exclude=exclude, petsc=petsc)
     # no other method's samples depend on the range, and a wider one may take them as they are
     if choice.method in SPANNED and (support.width > 0 or choice.method != "prism"):
         choice = replace(choice, moduli=(support.lower, support.upper))
@@ -188,7 +182,7 @@ def campaign(
     if (choice.particles, choice.method, choice.tolerance) == ("spheres", "series", None):
         choice = replace(choice, tolerance=OF_SPHERES)
     task = CellTask(choice, crisp, case.radius.family)
-    shared = tuple(name for name in inputs if name in SHARED) or ("inclusion_modulus",)
+    shared = tuple(name for name in inputs if name in of_cell.SHARED) or ("inclusion_modulus",)
     return Campaign(
         task, inputs, plan_of(case), case.modulus.alpha, shared, known(case, inputs), store
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from alphacut.frame import StoreyFrame, envelope, plan
-from alphacut.frame.methods import foreseen
+from alphacut.frame.methods import modal
 from alphacut.fuzzy import Triangular
 
 FRAME = StoreyFrame(
@@ -35,7 +35,7 @@ def test_what_is_told_is_within_a_factor_of_what_it_takes(inputs, gap):
 
 
 def test_a_proof_that_its_boxes_do_not_end_is_told_with_the_search_after_it(monkeypatch):
-    monkeypatch.setattr(foreseen, "BOXES", 1.0)
+    monkeypatch.setattr(modal, "BOXES", 1.0)
     (told, *_) = plan(FRAME, INPUTS | MORE, duration=4.0, step=0.01, alpha=(0.0,))
     assert "for a proof that is expected to fail and" in told.words
     light = plan(FRAME, INPUTS | MORE, duration=4.0, step=0.01, alpha=(0.0,), method="modal")[0]
