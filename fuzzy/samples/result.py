@@ -25,6 +25,7 @@ from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.claimed import Claimed
 from alphacut.fuzzy.sets.numbers import Array, Mask, PiecewiseLinear
 from alphacut.fuzzy.sets.stepwise import Stepwise, outer_steps
+from alphacut.fuzzy.surrogates.response_surface import ResponseSurface
 
 if TYPE_CHECKING:
     import xarray
@@ -328,6 +329,10 @@ class FuzzyResult:
         if not self.domain.linear:
             return outer_steps(self.alpha, lower, upper)
         return PiecewiseLinear(tuple(self.alpha), tuple(lower), tuple(upper))
+
+    def surface(self, output: str = "y") -> ResponseSurface:
+        """Response surface of one output through the samples of the model (Fig. 2)."""
+        return ResponseSurface.fit(self.points, self.values.array[:, [self.column(output)]])
 
     def charged(self, *, calls: int, reused: int, seconds: float) -> FuzzyResult:
         """The same result with what it cost."""

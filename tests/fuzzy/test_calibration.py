@@ -20,6 +20,7 @@ from alphacut.fuzzy import (
     propagate,
 )
 from alphacut.fuzzy.knowledge import interval_arithmetic as interval
+from alphacut.fuzzy.surrogates.response_surface import ResponseSurface
 
 UNIT = {"x": Interval(0, 1)}
 X = np.linspace(0, 1, 100_001)
@@ -70,6 +71,14 @@ def test_what_the_last_look_finds_counts_twice(seen):
     centre = fresh + 1e-4 * np.sqrt(-np.log(seen))
     result = run(centre, 1.0)
     require_tight(result.error[0, 0], centre / 10 + 1 - result.upper[0, 0])
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_error_of_a_response_surface(degree):
+    points = (np.arange(40)[:, None] + 0.5) / 40
+    surface = ResponseSurface.fit(points, np.exp(2 * points), degree=degree)
+    true = np.sqrt(((surface(X[:, None]) - np.exp(2 * X[:, None])) ** 2).mean())
+    require_tight(surface.error[0], true)
 
 
 @pytest.mark.parametrize("boxes", [20, 40])

@@ -183,6 +183,19 @@ def test_a_function_without_outputs_is_refused(nothing):
         propagate(lambda x: nothing, {"x": Interval(0, 1)})
 
 
+def test_response_surface_reproduces_a_quadratic_and_states_its_error():
+    result = propagate(lambda a, b: 1 + a * b - b**2, INPUTS)
+    surface = result.surface()
+    assert surface.degree == 2
+    assert surface.error[0] < 1e-12
+    np.testing.assert_allclose(surface([[0.3, 0.7]]), 1 + 0.21 - 0.49)
+    wavy = propagate(lambda a, b: np.sin(4 * a + b), INPUTS).surface()
+    points = np.random.default_rng(1).uniform([0, -1], [1, 2], (500, 2))
+    true = np.sin(4 * points[:, 0] + points[:, 1])
+    seen = np.sqrt(np.mean((wavy(points)[:, 0] - true) ** 2))
+    assert seen < 3 * wavy.error[0] < 0.3
+
+
 def test_dataset_carries_bounds_and_places():
     data = propagate(model, INPUTS).to_dataset()
     assert data["lower"].dims == ("alpha", "output")
