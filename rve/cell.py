@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from numbers import Real
 
@@ -11,6 +12,7 @@ from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.truncated_normal import Array
 
 STRAIN = 0.01  # eq. 15
+IN_GPA = (0.01, 1e4)  # E that is no solid's in Pa (soft gels have 1e4) and is one's in GPa or MPa
 # eq. 15 as (ε11, ε22, 2 ε12); ε12 is the tensor component
 LOADS = np.array([[STRAIN, STRAIN, 0.0], [0.0, 0.0, 2 * STRAIN]])
 # with the third, the whole planar stiffness follows
@@ -43,6 +45,9 @@ class Phase:
             raise ValueError(
                 f"Young's modulus is {self.modulus:g} Pa; it must be positive and finite"
             )
+        if IN_GPA[0] <= self.modulus < IN_GPA[1]:
+            told = f"Young's modulus is {self.modulus:g} Pa, softer than any gel"
+            warnings.warn(f"{told}; a phase takes Pa, 1 GPa is 1e9", stacklevel=3)
         if not -1 < self.poisson < 0.5:
             raise ValueError(f"Poisson's ratio is {self.poisson:g}; it must lie inside (-1, 0.5)")
 

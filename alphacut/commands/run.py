@@ -199,8 +199,8 @@ def modulus_lines(found: Document) -> Iterator[str]:
             f" nu = {cell['nu']:.4f}"
         )
         yield from lines(cell["beside"], cell["particles"])
-        if cell["outside"]:
-            yield f"warning: {cell['outside']}"
+        if told := cell["outside"]:  # why, and the cure, was said before the run
+            yield f"warning: {told.partition(', and ')[0] if cell.get('shape') else told}"
         yield cell["publish"]
 
 

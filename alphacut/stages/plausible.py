@@ -25,6 +25,13 @@ DAMPED = (0.001, 0.2)  # of the critical damping
 MODULI = (1e5, 2e12)  # Pa, from soft gels to diamond
 BUILT = (1e9, 1e12)  # Pa, of what frames are made of
 CONTRAST = 1000.0  # between the phases
+STIFF = {
+    r"glass|\w*glas": (3e10, 1.2e11),
+    r"steel (fib\w+|wires?|balls?|shot|particles?)|stahlfasern?": (1.5e11, 2.6e11),
+    r"ceramics?|alumina|zirconia|silicon carbide|\w*keramik": (5e10, 6e11),
+}
+"""Words for materials of particles, and what their E is."""
+SOFT = {r"epox\w+|\w*resin|polymers?|polyester|\w*harz": (1e8, 1.5e10)}
 DRIFTS = (1e-5, 0.2)  # of the storey's height
 ANY = (0.0, math.inf)
 LIMITS = {"m": (1e-6, 20.0), "m/s": (1e-4, 50.0), "m/s^2": (1e-3, 500.0), "N": (1.0, 1e9)}
@@ -98,8 +105,25 @@ def unlikely_material(case: Case) -> Iterator[str]:
                 f"cell: the particle's modulus is {ratio:.3g} times the matrix's; check the units"
                 " of both, or name pores or rigid particles in the case's text"
             )
+        moduli = {name: modulus.modal for name, modulus in named.items()}
+        yield from () if meant else unlike_words(case.words, moduli)
     if (radius := case.sections.radius) and radius.a1.modal > radius.a3.modal:
         yield "radius: a1 is greater than a3, so the radius falls where θ rises; is that meant?"
+
+
+def unlike_words(words: str, moduli: dict[str, float]) -> Iterator[str]:
+    """Remarks on phases that are not what a case says: other moduli, or swapped ones."""
+    for pattern, (low, high) in (STIFF | SOFT).items():
+        found = re.search(rf"(?i)\b({pattern})\b(?P<matrix>[ -]matrix)?", words)
+        if found and not any(low <= value <= high for value in moduli.values()):
+            told = " and ".join(f"{name} {engineering(x, 'Pa')}" for name, x in moduli.items())
+            span = f"{engineering(low, 'Pa')} to {engineering(high, 'Pa')}"
+            yield f"cell: the case says {found[1]!r}, of {span}, and has {told}; check the units"
+            continue
+        swapped = pattern in STIFF and moduli["inclusion"] < moduli["matrix"]
+        if found and swapped and not found["matrix"]:
+            told = "the particles are softer than the matrix; are the phases swapped?"
+            yield f"cell: the case says {found[1]!r}, and {told}"
 
 
 def say_unlikely_material(case: Case) -> None:

@@ -11,7 +11,7 @@ from scipy.stats import kstest
 from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.io.problem import BadInput
-from alphacut.stages.material.microstructure import source
+from alphacut.stages.material.microstructure import given_sizes, source
 from alphacut.stochastic.particles.packing import Packing, _law_test
 from alphacut.stochastic.particles.radius_laws import MeasuredRadii
 
@@ -36,6 +36,13 @@ def case(tmp_path):
         "\n".join([*lines[:at], 'file = "diameters.csv"', *lines[at:]]), encoding="utf-8"
     )
     return path
+
+
+def test_slopes_of_given_sizes_say_that_their_chance_is_not_in_them(case):
+    (line,) = given_sizes(load(str(case)))
+    assert "only 300 sizes were measured is not in them" in line
+    assert "microstructure.sampling = true" in line
+    assert list(given_sizes(load(str(CONCRETE)))) == []
 
 
 def test_samples_follow_the_distribution_function_and_that_follows_the_list():

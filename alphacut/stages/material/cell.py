@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
@@ -168,9 +169,11 @@ def modal_parts(case: Case) -> tuple[CaseMap, Phase, Phase]:
 
 
 def phases_of(values: Mapping[str, float]) -> tuple[Phase, Phase]:
-    """Matrix and inclusion from the values of `INPUTS`, in SI."""
-    matrix = Phase(values["matrix_modulus"], values["matrix_poisson"])
-    return matrix, Phase(values["inclusion_modulus"], values["inclusion_poisson"])
+    """Matrix and inclusion from the values of `INPUTS`, in SI; remarks tell of odd ones."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        matrix = Phase(values["matrix_modulus"], values["matrix_poisson"])
+        return matrix, Phase(values["inclusion_modulus"], values["inclusion_poisson"])
 
 
 def modal_values(case: Case) -> dict[str, float]:

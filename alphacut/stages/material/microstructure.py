@@ -270,7 +270,9 @@ def compute(
             found = work(wanted, executor=executor, progress=progress)
         except ValueError as error:
             raise BadInput(Problem("microstructure", str(error), file=str(case.path))) from None
-    for remark in () if quiet else (*left_out(found), *crisp_slopes(fragment(found))):
+    for remark in (
+        () if quiet else (*left_out(found), *given_sizes(case), *crisp_slopes(fragment(found)))
+    ):
         say(remark)
     return found
 
@@ -330,6 +332,22 @@ def kinds(reasons: list[str]) -> Iterator[str]:
         first = reasons[kind.index(name)]
         words = "such as one that" if len(same) > 1 else "since each"
         yield f"{count} {words} {first}"
+
+
+def given_sizes(case: Case) -> Iterator[str]:
+    """A line where sizes come from a list: their chance is not in the slopes."""
+    from alphacut.stochastic.particles.radius_laws import MeasuredRadii
+
+    given = case.microstructure
+    packed = given.packing or (given.spheres if given.spheres and given.spheres.file else None)
+    if packed and packed.file:
+        law = radii_of(case, "packing" if given.packing else "spheres", packed)
+        few = f"only {len(law.values)} sizes" if isinstance(law, MeasuredRadii) else "a sieve curve"
+        yield (
+            f"a2 and a4 take the given sizes as exact: that {few} were measured is not in them, and"
+            " microstructure.sampling = true adds the chance of packings alone; to see it, run"
+            " parts of the list and widen a2 and a4 in radius.toml to hold them all"
+        )
 
 
 def crisp_slopes(fragment: str) -> Iterator[str]:

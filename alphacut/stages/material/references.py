@@ -312,10 +312,10 @@ def publish(case: Case, found: Document) -> str:
     """Which E to publish, in one sentence."""
     if case.cell.particles == "spheres":
         return "To publish: this E, the isotropic (Hill) average of spheres in a cubic array."
-    if (told := says_spheres(case)) is not None:
+    if says_spheres(case) is not None:
         return (
-            f"To publish, since {told}: E of spheres, by {taking_spheres(case)}; the E above is of"
-            " long parallel fibres, across them."
+            f"To publish: E of spheres, by {taking_spheres(case)}; the E above is of long parallel"
+            " fibres, across them."
         )
     if case.modulus.average == "isotropic":
         return (
