@@ -9,8 +9,8 @@ import numpy as np
 from alphacut.rve.cell import Phase
 from alphacut.rve.certificate import ROUND_OFF, CertificateError
 from alphacut.rve.spheres.bounds import hashin_shtrikman
-from alphacut.rve.spheres.many.random_cells import CellSample, Quantity, RandomCells
 from alphacut.stochastic.theta.truncated_normal import Array
+from benchmarks.rve.many_random_cells import CellSample, Quantity, RandomCells
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,6 @@ from alphacut.case.load import load
 from alphacut.rve.cell import Phase
 from alphacut.rve.spheres.bounds import hashin_shtrikman
 from alphacut.rve.spheres.cubic import hill_average
-from alphacut.rve.spheres.many.random_cells import SOLVER, RandomCells, limit_of_grids
 from alphacut.rve.spheres.many.stiffness import grid_stiffness
 from alphacut.rve.spheres.series.stiffness import cubic_stiffness
 from alphacut.stages.material import modulus
@@ -38,6 +37,7 @@ from alphacut.stochastic.spheres.power_cells import reduced_radii
 from alphacut.stochastic.spheres.spheres import Spheres
 from alphacut.stochastic.theta.truncated_normal import Array
 from benchmarks.rve.many_material import Declared, RandomMaterial, random_material
+from benchmarks.rve.many_random_cells import SOLVER, RandomCells, limit_of_grids
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "benchmarks" / "results"

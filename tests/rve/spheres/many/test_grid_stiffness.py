@@ -5,11 +5,11 @@ from alphacut.rve import Phase
 from alphacut.rve.spheres.bounds import bulk_and_shear
 from alphacut.rve.spheres.many import stiffness
 from alphacut.rve.spheres.many.laminate import voxel_stiffness
-from alphacut.rve.spheres.many.random_cells import limit_of_grids
 from alphacut.rve.spheres.many.stiffness import grid_stiffness, stiffness_of
 from alphacut.rve.spheres.many.voxels import Voxels
 from alphacut.rve.spheres.series.stiffness import cubic_stiffness
 from alphacut.stochastic.spheres.spheres import Spheres
+from benchmarks.rve.many_random_cells import limit_of_grids
 
 MATRIX, STIFF = Phase(20e9), Phase(80e9)
 

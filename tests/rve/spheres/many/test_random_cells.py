@@ -4,7 +4,6 @@ import pytest
 from alphacut.rve import Phase
 from alphacut.rve.certificate import CertificateError
 from alphacut.rve.spheres.bounds import hashin_shtrikman
-from alphacut.rve.spheres.many.random_cells import CellSample, RandomCells, smooth_odd
 from alphacut.stochastic.errors import RefusedError
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 from alphacut.stochastic.spheres.packing import SpherePacking
@@ -15,6 +14,7 @@ from benchmarks.rve.many_material import (
     isotropic_young,
     random_material,
 )
+from benchmarks.rve.many_random_cells import CellSample, RandomCells, smooth_odd
 
 MATRIX, STIFF = Phase(20e9), Phase(80e9)
 LAW = LogNormalRadii(1e-3, 1e-2)
