@@ -79,7 +79,12 @@ def _of(section: Section, name: str, case: Case) -> Iterator[Reading]:
         for one, places in _alike(listed):
             more = f" to {places[-1]}" if len(places) > 1 else ""
             full = f"{name}.{key}" + (f" {places[0]}{more}" if len(listed) > 1 else "")
-            yield Reading(full, *_shape(one), about.unit, "" if given else " (default)")
+            yield Reading(
+                full,
+                *_shape(one),
+                about.unit,
+                "" if given else " (default); second_moment is of one",
+            )
 
 
 def _alike(listed: Sequence[object]) -> Iterator[tuple[FuzzyNumber, Sequence[int]]]:

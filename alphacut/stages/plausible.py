@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from statistics import median_low
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from alphacut.case.case import Case
 from alphacut.case.limits import storey_height
 from alphacut.case.names import structures
@@ -17,11 +19,17 @@ from alphacut.io.units import engineering
 
 if TYPE_CHECKING:
     from alphacut.frame import Accelerogram
+    from alphacut.stages.vibration.structure import Structure
 
 PERIODS = (0.05, 15.0)  # s, from a stiff machine frame to the slenderest towers
-STOREYS = {"masses": "kg", "lengths": "m", "second_moment": "m^4", "stiffness": "N/m"}
-APART = 100.0  # of a storey's value from the median of all
+SLOW = 3.0  # s of the first period for each storey of a frame
+# unit, and how far a storey's value may be from the median of all
+STOREYS = {"masses": ("kg", 50), "lengths": ("m", 8), "second_moment": ("m^4", 100)}
+STOREYS |= {"stiffness": ("N/m", 50)}
+FLOORS = (0.01, 1e7)  # kg
+SPREAD = 0.002  # of a fuzzy value, that of measurements of a laboratory
 DAMPED = (0.001, 0.2)  # of the critical damping
+MOST_DAMPED = 0.5  # the same of dampers, some of which are made to
 MODULI = (1e5, 2e12)  # Pa, from soft gels to diamond
 BUILT = (1e9, 1e12)  # Pa, of what frames are made of
 CONTRAST = 1000.0  # between the phases
@@ -32,16 +40,18 @@ STIFF = {
 }
 """Words for materials of particles, and what their E is."""
 SOFT = {r"epox\w+|\w*resin|polymers?|polyester|\w*harz": (1e8, 1.5e10)}
-DRIFTS = (1e-5, 0.2)  # of the storey's height
+DRIFTS = (1e-4, 0.1)  # of the storey's height
+SHEARS = (0.002, 20.0)  # of the weight of a frame
 ANY = (0.0, math.inf)
-LIMITS = {"m": (1e-6, 20.0), "m/s": (1e-4, 50.0), "m/s^2": (1e-3, 500.0), "N": (1.0, 1e9)}
+LIMITS = {"m": (1e-6, 20.0), "m/s": (1e-4, 50.0), "m/s^2": (1e-3, 50.0), "N": (1.0, 1e9)}
 DESIGNED = (0.5, 15.0)  # m/s², of records that structures are designed for
 PEAKS = (0.003, 30.0)  # m/s², of the ground, from the weakest record to the strongest
 
 
 def unlikely(case: Case, ground: Accelerogram | None, period: float | None) -> Iterator[str]:
     """Remarks on values of which one has most likely the wrong unit."""
-    if period is not None and not PERIODS[0] <= period <= PERIODS[1]:
+    floors = len(case.frame.masses) if case.sections.frame else math.inf
+    if period is not None and not PERIODS[0] <= period <= min(PERIODS[1], SLOW * floors):
         yield (
             f"{part(case)}: a first natural period of {period:.3g} s is unusual for a structure;"
             " check the units of masses, lengths and moduli"
@@ -53,6 +63,22 @@ def unlikely(case: Case, ground: Accelerogram | None, period: float | None) -> I
             yield f"{record_key(case)}: {told}; check the unit in its header"
 
 
+def overdamped(case: Case, wanted: Structure) -> Iterator[str]:
+    """A remark on dampers or factors of Rayleigh that hardly let a structure vibrate."""
+    from scipy.linalg import eigh
+
+    from alphacut.frame.structures.linear import evaluate
+
+    if wanted.linear is None:
+        return
+    given = evaluate(wanted.linear, (), np.zeros((1, 0)), derivatives=False)[0]
+    squares, shapes = eigh(given.stiffness.value[0], given.mass.value[0])
+    ratio = shapes[:, 0] @ given.damping.value[0] @ shapes[:, 0] / (2 * squares[0] ** 0.5)
+    if ratio > MOST_DAMPED:
+        told = f"the slowest mode is damped by {ratio:.3g} of the critical damping"
+        yield f"{part(case)}: {told}, unusual for a structure; check the unit of its damping"
+
+
 def odd(case: Case) -> Iterator[str]:
     """Remarks on moduli of a structure and on limits that most likely have the wrong unit."""
     from alphacut.frame.outputs import output_unit
@@ -60,23 +86,32 @@ def odd(case: Case) -> Iterator[str]:
     for one in readings(case):
         if one.unit == "Pa" and one.key.startswith(("frame.", "tower.")):
             yield from unlike(one.key, one.values[0], one.unit, BUILT, "a frame")
+        if one.key.startswith("frame.masses"):
+            yield from unlike(one.key, one.values[0], one.unit, FLOORS, "a floor")
+        width = abs(one.values[-1] - one.values[0]) if one.values else 0.0
+        if one.key.startswith(("frame.", "tower.")) and 0 < width < SPREAD * abs(one.values[-1]):
+            share = f"{100 * width / abs(one.values[-1]):.2g} %"
+            yield f"{one.key}: a width of {share} is unusually small; is its percentage right?"
         for end in one.values[:: len(one.values) - 1 or 1] if "damping_ratio" in one.key else ():
             if one.values[-1] > 0:  # 0 leaves a structure undamped
                 yield from unlike(one.key, end, "", DAMPED, "a damping ratio")
     for section, output, value in limits(case):
         height, unit = storey_height(case, output), output_unit(output)
         usual = (DRIFTS[0] * height, DRIFTS[1] * height) if height else LIMITS.get(unit, ANY)
+        if unit == "N" and case.sections.frame:
+            weight = 9.81 * sum(number.modal for number in case.frame.masses)
+            usual = SHEARS[0] * weight, SHEARS[1] * weight
         yield from unlike(f"{section}: the limit of {output}", value, unit, usual, "one")
 
 
 def strangers(case: Case) -> Iterator[str]:
     """Remarks on values of one storey that are of another order than those of the others."""
     given = case.sections.frame
-    for name, unit in STOREYS.items() if given else ():
+    for name, (unit, apart) in STOREYS.items() if given else ():
         values = [number.modal for number in getattr(given, name) or ()]
         for storey, value in enumerate(values, start=1):
             middle = median_low(values)
-            if not 1 / APART < value / middle < APART:
+            if not 1 / apart < value / middle < apart:
                 told = f"{engineering(value, unit)} is {value / middle:.3g} times the median of"
                 yield f"frame.{name} {storey}: {told} all storeys; check its unit"
 

@@ -89,6 +89,7 @@ def ready(case: Case) -> Readiness:
         *plausible.unlikely_material(case),
         *outlasted(case, ground),
         *slips,
+        *plausible.overdamped(case, wanted),
         *fine_steps(case, wanted),
         *unproved(case, wanted),
     )

@@ -153,7 +153,9 @@ def test_what_a_unit_most_likely_spoilt_is_remarked_on(change, peak, remark, tmp
 
 
 def test_a_default_that_changes_the_stiffness_is_told(tmp_path, capfd):
-    assert "\nframe.columns: 2 (default)\n" in steel(tmp_path, ("columns = 8\n", ""), capfd=capfd)
+    assert "\nframe.columns: 2 (default); second_moment is of one\n" in steel(
+        tmp_path, ("columns = 8\n", ""), capfd=capfd
+    )
     assert "is unusual" not in steel(tmp_path, ("columns = 8\n", "p_delta = true\n"), capfd=capfd)
 
 
@@ -204,3 +206,34 @@ def test_steps_without_need_are_counted_and_a_longer_one_is_named(tmp_path, capf
     told = steel(tmp_path, short, capfd=capfd)
     assert re.search(r"envelope.step: 1.00 µs makes [\d,]+ steps, [\d,]+ of them in the s", told)
     assert re.search(r"shortest natural period; [\d.]+ .s is fine enough", told)
+
+
+EI = 'columns = 8\nsecond_moment = "25170 cm^4"\nmodulus = "210 GPa"'
+RATIO = 'damping_ratio = "[2, 4] %"'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "remark"),
+    [
+        (EI, 'stiffness = "40 kN/m"', "frame: a first natural period of 7.19 s is unusual"),  # MN
+        (
+            '"20 t", "20 t"',
+            '"20000 t", "20000 t"',
+            "frame.masses 1 to 2: 2e+07 kg is unusual for a floor",
+        ),  # kg
+        ('"25170 cm^4"', '"25170 mm^4"', "natural period of 13.2 s is unusual"),
+        ('["3.5 m"]', '["3.5 m", "3.5 cm"]', "frame.lengths 1: 3.500 m is 100 times the median"),
+        ('["3.5 m"]', '["3.5 m", "35 cm"]', "frame.lengths 1: 3.500 m is 10 times the median"),
+        ("<= 0.5 %", "<= 0.5 m", "the limit of drift1: 500.0 mm is unusual"),  # a share
+        ("<= 0.5 %", "<= 0.005 %", "the limit of drift1: 175.0 µm is unusual"),  # a fraction
+        ("a2 <= 1 g", "a2 <= 10 g", "the limit of a2: 98.07 m/s^2 is unusual"),  # m/s²
+        ("a2 <= 1 g", "base_shear <= 90 N", "the limit of base_shear: 90.00 N is unusual"),  # kN
+        ("a2 <= 1 g", "base_shear <= 90 MN", "the limit of base_shear: 90.00 MN is unusual"),
+        ("210 GPa", "210 GPa ± 0.05 %", "frame.modulus: a width of 0.1 % is unusually small"),
+        (RATIO, f'{RATIO}\nrayleigh_stiffness = "2 s"', "the slowest mode is damped by 47"),  # ms
+        (RATIO, f'{RATIO}\ndampers = "9 MN s/m"\ndamper_placement = "storey"', "mode is damped by"),
+    ],
+)
+def test_slips_of_an_engineer_are_remarked_on(old, new, remark, tmp_path, capfd):
+    assert "unusual" not in steel(tmp_path, capfd=capfd)
+    assert remark in steel(tmp_path, (old, new), capfd=capfd)
