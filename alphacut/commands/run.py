@@ -210,7 +210,13 @@ def image_lines(found: Document) -> Iterator[str]:
         cuts = picture["cuts"]["E_GPa"]
         yield (
             f"E = [{cuts['lower'][-1]:.4f}, {cuts['upper'][-1]:.4f}] GPa, support"
-            f" [{cuts['lower'][0]:.4f}, {cuts['upper'][0]:.4f}] GPa, {picture['nature']}"
+            f" [{cuts['lower'][0]:.4f}, {cuts['upper'][0]:.4f}] GPa, {picture['nature']};"
+            f" nu = [{picture['nu']['lower']:.4f}, {picture['nu']['upper']:.4f}]"
+        )
+        ends = picture["grains_E_GPa"]
+        yield (
+            "Hashin–Shtrikman bounds of E if the particles are grains:"
+            f" [{ends['lower']:.4f}, {ends['upper']:.4f}] GPa"
         )
 
 

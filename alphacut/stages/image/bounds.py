@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
 
+from alphacut.io.files import say
 from alphacut.io.progress import Tick
 from alphacut.rve.image.gap import constitutive_gap
 from alphacut.rve.image.model import ImageCut, ImageModel, reduced_to_pixels
@@ -78,6 +80,13 @@ class FuzzyImage:
         return reduced_to_pixels(pixels, self.model.parts)
 
 
+def solutions(study: ImageStudy) -> int:
+    """Pairs of solutions for bounds: at the modal values, on levels, and for each fuzzy source."""
+    sources = study.fuzzy_threshold + study.fuzzy_phases
+    window = study.model.boundary == "window"
+    return 1 + (len(study.alpha) + sources if sources else 0) + 2 * window
+
+
 def compute(study: ImageStudy, *, progress: Tick | None = None) -> FuzzyImage:
     """Bounds at every level, and what widens them.
 
@@ -88,18 +97,27 @@ def compute(study: ImageStudy, *, progress: Tick | None = None) -> FuzzyImage:
     began = perf_counter()
     tick = progress or (lambda share: None)
     modal = study.images(None, None)
-    done = [0.0]
+    done, first = [0.0], [math.inf]
+    count = solutions(study)
 
     def told(share: float) -> None:
         done[0] = share
         tick(share)
 
-    watched = replace(study.model.solver, watch=lambda: tick(done[0]))
+    def still() -> None:  # the time of the first solution tells how far the others are
+        spent = (perf_counter() - began) / first[0] / count
+        tick(max(done[0], min(spent, 0.99)))
+
+    watched = replace(study.model.solver, watch=still)
     start = replace(study.model, solver=watched)
     if study.random is not None:  # many images: pixels are divided only where that is asked for
         start = replace(start, division=start.parts)
     model, crisp = start.refined(modal)
-    told(0.3)
+    told(0.3 if study.random is not None else 1 / count)
+    first[0] = perf_counter() - began
+    if progress is not None and count > 1 and study.random is None:
+        pixels = f"image of {modal.bulk[0].size} pixels: {count} pairs of solutions, the first"
+        say(f"{pixels} took {first[0]:.0f} s, all about {count * first[0]:.0f} s or more")
     random = None if study.random is None else responses(study, model, study.random)
     if random is not None:
         cuts = random.cuts
@@ -107,7 +125,7 @@ def compute(study: ImageStudy, *, progress: Tick | None = None) -> FuzzyImage:
     else:
         levels = [study.images(level, level) for level in study.alpha]
         cuts = tuple(model.cuts(levels, (modal, crisp)))
-        told(0.7)
+        told(max(0.7, done[0]))
 
         def alone(threshold: Level, phases: Level) -> float:
             images = study.images(threshold, phases)

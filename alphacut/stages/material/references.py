@@ -311,7 +311,11 @@ def over_support(found: Document) -> str:
 def publish(case: Case, found: Document) -> str:
     """Which E to publish, in one sentence."""
     if case.cell.particles == "spheres":
-        return "To publish: this E, the isotropic (Hill) average of spheres in a cubic array."
+        return (
+            "To publish: this E, the isotropic (Hill) average of spheres in a cubic array. What one"
+            " cubic cell misses of many random spheres is not in its error: 0.44 % at a fraction of"
+            " 0.21 (benchmarks.rve.many_spheres), more where they are denser or stiffer."
+        )
     if says_spheres(case) is not None:
         return (
             f"To publish: E of spheres, by {taking_spheres(case)}; the E above is of long parallel"

@@ -71,6 +71,17 @@ def test_the_keys_of_the_result(folder, capfd):
     assert found["seconds"] > 0
 
 
+def test_the_cost_of_fuzzy_phases_is_told_before_and_nu_with_the_bounds_after(folder, capfd):
+    case = written(folder, modulus='["20 GPa", "[75, 80, 85] GPa"]')
+    assert main(["run", case, "--out", str(folder / "out"), "--no-figures"]) == 0
+    told = capfd.readouterr()
+    assert "image of 1024 pixels: 5 pairs of solutions, the first took" in told.err
+    assert "; nu = [0." in told.out
+    assert "Hashin–Shtrikman bounds of E if the particles are grains: [" in told.out
+    assert main(["image", written(folder, threshold="[130]")]) == 0
+    assert "pairs of solutions" not in capfd.readouterr().err
+
+
 def test_bulk_and_shear_moduli_say_the_same_as_young_and_poisson(folder, capfd):
     young = solved(folder, capfd, threshold="[130]")
     bulk = solved(

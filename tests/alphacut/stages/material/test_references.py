@@ -22,7 +22,7 @@ from alphacut.rve.spheres import bounds as space
 from alphacut.stages import summary
 from alphacut.stages.material.cell import cell_inputs, modal_parts, parts
 from alphacut.stages.material.modulus import read_number
-from alphacut.stages.material.references import beside, bounds_over_cuts, lines, references
+from alphacut.stages.material.references import beside, bounds_over_cuts, lines, publish, references
 from alphacut.stages.material.spheres import unmeasured
 from alphacut.stochastic import HermiteMap, RadiusMap
 from benchmarks.stochastic.averages import Isotropic
@@ -288,3 +288,9 @@ def test_measured_particles_of_spheres_are_warned_of_before_the_run(tmp_path: Pa
     (told,) = unmeasured(load(polymer(tmp_path)))
     assert "whose E is lower than that of stiffer spheres" in told
     assert not list(unmeasured(load(polymer(tmp_path), ["cell.particles=cylinders"])))
+
+
+def test_e_of_spheres_says_what_is_not_in_its_error() -> None:
+    case = SimpleNamespace(cell=SimpleNamespace(particles="spheres"))
+    told = publish(case, {})  # type: ignore[arg-type]
+    assert "What one cubic cell misses of many random spheres is not in its error: 0.44 %" in told
