@@ -11,7 +11,7 @@ import pytest
 from alphacut.report.material import discs
 from alphacut.stages.material.micrograph import compared, fractions
 from alphacut.stochastic.particles.annotation import cropped, rectangles
-from alphacut.stochastic.particles.image import MISFIT, STRANGERS, UNEVEN, SectionImage
+from alphacut.stochastic.particles.image import LIGHT, MISFIT, STRANGERS, UNEVEN, SectionImage
 
 SIDE = 300
 
@@ -127,8 +127,10 @@ def test_slow_light_is_evened_whatever_its_shape_and_named_where_strong(light, s
 
 def test_light_that_no_smooth_surface_follows_is_named():
     picture = section(np.random.default_rng(), count=40)
-    picture[:, SIDE // 2 :] += 70  # two pictures side by side
-    read = SectionImage("step.png", 1.0, "bright", drop=True).circles(picture)
+    for part in (np.s_[: SIDE // 2, SIDE // 2 :], np.s_[SIDE // 2 :, : SIDE // 2]):
+        picture[part] += 50  # four pictures side by side
+    read = SectionImage("seams.png", 1.0, "bright", drop=True).circles(picture)
+    assert read.light < LIGHT
     assert read.unevenness > UNEVEN
 
 
