@@ -71,6 +71,7 @@ def cheapest_tolerances(
         found = safe_scale(function, nominal, box, limits, most=top, tolerance=tolerance)
         if not found.safe or not np.isfinite(found.unsafe):
             why = "no tolerance is safe" if not found.safe else "no limit is ever reached"
+            why += f"; size {found.failure}: take a smaller most" if found.failure else ""
             raise ValueError(f"tolerances up to {top:g} times {box}: {why}")
         safe: Array = found.safe * shape
         return safe, found.unsafe / found.safe
@@ -93,8 +94,10 @@ def cheapest_tolerances(
 
 
 def _require(nominal: Mapping[str, float], costs: Mapping[str, float]) -> None:
-    if not costs or not set(costs) <= set(nominal):
-        raise ValueError(f"the costs name {', '.join(costs)}; inputs are {', '.join(nominal)}")
+    unknown = [name for name in costs if name not in nominal]
+    if not costs or unknown:
+        named = ", ".join(unknown) or "nothing"
+        raise ValueError(f"the costs name {named}; inputs are {', '.join(nominal)}")
     if not all(x > 0 and np.isfinite(x) for x in costs.values()):
         raise ValueError(f"the costs are {dict(costs)}; they must be positive")
     if zero := [name for name in costs if nominal[name] == 0]:

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from alphacut.fuzzy.arguments import fuzzy_inputs
+from alphacut.fuzzy.campaign.campaign import CampaignError
 from alphacut.fuzzy.counted import counted, ranged
 from alphacut.fuzzy.decisions.nested_boxes import ByLevel, Scaled, Threshold, Verdict, threshold
 from alphacut.fuzzy.html import html_table
@@ -58,11 +59,29 @@ class Limited:
         inputs = {
             name: Interval(low, high) if high > low else Crisp(low) for name, low, high in ends
         }
-        plan, arrays = BranchAndBound(self.function, self.precision, self.budget), self.vectorised
-        found = propagate(
-            self.function, inputs, plan, alpha=[1.0], vectorised=arrays, progress=False
-        )
+        plan, arrays = BranchAndBound(self._limited, self.precision, self.budget), self.vectorised
+        try:
+            found = propagate(
+                self._limited, inputs, plan, alpha=[1.0], vectorised=arrays, progress=False
+            )
+        except CampaignError as error:
+            if not (upper > lower).any():
+                raise
+            return Verdict(False, runs=error.total, failure=str(error).partition(": ")[2])
         return replace(self._verdict(found), runs=found.runs)
+
+    @cached_property
+    def _limited(self) -> Callable[..., object]:
+        """The outputs that have limits: bounds of others would take time and decide nothing."""
+        function, asked = self.function, tuple(self.limits)
+        if "y" in asked or any("[" in name for name in asked):
+            return function  # which may give its values without their names
+
+        def limited(**point: object) -> object:
+            found = function(**point)
+            return {name: found[name] for name in asked}  # type: ignore[index]
+
+        return limited
 
     def _verdict(self, found: FuzzyResult) -> Verdict:
         proved = (found.upper if self.sign > 0 else -found.lower)[0]
@@ -174,7 +193,7 @@ def decide(
     domain = Domain(fuzzy_inputs(inputs), levels(4) if alpha is None else alpha)
     sides = [(limits, 1), *(({name: limit}, -1) for name, limit in limits.items())]
     family, parts, found = ByLevel(domain), 1 + len(sides), []
-    arrays = takes_arrays(function, domain.names, *family.at(1.0))
+    arrays = takes_arrays(function, domain.names, *family.at(1.0), limits)
     with told(progress) as tell:
         whole = propagate(
             function,
@@ -184,8 +203,6 @@ def decide(
             vectorised=arrays,
             progress=part(tell, 0, parts),
         )
-        for name in limits:
-            whole.column(name)
         for turn, (asked, sign) in enumerate(sides, 1):
             judge = Limited(function, domain.names, asked, sign, budget=budget, vectorised=arrays)
             tick = part(tell, turn, parts) or None
@@ -207,12 +224,17 @@ def decide(
 
 
 def takes_arrays(
-    function: Callable[..., object], names: Sequence[str], lower: Array, upper: Array
+    function: Callable[..., object],
+    names: Sequence[str],
+    lower: Array,
+    upper: Array,
+    limits: Limits,
 ) -> bool:
     """Whether a function gives for arrays of points what it encloses; else it is run by points.
 
     Raises:
-        ValueError: It cannot be enclosed, so that nothing of it can be proved.
+        ValueError: It cannot be enclosed, so that nothing of it can be proved, or a limit names no
+            output.
     """
     points = np.stack([lower, upper])
     try:
@@ -220,6 +242,9 @@ def takes_arrays(
     except ValueError as error:
         what = f"{error}; of any other function `propagate` estimates bounds to set beside a limit"
         raise ValueError(f"nothing is proved: {what}") from None
+    for name in limits:
+        if name not in found:
+            raise ValueError(f"limit '{name}' names no output; there are {', '.join(found)}")
     try:
         given = function(**dict(zip(names, points.T, strict=True)))
         values = given.values() if isinstance(given, Mapping) else [given]
@@ -260,8 +285,10 @@ def safe_scale(
         progress: As for `propagate`.
 
     Raises:
-        ValueError: A number is not finite, a tolerance is negative or names no input, or the
-            function cannot be enclosed.
+        CampaignError: The function has no value at the nominal inputs. Where it has none in a
+            larger box, that one counts as unproved, and `failure` says where.
+        ValueError: A number is not finite, a tolerance is negative or names no input, a limit
+            names no output, or the function cannot be enclosed.
     """
     limits = finite_by_name("limits", limits, "{'y': 4.5}")
     nominal = finite_by_name("nominal values", nominal, "{'x': 1.0}")
@@ -280,7 +307,7 @@ def safe_scale(
             f"the tolerances are {dict(tolerances)}; they must be 0 or greater, finite"
         )
     family = Scaled(np.array([*nominal.values()], float), pairs[:, 0], pairs[:, 1])
-    arrays = takes_arrays(function, tuple(nominal), *family.at(1.0))
+    arrays = takes_arrays(function, tuple(nominal), *family.at(0.0), limits)
     judge = Limited(function, tuple(nominal), limits, budget=budget, vectorised=arrays)
     with told(progress) as tell:
         found = threshold(family, judge, most=most, tolerance=tolerance, progress=tell)

@@ -24,6 +24,7 @@ from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.knowledge.joint import joined_once
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.plan import Plan
+from alphacut.fuzzy.plans.transformation import Reduced
 from alphacut.fuzzy.progress_bar import Progress, part, told
 from alphacut.fuzzy.propagation import propagate
 from alphacut.fuzzy.samples.result import FuzzyResult
@@ -192,6 +193,10 @@ def measure_next(
         nullcontext(executor) if executor else pool(workers) as running,
         kept_on_interrupt(store, identity),
     ):
+        modal = {name: Crisp(number.modal) for name, number in numbers.items()}
+        how = {"vectorised": vectorised, "executor": running, "store": store, "identity": identity}
+        one = propagate(function, modal, Reduced(), alpha=[1.0], progress=False, **how)  # type: ignore[arg-type]
+        _width(one, output)  # which refuses a wrong output after one sample
 
         def answer(changed: Mapping[str, FuzzyNumber]) -> tuple[float, float]:
             found = propagate(
@@ -200,10 +205,7 @@ def measure_next(
                 plan,
                 alpha=[1.0],
                 known=known,
-                vectorised=vectorised,
-                executor=running,
-                store=store,
-                identity=identity,
+                **how,  # type: ignore[arg-type]
                 progress=part(tell, next(done), answers),
             )
             return _width(found, output)

@@ -82,11 +82,13 @@ class Verdict:
         safe: Whether the limits are proved to hold in all of the box.
         witness: A point where one does not hold, shape (inputs,); None where none is known.
         runs: Samples of the function that this took.
+        failure: Where the function has no value in it, in words; empty where none was found.
     """
 
     safe: bool
     witness: Array | None = None
     runs: int = 0
+    failure: str = ""
 
 
 Judge = Callable[[Array, Array], Verdict]
@@ -102,6 +104,8 @@ class Threshold:
         witness: The point that breaks a limit, shape (inputs,), or None.
         judged: Boxes that were judged.
         runs: Samples of the function that this took.
+        failure: Without a witness the least size whose box was found to hold a point where the
+            function has no value, and that point, in words; else empty.
     """
 
     safe: float | None
@@ -109,6 +113,7 @@ class Threshold:
     witness: Array | None
     judged: int
     runs: int = 0
+    failure: str = ""
 
     @property
     def gap(self) -> float:
@@ -131,6 +136,8 @@ class Threshold:
         if self.witness is not None:
             at = ", ".join(f"{x:.6g}" for x in self.witness)
             rows.append(("unsafe from", f"{self.unsafe:.9g}, at ({at})"))
+        if self.failure:
+            rows.append(("the function has no value in the box of size", self.failure))
         return [*rows, ("boxes judged", f"{self.judged}, with {counted(self.runs, 'run')}")]
 
 
@@ -161,7 +168,7 @@ def threshold(
             f"most, tolerance and limit are {most:g}, {tolerance:g}, {limit}; they must be positive"
         )
     last, first = judge(*family.at(most)), judge(*family.at(0.0))
-    runs = last.runs + first.runs
+    runs, failure = last.runs + first.runs, _failing(most, last)
     if last.safe:
         return Threshold(most, np.inf, None, 2, runs)
     if first.witness is not None or not (first.safe or last.witness is not None):
@@ -186,9 +193,15 @@ def threshold(
             unsafe, witness = min(family.size_of(found.witness), middle), found.witness
         else:
             undecided.append(middle)
+            failure = _failing(middle, found) or failure
         undecided = [size for size in undecided if safe < size < unsafe]
         if progress:  # each box halves what is open, down to the tolerance
             left = max((min(unsafe, most) - safe) / most, tolerance)
             progress(max(judged / limit, float(np.log(left) / min(np.log(tolerance), -1e-9))))
     least = None if safe == 0 and not first.safe else safe
-    return Threshold(least, unsafe, witness, judged, runs)
+    return Threshold(least, unsafe, witness, judged, runs, failure if witness is None else "")
+
+
+def _failing(size: float, found: Verdict) -> str:
+    """Size of a box and where in it the function has no value; empty where none was found."""
+    return f"{size:.6g}, {found.failure}" if found.failure else ""

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from alphacut.fuzzy import Triangular, from_data
+from alphacut.fuzzy.campaign.campaign import CampaignError
 from alphacut.fuzzy.decisions.limits import decide, safe_scale
 from alphacut.fuzzy.decisions.nested_boxes import Scaled, Verdict, threshold
 
@@ -37,8 +38,35 @@ def test_an_extreme_inside_decides():
 def test_any_of_several_limits_decides():
     both = decide(lambda x: {"a": x, "b": -x}, {"x": X}, {"a": 1.8, "b": -0.3})
     assert both.possibility == pytest.approx((0.3, 0.3), abs=1e-6)  # b: x < 0.3
-    with pytest.raises(ValueError, match="there is no output 'c'; there are a, b"):
-        decide(lambda x: {"a": x, "b": -x}, {"x": X}, {"c": 1})
+
+
+def test_a_limit_of_no_output_is_refused_and_not_dropped():
+    function = lambda x: {"w": x, "s": -x}  # noqa: E731
+    for asked in ({"S": 1.0}, {"w": 1.8, "S": 1.0}):
+        with pytest.raises(ValueError, match=r"^limit 'S' names no output; there are w, s$"):
+            decide(function, {"x": X}, asked)
+        with pytest.raises(ValueError, match=r"^limit 'S' names no output; there are w, s$"):
+            safe_scale(function, {"x": 1}, {"x": 0.1}, asked)
+
+
+def test_outputs_without_a_limit_cost_nothing():
+    def both(x, y):
+        return {"w": x + y, "s": np.sin(9 * x * y) * np.cos(7 * x - y)}
+
+    at, reach = {"x": 1, "y": 1}, {"x": 0.3, "y": 0.2}
+    alone = safe_scale(lambda x, y: x + y, at, reach, {"y": 2.4})
+    beside = safe_scale(both, at, reach, {"w": 2.4})
+    assert (beside.safe, beside.unsafe, beside.runs) == (alone.safe, alone.unsafe, alone.runs)
+
+
+def test_a_box_where_the_function_has_no_value_is_not_safe_and_a_smaller_one_is():
+    root = safe_scale(lambda x: np.sqrt(x), {"x": 1}, {"x": 0.5}, {"y": 9}, tolerance=1e-6)
+    assert root.safe == pytest.approx(2, abs=1e-4)
+    assert root.safe <= 2
+    assert "the function has no value in the box of size 2" in str(root)
+    assert "x = -" in str(root)
+    with pytest.raises(CampaignError, match="at x = -1"):
+        safe_scale(lambda x: np.sqrt(x), {"x": -1}, {"x": 0.5}, {"y": 9})
 
 
 def test_claims_make_the_possibility_a_bound_of_the_probability():

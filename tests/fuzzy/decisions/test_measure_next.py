@@ -182,3 +182,17 @@ def test_an_interruption_counts_the_samples_of_all_answers(tmp_path):
     del calls[:]
     with pytest.raises(KeyboardInterrupt, match="none of the samples is kept"):
         measure_next(stopped, inputs, Reduced())
+
+
+def test_a_wrong_output_is_refused_after_one_sample():
+    calls = []
+
+    def function(x, y):
+        calls.append(x)
+        return {"a": x + y, "b": x * y}
+
+    inputs = {"x": Triangular(0, 1, 2), "y": Triangular(0, 1, 2)}
+    for output in ("A", None):
+        with pytest.raises(ValueError, match="a, b"):
+            measure_next(function, inputs, output=output)
+    assert len(calls) <= 2 + 2  # the one sample, and whether it gives the same again
