@@ -55,7 +55,7 @@ def decided(summary: Document, folder: Path) -> Markup:
             low, high = margin["lower"], margin["upper"]
             margins = [between(low[k], high[k], unit, largest) for k in (0, -1)]
         degrees = (decision.degree(*one[kind]) for kind in ("possibility", "necessity"))
-        verdict = f"{one['verdict']} ({decision.worth(found, name)})"
+        verdict = f"{decision.verdict_of(found, name)} ({decision.worth(found, name)})"
         rows.append((of, allowed, *degrees, verdict, *margins))
     levels = (f"margin at α = {found['alpha'][level]:g}" for level in (0, -1))
     head = ("magnitude of", "limit", "possibly exceeded", "necessarily", "verdict", *levels)

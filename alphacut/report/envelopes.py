@@ -98,12 +98,13 @@ def peaks(summary: Document) -> Markup:
     largest = largest_by_unit((of["upper"][0], unit) for _, _, unit, of in each)
     rows = [(name, output, *peak_row(of, unit, largest[unit])) for name, output, unit, of in each]
     words = paragraphs(
-        "The peak is the largest magnitude of an output over the motion. The least peak on the"
-        " lowest level lies between two values: a bound, and the least one among some motions"
-        f" tried. All are peaks at the nodes{each_step(summary)}: at these no motion peaks higher"
-        " than the greatest where the bounds are guaranteed; others are worth what their nature"
-        " says. What a peak between two nodes may add is the last column but one, which falls with"
-        " the square of the step."
+        "The peak is the largest magnitude of an output over the motion. On each level it lies"
+        " between the least peak, a bound that no motion's falls below, and the greatest. Motions"
+        " may all peak higher than that bound; the least among some motions tried tells how far it"
+        f" may be from attained. All are peaks at the nodes{each_step(summary)}: at these no"
+        " motion peaks higher than the greatest where the bounds are guaranteed; others are"
+        " worth what their nature says. What a peak between two nodes may add is the column of"
+        " errors, which falls with the square of the step."
     )
     limit = Markup("")
     if "exceedance" in summary:
@@ -114,10 +115,11 @@ def peaks(summary: Document) -> Markup:
     head = (
         "study",
         "output",
-        f"least peak {low}",
+        f"least peak {low} (bound)",
+        "least of motions tried",
         f"greatest {low}",
         "between nodes and by error, up to",
-        f"peak {high}",
+        f"peak {high} (bounds)",
     )
     told = claims(summary["envelopes"])
     shown = Markup("<h3>Peaks</h3>") + words + table(head, rows, numbers=2) + told
@@ -139,11 +141,12 @@ def claims(studies: Document) -> Markup:
 
 
 def peak_row(of: Document, unit: str, largest: float) -> Iterator[str]:
-    """Peak: where the least and the greatest lie, the error, and both on the highest level."""
-    yield between(of["lower"][0], of["tried" if "tried" in of else "lower"][0], unit, largest)
+    """Peak: its least, that of motions tried, its greatest, the error, and the highest level's."""
+    yield engineering(of["lower"][0], unit, beside=largest)
+    yield engineering(of["tried"][0], unit, beside=largest) if "tried" in of else "none tried"
     yield engineering(of["upper"][0], unit, beside=largest)
     yield engineering(of["error"][0], unit, digits=2) if "error" in of else "not estimated"
-    yield between(of["tried" if "tried" in of else "lower"][-1], of["upper"][-1], unit, largest)
+    yield between(of["lower"][-1], of["upper"][-1], unit, largest)
 
 
 def between(lower: float, upper: float, unit: str, largest: float) -> str:

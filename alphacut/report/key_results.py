@@ -12,7 +12,7 @@ from alphacut.io.units import engineering, largest_by_unit
 from alphacut.report import envelopes
 from alphacut.report.tables import paragraphs, section, sentence, table
 from alphacut.stages.vibration import exceedance as outcomes
-from alphacut.stages.vibration.decision import degree, worth
+from alphacut.stages.vibration.decision import degree, verdict_of, worth
 from alphacut.stages.vibration.studies import fixed_line
 
 Line = tuple[str, str, str, str]
@@ -133,4 +133,4 @@ def decisions(summary: Document) -> Iterator[Line]:
         if (margin := found["margins"].get(name)) is not None:
             limit = engineering(margin["limit"], margin["unit"])
             of = f"|{margin.get('output', name)}| beyond {limit}"
-        yield of, one["verdict"], possible, worth(found, name)
+        yield of, verdict_of(found, name), possible, worth(found, name)

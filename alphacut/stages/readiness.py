@@ -20,7 +20,7 @@ from alphacut.stages.material.references import mean_share
 from alphacut.stages.vibration import update
 from alphacut.stages.vibration.envelope_task import task_of
 from alphacut.stages.vibration.provable import estimated_reason, too_many, unproved_reason
-from alphacut.stages.vibration.resolution_checks import rough
+from alphacut.stages.vibration.resolution_checks import rough, wanted_errors
 from alphacut.stages.vibration.structure import Structure, structure
 from alphacut.stages.vibration.studies import fixed_line, left_out, studies
 
@@ -247,6 +247,7 @@ def motion(case: Case, wanted: Structure) -> Iterator[str]:
     tasks = [study.task for study in studies(case)]
     named = {name: number for task in tasks for name, number in wanted.inputs(task.fuzzy).items()}
     yield from fixed_line(left_out(wanted, tasks))
+    yield from dict.fromkeys(line for task in tasks for line in wanted_errors(wanted, task))
     for reason in dict.fromkeys(estimated_reason(wanted, task) for task in tasks):
         if reason:
             yield f"envelope: bounds will be estimated, with their error: {reason}"

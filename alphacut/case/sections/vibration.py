@@ -78,8 +78,10 @@ class Envelope(Section):
     tolerance: Annotated[
         float,
         Key(
-            "wanted error of displacements; of other outputs the same share of their"
-            " peaks as of the first displacement's; a declared error above it is a failure",
+            "wanted error: of every output where all are displacements; where units are mixed, of"
+            " the first displacement, and of every other output, displacements too, the same share"
+            " of its peak (`check` prints each); a declared error above one that is asked for is"
+            " a failure",
             "m",
             allowed=POSITIVE,
         ),

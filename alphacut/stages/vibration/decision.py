@@ -224,7 +224,21 @@ def between_nodes(found: Document, name: str) -> str:
         return "exceeded there, so over time, too"
     if all(one["lower"][0] > 0 for x, one in found["margins"].items() if name in (x, ANY)):
         return f"between them kept by the {found['peaks']} envelope, see the margin"
-    return "the motion between them is not included"
+    if found["limits"][name]["verdict"] != "safe":
+        return "the motion between them is not included"
+    below = [(one["unit"], one["lower"][0]) for x, one in found["margins"].items() if name == x]
+    far = [f" by up to {engineering(-float(low), unit, digits=3)}" for unit, low in below]
+    return f"between them {OPEN}{''.join(far)}; a smaller step may settle it"
+
+
+OPEN = "open"
+
+
+def verdict_of(found: Document, name: str) -> str:
+    """A verdict in words: a limit is not called safe where the margin between nodes is negative."""
+    verdict, between = (found["limits"][name][key] for key in ("verdict", "between_nodes"))
+    kept = verdict == "safe" and between.startswith(f"between them {OPEN}")
+    return "kept at the nodes" if kept else str(verdict)
 
 
 def worth(found: Document, name: str) -> str:
@@ -271,7 +285,7 @@ def sentences(found: Document) -> Iterator[str]:
         (a, b), (c, d) = one["possibility"], one["necessity"]
         degrees = f"possible to {degree(a, b)}, necessary to {degree(c, d)}"
         if one["verdict"] in ("safe", "unsafe"):
-            yield f"{of}: {degrees}: {one['verdict']} ({worth(found, name)})"
+            yield f"{of}: {degrees}: {verdict_of(found, name)} ({worth(found, name)})"
         else:
             yield f"{of}: {one['verdict']}{why(one)}. It is {degrees}, {worth(found, name)}"
     for name, margin in found["margins"].items():

@@ -16,9 +16,9 @@ from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
 from alphacut.io.provenance import attributes, versions
 from alphacut.stages.contract import keep
-from alphacut.stages.vibration.envelope_task import EnvelopeTask
+from alphacut.stages.vibration.envelope_task import EnvelopeTask, task_of
 from alphacut.stages.vibration.provable import estimated_reason, too_many, unproved_reason
-from alphacut.stages.vibration.resolution_checks import guard_against
+from alphacut.stages.vibration.resolution_checks import WITH_TOLERANCE, guard_against
 from alphacut.stages.vibration.structure import Structure
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -175,6 +175,8 @@ def keep_tolerance(case: Case, dataset: xarray.Dataset, *, best_effort: bool) ->
             cure=cure(case, dataset),
             best_effort=best_effort,
         )
+    elif asked is None and not case.asked("envelope.certify"):
+        tell_rough(task_of(case), dataset)
     gap = asked_gap(case)
     if gap is not None and "gap" in dataset.attrs:
         keep(
@@ -184,6 +186,14 @@ def keep_tolerance(case: Case, dataset: xarray.Dataset, *, best_effort: bool) ->
             cure="narrower supports or fewer inputs reach it",
             best_effort=best_effort,
         )
+
+
+def tell_rough(task: EnvelopeTask, dataset: xarray.Dataset) -> None:
+    """A warning where a declared error passes the tolerance that stands in for one asked for."""
+    times = float(dataset.attrs.get("reached", 0.0)) / task.tolerance
+    if task.method in WITH_TOLERANCE and times > 1 + 1e-9:
+        what = f"a declared error is {times:.2g} times the one wanted, which check prints for each"
+        say(f"warning: envelope.tolerance: {what} output; to name a tolerance makes it a failure")
 
 
 def cure(case: Case, dataset: xarray.Dataset) -> str:

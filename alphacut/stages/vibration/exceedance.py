@@ -15,6 +15,7 @@ from alphacut.io.files import Document
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import Tick
 from alphacut.io.units import engineering
+from alphacut.stages.vibration.resolution_checks import shares_of_tolerance
 from alphacut.stages.vibration.structure import Structure
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -83,18 +84,9 @@ def with_peaks(found: Envelope, wanted: Structure, task: EnvelopeTask) -> xarray
 
 def reached(found: Envelope, wanted: Structure, task: EnvelopeTask) -> float | None:
     """Largest declared error in the tolerance's measure; None where no error is declared."""
-    from alphacut.frame.boxes import UnitFlow, boxes
-    from alphacut.frame.propagation import absolute
-
     if found.error is None:
         return None
-    if wanted.frame is not None:  # bounds of accelerations are found as absolute ones
-        wanted = replace(wanted, model=absolute(wanted.frame))
-    cuts = boxes(wanted.inputs(task.fuzzy), task.alpha)
-    scheme = task.scheme if wanted.linear is not None else task.integrator
-    flow = wanted.flow(cuts.names, task.duration, task.step, scheme)
-    scale = UnitFlow(flow, cuts, task.relative and task.certify is None).scale
-    return float((found.error.max((0, 1)) / scale).max())
+    return float((found.error.max((0, 1)) / shares_of_tolerance(wanted, task)).max())
 
 
 def peak_document(dataset: xarray.Dataset) -> dict[str, dict[str, Array]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from math import acos, ceil, cos, pi
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,9 @@ import numpy as np
 
 from alphacut.io.files import say
 from alphacut.io.problem import BadInput, Problem
+from alphacut.io.units import engineering
 from alphacut.stages.vibration.structure import Structure
+from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     from alphacut.stages.vibration.envelope_task import EnvelopeTask
@@ -26,6 +29,33 @@ def rough(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
     yield from coarse_tolerance(wanted, task)
     yield from coarse_nodes(wanted, task)
     yield from coarse_outputs(wanted, task)
+
+
+def shares_of_tolerance(wanted: Structure, task: EnvelopeTask) -> Array:
+    """Factor on the tolerance for each output, shape (m,): what its own error is measured by."""
+    from alphacut.frame.boxes import UnitFlow, boxes
+    from alphacut.frame.propagation import absolute
+
+    if wanted.frame is not None:  # bounds of accelerations are found as absolute ones
+        wanted = replace(wanted, model=absolute(wanted.frame))
+    cuts = boxes(wanted.inputs(task.fuzzy), task.alpha)
+    scheme = task.scheme if wanted.linear is not None else task.integrator
+    flow = wanted.flow(cuts.names, task.duration, task.step, scheme)
+    return UnitFlow(flow, cuts, task.relative and task.certify is None).scale
+
+
+def wanted_errors(wanted: Structure, task: EnvelopeTask) -> Iterator[str]:
+    """A line on the error, or gap, that is wanted of each output; none without a tolerance."""
+    from alphacut.frame.outputs import output_unit
+
+    if task.method not in WITH_TOLERANCE:
+        return
+    asked = task.tolerance if task.certify is None else task.certify
+    each = ", ".join(
+        f"{name} {engineering(float(share * asked), output_unit(name), digits=2)}"
+        for name, share in zip(wanted.outputs, shares_of_tolerance(wanted, task), strict=True)
+    )
+    yield f"envelope: wanted {'error' if task.certify is None else 'gap'} up to {each}"
 
 
 def coarse_step(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
@@ -108,10 +138,11 @@ def coarse_outputs(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
     added = within_steps(size, stray(flow, nothing)).max(0) / peak - 1
     coarse = [k for k in np.argsort(-added) if added[k] > ADDED and size[:, k].any()]
     if coarse:
-        each = ", ".join(f"{flow.outputs[k]} {100 * added[k]:.0f} %" for k in coarse)
-        finer = task.step / ceil((added[coarse[0]] / ADDED) ** 0.5)  # it falls with the square
+        each = ", ".join(f"{flow.outputs[k]} {100 * added[k]:.2g} %" for k in coarse)
+        parts = ceil((added[coarse[0]] / ADDED) ** 0.5)  # it falls with the square
+        left = f"{task.step / parts:.3g} s leaves some {100 * added[coarse[0]] / parts**2:.2g} %"
         what = f"{task.step:g} s between nodes leaves peaks between them open by some {each}"
-        yield Problem("envelope.step", f"{what}; {finer:.3g} s leaves {100 * ADDED:g} %")
+        yield Problem("envelope.step", f"{what}; {left}")
 
 
 def guard_against(wanted: Structure, task: EnvelopeTask, *, strict: bool) -> None:

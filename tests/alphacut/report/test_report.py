@@ -12,6 +12,8 @@ from markupsafe import Markup
 
 from alphacut.entry import main
 from alphacut.io.provenance import door
+from alphacut.report.envelopes import peaks
+from alphacut.report.key_results import peaks as key_peaks
 from tests.alphacut.one_floor import one_floor
 
 PAPER = Path(__file__).parents[3] / "cases" / "paper.toml"
@@ -249,3 +251,16 @@ def test_an_input_that_no_study_names_is_told_as_fixed(tmp_path, capfd):
     assert f"F{told}." in rest
     assert "<td>[9, 11] mm, fixed at 10 mm</td>" in re.sub("<td[^>]*>", "<td>", rest)
     assert "t, fixed at" not in rest
+
+
+def test_peaks_are_told_between_their_bounds_and_those_tried_apart():
+    """A motion of one's own may peak below the least of those tried, never below the bound."""
+    peak = {"lower": [1.0, 2.0], "tried": [1.5, 2.2], "upper": [3.0, 2.5], "error": [0.1, 0.1]}
+    study = {"alpha": [0, 1], "fuzzy": ["E"], "nature": "guaranteed", "peak": {"q1": peak}}
+    page = re.sub("<[^>]*>", "|", str(peaks({"envelopes": {"all": study}})))
+    assert "least of motions tried" in page
+    assert "2.000 m … 2.500 m" in page
+    (row,) = key_peaks({"envelopes": {"all": study}})
+    assert row[1:3] == ("2.000 m … 2.500 m", "1.000 m … 3.000 m")
+    for told in ("1.000 m", "1.500 m", "3.000 m", "2.000 m … 2.500 m"):
+        assert f"|{told}|" in page

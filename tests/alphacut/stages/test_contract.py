@@ -127,6 +127,14 @@ def test_numbers_of_the_quick_form_are_held_to_no_tolerance():
     assert asked_tolerance(quick(load(PAPER))) is None
 
 
+def test_an_error_above_a_tolerance_that_no_one_asked_for_is_warned_of(capfd):
+    case = load(PAPER.replace("paper.toml", "composite.toml"))
+    assert asked_tolerance(case) is None
+    for reached, warned in ((1.3e-4, True), (0.9e-4, False)):
+        keep_tolerance(case, xarray.Dataset(attrs={"reached": reached}), best_effort=False)
+        assert ("1.3 times the one wanted" in capfd.readouterr().err) is warned
+
+
 @pytest.mark.parametrize("nature", ["guaranteed", "verified by sampling"])
 def test_a_certificate_is_held_to_its_gap(nature, capfd):
     case = load(PAPER, ["envelope.certify=1 um", "envelope.method=modal"])

@@ -3,6 +3,7 @@ where that is wanted.
 """
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -130,3 +131,23 @@ def test_tolerances_that_contradict_each_other(case, changes, words, capfd):
 def test_modal_named_keeps_the_tolerance_that_is_asked_for():
     fuzzy = ["--fuzzy", "E,m", "--duration", "30", "--step", "0.1", "--alpha", "0"]
     assert main(["envelope", PAPER, *fuzzy, "--method", "modal", "--tolerance", "1e-4"]) == 0
+
+
+def test_check_tells_the_wanted_error_of_each_output(capfd):
+    building = str(CASES / "building.toml")
+    assert main(["check", building]) == 0
+    told = capfd.readouterr().out
+    assert "envelope: wanted error up to q8 200 µm, drift1 65 µm, base_shear 1.6 kN\n" in told
+    assert main(["check", building, "--set", 'frame.outputs=["q8", "drift1"]']) == 0
+    assert "wanted error up to q8 200 µm, drift1 200 µm\n" in capfd.readouterr().out
+
+
+def test_a_smaller_step_is_told_with_what_it_leaves(capfd):
+    """What is left is told for the step advised: 3 % beside 3 % advises nothing."""
+    building, changes = str(CASES / "building.toml"), ["--set", "envelope.step=0.04 s"]
+    assert main(["check", building, *changes, "--set", 'frame.outputs=["q8", "a1"]']) == 0
+    said = re.search(
+        r"open by some \w+ ([\d.]+) %.* s leaves some ([\d.]+) %", capfd.readouterr().err
+    )
+    assert said
+    assert 2 < float(said[2]) < 3 < float(said[1])
