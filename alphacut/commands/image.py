@@ -15,6 +15,7 @@ from alphacut.io.progress import progress
 from alphacut.io.provenance import attributes, fingerprint
 from alphacut.stages.image.bounds import compute
 from alphacut.stages.image.document import document, write
+from alphacut.stages.image.phases import contradicted
 from alphacut.stages.image.reading import study_of
 
 ABOUT = "proved bounds of the stiffness of the material whose every section is an image"
@@ -31,6 +32,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     case = load(options.case, options.set)
     require_read(case, ("cell", "modulus.alpha"), "image")
     study = study_of(case, petsc=petsc)
+    for remark in contradicted(case, study):
+        say(f"warning: {remark}")
     with progress("Image", quiet=options.quiet) as tick:
         found = compute(study, progress=tick)
     if options.out:
@@ -64,7 +67,7 @@ def summary(found: Document) -> str:
         if own
         else ""
     )
-    return (
+    return "".join(f"{line}\n" for line in found["phases"]) + (
         "alpha  lower GPa   upper GPa   (E of eq. 16, plane strain: not E_T, the transverse Young's"
         f" modulus of a fibre composite)\n{rows}"
         f"width of the stiffness's bounds at the top level: {found['width']:.2e}\n"

@@ -167,7 +167,7 @@ def image(found: Document, drawn: Markup) -> Markup:
     ]
     return section(
         "Stiffness of the image",
-        words,
+        paragraphs(*found.get("phases", ())) + words,
         drawn,
         table(("α", "lower E, GPa", "upper E, GPa", "nature"), rows),
         random_threshold(found),

@@ -13,6 +13,7 @@ from alphacut.fuzzy import FuzzyNumber, Interval, Triangular
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.units import STANDARD_GRAVITY, engineering
 from alphacut.stages import plausible
+from alphacut.stages.image.phases import contradicted
 from alphacut.stages.image.reading import expected_modulus, study_of
 from alphacut.stages.material import modulus, spheres
 from alphacut.stages.material.cell import cell_phases, modal_parts, phases_of
@@ -59,7 +60,7 @@ def ready(case: Case) -> Readiness:
         require_readable(case)
         dense = tuple(dense_remark(case))
     if "image" in case.stages:
-        study_of(case)
+        dense += tuple(contradicted(case, study_of(case)))
     stand_in = modulus.stand_in(case) if "modulus" in case.stages or case.stand_ins else None
     if "envelope" not in case.stages:
         if "modulus" in case.stages and (given := ", ".join(case.stand_ins)):

@@ -18,6 +18,8 @@ from alphacut.stages.image.random_response import RandomResponse, responses
 from alphacut.stages.image.study import ImageStudy, Level
 from alphacut.stochastic.theta.truncated_normal import Array
 
+MANY = 500_000  # pixels times pairs of solutions, from which on an image may take minutes
+
 
 @dataclass(frozen=True)
 class FuzzyImage:
@@ -57,19 +59,11 @@ class FuzzyImage:
         return np.asarray(np.add(*self.study.ranges(None)) / 2)
 
     @property
-    def fractions(self) -> Array:
-        """Area share of each phase at the modal values; a cut pixel counts half for its ends."""
-        count = len(self.study.pairs)
-        ends = self.study.ranges(None)
-        sums = [np.bincount(which.ravel(), minlength=count) for which in ends]
-        return np.asarray((sums[0] + sums[1]) / 2 / ends[0].size)
-
-    @property
     def grains(self) -> tuple[float, float]:
         """Hashin–Shtrikman interval of E of grains, at the highest level, in Pa."""
         phases = self.study.phases(self.study.alpha[-1])
         return grain_modulus(
-            list(self.fractions), [p.lower for p in phases], [p.upper for p in phases]
+            list(self.study.fractions), [p.lower for p in phases], [p.upper for p in phases]
         )
 
     @property
@@ -99,6 +93,10 @@ def compute(study: ImageStudy, *, progress: Tick | None = None) -> FuzzyImage:
     modal = study.images(None, None)
     done, first = [0.0], [math.inf]
     count = solutions(study)
+    pixels = f"image of {modal.bulk[0].size} pixels: {count} pairs of solutions"
+    several = progress is not None and count > 1 and study.random is None
+    if several and modal.bulk[0].size * count > MANY:
+        say(f"{pixels}, or more where pixels are divided: this may take minutes")
 
     def told(share: float) -> None:
         done[0] = share
@@ -115,9 +113,10 @@ def compute(study: ImageStudy, *, progress: Tick | None = None) -> FuzzyImage:
     model, crisp = start.refined(modal)
     told(0.3 if study.random is not None else 1 / count)
     first[0] = perf_counter() - began
-    if progress is not None and count > 1 and study.random is None:
-        pixels = f"image of {modal.bulk[0].size} pixels: {count} pairs of solutions, the first"
-        say(f"{pixels} took {first[0]:.0f} s, all about {count * first[0]:.0f} s or more")
+    if several:
+        say(
+            f"{pixels}, the first took {first[0]:.0f} s, all about {count * first[0]:.0f} s or more"
+        )
     random = None if study.random is None else responses(study, model, study.random)
     if random is not None:
         cuts = random.cuts

@@ -12,6 +12,7 @@ from alphacut.io.provenance import versions
 from alphacut.rve.image.directions import directions
 from alphacut.rve.image.model import ImageCut
 from alphacut.stages.image.bounds import FuzzyImage
+from alphacut.stages.image.phases import phase_lines
 from alphacut.stages.image.random_response import RandomResponse
 from alphacut.stages.material.cell import GPA
 
@@ -45,7 +46,8 @@ def document(found: FuzzyImage) -> Document:
         },
         "error_table": error_table(found),
         "random_threshold": None if found.random is None else random_threshold(found.random),
-        "fractions": found.fractions,
+        "fractions": found.study.fractions,
+        "phases": phase_lines(found.study),
         "grains_E_GPa": pair(found.grains),
         "apparent_E_GPa": None if found.apparent is None else pair(found.apparent),
         "directions_E_GPa": {"least": pair(turned.least), "greatest": pair(turned.greatest)},

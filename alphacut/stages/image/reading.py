@@ -17,6 +17,7 @@ from alphacut.rve.image.model import ImageModel
 from alphacut.rve.image.phase_images import threshold_ranges
 from alphacut.rve.image.random_threshold import ordered
 from alphacut.rve.image.windows import tiles_of
+from alphacut.stages.image.phases import phase_names
 from alphacut.stages.image.study import ImageStudy, RandomThreshold, Ranges, cut_at
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -46,6 +47,7 @@ def study_of(case: Case, *, petsc: Mapping[str, str] | None = None) -> ImageStud
             _model(given, parted.aspect, petsc or {}),
             parted.fuzzy,
             parted.random,
+            phase_names(given, len(first)),
         )
         if study.model.boundary == "window":
             source = "cell.tiles"

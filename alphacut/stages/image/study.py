@@ -58,6 +58,7 @@ class ImageStudy:
         fuzzy_threshold: Whether the phases of the pixels, or the law of a random threshold,
             depend on the level.
         random: Threshold that is random; its mean parts the phases of `ranges`.
+        names: Name of each phase for people.
     """
 
     ranges: Ranges
@@ -67,6 +68,7 @@ class ImageStudy:
     model: ImageModel
     fuzzy_threshold: bool
     random: RandomThreshold | None = None
+    names: tuple[str, ...] = ()
 
     def phases(self, level: Level) -> list[ModuliInterval]:
         """Moduli of each phase at a level."""
@@ -83,6 +85,13 @@ class ImageStudy:
     def images(self, threshold: Level, phases: Level) -> ModuliImages:
         """Least and greatest moduli of each pixel, at levels of threshold and phases."""
         return moduli_images(*self.ranges(threshold), self.phases(phases))
+
+    @property
+    def fractions(self) -> Array:
+        """Area share of each phase at the modal values; a cut pixel counts half for its ends."""
+        ends = self.ranges(None)
+        sums = [np.bincount(which.ravel(), minlength=len(self.pairs)) for which in ends]
+        return np.asarray((sums[0] + sums[1]) / 2 / ends[0].size)
 
     @property
     def outlined(self) -> bool:

@@ -1,12 +1,14 @@
 """The command ``image`` and the stage of a run: cases, results, bad input."""
 
 import json
+import re
 
 import numpy as np
 import pytest
 
 from alphacut.entry import main
 from alphacut.io.problem import BadInput
+from alphacut.stages.image import bounds
 
 HEAD = 'schema = 1\ntitle = "t"\nabout = "a"\nstages = ["image"]\n'
 IMAGE = {
@@ -71,11 +73,15 @@ def test_the_keys_of_the_result(folder, capfd):
     assert found["seconds"] > 0
 
 
-def test_the_cost_of_fuzzy_phases_is_told_before_and_nu_with_the_bounds_after(folder, capfd):
+def test_the_cost_of_fuzzy_phases_is_told_before_and_nu_with_the_bounds_after(
+    folder, capfd, monkeypatch
+):
+    monkeypatch.setattr(bounds, "MANY", 5 * 1024 - 1)
     case = written(folder, modulus='["20 GPa", "[75, 80, 85] GPa"]')
     assert main(["run", case, "--out", str(folder / "out"), "--no-figures"]) == 0
     told = capfd.readouterr()
-    assert "image of 1024 pixels: 5 pairs of solutions, the first took" in told.err
+    early, first = "pairs of solutions, or more where", "pairs of solutions, the first took"
+    assert 0 < told.err.index(f"image of 1024 pixels: 5 {early}") < told.err.index(first)
     assert "; nu = [0." in told.out
     assert "Hashin–Shtrikman bounds of E if the particles are grains: [" in told.out
     assert main(["image", written(folder, threshold="[130]")]) == 0
@@ -372,3 +378,33 @@ def test_study_of_a_case_without_image_is_refused(folder):
     )
     with pytest.raises(BadInput, match=r"needs section \[cell\]"):
         study_of(load(folder / "c.toml"))
+
+
+def test_each_phase_is_told_with_its_share_and_its_moduli(folder, capfd):
+    case = written(folder, threshold="[130]")
+    dark = r"dark phase \(below 130\): (\d\d\.\d)% of the area, E 20\.00 GPa, nu 0\.3\n"
+    bright = r"bright phase \(above 130\): (\d\d\.\d)% of the area, E 80\.00 GPa, nu 0\.3\n"
+    shares = []
+    for words in (["check", case], ["image", case], ["run", case, "--out", str(folder / "out")]):
+        assert main([*words, *(["--no-figures"] if words[0] == "run" else [])]) == 0
+        told = re.search(dark + bright, capfd.readouterr().out)
+        assert told, words
+        shares.append([float(x) for x in told.groups()])
+    assert sum(shares[0]) == pytest.approx(100)
+    assert shares[0][1] < 50
+    assert shares == [shares[0]] * 3
+    assert main(["report", str(folder / "out")]) == 0
+    assert "bright phase (above 130)" in (folder / "out/report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("command", ["check", "image", "run"])
+@pytest.mark.parametrize("swapped", [False, True])
+def test_a_share_in_words_that_another_phase_covers_is_warned_of(command, swapped, folder, capfd):
+    ends = ['"3 GPa"', '"72 GPa"']
+    moduli = f"[{', '.join(ends[:: -1 if swapped else 1])}]"
+    head = HEAD.replace('"t"', '"Glass fibres in epoxy, 16 % glass"')
+    case = written(folder, head, threshold="[130]", modulus=moduli)
+    more = ["--out", str(folder / "out"), "--no-figures"] if command == "run" else []
+    assert main([command, case, *more]) == 0
+    said = "the case says '16 % glass', and the phases of such a modulus cover 84.0%"
+    assert (said in capfd.readouterr().err) == swapped
