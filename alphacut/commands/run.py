@@ -14,7 +14,7 @@ from alphacut.case.idle import idle_mesh, require_read
 from alphacut.case.load import load
 from alphacut.case.quick import banner, quick, settings
 from alphacut.commands import options as common
-from alphacut.figures.captions import core
+from alphacut.figures.captions import core, in_words
 from alphacut.figures.showing import Showing
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.io.files import Document, as_json, say, write_text
@@ -194,10 +194,16 @@ def main_numbers(found: Document) -> str:
 def modulus_lines(found: Document) -> Iterator[str]:
     """The fuzzy modulus, if one was computed, and its references."""
     if cell := found.get("modulus"):
+        low, high = (f"{cell['nu_cuts'][side][0]:.4f}" for side in ("lower", "upper"))
+        ends = f", support [{low}, {high}]" if low != high else ""
         yield (
             f"E = {core(cell)}, support [{cell['lower_GPa']:.4f}, {cell['upper_GPa']:.4f}] GPa;"
-            f" nu = {cell['nu']:.4f}"
+            f" nu = {cell['nu']:.4f}{ends}"
         )
+        ranked = sorted(found.get("shares", {}).get("E", {}).items(), key=lambda one: -one[1])
+        first = [f"{in_words(name)} {share:.0%}" for name, share in ranked[:3] if share > 0]
+        if first:
+            yield f"share of the width of E that each leaves if known: {'; '.join(first)}"
         yield from lines(cell["beside"], cell["particles"])
         if told := cell["outside"]:  # why, and the cure, was said before the run
             yield f"warning: {told.partition(', and ')[0] if cell.get('shape') else told}"

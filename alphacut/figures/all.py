@@ -231,10 +231,10 @@ def drawn_now(todo: Iterable[Drawing], results: Results) -> list[str]:
 
 
 def particle_pictures(folder: Path, results: Results) -> list[str]:
-    """Figures of the microstructure stage: 03-04_two_point … 13_pbox, radius_map."""
+    """Figures of the microstructure stage: 03-04_two_point … 13_pbox, radius_map, circles."""
     if "microstructure" not in results.case.stages:
         return []
-    found = [path for path in sorted(folder.iterdir()) if re.match(r"\d|radi", path.name)]
+    found = [path for path in sorted(folder.iterdir()) if re.match(r"\d|radi|image_c", path.name)]
     return [str(path.relative_to(results.folder)) for path in found]
 
 

@@ -3,88 +3,14 @@
 from __future__ import annotations
 
 import re
+import tomllib
+from pathlib import Path
 
 from alphacut.io.files import Document
 
-FIGURES = {
-    "radii": "Distribution of the particles' radii",
-    "p-box": "Random radius of the cell: distribution at the modal values, and its p-box",
-    "cone": "Particle in the physical-stochastic domain: every slice at one θ is a cell",
-    "prism-mesh": (
-        "Prism mesh of the physical-stochastic domain, cut open: the matrix orange, the particle"
-        " violet"
-    ),
-    "stress-on-slices": "Stress 11 under ε11 = ε22 = 0.01 on slices at several θ",
-    "stress-curves": "Homogenised stress over θ, a curve for each fuzzy sample",
-    "mean-stress": "Mean homogenised stress of every sample, rearranged into α-cuts",
-    "modulus": "Fuzzy effective modulus",
-    "image": "The image, the error of its two fields pixel by pixel, and the bounds of E",
-    "membership": "Membership function of a fuzzy parameter and one of its α-cuts",
-    "fuzzy-sets": "Crisp, interval, triangular, trapezoidal and non-convex fuzzy sets",
-    "cuts": "A triangular fuzzy number, decomposed into α-cuts",
-    "mapping": "Fuzzy mapping: trajectories inside an α-cut, and the envelope that encloses them",
-    "graph-follower": "The Graph Follower, step by step",
-    "record": "Acceleration of the ground",
-    "spectrum": "Response spectrum of the record: pseudo-acceleration and displacement",
-    "frame": "The frame, to scale",
-    "tower": "The tower, to scale",
-    "chain": "The frame as masses, springs and dampers",
-    "response": (
-        "Random and fuzzy stress: its distribution between two bounds, and its fuzzy quantiles"
-    ),
-    "exceedance": "Fuzzy probability of exceeding a limit, over the limit",
-    "shares-modulus": "Share of each input in the width of the modulus",
-    "shares-over-time": "Share of each input in the width of the vibration over time",
-    "decision": "Fuzzy peak of each limited output beside its limit",
-    "joint": (
-        "What two values may be together: enclosing polygons shaded, hulls of pairs reached as"
-        " lines, the rectangle of both ranges dashed"
-    ),
-    "field": "Storeys that are alike: what each direction of their field does by itself",
-    "measure-next": "Width lost if an input is known twice as well, and exactly",
-    "update-inputs": "Inputs before and after natural modes were measured, level by level",
-    "two-point": (
-        "Why two points do not describe particles: equal discs of the same area fraction, for"
-        " illustration"
-    ),
-    "neighbours": (
-        "Direct neighbours and cells: equal discs of the same area fraction, for illustration"
-    ),
-    "neighbour-statistics": "Statistics of the direct neighbours",
-    "correlation": (
-        "Reduced radius of a cell against that of its neighbours, with their correlation"
-    ),
-    "cells": "Cells of the particles",
-    "areas": "Size of each cell over its reduced radius, and the limits that are kept",
-    "pbox": "Measured distribution of the reduced radius, and the p-box of its fuzzy map",
-    "radii-bounds": (
-        "Bounds of the spheres' radii, by volume, that the circles of a section leave, with those"
-        " of the packings"
-    ),
-    "radius-map": "Fuzzy map from θ to the reduced radius",
-}
-WORDS = {
-    "a2": "slope a2 of the radius map",
-    "a4": "slope a4 of the radius map",
-    "a1": "least radius a1",
-    "a3": "greatest radius a3",
-    "matrix_modulus": "modulus of the matrix",
-    "matrix_poisson": "Poisson's ratio of the matrix",
-    "inclusion_modulus": "modulus of the particle",
-    "inclusion_poisson": "Poisson's ratio of the particle",
-    "space": "mesh, or order of the series",
-    "theta": "discretisation of θ",
-    "table": "table over radius and modulus",
-    "symmetry": "symmetry of the stiffness",
-    "reuss": "Reuss bound",
-    "voigt": "Voigt bound",
-    "hashin_shtrikman": "Hashin–Shtrikman bounds of the plane bulk modulus",
-    "hill_mandel": (
-        "Hill–Mandel condition: mean stress times mean strain is the mean of their product"
-    ),
-    "residual": "residual of the linear systems",
-    "periodicity": "displacements agree on opposite sides of the cell",
-}
+_TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+FIGURES: dict[str, str] = _TABLES["figures"]
+WORDS: dict[str, str] = _TABLES["words"]
 
 
 def in_words(name: str) -> str:

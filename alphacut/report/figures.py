@@ -13,7 +13,9 @@ from alphacut.io.files import Document
 from alphacut.report.tables import fragment, section
 
 # figures that stand in the section they belong to
-ELSEWHERE = re.compile(r"(fig18-)?modulus|image|response|exceedance|update-.+|decision|joint")
+ELSEWHERE = re.compile(
+    r"(fig18-)?modulus|image(_circles)?|response|exceedance|update-.+|decision|joint"
+)
 # figures that need the page's whole width
 WIDE = re.compile(r"envelope-|chain|record|shares-over-time|graph-follower")
 SVG_LIMIT = 200_000  # bytes; a heavier figure goes into the page as PNG

@@ -9,11 +9,10 @@ from alphacut.io.files import Document
 from alphacut.report.tables import code, paragraphs, section, sentence, table
 from alphacut.stages.material import response
 from alphacut.stages.material.micrograph import compared
-from alphacut.stages.material.microstructure import crystalline
 from alphacut.stages.material.references import lines
 
 
-def microstructure(found: Document) -> Markup:
+def microstructure(found: Document, seen: Markup) -> Markup:
     """Particles, cells, and the fuzzy radius map."""
     low, high = found["limits"]
     cells = CELLS[found.get("particles", "discs")]
@@ -23,15 +22,13 @@ def microstructure(found: Document) -> Markup:
         f" {cells}.",
         *map(sentence, found.get("remarks", ())),
     )
-    if found.get("crystalline"):
-        words += paragraphs(f"Warning: {crystalline(found['hexagonal_order'])}.")
     rows = [("a1", f"{found['a1']:.5g}")]
     rows += [
         (name, "[" + ", ".join(f"{end:.5g}" for end in found[name]) + "]") for name in ("a2", "a4")
     ]
     rows.insert(2, ("a3", f"{found['a3']:.5g}"))
     return section(
-        "Microstructure", words, table(("parameter of the radius map", "fuzzy value"), rows)
+        "Microstructure", seen, words, table(("parameter of the radius map", "fuzzy value"), rows)
     )
 
 

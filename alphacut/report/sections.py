@@ -25,7 +25,8 @@ def sections(summary: Document, folder: Path) -> Iterator[Markup]:
     """All sections that the results allow, in reading order."""
     yield key_results(summary)
     if "microstructure" in summary:
-        yield microstructure(summary["microstructure"])
+        seen = listed(summary, folder, "image_circles")
+        yield microstructure(summary["microstructure"], seen)
     if "modulus" in summary:
         yield modulus(summary["modulus"], listed(summary, folder, "modulus"))
     if "image" in summary:

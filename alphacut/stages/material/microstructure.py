@@ -397,7 +397,9 @@ def write(
     from alphacut.stochastic.microstructure import Microstructure
     from alphacut.stochastic.microstructure_summary import fragment, summary, to_dataset
 
-    write_text(folder / "microstructure.json", as_json(summary(found), indent=2))
+    told = [remark.removeprefix("warning: ") for remark in left_out(found)]
+    numbers = {**summary(found), "remarks": told}
+    write_text(folder / "microstructure.json", as_json(numbers, indent=2))
     drawn = draw(found, folder / "figures") if figures else {}
     write_text(folder / "radius.toml", fragment(found))
     with whole_file(folder / "microstructure.nc") as partial:

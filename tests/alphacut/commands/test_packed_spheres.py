@@ -188,3 +188,23 @@ def test_a_machine_without_voro_is_told_before_anything_runs(monkeypatch, tmp_pa
     (line,) = capfd.readouterr().err.splitlines()
     assert "install Debian's package voro++" in line
     assert not (tmp_path / "run").exists()
+
+
+def test_circles_over_the_image_and_the_notes_of_a_run_stand_in_its_report(tmp_path):
+    io = pytest.importorskip("skimage.io")
+    rows, columns = np.mgrid[:294, :294]
+    grey = np.full((294, 294), 60, np.uint8)
+    for k, (row, column) in enumerate(np.argwhere(np.ones((7, 7))) * 42 + 21):
+        grey[np.hypot(rows - row, columns - column) < 10 + k % 7] = 200
+    io.imsave(tmp_path / "section.png", grey, check_contrast=False)
+    case, folder = tmp_path / "own.toml", tmp_path / "run"
+    text = IMAGE.replace(', "modulus"]', "]")
+    case.write_text(text.partition("[modulus]")[0], encoding="utf-8")
+    assert main(["run", str(case), "--out", str(folder), "--quiet"]) == 0
+    found = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert "figures/image_circles.png" in found["figures"]
+    assert main(["report", str(folder)]) == 0
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert page.count("Circles that stand for the particles, drawn over the image</") == 1
+    assert "Area fraction to compare with others" in page
+    assert found["microstructure"]["remarks"][-1].startswith("area fraction to compare")

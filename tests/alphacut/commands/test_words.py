@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from alphacut.commands import run
 from alphacut.commands.envelope import summary
 from alphacut.entry import main
 from alphacut.figures.captions import FIGURES, caption, core, figure_words
@@ -180,3 +181,16 @@ def test_citations_have_authors_years_and_places():
         r" \{10\.\d+/",
         out,
     )
+
+
+def test_nu_has_its_support_and_the_three_inputs_that_matter_most_are_named(monkeypatch):
+    cell = {"modal_GPa": 6.2, "E_GPa": {"lower": [5.8, 6.2], "upper": [6.6, 6.2]}, "nu": 0.3295}
+    cell |= {"lower_GPa": 5.8, "upper_GPa": 6.6, "outside": "", "publish": "P", "alpha": [0, 1]}
+    cell |= {"nu_cuts": {"lower": [0.309, 0.3295], "upper": [0.351, 0.3295]}, "beside": {}}
+    shares = {"a2": 0.6, "matrix_modulus": 0.3, "a4": 0.07, "matrix_poisson": 0.03}
+    monkeypatch.setattr(run, "lines", lambda *_: [])
+    found = {"modulus": cell | {"particles": "cylinders"}, "shares": {"E": shares}}
+    first, second, _ = run.modulus_lines(found)
+    assert first.endswith("GPa; nu = 0.3295, support [0.3090, 0.3510]")
+    assert "smaller (slope a2) 60%; modulus of the matrix 30%; spread" in second
+    assert "Poisson" not in second
