@@ -7,7 +7,9 @@ import atexit
 import os
 import sys
 import threading
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -126,7 +128,7 @@ def main(
             made[options.command].refuse([word for word in left if word.startswith("-")] or left)
         refuse_petsc(commands[options.command].__name__.rpartition(".")[2], petsc)
         check_destinations(made[options.command], options)
-        with standard_output(getattr(options, "json", None) == "-") as out:
+        with standard_output(getattr(options, "json", None) == "-") as out, plain_warnings():
             return int(commands[options.command].run(options, petsc, out))
     except BadInput as error:
         for problem in error.problems:
@@ -146,6 +148,21 @@ def main(
         return 3
     except (RuntimeError, ValueError, ArithmeticError, OSError, MemoryError, ImportError) as error:
         return failed(error)
+
+
+@contextmanager
+def plain_warnings() -> Iterator[None]:
+    """Warnings of the libraries as lines of this program, each once, without places in sources."""
+    told: set[str] = set()
+
+    def show(message: Warning | str, *_: object, **__: object) -> None:
+        if (text := " ".join(str(message).split())) not in told:
+            told.add(text)
+            say(f"warning: {pasted(text)}")
+
+    with warnings.catch_warnings():
+        warnings.showwarning = show
+        yield
 
 
 def leave(status: int) -> NoReturn:

@@ -45,7 +45,7 @@ class Phase:
             raise ValueError(
                 f"Young's modulus is {self.modulus:g} Pa; it must be positive and finite"
             )
-        if IN_GPA[0] <= self.modulus < IN_GPA[1]:
+        if IN_GPA[0] <= self.modulus < IN_GPA[1] and self.modulus != 1:  # 1 scales others
             told = f"Young's modulus is {self.modulus:g} Pa, softer than any gel"
             warnings.warn(f"{told}; a phase takes Pa, 1 GPa is 1e9", stacklevel=3)
         if not -1 < self.poisson < 0.5:

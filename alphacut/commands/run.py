@@ -78,6 +78,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         **summary.summary(results),
         **({"quick": settings(results.case)} if options.quick else {}),
         "shares": shares.mean_shares(driving),
+        **({"shares_notes": notes.split("\n")} if (notes := driving.attrs.get("notes")) else {}),
         **({"changes": options.set} if options.set else {}),
         "figures": drawn,
         "seconds": time.perf_counter() - start,

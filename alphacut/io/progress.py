@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -12,6 +13,10 @@ from alphacut.io.files import rank, say
 Tick = Callable[[float], None]
 EVERY = 10.0
 """Seconds from one line to the next where there is no terminal."""
+
+LATE = 0.95
+"""Share done from which a time left is held to: when twice of it has passed, none is told."""
+UNKNOWN = "the last part takes longer than foreseen, and its end is not known"
 
 
 @contextmanager
@@ -64,10 +69,12 @@ class Lines:
     def __init__(self, title: str) -> None:
         self.title = self.doing = title
         self.begun = self.told = self.since = time.monotonic()
+        self.promised = math.inf
 
     def stage(self, what: str) -> None:
         """What is being done from now on."""
         self.doing, self.since = f"{self.title}, {what}", time.monotonic()
+        self.promised = math.inf
 
     def __call__(self, done: float) -> None:
         """Say it, if the last line is old enough."""
@@ -79,4 +86,8 @@ class Lines:
             say(f"{self.doing}: begun, {spent:.0f} s so far")
             return
         left = (now - self.since) * (1 - done) / done
+        if now > self.promised:
+            say(f"{self.doing}: {done:.0%} done after {spent:.0f} s; {UNKNOWN}")
+            return
+        self.promised = min(self.promised, now + 2 * left) if done >= LATE else math.inf
         say(f"{self.doing}: {done:.0%} done after {spent:.0f} s, some {left:.0f} s left")

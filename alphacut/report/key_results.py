@@ -21,10 +21,19 @@ HEAD = ("quantity", "most plausible", "whole range", "nature of the range")
 
 def key_results(summary: Document) -> Markup:
     """Most plausible value, whole range and its worth of each result; empty without any."""
-    rows = [*moduli(summary), *peaks(summary), *exceeded(summary), *decisions(summary)]
+    rows, judged = [*moduli(summary), *peaks(summary), *exceeded(summary)], [*decisions(summary)]
     held = fixed_line(summary.get("structure", {}).get("words", {}).get("fixed", ()))
-    below = paragraphs(*map(sentence, held))
-    return section("Key results", table(HEAD, rows), below) if rows else Markup("")
+    if not rows + judged:
+        return Markup("")
+    if not rows or any(likely != whole for _, likely, whole, _ in rows):
+        return section("Key results", table(HEAD, rows + judged), paragraphs(*map(sentence, held)))
+    one = [(of, ends, nature) for of, ends, _, nature in rows]
+    one += [(of, f"{verdict}, {possible}", nature) for of, verdict, possible, nature in judged]
+    return section("Key results", table(ONE, one), paragraphs(*map(sentence, (ALIKE, *held))))
+
+
+ONE = ("quantity", "range", "nature of the range")
+ALIKE = "all inputs are intervals, or one level alone is computed: no value in a range is likelier"
 
 
 def moduli(summary: Document) -> Iterator[Line]:

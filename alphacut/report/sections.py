@@ -18,7 +18,16 @@ from alphacut.report.key_results import key_results
 from alphacut.report.material import given, image, microstructure, modulus, stress
 from alphacut.report.methods import methods
 from alphacut.report.spectrum import spectrum
-from alphacut.report.tables import citation, code, details, items, paragraphs, section, table
+from alphacut.report.tables import (
+    citation,
+    code,
+    details,
+    items,
+    paragraphs,
+    section,
+    sentence,
+    table,
+)
 
 
 def sections(summary: Document, folder: Path) -> Iterator[Markup]:
@@ -50,7 +59,7 @@ def sections(summary: Document, folder: Path) -> Iterator[Markup]:
     if (folder / "measure-next.json").is_file():
         yield next_measured(folder)
     if summary.get("shares"):
-        yield shares(summary["shares"])
+        yield shares(summary["shares"], summary.get("shares_notes", ()))
     if summary.get("paper"):
         yield comparison(summary["paper"])
     yield methods(summary)
@@ -67,13 +76,14 @@ def built(words: Document, periods: Markup) -> Markup:
     return section("Structure", sentences, table(words["head"], words["rows"]), periods)
 
 
-def shares(found: Document) -> Markup:
+def shares(found: Document, notes: Sequence[str] = ()) -> Markup:
     """Contributions of the inputs to the widths."""
     from alphacut.figures.envelope import WORDS
 
     words = paragraphs(
         "Share of the width at α = 0 that is lost when an input is fixed at its modal value and"
-        " all others are kept."
+        " all others are kept.",
+        *map(sentence, notes),
     )
     # quantities that depend on the same inputs share a table
     kinds = dict.fromkeys(tuple(entry) for entry in found.values())

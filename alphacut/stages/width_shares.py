@@ -7,7 +7,8 @@ serve, whatever the case itself uses: the series for the cell, the modal method 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +28,7 @@ from alphacut.stochastic.theta.truncated_normal import Array
 if TYPE_CHECKING:
     import xarray
 
+    from alphacut.frame import Envelope
     from alphacut.frame.structures.linear import LinearSystem
     from alphacut.fuzzy.width_contributions import Shares
 
@@ -73,15 +75,15 @@ def asked(task: EnvelopeTask, model: LinearSystem) -> Document:
     if model.ground is None:
         return {**common, "step": task.step}
     step = thinned(task.duration, task.step)
-    return {**common, "step": step, "tolerance": 1e-2, "relative": True, "passes": 1}
+    return {**common, "step": step, "tolerance": ACCURACY, "relative": True, "passes": 1}
 
 
 def envelope_shares(
     results: Results, study: Study, progress: Tick | None = None
-) -> tuple[Shares, Array, list[str]]:
+) -> tuple[Shares, Array, list[str], list[str]]:
     """Shares of a study's inputs in every output's width, (inputs, times, outputs).
 
-    With them the times and the outputs' names.
+    With them the times, the outputs' names, and notes.
 
     Raises:
         ModalError: The modal method cannot treat the structure.
@@ -100,13 +102,47 @@ def envelope_shares(
         if progress:
             progress((len(axes) + done) / (1 + len(groups)))
 
+    rough: list[float] = []
+
     def bounds(fuzzy: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
         left = {name: number for name, number in fuzzy.items() if not isinstance(number, Crisp)}
-        found = frame.envelope(model, left, progress=tick, **asked(study.task, model))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # told of all shares at once
+            found = frame.envelope(model, left, progress=tick, **asked(study.task, model))
+        rough.append(missed(found))
         axes.append((found.time, list(found.outputs)))
         return found.lower[0], found.upper[0]
 
-    return width_shares(bounds, inputs, groups=groups, progress=False), *axes[0]
+    shares = width_shares(bounds, inputs, groups=groups, progress=False)
+    return shares, *axes[0], [*together(groups), *roughness(max(rough))]
+
+
+def missed(found: Envelope) -> float:
+    """The largest error of an envelope that misses its tolerance, as a share of the peak, or 0."""
+    if found.error is None or "reason" not in found.facts:
+        return 0.0
+    peak = np.maximum(np.abs(found.lower), np.abs(found.upper)).max((0, 1))
+    error = found.error.max((0, 1))
+    return float(np.divide(error, peak, out=np.zeros_like(error), where=peak > 0).max())
+
+
+def roughness(worst: float) -> list[str]:
+    """A line on shares whose envelopes miss their tolerance."""
+    told = f"shares are rough: their envelopes are good to {100 * worst:.2g} % of each peak"
+    return [told] if worst > ACCURACY else []
+
+
+def together(groups: Mapping[str, Sequence[str]]) -> list[str]:
+    """A line on each name that stands for several inputs, which its share is of together."""
+    return [
+        f"{name} counts as one input in the shares; {', '.join(of)} by name part it"
+        for name, of in groups.items()
+        if len(of) > 1
+    ]
+
+
+ACCURACY = 1e-2
+"""Error of the envelopes wanted, as a share of each output's peak: shares need two digits."""
 
 
 def explained(wanted: Structure, task: EnvelopeTask) -> list[str]:
@@ -117,7 +153,10 @@ def explained(wanted: Structure, task: EnvelopeTask) -> list[str]:
         return []
     given = {"inputs": wanted.inputs(task.fuzzy), **asked(task, wanted.linear)}
     one, count = frame.plan(wanted.linear, **given)[0], 1 + len(task.fuzzy)
-    each = f"one with all {count - 1} inputs fuzzy and one with each of them fixed"
+    several = together({name: wanted.members(name) for name in task.fuzzy})
+    of = f"all {len(given['inputs'])} inputs fuzzy"
+    fixed = f"each of {', '.join(task.fuzzy)} fixed" if several else "each of them fixed"
+    each = "".join([f"one with {of} and one with {fixed}", *(f" ({line})" for line in several)])
     plan = str(replace(one, name="what drives the width, of run", seconds=count * one.seconds))
     cost = plan.partition(";")[0]
     return [f"{cost}; {count} envelopes, {each}, which [envelope] shares = false leaves out"]
@@ -130,6 +169,7 @@ def dataset(results: Results, progress: Tick | None = None) -> xarray.Dataset:
     from alphacut.frame.structures.modes import ModalError
 
     variables: dict[str, Any] = {}
+    notes: list[str] = []
     coordinates: dict[str, Any] = {}
     if results.modulus is not None and len(results.modulus["parameter"]) > 1:
         cell = modulus_shares(results.case)
@@ -140,16 +180,20 @@ def dataset(results: Results, progress: Tick | None = None) -> xarray.Dataset:
     study = richest(results)
     if study is not None and of_width(results, study):
         try:
-            structure, time, names = envelope_shares(results, study, progress)
+            structure, time, names, notes = envelope_shares(results, study, progress)
         except ModalError as error:
             say(f"no shares of the width over time: {error}")
         else:
+            for line in notes:
+                say(f"{'' if 'counts as' in line else 'warning: '}{line}")
             variables["share"] = (("input", "time", "output"), structure.share, {"units": "1"})
             units = {"units": "SI, by output"}
             variables["width"] = (("time", "output"), structure.width, units)
             coordinates |= {"input": list(structure.names), "output": names}
             coordinates["time"] = ("time", time, {"units": "s"})
-    return xarray.Dataset(variables, coordinates, {"study": study.name if study else ""})
+    return xarray.Dataset(
+        variables, coordinates, {"study": study.name if study else "", "notes": "\n".join(notes)}
+    )
 
 
 def of_width(results: Results, study: Study) -> bool:

@@ -31,7 +31,10 @@ def accelerogram(path: Path, key: str = "frame.accelerogram") -> Accelerogram:
     file = CsvFile(path, key, "record", ALLOWED)
     (line, first), *rows = file.rows(least=2)
     if len(first) != len(COLUMNS):
-        raise file.refuse(line, f"got {len(first)} columns", allowed=ALLOWED)
+        what = f"got {len(first)} columns"
+        if len(first) == 1:
+            what = "no comma found: commas, semicolons or tabs part columns, and blanks do not"
+        raise file.refuse(line, what, allowed=ALLOWED)
     scales = [
         file.scale(line, cell, name, si)
         for cell, (name, si) in zip(first, COLUMNS.items(), strict=True)

@@ -20,7 +20,16 @@ def too_many(key: str, wanted: Structure, task: EnvelopeTask) -> Iterator[Proble
     if len(names) > MOST_PARAMETERS:
         what = f"proofs are affordable up to {MOST_PARAMETERS} fuzzy inputs, and there are"
         cure = "fewer in [envelope] fuzzy, or no proof: envelopes and peaks need none"
+        if key == "decision":
+            cure = f"fewer in [envelope] fuzzy, or no [decision]: {BY_PEAKS}"
         yield Problem(key, f"{what} {len(names)}", ", ".join(names), cure)
+
+
+BY_PEAKS = (
+    "peaks.csv, which report --csv writes, then judges a limit: below 'least peak at nodes (bound)'"
+    " less its error every motion exceeds it, above 'greatest peak at nodes' and its error every"
+    " motion keeps it, which is searched and not proved"
+)
 
 
 def estimated_reason(wanted: Structure, task: EnvelopeTask) -> str:

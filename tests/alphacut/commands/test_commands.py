@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -413,3 +414,14 @@ def test_the_program_ends_with_its_status_its_output_and_what_was_left_for_the_e
     )
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert (run.returncode, run.stdout, run.stderr) == (3, "first\nlast\n", "")
+
+
+def test_warnings_of_the_libraries_are_plain_lines_each_once(monkeypatch, capfd):
+    def run(*_):
+        for _ in range(2):
+            warnings.warn("rough\n  shares", stacklevel=1)
+        return 0
+
+    monkeypatch.setattr(COMMANDS["check"], "run", run)
+    assert main(["check", PAPER]) == 0
+    assert capfd.readouterr().err == "alphacut: warning: rough shares\n"

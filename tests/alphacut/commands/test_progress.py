@@ -65,6 +65,18 @@ def test_a_line_says_what_is_done_and_no_share_of_nothing(monkeypatch):
     assert "Envelopes, search: 50% done after 130 s, some 30 s left\n" in shown.getvalue()
 
 
+def test_a_time_left_that_has_passed_twice_is_not_told_again(monkeypatch):
+    shown, clock = io.StringIO(), iter([0.0, 99.0, 113.0, 130.0])
+    monkeypatch.setattr(sys, "stderr", shown)
+    monkeypatch.setattr(told.time, "monotonic", lambda: next(clock))
+    with progress("Envelopes") as tick:
+        for done in (0.99, 0.99, 0.99):
+            tick(done)
+    lines = [line.split("Envelopes: ")[1] for line in shown.getvalue().splitlines()]
+    assert lines[0] == "99% done after 99 s, some 1 s left"
+    assert lines[1:] == [f"99% done after {spent} s; {told.UNKNOWN}" for spent in (113, 130)]
+
+
 def test_an_interrupted_command_says_what_is_kept_and_where(tmp_path):
     from argparse import Namespace
 

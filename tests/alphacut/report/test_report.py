@@ -13,7 +13,9 @@ from markupsafe import Markup
 from alphacut.entry import main
 from alphacut.io.provenance import door
 from alphacut.report.envelopes import peaks
+from alphacut.report.key_results import key_results
 from alphacut.report.key_results import peaks as key_peaks
+from alphacut.report.sections import shares
 from tests.alphacut.one_floor import one_floor
 
 PAPER = Path(__file__).parents[3] / "cases" / "paper.toml"
@@ -264,3 +266,19 @@ def test_peaks_are_told_between_their_bounds_and_those_tried_apart():
     assert row[1:3] == ("2.000 m … 2.500 m", "1.000 m … 3.000 m")
     for told in ("1.000 m", "1.500 m", "3.000 m", "2.000 m … 2.500 m"):
         assert f"|{told}|" in page
+
+
+def test_ranges_that_are_alike_on_every_level_are_told_once():
+    peak = {"lower": [1.0, 1.0], "upper": [3.0, 3.0]}
+    study = {"alpha": [0, 1], "fuzzy": ["E"], "nature": "guaranteed", "peak": {"q1": peak}}
+    page = str(key_results({"envelopes": {"all": study}}))
+    assert page.count("1.000 m … 3.000 m") == 1
+    assert "all inputs are intervals" in page.lower()
+    assert "most plausible" not in page
+    peak["lower"] = [1.0, 2.0]
+    assert "most plausible" in str(key_results({"envelopes": {"all": study}}))
+
+
+def test_notes_on_shares_stand_above_their_table():
+    page = str(shares({"q1": {"k": 0.5, "m": 0.5}}, ["shares are rough"]))
+    assert "Shares are rough" in page

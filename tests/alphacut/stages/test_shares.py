@@ -10,7 +10,7 @@ import pytest
 import xarray
 
 from alphacut.entry import main
-from alphacut.stages.width_shares import thinned
+from alphacut.stages.width_shares import roughness, thinned
 
 CASES = Path(__file__).parents[3] / "cases"
 SHORT = ['stages=["envelope"]', "envelope.fuzzy=E,m3"]
@@ -96,7 +96,32 @@ def test_the_plan_tells_what_shares_cost(tmp_path, capsys):
     assert main(asked) == 0
     out = capsys.readouterr().out
     assert re.search(r"what drives the width, of run: about \d[\d.]* s; 3 envelopes, one with", out)
-    assert "all 2 inputs fuzzy and one with each of them fixed" in out
+    assert "all 4 inputs fuzzy and one with each of E, m fixed" in out
     assert re.search(r"modal: about [\d.]+ s; \d+ bounds by .*; a proof is expected", out)
     assert main([*asked, "--set", "envelope.shares=false"]) == 0
     assert "what drives" not in capsys.readouterr().out
+
+
+def test_a_group_counts_as_one_input_and_says_so(tmp_path, capfd):
+    """Each stiffness is an input of the envelope, and all are one in the shares."""
+    (tmp_path / "two.toml").write_text(
+        'schema = 1\ntitle = "t"\nabout = "a"\nstages = ["envelope"]\n[frame]\nmasses = ["1 t",'
+        ' "[1, 2] t"]\nlengths = "3 m"\nstiffness = "25 MN/m ± 5 %"\ndisplacements = ["1 mm",'
+        ' "1 mm"]\nvelocities = "0 m/s"\ndamping_ratio = "3 %"\n[envelope]\nfuzzy = ["k", "m2"]\nduration = "0.2 s"\nstep = "0.01 s"\n'
+        "alpha = [0]\n",
+        encoding="utf-8",
+    )
+    case, note = str(tmp_path / "two.toml"), "k counts as one input in the shares; k1, k2 by name"
+    assert main(["envelope", case, "--explain"]) == 0
+    told = capfd.readouterr().out
+    assert "one with all 3 inputs fuzzy and one with each of k, m2 fixed" in told
+    assert note in told
+    out = tmp_path / "out"
+    assert main(["run", case, "--no-figures", "--out", str(out)]) == 0
+    assert note in capfd.readouterr().err
+    assert note in json.loads((out / "summary.json").read_text(encoding="utf-8"))["shares_notes"][0]
+
+
+def test_rough_shares_are_told_in_a_line():
+    assert roughness(0.0198) == ["shares are rough: their envelopes are good to 2 % of each peak"]
+    assert roughness(0.0099) == []

@@ -28,3 +28,12 @@ def test_a_record_may_have_semicolons_and_decimal_commas(tmp_path: Path) -> None
     file.write_text("time [s];acceleration [g]\n0,0;0\n0.02;1\n0,04;2\n", encoding="utf-8")
     with pytest.raises(BadInput, match=r"row 2 holds '0,0', a decimal comma, and row 3 '0.02'"):
         accelerogram(file)
+
+
+def test_a_record_that_blanks_part_is_told_what_parts_columns(tmp_path: Path) -> None:
+    file = tmp_path / "record.csv"
+    file.write_text("time [s] acceleration [g]\n0 0\n0.02 1\n0.04 2\n", encoding="utf-8")
+    with pytest.raises(BadInput, match=r"no comma found: .* allowed: time \[s\],acceleration"):
+        accelerogram(file)
+    file.write_text("time [s]\tacceleration [g]\n0\t0\n0.02\t1\n0.04\t2\n", encoding="utf-8")
+    assert len(accelerogram(file).acceleration) == 3

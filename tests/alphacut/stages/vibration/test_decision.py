@@ -219,6 +219,7 @@ def test_a_proof_that_none_can_afford_is_refused_before(
     assert main([command[0], str(path), *command[1:], *where]) == 2
     told = capsys.readouterr().err
     assert "proofs are affordable up to 6 fuzzy inputs, and there are 8" in told
+    assert ("searched and not proved" in told) is ("decision" in more)
     assert not (tmp_path / "out").exists()
 
 
