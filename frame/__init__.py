@@ -22,26 +22,8 @@ from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.frame.structures.storey import StoreyFrame
 
 __all__ = [
-    "INTEGRATORS",
-    "METHODS",
-    "Accelerogram",
-    "Envelope",
-    "Exact",
-    "FollowerRecord",
-    "Gauss4",
-    "GraphFollower",
-    "LagrangianFlow",
-    "LagrangianSystem",
-    "LinearFlow",
-    "MatrixStructure",
-    "Midpoint",
-    "Newmark",
-    "RungeKutta4",
-    "StepGuard",
-    "StoreyFrame",
-    "envelope",
-    "guard",
-    "pendulum",
-    "plan",
-    "record",
-]
+    "INTEGRATORS", "METHODS", "Accelerogram", "Envelope", "Exact", "FollowerRecord", "Gauss4",
+    "GraphFollower", "LagrangianFlow", "LagrangianSystem", "LinearFlow", "MatrixStructure",
+    "Midpoint", "Newmark", "RungeKutta4", "StepGuard", "StoreyFrame", "envelope", "guard",
+    "pendulum", "plan", "record",
+]  # fmt: skip

@@ -5,14 +5,6 @@ from alphacut.rve.model import Model, cross_check, named
 from alphacut.rve.result import Homogenised, StressCurve, effective_modulus
 
 __all__ = [
-    "LOADS",
-    "STRAIN",
-    "Cell",
-    "Homogenised",
-    "Model",
-    "Phase",
-    "StressCurve",
-    "cross_check",
-    "effective_modulus",
-    "named",
-]
+    "LOADS", "STRAIN", "Cell", "Homogenised", "Model", "Phase", "StressCurve", "cross_check",
+    "effective_modulus", "named",
+]  # fmt: skip

@@ -7,14 +7,6 @@ from alphacut.stochastic.theta.quadrature import ThetaRule, gauss_rule, layered_
 from alphacut.stochastic.theta.truncated_normal import TruncatedNormal
 
 __all__ = [
-    "Beta",
-    "ExponentialMap",
-    "HermiteMap",
-    "RadiusMap",
-    "ThetaLaw",
-    "ThetaRule",
-    "TruncatedNormal",
-    "gauss_rule",
-    "layered_rule",
-    "require_map",
-]
+    "Beta", "ExponentialMap", "HermiteMap", "RadiusMap", "ThetaLaw", "ThetaRule", "TruncatedNormal",
+    "gauss_rule", "layered_rule", "require_map",
+]  # fmt: skip

@@ -12,14 +12,8 @@ from alphacut.io.problem import Problem
 
 GROUPS = ("E", "I", "m", "l", "c", "k", "d", "q0", "v0", "zeta", *RAYLEIGH)
 LISTS = (
-    "lengths",
-    "dampers",
-    "displacements",
-    "velocities",
-    "second_moment",
-    "columns",
-    "stiffness",
-)
+    "lengths", "dampers", "displacements", "velocities", "second_moment", "columns", "stiffness",
+)  # fmt: skip
 """Keys of a frame with one value for each floor, or one for all."""
 OTHERS = {  # structures beside the storey frame, and their inputs
     "pendulum": ("m", "l", "d", "g", "phi_0", "omega_0"),

@@ -14,8 +14,7 @@ Tick = Callable[[float], None]
 EVERY = 10.0
 """Seconds from one line to the next where there is no terminal."""
 
-LATE = 0.95
-"""Share done from which a time left is held to: when twice of it has passed, none is told."""
+LATE = 0.95  # done: twice a time left that is told then is held to
 UNKNOWN = "the last part takes longer than foreseen, and its end is not known"
 
 

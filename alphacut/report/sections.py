@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from alphacut.figures.captions import in_words
 from alphacut.io.files import Document
-from alphacut.report import glossary
+from alphacut.report import glossary, tables
 from alphacut.report.decisions import decided, learned, next_measured, together
 from alphacut.report.differences import differences
 from alphacut.report.envelopes import envelopes, natural
@@ -18,16 +18,7 @@ from alphacut.report.key_results import key_results
 from alphacut.report.material import given, image, microstructure, modulus, stress
 from alphacut.report.methods import methods
 from alphacut.report.spectrum import spectrum
-from alphacut.report.tables import (
-    citation,
-    code,
-    details,
-    items,
-    paragraphs,
-    section,
-    sentence,
-    table,
-)
+from alphacut.report.tables import citation, code, details, items, paragraphs, section, table
 
 
 def sections(summary: Document, folder: Path) -> Iterator[Markup]:
@@ -83,11 +74,10 @@ def shares(found: Document, notes: Sequence[str] = ()) -> Markup:
     words = paragraphs(
         "Share of the width at α = 0 that is lost when an input is fixed at its modal value and"
         " all others are kept.",
-        *map(sentence, notes),
+        *map(tables.sentence, notes),
     )
-    # quantities that depend on the same inputs share a table
     kinds = dict.fromkeys(tuple(entry) for entry in found.values())
-    tables = []
+    drawn = []
     for inputs in kinds:
         of = [name for name, entry in found.items() if tuple(entry) == inputs]
         rows = [
@@ -97,8 +87,8 @@ def shares(found: Document, notes: Sequence[str] = ()) -> Markup:
             )
             for name in inputs
         ]
-        tables.append(table(("input", *of), rows))
-    return section("What drives the width", words, *tables)
+        drawn.append(table(("input", *of), rows))
+    return section("What drives the width", words, *drawn)
 
 
 def comparison(rows: Sequence[Document]) -> Markup:

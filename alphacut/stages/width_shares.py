@@ -134,15 +134,12 @@ def roughness(worst: float) -> list[str]:
 
 def together(groups: Mapping[str, Sequence[str]]) -> list[str]:
     """A line on each name that stands for several inputs, which its share is of together."""
-    return [
-        f"{name} counts as one input in the shares; {', '.join(of)} by name part it"
-        for name, of in groups.items()
-        if len(of) > 1
-    ]
+    several = {name: ", ".join(of) for name, of in groups.items() if len(of) > 1}
+    told = "counts as one input in the shares"
+    return [f"{name} {told}; {of} by name part it" for name, of in several.items()]
 
 
-ACCURACY = 1e-2
-"""Error of the envelopes wanted, as a share of each output's peak: shares need two digits."""
+ACCURACY = 1e-2  # wanted error of the envelopes, of each peak: shares need two digits
 
 
 def explained(wanted: Structure, task: EnvelopeTask) -> list[str]:
@@ -191,9 +188,8 @@ def dataset(results: Results, progress: Tick | None = None) -> xarray.Dataset:
             variables["width"] = (("time", "output"), structure.width, units)
             coordinates |= {"input": list(structure.names), "output": names}
             coordinates["time"] = ("time", time, {"units": "s"})
-    return xarray.Dataset(
-        variables, coordinates, {"study": study.name if study else "", "notes": "\n".join(notes)}
-    )
+    words = {"study": study.name if study else "", "notes": "\n".join(notes)}
+    return xarray.Dataset(variables, coordinates, words)
 
 
 def of_width(results: Results, study: Study) -> bool:

@@ -28,17 +28,9 @@ if TYPE_CHECKING:
 
 Sampler = Callable[[np.random.Generator, int], Array]
 FACTS = (
-    "output",
-    "limit",
-    "fuzzy",
-    "random",
-    "deviation",
-    "between_nodes",
-    "samples",
-    "step",
-    "trajectories",
-    "nature",
-)
+    "output", "limit", "fuzzy", "random", "deviation", "between_nodes", "samples", "step",
+    "trajectories", "nature",
+)  # fmt: skip
 NATURE = "inner: attained at the fuzzy points tried, with the sampling deviation given"
 
 
