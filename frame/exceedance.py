@@ -10,7 +10,7 @@ import numpy as np
 
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.calculus.low_discrepancy import chebyshev_points
+from alphacut.frame.calculus.low_discrepancy import chebyshev_points, corners
 from alphacut.frame.calculus.numbers import require_count
 from alphacut.frame.checks.admissible import require_motion
 from alphacut.frame.checks.between_nodes import stray
@@ -203,19 +203,9 @@ def exceedance(
         name = output if isinstance(output, str) else system.outputs[output]
     except (IndexError, TypeError):
         name = str(output)  # which is refused as others that are none
-    return exceedances(
-        system,
-        inputs,
-        random,
-        limits={name: limit},
-        duration=duration,
-        step=step,
-        alpha=alpha,
-        samples=samples,
-        spread=spread,
-        rng=rng,
-        progress=progress,
-    )[name]
+    times = {"duration": duration, "step": step, "alpha": alpha, "progress": progress}
+    how = {"limits": {name: limit}, "samples": samples, "spread": spread, "rng": rng, **times}
+    return exceedances(system, inputs, random, **how)[name]  # type: ignore[arg-type]
 
 
 ANY = "any of them"
@@ -257,8 +247,12 @@ def exceedances(
     cuts = boxes(inputs, alpha)
     drawn = [_drawn(name, random[name], rng, samples) for name in random]
     draws = np.column_stack(drawn) if random else np.zeros((1, 0))
-    flow = _flow(system, (*cuts.names, *random), duration, step)
-    if not isinstance(system, LagrangianSystem):
+    names = *cuts.names, *random
+    flow: Flow
+    if isinstance(system, LagrangianSystem):
+        flow = LagrangianFlow(system, names, duration, step)
+    else:
+        flow = LinearFlow(system, names, duration, step, Exact())
         middle = np.tile(cuts.modal, (len(draws), 1))
         require_motion(system, flow.names, np.hstack([middle, draws]), duration)
     tried = [_tried(cuts, level, spread) for level in range(len(cuts.alpha))]
@@ -367,17 +361,7 @@ def _bounds(peak: Array, of: Array, limits: Array) -> tuple[Array, Array]:
     )
 
 
-def _flow(
-    system: LinearSystem | LagrangianSystem, names: tuple[str, ...], duration: float, step: float
-) -> Flow:
-    if isinstance(system, LagrangianSystem):
-        return LagrangianFlow(system, names, duration, step)
-    return LinearFlow(system, names, duration, step, Exact())
-
-
 def _tried(cuts: Boxes, level: int, spread: int, *, corner: int = 8) -> Array:
-    from alphacut.frame.calculus.low_discrepancy import corners
-
     lower, upper = cuts.unit(level)
     if not (upper > lower).any():
         return cuts.modal[None]

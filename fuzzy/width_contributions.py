@@ -10,9 +10,10 @@ import numpy as np
 from alphacut.fuzzy.arguments import fuzzy_inputs
 from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.progress_bar import Progress, told
+from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.numbers import Array, Crisp, FuzzyNumber
 
-Bounds = Callable[[Mapping[str, FuzzyNumber]], tuple[Array, Array]]
+Bounds = Callable[[Mapping[str, FuzzyNumber]], tuple[Array, Array] | FuzzyResult]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -24,11 +25,13 @@ class Shares:
         width: Width with all inputs fuzzy, shape (…).
         lost: Width lost when one is fixed, shape (names, …). What is lost to all need not add up to
             the width: effects overlap.
+        outputs: Names of the outputs along the last axis of `width`; empty where there is none.
     """
 
     names: tuple[str, ...]
     width: Array
     lost: Array
+    outputs: tuple[str, ...] = ()
 
     @property
     def share(self) -> Array:
@@ -39,27 +42,35 @@ class Shares:
         return share
 
     def __str__(self) -> str:
-        """A line for each input or group, the least and the greatest share over all widths."""
+        """A line for each output and input or group, the least and the greatest share."""
         return "\n".join(
             ["share of the width lost where one is fixed at its modal value:"]
-            + [f"  {name}: {words}" for name, words in self._told()]
+            + [f"  {', '.join(names)}: {words}" for *names, words in self._told()]
         )
 
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
         """The shares as a table, for notebooks."""
-        return html_table(("input", "share of the width lost"), self._told())
+        head = ("output",) if len(self.outputs) > 1 else ()
+        return html_table((*head, "input", "share of the width lost"), self._told())
 
-    def _told(self) -> list[tuple[str, str]]:
-        rows = 100 * self.share.reshape(len(self.names), -1)
-        ends = zip(
-            self.names, rows.min(1, initial=np.inf), rows.max(1, initial=-np.inf), strict=True
-        )
+    def _told(self) -> list[tuple[str, ...]]:
+        """Output where there are several, input, and its shares over all but outputs."""
+        share = 100 * self.share
+        if len(self.outputs) < 2:
+            return [(name, _range(share[i])) for i, name in enumerate(self.names)]
         return [
-            (name, f"{low:.3g} %" if low == high else f"{low:.3g} … {high:.3g} %")
-            for name, low, high in ends
+            (output, name, _range(share[i, ..., k]))
+            for k, output in enumerate(self.outputs)
+            for i, name in enumerate(self.names)
         ]
+
+
+def _range(share: Array) -> str:
+    """The least and the greatest share in per cent, over levels and times."""
+    low, high = share.min(initial=np.inf), share.max(initial=-np.inf)
+    return f"{low:.3g} %" if low == high else f"{low:.3g} … {high:.3g} %"
 
 
 ASKED = (
@@ -79,7 +90,8 @@ def width_shares(
 
     Args:
         bounds: The propagation: from fuzzy inputs to lower and upper ends, two arrays of any one
-            shape (levels, times, outputs).
+            shape (levels, times, outputs), or to a result, as `lambda inputs:
+            propagate(function, inputs)`, whose outputs are told by name.
         inputs: The fuzzy inputs.
         groups: Names of inputs that are fixed together, by the name of their group; each input by
             itself if not given.
@@ -100,14 +112,21 @@ def width_shares(
             f"the groups name {', '.join(unknown)}; the fuzzy inputs are {', '.join(inputs)}"
         )
 
+    outputs: list[tuple[str, ...]] = []
+
     def width(fuzzy: Mapping[str, FuzzyNumber]) -> Array:
         try:
             found = bounds(fuzzy)
         except TypeError as error:
             raise ValueError(f"{ASKED}, and it raised TypeError: {error}") from error
+        if isinstance(found, FuzzyResult):
+            outputs.append(tuple(found.outputs))
+            found = found.lower, found.upper
         if not isinstance(found, Sequence | np.ndarray) or len(found) != 2:
             raise ValueError(f"{ASKED}, and it returned {repr(found).partition(chr(10))[0][:80]}")
         difference: Array = np.asarray(found[1], float) - np.asarray(found[0], float)
+        if len(outputs) == 0 and difference.ndim > 1:
+            outputs.append(tuple(f"output {k}" for k in range(difference.shape[-1])))
         return difference
 
     sets: list[dict[str, FuzzyNumber]] = [
@@ -124,4 +143,4 @@ def width_shares(
             if tell:
                 tell(len(widths) / len(sets))
     whole, *narrower = widths
-    return Shares(tuple(chosen), whole, np.array([whole - one for one in narrower]))
+    return Shares(tuple(chosen), whole, np.array([whole - one for one in narrower]), *outputs[:1])

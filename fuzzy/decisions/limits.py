@@ -285,8 +285,7 @@ def safe_scale(
         progress: As for `propagate`.
 
     Raises:
-        CampaignError: The function has no value at the nominal inputs. Where it has none in a
-            larger box, that one counts as unproved, and `failure` says where.
+        CampaignError: The function has no value at the nominal inputs.
         ValueError: A number is not finite, a tolerance is negative or names no input, a limit
             names no output, or the function cannot be enclosed.
     """

@@ -104,8 +104,7 @@ class Threshold:
         witness: The point that breaks a limit, shape (inputs,), or None.
         judged: Boxes that were judged.
         runs: Samples of the function that this took.
-        failure: Without a witness the least size whose box was found to hold a point where the
-            function has no value, and that point, in words; else empty.
+        failure: Without a witness the least size of a box with a point without a value, in words.
     """
 
     safe: float | None
@@ -168,7 +167,7 @@ def threshold(
             f"most, tolerance and limit are {most:g}, {tolerance:g}, {limit}; they must be positive"
         )
     last, first = judge(*family.at(most)), judge(*family.at(0.0))
-    runs, failure = last.runs + first.runs, _failing(most, last)
+    runs, failure = last.runs + first.runs, last.failure and f"{most:.6g}, {last.failure}"
     if last.safe:
         return Threshold(most, np.inf, None, 2, runs)
     if first.witness is not None or not (first.safe or last.witness is not None):
@@ -193,15 +192,10 @@ def threshold(
             unsafe, witness = min(family.size_of(found.witness), middle), found.witness
         else:
             undecided.append(middle)
-            failure = _failing(middle, found) or failure
+            failure = f"{middle:.6g}, {found.failure}" if found.failure else failure
         undecided = [size for size in undecided if safe < size < unsafe]
         if progress:  # each box halves what is open, down to the tolerance
             left = max((min(unsafe, most) - safe) / most, tolerance)
             progress(max(judged / limit, float(np.log(left) / min(np.log(tolerance), -1e-9))))
     least = None if safe == 0 and not first.safe else safe
     return Threshold(least, unsafe, witness, judged, runs, failure if witness is None else "")
-
-
-def _failing(size: float, found: Verdict) -> str:
-    """Size of a box and where in it the function has no value; empty where none was found."""
-    return f"{size:.6g}, {found.failure}" if found.failure else ""

@@ -139,9 +139,13 @@ class JointClaim:
         )
         return cls(rule, (*given, *([rule.words] if rule and rule.words else []), *held), opinions)
 
-    def resting_on(self, nature: str, *, interactions: bool = False) -> JointClaim:
-        """The claim of a result whose bounds are of a nature, perhaps under interactions."""
-        more = [] if nature == "guaranteed" else [f"the {nature} bounds are the true ones"]
+    def resting_on(
+        self, nature: str, *, interactions: bool = False, checked: bool = True
+    ) -> JointClaim:
+        """The claim of a result of a nature, under interactions, or that nothing checked."""
+        open_ = "is not proved" if checked else "this plan has not checked"
+        lack = f"if the true range stays inside the {nature} bounds, which {open_}"
+        more = [] if nature == "guaranteed" else [lack]
         more += ["the interactions hold"] if interactions else []
         return self if self.rule is None else replace(self, given=(*self.given, *more))
 

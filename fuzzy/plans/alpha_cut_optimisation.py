@@ -62,10 +62,7 @@ class Optimisation:
                 " be 1 or more"
             )
 
-    @property
-    def stepwise(self) -> bool:
-        """Samples depend on those before."""
-        return True
+    stepwise = True  # samples depend on those before
 
     def run(self, model: Model, domain: Domain) -> FuzzyResult:
         """Search all bounds."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from alphacut.fuzzy.counted import counted
 from alphacut.fuzzy.plans.looks import Looks, Purse, SpentError
 from alphacut.fuzzy.plans.monotonicity import primary
 from alphacut.fuzzy.plans.sparse_chebyshev import Chebyshev
@@ -67,10 +68,7 @@ class Automatic:
                 " bounded by budget="
             )
 
-    @property
-    def stepwise(self) -> bool:
-        """Samples depend on those before."""
-        return True
+    stepwise = True  # samples depend on those before
 
     def run(self, model: Model, domain: Domain) -> FuzzyResult:
         """Bounds of every output, with one line on how they were verified."""
@@ -132,7 +130,7 @@ class Automatic:
         """One sentence on what was verified."""
         width = (result.upper - result.lower)[0, chosen]
         share = float((error / np.where(width > 0, width, np.inf)).max(initial=0.0))
-        how = "and descents from the best of them " if looks.names else ""
+        how = " and descents from the best of them" if looks.names else ""
         grade = "" if share <= 10 * self.tolerance else "; take a larger budget or another plan"
         many = (
             "; most descents end on hills of their own, so a better one is likely"
@@ -140,14 +138,16 @@ class Automatic:
             else ""
         )
         ended = (
-            f"; the budget of {self.budget} samples ended this after {looks.done} whole looks"
+            f"; the budget of {self.budget} samples ended the search"
+            + (f" after {counted(looks.done, 'round')}" if looks.done else " in its first round")
+            + ", a larger one may find more"
             if looks.spent
             else ""
         )
         return (
-            f"searched for extremes inside: fresh points in every cut {how}leave an error of"
-            f" {share:.1g} of the width{ended}{many}{grade}; a spike between samples would not be"
-            " seen"
+            f"searched for extremes inside by fresh points in every cut{how}: the error is"
+            f" estimated at {100 * share:.1g} % of the width{ended}{many}{grade}; a spike between"
+            " samples would not be seen"
         )
 
 

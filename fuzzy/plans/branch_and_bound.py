@@ -60,10 +60,7 @@ class BranchAndBound:
                 " positive"
             )
 
-    @property
-    def stepwise(self) -> bool:
-        """Samples depend on those before."""
-        return True
+    stepwise = True  # samples depend on those before
 
     def run(self, model: Model, domain: Domain) -> FuzzyResult:
         """Prove both bounds of every output and level; the error is the gap to samples."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from alphacut.fuzzy.plans.plan import Plan
-from alphacut.fuzzy.plans.transformation import Reduced
+from alphacut.fuzzy.plans.transformation import Extended, General, Reduced
 from alphacut.fuzzy.samples.model import Memo, Model
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.fuzzy.samples.result import FuzzyResult
@@ -21,10 +21,11 @@ from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.given import require_fields
 from alphacut.fuzzy.sets.numbers import Array, Interval, Rows
 
-TAUGHT = (
-    "the metamodel missed its teacher's bounds of held-out boxes by up to {:.3g}; what the teacher"
-    " misses, as corners alone miss extremes inside, is not in its error"
+CORNERS = (
+    "on one box the teacher {} has the corners alone; where the function turns inside take"
+    " Metamodel(teacher=Optimisation()) or BranchAndBound(function), or another plan"
 )
+_NAMED = 4  # outputs whose error the note tells
 _SAFETY = 2  # the error elsewhere may be larger than on the boxes that were held out
 
 
@@ -35,8 +36,10 @@ class Metamodel:
     Args:
         boxes: Boxes to learn from.
         held_out: Boxes more that it is tested on.
-        teacher: Plan whose bounds on each box are learnt; the corners are enough where the model is
-            monotone.
+        teacher: Plan whose bounds on each box are learnt, at its cost for each of `boxes` and
+            `held_out`. A box has one level, of which `Reduced`, `General` and `Extended` take the
+            2^n corners alone, enough where the model is monotone; where it turns inside, take
+            `Optimisation()` or `BranchAndBound(function)`.
         seed: Where the boxes are drawn from.
 
     Raises:
@@ -56,10 +59,7 @@ class Metamodel:
                 " 1 at least"
             )
 
-    @property
-    def stepwise(self) -> bool:
-        """Samples depend on those before."""
-        return True
+    stepwise = True  # samples depend on those before
 
     def run(self, model: Model, domain: Domain) -> FuzzyResult:
         """Train on boxes within the support and predict the bounds of every cut."""
@@ -96,9 +96,12 @@ class Metamodel:
         learn, test = slice(0, self.boxes + 2), slice(self.boxes + 2, None)
         predict = RBFInterpolator(features[learn], targets[learn], kernel="cubic", degree=1)
         missed = np.abs(predict(features[test]) - targets[test]).reshape(-1, 2, taught.shape[2])
-        return TrainedBounds(
-            memo.values.columns, (lower, upper), predict, missed.max(axis=(0, 1)), len(memo)
-        )
+        each = len(memo) / len(unit)
+        notes = [f"the teacher {type(self.teacher).__name__} took {each:.3g} runs a box"]
+        if isinstance(self.teacher, Reduced | General | Extended):
+            notes.append(CORNERS.format(type(self.teacher).__name__))
+        support, most = (lower, upper), missed.max(axis=(0, 1))
+        return TrainedBounds(memo.values.columns, support, predict, most, len(memo), (*notes,))
 
     def _boxes(self, inputs: int) -> Array:
         """Boxes of the unit cube, shape (n, 2, inputs): the cube, its middle, spread ones."""
@@ -135,6 +138,7 @@ class TrainedBounds:
         predict: From boxes of the unit cube (n, 2 · moving inputs) to bounds (n, 2 · outputs).
         missed: Largest error on the boxes that were held out, shape (outputs,).
         runs: Samples of the model that the training took.
+        notes: What is to be said of the teacher, one sentence each.
     """
 
     outputs: tuple[str, ...]
@@ -142,6 +146,7 @@ class TrainedBounds:
     predict: Callable[[Array], Array]
     missed: Array
     runs: int
+    notes: tuple[str, ...] = ()
 
     def bounds(self, domain: Domain) -> FuzzyResult:
         """Predicted bounds of every cut, nested, without a run of the model.
@@ -181,5 +186,13 @@ class TrainedBounds:
             error=np.broadcast_to(_SAFETY * self.missed, least.shape).copy(),
             proved=np.zeros(least.shape, bool),
             enforced=(nested[0] < least) | (nested[1] > most),
-            notes=(TAUGHT.format(float(self.missed.max())),),
+            notes=(self._told(), *self.notes),
+        )
+
+    def _told(self) -> str:
+        missed = [f"{x:.3g} of {name}" for name, x in zip(self.outputs, self.missed, strict=True)]
+        shown = ", ".join([*missed[:_NAMED], *(["…"] if len(missed) > _NAMED else [])])
+        return (
+            f"the metamodel missed its teacher's bounds of held-out boxes by up to {shown}; the"
+            f" error is {_SAFETY} times that, and what the teacher misses is not in it"
         )

@@ -33,10 +33,7 @@ class _Sampling:
     samples: int = 256
     seed: int = 0
 
-    @property
-    def stepwise(self) -> bool:
-        """All samples are known beforehand."""
-        return False
+    stepwise = False  # all samples are known beforehand
 
     def __post_init__(self) -> None:
         require_fields(self)

@@ -35,10 +35,7 @@ class Signed:
     verification: Verification = field(default_factory=Verification)
     limit: int = 10_000
 
-    @property
-    def stepwise(self) -> bool:
-        """Samples depend on those before."""
-        return True
+    stepwise = True  # samples depend on those before
 
     def run(self, model: Model, domain: Domain) -> FuzzyResult:
         """Verify the signs, run the corners, rearrange them into α-cuts."""

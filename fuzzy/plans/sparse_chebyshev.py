@@ -62,10 +62,7 @@ class Chebyshev:
                 " positive"
             )
 
-    @property
-    def stepwise(self) -> bool:
-        """Samples depend on those before."""
-        return True
+    stepwise = True  # samples depend on those before
 
     def run(self, model: Model, domain: Domain) -> FuzzyResult:
         """Build the surface, search it, confirm what it says."""

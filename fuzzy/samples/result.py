@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
+_ITEM = re.compile(r"\[\d+\]$")  # an entry of an array
 _ROWS = 25  # that are printed, a level each
 
 
@@ -182,10 +183,11 @@ class FuzzyResult:
         runs += "; their error is not estimated" if np.isnan(self.error).any() else ""
         lines = [f"{self.nature} bounds{given} by the plan {self.plan}, {runs}"]
         for column, name in enumerate(self.outputs[: self._printed]):
-            cuts = zip(self.domain.alpha, self.lower[:, column], self.upper[:, column], strict=True)
+            ends = self.lower[:, column], self.upper[:, column], self.error[:, column]
             lines += [
                 f"{name}, α = {alpha:g}: {_shown(low)} … {_shown(high)}"
-                for alpha, low, high in cuts
+                + (f", error {error:.2g}" if error > 0 else "")
+                for alpha, low, high, error in zip(self.domain.alpha, *ends, strict=True)
             ]
         hidden = len(self.outputs) - self._printed
         what = f"… and {counted(hidden, 'output')} more: bounds(NAME) has them"
@@ -205,13 +207,19 @@ class FuzzyResult:
         notes = [line for line in said if ", α = " not in line]
         shown = range(min(len(self.outputs), self._printed))
         rows = [
-            (self.outputs[k], f"{alpha:g}", _shown(self.lower[a, k]), _shown(self.upper[a, k]))
+            (
+                self.outputs[k],
+                f"{alpha:g}",
+                *(_shown(ends[a, k]) for ends in (self.lower, self.upper)),
+                "not estimated" if np.isnan(self.error[a, k]) else f"{self.error[a, k]:.2g}",
+            )
             for k in shown
             for a, alpha in enumerate(self.domain.alpha)
         ]
-        return html_table(("output", "α", "lower", "upper"), rows, below="\n".join([head, *notes]))
+        header = ("output", "α", "lower", "upper", "error")
+        return html_table(header, rows, below="\n".join([head, *notes]))
 
-    def plot(self, output: str = "y", axes: Axes | None = None) -> Axes:
+    def plot(self, output: str | None = None, axes: Axes | None = None) -> Axes:
         """Draw one output's cuts as a membership function, with the levels that were computed.
 
         Between levels the ends go straight, as those of the inputs do. Where an input's do not (a
@@ -219,7 +227,8 @@ class FuzzyResult:
         lie inside it.
 
         Args:
-            output: Name of the output; `y` of an array y[0], y[1], …: bands over the index.
+            output: Name of the output; `y` of an array y[0], y[1], …: bands over the index. The
+                first one if not given, and the title says so where there are several.
             axes: Where to draw; a new figure if not given.
 
         Returns:
@@ -228,6 +237,12 @@ class FuzzyResult:
         Raises:
             ValueError: There is no such output.
         """
+        if output is None:
+            output = _ITEM.sub("", self.outputs[0])
+            axes = self.plot(output, axes)
+            if {_ITEM.sub("", name) for name in self.outputs} != {output}:
+                axes.set_title(f"{axes.get_title()}\nfirst output, others by plot(NAME)", size=10)
+            return axes
         item = re.compile(rf"{re.escape(str(output))}\[\d+\]")
         row = [k for k, name in enumerate(self.outputs) if item.fullmatch(name)]
         if row and output not in self._columns:
@@ -252,7 +267,8 @@ class FuzzyResult:
     def claim(self) -> JointClaim:
         """What the cuts claim, and which inputs are opinions."""
         joint = JointClaim.of(self.domain.inputs)
-        return joint.resting_on(self.nature, interactions=bool(self.domain.interactions))
+        checked, bounded = not np.isnan(self.error).any(), bool(self.domain.interactions)
+        return joint.resting_on(self.nature, interactions=bounded, checked=checked)
 
     @property
     def nature(self) -> Nature:
@@ -293,7 +309,10 @@ class FuzzyResult:
         """
         if output not in self._columns:
             there = [*self.outputs[:_ROWS], *(["…"] if len(self.outputs) > _ROWS else [])]
-            raise ValueError(f"there is no output {output!r}; there are {', '.join(there)}")
+            none = f"there is no output {output!r}; there are {', '.join(there)}"
+            if any(name.startswith(f"{output}[") for name in self.outputs):
+                none += f"; bounds('{output}[0]') are those of an entry, plot('{output}') draws all"
+            raise ValueError(none)
         return self._columns[output]
 
     @cached_property

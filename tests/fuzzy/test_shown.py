@@ -7,11 +7,13 @@ import pytest
 
 from alphacut.frame import Envelope, StoreyFrame, envelope, guard, plan
 from alphacut.fuzzy import (
+    Automatic,
     Crisp,
     Extended,
     General,
     Interval,
     Known,
+    Metamodel,
     MonteCarlo,
     Optimisation,
     Reduced,
@@ -190,3 +192,45 @@ def test_results_with_arrays_are_compared_and_hashed_as_objects():
 def test_a_table_without_notes_has_no_empty_paragraph():
     assert html_table(("a",), [("1",)]).endswith("</table>")
     assert html_table(("a",), [("1",)], below="x\ny").endswith("</table><p>x<br>y</p>")
+
+
+def test_a_metamodel_names_outputs_errors_and_what_its_teacher_sees():
+    two = lambda x, y: {"w": x * y, "s": 1e6 * x**2 * y}  # noqa: E731
+    found = propagate(two, X, Metamodel(boxes=9, held_out=4, teacher=General()))
+    half = found.error[0] / 2
+    assert f"by up to {half[0]:.3g} of w, {half[1]:.3g} of s; the error is 2 times" in str(found)
+    assert "the teacher General has the corners alone; where the function turns" in str(found)
+    assert " runs a box" in str(found)
+    assert str(found).splitlines()[1].endswith(f", error {found.error[0, 0]:.2g}")
+    assert f"<td>{found.error[0, 0]:.2g}</td></tr>" in found._repr_html_()
+
+
+def test_a_budget_that_ends_a_search_is_told_in_plain_words():
+    inputs = {name: Interval(0, 1 + k) for k, name in enumerate("abcdef")}
+    wave = lambda a, b, c, d, e, f: np.sin(9 * a * b) + np.cos(7 * c - d) * e * f  # noqa: E731
+    text = str(propagate(wave, inputs, Automatic(budget=200), alpha=[0, 1]))
+    assert "the budget of 200 samples ended the search in its first round" in text
+    assert "% of the width" in text
+
+
+def test_the_first_of_several_outputs_is_drawn_and_an_array_says_how_to_get_it():
+    found = propagate(lambda x, y: {"w": x, "a": [x, y]}, X, Reduced(), alpha=[0, 1])
+    axes = found.plot()
+    assert axes.get_xlabel() == "w"
+    assert "first output, others by plot(NAME)" in axes.get_title()
+    assert "first output" not in propagate(product, X, Reduced()).plot().get_title()
+    with pytest.raises(
+        ValueError, match=r"bounds\('a\[0\]'\) are those of an entry, plot\('a'\) draws"
+    ):
+        found.bounds("a")
+
+
+def test_shares_are_told_by_output():
+    two = lambda x, y: {"w": 3 * x, "s": 5 * y}  # noqa: E731
+    found = width_shares(lambda inputs: propagate(two, inputs, Reduced(), alpha=[0.5]), X)
+    lines = ["  w, x: 100 %", "  w, y: 0 %", "  s, x: 0 %", "  s, y: 100 %"]
+    assert str(found).splitlines()[1:] == lines
+    assert "<th>output</th><th>input</th>" in found._repr_html_()
+    unnamed = propagate(two, X, Reduced(), alpha=[0.5])
+    bare = width_shares(lambda inputs: (unnamed.lower, unnamed.upper), X)
+    assert "  output 1, y: 0 %" in str(bare)

@@ -9,6 +9,7 @@ from alphacut.fuzzy import (
     Ellipsoidal,
     Known,
     Optimisation,
+    Reduced,
     Signed,
     Triangular,
     from_data,
@@ -58,14 +59,16 @@ def test_propagation_joins_and_prints_the_claim_with_its_conditions():
     assert "result of the next value of x, y lies in its α-cut with P >= 1 - α" in text
     assert "x: 19 values drawn alike and independently, bounds [0, 100]" in text
     assert "2 sources of unknown dependence; z in its cut at α (opinions)" in text
-    assert "the inner bounds are the true ones" in text
+    assert text.endswith("if the true range stays inside the inner bounds, which is not proved")
+    unchecked = str(propagate(lambda x: x, {"x": FIRST}, Reduced(), alpha=[0, 1]).claim)
+    assert unchecked.endswith("the inner bounds, which this plan has not checked")
     assert result.to_dataset().attrs["claim"] == str(result.claim)
     assert result.claim.opinions == ("z",)
 
 
 def test_a_proved_result_rests_on_no_bounds_and_interactions_are_a_condition():
     proved = propagate(total, {"x": FIRST, "y": 2}, Signed(), known=Known({"x": 1, "y": 1}))
-    assert "bounds are the true ones" not in str(proved)
+    assert "if the true range" not in str(proved)
     bound = [Ellipsoidal({("x", "y"): 0.5})]
     inputs = {"x": FIRST, "y": SECOND}
     assert "the interactions hold" in str(

@@ -36,7 +36,7 @@ def test_predicted_bounds_lie_within_their_stated_error():
     assert (np.abs(result.upper - true.upper) <= result.error).all()
     assert (result.error < 0.02 * (true.upper[0] - true.lower[0])).all()
     assert "of held-out boxes by up to" in result.notes[0]
-    assert "as corners alone miss extremes inside" in result.notes[0]
+    assert "Reduced has the corners alone; where the function turns inside" in result.notes[2]
 
 
 def test_more_boxes_make_it_better():
