@@ -256,7 +256,6 @@ def exceedances(
         middle = np.tile(cuts.modal, (len(draws), 1))
         require_motion(system, flow.names, np.hstack([middle, draws]), duration)
     tried = [_tried(cuts, level, spread) for level in range(len(cuts.alpha))]
-    total = sum(map(len, tried))
     found: list[Array] = []
     higher: list[Array] = []
     spaced = tried[0][:: -(-len(tried[0]) // LOOKED_AT)]
@@ -268,7 +267,7 @@ def exceedances(
             found.append(size.max(1)[:, columns] / sizes)
             higher.append(within_steps(size, between).max(1)[:, columns] / sizes)
             if tell:
-                tell(len(found) / total)
+                tell(len(found) / sum(map(len, tried)))
     of = np.repeat(np.arange(len(tried)), [len(points) for points in tried])
     peak, more = np.array(found), np.array(higher)  # (points, draws, limits)
     each = [
@@ -355,10 +354,8 @@ def _deviation(share: float, draws: int) -> float:
 def _bounds(peak: Array, of: Array, limits: Array) -> tuple[Array, Array]:
     """Least and greatest share of peaks above each limit, nested over levels."""
     share = np.array([1 - np.searchsorted(row, limits, side="right") / len(row) for row in peak])
-    levels = range(of.max() + 1)
-    return np.array([share[of >= k].min(0) for k in levels]), np.array(
-        [share[of >= k].max(0) for k in levels]
-    )
+    parts = [share[of >= k] for k in range(of.max() + 1)]
+    return np.array([part.min(0) for part in parts]), np.array([part.max(0) for part in parts])
 
 
 def _tried(cuts: Boxes, level: int, spread: int, *, corner: int = 8) -> Array:

@@ -217,16 +217,11 @@ def shifted(found: Envelope, model: LinearSystem, moved: Sequence[int]) -> Envel
 def _no_structure(model: object) -> str:
     """Why a model has no trajectories, and what to take in its place."""
     kind = type(model).__name__
+    ends = "(box), with the lower and upper end of each uncertain parameter by name"
     if hasattr(model, "reduced"):
-        return (
-            f"{kind} is reduced to few shapes first: take model.reduced(box), with the lower and"
-            " upper end of each uncertain parameter by name"
-        )
+        return f"{kind} is reduced to few shapes first: take model.reduced{ends}"
     if hasattr(model, "structure"):
-        return (
-            f"{kind} describes a structure: take model.structure().reduced(box), with the lower and"
-            " upper end of each uncertain parameter by name"
-        )
+        return f"{kind} describes a structure: take model.structure().reduced{ends}"
     return f"{model!r} is no structure; take a StoreyFrame, a MatrixStructure or a LagrangianSystem"
 
 

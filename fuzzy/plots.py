@@ -92,14 +92,10 @@ def figure_36() -> Figure:
     return figure
 
 
-def figure_37(number: FuzzyNumber | None = None) -> Figure:
-    """The paper's Fig. 37: a triangular number decomposed into six α-cuts.
-
-    Args:
-        number: The number to show; the triangle (1, 2, 3.5) if not given.
-    """
+def figure_37() -> Figure:
+    """The paper's Fig. 37: a triangular number decomposed into six α-cuts."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(4.2, 3.0), layout="constrained")
-    plot_cuts(figure.subplots(), number or Triangular(1.0, 2.0, 3.5), levels(5))
+    plot_cuts(figure.subplots(), Triangular(1.0, 2.0, 3.5), levels(5))
     return figure

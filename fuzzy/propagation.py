@@ -123,9 +123,8 @@ def propagate(
         warnings.warn(doubt, stacklevel=2)
     own = filter(None, (TORN if samples is not None and samples.torn else "", doubt))
     result = replace(result, notes=(*result.notes, *shared_numbers(domain), *own))
-    return result.charged(
-        calls=campaign.calls, reused=campaign.reused, seconds=perf_counter() - start
-    )
+    cost = {"calls": campaign.calls, "reused": campaign.reused, "seconds": perf_counter() - start}
+    return replace(result, **cost)  # type: ignore[arg-type]
 
 
 TORN = (

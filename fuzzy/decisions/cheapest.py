@@ -96,8 +96,9 @@ def cheapest_tolerances(
 def _require(nominal: Mapping[str, float], costs: Mapping[str, float]) -> None:
     unknown = [name for name in costs if name not in nominal]
     if not costs or unknown:
-        named = ", ".join(unknown) or "nothing"
-        raise ValueError(f"the costs name {named}; inputs are {', '.join(nominal)}")
+        raise ValueError(
+            f"the costs name {', '.join(unknown) or 'nothing'}; inputs are {', '.join(nominal)}"
+        )
     if not all(x > 0 and np.isfinite(x) for x in costs.values()):
         raise ValueError(f"the costs are {dict(costs)}; they must be positive")
     if zero := [name for name in costs if nominal[name] == 0]:

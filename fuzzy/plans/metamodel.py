@@ -25,7 +25,6 @@ CORNERS = (
     "on one box the teacher {} has the corners alone; where the function turns inside take"
     " Metamodel(teacher=Optimisation()) or BranchAndBound(function), or another plan"
 )
-_NAMED = 4  # outputs whose error the note tells
 _SAFETY = 2  # the error elsewhere may be larger than on the boxes that were held out
 
 
@@ -191,7 +190,7 @@ class TrainedBounds:
 
     def _told(self) -> str:
         missed = [f"{x:.3g} of {name}" for name, x in zip(self.outputs, self.missed, strict=True)]
-        shown = ", ".join([*missed[:_NAMED], *(["…"] if len(missed) > _NAMED else [])])
+        shown = ", ".join([*missed[:4], *(["…"] if len(missed) > 4 else [])])
         return (
             f"the metamodel missed its teacher's bounds of held-out boxes by up to {shown}; the"
             f" error is {_SAFETY} times that, and what the teacher misses is not in it"

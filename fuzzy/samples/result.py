@@ -353,10 +353,6 @@ class FuzzyResult:
         """Response surface of one output through the samples of the model (Fig. 2)."""
         return ResponseSurface.fit(self.points, self.values.array[:, [self.column(output)]])
 
-    def charged(self, *, calls: int, reused: int, seconds: float) -> FuzzyResult:
-        """The same result with what it cost."""
-        return replace(self, calls=calls, reused=reused, seconds=seconds)
-
     def to_csv(self, path: str | Path) -> None:
         """Write a CSV file with a row for each output and level.
 
