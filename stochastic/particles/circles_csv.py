@@ -144,6 +144,7 @@ class MeasuredCircles:
         unevenness: Difference of the matrix's brightness over the image, a share of the contrast.
         light: Slow light that was taken out before, a share of the contrast too.
         strange: Share of the pixels that are much brighter or darker than both phases.
+        unsure: Places of clusters that were parted uncertainly, shape (n, 2), in m.
     """
 
     discs: Discs
@@ -154,3 +155,4 @@ class MeasuredCircles:
     unevenness: float = 0.0
     light: float = 0.0
     strange: float = 0.0
+    unsure: Array = field(default_factory=lambda: np.zeros((0, 2)))

@@ -1,7 +1,8 @@
 """Circles from the image of a section.
 
-The image is smoothed, cut at Otsu's threshold, and split by a watershed on the distance to the
-background where particles touch. Each particle becomes the circle of its centroid and area; its
+The image is smoothed and cut at Otsu's threshold. Particles that touch are told apart by the arcs
+of their outline, or by a watershed on the distance to the background where arcs are of no discs.
+Each particle becomes the circle of its centroid and area; its
 area counts every pixel by the share that the smoothed grey value gives it, which places the edge to
 a fraction of a pixel.
 
@@ -17,12 +18,13 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from alphacut.stochastic.particles.annotation import Crop, cropped
+from alphacut.stochastic.particles.arcs import FOREIGN, deepest_in, parted
 from alphacut.stochastic.particles.circles_csv import MeasuredCircles
 from alphacut.stochastic.particles.discs import Discs
 from alphacut.stochastic.particles.light import evened
@@ -49,12 +51,31 @@ LIT = 0.08  # of the contrast, by which slow light differs over the image before
 LIGHT = 1.0  # of the contrast, to which evening is tested
 UNEVEN = 0.2  # of the contrast, by which the brightness of the matrix may differ when evened
 TILES = 8  # along each side of the image, over which that brightness is compared
+RIM = 6  # pixels around a cluster in which its outline is looked at
 STRANGE = 0.4  # of the contrast, by which a pixel lies beyond both phases and is of neither
 STRANGERS = 5e-4  # share of such pixels that is warned of
 INK = 5.0  # times as many pixels have a drawn grey as the next three greys together
 FLATTENED = 0.45  # roundness of a disc that several neighbours overlap
 DROP = "[microstructure.image] drop = true"
 PARTICLES = ("auto", "bright", "dark")
+
+
+class Segments(NamedTuple):
+    """The particles' pixels.
+
+    Args:
+        share: Particle's share of each pixel.
+        labels: Number of the particle at each pixel, 0 in the matrix.
+        light: Slow light that was evened, over the contrast.
+        centres: Row and column of the discs that touch others, by label.
+        unsure: Row and column of clusters whose discs are not told for sure.
+    """
+
+    share: Array
+    labels: Labels
+    light: float
+    centres: dict[int, tuple[float, float]]
+    unsure: list[tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -147,8 +168,8 @@ class SectionImage:
                 particles' area lies in pieces that are no round particles, unless `drop` is set.
         """
         segmented = self._segmented(picture)
-        share, labels, light = segmented
-        found, rejected, lost, misfit = self._sorted(share, labels)
+        share, labels, light, _, unsure = segmented
+        found, rejected, lost, misfit = self._sorted(segmented)
         if not found:
             raise ValueError(
                 f"{self.path} shows no round particle of {self.smallest:g} pixels or more in radius"
@@ -176,25 +197,29 @@ class SectionImage:
         discs = Discs(centres, radius * self.pixel, size, periodic=False)
         apart = self._unevenness(share, labels, light)
         strange = _strange(picture, share)
-        return MeasuredCircles(discs, rejected, fraction, missing, misfit, apart, light, strange)
+        places = np.array([(column + 0.5, height - row - 0.5) for row, column in unsure])
+        unsure_at = places.reshape(-1, 2) * self.pixel
+        return MeasuredCircles(
+            discs, rejected, fraction, missing, misfit, apart, light, strange, unsure_at
+        )
 
-    def _cure(self, picture: Array, segmented: tuple[Array, Labels, float], besides: str) -> str:
+    def _cure(self, picture: Array, segmented: Segments, besides: str) -> str:
         """What helps where pieces are not round: other phase, even light, the image as the cell."""
         share = segmented[0]
         other = "dark" if np.vdot(share - share.mean(), picture) > 0 else "bright"
         turned = replace(self, particles=other)
         seen = turned._segmented(picture)
-        found, _, lost, misfit = turned._sorted(*seen[:2])
+        found, _, lost, misfit = turned._sorted(seen)
         if found and lost <= LOST * seen[0].sum() and misfit <= MISFIT:
             key = f'[microstructure.image] particles = "{other}"'
             return f"the {other} phase is round: take it as the particles ({key})"
-        if (apart := self._unevenness(*segmented)) > UNEVEN:
+        if (apart := self._unevenness(*segmented[:3])) > UNEVEN:
             return uneven_in_words(apart)
         cell = "particles that are not round need the image itself as the cell ([cell] image)"
         return cell + besides
 
     def _sorted(
-        self, share: Array, labels: Labels
+        self, segmented: Segments
     ) -> tuple[list[tuple[float, float, float]], dict[int, str], float, float]:
         """Circles in pixels, reasons of what was left out, pixels left out inside, and the misfit.
 
@@ -202,11 +227,13 @@ class SectionImage:
         """
         from skimage import measure
 
+        share, labels, _, centres, _ = segmented
         found, rejected, lost = [], {}, 0.0
         beyond, kept = 0.0, 0
         touching = _touching(labels)
         for region in measure.regionprops(labels):  # type: ignore[no-untyped-call]
             circle = _circle(share, labels, region.label, region.bbox)
+            circle = (*centres.get(region.label, circle[:2]), circle[2])
             reason = self._reason(region, circle[2], labels.shape, touching[region.label])
             if not reason:
                 found.append(circle)
@@ -250,8 +277,8 @@ class SectionImage:
         tiles = [tile[~np.isnan(tile)] for row in rows for tile in np.array_split(row, TILES, 1)]
         return float(np.ptp([np.median(tile) for tile in tiles if len(tile) >= 64] or [0.0]))
 
-    def _segmented(self, picture: Array) -> tuple[Array, Labels, float]:
-        """Particle's share of each pixel, labels of particles, light over contrast if evened."""
+    def _segmented(self, picture: Array) -> Segments:
+        """The particles' pixels."""
         from scipy import ndimage
         from skimage import filters
 
@@ -270,7 +297,7 @@ class SectionImage:
         within, without = (float(np.median(smooth[self._core(one)])) for one in (mask, ~mask))
         share = (smooth - without) / (within - without)  # noise beyond 0 and 1 cancels in sums
         labels = _rounder(self._pieces(mask), self.roundness, np.pi * self.smallest**2)
-        return share, labels, light
+        return Segments(share, labels, light, *_parted(share, labels, self.smallest))
 
     def _pieces(self, mask: NDArray[np.bool_]) -> Labels:
         """Watershed of the distance to the background."""
@@ -351,6 +378,48 @@ def _rounder(labels: Labels, least: float, smallest: float) -> Labels:
             labels[window][rows[parts == part], columns[parts == part]] = new
             new += 1
     return labels
+
+
+def _parted(
+    share: Array, labels: Labels, smallest: float
+) -> tuple[dict[int, tuple[float, float]], list[tuple[float, float]]]:
+    """Centres of discs by the arcs of clusters, which are labelled anew, and clusters left as is.
+
+    A cluster keeps its pieces where circles differ from its pixels by more than `FOREIGN`.
+    """
+    from scipy import ndimage
+
+    clusters = ndimage.label(labels > 0)[0]
+    centres: dict[int, tuple[float, float]] = {}
+    unsure = []
+    for number, window in enumerate(ndimage.find_objects(clusters), start=1):
+        here = clusters[window] == number
+        rows, columns = np.nonzero(here)
+        if len(rows) < np.pi * smallest**2 or convexity(rows, columns) >= CONVEX:
+            continue
+        found = parted(*_padded(share, window, here), smallest)
+        corner = np.array([one.start for one in window])
+        if found.differs <= FOREIGN or len(np.unique(labels[window][here])) > 1:
+            unsure += [(x, y) for x, y in np.array(found.unsure).reshape(-1, 2) + corner - RIM]
+        if found.differs > FOREIGN:
+            continue
+        new = labels.max() + 1
+        circles = found.circles - np.array([RIM, RIM, 0])
+        rest = found.rest[rows + RIM, columns + RIM]
+        own = deepest_in(circles, rows, columns)
+        labels[window][here] = new + np.where(rest, len(circles) + rest - 1, own)
+        at = circles[:, :2] + corner
+        centres |= {new + k: (float(x), float(y)) for k, (x, y) in enumerate(at)}
+    return centres, unsure
+
+
+def _padded(
+    share: Array, window: tuple[slice, slice], here: NDArray[np.bool_]
+) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
+    """A window's shares, pixels and what is seen with a rim of the next ones, or none beyond."""
+    rim = tuple(slice(one.start, one.stop + 2 * RIM) for one in window)
+    seen = np.pad(np.ones(share.shape, bool), RIM)[rim]
+    return np.pad(share, RIM, mode="edge")[rim], np.pad(here, RIM), seen
 
 
 def _touching(labels: Labels) -> NDArray[np.bool_]:

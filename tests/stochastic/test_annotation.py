@@ -162,8 +162,10 @@ def test_even_light_is_not_taken_for_uneven(dark):
 
 
 def test_an_accepted_image_warns_of_uneven_light():
-    def told(unevenness, light=0.0, strange=0.0):
-        read = SimpleNamespace(misfit=0.0, unevenness=unevenness, light=light, strange=strange)
+    def told(unevenness, light=0.0, strange=0.0, unsure=()):
+        read = SimpleNamespace(
+            misfit=0.0, unevenness=unevenness, light=light, strange=strange, unsure=unsure
+        )
         seen = SimpleNamespace(discs=range(9), read=read)
         sample = SimpleNamespace(values=range(4))
         found = SimpleNamespace(fraction_of_map=0.4, sample=sample, sections=[seen])
@@ -173,6 +175,8 @@ def test_an_accepted_image_warns_of_uneven_light():
     assert "warning: the light is uneven, the matrix's brightness differs by 0.56" in told(0.56)
     assert "subtract the background" in told(0.56)
     assert "the light differed by 0.35 of the contrast" in told(0.0, light=0.35)
+    doubtful = told(0.0, unsure=[(0.35e-3, 0.25e-3), (0.1e-3, 0.2e-3)])
+    assert "2 clusters of touching particles were parted uncertainly, at (0.35, 0.25)," in doubtful
     assert "warning: 2.00% of the pixels are much brighter" in told(0.0, strange=0.02)
 
 

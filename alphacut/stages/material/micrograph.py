@@ -9,6 +9,7 @@ from alphacut.case.case import Case
 
 if TYPE_CHECKING:
     from alphacut.stochastic.microstructure import Microstructure
+    from alphacut.stochastic.theta.truncated_normal import Array
 
 FALLEN = 0.05
 """Relative distance of the fraction that E takes from the image's that is warned of."""
@@ -40,6 +41,20 @@ def compared(fraction: float) -> str:
     return f"area fraction to compare with others: {fraction:.4f}, {told}"
 
 
+def uncertain(places: Array) -> str:
+    """Clusters whose discs are not told for sure, with their places, given in m."""
+    at = ", ".join(f"({1e3 * x:.4g}, {1e3 * y:.4g})" for x, y in places)
+    clusters = (
+        "cluster of touching particles was"
+        if len(places) == 1
+        else ("clusters of touching particles were")
+    )
+    return (
+        f"warning: {len(places)} {clusters} parted uncertainly, at {at} mm from the lower left"
+        " corner: look at image_circles.png"
+    )
+
+
 def fractions(found: Microstructure, fraction: float) -> Iterator[str]:
     """The one area fraction to compare with, what E takes of it, and what is lost between."""
     from alphacut.stochastic.particles.image import MISFIT, STRANGERS, UNEVEN, uneven_in_words
@@ -62,6 +77,8 @@ def fractions(found: Microstructure, fraction: float) -> Iterator[str]:
             f"warning: {misfit:.1%} of the particles' area lies outside the circles that stand for"
             f" them, where discs that touch leave less than {MISFIT:.0%}: they are not round"
         )
+    if len(read.unsure):
+        yield uncertain(read.unsure)
     if light := read.light:
         yield (
             f"the light differed by {light:.2f} of the contrast over the image and was evened"
