@@ -42,6 +42,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         raise BadInput(
             Problem("--no-figures", "there are none without --out", allowed="beside --out")
         )
+    for remark in microstructure.dense_remark(case):
+        say(f"warning: {remark}")
     with progress("Microstructure", quiet=options.quiet) as tick:
         found = microstructure.compute(case, workers=options.workers, progress=tick, quiet=True)
     written: list[str] = []

@@ -32,16 +32,19 @@ def microstructure(found: Document, seen: Markup) -> Markup:
     )
 
 
+OF_MAP = " by the fitted map at its modal values, which is what the modulus uses"
 CELLS = {"discs": "area", "spheres": "volume"}
 
 
 def discs(found: Document) -> str:
     """Discs and their area fractions."""
     whole = found.get("area_fraction_of_image")
+    name = "mean_area_fraction_of_map"  # which results of an older program lack
+    own = f"; {found[name]:.4f}{OF_MAP}" if name in found else ""
     image = "" if whole is None else f". The {compared(whole)}"
     return (
         f"{found['discs']} discs in {found['packings']} sections, area fraction"
-        f" {found['area_fraction']:.4f}{of_map(found)}{image}"
+        f" {found['area_fraction']:.4f}{own}{image}"
     )
 
 
@@ -54,18 +57,7 @@ def spheres(found: Document) -> str:
         f" cells{besides}. Volume fraction {found['volume_fraction']:.4f}, packed as"
         f" {found['volume_fraction_packed']:.4f} because {found['share_beyond_limit']:.1%} of the"
         " volume lies in cells tighter than a cubic one may be;"
-        f" {found['mean_volume_fraction_of_map']:.4f} by the fitted map at its modal values, which"
-        " is what the modulus uses"
-    )
-
-
-def of_map(found: Document) -> str:
-    """The area fraction that the modulus gets, where it is known."""
-    name = "mean_area_fraction_of_map"
-    return (
-        f"; {found[name]:.4f} by the fitted map at its modal values, which is what the modulus uses"
-        if name in found
-        else ""
+        f" {found['mean_volume_fraction_of_map']:.4f}{OF_MAP}"
     )
 
 

@@ -50,10 +50,11 @@ class RadiiPBox:
     @property
     def unknown(self) -> str:
         """Sentence on what no section tells."""
+        factor, unit = (1e6, "µm") if self.edges[-1] < 1e-3 else (1e3, "mm")
+        low, high = (f"{factor * self.edges[end]:.4g}" for end in (0, -1))
         return (
-            f"by {self.weight}, of the spheres between {self.edges[0]:.4g} and"
-            f" {self.edges[-1]:.4g} m: what smaller ones there are the section does not tell, and"
-            " larger ones are excluded by assumption"
+            f"by {self.weight}, of the spheres between {low} and {high} {unit}: what smaller ones"
+            " there are the section does not tell, and larger ones are excluded by assumption"
         )
 
     def holds(self, radius: ArrayLike, share: ArrayLike) -> bool:

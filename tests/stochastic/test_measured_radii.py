@@ -39,9 +39,11 @@ def case(tmp_path):
 
 
 def test_slopes_of_given_sizes_say_that_their_chance_is_not_in_them(case):
-    (line,) = given_sizes(load(str(case)))
+    (line,) = given_sizes(load(str(case), ["microstructure.sampling=false"]))
     assert "only 300 sizes were measured is not in them" in line
     assert "microstructure.sampling = true" in line
+    (set_before,) = given_sizes(load(str(case), ["microstructure.sampling=true"]))
+    assert "is not in them; to see it" in set_before
     assert list(given_sizes(load(str(CONCRETE)))) == []
 
 

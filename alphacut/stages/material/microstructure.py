@@ -121,6 +121,9 @@ def unfolded_radii(case: Case, given: PackedSpheres) -> tuple[RadiusLaw, RadiiPB
     try:
         radii = np.array(MeasuredRadii.read(case.beside(given.circles)).values)
         visible = float(radii[0]) if given.visible is None else given.visible
+        if visible >= small:
+            told = f"smallest_radius = {engineering(small, 'm')} must exceed the smallest circle"
+            raise ValueError(f"{told} seen, {engineering(visible, 'm')}: raise it or set visible")
         seen = radii[radii > visible]
         box = radii_pbox(seen, visible=visible, smallest=small, largest=large, level=given.level)
         return middle_law(seen, box, visible=visible), box
@@ -312,8 +315,20 @@ def crystalline(order: float) -> str:
 
 
 def dense_remark(case: Case) -> Iterator[str]:
-    """A remark where equal discs are to be packed so densely that they crystallise."""
-    packing = case.microstructure.packing
+    """A remark where particles are packed too densely: equal discs, or spheres for cubic cells."""
+    packing, spheres = case.microstructure.packing, case.microstructure.spheres
+    if spheres is not None:
+        law = radii_of(case, "spheres", spheres)
+        # fitted to packings of log-normal radii over factors of 1.5, 3.1 and 10
+        limit = 0.415 - 0.075 * np.log(min(law.largest / law.smallest, 10))
+        if spheres.volume_fraction > limit:
+            told = (
+                f"above about {limit:.2f} with these radii a quarter or more of the volume has no"
+            )
+            yield (
+                f"microstructure.spheres.volume_fraction: {told} cubic cell, and E will be marked"
+                " not to be published; Hashin–Shtrikman bounds or benchmarks.rve.many_spheres serve"
+            )
     if packing is None or packing.area_fraction < CRYSTALLISE:
         return
     law = radii_of(case, "packing", packing)
@@ -342,11 +357,14 @@ def given_sizes(case: Case) -> Iterator[str]:
     packed = given.packing or (given.spheres if given.spheres and given.spheres.file else None)
     if packed and packed.file:
         law = radii_of(case, "packing" if given.packing else "spheres", packed)
-        few = f"only {len(law.values)} sizes" if isinstance(law, MeasuredRadii) else "a sieve curve"
+        few = "the error of the sieve curve"
+        if isinstance(law, MeasuredRadii):
+            few = f"that only {len(law.values)} sizes were measured"
+        adds = ", and microstructure.sampling = true adds the chance of packings alone"
         yield (
-            f"a2 and a4 take the given sizes as exact: that {few} were measured is not in them, and"
-            " microstructure.sampling = true adds the chance of packings alone; to see it, run"
-            " parts of the list and widen a2 and a4 in radius.toml to hold them all"
+            f"a2 and a4 take the given sizes as exact: {few} is not in"
+            f" them{'' if given.sampling else adds}; to see it, run parts of the list and widen a2"
+            " and a4 in radius.toml to hold them all"
         )
 
 

@@ -208,3 +208,26 @@ def test_circles_over_the_image_and_the_notes_of_a_run_stand_in_its_report(tmp_p
     assert page.count("Circles that stand for the particles, drawn over the image</") == 1
     assert "Area fraction to compare with others" in page
     assert found["microstructure"]["remarks"][-1].startswith("area fraction to compare")
+
+
+@pytest.mark.parametrize(("fraction", "said"), [(0.28, False), (0.3, True), (0.38, True)])
+def test_spheres_too_dense_for_cubic_cells_are_told_before(fraction, said, capfd):
+    assert main(["check", str(CASE), "--set", f"{SPHERES}.volume_fraction={fraction}"]) == 0
+    assert ("E will be marked not to be published" in capfd.readouterr().err) == said
+
+
+def test_a_smallest_sphere_below_the_circles_seen_is_told_in_its_unit(tmp_path, capfd):
+    rows = "".join(f"{10 + k / 10:g}\n" for k in range(40))
+    (tmp_path / "c.csv").write_text(f"r [µm]\n{rows}", encoding="utf-8")
+    text = CASE.read_text(encoding="utf-8")
+    for name, value in (
+        ("circles", "c.csv"),
+        ("smallest_radius", "4 µm"),
+        ("largest_radius", "30 µm"),
+    ):
+        text = re.sub(rf"(?m)^{name} =.*", f'{name} = "{value}"', text)
+    text = re.sub(r"(?m)^visible.*\n", "", text)
+    (tmp_path / "own.toml").write_text(text, encoding="utf-8")
+    assert main(["check", str(tmp_path / "own.toml")]) == 2
+    told = "smallest_radius = 4.000 µm must exceed the smallest circle seen, 10.00 µm: raise it"
+    assert told in capfd.readouterr().err

@@ -112,8 +112,8 @@ def test_a_wide_section_makes_a_wide_map_that_holds_every_possible_law(wide):
 
 
 def test_what_the_section_does_not_tell_is_said(wide):
-    told = next(iter(wide.remarks))
-    assert "between 0.001 and 0.003 m: what smaller ones there are the section does not" in told
+    told = next(one for one in wide.remarks if "does not tell" in one)
+    assert "between 1 and 3 mm: what smaller ones there are the section does not" in told
     document = summary(wide)
     assert "smaller ones" in str(document["unknown"])
     assert document["remarks"] == list(wide.remarks)
