@@ -3,37 +3,15 @@
 from __future__ import annotations
 
 import re
+import tomllib
+from pathlib import Path
 
 from markupsafe import Markup, escape
 
 from alphacut.report.tables import fragment
 
-TERMS = {
-    "α-cut": "All values whose membership is at least α. At α = 0 it is the support, at α = 1 the"
-    " most plausible values.",
-    "Declared error": "What a printed number may be away from the exact answer of the stated model,"
-    " all causes together.",
-    "Envelope": "Lowest and highest value that an output can take at each time, for all inputs of"
-    " one α-cut.",
-    "Estimated": "Of bounds: from a model whose error is estimated, not proved.",
-    "Guaranteed": "Proved: no admissible input gives a value outside the bounds. A result that"
-    " rests on something stated by you says so beside the word. Of an image, *at two corners* where"
-    " materials that can occur reach both bounds, and *enclosure* where they need not.",
-    "Inner": "Of bounds: found by trying, so the true range is at least so wide.",
-    "Membership": "Degree, between 0 and 1, to which a value is possible.",
-    "Modal value": "Value of membership 1. Of a structure's motion, *modal* means by natural"
-    " modes.",
-    "Nature": "What a bound is: guaranteed, verified by sampling, estimated, searched or inner.",
-    "Necessity": "One minus the possibility of the contrary. A necessity of 1 says that it must"
-    " happen.",
-    "Possibility": "Highest membership among the inputs for which something happens. A possibility"
-    " of 0 says that it cannot happen.",
-    "Searched": "Of bounds: that no better optimum is left rests on samples alone, and so does the"
-    " declared error.",
-    "Support": "Values whose membership is above 0, with their limits.",
-    "Verified by sampling": "Of bounds: the search leaves nothing out, but the error of its model"
-    " was only sampled, so they are not proved.",
-}
+_FILE = Path(__file__).with_suffix(".toml")
+TERMS: dict[str, str] = tomllib.loads(_FILE.read_text(encoding="utf-8"))
 """Terms and their meaning, word for word as in the documentation's glossary."""
 _SAID = {name: meaning.replace("*", "") for name, meaning in TERMS.items()}
 _WORDS = re.compile(
