@@ -44,7 +44,7 @@ def watch(command_modules: Iterable[object], events: list, monkeypatch) -> None:
     spies = {"progress": _bar(events), "answer": _answer(events), "pool": _pool(events)}
     monkeypatch.setattr(alphacut.figures.style, "save", _saving(events))
     monkeypatch.setattr(alphacut.fuzzy.campaign.workers, "pool", spies["pool"])
-    for module in (alphacut.io.progress, pipeline, *command_modules):
+    for module in (alphacut.io.progress, options, pipeline, *command_modules):
         for name, spy in spies.items():
             if hasattr(module, name):
                 monkeypatch.setattr(module, name, spy)
