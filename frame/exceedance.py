@@ -23,6 +23,7 @@ from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.counted import counted
+from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.progress_bar import Progress, told
 from alphacut.fuzzy.sets.given import positive
 
@@ -124,7 +125,7 @@ def tried_peaks(flow: Flow, cuts: Boxes, *, spread: int = 32) -> Array:
     return np.array(found[::-1])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FuzzyProbability:
     """Probability that |output| exceeds a limit within the duration, as intervals by level.
 
@@ -152,6 +153,25 @@ class FuzzyProbability:
     curve_lower: Array
     curve_upper: Array
     error: Array
+
+    def __str__(self) -> str:
+        """A line for each level."""
+        head = (
+            f"probability of exceeding the limit, attained at the points tried, {self.trajectories}"
+            f" trajectories, standard deviation up to {self.deviation:.2g}"
+        )
+        rows = [f"  α = {a}: {low} … {high}, {short}" for a, low, high, short in self._told()]
+        return "\n".join([head, *rows])
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        """The levels as a table, for notebooks."""
+        return html_table(("α", "least", "greatest", "peaks between nodes"), self._told())
+
+    def _told(self) -> list[tuple[str, ...]]:
+        rows = zip(self.alpha, self.lower, self.upper, self.error, strict=True)
+        return [(f"{a:g}", f"{x:.4g}", f"{y:.4g}", f"may add {e:.2g}") for a, x, y, e in rows]
 
 
 def exceedance(
@@ -254,7 +274,7 @@ def exceedances(
     else:
         flow = LinearFlow(system, names, duration, step, Exact())
         middle = np.tile(cuts.modal, (len(draws), 1))
-        require_motion(system, flow.names, np.hstack([middle, draws]), duration)
+        require_motion(system, flow.names, np.hstack([middle, draws]), duration, step)
     tried = [_tried(cuts, level, spread) for level in range(len(cuts.alpha))]
     found: list[Array] = []
     higher: list[Array] = []

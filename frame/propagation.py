@@ -179,7 +179,7 @@ def _prepared(
     else:
         flow = LinearFlow(model, cuts.names, duration, step, _integrator(integrator, method))
         scheme = flow.integrator.name
-    require_admissible(model, cuts, duration)
+    require_admissible(model, cuts, duration, step)
     require_stable(flow, cuts)
     return method, way, UnitFlow(flow, cuts, relative), scheme
 

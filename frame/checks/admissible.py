@@ -18,6 +18,7 @@ from alphacut.frame.structures.storey import StoreyFrame
 
 OTHER_UNITS = 500  # from so many times the structure's own value on, or that part of it
 SLOW = 100  # periods longer than so many durations are warned of
+NODES = 3  # or all of fewer steps than these
 POSITIVE, NOT_NEGATIVE, RATIO = (
     "positive",
     "0 or greater",
@@ -48,7 +49,7 @@ def _(system: MatrixStructure, name: str) -> str | None:
 
 
 def require_admissible(
-    system: LinearSystem | LagrangianSystem, cuts: Boxes, duration: float
+    system: LinearSystem | LagrangianSystem, cuts: Boxes, duration: float, step: float
 ) -> None:
     """Refuses supports that reach values without a meaning.
 
@@ -56,6 +57,7 @@ def require_admissible(
         system: The structure.
         cuts: Its uncertain parameters.
         duration: Length of the simulation, in s.
+        step: Distance of nodes, in s.
 
     Raises:
         ValueError: A support is not finite or reaches what its parameter must not be, or is of
@@ -65,7 +67,7 @@ def require_admissible(
 
     Warns:
         UserWarning: A stiffness or damping has a negative eigenvalue there, or all periods are
-            long beside the duration.
+            long beside the duration, or short beside the step.
     """
     for name, low, high in zip(cuts.names, cuts.lower.min(0), cuts.upper.max(0), strict=True):
         rule = wanted(system, name)
@@ -84,7 +86,7 @@ def require_admissible(
         ends = zip(cuts.lower.min(0).tolist(), cuts.upper.max(0).tolist(), strict=True)
         system.require_standing(dict(zip(cuts.names, ends, strict=True)))
     if not isinstance(system, LagrangianSystem):
-        require_motion(system, cuts.names, probes(cuts), duration)
+        require_motion(system, cuts.names, probes(cuts), duration, step)
 
 
 def _require_size(name: str, own: float, support: Array) -> None:
@@ -99,10 +101,10 @@ def _require_size(name: str, own: float, support: Array) -> None:
 
 
 def require_motion(
-    system: LinearSystem, names: tuple[str, ...], points: Array, duration: float
+    system: LinearSystem, names: tuple[str, ...], points: Array, duration: float, step: float
 ) -> None:
     """As `require_admissible`, at parameters `points` (S, d) of a linear structure."""
-    period = np.inf  # the longest natural one, where that is shortest
+    periods = []  # the longest natural one at each point
     moved = system.ground is not None and np.any(system.ground.acceleration)
     growing: dict[str, str] = {}
     for point in points:
@@ -117,7 +119,7 @@ def require_motion(
                 f"mass: the matrix is not positive definite at {at}; narrow the supports to where"
                 " every unknown has a mass"
             )
-        period = min(period, _longest_period(found.mass.value[0], found.stiffness.value[0]))
+        periods.append(_longest_period(found.mass.value[0], found.stiffness.value[0]))
         moved = moved or found.q0.value.any() or found.v0.value.any()
         for kind, jet in (("stiffness", found.stiffness), ("damping", found.damping)):
             rates = np.linalg.eigvalsh((jet.value[0] + jet.value[0].T) / 2)
@@ -134,11 +136,23 @@ def require_motion(
             " without end; check its entries and their signs",
             stacklevel=4,
         )
-    if period > SLOW * duration:
+    _warn_of_units(min(periods, default=np.inf), max(periods, default=0.0), duration, step)
+
+
+def _warn_of_units(shortest: float, longest: float, duration: float, step: float) -> None:
+    """Warns where first natural periods are unlike what is asked, as with t for kg."""
+    units = "check the units, which are SI (Pa, kg, m, s, N)"
+    if shortest > SLOW * duration:
         warnings.warn(
-            f"the longest natural period is {period:.3g} s beside a duration of {duration:g} s: the"
-            " structure hardly moves; check the units, which are SI (Pa, kg, m, s, N)",
-            stacklevel=4,
+            f"the longest natural period is {shortest:.3g} s beside a duration of {duration:g} s:"
+            f" the structure hardly moves; {units}",
+            stacklevel=5,
+        )
+    if 0 < longest < NODES * step:
+        warnings.warn(
+            f"the longest natural period is {longest:.3g} s beside a step of {step:g} s: most peaks"
+            f" fall between nodes; take a smaller step, or {units}",
+            stacklevel=5,
         )
 
 

@@ -58,7 +58,7 @@ class LimitSearch:
         lower, upper = self.reach(size)
         ends = np.stack([lower, self.nominal]), np.stack([upper, self.nominal])
         boxes = Boxes(self.flow.names, np.array([0.0, 1.0]), *ends, self.nominal)
-        require_admissible(self.flow.system, boxes, self.flow.duration)
+        require_admissible(self.flow.system, boxes, self.flow.duration, self.flow.step)
         unit = LimitFlow(self.flow, boxes, False, None, self.limits)
         model, error, self.reason = model_with_error(
             self.flow, unit, Modal(tolerance=self.gap), self.gap

@@ -213,3 +213,12 @@ def test_peaks_show_themselves_in_lines_with_units_and_errors() -> None:
     assert lines[1].endswith(f", error {found.error[0, 1]:.2g} m")
     assert len(lines) == 3
     assert repr(replace(found, error=None, outputs=())).endswith(" at α = 0, error not estimated")
+
+
+def test_probabilities_show_themselves_in_a_line_for_each_level() -> None:
+    random = {"v2_0": scipy.stats.norm(0.4, 0.05)}
+    found = exceedance(FRAME, INPUTS, random, limit=0.1, duration=1, step=0.1, alpha=(0, 1))
+    lines = str(found).splitlines()
+    assert [line.split(":")[0].strip() for line in lines[1:]] == ["α = 0", "α = 1"]
+    assert f"{found.lower[0]:.4g} … {found.upper[0]:.4g}, " in lines[1]
+    assert "<td>1</td>" in found._repr_html_()

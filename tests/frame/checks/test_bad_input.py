@@ -220,3 +220,12 @@ def test_a_frame_in_other_units_hardly_moves_and_is_warned_of(wrong: dict[str, A
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         computed()
+
+
+def test_masses_in_tonnes_swing_between_nodes_and_are_warned_of() -> None:
+    told = (
+        r"longest natural period is 0\.\d* s beside a step of .* s: most peaks fall between nodes"
+    )
+    with pytest.warns(UserWarning, match=told) as seen:
+        computed(model=replace(FRAME, masses=tuple(m / 1e3 for m in FRAME.masses)))
+    assert len(seen) == 1
