@@ -12,7 +12,7 @@ from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points, corners
 from alphacut.frame.calculus.numbers import require_count
-from alphacut.frame.checks.admissible import require_motion
+from alphacut.frame.checks.admissible import require_motion, require_size
 from alphacut.frame.checks.between_nodes import stray
 from alphacut.frame.dynamics.flow import Flow, LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
@@ -158,7 +158,8 @@ class FuzzyProbability:
         """A line for each level."""
         head = (
             f"probability of exceeding the limit, attained at the points tried, {self.trajectories}"
-            f" trajectories, standard deviation up to {self.deviation:.2g}"
+            f" trajectories, with peaks between {self.limits[0]:.4g} and {self.limits[-1]:.4g},"
+            f" standard deviation up to {self.deviation:.2g}"
         )
         rows = [f"  α = {a}: {low} … {high}, {short}" for a, low, high, short in self._told()]
         return "\n".join([head, *rows])
@@ -275,6 +276,8 @@ def exceedances(
         flow = LinearFlow(system, names, duration, step, Exact())
         middle = np.tile(cuts.modal, (len(draws), 1))
         require_motion(system, flow.names, np.hstack([middle, draws]), duration, step)
+    for name, values in zip(random, drawn, strict=True):
+        require_size(name, system.parameters[name], np.array([values.min(), values.max()]))
     tried = [_tried(cuts, level, spread) for level in range(len(cuts.alpha))]
     found: list[Array] = []
     higher: list[Array] = []

@@ -52,8 +52,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         raise BadInput(problems)
     handed = common.given_modulus(options.modulus) or stand_in(case)
     with progress("Measure next", quiet=options.quiet) as tick:
-        name, found, fixed = measure_next(case, handed, options.output, tick)
-    document = advice_document(found, name, fixed)
+        name, every, found, fixed = measure_next(case, handed, options.output, tick)
+    document = {**advice_document(found, name, fixed), "nodes_every": every}
     if folder is not None:
         from alphacut.figures.questions import gains
         from alphacut.figures.style import save, style
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
             save(gains(document), folder / "figures" / "measure-next")
         write_text(folder / "measure-next.json", as_json(document, indent=2))
     width = engineering(found.width, document["unit"], digits=6)
-    of = "width" if name == "E" else "mean width over time"
+    of = "width" if name == "E" else f"mean width at nodes every {every:.6g} s"
     lines = [f"{name}: {found.told(f'{of} {width}')}", *fixed_line(fixed)]
     common.answer(options, document, out, "".join(f"{line}\n" for line in lines))
     return 0

@@ -1,7 +1,8 @@
 """Which input of a case to measure next: how much narrower the answer is if one is known better.
 
-The answer is the width of an output's envelope at the lowest level, its mean over time; without a
-structure it is the width of E. Where the cell gives E, its own inputs stand in E's place.
+The answer is the width of an output's envelope at the lowest level, its mean over nodes, under a
+record a hundred or some more; without a structure it is the width of E. Where the cell gives E, its
+own inputs stand in E's place.
 """
 
 from __future__ import annotations
@@ -31,8 +32,10 @@ TOLERANCE = 1e-3
 
 def measure_next(
     case: Case, handed: FuzzyNumber | None, output: str | None = None, progress: Tick | None = None
-) -> tuple[str, Advice, list[str]]:
+) -> tuple[str, float, Advice, list[str]]:
     """The answer's name, gains of knowing each input of [envelope] fuzzy better, and those fixed.
+
+    After the name stands the distance in s of the nodes over which a width is averaged, 0 for E.
 
     Args:
         case: With a linear structure and [envelope], or with a cell.
@@ -47,7 +50,7 @@ def measure_next(
     if "envelope" not in case.stages:
         if cell is None or output is not None:
             raise BadInput(Problem("stages", "there is no envelope", allowed="stage envelope"))
-        return "E", _advice(lambda x: _moduli(cell, x), cell.inputs, 0.0, progress), []
+        return "E", 0.0, _advice(lambda x: _moduli(cell, x), cell.inputs, 0.0, progress), []
     wanted, task = structure(case, handed or _expected(case, cell)), task_of(case)
     if case.sections.update is not None:
         wanted = learned(case, wanted).structure
@@ -62,10 +65,11 @@ def measure_next(
         own = {name: changed[name] for name in inputs}
         if cell is not None and of_cell:
             own["E"] = _interval(*_ends(cell, {name: changed[name] for name in of_cell}))
-        return _width(wanted, task, own, column)
+        return _width(wanted, task, own, column, every)
 
+    every = task.step if wanted.linear.ground is None else thinned(task.duration, task.step)
     found = _advice(answer, {**of_cell, **inputs}, task.alpha[0], progress)
-    return wanted.outputs[column], found, left_out(wanted, [task])
+    return wanted.outputs[column], every, found, left_out(wanted, [task])
 
 
 def _expected(case: Case, cell: Campaign | None) -> FuzzyNumber | None:
@@ -97,22 +101,24 @@ def _column(case: Case, wanted: Structure, output: str | None) -> int:
 
 
 def _width(
-    wanted: Structure, task: EnvelopeTask, inputs: Mapping[str, FuzzyNumber], column: int
+    wanted: Structure,
+    task: EnvelopeTask,
+    inputs: Mapping[str, FuzzyNumber],
+    column: int,
+    every: float,
 ) -> tuple[float, float]:
-    """Mean width over time of an output's envelope, and its error."""
+    """Mean width of an output's envelope at nodes every so many seconds, and its error."""
     from alphacut import frame
 
     assert wanted.linear is not None
     if all(isinstance(number, Crisp) for number in inputs.values()):
         return 0.0, 0.0
-    still = wanted.linear.ground is None
-    step = task.step if still else thinned(task.duration, task.step)
     found = frame.envelope(
         wanted.linear,
         inputs,
         alpha=(0.0,),
         duration=task.duration,
-        step=step,
+        step=every,
         method="modal",
         tolerance=TOLERANCE,
         relative=True,

@@ -17,7 +17,7 @@ from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.frame.structures.storey import StoreyFrame
 
 OTHER_UNITS = 500  # from so many times the structure's own value on, or that part of it
-SLOW = 100  # periods longer than so many durations are warned of
+SLOW = 10  # periods longer than so many durations are warned of
 NODES = 3  # or all of fewer steps than these
 POSITIVE, NOT_NEGATIVE, RATIO = (
     "positive",
@@ -81,7 +81,7 @@ def require_admissible(
                 f"uncertain parameter {name}: its support [{low:g}, {high:g}] must be"
                 f" {rule or 'finite'}; narrow it"
             )
-        _require_size(name, system.parameters[name], np.array([low, high]))
+        require_size(name, system.parameters[name], np.array([low, high]))
     if isinstance(system, StoreyFrame):
         ends = zip(cuts.lower.min(0).tolist(), cuts.upper.max(0).tolist(), strict=True)
         system.require_standing(dict(zip(cuts.names, ends, strict=True)))
@@ -89,8 +89,12 @@ def require_admissible(
         require_motion(system, cuts.names, probes(cuts), duration, step)
 
 
-def _require_size(name: str, own: float, support: Array) -> None:
-    """Refuses a support that lies as far from the structure's own value as kN from N."""
+def require_size(name: str, own: float, support: Array) -> None:
+    """Refuses a support that lies as far from the structure's own value as kN from N.
+
+    Raises:
+        ValueError: It does.
+    """
     size = np.abs(support) / abs(own) if own else np.ones(2)
     if size.min() >= OTHER_UNITS or (0 < size.max() <= 1 / OTHER_UNITS):
         low, high = support
@@ -136,10 +140,13 @@ def require_motion(
             " without end; check its entries and their signs",
             stacklevel=4,
         )
-    _warn_of_units(min(periods, default=np.inf), max(periods, default=0.0), duration, step)
+    every = system.ground.step if moved and system.ground is not None else 0.0
+    _warn_of_units(min(periods, default=np.inf), max(periods, default=0.0), duration, step, every)
 
 
-def _warn_of_units(shortest: float, longest: float, duration: float, step: float) -> None:
+def _warn_of_units(
+    shortest: float, longest: float, duration: float, step: float, every: float
+) -> None:
     """Warns where first natural periods are unlike what is asked, as with t for kg."""
     units = "check the units, which are SI (Pa, kg, m, s, N)"
     if shortest > SLOW * duration:
@@ -152,6 +159,12 @@ def _warn_of_units(shortest: float, longest: float, duration: float, step: float
         warnings.warn(
             f"the longest natural period is {longest:.3g} s beside a step of {step:g} s: most peaks"
             f" fall between nodes; take a smaller step, or {units}",
+            stacklevel=5,
+        )
+    if 0 < longest < every:
+        warnings.warn(
+            f"the record has a value every {every:g} s and the longest natural period is"
+            f" {longest:.3g} s: the structure swings between them; {units}",
             stacklevel=5,
         )
 

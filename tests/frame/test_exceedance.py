@@ -221,4 +221,11 @@ def test_probabilities_show_themselves_in_a_line_for_each_level() -> None:
     lines = str(found).splitlines()
     assert [line.split(":")[0].strip() for line in lines[1:]] == ["α = 0", "α = 1"]
     assert f"{found.lower[0]:.4g} … {found.upper[0]:.4g}, " in lines[1]
+    assert f"with peaks between {found.limits[0]:.4g} and {found.limits[-1]:.4g}" in lines[0]
     assert "<td>1</td>" in found._repr_html_()
+
+
+def test_a_random_mass_in_tonnes_is_refused() -> None:
+    random = {"m1": scipy.stats.norm(9, 0.5)}
+    with pytest.raises(ValueError, match=r"m1: its support .* of another size than .* own value"):
+        exceedance(FRAME, {"E": INPUTS["E"]}, random, limit=0.1, duration=1, step=0.1)

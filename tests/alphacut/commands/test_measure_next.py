@@ -49,7 +49,9 @@ def test_the_width_is_told_with_its_unit_and_what_it_is(
 ) -> None:
     assert main(["measure-next", str(case)]) == 0
     told = capsys.readouterr().out
-    assert re.match(r"q1: mean width over time [\d.]+ mm at α = 0, less by", told), told
+    assert re.match(r"q1: mean width at nodes every 0\.\d+ s [\d.]+ mm at α = 0, less by", told), (
+        told
+    )
 
 
 def test_the_report_of_the_folder_shows_it(case: Path, tmp_path: Path) -> None:

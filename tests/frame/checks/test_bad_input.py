@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from alphacut.frame import MatrixStructure, StoreyFrame, envelope, pendulum, record
+from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame, envelope, pendulum, record
 from alphacut.frame.methods.named import METHODS, options_of
 from alphacut.fuzzy import Interval, Triangular
 
@@ -229,3 +229,19 @@ def test_masses_in_tonnes_swing_between_nodes_and_are_warned_of() -> None:
     with pytest.warns(UserWarning, match=told) as seen:
         computed(model=replace(FRAME, masses=tuple(m / 1e3 for m in FRAME.masses)))
     assert len(seen) == 1
+
+
+def test_a_record_slower_than_the_structure_is_warned_of() -> None:
+    slow = replace(FRAME, ground=Accelerogram(20.0, np.array([0.0, 1.0, -1.0])))
+    told = "the record has a value every 20 s and the longest natural period is"
+    with pytest.warns(UserWarning, match=told) as seen:
+        computed(model=slow)
+    assert len(seen) == 1
+
+
+@pytest.mark.parametrize("duration", [0.02, 0.1])
+def test_a_motion_much_shorter_than_a_swing_is_warned_of(duration: float) -> None:
+    """A frame in t and GPa swings a thousand times slower than the one meant."""
+    frame = replace(FRAME, masses=tuple(1e5 * m for m in FRAME.masses))
+    with pytest.warns(UserWarning, match="the structure hardly moves; check the units"):
+        computed(model=frame, duration=100 * duration, step=duration)
