@@ -16,6 +16,7 @@ from alphacut.io.units import factor, size_problem
 NUMBER = r"[-+\u2212]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 LIST = re.compile(r"\[(.*)\]\s*(.*)", re.DOTALL)
 SPREAD = re.compile(rf"({NUMBER})\s*(.*?)\s*(?:±|\+/-|\+-)\s*({NUMBER})\s*(.*)")
+PER_CENT = re.compile(r"(?:%|per ?cent)[\s*·)]*([^\s*·)].*)")
 SINGLE = re.compile(rf"({NUMBER})\s*(.*)")
 ORDERS = {
     2: "lower ≤ upper",
@@ -57,6 +58,9 @@ def listed(inner: str, unit: str, si: str) -> tuple[Decimal, ...]:
 def spread(match: re.Match[str], si: str) -> tuple[Decimal, ...]:
     """Both ends of the interval "20 t ± 5 %", "20 t ± 1 t" or "20 ± 1 t"."""
     middle, unit, width, width_unit = match[1], match[2].strip(), match[3], match[4].strip()
+    if si and (before := PER_CENT.match(width_unit)):
+        told = f"{middle} {unit if unit[:1].isalpha() else before[1]} ± {width} %"
+        raise ValueError(f"a percentage stands before the unit: write {told}")
     if (unit and not width_unit) or unit == width_unit == "%":
         cure = "the ends, such as [2, 4] %" if unit == "%" else f"± {width} % or ± {width} {unit}"
         raise ValueError(f"the spread ± {width} may mean two things: write {cure}")

@@ -99,6 +99,9 @@ EVERYDAY = {
 PRINTED = r"pixel|px\b|\b(pel|dot|pt)s?\b|pica|point|didot|cicero|\b[pb]p\b"
 """Units of print and screens, which Pint takes for 1/96 inch, 1/72 inch and the like."""
 
+SHARES = r"[%‰]|\bper ?cent\b|\bper ?mille\b|\bpp[mb]\b"
+"""Shares, by which Pint takes 5 % MPa for 0.05 MPa."""
+
 # units that are others than were meant
 MEANT = {("m/s^2", "G"): "g", ("s", "m"): "min", ("kg", "T"): "t", ("Pa", "g"): "GPa"}
 
@@ -126,6 +129,8 @@ def factor(unit: str, si: str) -> Decimal:
         raise ValueError(f'the unit "{unit}" is wrong')
     if not unit:
         raise ValueError("the unit is missing")
+    if share := re.search(SHARES, unit):
+        raise ValueError(f'"{unit}": {share[0]} is a share, no part of a unit; write "20 t ± 5 %"')
     if (si, unit) == ("m/s^2", "g"):  # standard gravity, no gram
         return STANDARD_GRAVITY
     if (si, unit.lower()) == ("m/s^2", "gal"):  # cm/s², no gallon

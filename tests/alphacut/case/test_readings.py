@@ -34,6 +34,29 @@ def test_a_spread_that_may_mean_two_things_is_refused(text, si, cure):
     assert cure in str(refusal.value)
 
 
+@pytest.mark.parametrize(
+    ("text", "cure"),
+    [
+        ("2600 ± 5 % MPa", "2600 MPa ± 5 %"),
+        ("2600 ±5% MPa", "2600 MPa ± 5 %"),
+        ("72000±2 % MPa", "72000 MPa ± 2 %"),
+        ("2.6 +- 5 percent GPa", "2.6 GPa ± 5 %"),
+        ("2600 (± 5 %) MPa", "2600 MPa ± 5 %"),
+    ],
+)
+def test_a_percentage_before_the_unit_is_refused(text, cure):
+    with pytest.raises(ValueError, match="stands before the unit: write") as refusal:
+        quantity.fuzzy(text, "Pa")
+    assert str(refusal.value).endswith(f"write {cure}")
+    assert quantity.fuzzy(cure, "Pa").support.lower > 1e9
+
+
+@pytest.mark.parametrize("text", ["5 % MPa", "[5, 10] % MPa", "2600 ± 5 MPa %", "9 ppm Pa"])
+def test_a_share_is_no_part_of_a_unit(text):
+    with pytest.raises(ValueError, match="is a share, no part of a unit"):
+        quantity.fuzzy(text, "Pa")
+
+
 def test_check_prints_what_every_fuzzy_input_was_read_as(tmp_path, capfd):
     case = tmp_path / "case.toml"
     text = PAPER.read_text(encoding="utf-8").replace('"[19, 20, 21] t"', '"20 t ± 5 %"')
