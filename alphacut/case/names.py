@@ -133,8 +133,12 @@ def known_input(case: Case, key: str, name: str, count: int) -> Iterator[Problem
     members += [f"{group}{floor + 1}_0" for group in ("q", "v") for floor in range(count)]
     members += [f"zeta{mode + 1}" for mode in range(count)]
     if name not in GROUPS and name not in members:
-        each = f"m1 to m{count}" if count > 1 else "m1"
-        allowed = f"{', '.join(GROUPS)}, or one floor: {each}, l1, c1, d1, q1_0, v1_0 …"
+        groups = ", ".join(group for group in GROUPS if not no_such_part(case, group))
+        members = [member for member in members if not no_such_part(case, member)]
+        firsts = [member for member in members if re.fullmatch(r"\D+1(_0)?", member)]
+        ends = ((first, first.replace("1", str(count))) for first in firsts)
+        each = ", ".join(" to ".join(dict.fromkeys(pair)) for pair in ends)
+        allowed = f"{groups}, or one floor: {each}"
         yield Problem(
             key,
             f"the frame has no input {name}",

@@ -52,8 +52,8 @@ def decided(summary: Document, folder: Path) -> Markup:
         if (margin := found["margins"].get(name)) is not None:
             unit, largest = margin["unit"], float(margin["limit"])
             allowed, of = engineering(largest, unit), margin.get("output", name)
-            low, high = margin["lower"], margin["upper"]
-            margins = [between(low[k], high[k], unit, largest) for k in (0, -1)]
+            ends = (decision.margin_ends(found, name, level) for level in (0, -1))
+            margins = [between(low, high, unit, largest) for low, high in ends]
         degrees = (decision.degree(*one[kind]) for kind in ("possibility", "necessity"))
         verdict = f"{decision.verdict_of(found, name)} ({decision.worth(found, name)})"
         rows.append((of, allowed, *degrees, verdict, *margins))

@@ -248,6 +248,13 @@ def worth(found: Document, name: str) -> str:
     return f"{of}{one['nature']}, {nodes}: {between_nodes(found, name)}"
 
 
+def margin_ends(found: Document, name: str, level: int) -> tuple[float, float]:
+    """Ends of a safety margin; a limit that every motion exceeds leaves none above 0."""
+    low, high = (float(found["margins"][name][side][level]) for side in SIDES)
+    unsafe = found["limits"][name]["verdict"] == "unsafe"
+    return low, max(low, min(high, 0.0)) if unsafe else high
+
+
 SIDES = ("lower", "upper")
 DIGITS = 6  # of a degree; the search that proves it goes little further
 
@@ -289,9 +296,13 @@ def sentences(found: Document) -> Iterator[str]:
         else:
             yield f"{of}: {one['verdict']}{why(one)}. It is {degrees}, {worth(found, name)}"
     for name, margin in found["margins"].items():
-        ends = (engineering(float(margin[side][0]), margin["unit"], digits=3) for side in SIDES)
-        level = f"α = {found['alpha'][0]:g}"
-        yield f"safety margin of {name} at {level}: {' … '.join(ends)} (peaks {found['peaks']})"
+        low, high = margin_ends(found, name, 0)
+        ends = (engineering(end, margin["unit"], digits=3) for end in (low, high))
+        level, of = f"α = {found['alpha'][0]:g}", f"peaks {found['peaks']}"
+        if (above := float(margin["upper"][0])) > high:
+            alone = engineering(above, margin["unit"], digits=3)
+            of += f"; upper end 0 by the decision, {alone} by them alone"
+        yield f"safety margin of {name} at {level}: {' … '.join(ends)} ({of})"
     if found["reason"]:
         yield f"not proved: {found['reason']}"
     if found["claim"]:

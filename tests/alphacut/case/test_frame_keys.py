@@ -116,6 +116,7 @@ def test_the_command_line_takes_names_with_brackets(tmp_path: Path) -> None:
         (CASE.replace(', "18 MN/m"]', "]"), "frame.stiffness: got 2 values for 3 floors"),
         (CASE.replace('"18 MN/m"', '"0 MN/m"'), 'entry 3, "0 MN/m": out of range'),
         (CASE.replace('"stiffness", "m', '"stiffness[4]", "m'), "the frame has no input k4"),
+        (CASE.replace('"stiffness", "m', '"k7", "m'), "or one floor: m1 to m3, k1 to k3"),
         (CASE.replace('"stiffness", "m', '"E", "m'), "no input E: its stiffness is given"),
         (CASE.replace('"stiffness", "m', '"l1", "m'), "l1: beside stiffness a height acts by p_d"),
         (more(HEIGHTS).replace('"18 MN/m"', '"[40, 50] kN/m"'), "P-Delta: storey 3 buckles"),
@@ -136,7 +137,7 @@ def test_the_command_line_takes_names_with_brackets(tmp_path: Path) -> None:
             "frame.second_moment: missing",
         ),
     ],
-    ids=range(16),
+    ids=range(17),
 )
 def test_what_does_not_go_together_is_named(
     text: str, pattern: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]

@@ -14,7 +14,7 @@ from alphacut.case.load import load
 from alphacut.case.quick import quick
 from alphacut.entry import main
 from alphacut.io.units import engineering
-from alphacut.stages.vibration.decision import ANY, _verdicts, degree, outward, why
+from alphacut.stages.vibration.decision import ANY, _verdicts, degree, outward, sentences, why
 from tests.alphacut.one_floor import RIGIDITY, one_floor
 
 # |q| = v0 / ω, base shear v0 ω m
@@ -301,3 +301,18 @@ def test_an_undecided_limit_is_told_with_its_reason_before_its_degrees(
     told = capsys.readouterr().out
     assert f"mm: {why}. It is possible to 0.4998" in told
     assert ", both degrees guaranteed, at nodes every 0.001 s: the motion between" in told
+
+
+def test_the_margin_of_an_exceeded_limit_ends_at_zero() -> None:
+    one = {"possibility": (1, 1), "necessity": (1, 1), "verdict": "unsafe", "nature": "guaranteed"}
+    margin = {"output": "q1", "limit": 6.3e-3, "unit": "m", "lower": [-2e-3], "upper": [1.9e-4]}
+    found = {
+        "limits": {"q1": {**one, "between_nodes": ""}},
+        "margins": {"q1": margin},
+        "alpha": [0.0],
+        **{"step": 0.01, "peaks": "guaranteed", "reason": "", "claim": ""},
+    }
+    line = list(sentences(found))[1]
+    assert "−2.00 mm … 0 m (peaks guaranteed; upper end 0 by the decision, 190 µm by them" in line
+    found["limits"] = {"q1": {**found["limits"]["q1"], "verdict": "undecided", "witness": None}}
+    assert "−2.00 mm … 190 µm (peaks guaranteed)" in list(sentences(found))[1]
