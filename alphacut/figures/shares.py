@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 COLOURS = (BLUE, ORANGE, PURPLE, GREY)
 STYLES = ("-", "--", ":", "-.")
+HATCHES = ("", "////", "....")  # of bars whose colour stands already
 MOST = 4  # outputs in one figure
 WINDOW = 1 / 40  # of the duration: the means wander less than the vibration
 
@@ -44,9 +45,16 @@ def over_time(found: xarray.Dataset) -> Figure:
     )
     grid[0, 0].set_title(title, loc="left", fontsize=10)
     grid[-1, 0].set_xlabel("time t, s")
-    names = grid[0, 0].get_legend_handles_labels()
-    drawn.legend(*names, fontsize=8, loc="outside lower center", ncols=min(4, len(names[0])))
+    _legend_below(drawn, grid[0, 0])
     return drawn
+
+
+def _legend_below(drawn: Figure, axes: Axes) -> None:
+    """One legend for all axes, in as many columns as its longest text leaves room for."""
+    handles, names = axes.get_legend_handles_labels()
+    longest = 0.5 + 0.065 * max(map(len, names), default=0)  # inches at the size 8
+    columns = max(1, min(4, len(names), int(drawn.get_figwidth() / longest)))
+    drawn.legend(handles, names, fontsize=8, loc="outside lower center", ncols=columns)
 
 
 def panel(axes: Axes, found: xarray.Dataset, output: str) -> None:
@@ -101,8 +109,7 @@ def of_modulus(found: xarray.Dataset) -> Figure:
     )
     for axes, (name, quantity) in zip(grid[:, 0], kinds, strict=True):
         cell_panel(axes, found[name], quantity)
-    names = grid[0, 0].get_legend_handles_labels()
-    drawn.legend(*names, fontsize=8, loc="outside lower center", ncols=min(3, len(names[0])))
+    _legend_below(drawn, grid[0, 0])
     return drawn
 
 
@@ -119,9 +126,10 @@ def cell_panel(axes: Axes, found: xarray.DataArray, quantity: str) -> None:
         share = [float(found.sel(cell_input=name, alpha=level)) for level in levels]
         shift = (index - (len(names) - 1) / 2) * thickness
         places = [place + shift for place in range(len(levels))]
-        axes.bar(
-            places, share, thickness, color=COLOURS[index % len(COLOURS)], label=in_words(name)
-        )
+        again, kind = divmod(index, len(COLOURS))
+        bars = axes.bar(places, share, thickness, color=COLOURS[kind], label=in_words(name), lw=0)
+        for bar in bars:
+            bar.set(hatch=HATCHES[again % len(HATCHES)], edgecolor="white")
     axes.set_xticks(range(len(levels)), [f"α = {level:g}" for level in levels])
     axes.set_ylabel(f"share of the width of {quantity}")
     axes.set_ylim(0, 1)
