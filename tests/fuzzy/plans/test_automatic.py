@@ -85,7 +85,7 @@ def check(seeds):
     for seed in seeds:
         found, result = misses(seed, None)
         assert result.notes[-1].startswith(
-            "searched for extremes inside: fresh points in every cut"
+            "searched for extremes inside by fresh points in every cut"
         )
         assert result.runs + result.verification_runs < 4000
         assert (found[:, 2] < 1e-3).all()  # attained: no wider than the truth
