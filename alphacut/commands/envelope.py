@@ -116,7 +116,9 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         "tolerance": contract,
         **({"exceedance": limit} if limit else {}),
     }
-    text = summary(found, tried[0]) + "".join(f"{line}\n" for line in fixed_line(fixed))
+    text = summary(found, tried[0], own_gap=task.certify is None) + "".join(
+        f"{line}\n" for line in fixed_line(fixed)
+    )
     text += outcomes.sentences(limit) if limit else ""
     common.answer(options, document, out, text)
     return 0
@@ -183,7 +185,7 @@ def excluded(text: str) -> tuple[str, ...]:
     return names
 
 
-def summary(found: Envelope, tried: Array | None = None) -> str:
+def summary(found: Envelope, tried: Array | None = None, *, own_gap: bool = False) -> str:
     """Extremes and fuzzy peaks at the lowest level as a small table."""
     from alphacut.frame.exceedance import peaks
     from alphacut.frame.outputs import output_unit
@@ -219,7 +221,7 @@ def summary(found: Envelope, tried: Array | None = None) -> str:
         f" {found.alpha[0]:g}, nodes every {found.time[1]:g} s)\n"
     )
     claim = f"{found.facts['claim']}\n" if "claim" in found.facts else ""
-    lines.append(f"{cost}\n{unproved(found)}{proved(found)}{claim}")
+    lines.append(f"{cost}\n{unproved(found)}{proved(found, own_gap=own_gap)}{claim}")
     return f"{head}{''.join(lines)}"
 
 
@@ -252,8 +254,8 @@ def error_in_words(found: Envelope) -> str:
     )
 
 
-def proved(found: Envelope) -> str:
-    """Line on the certificate; empty without one."""
+def proved(found: Envelope, *, own_gap: bool) -> str:
+    """Line on the certificate; empty without one. `own_gap`: the program chose what gap to ask."""
     from alphacut.frame.outputs import output_unit
 
     if found.proved_lower is not None and found.proved_upper is not None:
@@ -269,4 +271,5 @@ def proved(found: Envelope) -> str:
         return ""
     of = str(found.facts["gap_output"])
     gap = engineering(float(found.facts["gap"]), output_unit(of))
-    return f"every node's bounds enclosed to within {gap} of {of}; {found.facts['proof']}\n"
+    asked = " (asked of the proof by the program itself)" if own_gap else ""
+    return f"every node's bounds enclosed to within {gap} of {of}{asked}; {found.facts['proof']}\n"

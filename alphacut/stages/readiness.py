@@ -19,6 +19,7 @@ from alphacut.stages.material import modulus, spheres
 from alphacut.stages.material.cell import cell_phases, modal_parts, phases_of
 from alphacut.stages.material.references import mean_share
 from alphacut.stages.vibration import update
+from alphacut.stages.vibration.accelerogram import cut_short
 from alphacut.stages.vibration.envelope_task import task_of
 from alphacut.stages.vibration.provable import estimated_reason, too_many, unproved_reason
 from alphacut.stages.vibration.resolution_checks import rough, wanted_errors
@@ -231,7 +232,7 @@ def unlearned(case: Case, wanted: Structure) -> Iterator[Problem]:
 
 
 def outlasted(case: Case, record: Accelerogram | None) -> Iterator[str]:
-    """A remark on durations that are longer than the record."""
+    """A remark on durations that are longer than the record, or leave out a part of it."""
     if record is None:
         return
     end = (len(record.acceleration) - 1) * record.step
@@ -240,6 +241,11 @@ def outlasted(case: Case, record: Accelerogram | None) -> Iterator[str]:
         yield (
             f"{plausible.record_key(case)}: the record ends at {end:g} s and the simulation at"
             f" {longest:g} s; afterwards the ground is at rest"
+        )
+    elif cut_short(record, longest):
+        yield (
+            f"{plausible.record_key(case)}: the simulation ends at {longest:g} s, the record at"
+            f" {end:g} s: the rest of the record is left out"
         )
 
 

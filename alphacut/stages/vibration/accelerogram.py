@@ -47,6 +47,13 @@ def accelerogram(path: Path, key: str = "frame.accelerogram") -> Accelerogram:
     return Accelerogram(even_step(file, times, [line for line, _ in rows]), values[:, 1])
 
 
+def cut_short(record: Accelerogram, duration: float) -> bool:
+    """Whether a simulation leaves out a part of the record that moves the ground."""
+    end = (len(record.acceleration) - 1) * record.step
+    rest = record.acceleration[math.floor(duration / record.step + EVEN) + 1 :]
+    return end - duration > max(record.step, 0.01 * end) and bool(np.any(rest))
+
+
 def pair(file: CsvFile, line: int, row: list[str]) -> tuple[float, float]:
     """Time and acceleration of a row."""
     try:

@@ -157,6 +157,9 @@ def test_the_bounds_of_the_stated_nature_are_printed():
     )
     assert "−201.0 mm      302.0 mm" in summary(certified)
     assert "−200.0" not in summary(certified)
+    facts = {"gap": 1e-3, "gap_output": "q1", "proof": "rigorous"}
+    line = summary(replace(certified, facts=facts), own_gap=True)
+    assert "within 1.000 mm of q1 (asked of the proof by the program itself); rigorous" in line
 
 
 def test_only_what_a_run_used_differs_from_the_paper():

@@ -102,6 +102,12 @@ def test_a_duration_beyond_the_record_is_remarked(tmp_path, capfd):
     assert "the record ends at 20 s and the simulation at 30 s" in found
 
 
+def test_a_record_that_is_cut_short_is_remarked(tmp_path, capfd):
+    path = own(tmp_path, "building", ('duration = "20 s"', 'duration = "8 s"'))
+    (found,) = warnings(path, capfd=capfd)
+    assert "the simulation ends at 8 s, the record at 20 s: the rest of the record is" in found
+
+
 def test_a_coarse_step_is_warned_of(tmp_path, capfd):
     path = own(tmp_path, "building", ('integrator = "exact"', 'integrator = "midpoint"'))
     (found,) = warnings(path, capfd=capfd)
