@@ -13,7 +13,7 @@ from alphacut.case.readings import readings
 from alphacut.commands.options import add_common, answer
 from alphacut.io.files import say
 from alphacut.io.problem import BadInput
-from alphacut.stages.image.phases import phase_lines
+from alphacut.stages.image.phases import BEYOND, phase_lines
 from alphacut.stages.image.reading import study_of
 from alphacut.stages.material.microstructure import plan
 from alphacut.stages.readiness import motion, ready
@@ -39,7 +39,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         answer(options, {"case": options.case, "ok": False, "problems": problems}, out)
         raise
     inputs, plans = list(readings(case)), list(plan(case))
-    plans += phase_lines(study_of(case)) if "image" in case.stages else []
+    if "image" in case.stages:
+        plans += [*phase_lines(study_of(case)), BEYOND[case.picture.boundary]]
     plans += [] if found.structure is None else motion(case, found.structure)
     warnings = [f"warning: {remark}" for remark in (*found.warnings, *found.rough)]
     document = {

@@ -67,7 +67,7 @@ def summary(found: Document) -> str:
         if own
         else ""
     )
-    return "".join(f"{line}\n" for line in found["phases"]) + (
+    return "".join(f"{line}\n" for line in (*found["phases"], found["boundary"])) + (
         "alpha  lower GPa   upper GPa   (E of eq. 16, plane strain: not E_T, the transverse Young's"
         f" modulus of a fibre composite)\n{rows}"
         f"width of the stiffness's bounds at the top level: {found['width']:.2e}\n"

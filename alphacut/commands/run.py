@@ -215,6 +215,7 @@ def image_lines(found: Document) -> Iterator[str]:
     """The bounds of an image's modulus, if there is one."""
     if picture := found.get("image"):
         yield from picture.get("phases", ())  # results of an older program have none
+        yield from filter(None, [picture.get("boundary")])
         cuts = picture["cuts"]["E_GPa"]
         yield (
             f"E = [{cuts['lower'][-1]:.4f}, {cuts['upper'][-1]:.4f}] GPa, support"

@@ -156,7 +156,7 @@ def image(found: Document, drawn: Markup) -> Markup:
     ]
     return section(
         "Stiffness of the image",
-        paragraphs(*found.get("phases", ())) + words,
+        paragraphs(*found.get("phases", ()), *filter(None, [found.get("boundary")])) + words,
         drawn,
         table(("α", "lower E, GPa", "upper E, GPa", "nature"), rows),
         random_threshold(found),

@@ -82,12 +82,7 @@ def solutions(study: ImageStudy) -> int:
 
 
 def compute(study: ImageStudy, *, progress: Tick | None = None) -> FuzzyImage:
-    """Bounds at every level, and what widens them.
-
-    Args:
-        study: What is solved.
-        progress: Told the share done.
-    """
+    """Bounds at every level, and what widens them."""
     began = perf_counter()
     tick = progress or (lambda share: None)
     modal = study.images(None, None)

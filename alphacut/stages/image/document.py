@@ -12,7 +12,7 @@ from alphacut.io.provenance import versions
 from alphacut.rve.image.directions import directions
 from alphacut.rve.image.model import ImageCut
 from alphacut.stages.image.bounds import FuzzyImage
-from alphacut.stages.image.phases import phase_lines
+from alphacut.stages.image.phases import BEYOND, IF, phase_lines
 from alphacut.stages.image.random_response import RandomResponse
 from alphacut.stages.material.cell import GPA
 
@@ -31,7 +31,7 @@ def document(found: FuzzyImage) -> Document:
         "upper_GPa": bounds.upper / GPA,
         "width": bounds.width,
         "E_GPa": pair(cut.modulus),
-        "nature": cut.nature,
+        "nature": cut.nature + IF[found.model.boundary],
         "iterations": max(c.iterations for c in (found.crisp, *found.cuts)),
         "seconds": found.seconds,
         "nu": poisson(cut),
@@ -42,12 +42,13 @@ def document(found: FuzzyImage) -> Document:
                 "lower": [c.modulus[0] / GPA for c in found.cuts],
                 "upper": [c.modulus[1] / GPA for c in found.cuts],
             },
-            "nature": [c.nature for c in found.cuts],
+            "nature": [c.nature + IF[found.model.boundary] for c in found.cuts],
         },
         "error_table": error_table(found),
         "random_threshold": None if found.random is None else random_threshold(found.random),
         "fractions": found.study.fractions,
         "phases": phase_lines(found.study),
+        "boundary": BEYOND[found.model.boundary],
         "grains_E_GPa": pair(found.grains),
         "apparent_E_GPa": None if found.apparent is None else pair(found.apparent),
         "directions_E_GPa": {"least": pair(turned.least), "greatest": pair(turned.greatest)},
@@ -134,7 +135,7 @@ def dataset(found: FuzzyImage) -> xarray.Dataset:
         "column": ["11", "22", "12"],
     }
     return xarray.Dataset(
-        variables, coordinates, {"nature": found.top.nature, "seconds": found.seconds}
+        variables, coordinates, {"nature": document(found)["nature"], "seconds": found.seconds}
     )
 
 

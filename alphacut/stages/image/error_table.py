@@ -40,13 +40,7 @@ class Contribution:
 def contributions(
     study: ImageStudy, discretisation: float, width: Callable[[Level, Level], float]
 ) -> tuple[Contribution, ...]:
-    """The sources there are, the widest first.
-
-    Args:
-        study: What is solved.
-        discretisation: Width of E from the pixels alone, in Pa.
-        width: Width of E with the threshold and the phases at levels, in Pa.
-    """
+    """The sources there are, the widest first, by widths of E in Pa: of pixels, and at levels."""
     base, lowest = width(None, None), study.alpha[0]
     widths = {"outline" if study.outlined else "discretisation": discretisation}
     if study.model.boundary == "window":

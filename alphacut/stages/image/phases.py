@@ -6,12 +6,20 @@ import itertools
 import re
 from collections.abc import Iterator
 
+import numpy as np
+
 from alphacut.case.case import Case
 from alphacut.case.sections.picture import Picture
 from alphacut.io.units import engineering
 from alphacut.stages.image.study import ImageStudy
 from alphacut.stages.plausible import SOFT, STIFF
 
+BEYOND = {
+    "periodic": 'boundary = "periodic": the image repeats itself',
+    "window": 'boundary = "window": a piece of a larger material',
+}
+IF = {"periodic": ', if the image repeats itself (boundary = "periodic")', "window": ""}
+SEAM, OFTENER = 0.1, 3  # of an edge, and of neighbouring lines: beyond both an edge does not match
 APART = 0.05  # of the area, by which a phase may differ from what the case's words say
 
 
@@ -37,8 +45,24 @@ def phase_lines(study: ImageStudy) -> list[str]:
     ]
 
 
+def unmatched(study: ImageStudy) -> Iterator[str]:
+    """A remark where phases differ across opposite edges more than between neighbouring lines."""
+    phase, found = study.ranges(None)[0], []
+    for name, lines in (("left and right", phase.T), ("top and bottom", phase)):
+        seam, inner = np.mean(lines[0] != lines[-1]), np.mean(lines[1:] != lines[:-1])
+        if seam > max(SEAM, OFTENER * inner):
+            found.append(f"{name} on {seam:.0%}")
+    if found and study.model.boundary == "periodic":
+        yield (
+            f"cell.boundary: the image's edges do not match, {', '.join(found)} of their length:"
+            ' boundary = "window" is for a piece of a larger material'
+        )
+
+
 def contradicted(case: Case, study: ImageStudy) -> Iterator[str]:
-    """Remarks where phases of a material that the case names cover another percentage."""
+    """Remarks where phases cover another percentage than the case names, or edges do not match."""
+    if case.picture.inequality is None:
+        yield from unmatched(study)
     shares = list(zip(study.fractions, study.pairs, strict=True)) if study.young else []
     for pattern, (low, high) in (STIFF | SOFT).items():
         meant = sum(share for share, (young, _) in shares if low <= young.modal <= high)

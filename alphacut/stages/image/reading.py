@@ -25,11 +25,7 @@ ACCURACY = 1e-5  # relative energy that the solver may leave; a width asked for 
 
 
 def study_of(case: Case, *, petsc: Mapping[str, str] | None = None) -> ImageStudy:
-    """The study that a case describes.
-
-    Args:
-        case: The case.
-        petsc: PETSc options for its solver, without their prefix; none: the own one.
+    """The study that a case describes, solved with PETSc where there are options of it.
 
     Raises:
         BadInput: Its picture cannot be used.

@@ -127,10 +127,6 @@ def bounds_over_cuts(case: Case, alpha: Sequence[float]) -> Document:
 
     At the corners of the box of the cell's inputs, and half-way of Poisson's ratios, in which the
     bounds need not be monotone.
-
-    Args:
-        case: With a cell and its radius.
-        alpha: Levels, shape (A,).
     """
     inputs = cell_inputs(case)
     ends = np.array([_over_box(case, inputs, level) for level in alpha])
@@ -338,14 +334,7 @@ def publish(case: Case, found: Document) -> str:
 def outside(
     case: Case, found: Document, modulus: float, support: tuple[float, float] | None = None
 ) -> str:
-    """Warning where E in GPa leaves the bounds in space and the case's words say spheres, or ''.
-
-    Args:
-        case: The case.
-        found: The references.
-        modulus: E at the modal values.
-        support: E at the lowest level, where it is fuzzy.
-    """
+    """Warning where E in GPa leaves the bounds in space and the case's words say spheres, or ''."""
     told = says_spheres(case)
     if told is None:
         return ""

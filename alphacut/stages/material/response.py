@@ -28,12 +28,7 @@ CUT = ("alpha", "bound")
 
 
 def random_response(case: Case, modulus: xarray.Dataset) -> RandomResponse:
-    """The wanted stress at every sample of the fuzzy modulus.
-
-    Args:
-        case: With the section response.
-        modulus: Dataset of the fuzzy modulus, with the samples' stress curves over θ.
-    """
+    """The wanted stress at every sample of the fuzzy modulus, whose curves over θ it holds."""
     from alphacut.fuzzy.samples.design import Design
     from alphacut.fuzzy.samples.model import Values
 

@@ -105,13 +105,7 @@ def remark(case: Case, share: float, matrix: Phase, inclusion: Phase) -> str | N
 
     None where nothing says so, or where the case names cylinders itself. The difference is that of
     the bounds of Hashin and Shtrikman that the matrix gives, in the plane and in space, at one
-    fraction.
-
-    Args:
-        case: The case.
-        share: Area fraction of the particles, in (0, 1).
-        matrix: Material between them.
-        inclusion: Their material.
+    fraction, the area's share.
     """
     told = says_spheres(case)
     if told is None:

@@ -18,6 +18,7 @@ IMAGE = {
     "modulus": '["20 GPa", "80 GPa"]',
     "poisson": "[0.3]",
 }
+REPEATED = 'if the image repeats itself (boundary = "periodic")'
 FRAME = """
 [frame]
 second_moment = "1e-6 m^4"
@@ -64,7 +65,7 @@ def test_the_keys_of_the_result(folder, capfd):
     assert np.linalg.eigvalsh(upper - lower)[0] > 0
     assert 0 < found["width"] < 0.05
     assert found["E_GPa"]["lower"] < found["E_GPa"]["upper"]
-    assert found["nature"] == "guaranteed, at two corners"
+    assert found["nature"] == f"guaranteed, at two corners, {REPEATED}"
     cuts = found["cuts"]["E_GPa"]
     assert cuts["lower"][0] < cuts["lower"][1] < cuts["upper"][1] < cuts["upper"][0]
     assert [row["source"] for row in found["error_table"]] == ["threshold", "discretisation"]
@@ -104,13 +105,15 @@ def test_bulk_and_shear_moduli_say_the_same_as_young_and_poisson(folder, capfd):
 
 def test_a_fuzzy_poisson_ratio_is_told_to_be_enclosed(folder, capfd):
     found = solved(folder, capfd, poisson="[[0.25, 0.3, 0.35], 0.3]")
-    assert found["cuts"]["nature"] == ["guaranteed enclosure", "guaranteed, at two corners"]
+    assert found["cuts"]["nature"] == [
+        f"{nature}, {REPEATED}" for nature in ("guaranteed enclosure", "guaranteed, at two corners")
+    ]
 
 
 def test_a_random_threshold_gives_the_mean_and_quantiles(folder, capfd):
     law = {"threshold": "[[127, 130, 133]]", "threshold_deviation": "[8, 10, 12]"}
     found = solved(folder, capfd, **law, quantiles="[0.1, 0.9]")
-    assert found["nature"] == "guaranteed, of the mean over the random threshold"
+    assert found["nature"] == f"guaranteed, of the mean over the random threshold, {REPEATED}"
     cuts = found["cuts"]["E_GPa"]
     assert cuts["lower"][0] < cuts["lower"][1] < cuts["upper"][1] < cuts["upper"][0]
     random = found["random_threshold"]
@@ -144,7 +147,7 @@ def test_labels_and_an_inequality_give_what_a_threshold_does(folder, capfd):
     outline = {"image": None, "pixel": None, "threshold": None, "size": '["1 m", "1 m"]'}
     drawn = {"inequality": '"(x - 0.5)**2 + (y - 0.5)**2 <= 0.05"', "pixels": "32"}
     found = solved(folder, capfd, **outline, **drawn)
-    assert found["nature"] == "guaranteed, at two corners"
+    assert found["nature"] == f"guaranteed, at two corners, {REPEATED}"
     (widest,) = (row for row in found["error_table"] if row["source"] == "outline")
     assert widest["cure"] == "take more pixels across: cell.pixels"
     corners = 0.5 + np.sqrt(0.05) * np.array(
@@ -163,6 +166,26 @@ def test_a_window_gives_a_confidence_interval_and_says_so(folder, capfd):
     assert found["apparent_E_GPa"]["upper"] < found["E_GPa"]["upper"]
     assert [row["source"] for row in found["error_table"]] == ["finite window", "discretisation"]
     assert main(["image", written(folder, boundary='"window"', tiles="2"), "--quiet"]) == 0
+
+
+@pytest.mark.parametrize("command", ["check", "image", "run"])
+def test_a_piece_of_a_larger_material_is_not_taken_as_periodic_unseen(folder, capfd, command):
+    image = pytest.importorskip("PIL.Image")
+    grey = np.asarray(image.open(folder / "a.png"))
+    image.fromarray(grey[:, 10:]).save(folder / "piece.png")
+    out = ["--out", str(folder / "out"), "--no-figures"] if command == "run" else []
+    assert main([command, written(folder, image='"piece.png"', threshold="[130]"), *out]) == 0
+    told = capfd.readouterr()
+    assert "edges do not match, left and right on " in told.err
+    assert 'boundary = "window" is for a piece of a larger material' in told.err
+    assert 'boundary = "periodic": the image repeats itself' in told.out
+    assert command == "check" or f"guaranteed, at two corners, {REPEATED}" in told.out
+    assert main(["check", written(folder)]) == 0
+    assert "do not match" not in capfd.readouterr().err
+    assert main(["check", written(folder, boundary='"window"')]) == 0
+    told = capfd.readouterr()
+    assert 'boundary = "window": a piece of a larger material' in told.out
+    assert "do not match" not in told.err
 
 
 def test_a_width_asked_for_divides_the_pixels(folder, capfd):
