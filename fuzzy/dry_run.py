@@ -180,11 +180,9 @@ def _rehearsed(
         points, missing = plan.run(rehearsal, domain).points, np.empty((0, len(domain.names)))
     except _MissingError as stop:
         points, missing = stop.points, stop.missing
-    reasons = (
-        _reasons(rehearsal.samples, identity, domain, missing)
-        if len(missing)
-        else ("everything is stored: nothing would run",)
-    )
+    reasons: tuple[str, ...] = ("everything is stored: nothing would run",)
+    if len(missing):
+        reasons = _reasons(rehearsal.samples, identity, domain, missing)
     count = rehearsal.seen + len(missing) if len(missing) else len(points)
     return Explanation(
         samples=count,
@@ -202,15 +200,8 @@ def _counted(size: int, domain: Domain, vectorised: bool) -> Explanation:
     """Count of samples too many to list; points of two levels count twice."""
     calls = -(-size // BATCH) if vectorised else size
     few = "too many to list; take Signed, Optimisation or Chebyshev if these are too many to run"
-    return Explanation(
-        size,
-        0,
-        (),
-        calls,
-        None,
-        needed(size, len(domain.names) + 1),
-        ("there is no store yet: every sample is new", few),
-    )
+    reasons, memory = (_NO_STORE, few), needed(size, len(domain.names) + 1)
+    return Explanation(size, 0, (), calls, None, memory, reasons)
 
 
 def _open_end(plan: Plan) -> str:
@@ -221,6 +212,9 @@ def _open_end(plan: Plan) -> str:
     return f"how many samples {type(plan).__name__} takes depends on the model ({known}); "
 
 
+_NO_STORE = "there is no store yet: every sample is new"
+
+
 def _never(**_: float) -> float:
     raise AssertionError("an explanation runs nothing")
 
@@ -229,17 +223,11 @@ def _reasons(
     samples: Shelf | None, identity: Identity, domain: Domain, missing: Array
 ) -> tuple[str, ...]:
     if samples is None:
-        return ("there is no store yet: every sample is new",)
+        return (_NO_STORE,)
     keys = [samples.key(missing[row]) for row in range(len(missing))]
     failed = samples.failed(keys)
-    reasons = (
-        [
-            f"{len(failed)} failed before and would be tried again, the first with:"
-            f" {next(iter(failed.values()))}"
-        ]
-        if failed
-        else []
-    )
+    again = f"{len(failed)} failed before and would be tried again, the first with:"
+    reasons = [f"{again} {next(iter(failed.values()))}"] if failed else []
     own = [model for model in samples.models() if model.identity == dict(identity)]
     if own and own[0].samples:
         reasons += _new_values(samples, domain, missing)
@@ -255,10 +243,8 @@ def _new_values(samples: Shelf, domain: Domain, missing: Array) -> list[str]:
     for column, name in enumerate(domain.names):
         fresh = {float(value) for value in missing[:, column]} - {point[name] for point in stored}
         if fresh:
-            found.append(
-                f"{name} takes {counted(len(fresh), 'value')} that no stored sample has, the first"
-                f" {min(fresh):.6g}"
-            )
+            values = f"{name} takes {counted(len(fresh), 'value')} that no stored sample has"
+            found.append(f"{values}, the first {min(fresh):.6g}")
     return found or ["the inputs take stored values in new combinations"]
 
 
@@ -268,22 +254,17 @@ def _nearest(models: list[Stored], identity: Identity) -> list[str]:
         return ["the store is empty: every sample is new"]
     differences = [_differences(model.identity, identity) for model in models]
     nearest = min(range(len(models)), key=lambda i: len(differences[i]))
-    what = "; ".join(differences[nearest])
-    return [
-        f"no sample of this model is stored; the nearest model, with {models[nearest].samples}"
-        f" samples, differs: {what}"
-    ]
+    near = f"the nearest model, with {models[nearest].samples} samples"
+    what = f"{near}, differs: {'; '.join(differences[nearest])}"
+    return [f"no sample of this model is stored; {what}"]
 
 
 def _differences(stored: Any, asked: Any, path: str = "") -> list[str]:
     """Differences of two identities, each as `key: stored → asked`."""
     if isinstance(stored, Mapping) and isinstance(asked, Mapping):
-        keys = sorted({*stored, *asked})
-        return [
-            line
-            for key in keys
-            for line in _differences(
-                stored.get(key), asked.get(key), f"{path}.{key}" if path else str(key)
-            )
-        ]
+        found = []
+        for key in sorted({*stored, *asked}):
+            below = f"{path}.{key}" if path else str(key)
+            found += _differences(stored.get(key), asked.get(key), below)
+        return found
     return [] if stored == asked else [f"{path}: {stored} → {asked}"]

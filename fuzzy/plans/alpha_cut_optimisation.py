@@ -37,7 +37,8 @@ class Optimisation:
         look: Spread points of the first look per level and input.
         budget: Samples per bound that a global optimiser may take.
         seed: Where random searches start from.
-        outputs: Outputs whose bounds matter; all if none is named.
+        outputs: Outputs whose bounds matter; all if none is named. The others are printed as the
+            samples happen to bound them, without an error.
 
     Raises:
         ValueError: There is no such method, or a number is not positive.
@@ -82,9 +83,9 @@ class Optimisation:
                 for sign in (1.0, -1.0):
                     self._search(cut, name, sign)
             model.report(1 - level / len(domain.alpha))
-        return Design.from_samples(domain, memo.points).bounds(
-            memo.values, plan=f"optimisation by {self.method}"
-        )
+        design, plan = Design.from_samples(domain, memo.points), f"optimisation by {self.method}"
+        result = design.bounds(memo.values, plan=plan)
+        return result.searched([result.column(name) for name in names], self.outputs)
 
     def _search(self, cut: LevelSearch, output: str, sign: float) -> None:
         if self.method == "multistart":

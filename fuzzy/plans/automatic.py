@@ -42,7 +42,8 @@ class Automatic:
         look: Fresh points per level, input and look.
         looks: Looks at most.
         seed: Where the fresh points start from.
-        outputs: Outputs whose bounds matter; all if none is named.
+        outputs: Outputs whose bounds matter; all if none is named. The others are printed as the
+            samples happen to bound them, without an error.
 
     Raises:
         ValueError: A number is not positive, or the budget does not carry the first surface.
@@ -88,12 +89,14 @@ class Automatic:
         chosen = [result.column(name) for name in names]
         if not few:
             result = _further(result, found)
-        error = np.maximum(found.error, looks.error)
+        aside = np.isin(result.outputs, found.unsearched)
+        error = np.maximum(found.error, np.where(aside, 0.0, looks.error))
         return replace(
             result,
             runs=spent,
             verification_runs=len(memo) - spent,
             error=error,
+            unsearched=found.unsearched,
             notes=(*found.notes, self._told(result, error[:, chosen], chosen, looks)),
         )
 
@@ -114,9 +117,8 @@ class Automatic:
         while not self._carried(memo, domain, share):
             share = max(share // 2, first)
         purse.left += extremes
-        return Chebyshev(
-            self.tolerance, share, confirm=bool(names), outputs=self.outputs or names
-        ).run(memo, domain)
+        surface = Chebyshev(self.tolerance, share, confirm=bool(names), outputs=self.outputs)
+        return surface.run(memo, domain)
 
     def _carried(self, memo: Memo, domain: Domain, share: int) -> bool:
         """Whether the budget carries a surface of so many samples, whose last step passes them."""

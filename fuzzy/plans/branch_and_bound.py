@@ -15,7 +15,7 @@ from alphacut.fuzzy.samples.model import Model, Values
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
-from alphacut.fuzzy.sets.given import require_fields
+from alphacut.fuzzy.sets.given import require_end, require_fields
 from alphacut.fuzzy.sets.numbers import Array, Rows
 
 _ROUND_OFF = 1 + 1e-12  # more than the round-off of the mean-value form
@@ -54,11 +54,7 @@ class BranchAndBound:
 
     def __post_init__(self) -> None:
         require_fields(self)
-        if not (self.tolerance > 0 and self.budget >= 1):
-            raise ValueError(
-                f"tolerance and budget are {self.tolerance:g} and {self.budget}; both must be"
-                " positive"
-            )
+        require_end(self.tolerance, self.budget)
 
     stepwise = True  # samples depend on those before
 

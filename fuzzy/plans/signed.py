@@ -25,8 +25,9 @@ class Signed:
     probes. The bounds are guaranteed where all signs are stated or proved, and inner otherwise.
 
     Args:
-        outputs: Outputs whose bounds matter; all if none is named. The others get what the same
-            samples give.
+        outputs: Outputs whose bounds matter; all if none is named. The others are printed as the
+            samples happen to bound them, without an error
+            unless they are proved.
         verification: How signs are looked for where they are not stated.
         limit: Samples that the plan may take where signs are missing.
     """

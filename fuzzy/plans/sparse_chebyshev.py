@@ -14,7 +14,7 @@ from alphacut.fuzzy.samples.model import Memo, Model
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
-from alphacut.fuzzy.sets.given import require_fields
+from alphacut.fuzzy.sets.given import require_end, require_fields
 from alphacut.fuzzy.sets.numbers import Array, Rows
 from alphacut.fuzzy.surrogates.chebyshev_polynomial import Polynomial
 
@@ -43,7 +43,8 @@ class Chebyshev:
             (inner), their error the disagreement there and twice that at held-out samples (three
             times where the budget ended it for several inputs); otherwise they are the surface's
             (estimated), their error the latter alone.
-        outputs: Outputs whose bounds matter; all if none is named.
+        outputs: Outputs whose bounds matter; all if none is named. The others are printed as the
+            samples happen to bound them, without an error.
 
     Raises:
         ValueError: A number is not positive.
@@ -56,11 +57,7 @@ class Chebyshev:
 
     def __post_init__(self) -> None:
         require_fields(self)
-        if not (self.tolerance > 0 and self.budget >= 1):
-            raise ValueError(
-                f"tolerance and budget are {self.tolerance:g} and {self.budget}; both must be"
-                " positive"
-            )
+        require_end(self.tolerance, self.budget)
 
     stepwise = True  # samples depend on those before
 
@@ -70,14 +67,13 @@ class Chebyshev:
 
         memo = Memo(model)
         columns = memo(domain.modal[None]).columns
-        _require_few(self.outputs or primary(columns, model.known), domain)
+        names = self.outputs or primary(columns, model.known)
+        _require_few(names, domain)
         grid = SparseGrid(memo, *(ends[0] for ends in domain.boxes))
         missed, met = grid.refine(self.tolerance, self.budget)
         left = float((missed / np.maximum(np.ptp(memo.values.array, axis=0), _TINY)).max())
         missed = (_SAFETY if met or len(domain.names) == 1 else _ROUGH) * missed
-        chosen = np.array(
-            [memo.values.column(name) for name in self.outputs or primary(columns, model.known)]
-        )
+        chosen = np.array([memo.values.column(name) for name in names])
         ends = _extremes(grid.polynomial(), domain, chosen)
         error = np.broadcast_to(missed[chosen], ends.values.shape[:2])
         if self.confirm:
@@ -88,7 +84,8 @@ class Chebyshev:
         ended = f"the surface ended at its budget of {self.budget} samples with {left:.1e} of"
         notes = () if met else (f"{ended} the range missed",)
         result = replace(result, error=table, notes=notes)
-        return result if self.confirm else _estimated(result, ends, chosen)
+        result = result if self.confirm else _estimated(result, ends, chosen)
+        return result.searched(chosen, self.outputs)
 
     def _disagreement(self, memo: Memo, ends: _Ends, chosen: Rows) -> Array:
         """Distance of model and surface at the surface's extremes, (levels, outputs)."""

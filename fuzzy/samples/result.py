@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -23,7 +23,7 @@ from alphacut.fuzzy.samples.model import Values
 from alphacut.fuzzy.samples.nature import Nature, condition
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.claimed import Claimed
-from alphacut.fuzzy.sets.numbers import Array, Mask, PiecewiseLinear
+from alphacut.fuzzy.sets.numbers import Array, Mask, PiecewiseLinear, Rows
 from alphacut.fuzzy.sets.stepwise import Stepwise, outer_steps
 from alphacut.fuzzy.surrogates.response_surface import ResponseSurface
 
@@ -70,6 +70,7 @@ class FuzzyResult:
         proved: Where the true range is proved to lie inside the bounds, shape (levels, outputs).
         enforced: Where nesting had to be enforced, shape (levels, outputs).
         given: Facts that the proof rests on and nobody proved, one sentence each.
+        unsearched: Outputs that the plan did not search: inner bounds, without an error.
         notes: What the plan found on its way, one sentence each.
         points: Samples of the model, shape (n, inputs).
         values: Outputs at `points`.
@@ -92,6 +93,7 @@ class FuzzyResult:
     proved: Mask = field(default_factory=lambda: np.zeros(0, bool))
     enforced: Mask = field(default_factory=lambda: np.zeros(0, bool))
     given: tuple[str, ...] = ()
+    unsearched: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     points: Array = field(default_factory=lambda: np.zeros((0, 0)))
     values: Values = field(default_factory=lambda: Values((), np.zeros((0, 0))))
@@ -160,6 +162,19 @@ class FuzzyResult:
             given=given,
             notes=(*self.notes, *notes),
         )
+
+    def searched(self, columns: Sequence[int] | Rows, named: Sequence[str]) -> FuzzyResult:
+        """The same, all but the searched columns without an error; `named` by the caller."""
+        aside = ~np.isin(np.arange(len(self.outputs)), columns)
+        if not aside.any():
+            return self
+        names = tuple(self.outputs[k] for k in np.flatnonzero(aside))
+        why = f"outputs = {tuple(named)}" if named else "of derivatives only those named are"
+        told = ", ".join([*names[:4], *(["…"] if len(names) > 4 else [])])
+        note = f"{told} {'was' if len(names) == 1 else 'were'} not searched: {why}"
+        exact = self.proved | _crisp(self.domain)[:, None]
+        error = np.where(aside, np.where(exact, 0.0, np.nan), self.error)
+        return replace(self, error=error, unsearched=names, notes=(*self.notes, note))
 
     def confronted(self, signs: Signs) -> FuzzyResult:
         """The same bounds, proved where samples do not contradict signs (outputs, inputs)."""
@@ -286,9 +301,9 @@ class FuzzyResult:
 
     def nature_of(self, output: str = "y") -> tuple[Nature, ...]:
         """Nature of one output's bounds on each level."""
+        base = Nature.INNER if output in self.unsearched else self.base
         return tuple(
-            Nature.GUARANTEED if proved else self.base
-            for proved in self.proved[:, self.column(output)]
+            Nature.GUARANTEED if proved else base for proved in self.proved[:, self.column(output)]
         )
 
     @property

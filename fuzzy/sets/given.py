@@ -77,3 +77,10 @@ def require_fields(owner: DataclassInstance) -> None:
             raise ValueError(
                 f"{field.name} of {type(owner).__name__} is {value!r}; it must be {words}{least}"
             )
+
+
+def require_end(tolerance: float, budget: int) -> None:
+    """Refuse a search without an end."""
+    if not (tolerance > 0 and budget >= 1):
+        both = f"tolerance and budget are {tolerance:g} and {budget}"
+        raise ValueError(f"{both}; both must be positive")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from alphacut.fuzzy import (
+    Automatic,
     Chebyshev,
     Extended,
     General,
@@ -265,6 +266,34 @@ def test_named_outputs_are_searched_and_the_others_get_what_is_there():
         result = propagate(model, {"x": Triangular(0.0, 0.5, 1.0)}, plan)
         assert result.bounds("f")[0][0] == pytest.approx(0, abs=1e-9)
         assert result.outputs == ("f", "g")
+
+
+@pytest.mark.parametrize("plan", [Automatic, Chebyshev, Optimisation])
+def test_outputs_that_are_not_searched_have_no_error_and_a_note_says_so(plan):
+    def model(a, b):
+        return {"p": a**2 * np.sin(b) + b, "q": a * np.cos(3 * b)}
+
+    inputs = {"a": Triangular(1, 2, 3), "b": Interval(0.5, 2.5)}
+    found = propagate(model, inputs, plan(outputs=("p",)), alpha=[0, 1])
+    assert np.isnan(found.error[:, 1]).all()
+    assert "q was not searched: outputs = ('p',)" in found.notes
+    assert "not searched" not in str(propagate(model, inputs, plan(), alpha=[0]))
+    if plan is not Optimisation:
+        assert np.isfinite(found.error[:, 0]).all()
+    if plan is Chebyshev:
+        rough = propagate(model, inputs, plan(outputs=("p",), confirm=False), alpha=[0])
+        assert [rough.nature_of(name)[0] for name in "pq"] == ["estimated", "inner"]
+        exact = propagate(model, {"a": 1, "b": 2}, plan(outputs=("p",)), alpha=[0])
+        assert exact.error[0, 1] == 0
+
+
+@pytest.mark.parametrize("plan", [Automatic(), Chebyshev(), Optimisation()])
+def test_derivatives_that_are_not_named_are_not_searched(plan):
+    known = Known(derivatives={"f": {"x": "slope"}})
+    model = lambda x: {"f": np.sin(3 * x), "slope": 3 * np.cos(3 * x)}  # noqa: E731
+    found = propagate(model, {"x": Interval(0, 2)}, plan, alpha=[0], known=known)
+    assert np.isnan(found.error[0, 1])
+    assert "slope was not searched: of derivatives only those named are" in found.notes
 
 
 def test_samples_depend_on_the_seed_only():
