@@ -195,16 +195,23 @@ def main_numbers(found: Document) -> str:
 def modulus_lines(found: Document) -> Iterator[str]:
     """The fuzzy modulus, if one was computed, and its references."""
     if cell := found.get("modulus"):
-        low, high = (f"{cell['nu_cuts'][side][0]:.4f}" for side in ("lower", "upper"))
-        ends = f", support [{low}, {high}]" if low != high else ""
+        inner, ends = (
+            [f"{cell['nu_cuts'][s][k]:.4f}" for s in ("lower", "upper")] for k in (-1, 0)
+        )
+        nu = f"{cell['nu']:.4f}"
+        if inner[0] != inner[1]:
+            nu = f"[{', '.join(inner)}] at α = {cell['alpha'][-1]:g}"
+        nu += f", support [{', '.join(ends)}]" if ends[0] != ends[1] else ""
         yield (
             f"E = {core(cell)}, support [{cell['lower_GPa']:.4f}, {cell['upper_GPa']:.4f}] GPa;"
-            f" nu = {cell['nu']:.4f}{ends}"
+            f" nu = {nu}"
         )
         ranked = sorted(found.get("shares", {}).get("E", {}).items(), key=lambda one: -one[1])
         first = [f"{in_words(name)} {share:.0%}" for name, share in ranked[:3] if share > 0]
         if first:
-            yield f"share of the width of E that each leaves if known: {'; '.join(first)}"
+            some = f" (the first {len(first)} of {len(ranked)})" if len(ranked) > len(first) else ""
+            told = f"the width of E shrinks by this share if the input were known{some}"
+            yield f"{told}: {'; '.join(first)}"
         yield from lines(cell["beside"], cell["particles"])
         if told := cell["outside"]:  # why, and the cure, was said before the run
             yield f"warning: {told.partition(', and ')[0] if cell.get('shape') else told}"

@@ -280,12 +280,20 @@ def compute(
     return found
 
 
+LEFT_OUT = 0.1  # share of the spheres' volume without a cubic cell, above which it is warned of
+
+
 def left_out(found: Microstructure | SphereMicrostructure) -> Iterator[str]:
     """Lines on what is not known of spheres, on what was not taken as measured, on the image."""
     from alphacut.stochastic.microstructure import TIGHTEST
     from alphacut.stochastic.spheres.microstructure import SphereMicrostructure
 
     if isinstance(found, SphereMicrostructure):
+        yield (
+            f"{'warning: ' if found.share_beyond > LEFT_OUT else ''}the map is of"
+            f" {1 - found.share_beyond:.0%} of the volume; packed at {found.packed[0].fraction:.3f}"
+            f" so that the map has {found.fraction_of_map:.3f}"
+        )
         yield from (f"warning: {remark}" for remark in found.remarks)
         return
     reasons = [reason for section in found.sections for reason in section.read.rejected.values()]

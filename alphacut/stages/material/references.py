@@ -93,15 +93,9 @@ def references(
     *,
     averaged: bool = False,
 ) -> References:
-    """The composites beside a cell.
+    """The composites beside a cell of E in Pa and ν by eq. 16, averaged, or by Hill's average.
 
-    Args:
-        radius: Its map.
-        phases: Matrix and particle.
-        moduli: Its E in Pa and ν, of eq. 16 or of Hill's average.
-        ratio: Shear modulus along the diagonals over that along the axes; None where unknown.
-        particles: "cylinders" or "spheres".
-        averaged: Whether E of cylinders is that of the isotropic average.
+    The ratio is the shear modulus along the diagonals over that along the axes, None if unknown.
     """
     share = np.asarray(mean_share(radius, particles))
     fibres, spheres = bounds_of(float(share), phases)
@@ -120,6 +114,9 @@ def references(
         average if own and not averaged else None,
         across_fibres(cell, bulk23, shear23) if own else None,
     )
+
+
+MIDDLE = " at the middle of the cut at α = 1"
 
 
 def bounds_over_cuts(case: Case, alpha: Sequence[float]) -> Document:
@@ -205,14 +202,9 @@ def _average(modulus: float, poisson: float, ratio: float) -> Array:
 def beside(
     case: Case, modulus: float, poisson: float, ratio: float | None, cuts: Cuts | None = None
 ) -> Document:
-    """References at the modal values of a case's cell, over its α-cuts, and what they say of E.
+    """References at nominal inputs of a case's cell, over its α-cuts, and what they say of E in Pa.
 
-    Args:
-        case: With a cell and its radius.
-        modulus: E in Pa at the modal values.
-        poisson: ν there.
-        ratio: Its shear ratio; None where unknown.
-        cuts: Levels with the lower and upper ends of E in Pa, where E is fuzzy.
+    The modulus and ν are of the middle of the highest of the cuts, where E is fuzzy.
 
     Returns:
         "beside", with "cuts" where E is fuzzy, "outside", a warning where E contradicts the case's
@@ -256,10 +248,11 @@ def _fibres_in_words(found: Document, particles: str) -> Iterator[str]:
     """That E of the plane is not the transverse Young's modulus, and what that one is."""
     if particles == "spheres" or "across" not in found:  # results of an older program
         return
+    place = MIDDLE if found.get("cuts") else ""
     if own := found.get("across"):
         told = (
-            f"that is E_T = {own['E_T_GPa']:.3f} GPa: 1/E_T = 1/(4 G23) + 1/(4 K23) + ν_LT²/E_L,"
-            f" G23 {own['G23_GPa']:.3f} GPa averaged over all directions, K23"
+            f"that is E_T = {own['E_T_GPa']:.3f} GPa{place}: 1/E_T = 1/(4 G23) + 1/(4 K23)"
+            f" + ν_LT²/E_L, G23 {own['G23_GPa']:.3f} GPa averaged over all directions, K23"
             f" {own['K23_GPa']:.3f} GPa of plane strain, E_L {own['E_L_GPa']:.3f} GPa, ν_LT"
             f" {own['nu_LT']:.4f}"
         )
@@ -280,15 +273,16 @@ def _bounds_in_words(found: Document, particles: str) -> str:
     ]
     kind = "volume" if particles == "spheres" else "area"  # of a section across the fibres
     average = found["isotropic_average_E_GPa"]
-    own = f"; this array averaged over all directions {average:.3f}" if average else ""
+    place = MIDDLE if found.get("cuts") else ""
+    own = f"; this array averaged over all directions {average:.3f}{place}" if average else ""
     shape = (
         "discs of the plane are long fibres, their E in the same sense as the E above"
         if particles == "cylinders"
         else "these are spheres"
     )
     return (
-        f"Hashin–Shtrikman bounds of E at the {kind} fraction {found['fraction']:.4f}, GPa:"
-        f" {'; '.join(kinds)}{own}; {shape}{over_support(found)}"
+        f"Hashin–Shtrikman bounds of E at nominal inputs and the {kind} fraction"
+        f" {found['fraction']:.4f}, GPa: {'; '.join(kinds)}{own}; {shape}{over_support(found)}"
     )
 
 
@@ -323,7 +317,7 @@ def publish(case: Case, found: Document) -> str:
             " modulus across long fibres."
         )
     average, across = found["isotropic_average_E_GPa"], found["across"]
-    told = f", {average:.3f} GPa at the modal values" if average else ""
+    told = f", {average:.3f} GPa{MIDDLE if found.get('cuts') else ''}" if average else ""
     first = f" E_T = {across['E_T_GPa']:.3f} GPa as modulus across them;" if across else ""
     return (
         f"To publish for long fibres:{first} for plane strain the isotropic average{told}"

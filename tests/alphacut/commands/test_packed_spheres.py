@@ -50,9 +50,15 @@ def test_a_section_of_spheres_becomes_a_modulus_and_a_report(tmp_path, capfd):
     assert low < found["modulus"]["modal_GPa"] < high
     assert (folder / "figures" / "radii_bounds.png").stat().st_size > 1000
     assert (folder / "figures" / "10_cells.png").stat().st_size > 1000
-    assert "does not tell" in capfd.readouterr().err
+    told = capfd.readouterr().err
+    assert "does not tell" in told
+    beyond, packed = own["share_beyond_limit"], own["volume_fraction_packed"]
+    line = f"the map is of {1 - beyond:.0%} of the volume; packed at {packed:.3f} so that the map"
+    assert line in told
+    assert (f"warning: {line}" in told) == (beyond > 0.1)
     assert main(["report", str(folder)]) == 0
     page = (folder / "report.html").read_text(encoding="utf-8")
+    assert line.removeprefix("the") in page
     assert "250 spheres in 5 periodic cubes, divided into Laguerre cells, and 4 more laws" in page
     assert "what smaller ones there are the section does not tell" in page
 

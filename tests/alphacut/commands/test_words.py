@@ -197,3 +197,8 @@ def test_nu_has_its_support_and_the_three_inputs_that_matter_most_are_named(monk
     assert first.endswith("GPa; nu = 0.3295, support [0.3090, 0.3510]")
     assert "smaller (slope a2) 60%; modulus of the matrix 30%; spread" in second
     assert "Poisson" not in second
+    assert second.startswith("the width of E shrinks by this share if the input were known (the")
+    assert "the first 3 of 4): " in second
+    found["modulus"]["nu_cuts"] = {"lower": [0.309, 0.32], "upper": [0.351, 0.339]}
+    first, *_ = run.modulus_lines(found)
+    assert first.endswith("; nu = [0.3200, 0.3390] at α = 1, support [0.3090, 0.3510]")

@@ -115,6 +115,10 @@ def test_the_transverse_modulus_of_fibres_stands_beside_e_of_plane_strain(tmp_pa
         f"not the transverse Young's modulus of a fibre composite; that is E_T = {found['E_T_GPa']:.3f} GPa"
         in text
     )
+    assert "Hashin–Shtrikman bounds of E at nominal inputs and the area fraction" in text
+    fuzzy = {**told["beside"], "cuts": bounds_over_cuts(case, [1.0])}
+    text = "\n".join(lines(fuzzy, "cylinders"))
+    assert f"E_T = {found['E_T_GPa']:.3f} GPa at the middle of the cut at α = 1" in text
     averaged = plane_average(square_moduli(stiffness))
     again = beside(load(case.path, ["modulus.average=isotropic"]), *averaged, ratio)
     assert again["beside"]["across"] == pytest.approx(found, rel=1e-9)
