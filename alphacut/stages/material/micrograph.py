@@ -25,7 +25,7 @@ def crop_of(case: Case) -> tuple[int, int, int, int] | None:
     given = None if photograph is None else photograph.crop
     if given is None:
         return None
-    if len(given) != 4 or any(value != int(value) for value in given):
+    if len(given) != 4 or any(value % 1 != 0 for value in given):
         raise case.refuse(
             "microstructure.image.crop",
             "the part needs left, top, right and bottom in whole pixels",

@@ -120,7 +120,7 @@ def _numbers(file: CsvFile, line: int, row: list[str], count: int) -> list[float
         values = []
     if (
         len(values) != count
-        or not (values[0] >= 1 and values[0] == int(values[0]))
+        or not (values[0] >= 1 and values[0] % 1 == 0)
         or not 0 < values[1] < float("inf")
         or np.isinf(values).any()
     ):

@@ -79,6 +79,7 @@ def test_figures_and_envelopes_before_and_after(
         ("mode,frequency,q1,q1\n1,2,1,1\n", "the header is wrong"),
         ("mode,frequency,q1,q2\n1,-2,1,1\n", "no measured mode"),
         ("mode,frequency,q1,q2\n0,2,1,1\n", "no measured mode"),
+        ("mode,frequency,q1,q2\ninf,2,1,1\n", "no measured mode"),
         ("mode,frequency,q1,q2\n1,2;5,1,1\n", "no measured mode"),
         ("mode,frequency,q1,q2\n1,2,1\n", "no measured mode"),
         ("mode,frequency,q1,q2\n1,2,1,1\n1,2,,1\n", "in some rows only"),
