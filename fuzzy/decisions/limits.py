@@ -53,6 +53,7 @@ class Limited:
     budget: int = 50_000
     vectorised: bool = True
 
+    @np.errstate(invalid="ignore", divide="ignore")  # told as the box's failure
     def __call__(self, lower: Array, upper: Array) -> Verdict:
         """What branch and bound proves of a box, two arrays of shape (inputs,)."""
         ends = zip(self.names, map(float, lower), map(float, upper), strict=True)
@@ -223,6 +224,7 @@ def decide(
     return Decision(possible, necessary, margin, levels_of, witness, str(whole.claim), runs)
 
 
+@np.errstate(invalid="ignore", divide="ignore")
 def takes_arrays(
     function: Callable[..., object],
     names: Sequence[str],

@@ -20,6 +20,11 @@ from alphacut.fuzzy.sets.given import require_fields
 from alphacut.fuzzy.sets.numbers import Array
 
 _SEARCHED = 12  # outputs up to which each bound of each is searched and confirmed
+_UNKNOWN = 0.5  # error over width from which the answer tells nothing
+UNKNOWN = (
+    "; the error is as wide as the answer itself: take it as unknown; BranchAndBound(function)"
+    " proves bounds of plain NumPy functions"
+)
 _SURFACE = 400  # samples at which the surface ends where no budget is named
 
 
@@ -134,6 +139,7 @@ class Automatic:
         share = float((error / np.where(width > 0, width, np.inf)).max(initial=0.0))
         how = " and descents from the best of them" if looks.names else ""
         grade = "" if share <= 10 * self.tolerance else "; take a larger budget or another plan"
+        grade = grade if share < _UNKNOWN else UNKNOWN
         many = (
             "; most descents end on hills of their own, so a better one is likely"
             if looks.hills.any()
@@ -148,9 +154,14 @@ class Automatic:
         )
         return (
             f"searched for extremes inside by fresh points in every cut{how}: the error is"
-            f" estimated at {100 * share:.1g} % of the width{ended}{many}{grade}; a spike between"
+            f" estimated at {_per_cent(share)} of the width{ended}{many}{grade}; a spike between"
             " samples would not be seen"
         )
+
+
+def _per_cent(share: float) -> str:
+    """A share in per cent, one digit that counts, without powers of ten; 0 below 0.0001 %."""
+    return f"{float(f'{100 * share:.1g}'):.4f}".rstrip("0").rstrip(".") + " %"
 
 
 def _further(samples: FuzzyResult, surface: FuzzyResult) -> FuzzyResult:

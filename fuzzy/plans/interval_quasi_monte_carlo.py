@@ -25,7 +25,7 @@ from alphacut.fuzzy.samples.nature import Nature
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.given import require_fields
-from alphacut.fuzzy.sets.numbers import Array, FuzzyNumber, PiecewiseLinear
+from alphacut.fuzzy.sets.numbers import Array, Crisp, FuzzyNumber, PiecewiseLinear
 
 _NOTES = 5  # of the plan at its many points that are kept
 _INNER = (
@@ -133,9 +133,8 @@ class IntervalQuasiMonteCarlo:
     def __post_init__(self) -> None:
         require_fields(self)
         if self.points < 1:
-            raise ValueError(
-                f"the number of quasi-random points is {self.points}; it must be 1 or more"
-            )
+            number = f"the number of quasi-random points is {self.points}"
+            raise ValueError(f"{number}; it must be 1 or more")
 
     def run(
         self,
@@ -154,33 +153,31 @@ class IntervalQuasiMonteCarlo:
             function: Gets random and fuzzy inputs by name.
             random: The random inputs.
             inputs: The fuzzy inputs, which may be none; a plain number is crisp.
-            alpha: Rising levels from 0 to 1.
+            alpha: Rising levels within 0 to 1.
             vectorised: Whether the function takes arrays.
             known: Facts about the function.
             progress: As for `propagate`.
 
         Raises:
             ValueError: There is no random input, an input is named twice, or the levels do not rise
-                from 0 to 1.
+                within 0 to 1.
         """
         from scipy.stats import qmc
 
         fuzzy, random = fuzzy_inputs(inputs), _random_inputs(random)
+        alpha = Domain({"u": Crisp(0.0)}, alpha).alpha  # which refuses wrong levels
         twice = sorted(set(random) & set(inputs))
         if twice:
-            raise ValueError(
-                f"{', '.join(twice)} is named among the random and the fuzzy inputs; each must be"
-                " one of the two"
-            )
+            both = f"{', '.join(twice)} is named among the random and the fuzzy inputs"
+            raise ValueError(f"{both}; each must be one of the two")
         facts = known_facts(known, (*random, *fuzzy))
         u: Array = qmc.Sobol(len(random), rng=np.random.default_rng(self.seed)).random(self.points)
         ends = {
             name: [one.interval(u[:, i], level) for level in alpha]
             for i, (name, one) in enumerate(random.items())
         }
-        campaign = Campaign(
-            Call(function, (*random, *inputs), vectorised=vectorised), known=facts, stepwise=True
-        )
+        call = Call(function, (*random, *inputs), vectorised=vectorised)
+        campaign = Campaign(call, known=facts, stepwise=True)
         response = _Gathered()
         with told(progress) as tell:
             for k in range(self.points):
@@ -214,30 +211,21 @@ class _Gathered:
 
     def response(self, alpha: tuple[float, ...]) -> IntervalResponse:
         """The response over all points, with the weakest of what their bounds are worth."""
-        weakest = next(
-            nature
-            for nature in (Nature.ESTIMATED, Nature.INNER, Nature.GUARANTEED)
-            if nature in self.natures
-        )
+        order = Nature.ESTIMATED, Nature.INNER, Nature.GUARANTEED
+        weakest = next(nature for nature in order if nature in self.natures)
         notes = (*tuple(self.notes)[:_NOTES], *((_INNER,) if weakest is Nature.INNER else ()))
-        table = np.array(self.rows)
-        return IntervalResponse(
-            alpha, self.outputs, table[:, 0], table[:, 1], self.runs, weakest, notes
-        )
+        low, high = np.array(self.rows).swapaxes(0, 1)
+        return IntervalResponse(alpha, self.outputs, low, high, self.runs, weakest, notes)
 
 
 def _random_inputs(random: Mapping[str, RandomInput]) -> dict[str, RandomInput]:
     """The random inputs, a plain number among their parameters made a crisp one."""
     wrong = [name for name, one in random.items() if not isinstance(one, RandomInput)]
     if wrong or not random:
-        got = (
-            f"the random input {wrong[0]} is {random[wrong[0]]!r}"
-            if wrong
-            else "there is no random input"
-        )
-        raise ValueError(
-            f"{got}; give RandomInput(quantile, parameters), or propagate the fuzzy inputs alone"
-        )
+        first = (f"the random input {name} is {random[name]!r}" for name in wrong)
+        got = next(first, "there is no random input")
+        cure = "give RandomInput(quantile, parameters), or propagate the fuzzy inputs alone"
+        raise ValueError(f"{got}; {cure}")
     return {
         name: RandomInput(one.quantile, fuzzy_inputs(one.parameters))
         for name, one in random.items()
@@ -247,6 +235,8 @@ def _random_inputs(random: Mapping[str, RandomInput]) -> dict[str, RandomInput]:
 def _number(
     alpha: Sequence[float], lower: Sequence[float], upper: Sequence[float]
 ) -> PiecewiseLinear:
-    """Quantiles of a point as a fuzzy number, nested to round-off."""
+    """Quantiles of a point as a fuzzy number, nested to round-off, constant beyond the levels."""
     low, high = np.maximum.accumulate(lower), np.minimum.accumulate(upper)
-    return PiecewiseLinear(tuple(alpha), tuple(np.minimum(low, high)), tuple(high))
+    wide = tuple(sorted({0.0, *alpha, 1.0}))
+    ends = (np.interp(wide, alpha, side).tolist() for side in (np.minimum(low, high), high))
+    return PiecewiseLinear(wide, *map(tuple, ends))

@@ -1,6 +1,7 @@
 """What results say of themselves in text, in a notebook, and in a CSV file."""
 
 import csv
+import warnings
 
 import numpy as np
 import pytest
@@ -12,10 +13,12 @@ from alphacut.fuzzy import (
     Extended,
     General,
     Interval,
+    IntervalQuasiMonteCarlo,
     Known,
     Metamodel,
     MonteCarlo,
     Optimisation,
+    RandomInput,
     Reduced,
     Signed,
     Triangular,
@@ -28,6 +31,7 @@ from alphacut.fuzzy import (
 )
 from alphacut.fuzzy.decisions.measure_next import measure_next
 from alphacut.fuzzy.html import html_table
+from alphacut.fuzzy.plans.automatic import _per_cent
 from alphacut.fuzzy.plans.interval_quasi_monte_carlo import IntervalResponse
 from alphacut.fuzzy.random_response import RandomResponse
 from alphacut.fuzzy.samples.model import Values
@@ -234,3 +238,30 @@ def test_shares_are_told_by_output():
     unnamed = propagate(two, X, Reduced(), alpha=[0.5])
     bare = width_shares(lambda inputs: (unnamed.lower, unnamed.upper), X)
     assert "  output 1, y: 0 %" in str(bare)
+
+
+def test_one_level_of_random_inputs_works():
+    load = {"load": RandomInput(lambda u, m: m + u, {"m": Triangular(0, 0.5, 2)})}
+    run = lambda alpha: IntervalQuasiMonteCarlo(8).run(lambda load: load, load, {}, alpha=alpha)  # noqa: E731
+    one, some, both = run([0]), run([0, 0.5]), run([0, 0.5, 1])
+    assert (one.lower[:, 0] == both.lower[:, 0]).all()
+    assert (some.upper == both.upper[:, :2]).all()
+    with pytest.raises(ValueError, match="α-levels are"):
+        run([])
+
+
+def test_an_error_is_told_in_plain_per_cents_and_as_unknown_from_half_the_width():
+    assert [_per_cent(x) for x in (0, 1e-4, 0.12, 1.0)] == ["0 %", "0.01 %", "10 %", "100 %"]
+    wild = lambda a, b, c, d: np.sin(40 * a) * np.cos(50 * b) * np.sin(60 * c * d)  # noqa: E731
+    inputs = {name: Interval(0, 3) for name in "abcd"}
+    found = propagate(wild, inputs, Automatic(budget=60), alpha=[0])
+    assert found.error[0, 0] > 0.5 * np.ptp([found.lower[0, 0], found.upper[0, 0]])
+    assert "as wide as the answer itself: take it as unknown; BranchAndBound" in str(found)
+
+
+def test_trial_boxes_beyond_the_domain_of_the_function_warn_of_nothing():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        root = lambda q, a: q * np.sqrt(a)  # noqa: E731
+        found = safe_scale(root, {"q": 8, "a": 2}, {"q": 1, "a": 0.5}, {"y": 13.5}, tolerance=0.01)
+    assert 0 < found.safe < found.unsafe
