@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from alphacut.fuzzy.arguments import fuzzy_inputs
 from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.progress_bar import Progress, told
+from alphacut.fuzzy.samples.nature import Nature
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.numbers import Array, Crisp, FuzzyNumber
 
 Bounds = Callable[[Mapping[str, FuzzyNumber]], tuple[Array, Array] | FuzzyResult]
+
+_ROUND_OFF = 1e-9  # least share of a width that is negative in earnest
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -26,12 +29,14 @@ class Shares:
         lost: Width lost when one is fixed, shape (names, …). What is lost to all need not add up to
             the width: effects overlap.
         outputs: Names of the outputs along the last axis of `width`; empty where there is none.
+        basis: What the bounds are worth, in words; empty where the propagation gave two arrays.
     """
 
     names: tuple[str, ...]
     width: Array
     lost: Array
     outputs: tuple[str, ...] = ()
+    basis: str = ""
 
     @property
     def share(self) -> Array:
@@ -46,6 +51,7 @@ class Shares:
         return "\n".join(
             ["share of the width lost where one is fixed at its modal value:"]
             + [f"  {', '.join(names)}: {words}" for *names, words in self._told()]
+            + self._said
         )
 
     __repr__ = __str__
@@ -53,7 +59,13 @@ class Shares:
     def _repr_html_(self) -> str:
         """The shares as a table, for notebooks."""
         head = ("output",) if len(self.outputs) > 1 else ()
-        return html_table((*head, "input", "share of the width lost"), self._told())
+        rows, below = self._told(), "\n".join(self._said)
+        return html_table((*head, "input", "share of the width lost"), rows, below=below)
+
+    @property
+    def _said(self) -> list[str]:
+        """What the bounds are worth, and what negative shares say of them."""
+        return [*filter(None, (self.basis, widened(float(self.share.min(initial=0.0)))))]
 
     def _told(self) -> list[tuple[str, ...]]:
         """Output where there are several, input, and its shares over all but outputs."""
@@ -71,6 +83,39 @@ def _range(share: Array) -> str:
     """The least and the greatest share in per cent, over levels and times."""
     low, high = share.min(initial=np.inf), share.max(initial=-np.inf)
     return f"{low:.3g} %" if low == high else f"{low:.3g} … {high:.3g} %"
+
+
+def widened(share: float) -> str:
+    """What the least share of a width lost says of the bounds where it is negative."""
+    if share > -_ROUND_OFF:
+        return ""
+    return (
+        f"a negative share, {100 * share:.3g} %: a narrower input cannot widen the true answer, so"
+        " the bounds are wrong by that much at least; BranchAndBound(function) proves some"
+    )
+
+
+@dataclass
+class Basis:
+    """What the bounds of several propagations are worth."""
+
+    plan: str = ""
+    natures: set[Nature] = field(default_factory=set)
+    unknown: bool = False
+
+    def add(self, found: FuzzyResult, output: str | None = None) -> None:
+        """Take one more result, or one output of it."""
+        own = [found.column(output)] if output is not None else range(len(found.outputs))
+        self.plan = self.plan or found.plan
+        self.natures.update(*(found.nature_of(found.outputs[k]) for k in own))
+        self.unknown |= bool(np.isnan(found.error[:, own]).any())
+
+    def __str__(self) -> str:
+        """The weakest nature, the first plan, and whether an error is missing."""
+        order = (Nature.ESTIMATED, Nature.INNER, Nature.GUARANTEED)
+        weakest = next((one for one in order if one in self.natures), None)
+        error = ", whose error is not estimated" if self.unknown else ""
+        return f"by {weakest} bounds of the plan {self.plan}{error}" if weakest else ""
 
 
 ASKED = (
@@ -113,6 +158,7 @@ def width_shares(
         )
 
     outputs: list[tuple[str, ...]] = []
+    basis = Basis()
 
     def width(fuzzy: Mapping[str, FuzzyNumber]) -> Array:
         try:
@@ -121,6 +167,7 @@ def width_shares(
             raise ValueError(f"{ASKED}, and it raised TypeError: {error}") from error
         if isinstance(found, FuzzyResult):
             outputs.append(tuple(found.outputs))
+            basis.add(found)
             found = found.lower, found.upper
         if not isinstance(found, Sequence | np.ndarray) or len(found) != 2:
             raise ValueError(f"{ASKED}, and it returned {repr(found).partition(chr(10))[0][:80]}")
@@ -143,4 +190,5 @@ def width_shares(
             if tell:
                 tell(len(widths) / len(sets))
     whole, *narrower = widths
-    return Shares(tuple(chosen), whole, np.array([whole - one for one in narrower]), *outputs[:1])
+    lost, named = np.array([whole - one for one in narrower]), outputs[0] if outputs else ()
+    return Shares(tuple(chosen), whole, lost, named, str(basis))

@@ -206,9 +206,9 @@ def summary(found: Envelope, tried: Array | None = None, *, own_gap: bool = Fals
         for unit, values in zip(units, columns, strict=True)
     ]
     rows = [(name, *values) for name, values in zip(found.outputs, shown, strict=True)]
-    of_least = "least not below" if tried is None else "least in motions tried"
+    of_least = "least not below" if tried is None else "of motions tried some peaks at"
     lines = [
-        f"{name:>14}  {low:>12}  {high:>12}   {most}, {of_least} {least}{beyond(error, name)}\n"
+        f"{name:>14}  {low:>12}  {high:>12}   {most}{beyond(error, name)}; {of_least} {least}\n"
         for (name, low, high, least, most), error in zip(rows, errors, strict=True)
     ]
     effort = "eigen-analyses" if found.method == "modal" else "trajectories"
@@ -217,7 +217,7 @@ def summary(found: Envelope, tried: Array | None = None, *, own_gap: bool = Fals
         f" {found.nature}{error_in_words(found)}"
     )
     head = (
-        "        output           min           max   greatest peak at nodes, and least   (α ="
+        "        output           min           max   greatest peak at nodes   (α ="
         f" {found.alpha[0]:g}, nodes every {found.time[1]:g} s)\n"
     )
     claim = f"{found.facts['claim']}\n" if "claim" in found.facts else ""

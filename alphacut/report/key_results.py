@@ -22,7 +22,8 @@ HEAD = ("quantity", "most plausible", "whole range", "nature of the range")
 def key_results(summary: Document) -> Markup:
     """Most plausible value, whole range and its worth of each result; empty without any."""
     rows, judged = [*moduli(summary), *peaks(summary), *exceeded(summary)], [*decisions(summary)]
-    held = fixed_line(summary.get("structure", {}).get("words", {}).get("fixed", ()))
+    words = summary.get("structure", {}).get("words", {})
+    held = [*fixed_line(words.get("fixed", ())), *words.get("cut", ())]
     if not rows + judged:
         return Markup("")
     if not rows or any(likely != whole for _, likely, whole, _ in rows):

@@ -11,7 +11,7 @@ import itertools
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +29,7 @@ from alphacut.fuzzy.progress_bar import Progress, part, told
 from alphacut.fuzzy.propagation import propagate
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.numbers import Crisp, Cut, FuzzyNumber, Interval
+from alphacut.fuzzy.width_contributions import Basis, widened
 
 _ANSWERS = 6  # for each input: its cut halved and exact, in three places
 Answer = Callable[[Mapping[str, FuzzyNumber]], tuple[float, float]]
@@ -68,6 +69,7 @@ class Advice:
         error: Error of a difference of any two widths: the sum of the two largest errors.
         alpha: The level.
         note: Why no input can be named; empty where one can.
+        basis: What the bounds are worth, in words; empty where nobody told.
     """
 
     gains: tuple[Gain, ...]
@@ -75,6 +77,7 @@ class Advice:
     error: float
     alpha: float
     note: str
+    basis: str = ""
 
     def __str__(self) -> str:
         """A line for each input, then what cannot be said."""
@@ -99,7 +102,12 @@ class Advice:
         """What cannot be said, and what the level ranks."""
         bounds = "at α = 0 the outermost bounds of the inputs are ranked: where you set them"
         bounds += " yourself, more values narrow only the cuts above, as alpha=0.5 ranks them"
-        return [*([self.note] if self.note else []), *([bounds] if self.alpha == 0 else [])]
+        every = [y for x in self.gains for y in (x.half, x.half_least, x.exact, x.exact_least)]
+        less = widened(min(every, default=0.0) / self.width if self.width > 0 else 0.0)
+        return [
+            *filter(None, (self.note, self.basis, less)),
+            *([bounds] if self.alpha == 0 else []),
+        ]
 
     __repr__ = __str__
 
@@ -184,7 +192,7 @@ def measure_next(
     """
     numbers, alpha = joined_once(fuzzy_inputs(inputs)), one_level(alpha)
     moving = [name for name, number in numbers.items() if number.cut(alpha).width > 0]
-    answers, done = 1 + _ANSWERS * len(moving), itertools.count()
+    basis, answers, done = Basis(), 1 + _ANSWERS * len(moving), itertools.count()
     require_workers(workers)
     require_executor(executor, workers)
     require_callable(function, list(numbers), by_name=True, sent=workers > 1)
@@ -208,9 +216,10 @@ def measure_next(
                 **how,  # type: ignore[arg-type]
                 progress=part(tell, next(done), answers),
             )
+            basis.add(found, output)
             return _width(found, output)
 
-        return advice(answer, numbers, alpha=alpha)
+        return replace(advice(answer, numbers, alpha=alpha), basis=str(basis))
 
 
 @contextmanager

@@ -68,6 +68,7 @@ class BranchAndBound:
         _require_the_model(function, domain, tried, first)
         proved, attained = (np.empty((len(domain.alpha), len(columns), 2)) for _ in range(2))
         places, runs = np.empty((*proved.shape, len(domain.names))), len(tried)
+        ended = 0.0
         for level in reversed(range(len(domain.alpha))):
             for (column, name), (side, sign) in product(enumerate(columns), enumerate((1.0, -1.0))):
                 search = _Search(
@@ -78,6 +79,7 @@ class BranchAndBound:
                 proved[here], attained[here] = sign * search.proved, sign * search.best
                 places[here] = search.place
                 runs += search.runs
+                ended = max(ended, search.open)
             model.report(1 - level / len(domain.alpha))
         return FuzzyResult(
             domain=domain,
@@ -94,7 +96,14 @@ class BranchAndBound:
             proved=np.ones(proved.shape[:2], bool),
             enforced=np.zeros(proved.shape[:2], bool),
             given=(f"the enclosed function is the model, as at all {runs:,} samples",),
+            notes=(self._ended(ended),) if ended > 0 else (),
         )
+
+    def _ended(self, gap: float) -> str:
+        """One sentence on bounds whose budget ended with a gap, a share of the range."""
+        left = f"is {100 * gap:.3g} %" if np.isfinite(gap) else "is not finite"
+        instead = f"instead of {100 * self.tolerance:.3g} % of the range"
+        return f"ended at its budget of {self.budget} boxes: the gap {left} {instead}"
 
 
 def _require_the_model(function: Enclosed, domain: Domain, tried: Array, first: Values) -> None:
@@ -158,7 +167,7 @@ class _Search:
         sign: float,
     ) -> None:
         self.plan, self.model, self.names, self.function = plan, model, domain.names, function
-        self.output, self.sign = output, sign
+        self.output, self.sign, self.count = output, sign, 1
         self.best, self.worst, self.runs = np.inf, -np.inf, 0
         lower, upper = (ends[level : level + 1] for ends in domain.boxes)
         self.place: Array = lower[0]
@@ -169,12 +178,17 @@ class _Search:
         """A proved lower bound of the least value."""
         return float(min(self.boxes.bound.min(initial=np.inf), self.best))
 
+    @property
+    def open(self) -> float:
+        """Gap that the budget left, as a share of the range seen; 0 where it did not end it."""
+        gap = (self.best - self.proved) / self._scale()
+        return gap if gap > self.plan.tolerance and self.count >= self.plan.budget else 0.0
+
     def run(self) -> None:
         """Split the boxes of the lowest bounds until the gap is small enough."""
-        count = 1
         while (
             self.best - self.proved > self.plan.tolerance * self._scale()
-            and count < self.plan.budget
+            and self.count < self.plan.budget
         ):
             order = np.argsort(self.boxes.bound)
             chosen, rest = order[:_TOGETHER], order[_TOGETHER:]
@@ -188,7 +202,7 @@ class _Search:
                 for old, new in zip(self.boxes, children, strict=True)
             ]
             self.boxes = _Boxes(*parts)
-            count += len(children.bound)
+            self.count += len(children.bound)
 
     def _scale(self) -> float:
         """Range of the values seen; a share of the least one where there is none."""
