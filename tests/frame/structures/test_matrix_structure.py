@@ -105,7 +105,7 @@ def test_motions_that_may_grow_are_warned_of(kind: str, least: str) -> None:
     changed = replace(MATRIX, **{kind: [("m1", np.diag([float(least) / 3, 1.0]))]})
     told = rf"{kind}: the matrix has the negative eigenvalue {least} beside 3 at E = [^,]*, m1 = 3,"
     inputs = {"E": Triangular(4.8, 5, 5.2), "m1": Crisp(3.0)}
-    asked = {"duration": 0.2, "step": 0.01, "alpha": (0,), "method": "vertex"}
+    asked = {"duration": 0.6, "step": 0.01, "alpha": (0,), "method": "vertex"}
     with pytest.warns(UserWarning, match=told) as seen:
         envelope(changed, inputs, **asked)
     assert len(seen) == 1
