@@ -81,37 +81,45 @@ def solutions(study: ImageStudy) -> int:
     return 1 + (len(study.alpha) + sources if sources else 0) + 2 * window
 
 
+class Told:
+    """Progress of some pairs of solutions: by what is done, and within one by the time spent."""
+
+    def __init__(self, tick: Tick, count: int) -> None:
+        self.tick, self.count = tick, count
+        self.began, self.first, self.share = perf_counter(), math.inf, 0.0
+
+    @property
+    def seconds(self) -> float:
+        """Time since the start."""
+        return perf_counter() - self.began
+
+    def done(self, share: float) -> None:
+        """Tell a share that is reached."""
+        self.share = share
+        self.tick(share)
+
+    def still(self) -> None:
+        """Tell that a solution goes on; the time of the first one tells how far the others are."""
+        self.tick(max(self.share, min(self.seconds / self.first / self.count, 0.99)))
+
+
 def compute(study: ImageStudy, *, progress: Tick | None = None) -> FuzzyImage:
     """Bounds at every level, and what widens them."""
-    began = perf_counter()
-    tick = progress or (lambda share: None)
-    modal = study.images(None, None)
-    done, first = [0.0], [math.inf]
-    count = solutions(study)
+    modal, count = study.images(None, None), solutions(study)
+    told = Told(progress or (lambda share: None), count)
     pixels = f"image of {modal.bulk[0].size} pixels: {count} pairs of solutions"
     several = progress is not None and count > 1 and study.random is None
     if several and modal.bulk[0].size * count > MANY:
         say(f"{pixels}, or more where pixels are divided: this may take minutes")
-
-    def told(share: float) -> None:
-        done[0] = share
-        tick(share)
-
-    def still() -> None:  # the time of the first solution tells how far the others are
-        spent = (perf_counter() - began) / first[0] / count
-        tick(max(done[0], min(spent, 0.99)))
-
-    watched = replace(study.model.solver, watch=still)
+    watched = replace(study.model.solver, watch=told.still)
     start = replace(study.model, solver=watched)
     if study.random is not None:  # many images: pixels are divided only where that is asked for
         start = replace(start, division=start.parts)
     model, crisp = start.refined(modal)
-    told(0.3 if study.random is not None else 1 / count)
-    first[0] = perf_counter() - began
+    told.done(0.3 if study.random is not None else 1 / count)
+    told.first = first = told.seconds
     if several:
-        say(
-            f"{pixels}, the first took {first[0]:.0f} s, all about {count * first[0]:.0f} s or more"
-        )
+        say(f"{pixels}, the first took {first:.0f} s, all about {count * first:.0f} s or more")
     random = None if study.random is None else responses(study, model, study.random)
     if random is not None:
         cuts = random.cuts
@@ -119,7 +127,7 @@ def compute(study: ImageStudy, *, progress: Tick | None = None) -> FuzzyImage:
     else:
         levels = [study.images(level, level) for level in study.alpha]
         cuts = tuple(model.cuts(levels, (modal, crisp)))
-        told(max(0.7, done[0]))
+        told.done(max(0.7, told.share))
 
         def alone(threshold: Level, phases: Level) -> float:
             images = study.images(threshold, phases)
@@ -132,6 +140,5 @@ def compute(study: ImageStudy, *, progress: Tick | None = None) -> FuzzyImage:
     if model.boundary == "window":
         tiling, _ = model.tiling(modal, 1)
         apparent = tiling.bracket.modulus
-    tick(1.0)
-    seconds = perf_counter() - began
-    return FuzzyImage(study, model, crisp, cuts, rows, apparent, random, seconds)
+    told.done(1.0)
+    return FuzzyImage(study, model, crisp, cuts, rows, apparent, random, told.seconds)

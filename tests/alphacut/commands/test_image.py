@@ -9,6 +9,7 @@ import pytest
 from alphacut.entry import main
 from alphacut.io.problem import BadInput
 from alphacut.stages.image import bounds
+from alphacut.stages.image.bounds import Told
 
 HEAD = 'schema = 1\ntitle = "t"\nabout = "a"\nstages = ["image"]\n'
 IMAGE = {
@@ -431,3 +432,16 @@ def test_a_share_in_words_that_another_phase_covers_is_warned_of(command, swappe
     assert main([command, case, *more]) == 0
     said = "the case says '16 % glass', and the phases of such a modulus cover 84.0%"
     assert (said in capfd.readouterr().err) == swapped
+
+
+def test_progress_within_a_solution_is_by_the_time_of_the_first(monkeypatch):
+    seen, clock = [], iter((0.0, 5.0, 10.0, 10.0, 15.0, 500.0))
+    monkeypatch.setattr("alphacut.stages.image.bounds.perf_counter", lambda: next(clock))
+    told = Told(seen.append, 4)
+    told.still()  # nothing is known of the time of one yet
+    told.done(0.25)
+    told.first = told.seconds
+    told.still()
+    told.still()
+    told.still()
+    assert seen == [0.0, 0.25, 0.25, 0.375, 0.99]

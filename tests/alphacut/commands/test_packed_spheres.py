@@ -139,14 +139,19 @@ method = "series"
 """
 
 
-def test_an_image_of_spheres_is_led_to_the_spheres_behind_its_circles(tmp_path, capfd):
-    """No stage unfolds an image's circles: one line says how, and every step of it goes through."""
+def section_of_discs(path):
+    """Write an image of 49 bright discs in rows, of seven sizes."""
     io = pytest.importorskip("skimage.io")
     rows, columns = np.mgrid[:294, :294]
     grey = np.full((294, 294), 60, np.uint8)
     for k, (row, column) in enumerate(np.argwhere(np.ones((7, 7))) * 42 + 21):
         grey[np.hypot(rows - row, columns - column) < 10 + k % 7] = 200
-    io.imsave(tmp_path / "section.png", grey, check_contrast=False)
+    io.imsave(path, grey, check_contrast=False)
+
+
+def test_an_image_of_spheres_is_led_to_the_spheres_behind_its_circles(tmp_path, capfd):
+    """No stage unfolds an image's circles: one line says how, and every step of it goes through."""
+    section_of_discs(tmp_path / "section.png")
     path = tmp_path / "own.toml"
     path.write_text(IMAGE, encoding="utf-8")
     assert main(["check", str(path)]) == 0
@@ -197,12 +202,7 @@ def test_a_machine_without_voro_is_told_before_anything_runs(monkeypatch, tmp_pa
 
 
 def test_circles_over_the_image_and_the_notes_of_a_run_stand_in_its_report(tmp_path):
-    io = pytest.importorskip("skimage.io")
-    rows, columns = np.mgrid[:294, :294]
-    grey = np.full((294, 294), 60, np.uint8)
-    for k, (row, column) in enumerate(np.argwhere(np.ones((7, 7))) * 42 + 21):
-        grey[np.hypot(rows - row, columns - column) < 10 + k % 7] = 200
-    io.imsave(tmp_path / "section.png", grey, check_contrast=False)
+    section_of_discs(tmp_path / "section.png")
     case, folder = tmp_path / "own.toml", tmp_path / "run"
     text = IMAGE.replace(', "modulus"]', "]")
     case.write_text(text.partition("[modulus]")[0], encoding="utf-8")
