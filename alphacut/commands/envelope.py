@@ -30,7 +30,7 @@ from alphacut.stages.vibration import decision, envelope
 from alphacut.stages.vibration import exceedance as outcomes
 from alphacut.stages.vibration.envelope_task import EnvelopeTask, task_of
 from alphacut.stages.vibration.structure import Structure, structure
-from alphacut.stages.vibration.studies import fixed_line, left_out
+from alphacut.stages.vibration.studies import cut_line, fixed_line, left_out
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
@@ -107,17 +107,18 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     limit = exceeded(options, case, wanted)
     tried = dataset["peak_tried"].values
     contract = {"asked": task.tolerance, "reached": dataset.attrs.get("reached")}
-    fixed = left_out(wanted, [task])
+    fixed, cut = left_out(wanted, [task]), cut_line(wanted, [task])
     document = {
         **envelope.document(found, tried),
         "fixed": fixed,
+        "cut": cut,
         "duration": task.duration,
         "step": task.step,
         "tolerance": contract,
         **({"exceedance": limit} if limit else {}),
     }
     text = summary(found, tried[0], own_gap=task.certify is None) + "".join(
-        f"{line}\n" for line in fixed_line(fixed)
+        f"{line}\n" for line in (*fixed_line(fixed), *cut)
     )
     text += outcomes.sentences(limit) if limit else ""
     common.answer(options, document, out, text)

@@ -13,9 +13,8 @@ from alphacut.case.sections.structures import Frame
 from alphacut.fuzzy import Crisp, FuzzyNumber, PiecewiseLinear
 from alphacut.io.files import Document
 from alphacut.io.units import MINUS, shown
-from alphacut.stages.vibration.accelerogram import cut_short
 from alphacut.stages.vibration.structure import Structure, per_floor
-from alphacut.stages.vibration.studies import fixed_line, left_out, studies
+from alphacut.stages.vibration.studies import cut_line, fixed_line, left_out, studies
 
 if TYPE_CHECKING:
     from alphacut.frame.structures.linear import Accelerogram
@@ -65,9 +64,10 @@ def in_unit(number: FuzzyNumber, unit: str, si: str) -> str:
 
 def structure_words(case: Case, wanted: Structure) -> Document:
     """Sentences on the structure, and head and rows of a table of its floors."""
-    fixed = left_out(wanted, (study.task for study in studies(case)))
+    tasks = [study.task for study in studies(case)]
+    fixed = left_out(wanted, tasks)
     told = [f"F{line[1:]}." for line in fixed_line(fixed)]
-    cut = [*left_out_of_record(case, wanted)]
+    cut = cut_line(wanted, tasks)
     if wanted.frame is not None:
         return {
             "sentences": [*frame_sentences(case.frame, wanted), *told],
@@ -84,14 +84,6 @@ def structure_words(case: Case, wanted: Structure) -> Document:
         "fixed": fixed,
         "cut": cut,
     }
-
-
-def left_out_of_record(case: Case, wanted: Structure) -> Iterator[str]:
-    """A sentence where no study simulates the whole record."""
-    ground = None if wanted.linear is None else wanted.linear.ground
-    longest = max((study.task.duration for study in studies(case)), default=0.0)
-    if ground is not None and cut_short(ground, longest):
-        yield f"all results are of the first {longest:g} s of the record: its rest is left out"
 
 
 def inputs(case: Case) -> Iterator[list[str]]:

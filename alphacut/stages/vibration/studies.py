@@ -12,6 +12,7 @@ from alphacut.io.kept_arrays import KeptArrays
 from alphacut.io.progress import Tick
 from alphacut.stages.vibration import envelope
 from alphacut.stages.vibration import exceedance as outcomes
+from alphacut.stages.vibration.accelerogram import cut_short
 from alphacut.stages.vibration.envelope_task import EnvelopeTask, task_of
 from alphacut.stages.vibration.structure import Structure
 
@@ -67,6 +68,15 @@ def fixed_line(names: Iterable[str]) -> list[str]:
     told = ", ".join(names)
     what = "fixed at the middle of the top cut, since no study names them"
     return [f"{what}: {told}"] if told else []
+
+
+def cut_line(wanted: Structure, tasks: Iterable[EnvelopeTask]) -> list[str]:
+    """A line where none of the tasks simulates the whole record."""
+    ground = None if wanted.linear is None else wanted.linear.ground
+    longest = max((task.duration for task in tasks), default=0.0)
+    if ground is None or not cut_short(ground, longest):
+        return []
+    return [f"all results are of the first {longest:g} s of the record: its rest is left out"]
 
 
 def envelope_of(

@@ -11,8 +11,9 @@ from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.fuzzy import Interval
 from alphacut.report.key_results import key_results
+from alphacut.stages.vibration.envelope_task import task_of
 from alphacut.stages.vibration.structure import structure
-from alphacut.stages.vibration.structure_words import left_out_of_record
+from alphacut.stages.vibration.studies import cut_line
 
 CASES = Path(__file__).parents[3] / "cases"
 
@@ -112,13 +113,16 @@ def test_a_record_that_is_cut_short_is_remarked(tmp_path, capfd):
     (found,) = warnings(path, capfd=capfd)
     assert "the simulation ends at 8 s, the record at 20 s: the rest of the record is" in found
     case = load(path)
-    (told,) = left_out_of_record(case, structure(case, Interval(24e9, 25e9)))
+    (told,) = cut_line(structure(case, Interval(24e9, 25e9)), [task_of(case)])
     assert told == "all results are of the first 8 s of the record: its rest is left out"
     modulus = {"E_GPa": {"lower": [24.0], "upper": [25.0]}}
     shown = key_results({"given_modulus": modulus, "structure": {"words": {"cut": [told]}}})
     assert f"{told[1:]}." in shown
     whole = load(own(tmp_path, "building"))
-    assert not [*left_out_of_record(whole, structure(whole, Interval(24e9, 25e9)))]
+    assert not cut_line(structure(whole, Interval(24e9, 25e9)), [task_of(whole)])
+    short = ["--duration=1 s", "--alpha=1", "--fuzzy=E", "--set", "frame.modulus = '[23, 24, 25] GPa'"]
+    assert main(["envelope", str(path), *short]) == 0
+    assert "all results are of the first 1 s of the record" in capfd.readouterr().out
 
 
 def test_a_coarse_step_is_warned_of(tmp_path, capfd):
