@@ -29,7 +29,9 @@ TABLE = 12
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument(
-        "record", metavar="RECORD.csv", help="time [s],acceleration [m/s^2], [g] or [gal]"
+        "record",
+        metavar="RECORD.csv",
+        help="time [s],acceleration [m/s^2], [g] or [gal]; or an AT2 file",
     )
     parser.add_argument(
         "--damping",

@@ -40,18 +40,9 @@ class CsvFile:
         Raises:
             BadInput: The file cannot be read, or has fewer rows.
         """
-        try:
-            lines = self.path.read_text(encoding="utf-8-sig").splitlines()
-        except UnicodeDecodeError:
-            what = f"the {self.what} {not_text(self.path)}"
-            raise self.unreadable(what, self.allowed) from None
-        except OSError as error:
-            reason = (error.strerror or str(error)).lower()
-            what = f"the {self.what} cannot be read: {reason}"
-            raise self.unreadable(what, hint(self.path)) from None
         kept = [
             (number, line)
-            for number, line in enumerate(lines, start=1)
+            for number, line in enumerate(self.lines(), start=1)
             if line.strip() and not line.startswith("#")
         ]
         if len(kept) <= least:
@@ -68,6 +59,22 @@ class CsvFile:
         except ValueError as error:
             raise self.unreadable(str(error), "points, or commas throughout") from None
 
+    def lines(self) -> list[str]:
+        """All lines of the file as text.
+
+        Raises:
+            BadInput: The file cannot be read.
+        """
+        try:
+            return self.path.read_text(encoding="utf-8-sig").splitlines()
+        except UnicodeDecodeError:
+            what = f"the {self.what} {not_text(self.path)}"
+            raise self.unreadable(what, self.allowed) from None
+        except OSError as error:
+            reason = (error.strerror or str(error)).lower()
+            what = f"the {self.what} cannot be read: {reason}"
+            raise self.unreadable(what, hint(self.path)) from None
+
     def unreadable(self, what: str, allowed: str) -> BadInput:
         """The error of the file as a whole."""
         return BadInput(Problem(self.key, what, str(self.path), allowed))
@@ -82,7 +89,7 @@ class CsvFile:
 
         Args:
             line: Line of the header.
-            cell: Its entry, ``time [s]``.
+            cell: Its entry, ``time [s]`` or ``time (s)``.
             name: What the column is called, for messages.
             si: SI unit.
             pattern: Regular expression of its names; `name` unless given.
@@ -90,10 +97,10 @@ class CsvFile:
         Raises:
             BadInput: It has another name, or no unit of that kind.
         """
-        match = re.fullmatch(r"\s*(.+?)\s*\[([^\]]+)\]\s*", cell)
+        match = re.fullmatch(r"\s*(.+?)\s*(?:\[([^\]]+)\]|\(([^()]+)\))\s*", cell)
         try:
             if match is None or not re.fullmatch(pattern or name, match[1], re.IGNORECASE):
                 raise ValueError(f"the column {cell.strip()!r} is not {name} with its unit")
-            return float(factor(match[2], si))
+            return float(factor(match[2] or match[3], si))
         except ValueError as error:
             raise self.refuse(line, str(error), allowed=self.allowed) from None

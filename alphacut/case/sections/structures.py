@@ -107,7 +107,7 @@ class Frame(Section):
     accelerogram: Annotated[
         str | None,
         Key(
-            "CSV file of the ground's acceleration; displacements are then relative to the ground",
+            "CSV or AT2 file of the ground's acceleration; displacements are relative to it",
             file=True,
         ),
     ] = None
@@ -178,7 +178,7 @@ class Tower(Section):
             allowed=NOT_NEGATIVE,
         ),
     ] = ZERO
-    accelerogram: Annotated[str, Key("CSV file of the ground's acceleration", file=True)]
+    accelerogram: Annotated[str, Key("CSV or AT2 file of the ground's acceleration", file=True)]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

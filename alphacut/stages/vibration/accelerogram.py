@@ -1,26 +1,31 @@
-"""Ground acceleration from a CSV file: ``time [s],acceleration [m/s^2]``."""
+"""Ground acceleration from a file: ``time [s],acceleration [m/s^2]``, or PEER's AT2."""
 
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from alphacut.io.csv_rows import CsvFile
+from alphacut.io.units import factor
 
 if TYPE_CHECKING:
     from alphacut.frame import Accelerogram
 
 COLUMNS = {"time": "s", "acceleration": "m/s^2"}
+PATTERNS = {"time": "time|t", "acceleration": r"acceleration|acc\.?|a"}
 ALLOWED = "time [s],acceleration [m/s^2], [g] or [gal]"
 PAIR = "a time and an acceleration, such as 0.02,-0.35, with points and not commas in the numbers"
+NPTS = re.compile(r"NPTS\s*=\s*(\d+)\s*,\s*DT\s*=\s*(\d*\.?\d+)\s*SEC", re.IGNORECASE)
+IN_G = re.compile(r"ACCELERATION .*IN UNITS OF G\b", re.IGNORECASE)
 EVEN = 1e-6  # relative: steps that differ by more are not even
 
 
 def accelerogram(path: Path, key: str = "frame.accelerogram") -> Accelerogram:
-    """Read a record with even steps that begins at t = 0.
+    """Read a record with even steps that begins at t = 0: a CSV file, or an AT2 file of PEER.
 
     Raises:
         BadInput: The file is missing, a unit is wrong, a row is no pair of numbers, or the steps
@@ -29,6 +34,10 @@ def accelerogram(path: Path, key: str = "frame.accelerogram") -> Accelerogram:
     from alphacut.frame import Accelerogram
 
     file = CsvFile(path, key, "record", ALLOWED)
+    lines = file.lines()
+    for head, text in enumerate(lines[:9]):
+        if found := NPTS.search(text):
+            return peer(file, lines, head, int(found[1]), float(found[2]))
     (line, first), *rows = file.rows(least=2)
     if len(first) != len(COLUMNS):
         what = f"got {len(first)} columns"
@@ -36,7 +45,7 @@ def accelerogram(path: Path, key: str = "frame.accelerogram") -> Accelerogram:
             what = "no comma found: commas, semicolons or tabs part columns, and blanks do not"
         raise file.refuse(line, what, allowed=ALLOWED)
     scales = [
-        file.scale(line, cell, name, si)
+        file.scale(line, cell, name, si, pattern=PATTERNS[name])
         for cell, (name, si) in zip(first, COLUMNS.items(), strict=True)
     ]
     values = np.array([pair(file, line, row) for line, row in rows]) * scales
@@ -45,6 +54,23 @@ def accelerogram(path: Path, key: str = "frame.accelerogram") -> Accelerogram:
         raise file.unreadable(what, "a record that moves the ground")
     times = list(map(float, values[:, 0]))
     return Accelerogram(even_step(file, times, [line for line, _ in rows]), values[:, 1])
+
+
+def peer(file: CsvFile, lines: list[str], head: int, count: int, step: float) -> Accelerogram:
+    """A record of PEER's data base: its head ends with NPTS and DT, its values are in g."""
+    from alphacut.frame import Accelerogram
+
+    if not any(IN_G.search(line) for line in lines[:head]):
+        what = "the lines above NPTS and DT do not say that the values are accelerations in g"
+        raise file.refuse(head + 1, what, allowed="ACCELERATION TIME SERIES IN UNITS OF G")
+    try:
+        values = np.array([float(text) for line in lines[head + 1 :] for text in line.split()])
+    except ValueError as error:
+        raise file.unreadable(str(error), "numbers below the line of NPTS and DT") from None
+    if not (len(values) == count >= 2 and step > 0 and np.isfinite(values).all() and values.any()):
+        what = f"{len(values)} numbers follow NPTS = {count} and DT = {step:g} s"
+        raise file.unreadable(what, "as many finite numbers, not all 0, at a step above 0")
+    return Accelerogram(step, values * float(factor("g", "m/s^2")))
 
 
 def cut_short(record: Accelerogram, duration: float) -> bool:

@@ -120,7 +120,13 @@ def test_a_record_that_is_cut_short_is_remarked(tmp_path, capfd):
     assert f"{told[1:]}." in shown
     whole = load(own(tmp_path, "building"))
     assert not cut_line(structure(whole, Interval(24e9, 25e9)), [task_of(whole)])
-    short = ["--duration=1 s", "--alpha=1", "--fuzzy=E", "--set", "frame.modulus = '[23, 24, 25] GPa'"]
+    short = [
+        "--duration=1 s",
+        "--alpha=1",
+        "--fuzzy=E",
+        "--set",
+        "frame.modulus = '[23, 24, 25] GPa'",
+    ]
     assert main(["envelope", str(path), *short]) == 0
     assert "all results are of the first 1 s of the record" in capfd.readouterr().out
 

@@ -37,3 +37,49 @@ def test_a_record_that_blanks_part_is_told_what_parts_columns(tmp_path: Path) ->
         accelerogram(file)
     file.write_text("time [s]\tacceleration [g]\n0\t0\n0.02\t1\n0.04\t2\n", encoding="utf-8")
     assert len(accelerogram(file).acceleration) == 3
+
+
+@pytest.mark.parametrize(
+    "header", ["Time(s)\tAcc(g)", "t [s]\ta [g]", "TIME (s)\tAcceleration (g)"]
+)
+def test_a_header_may_have_parentheses_and_short_names(tmp_path: Path, header: str) -> None:
+    file = tmp_path / "record.txt"
+    file.write_text(f"{header}\n0\t0\n0.02\t1\n0.04\t2\n", encoding="utf-8")
+    assert accelerogram(file).acceleration / 9.80665 == pytest.approx([0, 1, 2])
+
+
+AT2 = """PEER NGA STRONG MOTION DATABASE RECORD
+Own Hill, 1/2/2003, Station 7, 90
+ACCELERATION TIME SERIES IN UNITS OF G
+NPTS=      7, DT=   .0050 SEC,
+  .0000000E+00  .1000000E+00 -.2000000E-01  .3000000E-02  .4000000E+00
+ -.5000000E+00  .0000000E+00
+"""
+
+
+def test_a_record_of_peer_is_read_as_it_comes(tmp_path: Path) -> None:
+    file = tmp_path / "RSN7.AT2"
+    file.write_text(AT2, encoding="utf-8")
+    found = accelerogram(file)
+    assert found.step == 0.005
+    assert found.acceleration / 9.80665 == pytest.approx([0, 0.1, -0.02, 0.003, 0.4, -0.5, 0])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("ACCELERATION", "VELOCITY", "do not say that the values are accelerations in g"),
+        ("OF G", "OF CM/S2", "do not say that the values are accelerations in g"),
+        ("=      7", "=      8", "7 numbers follow NPTS = 8"),
+        (".0050", ".0000", "at a step above 0"),
+        ("-.5000000E+00", "nan", "as many finite numbers"),
+        ("-.5000000E+00", "end", "could not convert"),
+    ],
+)
+def test_a_record_of_peer_that_is_none_is_refused(
+    tmp_path: Path, old: str, new: str, told: str
+) -> None:
+    file = tmp_path / "RSN7.AT2"
+    file.write_text(AT2.replace(old, new), encoding="utf-8")
+    with pytest.raises(BadInput, match=told):
+        accelerogram(file)
