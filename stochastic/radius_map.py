@@ -130,16 +130,6 @@ class HermiteMap:
         )
         return float(radii.min()), float(radii.max())
 
-    @property
-    def is_monotone(self) -> bool:
-        """True if r never falls as θ rises."""
-        _, b, c, d = self.monomials
-        turning = [-c / (3 * d)] if d else []
-        lowest = [
-            b + 2 * c * x + 3 * d * x * x for x in (0.0, 1.0, *(x for x in turning if 0 < x < 1))
-        ]
-        return bool(min(lowest) >= 0)
-
 
 @dataclass(frozen=True)
 class ExponentialMap:

@@ -29,9 +29,7 @@ TABLE = 12
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument(
-        "record",
-        metavar="RECORD.csv",
-        help="time [s],acceleration [m/s^2], [g] or [gal]; or an AT2 file",
+        "record", metavar="RECORD", help="time [s],acceleration [m/s^2], [g] or [gal]; or AT2"
     )
     parser.add_argument(
         "--damping",

@@ -11,6 +11,7 @@ from collections.abc import Iterable
 import numpy as np
 from cvxopt import cholmod, matrix, spmatrix
 
+from alphacut.rve.mesh.triangulation import Integers
 from alphacut.rve.solver.level_stiffness import LevelPattern
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -18,7 +19,30 @@ _SOLVE_L, _SOLVE_LT, _PERMUTE = 4, 5, 7
 cholmod.options["supernodal"] = 2  # always L Lᵀ, never L D Lᵀ
 
 
-class LevelCholesky:
+def permutation(factor: object, size: int) -> Integers:
+    """The fill-reducing order of a factor."""
+    place = matrix(np.arange(size, dtype=float))
+    cholmod.solve(factor, place, sys=_PERMUTE)
+    return np.asarray(place).ravel().astype(np.int64)
+
+
+class LevelFactors:
+    """Factors of many matrices of one pattern."""
+
+    _factors: list[object]
+
+    def _apply(self, vectors: Array, system: int) -> Array:
+        result = np.empty_like(vectors)
+        if not vectors.size:  # no column is left for this rank
+            return result
+        for factor, source, target in zip(self._factors, vectors, result, strict=True):
+            columns = matrix(source)
+            cholmod.solve(factor, columns, sys=system)
+            target[:] = np.asarray(columns)
+        return result
+
+
+class LevelCholesky(LevelFactors):
     """P A_k Pᵀ = L_k L_kᵀ for matrices A_k of one pattern.
 
     Args:
@@ -33,9 +57,7 @@ class LevelCholesky:
         row, column = pattern.rows_columns
         template = spmatrix(1.0, row, column, (pattern.size, pattern.size))
         self._factors = [self._factorise(template, entries) for entries in values]
-        place = matrix(np.arange(pattern.size, dtype=float))
-        cholmod.solve(self._factors[0], place, sys=_PERMUTE)
-        self._order = np.asarray(place).ravel().astype(np.int64)
+        self._order = permutation(self._factors[0], pattern.size)
 
     @staticmethod
     def _factorise(template: spmatrix, entries: Array) -> object:
@@ -49,16 +71,6 @@ class LevelCholesky:
                 " contrast is too high"
             ) from failure
         return factor
-
-    def _apply(self, vectors: Array, system: int) -> Array:
-        result = np.empty_like(vectors)
-        if not vectors.size:  # no column is left for this rank
-            return result
-        for factor, source, target in zip(self._factors, vectors, result, strict=True):
-            columns = matrix(source)
-            cholmod.solve(factor, columns, sys=system)
-            target[:] = np.asarray(columns)
-        return result
 
     def forward(self, vectors: Array) -> Array:
         """L_k⁻¹ P v_k for each k and column, shape (matrices, size, columns)."""

@@ -15,10 +15,11 @@ from cvxopt import cholmod, matrix, spmatrix
 
 from alphacut.rve.mesh.triangulation import Integers
 from alphacut.rve.solver.krylov import ConvergenceError
+from alphacut.rve.solver.level_cholesky import LevelFactors, permutation
 from alphacut.rve.solver.level_stiffness import LevelPattern
 from alphacut.stochastic.theta.truncated_normal import Array
 
-_SOLVE_L, _SOLVE_LT, _SOLVE_D, _PERMUTE = 4, 5, 6, 7
+_SOLVE_L, _SOLVE_LT, _SOLVE_D = 4, 5, 6
 
 
 @contextmanager
@@ -32,7 +33,7 @@ def _options(**options: int) -> Iterator[None]:
         cholmod.options.update(before)
 
 
-class LevelLDL:
+class LevelLDL(LevelFactors):
     """P S_k Pᵀ = L_k J L_kᵀ with a diagonal J of signs, the same for all k.
 
     Args:
@@ -58,9 +59,7 @@ class LevelLDL:
                 template.V = matrix(pattern.values(one))
                 self._factors.append(cholmod.symbolic(template, p=matrix(wanted.tolist())))
                 cholmod.numeric(template, self._factors[-1])
-        place = matrix(np.arange(pattern.size, dtype=float))
-        cholmod.solve(self._factors[0], place, sys=_PERMUTE)
-        self._order = np.asarray(place).ravel().astype(np.int64)
+        self._order = permutation(self._factors[0], pattern.size)
         inverse = [self._inverse_pivots(factor) for factor in self._factors]
         self._root = np.sqrt(np.abs(inverse))[:, :, None]
         self.signs = np.where(self._order < displacements, 1.0, -1.0)[:, None]
@@ -74,16 +73,6 @@ class LevelLDL:
         ones = matrix(1.0, (self._order.size, 1))
         cholmod.solve(factor, ones, sys=_SOLVE_D)
         return np.asarray(ones).ravel()
-
-    def _apply(self, vectors: Array, system: int) -> Array:
-        result = np.empty_like(vectors)
-        if not vectors.size:  # no column is left for this rank
-            return result
-        for factor, source, target in zip(self._factors, vectors, result, strict=True):
-            columns = matrix(source)
-            cholmod.solve(factor, columns, sys=system)
-            target[:] = np.asarray(columns)
-        return result
 
     def forward(self, vectors: Array) -> Array:
         """J L_k⁻¹ P v_k for each k and column, shape (matrices, size, columns)."""
@@ -108,9 +97,7 @@ def _order(pattern: LevelPattern, elements: Array, unknowns: Integers) -> Intege
     template = spmatrix(matrix(pattern.values(elements)), row, column, (pattern.size, pattern.size))
     factor = cholmod.symbolic(template)
     cholmod.numeric(template, factor)
-    order = matrix(np.arange(pattern.size, dtype=float))
-    cholmod.solve(factor, order, sys=_PERMUTE)
     place = np.empty(pattern.size)
-    place[np.asarray(order).ravel().astype(np.int64)] = np.arange(pattern.size)
+    place[permutation(factor, pattern.size)] = np.arange(pattern.size)
     last = np.where(unknowns >= 0, place[unknowns], -1.0).max(axis=1)
     return np.argsort(np.concatenate([place, last + 0.5]), kind="stable")

@@ -79,11 +79,10 @@ def test_map_equals_the_printed_hermite_functions():
 @pytest.mark.parametrize(
     "case", [PAPER, dict(a1=0.5, a2=1.2, a3=0.5, a4=1.2), dict(a1=0.3, a2=0.0, a3=0.4, a4=2.0)]
 )
-def test_extremes_and_monotony_against_dense_sampling(case):
+def test_extremes_against_dense_sampling(case):
     radius = HermiteMap(**case)
     dense = radius(np.linspace(-3, 3, 200_001))
     assert radius.extremes() == pytest.approx((dense.min(), dense.max()), abs=1e-10)
-    assert radius.is_monotone == bool((np.diff(dense) > -1e-12).all())
 
 
 @pytest.mark.parametrize(

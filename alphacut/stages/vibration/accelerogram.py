@@ -11,6 +11,7 @@ import numpy as np
 
 from alphacut.io.csv_rows import CsvFile
 from alphacut.io.units import factor
+from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     from alphacut.frame import Accelerogram
@@ -37,7 +38,8 @@ def accelerogram(path: Path, key: str = "frame.accelerogram") -> Accelerogram:
     lines = file.lines()
     for head, text in enumerate(lines[:9]):
         if found := NPTS.search(text):
-            return peer(file, lines, head, int(found[1]), float(found[2]))
+            values = peer(file, lines, head, int(found[1]), float(found[2]))
+            return Accelerogram(float(found[2]), values)
     (line, first), *rows = file.rows(least=2)
     if len(first) != len(COLUMNS):
         what = f"got {len(first)} columns"
@@ -52,25 +54,22 @@ def accelerogram(path: Path, key: str = "frame.accelerogram") -> Accelerogram:
     if not values[:, 1].any():
         what = "the acceleration is zero throughout"
         raise file.unreadable(what, "a record that moves the ground")
-    times = list(map(float, values[:, 0]))
-    return Accelerogram(even_step(file, times, [line for line, _ in rows]), values[:, 1])
+    return Accelerogram(even_step(file, values[:, 0], [line for line, _ in rows]), values[:, 1])
 
 
-def peer(file: CsvFile, lines: list[str], head: int, count: int, step: float) -> Accelerogram:
-    """A record of PEER's data base: its head ends with NPTS and DT, its values are in g."""
-    from alphacut.frame import Accelerogram
-
+def peer(file: CsvFile, lines: list[str], head: int, count: int, step: float) -> Array:
+    """Accelerations of a file of PEER's data base: its head ends with NPTS and DT."""
     if not any(IN_G.search(line) for line in lines[:head]):
         what = "the lines above NPTS and DT do not say that the values are accelerations in g"
         raise file.refuse(head + 1, what, allowed="ACCELERATION TIME SERIES IN UNITS OF G")
     try:
-        values = np.array([float(text) for line in lines[head + 1 :] for text in line.split()])
+        values = np.array(" ".join(lines[head + 1 :]).split(), float)
     except ValueError as error:
         raise file.unreadable(str(error), "numbers below the line of NPTS and DT") from None
     if not (len(values) == count >= 2 and step > 0 and np.isfinite(values).all() and values.any()):
         what = f"{len(values)} numbers follow NPTS = {count} and DT = {step:g} s"
         raise file.unreadable(what, "as many finite numbers, not all 0, at a step above 0")
-    return Accelerogram(step, values * float(factor("g", "m/s^2")))
+    return values * float(factor("g", "m/s^2"))
 
 
 def cut_short(record: Accelerogram, duration: float) -> bool:
@@ -91,7 +90,7 @@ def pair(file: CsvFile, line: int, row: list[str]) -> tuple[float, float]:
     return time, value
 
 
-def even_step(file: CsvFile, times: list[float], lines: list[int]) -> float:
+def even_step(file: CsvFile, times: Array, lines: list[int]) -> float:
     """The step of evenly spaced times from 0."""
     step = times[1] - times[0]
     for index, time in enumerate(times):
@@ -100,4 +99,4 @@ def even_step(file: CsvFile, times: list[float], lines: list[int]) -> float:
             allowed = f"{index * step:g} s here, by the first two rows"
             raise file.refuse(lines[index], what, allowed=allowed)
     # rounding of the first two rows would grow towards the end
-    return times[-1] / (len(times) - 1)
+    return float(times[-1]) / (len(times) - 1)

@@ -65,7 +65,7 @@ def motion_rows(path: Path, known: Sequence[str]) -> MotionRows:
             raise file.refuse(number, "this row is no instant", ",".join(row), allowed)
         table.append(values)
     found = np.array(table) * scales
-    step = even_step(file, [*map(float, found[:, 0])], [number for number, _ in rows])
+    step = even_step(file, found[:, 0], [number for number, _ in rows])
     return MotionRows(step, tuple(names[1:]), found[:, 1:])
 
 

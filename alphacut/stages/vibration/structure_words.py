@@ -67,22 +67,17 @@ def structure_words(case: Case, wanted: Structure) -> Document:
     tasks = [study.task for study in studies(case)]
     fixed = left_out(wanted, tasks)
     told = [f"F{line[1:]}." for line in fixed_line(fixed)]
-    cut = cut_line(wanted, tasks)
+    words = {"fixed": fixed, "cut": cut_line(wanted, tasks)}
     if wanted.frame is not None:
-        return {
-            "sentences": [*frame_sentences(case.frame, wanted), *told],
-            **floors(case.frame, wanted, fixed),
-            "fixed": fixed,
-            "cut": cut,
-        }
+        sentences = [*frame_sentences(case.frame, wanted), *told]
+        return {"sentences": sentences, **floors(case.frame, wanted, fixed), **words}
     ground = None if wanted.linear is None else wanted.linear.ground
     sentences = [motion(case.tower.accelerogram, ground)] if ground is not None else []
     return {
         "sentences": [*sentences, *told],
         "head": ["input", "what it is", "value"],
         "rows": list(inputs(case)),
-        "fixed": fixed,
-        "cut": cut,
+        **words,
     }
 
 
