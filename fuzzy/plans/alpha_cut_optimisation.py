@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -17,6 +18,7 @@ from alphacut.fuzzy.sets.interaction import pulled
 from alphacut.fuzzy.sets.numbers import Array
 from alphacut.fuzzy.surrogates.chebyshev_polynomial import corners, dividing
 
+Bound = tuple[float, float]
 Method = Literal["multistart", "differential_evolution", "shgo", "direct", "dual_annealing"]
 _DIFFERENCE = 1e-6  # step of a derivative, as a share of the width of the cut
 # least distance of two starts, as a share of the width of the cut: they should lie in different
@@ -104,21 +106,41 @@ class Optimisation:
         bounds = [(0.0, 1.0)] * len(cut.moving)
         if self.method == "differential_evolution":
             rounds = max(1, self.budget // (15 * len(bounds)) - 1)
-            options = {
-                "maxiter": rounds,
-                "rng": self.seed,
-                "vectorized": True,
-                "updating": "deferred",
-                "polish": False,
-                "tol": 1e-8,
-            }
-            scipy.optimize.differential_evolution(objective, bounds, **options)
+            options = {"maxiter": rounds, "rng": self.seed, "tol": 1e-8, "polish": False}
+            scipy.optimize.differential_evolution(
+                objective, bounds, **options, vectorized=True, updating="deferred"
+            )
         elif self.method == "direct":
-            scipy.optimize.direct(objective, bounds, maxfun=self.budget)
+            _direct(objective, bounds, self.budget)
         elif self.method == "shgo":
             scipy.optimize.shgo(objective, bounds, options={"maxfev": self.budget})
         else:
             scipy.optimize.dual_annealing(objective, bounds, maxfun=self.budget, rng=self.seed)
+
+
+def _direct(objective: Callable[[Array], object], bounds: list[Bound], budget: int) -> None:
+    """SciPy's `direct`, with the first exception of the objective raised: its C code loses them.
+
+    It cannot be stopped; what it asks for after the exception gets 0 without being evaluated. Of
+    the other optimisers none calls back from C.
+    """
+    import scipy.optimize
+
+    raised: list[BaseException] = []
+
+    def kept(unit: Array) -> object:
+        try:
+            return 0.0 if raised else objective(unit)
+        except BaseException as error:
+            raised.append(error)
+            return 0.0
+
+    try:
+        scipy.optimize.direct(kept, bounds, maxfun=budget)
+    except SystemError as error:  # of an interrupt between two evaluations
+        raised.append(error.__cause__ or error)
+    if raised:
+        raise raised[0]
 
 
 class LevelSearch:
