@@ -116,10 +116,11 @@ def _grid(
     """The points that are taken: fewer than all combinations where these are too many."""
     (whole, few), count = _grids(model), len(model.boxes.names)
     middle = np.zeros((1, count))
-    width = max(
-        sum(x.size * (2 if np.iscomplexobj(x) else 1) for x in sample(middle).values())
+    sizes = [
+        {key: x.size * (2 if np.iscomplexobj(x) else 1) for key, x in sample(middle).items()}
         for sample in samples
-    )
+    ]
+    width, m = max(sum(size.values()) for size in sizes), len(model.outputs)
     if len(whole) * width <= MOST_NUMBERS:
         return whole
     if not patient:
@@ -129,10 +130,13 @@ def _grid(
             " estimated bounds, and fewer fuzzy inputs are proved at once"
         )
     if DEAR * len(few) * width > MOST_NUMBERS:
+        own = sizes[0]["outputs"] // m
+        most = (MOST_NUMBERS // DEAR // len(few) - width) // own + m  # outputs that leave room
+        fewer = f"up to {most} of the {m} outputs at once, " if most > 0 else ""
         raise dependence.UnprovedError(
             f"the error of the modes takes {len(few)} points of {count} fuzzy inputs, and"
-            f" {MOST_NUMBERS // DEAR // width} are affordable; narrower or fewer inputs, or a wider"
-            " gap, can be proved"
+            f" {MOST_NUMBERS // DEAR // width} are affordable; {fewer}narrower or fewer"
+            " inputs, or a shorter duration, can be proved"
         )
     return few
 

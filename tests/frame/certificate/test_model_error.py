@@ -4,6 +4,7 @@ enough to be of use.
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 
 import numpy as np
@@ -440,5 +441,26 @@ def test_fewer_points_than_all_combinations_give_the_same_bound(monkeypatch) -> 
     with pytest.raises(UnprovedError, match="takes minutes and is not tried unasked"):
         proved_error(found, patient=False)
     monkeypatch.setattr(model_error, "DEAR", 100)
-    with pytest.raises(UnprovedError, match=r"points of 3 fuzzy inputs, and \d+ are affordable"):
+    told = (
+        r"points of 3 fuzzy inputs, and \d+ are affordable; narrower or fewer inputs, or a shorter"
+    )
+    with pytest.raises(UnprovedError, match=told):
         proved_error(found)
+
+
+def test_outputs_are_named_where_fewer_of_them_can_be_proved(monkeypatch) -> None:
+    inputs = {"E": Interval(24e9, 26e9), "m1": Interval(19e3, 21e3), "zeta": Interval(0.02, 0.04)}
+    frame = replace(SHAKEN, dampers=(), damping_ratio=0.03, outputs=("q3", "drift2"))
+    found, alone = (model(replace(frame, outputs=x), inputs) for x in (("q3", "drift2"), ("q3",)))
+    few, told = len(model_error._grids(found)[1]), list[str]()
+    monkeypatch.setattr(model_error, "DEAR", 1)
+    with contextlib.suppress(UnprovedError):
+        while True:  # values at a point, until what was affordable is refused
+            monkeypatch.setattr(model_error, "MOST_NUMBERS", few * (200 - 2 * len(told)))
+            proved_error(found)
+            told.append("proved")
+    named = "up to 1 of the 2 outputs at once, narrower or fewer inputs, or a shorter"
+    assert told
+    with pytest.raises(UnprovedError, match=named):
+        proved_error(found)
+    assert (proved_error(alone) < np.inf).all()
