@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
@@ -113,7 +113,7 @@ def propagate(
         campaign = Campaign(
             call, running, tell, known, samples, stepwise=plan.stepwise, spot_check=check
         )
-        with kept_on_interrupt(campaign, store):
+        with on_interrupt(lambda: _kept(campaign, store)):
             result = plan.run(campaign, domain)
             within = store is None and not (isinstance(plan, Automatic) and plan.budget)
             doubt = campaign.randomness() if within else ""
@@ -134,17 +134,22 @@ TORN = (
 
 
 @contextmanager
-def kept_on_interrupt(campaign: Campaign, store: Store | str | Path | None) -> Iterator[None]:
-    """Say on Ctrl-C how many samples are kept, and how to go on."""
+def on_interrupt(words: Callable[[], str]) -> Iterator[None]:
+    """Say on Ctrl-C what is kept, in words."""
     try:
         yield
     except KeyboardInterrupt:
-        done = campaign.runs + campaign.reused
-        if store is None:
-            were = f"{counted(done, 'sample')} {'was' if done == 1 else 'were'} done"
-            cure = f"{were} and none is kept: `propagate` keeps them in a store="
-        else:
-            path = store.path if isinstance(store, Store) else store
-            kept = f"{counted(done, 'sample')} {'is' if done == 1 else 'are'} kept"
-            cure = f"{kept} in {path}: the same call goes on from there"
-        raise KeyboardInterrupt(f"interrupted; {cure}") from None
+        raise KeyboardInterrupt(f"interrupted; {words()}") from None
+
+
+def _kept(campaign: Campaign, store: Store | str | Path | None) -> str:
+    """How many samples are kept, and how to go on."""
+    done = campaign.runs + campaign.reused
+    if store is None or campaign.shelf is None:
+        were = f"{counted(done, 'sample')} {'was' if done == 1 else 'were'} done"
+        return f"{were} and none is kept: `propagate` keeps them in a store="
+    path, more = store.path if isinstance(store, Store) else store, campaign.shelf.held
+    mine = f"the {counted(done, 'sample')} of this call {'is' if done == 1 else 'are'} in {path}"
+    mine = mine if done else f"no sample of this call is in {path}"
+    more -= campaign.reused
+    return f"{mine}{f', which holds {more} more' * (more > 0)}: the same call goes on from there"

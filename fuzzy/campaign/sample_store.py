@@ -71,6 +71,7 @@ class Shelf:
         self._claims: Claims | None = None  # not made before there is something to run
         self._look()
         self._begun, self.torn = self._end, store.torn  # before anybody writes
+        self.held = sum(not place.error for place in self._places.values())  # likewise
 
     def key(self, point: Array) -> str:
         """A point as text, exact to the last bit and the same whatever the order of the inputs."""

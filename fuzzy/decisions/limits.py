@@ -21,13 +21,14 @@ from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.knowledge.enclosure import Enclosed
 from alphacut.fuzzy.plans.branch_and_bound import BranchAndBound
 from alphacut.fuzzy.progress_bar import Progress, part, told
-from alphacut.fuzzy.propagation import propagate
+from alphacut.fuzzy.propagation import on_interrupt, propagate
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain, levels
 from alphacut.fuzzy.sets.given import finite, finite_by_name, positive
 from alphacut.fuzzy.sets.numbers import Array, Crisp, FuzzyNumber, Interval
 
 Limits = Mapping[str, float]
+_UNKEPT = "keeps nothing: a larger tolerance or a smaller budget ends it sooner"
 
 
 @dataclass(frozen=True)
@@ -195,7 +196,7 @@ def decide(
     sides = [(limits, 1), *(({name: limit}, -1) for name, limit in limits.items())]
     family, parts, found = ByLevel(domain), 1 + len(sides), []
     arrays = takes_arrays(function, domain.names, *family.at(1.0), limits)
-    with told(progress) as tell:
+    with told(progress) as tell, on_interrupt(lambda: f"`decide` {_UNKEPT}"):
         whole = propagate(
             function,
             domain.inputs,
@@ -310,7 +311,7 @@ def safe_scale(
     family = Scaled(np.array([*nominal.values()], float), pairs[:, 0], pairs[:, 1])
     arrays = takes_arrays(function, tuple(nominal), *family.at(0.0), limits)
     judge = Limited(function, tuple(nominal), limits, budget=budget, vectorised=arrays)
-    with told(progress) as tell:
+    with told(progress) as tell, on_interrupt(lambda: f"`safe_scale` {_UNKEPT}"):
         found = threshold(family, judge, most=most, tolerance=tolerance, progress=tell)
         if tell:
             tell(1.0)

@@ -8,9 +8,9 @@ beforehand, so the least gain over those places stands beside the gain at the mo
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
-from contextlib import contextmanager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -26,7 +26,7 @@ from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.plan import Plan
 from alphacut.fuzzy.plans.transformation import Reduced
 from alphacut.fuzzy.progress_bar import Progress, part, told
-from alphacut.fuzzy.propagation import propagate
+from alphacut.fuzzy.propagation import on_interrupt, propagate
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.numbers import Crisp, Cut, FuzzyNumber, Interval
 from alphacut.fuzzy.width_contributions import Basis, widened
@@ -100,8 +100,8 @@ class Advice:
     @property
     def _said(self) -> list[str]:
         """What cannot be said, and what the level ranks."""
-        bounds = "at α = 0 the outermost bounds of the inputs are ranked: where you set them"
-        bounds += " yourself, more values narrow only the cuts above, as alpha=0.5 ranks them"
+        bounds = "This ranks the supports (α = 0). Where a support is a bound that you stated, more"
+        bounds += " measurements do not change it; alpha=0.5 ranks what measurements can change."
         every = [y for x in self.gains for y in (x.half, x.half_least, x.exact, x.exact_least)]
         less = widened(min(every, default=0.0) / self.width if self.width > 0 else 0.0)
         return [
@@ -199,7 +199,7 @@ def measure_next(
     with (
         told(progress) as tell,
         nullcontext(executor) if executor else pool(workers) as running,
-        kept_on_interrupt(store, identity),
+        on_interrupt(lambda: _kept(store, identity)),
     ):
         modal = {name: Crisp(number.modal) for name, number in numbers.items()}
         how = {"vectorised": vectorised, "executor": running, "store": store, "identity": identity}
@@ -222,22 +222,14 @@ def measure_next(
         return replace(advice(answer, numbers, alpha=alpha), basis=str(basis))
 
 
-@contextmanager
-def kept_on_interrupt(
-    store: Store | str | Path | None, identity: Identity | None
-) -> Iterator[None]:
-    """Say on Ctrl-C how many samples of all answers are kept, and how to go on."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        if store is None:
-            cure = "none of the samples is kept: `measure_next` keeps them in a store="
-        else:
-            with nullcontext(store) if isinstance(store, Store) else Store(store) as opened:
-                models = [one for one in opened.models() if one.identity == dict(identity or {})]
-                kept = counted(sum(one.samples for one in models), "sample")
-                cure = f"{opened.path} keeps {kept} of all answers: the same call goes on from them"
-        raise KeyboardInterrupt(f"interrupted; {cure}") from None
+def _kept(store: Store | str | Path | None, identity: Identity | None) -> str:
+    """How many samples of all answers are kept, and how to go on."""
+    if store is None:
+        return "none of the samples is kept: `measure_next` keeps them in a store="
+    with nullcontext(store) if isinstance(store, Store) else Store(store) as opened:
+        models = [one for one in opened.models() if one.identity == dict(identity or {})]
+        kept = counted(sum(one.samples for one in models), "sample")
+        return f"{opened.path} keeps {kept} of all answers: the same call goes on from them"
 
 
 def one_level(alpha: object) -> float:

@@ -26,8 +26,7 @@ class Signed:
 
     Args:
         outputs: Outputs whose bounds matter; all if none is named. The others are printed as the
-            samples happen to bound them, without an error
-            unless they are proved.
+            samples happen to bound them, without an error unless they are proved.
         verification: How signs are looked for where they are not stated.
         limit: Samples that the plan may take where signs are missing.
     """

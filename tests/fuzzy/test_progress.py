@@ -120,15 +120,44 @@ def test_an_interrupt_says_what_is_kept_and_the_same_call_goes_on(tmp_path):
 
     given = {"store": tmp_path / "s.db", "identity": {"v": 1}}
     with pytest.raises(
-        KeyboardInterrupt, match=r"^interrupted; 19 samples are kept in .*s\.db: the"
+        KeyboardInterrupt, match=r"^interrupted; the 19 samples of this call are in .*s\.db: the"
     ):
         propagate(stopped, X, **given)
     assert propagate(bent, X, spot_check=0, **given).reused == 19
+    held = propagate(bent, X, spot_check=0, **given).samples
+    calls.clear()
+    with pytest.raises(KeyboardInterrupt, match=r"s\.db, which holds \d+ more: the") as caught:
+        propagate(stopped, X, Metamodel(), spot_check=0, **given)
+    own, more = re.findall(r" (\d+) ", str(caught.value))
+    assert int(own) + int(more) == held + 19
+    calls[:] = range(19)
+    with pytest.raises(KeyboardInterrupt, match="no sample of this call is in"):
+        propagate(stopped, X, Metamodel(), **{**given, "identity": {"v": 2}})
     calls.clear()
     with pytest.raises(
         KeyboardInterrupt, match="19 samples were done and none is kept: `propagate` keeps them"
     ):
         propagate(stopped, X)
+
+
+@pytest.mark.parametrize(
+    ("call", "ask"),
+    [
+        ("decide", lambda stopped: decide(stopped, X, {"y": 5})),
+        ("safe_scale", lambda stopped: safe_scale(stopped, {"x": 1, "y": 1}, {"x": 0.1}, {"y": 2})),
+    ],
+)
+def test_an_interrupted_proof_offers_no_store(call, ask):
+    calls = []
+
+    def stopped(x, y):
+        calls.append(x)
+        if len(calls) == 20:
+            raise KeyboardInterrupt
+        return bent(x, y)
+
+    with pytest.raises(KeyboardInterrupt, match=f"^interrupted; `{call}` keeps nothing: a larger"):
+        ask(stopped)
 
 
 def test_what_to_measure_next_takes_an_executor_and_a_store(tmp_path):
