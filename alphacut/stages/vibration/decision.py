@@ -51,16 +51,39 @@ def decision(
     from alphacut.frame.structures.modes import ModalError
 
     limits, task = limits_of(case), task_of(case)
-    outputs = tuple(dict.fromkeys(one.output for one in limits))
-    if peaks is None or not set(outputs) <= set(map(str, peaks["output"].values)):
-        assert wanted.frame is not None
-        limited = replace(wanted, model=replace(wanted.frame, outputs=outputs))
-        peaks = with_peaks(envelope.compute(limited, task), limited, task)
+    peaks = _peaks([one.output for one in limits], wanted, task, peaks)
     try:
         found = _decisions(wanted, task, limits, workers, progress)
     except (ValueError, ModalError) as error:
         raise BadInput(Problem("decision", str(error), file=str(case.path))) from None
     return _dataset(found, limits, peaks, task)
+
+
+def _peaks(
+    outputs: Sequence[str], wanted: Structure, task: EnvelopeTask, given: xarray.Dataset | None
+) -> xarray.Dataset:
+    """Peaks of `outputs`: those given, and those of an envelope of the outputs without any.
+
+    That envelope's first output is that of the given one, so that a gap means the same there.
+    """
+    import xarray
+
+    known = [] if given is None else [*map(str, given["output"].values)]
+    missing = [name for name in dict.fromkeys(outputs) if name not in known]
+    if given is not None and not missing:
+        return given
+    assert wanted.frame is not None
+    limited = replace(wanted, model=replace(wanted.frame, outputs=(*known[:1], *missing)))
+    more = with_peaks(envelope.compute(limited, task), limited, task)
+    if given is None:
+        return more
+    parts = (given, more.sel(output=missing))
+    bare = [part[[name for name in PEAKS if name in part]] for part in parts]
+    nature = " or ".join(dict.fromkeys(str(part.attrs["nature"]) for part in parts))
+    return xarray.concat(bare, "output", fill_value=0.0).assign_attrs(nature=nature)
+
+
+PEAKS = ("peak", "peak_error", "peak_below")
 
 
 def _decisions(

@@ -77,12 +77,8 @@ def coarse_tolerance(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]
     if task.method not in WITH_TOLERANCE:
         return
     inputs = wanted.inputs(task.fuzzy)
-    flow = wanted.flow(
-        tuple(inputs),
-        task.duration,
-        task.step,
-        "exact" if wanted.linear is not None else task.integrator,
-    )
+    scheme = "exact" if wanted.linear is not None else task.integrator
+    flow = wanted.flow(tuple(inputs), task.duration, task.step, scheme)
     if task.certify is not None:
         gap = tolerance_guard(UnitFlow(flow, boxes(inputs, (0.0,))), task.certify)
         if not gap.ok:
@@ -95,13 +91,8 @@ def coarse_tolerance(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]
         return
     found = tolerance_guard(UnitFlow(flow, boxes(inputs, (0.0,)), task.relative), task.tolerance)
     if not found.ok:
-        key = (
-            "envelope.relative_tolerance"
-            if task.relative
-            else "envelope.tolerance"
-            if wanted.linear
-            else "pendulum.tolerance"
-        )
+        own = "envelope.tolerance" if wanted.linear else "pendulum.tolerance"
+        key = "envelope.relative_tolerance" if task.relative else own
         cure = "envelope.relative_tolerance = 0.001"
         told = found.message.replace("a relative tolerance such as 0.001", cure)
         yield Problem(key, told.removeprefix("tolerance: "))

@@ -49,15 +49,7 @@ def in_unit(number: FuzzyNumber, unit: str, si: str) -> str:
             for value in (low, high, number.modal)
         ]
         return f"{ends[0]} … {ends[1]} {unit}, modal {ends[2]} {unit}".strip()
-    values = (
-        [low]
-        if low == high
-        else (
-            [low, high]
-            if (low, high) == (left, right)
-            else list(dict.fromkeys([low, left, right, high]))
-        )
-    )
+    values = dict.fromkeys([low, left, right, high])
     numbers = [f"{shown(value, unit, si):.5g}".replace("-", MINUS) for value in values]
     return f"{numbers[0] if len(numbers) == 1 else '[' + ', '.join(numbers) + ']'} {unit}".strip()
 
@@ -186,10 +178,7 @@ def spread_damping(given: Frame) -> Iterator[str]:
 
 def motion(file: str, ground: Accelerogram) -> str:
     """The record in words."""
-    peak, end = (
-        float(np.abs(ground.acceleration).max()),
-        (len(ground.acceleration) - 1) * ground.step,
-    )
+    peak, end = float(np.abs(values := ground.acceleration).max()), (len(values) - 1) * ground.step
     return (
         f"The ground moves by the record {file}: {len(ground.acceleration)} values, one every"
         f" {ground.step:g} s up to {end:g} s, peak {peak:.3g} m/s²; displacements are relative to"
@@ -247,9 +236,8 @@ def column(
     """Values of all floors, each that does not vary with the value at which it is fixed."""
     return [
         in_unit(number, *units)
-        + (f", fixed at {in_unit(Crisp(number.modal), *units)}" if name in fixed else "")
+        + f", fixed at {in_unit(Crisp(number.modal), *units)}" * (symbol.format(floor) in fixed)
         for floor, number in enumerate(numbers, start=1)
-        for name in [symbol.format(floor)]
     ]
 
 

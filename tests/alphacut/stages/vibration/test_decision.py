@@ -9,12 +9,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 
 from alphacut.case.load import load
 from alphacut.case.quick import quick
 from alphacut.entry import main
 from alphacut.io.units import engineering
-from alphacut.stages.vibration.decision import ANY, _verdicts, degree, outward, sentences, why
+from alphacut.stages.vibration import decision
+from alphacut.stages.vibration.decision import (
+    ANY,
+    _peaks,
+    _verdicts,
+    degree,
+    outward,
+    sentences,
+    why,
+)
+from alphacut.stages.vibration.envelope_task import task_of
+from alphacut.stages.vibration.structure import Structure, structure
 from tests.alphacut.one_floor import RIGIDITY, one_floor
 
 # |q| = v0 / ω, base shear v0 ω m
@@ -153,6 +165,33 @@ def test_motion_between_nodes_takes_from_one_end_of_a_margin_alone(tmp_path: Pat
     assert ends["error"][0] > 0.005 * limit
     assert margin["upper"][0] == pytest.approx(limit - ends["lower"][0], abs=1e-12)
     assert margin["lower"][0] == pytest.approx(limit - ends["upper"][0] - ends["error"][0])
+
+
+def test_a_margin_is_that_of_the_envelope_shown_where_other_limits_need_their_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The further envelope begins with the first output, whose tolerance or gap is told."""
+
+    def peaks(nature: str, **high: float) -> xarray.Dataset:
+        ends = np.array([[[0.0] * len(high), [*high.values()]]])
+        axes = {"alpha": [0.0], "bound": ["lower", "upper"], "output": list(high)}
+        return xarray.Dataset({"peak": (tuple(axes), ends)}, axes, {"nature": nature})
+
+    def compute(wanted: Structure, task: object) -> None:
+        assert wanted.frame is not None
+        asked.append(wanted.frame.outputs)
+
+    asked = list[tuple[str, ...]]()
+    case = load(str(written(tmp_path, ["q1 <= 1 m"])))
+    more = peaks("estimated", q1=9.0, base_shear=4.0)
+    monkeypatch.setattr(decision.envelope, "compute", compute)
+    monkeypatch.setattr(decision, "with_peaks", lambda *_: more)
+    given, both = peaks("guaranteed", q1=3.0), ["base_shear", "q1"]
+    found = _peaks(both, structure(case, None), task_of(case), given)
+    assert asked == [("q1", "base_shear")]
+    assert found["peak"].sel(output=both, bound="upper").values.tolist() == [[4.0, 3.0]]
+    assert found.attrs["nature"] == "guaranteed or estimated"
+    assert _peaks(["q1"], structure(case, None), task_of(case), given) is given
 
 
 @pytest.mark.parametrize(
