@@ -14,7 +14,7 @@ from alphacut.io.files import Document, say
 from alphacut.io.progress import progress
 from alphacut.io.provenance import attributes, fingerprint
 from alphacut.stages.image.bounds import compute
-from alphacut.stages.image.document import document, write
+from alphacut.stages.image.document import document, interval, own_of_window, write
 from alphacut.stages.image.phases import contradicted
 from alphacut.stages.image.reading import study_of
 
@@ -59,21 +59,18 @@ def summary(found: Document) -> str:
             strict=True,
         )
     )
-    bulk, grains, own = (
-        found[key] for key in ("plane_strain_bulk_GPa", "grains_E_GPa", "apparent_E_GPa")
-    )
-    apparent = (
-        f"the window's own apparent E, proved: {_interval(own)}, not that of the material\n"
-        if own
-        else ""
-    )
+    bulk, grains = found["plane_strain_bulk_GPa"], found["grains_E_GPa"]
+    own = own_of_window(found)
+    place = f"over the inputs at α = {cuts['alpha'][-1]:g}"
+    place += ", of the window's tiles and not of the material" if own else ""
     return "".join(f"{line}\n" for line in (*found["phases"], found["boundary"])) + (
         "alpha  lower GPa   upper GPa   (E of eq. 16, plane strain: not E_T, the transverse Young's"
         f" modulus of a fibre composite)\n{rows}"
-        f"width of the stiffness's bounds at the top level: {found['width']:.2e}\n"
-        f"plane-strain bulk modulus: {_interval(bulk)}\n{anisotropy(found)}"
-        f"{apparent}{quantiles(found)}"
-        f"if the particles are grains, E (Hashin-Shtrikman): {_interval(grains)}\n"
+        f"{place}:\n"
+        f"  width of the stiffness's bounds: {found['width']:.2e}\n"
+        f"  plane-strain bulk modulus: {interval(bulk)}\n{anisotropy(found)}{quantiles(found)}"
+        f"  if the particles are grains, E (Hashin-Shtrikman): {interval(grains)}\n"
+        f"{own and own + chr(10)}"
         f"{table_of(found['error_table'])}"
         f"{found['iterations']} iterations, {found['seconds']:.1f} s\n"
     )
@@ -83,10 +80,11 @@ def anisotropy(found: Document) -> str:
     """E over all directions, and the nearest isotropic tensor, in two lines."""
     turned, nearest = found["directions_E_GPa"], found["isotropic"]
     return (
-        f"plane-strain Young's modulus of the softest direction: {_interval(turned['least'])}, "
-        f"of the stiffest: {_interval(turned['greatest'])}\n"
-        f"nearest isotropic tensor: plane-strain bulk {nearest['plane_strain_bulk_GPa']:.4f} GPa, "
-        f"shear {nearest['shear_GPa']:.4f} GPa, {nearest['distance']:.1%} away\n"
+        f"  plane-strain Young's modulus of the softest direction: {interval(turned['least'])}, "
+        f"of the stiffest: {interval(turned['greatest'])}\n"
+        f"  middle of these bounds, nearest isotropic tensor: plane-strain bulk"
+        f" {nearest['plane_strain_bulk_GPa']:.4f} GPa, shear {nearest['shear_GPa']:.4f} GPa,"
+        f" {nearest['distance']:.1%} away\n"
     )
 
 
@@ -95,7 +93,7 @@ def quantiles(found: Document) -> str:
     random = found["random_threshold"]
     rows = random["quantiles"] if random else []
     return "".join(
-        f"quantile {row['share']:g} of E: {_interval(row['E_GPa'][-1])}\n" for row in rows
+        f"  quantile {row['share']:g} of E: {interval(row['E_GPa'][-1])}\n" for row in rows
     )
 
 
@@ -106,7 +104,3 @@ def table_of(rows: Sequence[Document]) -> str:
         for row in rows
     )
     return f"what widens E, the source to improve first on top:\n{lines}"
-
-
-def _interval(pair: Mapping[str, float]) -> str:
-    return f"[{pair['lower']:.4f}, {pair['upper']:.4f}] GPa"

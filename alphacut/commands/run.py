@@ -25,6 +25,7 @@ from alphacut.io.units import engineering, largest_by_unit
 from alphacut.stages import summary
 from alphacut.stages import width_shares as shares
 from alphacut.stages.contract import require_choice
+from alphacut.stages.image.document import interval, own_of_window
 from alphacut.stages.material.references import lines
 from alphacut.stages.pipeline import Chain
 from alphacut.stages.readiness import ready
@@ -223,17 +224,17 @@ def image_lines(found: Document) -> Iterator[str]:
     if picture := found.get("image"):
         yield from picture.get("phases", ())  # results of an older program have none
         yield from filter(None, [picture.get("boundary")])
-        cuts = picture["cuts"]["E_GPa"]
+        cuts, own = picture["cuts"]["E_GPa"], own_of_window(picture)
+        top = f"at α = {picture['cuts']['alpha'][-1]:g}"
         yield (
-            f"E = [{cuts['lower'][-1]:.4f}, {cuts['upper'][-1]:.4f}] GPa, support"
-            f" [{cuts['lower'][0]:.4f}, {cuts['upper'][0]:.4f}] GPa, {picture['nature']};"
-            f" nu = [{picture['nu']['lower']:.4f}, {picture['nu']['upper']:.4f}]"
+            f"E = [{cuts['lower'][-1]:.4f}, {cuts['upper'][-1]:.4f}] GPa {top}, support"
+            f" [{cuts['lower'][0]:.4f}, {cuts['upper'][0]:.4f}] GPa, {picture['nature']}; nu"
+            f"{own and ' of the tiles'} = [{picture['nu']['lower']:.4f},"
+            f" {picture['nu']['upper']:.4f}] {top}"
         )
-        ends = picture["grains_E_GPa"]
-        yield (
-            "Hashin–Shtrikman bounds of E if the particles are grains:"
-            f" [{ends['lower']:.4f}, {ends['upper']:.4f}] GPa"
-        )
+        yield from filter(None, [own])
+        grains = interval(picture["grains_E_GPa"])
+        yield f"Hashin–Shtrikman bounds of E if the particles are grains: {grains} {top}"
 
 
 def envelope_lines(name: str, study: Document) -> Iterator[str]:

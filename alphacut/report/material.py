@@ -7,6 +7,7 @@ from markupsafe import Markup
 from alphacut.figures.captions import core, in_words
 from alphacut.io.files import Document
 from alphacut.report.tables import code, paragraphs, section, sentence, table
+from alphacut.stages.image.document import interval, own_of_window
 from alphacut.stages.material import response
 from alphacut.stages.material.micrograph import compared
 from alphacut.stages.material.references import lines
@@ -128,27 +129,16 @@ def image(found: Document, drawn: Markup) -> Markup:
         cuts["alpha"], cuts["E_GPa"]["lower"], cuts["E_GPa"]["upper"], cuts["nature"], strict=True
     )
     rows = [(f"{a:g}", f"{low:.4f}", f"{high:.4f}", nature) for a, low, high, nature in ends]
-    grains, least, greatest = (
-        f"[{pair['lower']:.3f}, {pair['upper']:.3f}] GPa"
-        for pair in (
-            found["grains_E_GPa"],
-            found["directions_E_GPa"]["least"],
-            found["directions_E_GPa"]["greatest"],
-        )
-    )
-    apparent = found.get("apparent_E_GPa")
-    own = (
-        f" The window as it is has E in [{apparent['lower']:.3f}, {apparent['upper']:.3f}] GPa;"
-        " that is proved, and bounds its apparent stiffness only."
-        if apparent
-        else ""
-    )
+    turned = (found["directions_E_GPa"][end] for end in ("least", "greatest"))
+    grains, least, greatest = map(interval, (found["grains_E_GPa"], *turned))
+    own, level = own_of_window(found), f"over the inputs at α = {cuts['alpha'][-1]:g}"
     words = paragraphs(
         "Plane strain: every section of the material is the image, as with fibres; E is that of an"
         " isotropic solid with its plane bulk and shear moduli, not E_T across the fibres. If the"
-        f" particles are grains, the Hashin–Shtrikman interval of E is {grains}. The plane-strain"
-        f" Young's modulus of the softest direction lies in {least}, of the stiffest in"
-        f" {greatest}.{own}"
+        f" particles are grains, the Hashin–Shtrikman interval of E is {grains} {level}."
+        f" The plane-strain Young's modulus of the softest direction lies in {least}, of the"
+        f" stiffest in {greatest} {level}.",
+        *filter(None, [sentence(own)]),
     )
     widths = [
         (row["source"], f"{row['width_GPa']:.3g}", f"{row['share']:.1%}", row["cure"])

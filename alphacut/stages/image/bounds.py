@@ -12,7 +12,7 @@ from alphacut.io.files import say
 from alphacut.io.progress import Tick
 from alphacut.rve.image.gap import constitutive_gap
 from alphacut.rve.image.model import ImageCut, ImageModel, reduced_to_pixels
-from alphacut.rve.image.moduli import grain_modulus
+from alphacut.rve.image.moduli import PlaneModuli, grain_modulus
 from alphacut.stages.image.error_table import Contribution, contributions
 from alphacut.stages.image.random_response import RandomResponse, responses
 from alphacut.stages.image.study import ImageStudy, Level
@@ -31,7 +31,8 @@ class FuzzyImage:
         crisp: Periodic bounds at the modal values.
         cuts: One for each level of the study, rising.
         contributions: Widths of E by source, the widest first.
-        apparent: Proved bounds of E of a window as it is, in Pa; None for a periodic image.
+        apparent: Proved bounds of E of a window as it is over the inputs at the lowest and at the
+            highest level, in Pa; none for a periodic image.
         random: Responses over a random threshold; None for a certain or fuzzy one.
         seconds: Wall time.
     """
@@ -41,7 +42,7 @@ class FuzzyImage:
     crisp: ImageCut
     cuts: tuple[ImageCut, ...]
     contributions: tuple[Contribution, ...]
-    apparent: tuple[float, float] | None
+    apparent: tuple[tuple[float, float], ...]
     random: RandomResponse | None
     seconds: float
 
@@ -60,11 +61,19 @@ class FuzzyImage:
 
     @property
     def grains(self) -> tuple[float, float]:
-        """Hashin–Shtrikman interval of E of grains, at the highest level, in Pa."""
-        phases = self.study.phases(self.study.alpha[-1])
-        return grain_modulus(
-            list(self.study.fractions), [p.lower for p in phases], [p.upper for p in phases]
+        """Hashin–Shtrikman interval of E of grains, over the inputs at the highest level, in Pa."""
+        level, count = self.study.alpha[-1], len(self.study.pairs)
+        first, last = self.study.ranges(level)
+        images = self.study.images(level, level)
+        _, at, pixels = np.unique(first * count + last, return_index=True, return_counts=True)
+        softest, stiffest = (
+            [
+                PlaneModuli(float(images.bulk[end].flat[i]), float(images.shear[end].flat[i]))
+                for i in at
+            ]
+            for end in (0, 1)
         )
+        return grain_modulus(list(pixels / first.size), softest, stiffest)
 
     @property
     def gap(self) -> Array:
@@ -78,7 +87,15 @@ def solutions(study: ImageStudy) -> int:
     """Pairs of solutions for bounds: at the modal values, on levels, and for each fuzzy source."""
     sources = study.fuzzy_threshold + study.fuzzy_phases
     window = study.model.boundary == "window"
-    return 1 + (len(study.alpha) + sources if sources else 0) + 2 * window
+    return 1 + (len(study.alpha) + sources if sources else 0) + (2 + bool(sources)) * window
+
+
+def apparent(study: ImageStudy, model: ImageModel) -> tuple[tuple[float, float], ...]:
+    """Bounds of E of a window as it is, at the lowest and the highest level; equal ones once."""
+    least, most = (study.images(level, level) for level in (study.alpha[0], study.alpha[-1]))
+    found = [model.tiling(least, 1)[0].bracket.modulus]
+    found.append(found[0] if least.same(most) else model.tiling(most, 1)[0].bracket.modulus)
+    return tuple(found)
 
 
 class Told:
@@ -136,9 +153,6 @@ def compute(study: ImageStudy, *, progress: Tick | None = None) -> FuzzyImage:
 
         width = alone
     rows = contributions(study, crisp.modulus[1] - crisp.modulus[0], width)
-    apparent = None
-    if model.boundary == "window":
-        tiling, _ = model.tiling(modal, 1)
-        apparent = tiling.bracket.modulus
+    own = apparent(study, model) if model.boundary == "window" else ()
     told.done(1.0)
-    return FuzzyImage(study, model, crisp, cuts, rows, apparent, random, told.seconds)
+    return FuzzyImage(study, model, crisp, cuts, rows, own, random, told.seconds)

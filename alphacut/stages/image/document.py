@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,7 +51,8 @@ def document(found: FuzzyImage) -> Document:
         "phases": phase_lines(found.study),
         "boundary": BEYOND[found.model.boundary],
         "grains_E_GPa": pair(found.grains),
-        "apparent_E_GPa": None if found.apparent is None else pair(found.apparent),
+        "apparent_E_GPa": pair(found.apparent[-1]) if found.apparent else None,
+        "apparent_E_support_GPa": pair(found.apparent[0]) if found.apparent else None,
         "directions_E_GPa": {"least": pair(turned.least), "greatest": pair(turned.greatest)},
         "isotropic": {
             "plane_strain_bulk_GPa": turned.isotropic[0] / GPA,
@@ -60,6 +62,21 @@ def document(found: FuzzyImage) -> Document:
         "division": found.model.parts,
         "versions": versions(),
     }
+
+
+def own_of_window(found: Document) -> str:
+    """What is proved of a window as it is, over the inputs of two levels; empty if periodic."""
+    if not found.get("apparent_E_support_GPa"):  # results of an older program hold modal values
+        return ""
+    ends = (found["apparent_E_GPa"], -1), (found["apparent_E_support_GPa"], 0)
+    told = [f"{interval(x)} at α = {found['cuts']['alpha'][k]:g}" for x, k in ends]
+    start = "the window's own apparent E, proved over the inputs"
+    return f"{start}: {', '.join(told)}; not that of the material"
+
+
+def interval(ends: Mapping[str, float]) -> str:
+    """An interval of moduli in GPa, for people."""
+    return f"[{ends['lower']:.4f}, {ends['upper']:.4f}] GPa"
 
 
 def error_table(found: FuzzyImage) -> list[Document]:
@@ -123,7 +140,7 @@ def dataset(found: FuzzyImage) -> xarray.Dataset:
         "gap": (
             plane,
             found.gap.astype(np.float32),
-            {"units": "Pa", "long_name": "constitutive error of the two fields"},
+            {"units": "Pa", "long_name": "constitutive error of the two fields, modal inputs"},
         ),
     }
     if found.random is not None:
@@ -141,7 +158,10 @@ def dataset(found: FuzzyImage) -> xarray.Dataset:
 
 def random_variables(found: RandomResponse) -> Document:
     """E over the random threshold, and its quantiles at each level."""
-    about = {"units": "Pa", "long_name": "Young's modulus, eq. 16, over the threshold"}
+    about = {
+        "units": "Pa",
+        "long_name": "E of eq. 16 over the threshold, modal phases",
+    }
     return {
         "E_of_threshold": (("node", "bound"), np.stack(found.modal.modulus, axis=-1), about),
         "threshold": (("node",), found.modal.threshold, {"long_name": "grey value"}),

@@ -38,9 +38,10 @@ def phase_names(given: Picture, count: int) -> tuple[str, ...]:
 def phase_lines(study: ImageStudy) -> list[str]:
     """A line for each phase: its share of the area, and its moduli, at the modal values."""
     first, second = ("E", "nu") if study.young else ("K", "G")
+    modal = " (modal values)" if study.fuzzy_phases or study.fuzzy_threshold else ""
     return [
         f"{name}: {share:.1%} of the area, {first} {engineering(one.modal, 'Pa')}, {second}"
-        f" {engineering(other.modal, '' if study.young else 'Pa')}"
+        f" {engineering(other.modal, '' if study.young else 'Pa')}{modal}"
         for name, share, (one, other) in zip(study.names, study.fractions, study.pairs, strict=True)
     ]
 

@@ -5,9 +5,11 @@ import re
 
 import numpy as np
 import pytest
+from markupsafe import Markup
 
 from alphacut.entry import main
 from alphacut.io.problem import BadInput
+from alphacut.report import material
 from alphacut.stages.image import bounds
 from alphacut.stages.image.bounds import Told
 
@@ -166,7 +168,40 @@ def test_a_window_gives_a_confidence_interval_and_says_so(folder, capfd):
     assert found["E_GPa"]["lower"] < found["apparent_E_GPa"]["lower"]
     assert found["apparent_E_GPa"]["upper"] < found["E_GPa"]["upper"]
     assert [row["source"] for row in found["error_table"]] == ["finite window", "discretisation"]
-    assert main(["image", written(folder, boundary='"window"', tiles="2"), "--quiet"]) == 0
+    capfd.readouterr()
+    assert main(["image", written(folder, boundary='"window"', tiles="2")]) == 0
+    told = capfd.readouterr().out
+    assert "over the inputs at α = 1, of the window's tiles and not of the material:\n" in told
+
+
+def test_every_admissible_case_lies_within_what_is_said_of_an_image(folder, capfd):
+    image = pytest.importorskip("PIL.Image")
+    image.fromarray(np.asarray(image.open(folder / "a.png"))[::2, ::2]).save(folder / "a.png")
+    window = {"boundary": '"window"', "tiles": "2"}
+    ranges = '["20 GPa ± 10 %", "[70, 75, 85, 90] GPa"]'
+    found = solved(folder, capfd, **window, threshold="[[115, 120, 140, 145]]", modulus=ranges)
+    ends = (("18 GPa", "70 GPa", 145, 0), ("22 GPa", "90 GPa", 115, 0))
+    ends += (("18 GPa", "75 GPa", 140, 1), ("22 GPa", "85 GPa", 120, 1))
+    for matrix, particle, threshold, alpha in ends:
+        modulus = f'["{matrix}", "{particle}"]'
+        corner = solved(folder, capfd, **window, modulus=modulus, threshold=f"[{threshold}]")
+        whole = ["apparent_E_support_GPa", "apparent_E_GPa"][alpha]
+        inside(corner["apparent_E_GPa"], found[whole])
+        if alpha:
+            inside(corner["grains_E_GPa"], found["grains_E_GPa"])
+    case = written(folder, **window, modulus=ranges)
+    assert main(["run", case, "--out", str(folder / "out"), "--no-figures"]) == 0
+    told = capfd.readouterr().out
+    assert "the window's own apparent E, proved over the inputs: [" in told
+    assert "GPa, nu 0.3 (modal values)" in told
+    page = material.image(found, Markup(""))
+    assert "The window&#39;s own apparent E, proved over the inputs: [" in page
+
+
+def inside(one, other):
+    """An interval lies in another; rounding aside."""
+    assert other["lower"] <= one["lower"] * (1 + 1e-6)
+    assert one["upper"] <= other["upper"] * (1 + 1e-6)
 
 
 @pytest.mark.parametrize("command", ["check", "image", "run"])
