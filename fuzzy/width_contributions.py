@@ -48,19 +48,23 @@ class Shares:
 
     def __str__(self) -> str:
         """A line for each output and input or group, the least and the greatest share."""
-        return "\n".join(
-            ["share of the width lost where one is fixed at its modal value:"]
-            + [f"  {', '.join(names)}: {words}" for *names, words in self._told()]
-            + self._said
-        )
+        lines = [f"  {', '.join(names)}: {words}" for *names, words in self._told()]
+        return "\n".join([f"{self._head}:", *lines, *self._said])
 
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
         """The shares as a table, for notebooks."""
         head = ("output",) if len(self.outputs) > 1 else ()
-        rows, below = self._told(), "\n".join(self._said)
+        rows, below = self._told(), "\n".join([self._head, *self._said])
         return html_table((*head, "input", "share of the width lost"), rows, below=below)
+
+    @property
+    def _head(self) -> str:
+        """What a share is, and what its range runs over."""
+        over = "the levels and times" if self.width.ndim > 2 else "the levels"
+        fixed = "share of the width lost where the input is fixed at the middle of its cut at α = 1"
+        return f"{fixed}; smallest … largest over {over}"
 
     @property
     def _said(self) -> list[str]:

@@ -222,8 +222,8 @@ def verified(result: FuzzyResult, memo: Memo, effects: Effects) -> FuzzyResult:
         result, memo, effects
     )
     notes = tuple(
-        f"a sample lies beyond the corners of output {result.outputs[i]}: the signs do not hold"
-        for i in np.flatnonzero(refuted)
+        f"a sample lies beyond the corners of output {name}: {_basis(memo, effects, name)} not hold"
+        for name in np.array(result.outputs)[refuted]
     )
     proved = effects.table(result, effects.proved) & ~refuted
     spent = len(memo) - result.runs
@@ -236,6 +236,15 @@ def verified(result: FuzzyResult, memo: Memo, effects: Effects) -> FuzzyResult:
         verification_runs=spent,
         notes=(*effects.notes(result.domain), *notes),
     )
+
+
+def _basis(memo: Memo, effects: Effects, output: str) -> str:
+    """What the corners of an output rest on, with an auxiliary verb."""
+    row = effects.outputs.index(output)
+    if not ((effects.signs[:, row] != 0) & ~effects.proved[:, row]).any():
+        return "the signs do"
+    stated = "what was stated or " if memo.known.words else ""
+    return f"{stated}the monotonicity seen at the probes does"
 
 
 def _contradicted(result: FuzzyResult, memo: Memo, effects: Effects) -> Mask:

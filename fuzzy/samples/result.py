@@ -194,7 +194,8 @@ class FuzzyResult:
         given = condition(self._rests_on)
         runs = f"{self.runs} runs"
         if self.verification_runs:
-            runs += f" and {self.verification_runs} more that looked for what they missed"
+            how = "looked for what they missed" if "auto" in self.plan else "tested monotonicity"
+            runs += f" and {self.verification_runs} more that {how}"
         runs += "; their error is not estimated" if np.isnan(self.error).any() else ""
         lines = [f"{self.nature} bounds{given} by the plan {self.plan}, {runs}"]
         for column, name in enumerate(self.outputs[: self._printed]):

@@ -124,7 +124,17 @@ def test_a_sample_beyond_the_corners_refutes_the_signs():
         {"x": Triangular(0, 1, 2)},
         Signed(verification=hidden),
     )
-    assert any("the signs do not hold" in note or "not monotone" in note for note in result.notes)
+    assert "the monotonicity seen at the probes does not hold" in " ".join(result.notes)
+    assert "9 runs and 6 more that tested monotonicity" in str(result)
+    mixed = propagate(
+        lambda x, y: x + 3 * np.exp(-(((x - 1.0) / 0.1) ** 2)) + y,
+        {"x": Triangular(0, 1, 2), "y": Triangular(0, 1, 2)},
+        Signed(verification=hidden),
+        known=Known({"y": 1}),
+    )
+    assert "what was stated or the monotonicity seen at the probes does" in " ".join(mixed.notes)
+    free = propagate(lambda x: np.sin(x), {"x": Interval(0, 2)})
+    assert "more that looked for what they missed" in str(free)
     assert result.upper.max() >= 4 - 1e-9
     stated = propagate(
         lambda x: 1 - x**2, {"x": Triangular(-1, 0.1, 2)}, Signed(), known=Known({"x": -1})
