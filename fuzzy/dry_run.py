@@ -68,14 +68,8 @@ class Explanation:
             for point in self.missing[:_SHOWN]
         ]
         more = [f"… and {missing - _SHOWN} more"] if missing > _SHOWN else []
-        return "\n".join(
-            [
-                f"{head}{time}; {self.memory / 1e6:.3g} MB of memory",
-                *self.reasons,
-                *(f"  would run {row}" for row in first),
-                *more,
-            ]
-        )
+        head += f"{time}; {self.memory / 1e6:.3g} MB of memory"
+        return "\n".join([head, *self.reasons, *(f"  would run {row}" for row in first), *more])
 
     __repr__ = __str__
 

@@ -96,15 +96,8 @@ def joint_outputs(
         inner.append(_hull(np.array(pairs)))
         cut = _polygon(unit, found.lower[level], found.upper[level])
         outer.append(cut if len(cut) else inner[-1])  # of one pair alone rounding leaves nothing
-    natures = {str(found.nature)}
-    return JointOutputs(
-        tuple(found.domain.alpha),
-        tuple(outer),
-        tuple(inner),
-        ", ".join(sorted(natures)),
-        str(found.claim),
-        found,
-    )
+    levels, nature = tuple(found.domain.alpha), str(found.nature)
+    return JointOutputs(levels, tuple(outer), tuple(inner), nature, str(found.claim), found)
 
 
 @dataclass(frozen=True)

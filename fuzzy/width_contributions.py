@@ -150,11 +150,8 @@ def width_shares(
         ValueError: A group names no input, or a propagation gives no two arrays.
     """
     inputs = fuzzy_inputs(inputs)
-    chosen = (
-        {name: tuple(members) for name, members in groups.items()}
-        if groups
-        else {name: (name,) for name in inputs}
-    )
+    groups = groups or {name: (name,) for name in inputs}
+    chosen = {name: tuple(members) for name, members in groups.items()}
     unknown = sorted({member for members in chosen.values() for member in members} - set(inputs))
     if unknown:
         raise ValueError(
@@ -180,13 +177,8 @@ def width_shares(
             outputs.append(tuple(f"output {k}" for k in range(difference.shape[-1])))
         return difference
 
-    sets: list[dict[str, FuzzyNumber]] = [
-        dict(inputs),
-        *(
-            {**inputs, **{member: Crisp(inputs[member].modal) for member in members}}
-            for members in chosen.values()
-        ),
-    ]
+    fixed = ({x: Crisp(inputs[x].modal) for x in members} for members in ((), *chosen.values()))
+    sets = [{**inputs, **crisp} for crisp in fixed]
     widths = []
     with told(progress) as tell:
         for kept in sets:

@@ -81,12 +81,8 @@ def cheapest_tolerances(
     def cost(logs: Array) -> float:
         return float(np.log((c / proved(start * np.exp(logs - logs.mean()), 8.0)[0]).sum()))
 
-    found = minimize(
-        cost,
-        np.zeros(len(names)),
-        method="BFGS",
-        options={"eps": 1e-4, "gtol": 3e-5, "maxiter": 60},
-    )
+    options = {"eps": 1e-4, "gtol": 3e-5, "maxiter": 60}
+    found = minimize(cost, np.zeros(len(names)), method="BFGS", options=options)
     shape = start * np.exp(found.x - found.x.mean())
     safe, unsafe = proved(shape, 8.0)
     tolerances = dict(zip(names, map(float, safe), strict=True))

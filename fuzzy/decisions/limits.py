@@ -215,10 +215,8 @@ def decide(
     possible = _degree(below)
     staying = [_degree(one) for one in above]
     necessary = max(1 - high for _, high in staying), max(1 - low for low, _ in staying)
-    margin = {}
-    for name, limit in limits.items():
-        lower, upper = whole.bounds(name)
-        margin[name] = (limit - upper, limit - lower)
+    ends = {name: whole.bounds(name) for name in limits}
+    margin = {name: (limits[name] - high, limits[name] - low) for name, (low, high) in ends.items()}
     at = below.witness
     witness = None if at is None else dict(zip(domain.names, map(float, at), strict=True))
     levels_of, runs = tuple(domain.alpha), whole.runs + sum(one.runs for one in found)

@@ -122,21 +122,9 @@ class JointClaim:
             if number.claim.given:
                 alike.setdefault(", ".join(number.claim.given), []).append(name)
         given = [f"{', '.join(names)}: {words}" for words, names in alike.items()]
-        rule = next(
-            (
-                number.joint or Joint((name,), False, number.claim.about)
-                for name, number in claimed.items()
-            ),
-            None,
-        )
-        held = (
-            [
-                f"{', '.join(opinions)} in {'their cuts' if len(opinions) > 1 else 'its cut'} at"
-                f" α (opinions)"
-            ]
-            if opinions
-            else []
-        )
+        rules = (x.joint or Joint((name,), False, x.claim.about) for name, x in claimed.items())
+        rule, where = next(rules, None), "their cuts" if len(opinions) > 1 else "its cut"
+        held = [f"{', '.join(opinions)} in {where} at α (opinions)"] if opinions else []
         return cls(rule, (*given, *([rule.words] if rule and rule.words else []), *held), opinions)
 
     def resting_on(

@@ -176,12 +176,8 @@ class Extended(_Transformation):
         effects = verify(memo, domain, self.verification, outputs=self.outputs)
         widest = effects.signs[0] != 0
         classes = (widest | model.known.monotone_in(domain.names, effects.outputs)).all(axis=0)
-        chosen = replace(
-            self,
-            monotone=tuple(
-                name for name, holds in zip(domain.names, classes, strict=True) if holds
-            ),
-        )
+        names = tuple(name for name, holds in zip(domain.names, classes, strict=True) if holds)
+        chosen = replace(self, monotone=names)
         model.report(0.5, last=True)
         require_few(chosen.size(domain), self.limit, effects.notes(domain))
         return verified(super(Extended, chosen).run(memo, domain), memo, effects)

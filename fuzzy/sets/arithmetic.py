@@ -155,13 +155,9 @@ def apply(
 
 
 def _text(number: FuzzyNumber) -> str:
-    return (
-        number.text
-        if isinstance(number, Expression)
-        else f"{number.value:g}"
-        if isinstance(number, Crisp)
-        else str(number)
-    )
+    if isinstance(number, Expression):
+        return number.text
+    return f"{number.value:g}" if isinstance(number, Crisp) else str(number)
 
 
 def _sources(number: FuzzyNumber) -> tuple[FuzzyNumber, ...]:

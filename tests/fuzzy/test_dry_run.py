@@ -190,7 +190,7 @@ def test_samples_of_earlier_steps_count_and_a_torn_end_is_told(tmp_path):
             raise KeyboardInterrupt
         return x * y
 
-    with pytest.raises(KeyboardInterrupt, match="2 samples are kept"):
+    with pytest.raises(KeyboardInterrupt, match="the 2 samples of this call are in"):
         fuzzy.propagate(stopped, inputs, store=path, identity=identity)
     assert explain(inputs, store=path, identity=identity).stored == 2
     path.write_bytes(path.read_bytes()[:-3])
