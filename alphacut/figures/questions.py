@@ -11,6 +11,7 @@ from alphacut.figures.captions import in_words
 from alphacut.figures.style import BLUE, GREY, INK, ORANGE, alpha_legend, colours, figure
 from alphacut.io.files import Document
 from alphacut.io.units import MINUS, axis_prefix
+from alphacut.stages.vibration.decision import degree
 
 if TYPE_CHECKING:
     import xarray
@@ -22,15 +23,19 @@ def decision(found: xarray.Dataset) -> Figure:
     names, alpha = [str(name) for name in found["output"].values], found["alpha"].values
     drawn, axes = figure(7.2, 1.1 + 0.75 * len(names))
     share = 1 - found["margin"] / found["allowed"]
-    places = np.arange(len(names))[::-1]
-    for place, name in zip(places, names, strict=True):
-        ends = share.sel(output=name)
-        low, high = ends.sel(bound="upper").values, ends.sel(bound="lower").values
+    places, verdicts = np.arange(len(names))[::-1], found.attrs["verdict"].split(", ")
+    for place, name, verdict in zip(places, names, verdicts, strict=False):
+        ends, sure = share.sel(output=name), verdict == "unsafe"
+        wide, high = ends.sel(bound="upper").values, ends.sel(bound="lower").values
+        low = np.maximum(wide, 1.0) if sure else wide  # every motion exceeds the limit
         for level, left, right, shade in zip(alpha, low, high, colours(alpha), strict=True):
             height = 0.66 - 0.4 * float(level)
             axes.barh(place, right - left, left=left, height=height, color=shade, lw=0)
+        left_out = low[0] - wide[0]
+        axes.barh(place, left_out, left=wide[0], height=0.66, fc="none", ec=GREY, hatch="///", lw=0)
         axes.plot([low[-1], high[-1]], [place, place], color=INK, lw=2)
         words, across = degrees(found.sel(limit=name)), axes.get_yaxis_transform()
+        words += ": exceeded for sure" + ", not where hatched" * (left_out > 0) if sure else ""
         axes.text(0.01, place + 0.38, words, fontsize=8, transform=across)
     axes.axvline(1.0, color=ORANGE, lw=1.4, ls="--")
     axes.set_ylim(-0.5, len(names) - 0.2)
@@ -44,12 +49,8 @@ def decision(found: xarray.Dataset) -> Figure:
 
 def degrees(found: xarray.Dataset) -> str:
     """Bounds of possibility and necessity of exceeding one limit."""
-    words = []
-    for kind, word in (("possibility", "possible"), ("necessity", "necessary")):
-        low, high = found[kind].values
-        ends = f"{low:.3g}" if high - low < 5e-4 else f"{low:.3g} … {high:.3g}"
-        words.append(f"{word} to {ends}")
-    return f"exceeding is {', '.join(words)}"
+    possible, necessary = (degree(*found[x].values) for x in ("possibility", "necessity"))
+    return f"exceeding is possible to {possible}, necessary to {necessary}"
 
 
 def joint(found: xarray.Dataset) -> Figure:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -64,7 +65,7 @@ def _peaks(
 ) -> xarray.Dataset:
     """Peaks of `outputs`: those given, and those of an envelope of the outputs without any.
 
-    That envelope's first output is that of the given one, so that a gap means the same there.
+    That envelope begins with the given one's first output, which a tolerance or gap is of.
     """
     import xarray
 
@@ -96,20 +97,9 @@ def _decisions(
     from alphacut.frame.decisions.exceeding import any_exceeding, exceeding
 
     assert wanted.frame is not None
-    frame, inputs, count = wanted.frame, wanted.inputs(task.fuzzy), len(limits) + 1
-
-    def of(part: Mapping[str, float]) -> Exceeding:
-        return exceeding(
-            frame,
-            inputs,
-            part,
-            duration=task.duration,
-            step=task.step,
-            lowest=task.alpha[0],
-            workers=workers,
-            progress=False,
-        )
-
+    count = len(limits) + 1
+    of = partial(exceeding, wanted.frame, wanted.inputs(task.fuzzy), workers=workers)
+    of = partial(of, duration=task.duration, step=task.step, lowest=task.alpha[0], progress=False)
     each, least = {}, {one.output: one.value for one in sorted(limits, key=lambda x: -x.value)}
     for one in limits:
         each[one.name] = of({one.output: one.value})
@@ -180,7 +170,7 @@ def _dataset(
         {
             "verdict": ", ".join(_verdicts(found, margin[0], str(peaks.attrs["nature"]))),
             "nature": ", ".join(x.scale.nature for x in found.values()),
-            "reason": next((x.scale.reason for x in found.values() if x.scale.reason), ""),
+            "reason": "\n".join(_reasons(found)),
             "claim": next(iter(found.values())).claim,
             "step": task.step,
             "peaks": str(peaks.attrs["nature"]),
@@ -188,26 +178,33 @@ def _dataset(
     )
 
 
+def _reasons(found: Mapping[str, Exceeding]) -> Iterator[str]:
+    """Why limits are not proved, each reason with the limits that it is of."""
+    told = {name: one.scale.reason for name, one in found.items() if name != ANY}
+    for reason in dict.fromkeys(filter(None, told.values())):
+        yield f"of {', '.join(name for name in told if told[name] == reason)}: {reason}"
+
+
 def _verdicts(found: Mapping[str, Exceeding], margin: Array, nature: str) -> Iterator[str]:
     """A verdict on each limit; where nothing is proved, what the envelope says of it.
 
     `margin` is limit less peak at the lowest level, lower and upper ends, (2, limits).
     """
-    told = []
+    unproved = "" if nature == "guaranteed" else " (not proved)"
+    told, held = [], HOLDS.format(nature) + unproved
     for one, (low, high) in zip(found.values(), [*margin.T, (np.nan, np.nan)], strict=False):
         verdict = one.verdict
         if verdict == "undecided" and one.scale.witness is None and low > 0:
-            verdict = HOLDS.format(nature)
+            verdict = held
         elif verdict == "undecided" and high < 0:
-            verdict = f"exceeded by the {nature} envelope (not proved)"
+            verdict = f"exceeded by the {nature} envelope{unproved}"
         told.append(verdict)
-    kept = {"safe", HOLDS.format(nature)}
-    if ANY in found and told[-1] == "undecided" and set(told[:-1]) <= kept:
-        told[-1] = HOLDS.format(nature)
+    if ANY in found and told[-1] == "undecided" and set(told[:-1]) <= {"safe", held}:
+        told[-1] = held
     yield from told
 
 
-HOLDS = "holds by the {} envelope (not proved)"
+HOLDS = "holds by the {} envelope"
 
 
 def decision_document(found: xarray.Dataset) -> Document:
@@ -249,9 +246,8 @@ def between_nodes(found: Document, name: str) -> str:
         return f"between them kept by the {found['peaks']} envelope, see the margin"
     if found["limits"][name]["verdict"] != "safe":
         return "the motion between them is not included"
-    below = [(one["unit"], one["lower"][0]) for x, one in found["margins"].items() if name == x]
-    far = [f" by up to {engineering(-float(low), unit, digits=3)}" for unit, low in below]
-    return f"between them {OPEN}{''.join(far)}; a smaller step may settle it"
+    far = _spare(found, name, " by up to {}")
+    return f"between them {OPEN}{far}; a smaller step may settle it"
 
 
 OPEN = "open"
@@ -268,7 +264,8 @@ def worth(found: Document, name: str) -> str:
     """Nature of a verdict, the nodes that it is on, and what it says of the motion between."""
     one, nodes = found["limits"][name], f"at nodes every {found['step']:g} s"
     of = "" if one["verdict"] in ("safe", "unsafe") else "both degrees "
-    return f"{of}{one['nature']}, {nodes}: {between_nodes(found, name)}"
+    of = "" if degree(*one["possibility"]) == UNKNOWN else f"{of}{one['nature']}, "
+    return f"{of}{nodes}: {between_nodes(found, name)}"
 
 
 def margin_ends(found: Document, name: str, level: int) -> tuple[float, float]:
@@ -291,18 +288,28 @@ def outward(ends: tuple[float, float]) -> tuple[float, float]:
 def degree(low: float, high: float) -> str:
     """A degree between two bounds in words, one number where four decimals tell them alike."""
     ends = [f"{round(float(end), 4):g}" for end in (low, high)]
-    return " … ".join(dict.fromkeys(ends))
+    return UNKNOWN if ends == ["0", "1"] else " … ".join(dict.fromkeys(ends))
+
+
+UNKNOWN = "0 … 1 (unknown)"
 
 
 def why(one: Document) -> str:
     """Why a limit is neither safe nor unsafe, and what would decide it."""
-    if one["verdict"] in ("safe", "unsafe"):
-        return ""
     if one["verdict"] != "undecided":
-        return "; fewer or narrower fuzzy inputs would give a proof"
+        cure = "; fewer or narrower fuzzy inputs would give a proof"
+        return cure if "not proved" in one["verdict"] else ""
     if one["witness"] is None:
         return ", since neither a proof nor a motion beyond it was found; narrower inputs decide"
     return ", since some of the motions exceed it and some do not; narrower inputs decide"
+
+
+def _spare(found: Document, name: str, words: str) -> str:
+    """`words` on how far peaks between nodes are from a limit; empty for several limits."""
+    each = [
+        (float(one["lower"][0]), one["unit"]) for x, one in found["margins"].items() if x == name
+    ]
+    return "".join(words.format(engineering(abs(low), unit, digits=3)) for low, unit in each)
 
 
 def sentences(found: Document) -> Iterator[str]:
@@ -316,8 +323,13 @@ def sentences(found: Document) -> Iterator[str]:
         degrees = f"possible to {degree(a, b)}, necessary to {degree(c, d)}"
         if one["verdict"] in ("safe", "unsafe"):
             yield f"{of}: {degrees}: {verdict_of(found, name)} ({worth(found, name)})"
-        else:
-            yield f"{of}: {one['verdict']}{why(one)}. It is {degrees}, {worth(found, name)}"
+            continue
+        verdict, more = one["verdict"], f". It is {degrees}, {worth(found, name)}"
+        if verdict.startswith(HOLDS[:5]):
+            spare, more = _spare(found, name, " with {} to spare"), "" if UNKNOWN in more else more
+            proof = "not proved, but " if "not proved" in verdict else ""
+            verdict = f"{proof}kept by the {found['peaks']} envelope{spare}"
+        yield f"{of}: {verdict}{why(one)}{more}"
     for name, margin in found["margins"].items():
         low, high = margin_ends(found, name, 0)
         ends = (engineering(end, margin["unit"], digits=3) for end in (low, high))
@@ -326,7 +338,6 @@ def sentences(found: Document) -> Iterator[str]:
             alone = engineering(above, margin["unit"], digits=3)
             of += f"; upper end 0 by the decision, {alone} by them alone"
         yield f"safety margin of {name} at {level}: {' … '.join(ends)} ({of})"
-    if found["reason"]:
-        yield f"not proved: {found['reason']}"
+    yield from (f"not proved, {reason}" for reason in found["reason"].splitlines())
     if found["claim"]:
         yield f"a limit is exceeded with P at most as it is possible: {found['claim']}"

@@ -6,6 +6,8 @@ import csv
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -14,16 +16,19 @@ import xarray
 from alphacut.case.load import load
 from alphacut.case.quick import quick
 from alphacut.entry import main
+from alphacut.figures import questions
 from alphacut.io.units import engineering
 from alphacut.stages.vibration import decision
 from alphacut.stages.vibration.decision import (
     ANY,
     _peaks,
+    _reasons,
     _verdicts,
     degree,
     outward,
     sentences,
     why,
+    worth,
 )
 from alphacut.stages.vibration.envelope_task import task_of
 from alphacut.stages.vibration.structure import Structure, structure
@@ -301,18 +306,16 @@ def test_a_storey_that_is_not_there_is_told_before_its_height(
 
 
 def test_what_is_not_proved_is_judged_by_the_envelope_with_a_reason() -> None:
-    from types import SimpleNamespace
-    from typing import Any, cast
-
     def one(witness: object, verdict: str = "undecided") -> Any:
         return cast("Any", SimpleNamespace(verdict=verdict, scale=SimpleNamespace(witness=witness)))
 
     margin = np.array([[0.2, 0.1, -0.1, -0.3], [0.4, 0.3, 0.2, -0.1]])
     found = {"a": one(None), "b": one(1.0), "c": one(None), "d": one(None), ANY: one(1.0)}
     told = list(_verdicts(found, margin, "estimated"))
-    kept = "holds by the estimated envelope (not proved)"
+    kept, sure = "holds by the estimated envelope (not proved)", "holds by the guaranteed envelope"
     passed = "exceeded by the estimated envelope (not proved)"
     assert told == [kept, "undecided", "undecided", passed, "undecided"]
+    assert next(_verdicts(found, margin, "guaranteed")) == sure
     calm = {"a": one(None), "b": one(None, "safe"), ANY: one(None)}
     assert list(_verdicts(calm, margin, "estimated")) == [kept, "safe", kept]
     for verdict, witness, words in (
@@ -320,8 +323,11 @@ def test_what_is_not_proved_is_judged_by_the_envelope_with_a_reason() -> None:
         ("undecided", None, ", since neither a proof nor a motion beyond it was found"),
         ("undecided", {"m1": 1.0}, ", since some of the motions exceed it"),
         ("safe", None, ""),
+        (sure, None, ""),
     ):
-        assert why({"verdict": verdict, "witness": witness}).startswith(words)
+        told = why({"verdict": verdict, "witness": witness})
+        assert told.startswith(words)
+        assert bool(told) is bool(words)
 
 
 def test_quick_keeps_one_level_alone(tmp_path: Path) -> None:
@@ -355,3 +361,58 @@ def test_the_margin_of_an_exceeded_limit_ends_at_zero() -> None:
     assert "−2.00 mm … 0 m (peaks guaranteed; upper end 0 by the decision, 190 µm by them" in line
     found["limits"] = {"q1": {**found["limits"]["q1"], "verdict": "undecided", "witness": None}}
     assert "−2.00 mm … 190 µm (peaks guaranteed)" in list(sentences(found))[1]
+
+
+def test_a_limit_that_the_envelope_keeps_is_told_by_what_it_spares_and_its_own_reason() -> None:
+    one = {"possibility": (0, 1), "necessity": (0, 0), "nature": "verified by sampling"}
+    one |= {"verdict": "holds by the estimated envelope (not proved)", "witness": None}
+    margin = {"output": "q1", "limit": 6.3e-3, "unit": "m", "lower": [2e-3], "upper": [3e-3]}
+    found = {
+        "limits": {name: {**one, "between_nodes": ""} for name in ("q1", ANY)},
+        "margins": {"q1": margin},
+        "alpha": [0.0],
+        **{"step": 0.01, "peaks": "estimated", "claim": ""},
+        "reason": "of q1: it takes many points\nof q2: it takes more",
+    }
+    lines, end = list(sentences(found)), "; fewer or narrower fuzzy inputs would give a proof"
+    kept = "not proved, but kept by the estimated envelope"
+    assert lines[0] == f"|q1| > 6.300 mm: {kept} with 2.00 mm to spare{end}"
+    assert lines[1] == f"{ANY}: {kept}{end}"
+    assert lines[-1] == "not proved, of q2: it takes more"
+    assert worth(found, "q1").startswith("at nodes every 0.01 s: between them kept by")
+    found["limits"] = {"q1": {**one, "between_nodes": "", "possibility": (0, 0.4)}}
+    assert "to spare" + end + ". It is possible to 0 … 0.4, n" in next(sentences(found))
+
+
+def test_reasons_name_the_limits_that_they_are_of() -> None:
+    def of(reason: str) -> Any:
+        return SimpleNamespace(scale=SimpleNamespace(reason=reason))
+
+    found = {"a": of("why"), "b": of(""), "c": of("why"), "d": of("else"), ANY: of("why")}
+    assert list(_reasons(found)) == ["of a, c: why", "of d: else"]
+
+
+def test_the_figure_of_decisions_leaves_out_what_a_sure_excess_rules_out() -> None:
+    """The peaks alone leave room below the limit, which no motion keeps."""
+    ends = [[[-1.0, -1.0], [0.5, 0.5]]]
+    found = xarray.Dataset(
+        {
+            **{
+                kind: (("limit", "bound"), [[1.0, 1.0], [low, 1.0]])
+                for kind, low in (("possibility", 1.0), ("necessity", 0.0))
+            },
+            "margin": (("alpha", "bound", "output"), ends),
+        },
+        {
+            **{"limit": ["a", "b"], "output": ["a", "b"], "bound": ["lower", "upper"]},
+            **{"alpha": [0.0], "allowed": ("output", [1.0, 1.0])},
+        },
+        {"verdict": "unsafe, undecided"},
+    )
+    (axes,) = questions.decision(found).axes
+    full, hatched, whole, none = (patch.get_bbox() for patch in axes.patches)
+    assert (full.x0, full.x1, hatched.x0, hatched.x1) == (1.0, 2.0, 0.5, 1.0)
+    assert (whole.x0, whole.x1, none.width) == (0.5, 2.0, 0.0)
+    told = [text.get_text() for text in axes.texts]
+    assert told[0].endswith("necessary to 1: exceeded for sure, not where hatched")
+    assert told[1] == "exceeding is possible to 1, necessary to 0 … 1 (unknown)"
