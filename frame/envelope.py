@@ -23,6 +23,11 @@ if TYPE_CHECKING:
     from alphacut.frame.boxes import Boxes
 
 
+def error_name(*, inside: bool) -> str:
+    """What the error of certified bounds, which hold it, and that of others are called."""
+    return "error within the bounds" if inside else "error to be added"
+
+
 class Trajectories(Protocol):
     """Trajectories as an envelope needs them."""
 
@@ -231,9 +236,9 @@ class Envelope:
     def to_csv(self, path: str | Path) -> None:
         """Write a CSV file with a row for each output, level and node.
 
-        Its columns are output, unit, alpha, time [s], lower, upper, error where there is one, then
-        for each parameter where the bounds are reached, in SI units: `NAME at lower`, `NAME at
-        upper`.
+        Its columns are output, unit, alpha, time [s], lower, upper, where there is one `error
+        within the bounds` (certified) or `error to be added`, in the same unit, then for each
+        parameter where the bounds are reached, in SI units: `NAME at lower`, `NAME at upper`.
 
         Args:
             path: The file; one that is there is replaced.
@@ -250,7 +255,8 @@ class Envelope:
             for a, alpha in enumerate(self.alpha)
             for t, time in enumerate(self.time)
         )
-        bounds = ("lower", "upper", "error")[: len(bands)]
+        error = error_name(inside=self.inner_lower is not None)
+        bounds = ("lower", "upper", error)[: len(bands)]
         write_csv(path, ("output", "unit", "alpha", "time [s]", *bounds, *places), rows)
 
     def to_dataset(self) -> xarray.Dataset:

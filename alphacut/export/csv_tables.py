@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from alphacut.frame.envelope import error_name
 from alphacut.frame.outputs import output_unit
 from alphacut.io.files import write_text
 from alphacut.io.netcdf import read_dataset
@@ -101,7 +102,8 @@ def _by_output(dataset: xarray.Dataset) -> Iterator[tuple[str, str]]:
         columns = {"time [s]": one["time"].values}
         for level in one["alpha"].values:
             for band in (band for band in BANDS if band in one):
-                title = f"{band} at alpha {level:g} [{unit}]"
+                what = band if band != "error" else error_name(inside="inner_lower" in one)
+                title = f"{what} at alpha {level:g} [{unit}]"
                 columns[title] = one[band].sel(alpha=level).values
         if "between" in one:
             columns[f"between [{unit}]"] = one["between"].values

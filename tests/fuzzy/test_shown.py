@@ -3,6 +3,7 @@
 import csv
 import re
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -161,6 +162,11 @@ def test_an_envelope_goes_into_a_csv_file_with_its_units(tmp_path):
     assert (float(last["time [s]"]), float(last["alpha"])) == (0.4, 1.0)
     assert float(last["lower"]) == found.lower[-1, -1, 0]
     assert float(last["E at upper"]) == found.upper_at[-1, -1, 0, 0]
+    assert found.nature == "guaranteed"
+    assert float(last["error within the bounds"]) == found.error[-1, -1, 0]
+    estimated = replace(found, nature="estimated", inner_lower=None, inner_upper=None)
+    estimated.to_csv(tmp_path / "estimated.csv")
+    assert "error to be added" in table(tmp_path / "estimated.csv")[0]
 
 
 @pytest.mark.parametrize("place", ["none/found.csv", "."])

@@ -71,6 +71,25 @@ def test_the_report_writes_them_on_demand(tmp_path, capfd):
     assert main(["report", str(out), "--csv", str(tmp_path / "file")]) == 2
 
 
+@pytest.mark.parametrize(
+    ("more", "what"),
+    [((), "error to be added"), (("inner_lower", "inner_upper"), "error within the bounds")],
+)
+def test_an_error_says_whether_the_bounds_hold_it(tmp_path, more, what):
+    band = (("alpha", "time", "output"), np.ones((1, 2, 1)))
+    data = xarray.Dataset(
+        dict.fromkeys(("lower", "upper", "error", *more), band),
+        {"alpha": [0.5], "time": [0.0, 0.1], "output": ["q1"]},
+        {"format_version": 2},
+    )
+    places = (("alpha", "time", "output", "parameter"), np.ones((1, 2, 1, 1)))
+    data.assign(lower_at=places, upper_at=places).to_netcdf(tmp_path / "envelope_all.nc")
+    write_tables(tmp_path, tmp_path / "tables")
+    with (tmp_path / "tables" / "envelope_all-q1.csv").open(encoding="utf-8") as file:
+        (row, _) = csv.DictReader(file)
+    assert row[f"{what} at alpha 0.5 [m]"] == "1.0"
+
+
 def test_values_of_several_units_have_theirs_in_a_column(tmp_path):
     margin = {"units": "SI, by output"}
     data = xarray.Dataset(
