@@ -1,8 +1,9 @@
-/* Local maxima of quadratics g.x + x.H.x/2 over boxes: the twin of box_quadratic.py. */
+/* Maxima of quadratics g.x + x.H.x/2 over boxes: the twin of box_quadratic.py. */
 #include <math.h>
 #include <string.h>
 
 #define MOST 64
+#define FACES 6
 
 static double gain(int d, const double *g, const double *H, const double *x)
 {
@@ -123,6 +124,87 @@ int local_maximum(long count, int d, int rounds, const double *g, const double *
             double after = gain(d, gn, Hn, xn);
             if (!(after - before > 1e-10 * (1e-6 + fabs(before)))) break;
             before = after;
+        }
+    }
+    return 1;
+}
+
+/* Cholesky factor of A (m, m) in its place; 0 where it is not positive definite. */
+static int definite(int m, double *A)
+{
+    for (int j = 0; j < m; j++)
+        for (int i = j; i < m; i++) {
+            double left = A[i * m + j];
+            for (int k = 0; k < j; k++) left -= A[i * m + k] * A[j * m + k];
+            if (i == j && !(left > 0)) return 0;
+            A[i * m + j] = i == j ? sqrt(left) : left / A[j * m + j];
+        }
+    return 1;
+}
+
+static void solve(int m, const double *L, double *b)
+{
+    for (int i = 0; i < m; i++) {
+        for (int j = 0; j < i; j++) b[i] -= L[i * m + j] * b[j];
+        b[i] /= L[i * m + i];
+    }
+    for (int i = m - 1; i >= 0; i--) {
+        for (int j = i + 1; j < m; j++) b[i] -= L[j * m + i] * b[j];
+        b[i] /= L[i * m + i];
+    }
+}
+
+/* Best maximum inside the faces on which the m axes `free` are not at their ends. */
+static void faces(int d, int m, const int *free, const double *g, const double *H,
+                  const double *low, const double *high, double *best, double *top)
+{
+    double A[FACES * FACES], step[FACES], x[FACES], largest = 0;
+    int bound[FACES], b = 0;
+    for (int i = 0; i < m * m; i++) {
+        A[i] = -H[free[i / m] * d + free[i % m]];
+        if (fabs(A[i]) > largest) largest = fabs(A[i]);
+    }
+    for (int i = 0; i < m; i++) A[i * m + i] += 1e-13 * (largest + 1e-300);
+    if (!definite(m, A)) return; /* its faces hold better points */
+    for (int i = 0, a = 0; i < d; i++)
+        if (a < m && free[a] == i) a++; else bound[b++] = i;
+    for (int c = 0; c < 1 << b; c++) {
+        for (int k = 0; k < b; k++)
+            x[bound[k]] = c >> (b - 1 - k) & 1 ? high[bound[k]] : low[bound[k]];
+        for (int a = 0; a < m; a++) {
+            step[a] = g[free[a]];
+            for (int k = 0; k < b; k++) step[a] += H[free[a] * d + bound[k]] * x[bound[k]];
+        }
+        solve(m, A, step);
+        for (int a = 0; a < m; a++) {
+            int i = free[a];
+            x[i] = step[a] < low[i] ? low[i] : step[a] > high[i] ? high[i] : step[a];
+        }
+        double value = gain(d, g, H, x);
+        if (value > *top) {
+            *top = value;
+            memcpy(best, x, d * sizeof(double));
+        }
+    }
+}
+
+/* x, zero at first, becomes the global maximum; 0 where the faces are too many. */
+int global_maximum(long count, int d, const double *g, const double *H, const double *lower,
+                   const double *upper, double *x)
+{
+    if (d > FACES) return 0;
+    for (long n = 0; n < count; n++) {
+        double top = 0;
+        for (int m = 0; m <= d; m++) {
+            int free[FACES], k = 0;
+            for (int i = 0; i < m; i++) free[i] = i;
+            while (k >= 0) {
+                faces(d, m, free, g + n * d, H + n * d * d, lower + n * d, upper + n * d,
+                      x + n * d, &top);
+                for (k = m - 1; k >= 0 && free[k] == d - m + k; k--) ;
+                if (k >= 0) free[k]++;
+                for (int i = k + 1; k >= 0 && i < m; i++) free[i] = free[i - 1] + 1;
+            }
         }
     }
     return 1;

@@ -63,15 +63,17 @@ def local_maximum(
 
 
 def _compiled_maximum(
-    g: Array, H: Array, lower: Array, upper: Array, x: Array, rounds: int
+    g: Array, H: Array, lower: Array, upper: Array, x: Array, rounds: int = 0
 ) -> bool:
-    """Moves `x` uphill by compiled code; False where there is none."""
+    """Moves `x` uphill, without rounds to the top, by compiled code; False where there is none."""
     library = c_library(SOURCE)
     if library is None:
         return False
     parts = [np.ascontiguousarray(part, float) for part in (g, H, lower, upper)]
     counts = (ctypes.c_long(len(x)), ctypes.c_int(x.shape[1]), ctypes.c_int(rounds))
-    return bool(library.local_maximum(*counts, *map(address, parts), address(x)))
+    if rounds:
+        return bool(library.local_maximum(*counts, *map(address, parts), address(x)))
+    return bool(library.global_maximum(*counts[:2], *map(address, parts), address(x)))
 
 
 def _axes_ascent(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> None:
@@ -113,7 +115,9 @@ def global_maximum(g: Array, H: Array, lower: Array, upper: Array) -> Array:
     d = g.shape[1]
     if d > FACES_UP_TO:
         return _best_of_starts(g, H, lower, upper)
-    best, best_gain = np.zeros_like(g), np.zeros(len(g))
+    best, best_gain = np.zeros_like(g, order="C"), np.zeros(len(g))
+    if _compiled_maximum(g, H, lower, upper, best):
+        return best
     for size in range(d + 1):
         for free in combinations(range(d), size):
             points = _face_points(g, H, lower, upper, free)

@@ -139,18 +139,24 @@ class Polynomial:
         """Values at (S, d), shape (S, K)."""
         return product(basis(u, self.index), self.coefficients)
 
-    def jet(self, u: Array) -> Jet:
-        """Values with first and second derivatives, V = (S, K)."""
-        B = basis(u, self.index)
+    def derivatives(self, u: Array) -> tuple[Array, Array, Array]:
+        """Values (S, K), first (S, d, K) and second derivatives (S, pairs i ≤ j, K)."""
+        B, K = basis(u, self.index), self.coefficients.shape[1]
+        found = [product(B[:, : len(own)], own).reshape(len(u), -1, K) for own in self._packed]
+        return product(B, self.coefficients), found[0], found[1]
+
+    @cached_property
+    def _packed(self) -> list[Array]:
+        """Coefficients of all first and all second derivatives side by side, without zero rows."""
         d, degree = self.index.shape[1], int(self.index.sum(1).max())
-        second = np.empty((d, d, len(u), self.coefficients.shape[1]), self.coefficients.dtype)
-        # a derivative has fewer terms
-        lower, lowest = (terms(d, max(degree - k, 0)) for k in (1, 2))
-        for i in range(d):
-            for j in range(i, d):
-                second[i, j] = second[j, i] = product(B[:, :lowest], self.curve[i, j, :lowest])
-        first = np.stack([product(B[:, :lower], self.slope[i, :lower]) for i in range(d)])
-        return Jet(product(B, self.coefficients), first, second)
+        pairs = np.triu_indices(d)
+        every = (self.slope, self.curve[pairs])
+        return [
+            np.ascontiguousarray(x[:, : terms(d, max(degree - k, 0))].swapaxes(0, 1)).reshape(
+                terms(d, max(degree - k, 0)), -1
+            )
+            for k, x in enumerate(every, start=1)
+        ]
 
 
 def fit(u: Array, data: Jet, degree: int) -> Polynomial:

@@ -15,11 +15,12 @@ from typing import ClassVar
 import numpy as np
 
 from alphacut.frame.boxes import Boxes
-from alphacut.frame.calculus.jet import Array, Jet
+from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial, basis, product
 from alphacut.frame.calculus.threads import each
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.modal.ground_response import LoadTables, decaying
+from alphacut.frame.modal.modal_jet import Parts, composed
 
 PIECE = 20_000
 """Points whose values are computed together."""
@@ -136,7 +137,7 @@ class ModalModel:
         for o in np.unique(output):
             rows = np.flatnonzero(output == o)
             if rates is None:
-                found = self._taylor(self.of_output[o].jet(unit[rows]), node[rows])
+                found = self._taylor(self.of_output[o].derivatives(unit[rows]), node[rows])
             else:
                 assert waves is not None
                 own = [None if w is None else (w[0][rows], w[1][rows], w[2][rows]) for w in waves]
@@ -181,14 +182,13 @@ class ModalModel:
         curved = 2 * _real_product(weight, all_bent.reshape(-1, all_bent.shape[-1]).T)
         return f, g, H + H.swapaxes(1, 2) + curved.reshape(H.shape)
 
-    def _taylor(self, both: Jet, node: Array) -> tuple[Array, Array, Array]:
-        n = self.count
-        rate = both[..., :n]
-        f, g, H = composed(rate, both[..., n : 2 * n], self._free(rate.value, node))
+    def _taylor(self, parts: Parts, node: Array) -> Parts:
+        (count, d), rate = parts[1].shape[:2], parts[0][:, : self.count]
+        out = np.zeros(count), np.zeros((count, d)), np.zeros((count, d, d))
+        composed(parts, 1, self._free(rate, node), out)
         if self.load is not None:
-            more = composed(rate, both[..., 2 * n :], self.load.response(rate.value, node))
-            f, g, H = f + more[0], g + more[1], H + more[2]
-        return f, g, H
+            composed(parts, 2, self.load.response(rate, node), out)
+        return out
 
     def _free(self, rate: Array, node: Array) -> tuple[Array, Array, Array]:
         """Exp(λ t) and its derivatives by λ at one node per point, (N, n)."""
@@ -228,17 +228,3 @@ def _real_product(a: Array, b: Array) -> Array:
     """Real part of a @ b for complex arrays."""
     left, right = np.concatenate([a.real, -a.imag], -1), np.concatenate([b.real, b.imag], -2)
     return np.asarray(left @ right)
-
-
-def composed(rate: Jet, share: Jet, wave: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
-    """2 Re Σ_k C_k w(λ_k) with gradient and Hessian; `wave` holds w, w', w'', (N, n)."""
-    w, dw, ddw = wave
-    value = 2 * (share.value * w).real.sum(-1)
-    inner = share.value * dw
-    g = 2 * (share.first * w + inner * rate.first).real.sum(-1)
-    mixed = share.first[:, None] * (dw * rate.first)[None, :]
-    outer = (share.value * ddw * rate.first)[:, None] * rate.first[None, :]
-    H = 2 * (
-        share.second * w + inner * rate.second + mixed + mixed.swapaxes(0, 1) + outer
-    ).real.sum(-1)
-    return value, np.moveaxis(g, 0, -1), np.moveaxis(H, (0, 1), (-2, -1))

@@ -225,6 +225,19 @@ def test_compiled_maxima_of_quadratics_are_those_of_numpy(
     assert (fast <= high).all()
 
 
+@pytest.mark.parametrize("d", [1, 2, 4, 6])
+def test_compiled_global_maxima_are_those_of_numpy(d: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(d + 40)
+    g, H = rng.normal(size=(300, d)), rng.normal(size=(300, d, d))
+    H = (H + H.swapaxes(1, 2)) / 2 - rng.choice([0.0, 2.0], (300, 1, 1)) * np.eye(d)
+    low, high = -rng.random((300, d)), rng.random((300, d))
+    fast = box_quadratic.global_maximum(g, H, low, high)
+    monkeypatch.setattr(box_quadratic, "_compiled_maximum", lambda *_: False)
+    slow = box_quadratic.global_maximum(g, H, low, high)
+    assert np.abs(fast - slow).max() < 1e-10
+    assert ((fast > low) & (fast < high)).any()
+
+
 def test_auto_starts_nothing_that_is_expected_to_take_too_long() -> None:
     flow = unit_flow(FRAME, ("E", "m1"), 0.05)
     plan = candidates(flow, 20000)
