@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
+from alphacut.frame.decisions.limit_search import Unproved
 from alphacut.frame.decisions.safe_scale import SafeScale, limit_search, safe_scale
 from alphacut.frame.decisions.sure_exceeding import sure_exceeding
 from alphacut.frame.structures.storey import StoreyFrame
@@ -68,6 +69,7 @@ def exceeding(
     lowest: float = 0.0,
     workers: int = 1,
     progress: Progress | bool | None = None,
+    failed: Unproved | None = None,
 ) -> Exceeding:
     """Bounds of the possibility and the necessity that some |output| exceeds its limit at a node.
 
@@ -81,6 +83,7 @@ def exceeding(
         lowest: Lowest level that the inputs decide.
         workers: Processes of the proof.
         progress: As for `envelope`.
+        failed: As for `safe_scale`, of limits on the same inputs.
 
     Raises:
         ValueError: A limit is not positive, or an input is no parameter.
@@ -102,13 +105,14 @@ def exceeding(
         most=most,
         workers=workers,
         progress=progress,
+        failed=failed,
     )
     safe = 0.0 if found.safe is None else found.safe
     upper = lowest if safe >= most else 1 - safe
     lower = 1 - found.unsafe if np.isfinite(found.unsafe) else 0.0
     necessity, sampled = (0.0, 0.0), ""
     if found.safe is None:
-        search = limit_search(frame, nominal, reach, limits, duration, step)
+        search = limit_search(frame, nominal, reach, limits, duration, step, failed)
         sure = sure_exceeding(search, most)
         necessity = (sure.size or 0.0, min(sure.kept, 1.0))
         sampled = search.reason

@@ -29,6 +29,9 @@ LEAST = 1e-9
 
 Reach = Callable[[float], tuple[Array, Array]]
 
+Unproved = list[tuple[float, float, str]]
+"""Sizes and gaps whose model no proof covers, and why: more of either has none, too."""
+
 
 @dataclass(frozen=True, eq=False)
 class LimitFlow(UnitFlow):
@@ -51,6 +54,7 @@ class LimitSearch:
     limits: Array
     nominal: Array
     gap: float
+    failed: Unproved = field(default_factory=list)
 
     def fit(self, size: float) -> None:
         """Model of the motion over the box of a size, in units of the limits."""
@@ -60,11 +64,20 @@ class LimitSearch:
         boxes = Boxes(self.flow.names, np.array([0.0, 1.0]), *ends, self.nominal)
         require_admissible(self.flow.system, boxes, self.flow.duration, self.flow.step)
         unit = LimitFlow(self.flow, boxes, False, None, self.limits)
+        before = self.hopeless(size)
+        method = Modal(tolerance=self.gap)
         model, error, self.reason = model_with_error(
-            self.flow, unit, Modal(tolerance=self.gap), self.gap
+            self.flow, unit, method, self.gap, unproved=before
         )
+        if self.reason and not before:
+            self.failed.append((size, self.gap, self.reason))
         self.model: ModalModel = model.in_units(self.limits)
         self.error: Array = error / self.limits
+
+    def hopeless(self, size: float) -> str:
+        """Why nothing is proved over the box of a size, where that is known from before."""
+        known = (why for least, gap, why in self.failed if least <= size and gap >= self.gap)
+        return next(known, "")
 
     def unit(self, size: float) -> tuple[Array, Array]:
         """Box of a size in the model's coordinates."""

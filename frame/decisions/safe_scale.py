@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.decisions.limit_search import LEAST, LimitSearch, Reach, unproved
+from alphacut.frame.decisions.limit_search import LEAST, LimitSearch, Reach, Unproved, unproved
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.structures.storey import StoreyFrame
@@ -85,6 +85,7 @@ def safe_scale(
     budget: float = 100,
     workers: int = 1,
     progress: Progress | bool | None = None,
+    failed: Unproved | None = None,
 ) -> SafeScale:
     """Largest scale of a family of boxes in which every |output| stays at most at its limit.
 
@@ -101,6 +102,7 @@ def safe_scale(
         budget: Most boxes per node on average at each scale that is tried.
         workers: Processes of the proof.
         progress: As for `envelope`.
+        failed: Boxes that other limits were not proved on, which saves trying again; is added to.
 
     Raises:
         ValueError: A limit is not positive, or the largest box reaches values without a meaning.
@@ -108,7 +110,7 @@ def safe_scale(
     """
     _require(limits, most)
     begun, names = time.perf_counter(), tuple(nominal)
-    search = limit_search(frame, nominal, reach, limits, duration, step)
+    search = limit_search(frame, nominal, reach, limits, duration, step, failed)
     centre = search.nominal
     if (nominal_share := search.share(centre)) >= 1:
         seconds = time.perf_counter() - begun
@@ -143,6 +145,8 @@ def _easily(
     pending: Array = np.arange(2 * len(search.flow.time) * len(search.flow.outputs))
     boxes = 0
     for search.gap in (share * left for share in EASY):
+        if search.hopeless(most):
+            break
         search.fit(most)
         if search.reason or search.witness(most) is not None:
             break
@@ -194,12 +198,13 @@ def limit_search(
     limits: Mapping[str, float],
     duration: float,
     step: float,
+    failed: Unproved | None = None,
 ) -> LimitSearch:
     """The exact motion of the limited outputs, and the boxes, as for `safe_scale`."""
     limited = replace(frame, outputs=tuple(limits))
     flow = LinearFlow(limited, tuple(nominal), duration, step, Exact())
     sizes, centre = np.array([*limits.values()], float), np.array([*nominal.values()], float)
-    return LimitSearch(flow, reach, sizes, centre, GAP)
+    return LimitSearch(flow, reach, sizes, centre, GAP, [] if failed is None else failed)
 
 
 def scaled(nominal: Array, below: Array, above: Array) -> Reach:

@@ -298,12 +298,19 @@ def _proof_facts(
 
 
 def model_with_error(
-    linear: LinearFlow, flow: UnitFlow, method: Modal, gap: float, *, patient: bool = True
+    linear: LinearFlow,
+    flow: UnitFlow,
+    method: Modal,
+    gap: float,
+    *,
+    patient: bool = True,
+    unproved: str = "",
 ) -> tuple[ModalModel, Array, str]:
     """Modal model for a certificate, its error (T, m), and why that is only sampled.
 
     The proved bound exceeds the sampled error some thirty times, so the polynomials are refined
-    until it takes little of the gap. `patient` is as for `proved_error`.
+    until it takes little of the gap. `patient` is as for `proved_error`; where it is known why
+    nothing is proved, `unproved` says so, and only sampled errors are asked for.
     """
 
     def fitted(tolerance: float) -> ModalModel:
@@ -317,8 +324,8 @@ def model_with_error(
         )
 
     model = first = fitted(min(method.tolerance, gap / 30))
-    reason = ""
-    for _ in range(ATTEMPTS):
+    reason = unproved
+    for _ in range(0 if unproved else ATTEMPTS):
         sampled = float((model.error / flow.scale).max())
         largest = USUAL * sampled  # a bound is seldom less, and takes time
         if largest <= PORTION * gap:

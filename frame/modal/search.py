@@ -34,6 +34,8 @@ CALM = 20.0
 """Change of phase (rad) over the box up to which the least effort finds the basins."""
 SMALL = 1e-3
 """Share of the wanted error that Newton's method may leave."""
+PASSES = 0.2
+"""Share of the time after which independent passes begin, for the progress alone."""
 QUIET = 0.05
 """Share of the wanted error that the last independent pass may gain."""
 
@@ -91,12 +93,13 @@ class ModalSearch:
         if (upper > lower).any():
             pool = self._samples(lower, upper)
             values = trajectories(model, pool)
-            tick(0.05)
+            tick(0.02)
             coarse, rivals = self._search(model, lower, upper, (pool, values), self.stride(model))
-            tick(0.25)
+            tick(0.1)
             found = self._spread(model, [coarse, *rivals], lower, upper, (pool, values))
-            tick(0.5)
-            gained = self._second_passes(model, found, lower, upper)
+            tick(PASSES)
+            passes = share(tick, PASSES, 0.97)
+            gained = self._second_passes(model, found, lower, upper, passes)
             tick(0.97)
             refine(model, found, np.arange(len(found.value)), lower, upper, self.small)
         else:
@@ -109,12 +112,15 @@ class ModalSearch:
         """Nodes from one that is searched anew to the next."""
         return max(1, int(self.resolution / (model.fastest * (model.time[1] - model.time[0]))))
 
-    def _second_passes(self, model: ModalModel, found: Optima, lower: Array, upper: Array) -> Array:
+    def _second_passes(
+        self, model: ModalModel, found: Optima, lower: Array, upper: Array, tick: Progress
+    ) -> Array:
         """Independent passes over `found` until one gains nothing; the last one's gain, (m,)."""
         gained = np.zeros(len(model.outputs))
         for count in range(1, self.passes + 1):
-            before = found.value.copy()
-            improved = second_pass(model, found, lower, upper, self, count)
+            before, halved = found.value.copy(), 0.5**count  # each pass may be the last
+            own = share(tick, 1 - 2 * halved, 1 - halved)
+            improved = second_pass(model, found, lower, upper, self, count, own)
             rng = np.random.default_rng((self.seed, 13, count))
             improved[probe(model, model, found, lower, upper, self.quiet / 4, rng)] = True
             if improved.any():
@@ -208,7 +214,13 @@ class ModalSearch:
 
 
 def second_pass(
-    model: Response, found: Optima, lower: Array, upper: Array, search: ModalSearch, count: int
+    model: Response,
+    found: Optima,
+    lower: Array,
+    upper: Array,
+    search: ModalSearch,
+    count: int,
+    tick: Progress = lambda done: None,
 ) -> Array:
     """Offer what fresh samples and fresh starts reach, without the optima found so far.
 
@@ -219,6 +231,7 @@ def second_pass(
         upper: Upper ends.
         search: Whose effort is repeated.
         count: Which pass this is, from 1 on; each has samples and nodes of its own.
+        tick: Told the share done.
 
     Returns:
         Which problems improved, shape (N,).
@@ -231,7 +244,9 @@ def second_pass(
     wide = FRESH * search.samples * float((upper - lower).max()) / 2
     pool = fresh_points(rng, lower, upper, int(np.clip(wide, 64, VALUES / len(found.value))))
     behind = BEHIND * np.abs(found.value).max()
-    for rival in best_of_pool(pool, trajectories(model, pool), every_node, search.basins):
+    rivals = best_of_pool(pool, trajectories(model, pool), every_node, search.basins)
+    for done, rival in enumerate(rivals):
+        tick(done / (len(rivals) + 1))
         open_ = np.flatnonzero(rival.value > found.value - behind)
         refine(model, rival, open_, lower, upper, search.quiet / 4)
         improved[found.offer(model, rival.point, every.ravel())] = True

@@ -11,6 +11,8 @@ from alphacut.frame import Exact, LinearFlow, StoreyFrame, envelope
 from alphacut.frame.decisions.exceeding import any_exceeding, exceeding
 from alphacut.frame.decisions.safe_scale import limit_search
 from alphacut.frame.decisions.sure_exceeding import surely
+from alphacut.frame.methods import modal
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy import FuzzyNumber, Interval, Triangular
 
 # one floor without damping: |q| = v0 / ω, absolute acceleration v0 ω, ω² = 24 E I / (l³ m)
@@ -64,6 +66,26 @@ def test_any_of_several_limits_and_accelerations_count() -> None:
     assert both.scale.nature == "guaranteed"
     one = exceeding(ONE, {"E": modulus}, {"drift1": drift}, **TIME)
     assert one.possibility == pytest.approx((0.2, 0.2), abs=0.01)
+
+
+def test_a_box_without_a_proof_is_not_tried_for_every_limit(monkeypatch) -> None:
+    tried, mass = [], {"m1": Triangular(800.0, 1000.0, 1200.0)}
+
+    def refused(model, *, patient):
+        tried.append(patient)
+        raise UnprovedError("too wide")
+
+    monkeypatch.setattr(modal, "proved_error", refused)
+    failed, limit = [], 0.5 * np.sqrt(1.1e3 / RIGIDITY)
+    far = exceeding(ONE, mass, {"q1": 2 * limit}, failed=failed, **TIME)
+    assert (far.scale.nature, far.scale.reason) == ("verified by sampling", "too wide")
+    assert (count := len(tried)) > 0
+    near = exceeding(ONE, mass, {"q1": limit}, failed=failed, **TIME)
+    assert len(tried) == count
+    assert (near.scale.nature, near.scale.reason) == ("verified by sampling", "too wide")
+    alone = exceeding(ONE, mass, {"q1": limit}, **TIME)
+    assert len(tried) > count
+    assert near.possibility == pytest.approx(alone.possibility, abs=1e-3)
 
 
 def test_safe_and_hopeless_limits_are_told() -> None:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     import xarray
 
     from alphacut.frame.decisions.exceeding import Exceeding
+    from alphacut.frame.decisions.limit_search import Unproved
 
 ANY = "any of them"
 
@@ -53,11 +54,19 @@ def decision(
 
     limits, task = limits_of(case), task_of(case)
     peaks = _peaks([one.output for one in limits], wanted, task, peaks)
+    reached = peaks["peak"].sel(bound="upper").max("alpha")
+
+    def near(one: Limit) -> float:
+        """The peak as a share of the limit; where the farthest is unproved, the others are."""
+        return float(reached.sel(output=one.output)) / one.value
+
     try:
-        found = _decisions(wanted, task, limits, workers, progress)
+        found = _decisions(wanted, task, sorted(limits, key=near), workers, progress)
     except (ValueError, ModalError) as error:
         raise BadInput(Problem("decision", str(error), file=str(case.path))) from None
-    return _dataset(found, limits, peaks, task)
+    names = [one.name for one in limits]
+    in_order = {name: found[name] for name in (*names, ANY) if name in found}
+    return _dataset(in_order, limits, peaks, task)
 
 
 def _peaks(
@@ -97,9 +106,28 @@ def _decisions(
     from alphacut.frame.decisions.exceeding import any_exceeding, exceeding
 
     assert wanted.frame is not None
+<<<<<<< HEAD
     count = len(limits) + 1
     of = partial(exceeding, wanted.frame, wanted.inputs(task.fuzzy), workers=workers)
     of = partial(of, duration=task.duration, step=task.step, lowest=task.alpha[0], progress=False)
+=======
+    frame, inputs, count = wanted.frame, wanted.inputs(task.fuzzy), len(limits) + 1
+    failed: Unproved = []
+
+    def of(part: Mapping[str, float]) -> Exceeding:
+        return exceeding(
+            frame,
+            inputs,
+            part,
+            duration=task.duration,
+            step=task.step,
+            lowest=task.alpha[0],
+            workers=workers,
+            progress=False,
+            failed=failed,
+        )
+
+>>>>>>> e8b8d59 (Try a proof that no limit's box allows once, and tell passes' progress)
     each, least = {}, {one.output: one.value for one in sorted(limits, key=lambda x: -x.value)}
     for one in limits:
         each[one.name] = of({one.output: one.value})
