@@ -81,10 +81,10 @@ def test_a_box_without_a_proof_is_not_tried_for_every_limit(monkeypatch) -> None
     assert (far.scale.nature, far.scale.reason) == ("verified by sampling", "too wide")
     assert (count := len(tried)) > 0
     near = exceeding(ONE, mass, {"q1": limit}, failed=failed, **TIME)
-    assert len(tried) == count
+    again = len(tried) - count  # on the smaller box up to the limit alone
     assert (near.scale.nature, near.scale.reason) == ("verified by sampling", "too wide")
     alone = exceeding(ONE, mass, {"q1": limit}, **TIME)
-    assert len(tried) > count
+    assert again < len(tried) - count - again
     assert near.possibility == pytest.approx(alone.possibility, abs=1e-3)
 
 
