@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     import xarray
 
     from alphacut.frame.decisions.exceeding import Exceeding
-    from alphacut.frame.decisions.limit_search import Unproved
 
 ANY = "any of them"
 
@@ -106,28 +105,11 @@ def _decisions(
     from alphacut.frame.decisions.exceeding import any_exceeding, exceeding
 
     assert wanted.frame is not None
-<<<<<<< HEAD
+    failed: list[tuple[float, float, str]] = []  # boxes that no other limit need try again
     count = len(limits) + 1
-    of = partial(exceeding, wanted.frame, wanted.inputs(task.fuzzy), workers=workers)
-    of = partial(of, duration=task.duration, step=task.step, lowest=task.alpha[0], progress=False)
-=======
-    frame, inputs, count = wanted.frame, wanted.inputs(task.fuzzy), len(limits) + 1
-    failed: Unproved = []
-
-    def of(part: Mapping[str, float]) -> Exceeding:
-        return exceeding(
-            frame,
-            inputs,
-            part,
-            duration=task.duration,
-            step=task.step,
-            lowest=task.alpha[0],
-            workers=workers,
-            progress=False,
-            failed=failed,
-        )
-
->>>>>>> e8b8d59 (Try a proof that no limit's box allows once, and tell passes' progress)
+    of = partial(exceeding, wanted.frame, wanted.inputs(task.fuzzy), failed=failed)
+    of = partial(of, duration=task.duration, step=task.step, lowest=task.alpha[0])
+    of = partial(of, workers=workers, progress=False)
     each, least = {}, {one.output: one.value for one in sorted(limits, key=lambda x: -x.value)}
     for one in limits:
         each[one.name] = of({one.output: one.value})
