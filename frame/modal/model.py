@@ -16,11 +16,11 @@ import numpy as np
 
 from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.modal_jet import Parts, composed
 from alphacut.frame.calculus.polynomial import Polynomial, basis, product
 from alphacut.frame.calculus.threads import each
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.modal.ground_response import LoadTables, decaying
-from alphacut.frame.modal.modal_jet import Parts, composed
 
 PIECE = 20_000
 """Points whose values are computed together."""

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from alphacut.frame.calculus import modal_jet
+from alphacut.frame.calculus.modal_jet import composed
 from alphacut.frame.calculus.polynomial import Polynomial, exponents
-from alphacut.frame.modal import modal_jet
-from alphacut.frame.modal.modal_jet import composed
 
 
 def drawn(seed, d, n, degree, count=20):
