@@ -15,7 +15,7 @@ import numpy as np
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.plan import Plan
 from alphacut.fuzzy.progress_bar import Progress
-from alphacut.fuzzy.propagation import propagate
+from alphacut.fuzzy.propagation import on_interrupt, propagate
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.numbers import Array, FuzzyNumber
 
@@ -85,9 +85,9 @@ def joint_outputs(
     if directions < 2:
         raise ValueError(f"there is {directions} direction; a hull needs two or more")
     turned = Turned(function, directions)
-    found = propagate(
-        turned, inputs, plan, alpha=alpha, known=known, vectorised=vectorised, progress=progress
-    )
+    with on_interrupt(lambda: "`joint_outputs` keeps nothing: fewer levels end it sooner"):
+        how = {"alpha": alpha, "known": known, "vectorised": vectorised, "progress": progress}
+        found = propagate(turned, inputs, plan, **how)  # type: ignore[arg-type]
     unit = _directions(directions)
     outer, inner = [], []
     for level in range(len(found.domain.alpha)):
