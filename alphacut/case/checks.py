@@ -190,7 +190,7 @@ def missing_sections(case: Case) -> Iterator[Problem]:
         yield Problem(
             "radius",
             "stage microstructure makes this section from the particles",
-            allowed="one of section and stage",
+            allowed="one of stage and section, which --radius, --a2 and --set radius.… write too",
         )
 
 

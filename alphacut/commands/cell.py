@@ -28,8 +28,6 @@ from alphacut.stages.material.references import beside, text_of
 from alphacut.stages.plausible import say_unlikely_material
 
 ABOUT = "homogenise the cell at crisp values; a fuzzy input takes its modal value"
-
-
 KEYS = {**common.SAMPLE, **common.MESH, **common.MODEL}
 READ = ("radius", "cell", "mesh", "modulus.method", "modulus.tolerance", "modulus.average")
 

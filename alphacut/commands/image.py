@@ -49,15 +49,10 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
 def summary(found: Document) -> str:
     """The bounds in a few lines for people."""
     cuts = found["cuts"]
+    columns = (cuts["alpha"], *(cuts["E_GPa"][x] for x in ("lower", "upper")), cuts["nature"])
     rows = "".join(
         f"{alpha:5.2f}  {low:10.5f}  {high:10.5f}  {nature}\n"
-        for alpha, low, high, nature in zip(
-            cuts["alpha"],
-            cuts["E_GPa"]["lower"],
-            cuts["E_GPa"]["upper"],
-            cuts["nature"],
-            strict=True,
-        )
+        for alpha, low, high, nature in zip(*columns, strict=True)
     )
     bulk, grains = found["plane_strain_bulk_GPa"], found["grains_E_GPa"]
     own = own_of_window(found)

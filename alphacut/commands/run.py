@@ -204,9 +204,10 @@ def modulus_lines(found: Document) -> Iterator[str]:
             nu = f"[{', '.join(inner)}] at α = {cell['alpha'][-1]:g}"
         nu += f", support [{', '.join(ends)}]" if ends[0] != ends[1] else ""
         yield (
-            f"E = {core(cell)}, support [{cell['lower_GPa']:.4f}, {cell['upper_GPa']:.4f}] GPa;"
-            f" nu = {nu}"
+            f"E = {core(cell)}, support [{cell['lower_GPa']:.4f}, {cell['upper_GPa']:.4f}] GPa,"
+            f" bounds {cell['nature']}; nu = {nu}"
         )
+        yield from crisp_particles(found.get("microstructure", {}))
         ranked = sorted(found.get("shares", {}).get("E", {}).items(), key=lambda one: -one[1])
         first = [f"{in_words(name)} {share:.0%}" for name, share in ranked[:3] if share > 0]
         if first:
@@ -219,18 +220,25 @@ def modulus_lines(found: Document) -> Iterator[str]:
         yield cell["publish"]
 
 
+def crisp_particles(found: Document) -> Iterator[str]:
+    """That a support holds no scatter of the particles, where slopes of their map are crisp."""
+    if crisp := [x for x in ("a2", "a4") if x in found and found[x][0] == found[x][-1]]:
+        held = "the phases only" if len(crisp) == 2 else "the other slope and the phases only"
+        yield f"the support holds {held}: {' and '.join(crisp)} of the particles are crisp"
+
+
 def image_lines(found: Document) -> Iterator[str]:
     """The bounds of an image's modulus, if there is one."""
     if picture := found.get("image"):
         yield from picture.get("phases", ())  # results of an older program have none
         yield from filter(None, [picture.get("boundary")])
-        cuts, own = picture["cuts"]["E_GPa"], own_of_window(picture)
-        top = f"at α = {picture['cuts']['alpha'][-1]:g}"
+        cuts, own, nu = picture["cuts"], own_of_window(picture), picture["nu"]
+        ends = ({side: cuts["E_GPa"][side][k] for side in nu} for k in (-1, 0))
+        core_of, support = map(interval, ends)
+        top = f"at α = {cuts['alpha'][-1]:g}"
         yield (
-            f"E = [{cuts['lower'][-1]:.4f}, {cuts['upper'][-1]:.4f}] GPa {top}, support"
-            f" [{cuts['lower'][0]:.4f}, {cuts['upper'][0]:.4f}] GPa, {picture['nature']}; nu"
-            f"{own and ' of the tiles'} = [{picture['nu']['lower']:.4f},"
-            f" {picture['nu']['upper']:.4f}] {top}"
+            f"E = {core_of} {top}, support {support}, {picture['nature']}; nu"
+            f"{own and ' of the tiles'} = [{nu['lower']:.4f}, {nu['upper']:.4f}] {top}"
         )
         yield from filter(None, [own])
         grains = interval(picture["grains_E_GPa"])

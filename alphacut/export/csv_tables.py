@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from alphacut.frame.envelope import error_name
 from alphacut.frame.outputs import output_unit
-from alphacut.io.files import write_text
+from alphacut.io.files import say, write_text
 from alphacut.io.netcdf import read_dataset
 from alphacut.stages.material.modulus import listed
 from alphacut.stages.vibration import exceedance as outcomes
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     import xarray
 
 BY_OUTPUT = "SI, by output"
+MOST = 500_000  # rows of a table; spreadsheets end at twice that
 LIMIT = {"limit value": "limit", "limit unit": "unit"}
 OF_LIMIT = LIMIT | {"verdict": "verdict", "nature": "nature", "between nodes": "between_nodes"}
 OF_EVENT = {"output": "output", **LIMIT, "more between nodes (estimated)": "between_nodes"}
@@ -31,7 +33,7 @@ def write_tables(results: Path, folder: Path) -> list[Path]:
     An envelope gives a file for each output, a row for each node, and all envelopes together one
     of peaks. Of other results variables over the same axes share a file. Every column is named with
     its unit, or a column `unit` has it, and one says what the numbers are worth (`nature`). Numbers
-    have all their digits.
+    have all their digits. A table of more than `MOST` rows is left out, which is said.
 
     Args:
         results: Folder of a run.
@@ -54,7 +56,11 @@ def write_tables(results: Path, folder: Path) -> list[Path]:
             dataset = dataset.drop_vars([x for x in ("curve", "limits") if x in dataset])
         for axes, part in _by_axes(dataset):
             own = [] if axes == _widest(dataset) else ["by", *axes]
-            tables["-".join([path.stem, *own])] = _csv(part)
+            name, rows = "-".join([path.stem, *own]), math.prod(part.sizes.values())
+            if rows > MOST:
+                say(f"{name}.csv is left out: it had {rows:,} rows; {path} holds them as NetCDF")
+                continue
+            tables[name] = _csv(part)
     if len(peaks) > 1:
         tables["peaks"] = "\n".join([*peaks, ""])
     made = {folder / f"{name}.csv": text for name, text in tables.items()}

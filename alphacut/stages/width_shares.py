@@ -36,13 +36,15 @@ if TYPE_CHECKING:
 OF_CELL = ("E", "nu")
 
 
-def modulus_shares(case: Case) -> Shares:
+def modulus_shares(case: Case, progress: Tick | None = None) -> Shares:
     """Shares of the cell's fuzzy inputs in the widths of E and ν, shape (inputs, levels, 2)."""
     from alphacut.fuzzy.width_contributions import width_shares
 
     wanted = campaign(case)
     return width_shares(
-        lambda inputs: cell_range(wanted, inputs, wanted.alpha), wanted.inputs, progress=False
+        lambda inputs: cell_range(wanted, inputs, wanted.alpha),
+        wanted.inputs,
+        progress=progress or False,
     )
 
 
@@ -169,7 +171,8 @@ def dataset(results: Results, progress: Tick | None = None) -> xarray.Dataset:
     notes: list[str] = []
     coordinates: dict[str, Any] = {}
     if results.modulus is not None and len(results.modulus["parameter"]) > 1:
-        cell = modulus_shares(results.case)
+        parts = 1 if results.structure is None else 2  # its envelopes follow
+        cell = modulus_shares(results.case, progress and (lambda done: progress(done / parts)))
         for column, name in enumerate(("modulus_share", "poisson_share")):
             share = cell.share[..., column]
             variables[name] = (("cell_input", "alpha"), share, {"units": "1"})

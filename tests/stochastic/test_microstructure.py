@@ -14,7 +14,7 @@ from alphacut.stages.material.microstructure import left_out
 from alphacut.stochastic.errors import RefusedError
 from alphacut.stochastic.figures.all import draw
 from alphacut.stochastic.fit.pbox import PBox, least_pbox
-from alphacut.stochastic.microstructure import TIGHTEST, Study, study
+from alphacut.stochastic.microstructure import TIGHTEST, Microstructure, Study, study
 from alphacut.stochastic.microstructure_summary import fragment, summary
 from alphacut.stochastic.particles.circles_csv import CircleFile
 from alphacut.stochastic.particles.discs import Discs
@@ -381,7 +381,7 @@ def test_study_of_measured_circles(tmp_path):
         )
 
 
-def test_measured_circles_have_fuzzy_slopes_unless_told_otherwise(tmp_path):
+def test_measured_circles_have_fuzzy_slopes_unless_told_otherwise(tmp_path, monkeypatch):
     packing = Packing(300, 0.55, LogNormalRadii(1e-3, 2e-3)).make(np.random.default_rng(5))
     rows = "".join(
         f"{x!r},{y!r},{r!r}\n"
@@ -399,6 +399,8 @@ def test_measured_circles_have_fuzzy_slopes_unless_told_otherwise(tmp_path):
     assert own.share_kept > 0.99
     (said,) = (line for line in left_out(own) if "r_n" in line)
     assert f"{own.share_capped:.2%} of the area lies in cells tighter than r_n = 0.99" in said
+    monkeypatch.setattr(Microstructure, "share_capped", 2e-16)
+    assert not [line for line in left_out(own) if "r_n" in line]
 
 
 def test_figures_are_drawn(found, tmp_path):

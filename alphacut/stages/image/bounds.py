@@ -147,8 +147,7 @@ def compute(study: ImageStudy, *, progress: Tick | None = None) -> FuzzyImage:
         told.done(max(0.7, told.share))
 
         def alone(threshold: Level, phases: Level) -> float:
-            images = study.images(threshold, phases)
-            (cut,) = model.cuts([images], (modal, crisp))
+            (cut,) = model.cuts([study.images(threshold, phases)], (modal, crisp))
             return cut.modulus[1] - cut.modulus[0]
 
         width = alone

@@ -158,10 +158,7 @@ def dataset(found: FuzzyImage) -> xarray.Dataset:
 
 def random_variables(found: RandomResponse) -> Document:
     """E over the random threshold, and its quantiles at each level."""
-    about = {
-        "units": "Pa",
-        "long_name": "E of eq. 16 over the threshold, modal phases",
-    }
+    about = {"units": "Pa", "long_name": "E of eq. 16 over the threshold, modal phases"}
     return {
         "E_of_threshold": (("node", "bound"), np.stack(found.modal.modulus, axis=-1), about),
         "threshold": (("node",), found.modal.threshold, {"long_name": "grey value"}),

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from alphacut.stochastic.microstructure import Microstructure
     from alphacut.stochastic.theta.truncated_normal import Array
 
-FALLEN = 0.05
-"""Relative distance of the fraction that E takes from the image's that is warned of."""
+TOLD, FALLEN = 0.01, 0.05
+"""Relative distances of the fraction that E takes from the image's that are told and warned of."""
 
 
 def crop_of(case: Case) -> tuple[int, int, int, int] | None:
@@ -44,11 +44,8 @@ def compared(fraction: float) -> str:
 def uncertain(places: Array) -> str:
     """Clusters whose discs are not told for sure, with their places, given in m."""
     at = ", ".join(f"({1e3 * x:.4g}, {1e3 * y:.4g})" for x, y in places)
-    clusters = (
-        "cluster of touching particles was"
-        if len(places) == 1
-        else ("clusters of touching particles were")
-    )
+    ends = ("", "was") if len(places) == 1 else ("s", "were")
+    clusters = "cluster{} of touching particles {}".format(*ends)
     return (
         f"warning: {len(places)} {clusters} parted uncertainly, at {at} mm from the lower left"
         " corner: look at image_circles.png"
@@ -64,8 +61,14 @@ def fractions(found: Microstructure, fraction: float) -> Iterator[str]:
     count = sum(len(section.discs) for section in found.sections)
     yield (
         f"{compared(fraction)}; E takes {taken:.4f}, from the {cells} of {count} circles whose"
-        " cells the image's edge cannot change"
+        f" cells the image's edge cannot change: the edge, and what is not round, leave"
+        f" {found.sample.area_fraction:.4f}; microstructure.limits and the map's fit do the rest"
     )
+    if abs(taken / fraction - 1) > TOLD:
+        yield (
+            "for E of fibres at the image's own fraction, pack these circles:"
+            f' [microstructure.packing] file = "circles.csv", area_fraction = {fraction:.4f}'
+        )
     if abs(taken / fraction - 1) > FALLEN:
         yield (
             f"warning: E takes an area fraction of {taken:.4f}, {taken / fraction - 1:+.0%} of the"

@@ -301,7 +301,7 @@ def left_out(found: Microstructure | SphereMicrostructure) -> Iterator[str]:
         told = "; ".join(kinds(reasons))
         taken = sum(len(section.discs) for section in found.sections)
         yield f"warning: {len(reasons)} of {taken + len(reasons)} particles were left out: {told}"
-    if found.share_capped > 0:
+    if found.share_capped > 5e-5:  # less is told as 0.00 %
         yield (
             f"{found.share_capped:.2%} of the area lies in cells tighter than r_n = {TIGHTEST:g},"
             " as between particles that touch, and is taken as that tight; no square cell is"

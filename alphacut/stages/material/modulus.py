@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alphacut.case.case import Case
-from alphacut.fuzzy import Crisp, FuzzyNumber, PiecewiseLinear, propagate
+from alphacut.fuzzy import Crisp, FuzzyNumber, General, PiecewiseLinear, propagate
 from alphacut.fuzzy import explain as fuzzy_explain
 from alphacut.fuzzy.dry_run import Explanation
 from alphacut.fuzzy.samples.nature import Nature
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     from alphacut.rve.result import Homogenised
 
+MANY = 2000  # samples of the general plan, from which on a cheaper one is named
 QUANTITIES = {"E": ("Pa", "effective Young's modulus"), "nu": ("1", "effective Poisson's ratio")}
 STRESSES = {
     "s11": ("Pa", "mean homogenised stress 11 under ε11 = ε22 = 0.01"),
@@ -239,9 +240,14 @@ def compute(wanted: Campaign, *, workers: int = 1, progress: Tick | None = None)
             mpi4py.futures`` all of those are used.
         progress: Told the share done.
     """
-    cell_model(
-        wanted.task.choice
-    )  # a model that cannot be had is one problem, not one for each sample
+    # a model that cannot be had is one problem, not one for each sample
+    cell_model(wanted.task.choice)
+    preview = explain(wanted) if progress and wanted.plan == General() else None
+    if preview and (count := preview.samples - preview.stored) > MANY:
+        say(
+            f"{count:,} samples of the cell, every combination of the inputs' points; modulus.plan"
+            ' = "signed" takes few where E and nu rise or fall with each input, which it checks'
+        )
     result = propagate(
         wanted.task,
         wanted.inputs,

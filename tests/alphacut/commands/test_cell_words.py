@@ -6,8 +6,10 @@ from pathlib import Path
 import pytest
 
 from alphacut.entry import main
+from alphacut.stages.material import modulus
 
-PAPER = str(Path(__file__).parents[3] / "cases" / "paper.toml")
+CASES = Path(__file__).parents[3] / "cases"
+PAPER = str(CASES / "paper.toml")
 STIFF = [
     "--set",
     "cell.inclusion_modulus=70 GPa",
@@ -142,3 +144,22 @@ def test_a_store_that_is_none_is_bad_input(tmp_path, capfd):
     assert main(["modulus", PAPER, "--method", "series", "--store", str(path)]) == 2
     assert "is no store of samples" in capfd.readouterr().err
     assert path.read_text(encoding="utf-8") == "d [mm]\n1.5\n"
+
+
+def test_a_radius_beside_the_stage_that_makes_it_is_refused_by_its_option(tmp_path, capfd):
+    text = (CASES / "spheres.toml").read_text(encoding="utf-8")
+    case = tmp_path / "c.toml"
+    case.write_text(text, encoding="utf-8")
+    (tmp_path / "spheres.circles.csv").write_bytes((CASES / "spheres.circles.csv").read_bytes())
+    assert main(["cell", str(case), "--radius", "0.6"]) == 2
+    assert "--radius, --a2 and --set radius.… write too" in capfd.readouterr().err
+
+
+def test_many_samples_are_told_before_with_a_plan_that_takes_fewer(tmp_path, capfd, monkeypatch):
+    monkeypatch.setattr(modulus, "MANY", 8)
+    case = [str(CASES / "porous.toml"), "--method", "series"]
+    assert main(["modulus", *case, "--alpha", "0,1", "--plan", "general"]) == 0
+    told = capfd.readouterr().err
+    assert "samples of the cell, every combination of the inputs' points; modulus.plan" in told
+    assert main(["modulus", *case, "--alpha", "0,1", "--plan", "signed"]) == 0
+    assert "samples of the cell, every" not in capfd.readouterr().err

@@ -213,7 +213,11 @@ def test_circles_over_the_image_and_the_notes_of_a_run_stand_in_its_report(tmp_p
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert page.count("Circles that stand for the particles, drawn over the image</") == 1
     assert "Area fraction to compare with others" in page
-    assert found["microstructure"]["remarks"][-1].startswith("area fraction to compare")
+    told, cure = found["microstructure"]["remarks"]
+    assert told.startswith("area fraction to compare")
+    assert "the edge, and what is not round, leave 0." in told
+    whole = found["microstructure"]["area_fraction_of_image"]
+    assert cure.endswith(f'packing] file = "circles.csv", area_fraction = {whole:.4f}')
 
 
 @pytest.mark.parametrize(("fraction", "said"), [(0.28, False), (0.3, True), (0.38, True)])

@@ -190,11 +190,17 @@ def test_nu_has_its_support_and_the_three_inputs_that_matter_most_are_named(monk
     cell = {"modal_GPa": 6.2, "E_GPa": {"lower": [5.8, 6.2], "upper": [6.6, 6.2]}, "nu": 0.3295}
     cell |= {"lower_GPa": 5.8, "upper_GPa": 6.6, "outside": "", "publish": "P", "alpha": [0, 1]}
     cell |= {"nu_cuts": {"lower": [0.309, 0.3295], "upper": [0.351, 0.3295]}, "beside": {}}
+    cell |= {"nature": "inner"}
     shares = {"a2": 0.6, "matrix_modulus": 0.3, "a4": 0.07, "matrix_poisson": 0.03}
     monkeypatch.setattr(run, "lines", lambda *_: [])
     found = {"modulus": cell | {"particles": "cylinders"}, "shares": {"E": shares}}
     first, second, _ = run.modulus_lines(found)
-    assert first.endswith("GPa; nu = 0.3295, support [0.3090, 0.3510]")
+    assert first.endswith("GPa, bounds inner; nu = 0.3295, support [0.3090, 0.3510]")
+    found["microstructure"] = {"a2": [0.2, 0.2, 0.2], "a4": [0.1, 0.1, 0.1]}
+    said = "the support holds the phases only: a2 and a4 of the particles are crisp"
+    assert list(run.modulus_lines(found))[1] == said
+    found["microstructure"]["a2"] = [0.1, 0.2, 0.3]
+    assert "other slope and the phases only: a4 of" in list(run.modulus_lines(found))[1]
     assert "smaller (slope a2) 60%; modulus of the matrix 30%; spread" in second
     assert "Poisson" not in second
     assert second.startswith("the width of E shrinks by this share if the input were known (the")

@@ -9,6 +9,7 @@ import pytest
 import xarray
 
 from alphacut.entry import main
+from alphacut.export import csv_tables
 from alphacut.export.csv_tables import write_tables
 
 
@@ -39,6 +40,15 @@ def test_every_number_keeps_all_its_digits_and_its_unit(results):
     stored = np.array(rows, float)
     assert stored[:, 2].tolist() == (np.arange(6.0) / 7).tolist()
     assert stored[:, 0].tolist() == [0, 0, 0, 1, 1, 1]
+
+
+def test_a_table_of_too_many_rows_is_left_out_and_that_is_said(results, monkeypatch, capfd):
+    monkeypatch.setattr(csv_tables, "MOST", 5)
+    made = write_tables(results, results / "tables")
+    assert [file.name for file in made] == ["envelope_all-by-alpha.csv"]
+    told = capfd.readouterr().err
+    assert "envelope_all.csv is left out: it had 6 rows; " in told
+    assert "envelope_all.nc holds them as NetCDF" in told
 
 
 def test_the_report_writes_them_on_demand(tmp_path, capfd):

@@ -6,10 +6,13 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray
 
+from alphacut.case.load import load
 from alphacut.entry import main
+from alphacut.stages import width_shares
 from alphacut.stages.width_shares import roughness, thinned
 
 CASES = Path(__file__).parents[3] / "cases"
@@ -46,6 +49,14 @@ def test_shares_take_a_hundred_nodes(duration, step, factor):
     assert round(duration / thinned(duration, step), 9) == int(
         round(duration / thinned(duration, step), 9)
     )
+
+
+def test_the_shares_of_a_modulus_tell_how_far_they_are(monkeypatch):
+    seen, ends = [], (np.zeros((2, 2)), np.ones((2, 2)))
+    monkeypatch.setattr(width_shares, "cell_range", lambda *_: ends)
+    width_shares.modulus_shares(load(str(CASES / "porous.toml"), []), seen.append)
+    assert len(seen) > 2
+    assert seen[-1] == 1.0
 
 
 def test_a_frame_under_an_earthquake_has_shares_and_its_report_names_periods(tmp_path, capfd):
