@@ -24,7 +24,7 @@ class Reading:
     Args:
         key: Full name of its key; of a list with the numbers of the entries, from 1; of a limit
             with its output.
-        shape: crisp, interval, triangle, trapezoid, limit, or flag without values.
+        shape: crisp, interval, triangle, trapezoid, limit; flag or choice without.
         values: Its one to four values, rising, in SI.
         unit: SI unit.
         beside: What else a limit amounts to, in words.
@@ -69,8 +69,9 @@ def _of(section: Section, name: str, case: Case) -> Iterator[Reading]:
     for key, about in keys_of(type(section)).items():
         fuzzy = about.kind.startswith("fuzzy")
         given = f"{name}.{key}" in case.written
-        if key == "p_delta" and not given:
-            yield Reading(f"{name}.{key}", "flag", (), "", "false (default)")
+        if key == "p_delta" or (given and about.kind in ("flag", "choice")):
+            told = f"{getattr(section, key)}".replace("True", "true").replace("False", "false")
+            yield Reading(f"{name}.{key}", about.kind, (), "", told + " (default)" * (not given))
         assumed = key == "columns" and case.frame.stiffness is None
         if not (given or assumed) or not (fuzzy or about.unit):
             continue
@@ -79,12 +80,8 @@ def _of(section: Section, name: str, case: Case) -> Iterator[Reading]:
         for one, places in _alike(listed):
             more = f" to {places[-1]}" if len(places) > 1 else ""
             full = f"{name}.{key}" + (f" {places[0]}{more}" if len(listed) > 1 else "")
-            yield Reading(
-                full,
-                *_shape(one),
-                about.unit,
-                "" if given else " (default); second_moment is of one",
-            )
+            beside = "" if given else " (default); second_moment is of one"
+            yield Reading(full, *_shape(one), about.unit, beside)
 
 
 def _alike(listed: Sequence[object]) -> Iterator[tuple[FuzzyNumber, Sequence[int]]]:

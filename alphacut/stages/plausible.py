@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from alphacut.stages.vibration.structure import Structure
 
 PERIODS = (0.05, 15.0)  # s, from a stiff machine frame to the slenderest towers
-SLOW = 3.0  # s of the first period for each storey of a frame
+SLOW, USUAL = (0.01, 1.0), (0.05, 0.3)  # s of the first period for each storey of a frame
+SOFTEST = 3.0  # the same of a frame whose modulus is computed
 # unit, and how far a storey's value may be from the median of all
 STOREYS = {"masses": ("kg", 50), "lengths": ("m", 8), "second_moment": ("m^4", 100)}
 STOREYS |= {"stiffness": ("N/m", 50)}
@@ -50,12 +51,14 @@ PEAKS = (0.003, 30.0)  # m/s², of the ground, from the weakest record to the st
 
 def unlikely(case: Case, ground: Accelerogram | None, period: float | None) -> Iterator[str]:
     """Remarks on values of which one has most likely the wrong unit."""
-    floors = len(case.frame.masses) if case.sections.frame else math.inf
-    if period is not None and not PERIODS[0] <= period <= min(PERIODS[1], SLOW * floors):
-        yield (
-            f"{part(case)}: a first natural period of {period:.3g} s is unusual for a structure;"
-            " check the units of masses, lengths and moduli"
-        )
+    floors = len(case.frame.masses) if case.sections.frame else 0
+    slow = SOFTEST * floors if {"modulus", "image"} & set(case.stages) else max(2, floors) * SLOW[1]
+    low, high = max(PERIODS[0], floors * SLOW[0]), min(PERIODS[1], slow if floors else math.inf)
+    if period is not None and not low <= period <= high:
+        told = f"{part(case)}: a first natural period of {period:.3g} s is unusual for a structure"
+        usual = " to ".join(f"{each * floors:.2g}" for each in USUAL)
+        more = f"; {floors} storey{'s' * (floors > 1)} usually take {usual} s" * bool(floors)
+        yield f"{told}; check the units of masses, lengths, stiffness and moduli{more}"
     if ground is not None:
         peak = float(abs(ground.acceleration).max())
         if not PEAKS[0] <= peak <= PEAKS[1]:

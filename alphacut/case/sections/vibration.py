@@ -100,10 +100,11 @@ class Envelope(Section):
     certify: Annotated[
         float | None,
         Key(
-            "gap within which the bounds of displacements of a linear structure, up to"
-            " six inputs fuzzy, are enclosed, and proved unless the result says verified by"
-            " sampling; for outputs of other units the same share of their peaks as of the first"
-            " displacement's; if left out, method auto proves its tolerance",
+            "gap within which the bounds of a linear structure, up to six inputs fuzzy, are"
+            " enclosed, and proved unless the result says verified by sampling: of every output"
+            " where all are displacements; where units are mixed, of the first displacement, and of"
+            " the others the same share of their peaks, so 3 mm of q1 may be 14 mm of q6 (`check`"
+            " prints each); if left out, method auto proves its tolerance",
             "m",
             allowed=POSITIVE,
         ),

@@ -179,7 +179,11 @@ def test_a_default_that_changes_the_stiffness_is_told(tmp_path, capfd):
     assert "\nframe.columns: 2 (default); second_moment is of one\n" in steel(
         tmp_path, ("columns = 8\n", ""), capfd=capfd
     )
-    assert "is unusual" not in steel(tmp_path, ("columns = 8\n", "p_delta = true\n"), capfd=capfd)
+    dampers = 'dampers = "9 kN s/m"\ndamper_placement = "storey"\n'
+    told = steel(tmp_path, ("columns = 8\n", f"p_delta = true\n{dampers}"), capfd=capfd)
+    assert "is unusual" not in told
+    assert "\nframe.p_delta: true\n" in told
+    assert "\nframe.damper_placement: storey\n" in told
 
 
 SIX = 'masses = ["60 t", "60 t", "60 t", "60 t", "60 t", "60 t"]'
@@ -213,6 +217,15 @@ def test_masses_of_a_frame_in_another_unit_give_an_unusual_period(mass, tmp_path
     assert "is unusual for a structure; check the units of masses" in told
 
 
+@pytest.mark.parametrize(("stiffness", "period"), [("13500 MN/m", "0.05"), ("3.3 MN/m", None)])
+def test_the_usual_period_grows_with_the_storeys(stiffness, period, tmp_path, capfd):
+    six, own = ('masses = ["20 t", "20 t"]', SIX), (EI, f'stiffness = "{stiffness}"')
+    told = steel(tmp_path, six, ('["3.5 m"]', HIGH), own, capfd=capfd)
+    remark = f"first natural period of {period}"
+    assert (remark in told) is bool(period)
+    assert ("; 6 storeys usually take 0.3 to 1.8 s" in told) is bool(period)
+
+
 def test_a_slip_that_may_have_made_the_step_too_coarse_is_told_before_it(tmp_path, capfd):
     text = FRAME.replace('lengths = ["3.5 m"]', 'lengths = ["3.5 m", "1.5 mm"]')
     assert text != FRAME
@@ -239,6 +252,7 @@ RATIO = 'damping_ratio = "[2, 4] %"'
     ("old", "new", "remark"),
     [
         (EI, 'stiffness = "40 kN/m"', "frame: a first natural period of 7.19 s is unusual"),  # MN
+        (EI, 'stiffness = "300 kN/m"', "frame: a first natural period of 2.62 s is unusual"),
         (
             '"20 t", "20 t"',
             '"20000 t", "20000 t"',
