@@ -12,7 +12,7 @@ from alphacut.io.files import say
 from alphacut.io.progress import Tick
 from alphacut.rve.image.gap import constitutive_gap
 from alphacut.rve.image.model import ImageCut, ImageModel, reduced_to_pixels
-from alphacut.rve.image.moduli import PlaneModuli, grain_modulus
+from alphacut.rve.image.moduli import grain_modulus
 from alphacut.stages.image.error_table import Contribution, contributions
 from alphacut.stages.image.random_response import RandomResponse, responses
 from alphacut.stages.image.study import ImageStudy, Level
@@ -62,18 +62,17 @@ class FuzzyImage:
     @property
     def grains(self) -> tuple[float, float]:
         """Hashin–Shtrikman interval of E of grains, over the inputs at the highest level, in Pa."""
-        level, count = self.study.alpha[-1], len(self.study.pairs)
-        first, last = self.study.ranges(level)
-        images = self.study.images(level, level)
-        _, at, pixels = np.unique(first * count + last, return_index=True, return_counts=True)
-        softest, stiffest = (
+        study, level = self.study, self.study.alpha[-1]
+        shares = [np.bincount(x.ravel(), minlength=len(study.pairs)) for x in study.ranges(level)]
+        low, high = (
             [
-                PlaneModuli(float(images.bulk[end].flat[i]), float(images.shear[end].flat[i]))
-                for i in at
+                grain_modulus(list(f / f.sum()), m, m)[end]
+                for m in study.corners(level, end)
+                for f in shares
             ]
             for end in (0, 1)
         )
-        return grain_modulus(list(pixels / first.size), softest, stiffest)
+        return min(low), max(high)
 
     @property
     def gap(self) -> Array:

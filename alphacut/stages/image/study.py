@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -81,6 +82,16 @@ class ImageStudy:
                 low, high = (PlaneModuli.of_bulk(first[end], second[end]) for end in (0, 1))
                 moduli.append(ModuliInterval(low, high))
         return moduli
+
+    def corners(self, level: float, end: int) -> Iterable[tuple[PlaneModuli, ...]]:
+        """Phases with moduli at one end, Poisson's ratios at both ends and half-way."""
+        choices = []
+        for pair in self.pairs:
+            first, second = (cut_at(number, level) for number in pair)
+            ratios = sorted({second[0], (second[0] + second[1]) / 2, second[1]})
+            young = [PlaneModuli.of_young(first[end], nu) for nu in ratios] if self.young else []
+            choices.append(young or [PlaneModuli.of_bulk(first[end], second[end])])
+        return product(*choices)
 
     def images(self, threshold: Level, phases: Level) -> ModuliImages:
         """Least and greatest moduli of each pixel, at levels of threshold and phases."""

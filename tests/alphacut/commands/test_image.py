@@ -179,16 +179,23 @@ def test_every_admissible_case_lies_within_what_is_said_of_an_image(folder, capf
     image.fromarray(np.asarray(image.open(folder / "a.png"))[::2, ::2]).save(folder / "a.png")
     window = {"boundary": '"window"', "tiles": "2"}
     ranges = '["20 GPa ± 10 %", "[70, 75, 85, 90] GPa"]'
-    found = solved(folder, capfd, **window, threshold="[[115, 120, 140, 145]]", modulus=ranges)
+    fuzzy = {"modulus": ranges, "poisson": "[[0.1, 0.4], 0.3]"}
+    found = solved(folder, capfd, **window, threshold="[[115, 120, 140, 145]]", **fuzzy)
     ends = (("18 GPa", "70 GPa", 145, 0), ("22 GPa", "90 GPa", 115, 0))
     ends += (("18 GPa", "75 GPa", 140, 1), ("22 GPa", "85 GPa", 120, 1))
+    grains = []
     for matrix, particle, threshold, alpha in ends:
         modulus = f'["{matrix}", "{particle}"]'
-        corner = solved(folder, capfd, **window, modulus=modulus, threshold=f"[{threshold}]")
+        inputs = {"modulus": modulus, "threshold": f"[{threshold}]"}
+        inputs["poisson"] = f"[{0.1 if alpha else 0.4}, 0.3]"
+        corner = solved(folder, capfd, **window, **inputs)
         whole = ["apparent_E_support_GPa", "apparent_E_GPa"][alpha]
         inside(corner["apparent_E_GPa"], found[whole])
         if alpha:
             inside(corner["grains_E_GPa"], found["grains_E_GPa"])
+            stiff = ("lower", "upper")[matrix == "22 GPa"]
+            grains.append(corner["grains_E_GPa"][stiff] / found["grains_E_GPa"][stiff])
+    assert np.allclose(grains, 1, rtol=1e-2)
     case = written(folder, **window, modulus=ranges)
     assert main(["run", case, "--out", str(folder / "out"), "--no-figures"]) == 0
     told = capfd.readouterr().out
