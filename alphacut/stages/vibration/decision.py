@@ -134,9 +134,13 @@ def explained(case: Case, wanted: Structure, task: EnvelopeTask) -> list[str]:
     cost = MODELS * len(limits) * one.seconds
     count = f"{len(limits)} limits" if len(limits) > 1 else "a limit"
     words = f"{count}, ten times as much if one lies within the peaks"
+    if (inputs := len(wanted.inputs(task.fuzzy))) >= MANY:
+        words += f"; a minute or more for each limit where no proof covers the {inputs} inputs"
     return [f"decision, of run: about {float(f'{cost:.1g}'):g} s; {words}"]
 
 
+MANY = 5
+"""Inputs from which on a proof of the modes' error is tried at length before it is given up."""
 MODELS = 3
 """Cost of a decision far from the limit, beside that of the envelope of its output."""
 

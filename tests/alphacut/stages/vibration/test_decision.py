@@ -416,3 +416,16 @@ def test_the_figure_of_decisions_leaves_out_what_a_sure_excess_rules_out() -> No
     told = [text.get_text() for text in axes.texts]
     assert told[0].endswith("necessary to 1: exceeded for sure, not where hatched")
     assert told[1] == "exceeding is possible to 1, necessary to 0 … 1 (unknown)"
+
+
+def test_explain_tells_what_decisions_of_many_inputs_may_take(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    case = load(written(tmp_path, ["q1 <= 5 cm", "drift1 <= 2 %"]))
+    wanted = structure(case, None)
+    (few,) = decision.explained(case, wanted, task_of(case))
+    assert re.match(r"decision, of run: about \S+ s; 2 limits, ten times as much", few)
+    assert "for each limit" not in few
+    monkeypatch.setattr(decision, "MANY", 1)
+    (many,) = decision.explained(case, wanted, task_of(case))
+    assert "a minute or more for each limit where no proof covers the 1 inputs" in many
