@@ -140,6 +140,10 @@ def test_check_tells_the_wanted_error_of_each_output(capfd):
     assert "envelope: wanted error up to q8 200 µm, drift1 65 µm, base_shear 1.6 kN\n" in told
     assert main(["check", building, "--set", 'frame.outputs=["q8", "drift1"]']) == 0
     assert "wanted error up to q8 200 µm, drift1 200 µm\n" in capfd.readouterr().out
+    gap = ["--set", "envelope.certify=3 mm", "--set", "envelope.method=modal"]
+    outputs = ["--set", 'frame.outputs=["drift1", "q8", "a8"]']
+    assert main(["check", building, *gap, *outputs]) == 0
+    assert "envelope: wanted gap up to drift1 3.0 mm, q8 9." in capfd.readouterr().out
 
 
 def test_a_smaller_step_is_told_with_what_it_leaves(capfd):
