@@ -189,8 +189,8 @@ def missing_sections(case: Case) -> Iterator[Problem]:
     ):
         yield Problem(
             "radius",
-            "stage microstructure makes this section from the particles",
-            allowed="one of stage and section, which --radius, --a2 and --set radius.… write too",
+            "stage microstructure makes this section from the particles, --radius without them",
+            allowed="one of stage and section; for --radius a case without the stage and its input",
         )
 
 

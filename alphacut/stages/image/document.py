@@ -134,7 +134,7 @@ def dataset(found: FuzzyImage) -> xarray.Dataset:
         "stiffness": (
             ("alpha", "bound", "row", "column"),
             np.array([[c.bounds.lower, c.bounds.upper] for c in found.cuts]),
-            {"units": "Pa", "long_name": "bounds of the plane-strain stiffness, 11, 22, 12"},
+            {"units": "Pa", "long_name": "bounds of the plane-strain stiffness, or of tiles' mean"},
         ),
         "phase": (plane, found.phase.astype(np.float32), {"long_name": "number of the phase"}),
         "gap": (

@@ -18,7 +18,7 @@ BEYOND = {
     "periodic": 'boundary = "periodic": the image repeats itself',
     "window": 'boundary = "window": a piece of a larger material',
 }
-IF = {"periodic": ', if the image repeats itself (boundary = "periodic")', "window": ""}
+IF = {"periodic": ', if the image repeats itself (boundary = "periodic")', "window": " (E alone)"}
 SEAM, OFTENER = 0.1, 3  # of an edge, and of neighbouring lines: beyond both an edge does not match
 APART = 0.05  # of the area, by which a phase may differ from what the case's words say
 

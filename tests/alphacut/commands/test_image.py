@@ -164,7 +164,7 @@ def test_labels_and_an_inequality_give_what_a_threshold_does(folder, capfd):
 
 def test_a_window_gives_a_confidence_interval_and_says_so(folder, capfd):
     found = solved(folder, capfd, boundary='"window"', tiles="2", threshold="[130]")
-    assert found["nature"] == "95 % confidence interval of the material, no proof"
+    assert found["nature"] == "95 % confidence interval of the material, no proof (E alone)"
     assert found["E_GPa"]["lower"] < found["apparent_E_GPa"]["lower"]
     assert found["apparent_E_GPa"]["upper"] < found["E_GPa"]["upper"]
     assert [row["source"] for row in found["error_table"]] == ["finite window", "discretisation"]
