@@ -207,7 +207,7 @@ def modulus_lines(found: Document) -> Iterator[str]:
             f"E = {core(cell)}, support [{cell['lower_GPa']:.4f}, {cell['upper_GPa']:.4f}] GPa,"
             f" bounds {cell['nature']}; nu = {nu}"
         )
-        yield from crisp_particles(found.get("microstructure", {}))
+        yield from filter(None, [cell.get("crisp")])
         ranked = sorted(found.get("shares", {}).get("E", {}).items(), key=lambda one: -one[1])
         first = [f"{in_words(name)} {share:.0%}" for name, share in ranked[:3] if share > 0]
         if first:
@@ -218,13 +218,6 @@ def modulus_lines(found: Document) -> Iterator[str]:
         if told := cell["outside"]:  # why, and the cure, was said before the run
             yield f"warning: {told.partition(', and ')[0] if cell.get('shape') else told}"
         yield cell["publish"]
-
-
-def crisp_particles(found: Document) -> Iterator[str]:
-    """That a support holds no scatter of the particles, where slopes of their map are crisp."""
-    if crisp := [x for x in ("a2", "a4") if x in found and found[x][0] == found[x][-1]]:
-        held = "the phases only" if len(crisp) == 2 else "the other slope and the phases only"
-        yield f"the support holds {held}: {' and '.join(crisp)} of the particles are crisp"
 
 
 def image_lines(found: Document) -> Iterator[str]:

@@ -87,7 +87,7 @@ def modulus(found: Document, drawn: Markup) -> Markup:
     head = ("α", "lower E, GPa", "upper E, GPa", "lower ν", "upper ν")[: 1 + len(ends)]
     beside = found.get("beside")
     told = [f"{one}." for one in lines(beside, found["particles"])] if beside else []
-    told += [found[name] for name in ("outside", "publish") if found.get(name)]
+    told += [found[name] for name in ("outside", "crisp", "publish") if found.get(name)]
     words = Markup(
         "<p>{} <strong>{}</strong>, support [{:.4f}, {:.4f}] GPa; Poisson's ratio {:.4f}. {} {}"
         " samples, {} linear systems, {:.1f} s. {} {} {}</p>"

@@ -52,7 +52,17 @@ def summary(results: Results) -> Document:
     if "modulus" in found and beyond > LEFT_OUT:
         told = f"E leaves out {beyond:.0%} of the volume, in cells too tight for a cubic one."
         found["modulus"] |= {"publish": f"Not to be published: {told}"}
+    if "modulus" in found:
+        found["modulus"] |= {"crisp": crisp_particles(found.get("microstructure", {}))}
     return {**found, "paper": comparison(quoted, found) if quoted else []}
+
+
+def crisp_particles(found: Document) -> str:
+    """That a support holds no scatter of the particles, where slopes of their map are crisp."""
+    crisp = [x for x in ("a2", "a4") if x in found and found[x][0] == found[x][-1]]
+    held = "the phases only" if len(crisp) == 2 else "the other slope and the phases only"
+    told = f"The support of E holds {held}: {' and '.join(crisp)} of the particles are crisp."
+    return told if crisp else ""
 
 
 def origin(case: Case) -> Document:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from markupsafe import Markup
 
 from alphacut.commands import run
 from alphacut.commands.envelope import summary
@@ -16,8 +17,10 @@ from alphacut.entry import main
 from alphacut.figures.captions import FIGURES, caption, core, figure_words
 from alphacut.frame import Envelope
 from alphacut.io.units import engineering, largest_by_unit
+from alphacut.report import material
 from alphacut.report.differences import differences
 from alphacut.report.tables import citation
+from alphacut.stages.summary import crisp_particles
 
 CASES = Path(__file__).parents[3] / "cases"
 
@@ -190,17 +193,13 @@ def test_nu_has_its_support_and_the_three_inputs_that_matter_most_are_named(monk
     cell = {"modal_GPa": 6.2, "E_GPa": {"lower": [5.8, 6.2], "upper": [6.6, 6.2]}, "nu": 0.3295}
     cell |= {"lower_GPa": 5.8, "upper_GPa": 6.6, "outside": "", "publish": "P", "alpha": [0, 1]}
     cell |= {"nu_cuts": {"lower": [0.309, 0.3295], "upper": [0.351, 0.3295]}, "beside": {}}
-    cell |= {"nature": "inner"}
+    cell |= {"nature": "inner", "crisp": "The support of E holds the phases only."}
     shares = {"a2": 0.6, "matrix_modulus": 0.3, "a4": 0.07, "matrix_poisson": 0.03}
     monkeypatch.setattr(run, "lines", lambda *_: [])
     found = {"modulus": cell | {"particles": "cylinders"}, "shares": {"E": shares}}
-    first, second, _ = run.modulus_lines(found)
+    first, crisp, second, _ = run.modulus_lines(found)
+    assert crisp == cell["crisp"]
     assert first.endswith("GPa, bounds inner; nu = 0.3295, support [0.3090, 0.3510]")
-    found["microstructure"] = {"a2": [0.2, 0.2, 0.2], "a4": [0.1, 0.1, 0.1]}
-    said = "the support holds the phases only: a2 and a4 of the particles are crisp"
-    assert list(run.modulus_lines(found))[1] == said
-    found["microstructure"]["a2"] = [0.1, 0.2, 0.3]
-    assert "other slope and the phases only: a4 of" in list(run.modulus_lines(found))[1]
     assert "smaller (slope a2) 60%; modulus of the matrix 30%; spread" in second
     assert "Poisson" not in second
     assert second.startswith("the width of E shrinks by this share if the input were known (the")
@@ -208,3 +207,15 @@ def test_nu_has_its_support_and_the_three_inputs_that_matter_most_are_named(monk
     found["modulus"]["nu_cuts"] = {"lower": [0.309, 0.32], "upper": [0.351, 0.339]}
     first, *_ = run.modulus_lines(found)
     assert first.endswith("; nu = [0.3200, 0.3390] at α = 1, support [0.3090, 0.3510]")
+
+
+def test_a_support_that_holds_no_scatter_of_the_particles_says_so():
+    slopes = {"a2": [0.2, 0.2, 0.2], "a4": [0.1, 0.1, 0.1]}
+    told = crisp_particles(slopes)
+    assert told == "The support of E holds the phases only: a2 and a4 of the particles are crisp."
+    assert "other slope and the phases only: a4 of" in crisp_particles(slopes | {"a2": [1, 2, 3]})
+    assert crisp_particles({"a2": [1, 2, 3], "a4": [1, 2, 3]}) == crisp_particles({}) == ""
+    found = {"E_GPa": {"lower": [5.0], "upper": [6.0]}, "alpha": [0.0], "crisp": told, "nu": 0.3}
+    found |= {"lower_GPa": 5.0, "upper_GPa": 6.0, "samples": 1, "solves": 0, "seconds": 0.0}
+    found |= {"nature": "inner", "plan": "general", "modal_GPa": 5.5}
+    assert told in material.modulus(found, Markup(""))
