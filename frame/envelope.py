@@ -12,9 +12,8 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.outputs import output_unit
-from alphacut.fuzzy.csv_table import write_csv
 from alphacut.fuzzy.drawing import draw_bands, new_axes
-from alphacut.fuzzy.html import html_table
+from alphacut.fuzzy.tables import html_table, write_csv
 
 if TYPE_CHECKING:
     import xarray
@@ -218,14 +217,12 @@ class Envelope:
     @property
     def minimum(self) -> Array:
         """Least value over time, shape (A, m)."""
-        least: Array = self.lower.min(1)
-        return least
+        return np.asarray(self.lower.min(1))
 
     @property
     def maximum(self) -> Array:
         """Greatest value over time, shape (A, m)."""
-        greatest: Array = self.upper.max(1)
-        return greatest
+        return np.asarray(self.upper.max(1))
 
     def nesting_violation(self) -> float:
         """By how much an α-cut leaves the next wider one, at most; 0 when nested."""

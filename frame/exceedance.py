@@ -23,9 +23,9 @@ from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.counted import counted
-from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.progress_bar import Progress, told
 from alphacut.fuzzy.sets.given import positive
+from alphacut.fuzzy.tables import html_table
 
 LIMITS = 201
 """Limits for which the probability is computed besides."""

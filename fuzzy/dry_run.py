@@ -15,7 +15,6 @@ from alphacut.fuzzy.campaign.memory_check import needed
 from alphacut.fuzzy.campaign.sample_store import Shelf, shelf
 from alphacut.fuzzy.campaign.store import Identity, Store, Stored
 from alphacut.fuzzy.counted import counted
-from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.plan import Plan
@@ -24,6 +23,7 @@ from alphacut.fuzzy.samples.model import Values
 from alphacut.fuzzy.sets.boxes import Domain, levels
 from alphacut.fuzzy.sets.interaction import Interaction
 from alphacut.fuzzy.sets.numbers import Array, FuzzyNumber
+from alphacut.fuzzy.tables import html_table
 
 Inputs = Mapping[str, FuzzyNumber | float]
 

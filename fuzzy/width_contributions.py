@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from alphacut.fuzzy.arguments import fuzzy_inputs
-from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.progress_bar import Progress, told
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.numbers import Array, Crisp, FuzzyNumber
+from alphacut.fuzzy.tables import html_table
 
 Bounds = Callable[[Mapping[str, FuzzyNumber]], tuple[Array, Array] | FuzzyResult]
 

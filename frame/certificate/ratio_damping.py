@@ -153,8 +153,7 @@ class RatioDamping:
     def read(self, stiffness: Comparison, mass: Comparison) -> Array:
         """Bound of the damping force over a floor's mass, over ‖v‖ in the norm of M, (m,)."""
         fastest = np.sqrt(stiffness.most(mass))
-        bound: Array = 2 * self.largest * fastest / self.root_masses
-        return bound
+        return np.asarray(2 * self.largest * fastest / self.root_masses)
 
     @cached_property
     def root_masses(self) -> Array:

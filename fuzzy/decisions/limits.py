@@ -17,7 +17,6 @@ from alphacut.fuzzy.arguments import fuzzy_inputs
 from alphacut.fuzzy.campaign.campaign import CampaignError
 from alphacut.fuzzy.counted import counted, ranged
 from alphacut.fuzzy.decisions.nested_boxes import ByLevel, Scaled, Threshold, Verdict, threshold
-from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.knowledge.enclosure import Enclosed
 from alphacut.fuzzy.plans.branch_and_bound import BranchAndBound
 from alphacut.fuzzy.progress_bar import Progress, part, told
@@ -26,6 +25,7 @@ from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain, levels
 from alphacut.fuzzy.sets.given import finite, finite_by_name, positive
 from alphacut.fuzzy.sets.numbers import Array, Crisp, FuzzyNumber, Interval
+from alphacut.fuzzy.tables import html_table
 
 Limits = Mapping[str, float]
 _UNKEPT = "keeps nothing: a larger tolerance or a smaller budget ends it sooner"

@@ -20,7 +20,6 @@ from alphacut.fuzzy.arguments import fuzzy_inputs, require_callable
 from alphacut.fuzzy.campaign.store import Identity, Store
 from alphacut.fuzzy.campaign.workers import pool, require_executor, require_workers
 from alphacut.fuzzy.counted import counted
-from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.knowledge.joint import joined_once
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.plan import Plan
@@ -29,6 +28,7 @@ from alphacut.fuzzy.progress_bar import Progress, part, told
 from alphacut.fuzzy.propagation import on_interrupt, propagate
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.numbers import Crisp, Cut, FuzzyNumber, Interval
+from alphacut.fuzzy.tables import html_table
 from alphacut.fuzzy.width_contributions import Basis, widened
 
 _ANSWERS = 6  # for each input: its cut halved and exact, in three places

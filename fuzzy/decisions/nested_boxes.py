@@ -9,10 +9,10 @@ from typing import Protocol
 import numpy as np
 
 from alphacut.fuzzy.counted import counted
-from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.numbers import Array
+from alphacut.fuzzy.tables import html_table
 
 
 class Growing(Protocol):

@@ -13,9 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alphacut.fuzzy.counted import counted
-from alphacut.fuzzy.csv_table import write_csv
 from alphacut.fuzzy.drawing import draw_bands, draw_membership, new_axes
-from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.knowledge.contradiction import contradictions
 from alphacut.fuzzy.knowledge.joint import JointClaim
 from alphacut.fuzzy.knowledge.known import Signs
@@ -26,6 +24,7 @@ from alphacut.fuzzy.sets.claimed import Claimed
 from alphacut.fuzzy.sets.numbers import Array, Mask, PiecewiseLinear, Rows
 from alphacut.fuzzy.sets.stepwise import Stepwise, outer_steps
 from alphacut.fuzzy.surrogates.response_surface import ResponseSurface
+from alphacut.fuzzy.tables import html_table, write_csv
 
 if TYPE_CHECKING:
     import xarray
@@ -39,8 +38,7 @@ _ROWS = 25  # that are printed, a level each
 def _crisp(domain: Domain) -> Mask:
     """Levels whose cut is one point, shape (levels,)."""
     lower, upper = domain.boxes
-    crisp: Mask = (lower == upper).all(axis=1)
-    return crisp
+    return np.asarray((lower == upper).all(axis=1))
 
 
 def _shown(value: float) -> str:

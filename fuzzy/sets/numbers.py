@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from alphacut.fuzzy.drawing import draw_membership, new_axes
-from alphacut.fuzzy.html import membership_svg
 from alphacut.fuzzy.sets.given import is_real
+from alphacut.fuzzy.tables import membership_svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -119,31 +119,31 @@ class FuzzyNumber(ABC):
         )
 
     def __add__(self, other: FuzzyNumber | float) -> FuzzyNumber:
-        return _combine("+", self, other)
+        return OPERATORS["+"](self, other)
 
     def __radd__(self, other: float) -> FuzzyNumber:
-        return _combine("+", other, self)
+        return OPERATORS["+"](other, self)
 
     def __sub__(self, other: FuzzyNumber | float) -> FuzzyNumber:
-        return _combine("-", self, other)
+        return OPERATORS["-"](self, other)
 
     def __rsub__(self, other: float) -> FuzzyNumber:
-        return _combine("-", other, self)
+        return OPERATORS["-"](other, self)
 
     def __mul__(self, other: FuzzyNumber | float) -> FuzzyNumber:
-        return _combine("*", self, other)
+        return OPERATORS["*"](self, other)
 
     def __rmul__(self, other: float) -> FuzzyNumber:
-        return _combine("*", other, self)
+        return OPERATORS["*"](other, self)
 
     def __truediv__(self, other: FuzzyNumber | float) -> FuzzyNumber:
-        return _combine("/", self, other)
+        return OPERATORS["/"](self, other)
 
     def __rtruediv__(self, other: float) -> FuzzyNumber:
-        return _combine("/", other, self)
+        return OPERATORS["/"](other, self)
 
     def __neg__(self) -> FuzzyNumber:
-        return _combine("-", 0.0, self)
+        return OPERATORS["-"](0.0, self)
 
     def __pow__(self, exponent: int) -> FuzzyNumber:
         return OPERATORS["**"](self, exponent)
@@ -160,10 +160,6 @@ def _boxed(value: object) -> NDArray[np.object_]:
 
 OPERATORS: dict[str, Callable[[FuzzyNumber | float, FuzzyNumber | float], FuzzyNumber]] = {}
 """Functions behind the signs; `fuzzy.sets.arithmetic` enters its own."""
-
-
-def _combine(sign: str, left: FuzzyNumber | float, right: FuzzyNumber | float) -> FuzzyNumber:
-    return OPERATORS[sign](left, right)
 
 
 def _interpolate(alpha: float, levels: Sequence[float], ends: Sequence[float]) -> float:

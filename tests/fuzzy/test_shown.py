@@ -33,12 +33,12 @@ from alphacut.fuzzy import (
     width_shares,
 )
 from alphacut.fuzzy.decisions.measure_next import measure_next
-from alphacut.fuzzy.html import html_table
 from alphacut.fuzzy.plans.automatic import _per_cent
 from alphacut.fuzzy.plans.interval_quasi_monte_carlo import IntervalResponse
 from alphacut.fuzzy.random_response import RandomResponse
 from alphacut.fuzzy.samples.model import Values
 from alphacut.fuzzy.samples.result import FuzzyResult
+from alphacut.fuzzy.tables import html_table
 from alphacut.rve.image.bounds import StiffnessBounds
 from alphacut.rve.image.random_threshold import ThresholdResponse
 from alphacut.rve.result import Homogenised, StressCurve
