@@ -66,24 +66,20 @@ class Boxes:
     @property
     def centre(self) -> Array:
         """Middle of the widest box, shape (d,)."""
-        middle: Array = (self.lower[0] + self.upper[0]) / 2
-        return middle
+        return np.asarray((self.lower[0] + self.upper[0]) / 2)
 
     @property
     def radius(self) -> Array:
         """Half widths of the widest box, shape (d,)."""
-        half: Array = (self.upper[0] - self.lower[0]) / 2
-        return half
+        return np.asarray((self.upper[0] - self.lower[0]) / 2)
 
     def to_unit(self, points: Array) -> Array:
         """Unit coordinates of physical points (…, d); a parameter without width is at 0."""
-        unit: Array = (points - self.centre) / np.where(self.radius > 0, self.radius, 1.0)
-        return unit
+        return np.asarray((points - self.centre) / np.where(self.radius > 0, self.radius, 1.0))
 
     def to_physical(self, unit: Array) -> Array:
         """Physical points of unit coordinates (…, d), never outside the widest box."""
-        points: Array = np.clip(self.centre + self.radius * unit, self.lower[0], self.upper[0])
-        return points
+        return np.asarray(np.clip(self.centre + self.radius * unit, self.lower[0], self.upper[0]))
 
     def in_unit(self, jet: Jet, *, anew: bool = True) -> Jet:
         """Derivatives by the unit coordinates from those by the physical parameters.

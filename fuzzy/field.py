@@ -62,8 +62,7 @@ class FuzzyField:
         values, vectors = np.maximum(values[::-1], 0.0), vectors[:, ::-1]
         held = np.cumsum(values) / values.sum()
         count = int(np.searchsorted(held, self.share * (1 - 1e-12))) + 1
-        shapes: Array = vectors[:, :count] * np.sqrt(values[:count])
-        return shapes
+        return np.asarray(vectors[:, :count] * np.sqrt(values[:count]))
 
     @property
     def left_out(self) -> float:
@@ -77,8 +76,7 @@ class FuzzyField:
 
         Each place's parts are scaled to a sum of 1: it reaches its own interval and no more.
         """
-        shapes: Array = self.shapes / np.abs(self.shapes).sum(1, keepdims=True)
-        return shapes
+        return np.asarray(self.shapes / np.abs(self.shapes).sum(1, keepdims=True))
 
     @property
     def apart(self) -> float:

@@ -47,8 +47,7 @@ class JointOutputs:
         """Whether pairs (n, 2) lie in the enclosing polygon of a level."""
         lower, upper = self.result.lower[level], self.result.upper[level]
         along = pairs @ _directions(len(lower)).T
-        inside: Array = ((along >= lower - slack) & (along <= upper + slack)).all(1)
-        return inside
+        return np.asarray(((along >= lower - slack) & (along <= upper + slack)).all(1))
 
     def area(self, level: int = 0) -> tuple[float, float]:
         """Areas of the inner and the outer polygon of a level."""

@@ -66,10 +66,8 @@ def p_box(case: Case) -> Figure:
     """Fig. 13: lower, upper and modal distribution of r_n over the fuzzy slopes."""
     drawn, axes = figure()
     corners = maps(case, 0.0)
-    low, high = (
-        min(radius.extremes()[0] for radius in corners),
-        max(radius.extremes()[1] for radius in corners),
-    )
+    low = min(radius.extremes()[0] for radius in corners)
+    high = max(radius.extremes()[1] for radius in corners)
     at = np.linspace(low, high, 600)
     family = np.array([distribution(radius, at) for radius in corners])
     axes.fill_between(

@@ -70,10 +70,8 @@ def panel(axes: Axes, found: xarray.Dataset, output: str) -> None:
     axes.set_zorder(behind.get_zorder() + 1)
     axes.patch.set_visible(False)
     for index, name in enumerate(found["input"].values):
-        colour, dashes = (
-            COLOURS[index % len(COLOURS)],
-            STYLES[(index // len(COLOURS)) % len(STYLES)],
-        )
+        colour = COLOURS[index % len(COLOURS)]
+        dashes = STYLES[(index // len(COLOURS)) % len(STYLES)]
         share = weighted(found["share"].sel(input=name).values, width)
         axes.plot(
             time,
@@ -95,8 +93,7 @@ def weighted(share: Array, width: Array) -> Array:
         np.convolve(values, np.ones(2 * half + 1))[half:-half]
         for values in (np.nan_to_num(share) * width, width)
     )
-    means: Array = np.divide(above, below, out=np.full(len(width), np.nan), where=below > 0)
-    return means
+    return np.asarray(np.divide(above, below, out=np.full(len(width), np.nan), where=below > 0))
 
 
 def of_modulus(found: xarray.Dataset) -> Figure:

@@ -17,12 +17,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-INK, BLUE, ORANGE, GREY = (
-    figure_style.INK,
-    figure_style.BLUE,
-    figure_style.ORANGE,
-    figure_style.GREY,
-)
+INK = figure_style.INK
+BLUE = figure_style.BLUE
+ORANGE = figure_style.ORANGE
+GREY = figure_style.GREY
 PURPLE = "#7b3294"  # differs from Okabe's and Ito's blue and orange in lightness
 WIDTH, HEIGHT = 6.4, 3.8  # inches
 

@@ -23,8 +23,7 @@ def gain(g: Array, H: Array, x: Array) -> Array:
         if x.ndim == 2
         else g[:, None] + 0.5 * np.matmul(x, H)
     )
-    total: Array = (slope * x).sum(-1)
-    return total
+    return np.asarray((slope * x).sum(-1))
 
 
 def linear_maximum(g: Array, lower: Array, upper: Array) -> Array:
@@ -155,5 +154,4 @@ def _best_of_starts(g: Array, H: Array, lower: Array, upper: Array) -> Array:
     starts = [np.zeros_like(g), linear_maximum(g, lower, upper)]
     found = np.stack([local_maximum(g, H, lower, upper, start) for start in starts], 1)
     pick = gain(g, H, found).argmax(1)
-    best: Array = found[np.arange(len(g)), pick]
-    return best
+    return np.asarray(found[np.arange(len(g)), pick])

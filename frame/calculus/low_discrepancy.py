@@ -34,8 +34,7 @@ def halton(dimension: int, count: int, *, skip: int = 1) -> Array:
 
 def chebyshev_points(dimension: int, count: int, *, skip: int = 1) -> Array:
     """Points of [−1, 1]^d of Chebyshev density, shape (count, dimension)."""
-    points: Array = -np.cos(np.pi * halton(dimension, count, skip=skip))
-    return points
+    return -np.cos(np.pi * halton(dimension, count, skip=skip))
 
 
 def corners(lower: Array, upper: Array) -> Array:

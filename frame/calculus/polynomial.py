@@ -78,8 +78,7 @@ def lowered(index: bytes, shape: tuple[int, int], axis: int) -> Index:
 def product(real: Array, coefficients: Array) -> Array:
     """Real @ coefficients for complex coefficients without making `real` complex."""
     if not np.iscomplexobj(coefficients):
-        plain: Array = real @ coefficients
-        return plain
+        return real @ coefficients
     flat = np.ascontiguousarray(coefficients).view(float)
     both: Array = (real @ flat).view(complex)
     return both
@@ -210,8 +209,7 @@ class ChebyshevGrid:
         ) / len(self)
         for axis in range(len(self.shape)):
             out[(slice(None),) * axis + (0,)] /= 2
-        coefficients: Array = out.reshape(values.shape)
-        return coefficients
+        return np.asarray(out.reshape(values.shape))
 
 
 @dataclass(frozen=True)
@@ -312,5 +310,4 @@ def _differentiated(B: Array, index: Index, axes: tuple[int, ...]) -> Array:
     for axis in axes:
         factor = factor * index[position, axis]
         position = lowered(index.tobytes(), index.shape, axis)[position]
-    out: Array = B[:, position] * factor
-    return out
+    return B[:, position] * factor

@@ -78,8 +78,7 @@ def proved_error(model: ModalModel, *, patient: bool = True) -> Array:
             * part.waves[0]
             @ (np.abs(defect["outputs"]).sum(0) + part.left_out[:, None] * largest)
         )
-    bound: Array = deviation[:, None] * _reading(structure["rows"], stiffness, mass, ratio) + own
-    return bound
+    return deviation[:, None] * _reading(structure["rows"], stiffness, mass, ratio) + own
 
 
 def _reading(
@@ -92,8 +91,7 @@ def _reading(
     speeding = np.array([mass.sup_dual(row[:, size:]) for row in rows])
     if ratio is not None:
         speeding = speeding + ratio.read(stiffness, mass)
-    reading: Array = np.hypot(moved, speeding)
-    return reading
+    return np.asarray(np.hypot(moved, speeding))
 
 
 def _grids(model: ModalModel) -> tuple[ChebyshevGrid, LowerGrid]:

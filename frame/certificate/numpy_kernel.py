@@ -57,20 +57,17 @@ class Items:
     @cached_property
     def bent(self) -> Array:
         """What the Hessian may change the gradient by, shape (I, d)."""
-        bent: Array = (np.abs(self.H) * self.r[:, None]).sum(-1)
-        return bent
+        return np.asarray((np.abs(self.H) * self.r[:, None]).sum(-1))
 
     @cached_property
     def pull(self) -> Array:
         """Twice what third derivatives may change the gradient by, shape (I, d)."""
-        pull: Array = np.einsum("nijk,nj,nk->ni", self.third, self.r, self.r)
-        return pull
+        return np.asarray(np.einsum("nijk,nj,nk->ni", self.third, self.r, self.r))
 
     @cached_property
     def rest(self) -> Array:
         """Bound of what the Taylor models leave out, and of rounding, shape (I,)."""
-        rest: Array = (self.pull * self.r).sum(-1) / 6 + self.margin[:, 0]
-        return rest
+        return np.asarray((self.pull * self.r).sum(-1) / 6 + self.margin[:, 0])
 
     @property
     def wander(self) -> Array:
@@ -93,8 +90,7 @@ class Items:
         top = np.where(
             inside, -(slope**2) / np.where(inside, 2 * bend, 1.0), slope * r + 0.5 * bend * r**2
         )
-        bounds: Array = self.f + top.sum(1) + self.rest
-        return bounds
+        return np.asarray(self.f + top.sum(1) + self.rest)
 
 
 def examine(piece: Piece, problems: Problems) -> tuple[Array, Array]:
@@ -158,8 +154,7 @@ def _full(J: Array, d: int) -> Array:
     place = np.empty((d, d), int)
     row, column = np.triu_indices(d)
     place[row, column] = place[column, row] = 1 + d + np.arange(len(row))
-    full: Array = J[..., place]
-    return full
+    return J[..., place]
 
 
 def _below_near_best(problems: Problems, items: Items, which: Array, centre: Array) -> Array:

@@ -39,8 +39,7 @@ def suprema(polynomial: Polynomial, reach: Array) -> list[Array]:
     size = np.prod(reach**polynomial.index, axis=1)
 
     def bound(coefficients: Array) -> Array:
-        total: Array = size @ np.abs(coefficients)
-        return total
+        return np.asarray(size @ np.abs(coefficients))
 
     zero = bound(polynomial.coefficients)
     first = np.stack([bound(polynomial.slope[i]) for i in range(d)])
@@ -57,8 +56,7 @@ def largest_growth(eigenvalue: Polynomial, reach: Array) -> Array:
     """Bounds of Re λ_k for |u_i| <= reach_i, shape (n,)."""
     size = np.prod(reach**eigenvalue.index, axis=1)
     real = eigenvalue.coefficients.real
-    bound: Array = real[0] + size[1:] @ np.abs(real[1:])
-    return bound
+    return np.asarray(real[0] + size[1:] @ np.abs(real[1:]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,8 +117,7 @@ def _noise(model: ModalModel, rate: Array, *, forced: bool) -> Array:
     steps = polynomial * (2 + turned) + 12 * model.count + 4 * d**3 + 50
     if forced:
         steps = steps + (len(model.time) + MOST_TERMS) * np.exp(REACH)
-    noise: Array = np.finfo(float).eps * steps
-    return noise
+    return np.finfo(float).eps * steps
 
 
 def _at_rest(model: ModalModel, reach: Array) -> Array:

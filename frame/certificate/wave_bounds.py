@@ -83,8 +83,7 @@ def _largest(growth: Array, step: float, count: int, power: int) -> Array:
     peak = -power / np.where(growth < 0, growth, -1e-300)
     inside = (peak > ends[:-1]) & (peak < ends[1:])
     summit = np.where(inside, peak, 0.0) ** power * np.exp(-float(power))
-    larger: Array = np.maximum(np.maximum(value[:-1], value[1:]), np.where(inside, summit, 0.0))
-    return larger
+    return np.asarray(np.maximum(np.maximum(value[:-1], value[1:]), np.where(inside, summit, 0.0)))
 
 
 def _convolved(kernel: Array, size: Array) -> Array:
@@ -99,5 +98,4 @@ def _convolved(kernel: Array, size: Array) -> Array:
     sums = np.array([np.convolve(column, size)[:count] for column in columns])
     out = np.moveaxis(sums.reshape(*kernel.shape[:-2], kernel.shape[-1], count), -1, -2)
     start = np.zeros((*out.shape[:-2], 1, out.shape[-1]))
-    ends: Array = np.concatenate([start, out], axis=-2)
-    return ends
+    return np.concatenate([start, out], axis=-2)

@@ -19,11 +19,9 @@ from alphacut.frame.structures.storey import StoreyFrame
 OTHER_UNITS = 500  # from so many times the structure's own value on, or that part of it
 SLOW = 10  # periods longer than so many durations are warned of
 NODES = 3  # or all of fewer steps than these
-POSITIVE, NOT_NEGATIVE, RATIO = (
-    "positive",
-    "0 or greater",
-    "0 or greater and below 1, the critical damping",
-)
+POSITIVE = "positive"
+NOT_NEGATIVE = "0 or greater"
+RATIO = "0 or greater and below 1, the critical damping"
 OF_FRAME = {
     r"E|I\d*|[mlck]\d+": POSITIVE,
     r"d\d+|rayleigh_(mass|stiffness)": NOT_NEGATIVE,

@@ -55,8 +55,7 @@ def stray(flow: Flow, points: Array) -> Array:
         np.roll(off, -1, 0),
         np.broadcast_to(FLOOR * off.max(0), off.shape),
     ]
-    found: Array = np.concatenate([np.zeros((1, off.shape[1])), SAFETY * np.max(spread, 0)])
-    return found
+    return np.concatenate([np.zeros((1, off.shape[1])), SAFETY * np.max(spread, 0)])
 
 
 def ground_stray(ground: Accelerogram, time: Array) -> Array:

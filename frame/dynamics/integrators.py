@@ -133,10 +133,8 @@ class Newmark:
         flow = state_matrix(matrices)
         acceleration = flow[..., n:, :]  # q̈ as rows acting on [q; v]
         eye, zero = np.eye(n), np.zeros((n, n))
-        new, old = (
-            np.vstack([self.beta * h**2 * eye, self.gamma * h * eye]),
-            np.vstack([(0.5 - self.beta) * h**2 * eye, (1 - self.gamma) * h * eye]),
-        )
+        new = np.vstack([self.beta * h**2 * eye, self.gamma * h * eye])
+        old = np.vstack([(0.5 - self.beta) * h**2 * eye, (1 - self.gamma) * h * eye])
         drift = np.block([[eye, h * eye], [zero, eye]])
         left = inverse(np.eye(2 * n) - new @ acceleration)
         load = left @ np.hstack([old @ -matrices.rigid, new @ -matrices.rigid])

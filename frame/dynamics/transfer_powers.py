@@ -68,8 +68,7 @@ def trajectory(step_map: StepMap, start: Jet, rows: Jet, *, load: Array | None, 
     def in_time(x: Array) -> Array:
         lead = x.shape[:-3]
         ordered = np.moveaxis(x.reshape((*lead, samples, size, m, blocks)), -1, -3)
-        cut: Array = ordered.reshape((*lead, samples, blocks * size, m))[..., :count, :]
-        return cut
+        return ordered.reshape((*lead, samples, blocks * size, m))[..., :count, :]
 
     return out.map(in_time)
 

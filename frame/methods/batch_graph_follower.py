@@ -110,10 +110,8 @@ class BatchFollower:
             lower, upper = flow.boxes.unit(level)
             out.enter(lower, upper, self)
             limit = self.budget * (done + 1) // levels
-            points, contests = (
-                self._start(flow, lower, upper, out)[: max(1, limit - len(out.points))],
-                self.contests,
-            )
+            points = self._start(flow, lower, upper, out)[: max(1, limit - len(out.points))]
+            contests = self.contests
             while len(points):
                 for chunk in np.array_split(points, -(-len(points) // self.batch)):
                     out.take(chunk)

@@ -104,9 +104,7 @@ class Storage:
     def _reserve(self, count: int) -> None:
         if count > len(self._points):
             room = max(count, 2 * len(self._points))
-            points, values = (
-                np.empty((room, self._points.shape[1])),
-                np.empty((*self._values.shape[:2], room)),
-            )
+            points = np.empty((room, self._points.shape[1]))
+            values = np.empty((*self._values.shape[:2], room))
             points[: self._count], values[..., : self._count] = self.points, self.values
             self._points, self._values = points, values

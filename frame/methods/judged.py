@@ -47,7 +47,8 @@ def judged(found: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
     proof = _proof(found, flow)
     if proof is not None:
         proved = _beside(found, proof, flow)
-        return proved if _resolved(proof, found) else _sharper(proved, found, flow)
+        sharp = float(proof.facts["gap"]) <= float(found.facts["gain"])  # enough to judge it
+        return proved if sharp else _sharper(proved, found, flow)
     error = _by_modes(found, flow)
     if error is not None:
         return _told(found, error, flow, BY_MODES)
@@ -56,11 +57,6 @@ def judged(found: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
     error = np.broadcast_to(own, found.lower.shape) + SAFETY * missed[:, None]
     error = error + (steps if found.error is None else 0.0)
     return _told(found, error, flow, f"{SAMPLES} independent trajectories on each level")
-
-
-def _resolved(proof: Envelope, found: Envelope) -> bool:
-    """Whether the proved bounds are sharp enough to judge a Graph Follower's."""
-    return float(proof.facts["gap"]) <= float(found.facts["gain"])
 
 
 def _sharper(proved: Envelope, found: Envelope, flow: UnitFlow) -> Envelope:
@@ -144,8 +140,7 @@ def _by_modes(found: Envelope, flow: UnitFlow) -> Array | None:
     if (own > resolved).any():
         return None
     apart = np.abs(bounds - np.stack([-found.lower, found.upper], -1))
-    distance: Array = (apart + left).max(-1) + own
-    return distance
+    return np.asarray((apart + left).max(-1) + own)
 
 
 def _missed(found: Envelope, flow: UnitFlow, level: int) -> Array:

@@ -99,7 +99,6 @@ class QuasiMonteCarlo:
 
         def points(lower: Array, upper: Array) -> Array:
             unit = qmc.Sobol(len(lower), rng=np.random.default_rng(self.seed)).random(self.samples)
-            chebyshev: Array = (lower + upper) / 2 - (upper - lower) / 2 * np.cos(np.pi * unit)
-            return chebyshev
+            return np.asarray((lower + upper) / 2 - (upper - lower) / 2 * np.cos(np.pi * unit))
 
         return sample(flow, points, "quasi-monte-carlo")

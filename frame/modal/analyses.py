@@ -114,5 +114,4 @@ def _by_energy(matrices: Matrices, rows: Array, X: Array, state: Array, upper: A
         for part, matrix in ((shapes[:n], K), (shapes[n:], M))
     ]
     size = 2 * np.sqrt(np.maximum(held[0] + held[1], 0.0))[:, None] * state[upper]
-    found: Array = size * np.sqrt(np.maximum(reading[0] + reading[1], 0.0))
-    return found
+    return np.asarray(size * np.sqrt(np.maximum(reading[0] + reading[1], 0.0)))

@@ -82,8 +82,7 @@ class ExactResponse:
 
     def values(self, unit: Array) -> Array:
         """Trajectories at unit coordinates (S, d), shape (S, T, m)."""
-        found: Array = self.model.flow.values(self.model.boxes.to_physical(unit)) / self.scale
-        return found
+        return self.model.flow.values(self.model.boxes.to_physical(unit)) / self.scale
 
     def value_at(self, unit: Array, node: Array, output: Array) -> Array:
         """Values (N,) of one output at one node per point (N, d)."""

@@ -267,8 +267,7 @@ def decaying(rate: Array, share: Array, step: float, count: int) -> Array:
     slow = np.exp(rate[:, None, :] * (np.arange(blocks) * size * step)[None, :, None])
     right = (fast[:, :, :, None] * share[:, None]).transpose(0, 2, 1, 3).reshape(points, n, -1)
     out = 2 * (slow.real @ right.real - slow.imag @ right.imag)
-    values: Array = out.reshape(points, blocks * size, m)[:, :count]
-    return values
+    return np.asarray(out.reshape(points, blocks * size, m)[:, :count])
 
 
 def left_out(phase: float, order: int) -> float:

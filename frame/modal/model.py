@@ -110,10 +110,8 @@ class ModalModel:
 
     def values(self, unit: Array) -> Array:
         """Trajectories at unit coordinates (S, d), shape (S, T, m)."""
-        rate, share = (
-            self.eigenvalue(unit),
-            self.coefficient(unit).reshape(len(unit), self.count, -1),
-        )
+        rate = self.eigenvalue(unit)
+        share = self.coefficient(unit).reshape(len(unit), self.count, -1)
         values = decaying(rate, share, self.flow.step, len(self.time))
         return values if self.load is None else values + self.load.values(unit, rate)
 

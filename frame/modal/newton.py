@@ -79,8 +79,7 @@ def _symmetric_rank_one(H: Array, step: Array, change: Array) -> Array:
     size = np.sqrt((lack**2).sum(1) * (step**2).sum(1))
     sound = np.abs(weight) > 1e-6 * size
     scaled = lack / np.where(sound, weight, 1.0)[:, None] * sound[:, None]
-    correction: Array = lack[:, :, None] * scaled[:, None, :]
-    return correction
+    return np.asarray(lack[:, :, None] * scaled[:, None, :])
 
 
 def _signed(

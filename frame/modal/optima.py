@@ -46,18 +46,15 @@ class Optima:
         value = self.side[which] * model.value_at(points, self.node[which], self.output[which])
         better = value > self.value[which] + 1e-12
         self.point[which[better]], self.value[which[better]] = points[better], value[better]
-        improved: Array = which[better]
-        return improved
+        return which[better]
 
 
 def problems(nodes: Array, outputs: int, d: int) -> Optima:
     """All outputs and sides at `nodes`, node by node; the sides of an output are (−1, +1)."""
     count = 2 * outputs
     node = np.repeat(nodes, count)
-    output, side = (
-        np.tile(np.repeat(np.arange(outputs), 2), len(nodes)),
-        np.tile([-1.0, 1.0], len(nodes) * outputs),
-    )
+    output = np.tile(np.repeat(np.arange(outputs), 2), len(nodes))
+    side = np.tile([-1.0, 1.0], len(nodes) * outputs)
     return Optima(
         node,
         output,

@@ -30,8 +30,7 @@ def polynomial_error(model: ModalModel) -> Array:
     Judging trajectories are few, so a node takes the largest deviation up to it, and the floor.
     """
     so_far = np.maximum.accumulate(model.error, axis=0)
-    estimate: Array = MARGIN * np.maximum(so_far, FLOOR * so_far[-1])
-    return estimate
+    return np.asarray(MARGIN * np.maximum(so_far, FLOOR * so_far[-1]))
 
 
 def judged_at_optima(model: ModalModel, at: Array, seed: int) -> tuple[ModalModel, int]:

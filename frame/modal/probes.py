@@ -80,8 +80,7 @@ def _best_hills(
 def _hills(value: Array) -> Array:
     """Where values (…, K) are no less than those beside them."""
     padded = np.pad(value, [(0, 0)] * (value.ndim - 1) + [(1, 1)], constant_values=-np.inf)
-    rises: Array = (value >= padded[..., :-2]) & (value >= padded[..., 2:])
-    return rises
+    return (value >= padded[..., :-2]) & (value >= padded[..., 2:])
 
 
 def along(model: Response, at: Optima, axes: Array, moved: Array) -> Array:

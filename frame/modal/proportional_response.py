@@ -54,10 +54,8 @@ class ProportionalResponse(ExactResponse):
         for rows, points, own in pieces(unit):
             physical, names = self.model.boxes.to_physical(points), self.model.flow.names
             if law.affine:
-                matrices, seen = (
-                    self._middle.moved(physical - self.model.boxes.centre).matrices,
-                    None,
-                )
+                matrices = self._middle.moved(physical - self.model.boxes.centre).matrices
+                seen = None
             else:
                 matrices, seen = evaluate(law.bare, names, physical, derivatives=False)
             at = self._waves(physical, matrices, own, node[rows])
@@ -109,8 +107,7 @@ class ProportionalResponse(ExactResponse):
             found = rows[own, output, : rows.shape[-1] // 2]
         else:
             found = fixed[output]
-        scaled: Array = found / self.scale[output][:, None]
-        return scaled
+        return found / self.scale[output][:, None]
 
     def _waves(
         self, physical: Array, matrices: Matrices, own: Array, node: Array, *, started: bool = False
@@ -205,8 +202,7 @@ class _Waves:
         """Outputs (N,) that take rows (N, n) of a derivative of the motion, (N,)."""
         kind, left = self.rate ** order[:, None], self._seen(taken)
         total = sum(left * (kind * part.wave).imag * part.amount for part in self.parts)
-        summed: Array = np.broadcast_to(total, left.shape).sum(1)
-        return summed
+        return np.asarray(np.broadcast_to(total, left.shape).sum(1))
 
     def sensitivities(self, taken: Array, order: Array) -> tuple[Array, Array, Array, Array]:
         """Derivatives by entries of M and K (N, n, n), by the start (N, 2n), by the rows (N, n)."""
@@ -237,8 +233,7 @@ class _Waves:
         return found[0], found[1], found[2]
 
     def _seen(self, taken: Array) -> Array:
-        seen: Array = (taken[:, None] @ self.shape)[:, 0]
-        return seen
+        return (taken[:, None] @ self.shape)[:, 0]
 
     def _answers(
         self, order: Array, more: Array, decay: Array

@@ -121,10 +121,8 @@ class BeamFrame:
         size = 3 * (self.bays + 1) * self.storeys
         index = np.array([e[0] for e in elements], int).reshape(-1, 6)
         blocks = np.array([e[1 + which] for e in elements]).reshape(-1, 6, 6)
-        rows, columns = (
-            np.repeat(index, 6, 1).reshape(-1, 6, 6),
-            np.tile(index[:, None, :], (1, 6, 1)),
-        )
+        rows = np.repeat(index, 6, 1).reshape(-1, 6, 6)
+        columns = np.tile(index[:, None, :], (1, 6, 1))
         kept = (rows >= 0) & (columns >= 0)
         return coo_array((blocks[kept], (rows[kept], columns[kept])), (size, size)).tocsr()
 

@@ -146,8 +146,7 @@ class AffineStructure:
                         + parts[1] * np.exp(np.outer(time, fast))
                     )
                 ) @ rows.T
-        found: Array = out.real
-        return found
+        return out.real
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,9 +234,5 @@ def _points(
     ]
 
 
-def _lifted(factor: Any, size: int, directions: int) -> Jet:
-    return (
-        factor
-        if isinstance(factor, Jet)
-        else Jet.constant(np.full(size, float(factor)), directions)
-    )
+def _lifted(factor: Any, size: int, d: int) -> Jet:
+    return factor if isinstance(factor, Jet) else Jet.constant(np.full(size, float(factor)), d)

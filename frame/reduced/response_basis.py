@@ -109,5 +109,4 @@ def energy_basis(
         mass, vectors = np.linalg.eigh(chosen.T @ (M @ chosen))
         apart = mass > 1e-12 * mass.max()
         chosen = chosen @ (vectors[:, apart] / np.sqrt(mass[apart]))
-    basis: Array = chosen
-    return basis
+    return chosen

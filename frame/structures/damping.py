@@ -59,11 +59,9 @@ def square_root(operator: Jet, mass: Array) -> Jet:
     below = np.linalg.inv(lower)
     squared, U = np.linalg.eigh(below @ (mass @ operator.value) @ below.swapaxes(-1, -2))
     _check(squared, np.zeros_like(squared))
-    omega, X, Y = (
-        np.sqrt(squared),
-        below.swapaxes(-1, -2) @ U,
-        U.swapaxes(-1, -2) @ lower.swapaxes(-1, -2),
-    )
+    omega = np.sqrt(squared)
+    X = below.swapaxes(-1, -2) @ U
+    Y = U.swapaxes(-1, -2) @ lower.swapaxes(-1, -2)
     total = omega[:, :, None] + omega[:, None, :]
 
     def solved(right: Array) -> Array:

@@ -80,5 +80,4 @@ def _reached(coupled: Array, moved: Array) -> Array:
 
 
 def _symmetric(array: Array) -> Array:
-    both: Array = (array + array.T) / 2
-    return both
+    return (array + array.T) / 2

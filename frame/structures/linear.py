@@ -82,8 +82,7 @@ class Accelerogram:
         samples = np.arange(len(self.acceleration)) * self.step
         close = np.minimum(time, samples[-1] * (1 + 1e-12))
         ended = time > samples[-1] * (1 + 1e-12)
-        found: Array = np.where(ended, 0.0, np.interp(close, samples, self.acceleration))
-        return found
+        return np.where(ended, 0.0, np.interp(close, samples, self.acceleration))
 
     def band(self, share: float = 0.999) -> float:
         """Angular frequency below which `share` of the record's power lies, in rad/s."""
@@ -171,5 +170,4 @@ def frequencies(system: LinearSystem) -> Array:
 
     matrices, _ = evaluate(system, (), np.zeros((1, 0)), derivatives=False)
     squared = eigh(matrices.stiffness.value[0], matrices.mass.value[0], eigvals_only=True)
-    rising: Array = np.sqrt(np.maximum(squared, 0.0))
-    return rising
+    return np.asarray(np.sqrt(np.maximum(squared, 0.0)))

@@ -113,8 +113,7 @@ def require_single(matrices: Matrices, chosen: Array) -> None:
 
 def oscillating(rate: Array) -> Array:
     """Mask of eigenvalues in the upper of a conjugate pair."""
-    yes: Array = rate.imag > 1e-9 * np.abs(rate)
-    return yes
+    return rate.imag > 1e-9 * np.abs(rate)
 
 
 def ordered_eigenvectors(A: Array) -> tuple[Array, Array]:

@@ -92,7 +92,8 @@ def _rows(bare: StoreyFrame) -> Array:
 
 @proportional.register
 def _(system: MatrixStructure, names: Sequence[str]) -> Proportional | None:
-    whole = [np.append(row, np.zeros(2 * system.size - len(row))) for row in _listed(system)]
+    observed = [np.asarray(row, float) for row in system.observed.values()]
+    whole = [np.append(row, np.zeros(2 * system.size - len(row))) for row in observed]
     halves = [np.split(row, 2) for row in whole]
     pure = all(not (q.any() and v.any()) for q, v in halves)
     if system.damping or len(system.ratios) > 1 or not pure:
@@ -106,7 +107,3 @@ def _(system: MatrixStructure, names: Sequence[str]) -> Proportional | None:
     named = [factor for kind in (system.mass, system.stiffness) for factor, _ in kind]
     affine = not any(callable(factor) for factor in named)
     return Proportional(bare, order, rows, ratio, (0.0, 0.0), affine)
-
-
-def _listed(system: MatrixStructure) -> list[Array]:
-    return [np.asarray(row, float) for row in system.observed.values()]

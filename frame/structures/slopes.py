@@ -100,8 +100,7 @@ class Slopes:
         light = np.linalg.solve(M, np.concatenate([K, D], -1)).swapaxes(1, 2)
         by_M = by_K @ light[:, :n] + by_D @ light[:, n:]
         found = self.along(own, by_M, -by_K, back, state * row[:, None], output)
-        slope: Array = found - _inner(self.damping, own, by_D)
-        return slope
+        return found - _inner(self.damping, own, by_D)
 
     def along(
         self, own: Array, by_M: Array, by_K: Array, back: Array, seen: Array, output: Array

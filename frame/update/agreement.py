@@ -93,14 +93,12 @@ class Agreement:
         step = 1e-6 * np.eye(len(logs))
         ends = self.values(self.chain.nominal * np.exp(np.vstack([logs + step, logs - step])))
         difference = (ends[: len(logs)] - ends[len(logs) :]) / 2e-6
-        slopes: Array = difference.T / self.scales[1][:, None]
-        return slopes
+        return difference.T / self.scales[1][:, None]
 
     def distance(self, logs: Array) -> Array:
         """Scaled distance of each quantity from the middle of its cut, shape (q,)."""
         middle, half = self.scales
-        away: Array = (self.values(self.chain.nominal * np.exp(logs)[None])[0] - middle) / half
-        return away
+        return np.asarray((self.values(self.chain.nominal * np.exp(logs)[None])[0] - middle) / half)
 
     def best(self, lower: Array, upper: Array) -> Array:
         """Log parameters in a box of them, (d,), whose least agreement is about the largest."""
@@ -134,8 +132,7 @@ class Agreement:
         ends = [*zip(lower - at, upper - at, strict=True), (0, None)]
         cost = np.append(np.zeros(d), 1.0)
         found: Any = linprog(cost, A_ub=rows, b_ub=np.append(-away, away), bounds=ends)
-        step: Array | None = found.x[:d] if found.status == 0 else None
-        return step
+        return found.x[:d] if found.status == 0 else None
 
 
 def widest(number: FuzzyNumber) -> Cut:

@@ -181,12 +181,10 @@ def _fit(record: RecordedMotion, ends: Array) -> tuple[Array, Array]:
     scale = float(np.abs(record.values).max()) or 1.0
 
     def miss(unit: Array) -> Array:
-        found: Array = record.misfit((middle + half * unit)[None])[0][0] / scale
-        return found
+        return np.asarray(record.misfit((middle + half * unit)[None])[0][0] / scale)
 
     def slopes(unit: Array) -> Array:
-        found: Array = -record.misfit((middle + half * unit)[None])[1][0] * half / scale
-        return found
+        return np.asarray(-record.misfit((middle + half * unit)[None])[1][0] * half / scale)
 
     starts = [np.zeros(len(middle)), *np.random.default_rng(0).uniform(-0.9, 0.9, (8, len(middle)))]
     fits = [
@@ -216,8 +214,7 @@ def _border(record: RecordedMotion, ends: Array, best: Array, rays: Array, level
         middle = (inside + outside) / 2
         held = _held(record, ends, best + middle[:, None] * rays, level)
         inside, outside = np.where(held, middle, inside), np.where(held, outside, middle)
-    found: Array = np.vstack([best[None], best + inside[:, None] * rays])
-    return found
+    return np.vstack([best[None], best + inside[:, None] * rays])
 
 
 def _held(record: RecordedMotion, ends: Array, points: Array, level: float) -> Array:

@@ -239,8 +239,7 @@ def _outward(logs: Array, agreement: Agreement, side: str) -> Array:
     ends = agreement.chain.nominal * np.exp(logs) * (1 + sign * 4e-16)
     at = int(side == "upper")
     limits = np.array([widest(x)[at] for x in agreement.prior.values()])
-    within: Array = np.maximum(ends, limits) if at == 0 else np.minimum(ends, limits)
-    return within
+    return np.asarray(np.maximum(ends, limits) if at == 0 else np.minimum(ends, limits))
 
 
 def _tried(

@@ -51,7 +51,8 @@ def _causes(failures: list[tuple[dict[str, float], str]]) -> list[str]:
     """Causes of failures with their points, each told once."""
     places: dict[str, list[str]] = {}
     for point, error in failures:
-        places.setdefault(error, []).append(_point(point))
+        place = ", ".join(f"{name} = {value:.6g}" for name, value in point.items())
+        places.setdefault(error, []).append(place)
     told = []
     for error, points in places.items():
         few = points if len(points) <= 2 else points[:1]
@@ -64,10 +65,6 @@ def _one_line(error: str) -> str:
     """The first line of an error, and no more than some hundred letters of it."""
     first = error.strip().partition("\n")[0]
     return first if first == error and len(first) <= _LONG else f"{first[:_LONG]} …"
-
-
-def _point(point: dict[str, float]) -> str:
-    return ", ".join(f"{name} = {value:.6g}" for name, value in point.items())
 
 
 @dataclass

@@ -125,8 +125,7 @@ def _outcomes(
 def _salvaged(executor: ProcessPool, call: Call, batch: Sequence[Array]) -> list[list[Outcome]]:
     """Outcomes of the first calls of a batch that ended its process, each part in its own."""
     try:
-        outcomes: list[list[Outcome]] = executor.alone(run, call, batch)
-        return outcomes
+        return executor.alone(run, call, batch)
     except BrokenExecutor:
         if len(batch) > 1:
             return _salvaged(executor, call, batch[: len(batch) // 2])

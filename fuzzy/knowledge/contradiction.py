@@ -37,8 +37,7 @@ class Contradiction(NamedTuple):
 
 def negligible(values: Array) -> Array:
     """Differences of outputs, shape (outputs,), that round-off explains."""
-    size: Array = ROUND_OFF * (np.ptp(values, axis=0) + np.abs(values).max(axis=0))
-    return size
+    return np.asarray(ROUND_OFF * (np.ptp(values, axis=0) + np.abs(values).max(axis=0)))
 
 
 def contradictions(points: Array, values: Array, signs: Signs) -> dict[int, Contradiction]:
@@ -63,11 +62,9 @@ def contradictions(points: Array, values: Array, signs: Signs) -> dict[int, Cont
 def _contradiction(points: Array, values: Array, signs: Signs, most: int) -> Contradiction | None:
     rows = np.argsort(values)
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), most)).astype(int))]
-    signed, ordered, free = (
-        points[rows][:, signs != 0] * signs[signs != 0],
-        values[rows],
-        points[rows][:, signs == 0],
-    )
+    signed = points[rows][:, signs != 0] * signs[signs != 0]
+    ordered = values[rows]
+    free = points[rows][:, signs == 0]
     below = np.ones((len(rows),) * 2, bool)
     for column in signed.T:
         below &= column[:, None] <= column[None]

@@ -121,5 +121,4 @@ class Known:
     def monotone_in(self, inputs: Sequence[str], outputs: Sequence[str]) -> Mask:
         """Stated monotonicity of each output in each input, shape (outputs, inputs)."""
         named = np.array([name in self.monotone for name in inputs])
-        monotone: Mask = (self.stated(inputs, outputs) != 0) | named
-        return monotone
+        return np.asarray((self.stated(inputs, outputs) != 0) | named)

@@ -82,8 +82,7 @@ def windows(n: int, quantile: float | None, side: Side, open_ends: tuple[bool, b
 def _binomial(n: int, quantile: float) -> Array:
     from scipy.stats import binom
 
-    inside: Array = binom.pmf(np.arange(n + 1), n, quantile)
-    return inside
+    return np.asarray(binom.pmf(np.arange(n + 1), n, quantile))
 
 
 def _tails(n: int, quantile: float) -> Callable[[int, int], float]:

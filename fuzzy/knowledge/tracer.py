@@ -78,7 +78,7 @@ class Tracer:
     def __pow__(self, exponent: object, modulo: object = None) -> Tracer:
         if modulo is not None:
             self._trace.refuse("a remainder has no enclosure")
-        if type(exponent) is Tracer or not _whole(self._number(exponent)):
+        if type(exponent) is Tracer or self._number(exponent) != int(self._number(exponent)):
             return self._positive_power(self._operand(exponent))
         whole = int(self._number(exponent))
         if whole < 0:
@@ -234,10 +234,6 @@ for _name in ["add", "radd", "sub", "rsub", "mul", "rmul", "truediv", "rtruediv"
 def _is_array(one: object) -> bool:
     """Whether something is a list of numpy; `isinstance` would ask a tracer for its class."""
     return issubclass(type(one), np.ndarray) and np.ndim(cast("Any", one)) > 0
-
-
-def _whole(exponent: float) -> bool:
-    return exponent == int(exponent)
 
 
 def _wide(value: Pair) -> Pair:

@@ -85,8 +85,7 @@ class Looks:
     @property
     def error(self) -> Array:
         """What the bounds may lack, shape (columns,)."""
-        lack: Array = _SAFETY * np.maximum(self.gain, self.hills)
-        return lack
+        return _SAFETY * np.maximum(self.gain, self.hills)
 
     def run(self, looks: int, per_input: int, seed: int) -> None:
         """Look until a look finds nothing new, or the budget ends."""
@@ -149,8 +148,7 @@ class Looks:
         return np.array([found.lower, found.upper])
 
     def _span(self) -> Array:
-        span: Array = np.ptp(self.memo.values.array, axis=0)
-        return span
+        return np.asarray(np.ptp(self.memo.values.array, axis=0))
 
     def _cuts(self) -> Iterator[LevelSearch]:
         """Cuts that have a width, from the narrowest on."""

@@ -165,8 +165,7 @@ class _Box:
         room = self.rule.margin * (most - least)
         rises, falls = (least > 0) & (least >= room), (most < 0) & (-most >= room)
         idle = (least == 0) & (most == 0)  # no effect at any probe: either end will do
-        signs: Signs = (rises | idle).astype(np.int8) - falls.astype(np.int8)
-        return signs
+        return np.asarray((rises | idle).astype(np.int8) - falls.astype(np.int8))
 
     def _corners(self, signs: Signs) -> Array:
         """The two extreme corners for every pattern of signs that occurs."""
@@ -203,8 +202,7 @@ class _Box:
         moved = points.copy()
         moved[:, column] += steps
         rise = self.model(moved).select(self.outputs) - values.select(self.outputs)
-        slopes: Array = rise / steps[:, None]
-        return slopes
+        return np.asarray(rise / steps[:, None])
 
 
 def verified(result: FuzzyResult, memo: Memo, effects: Effects) -> FuzzyResult:

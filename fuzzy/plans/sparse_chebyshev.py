@@ -91,8 +91,7 @@ class Chebyshev:
         """Distance of model and surface at the surface's extremes, (levels, outputs)."""
         values = memo(ends.places.reshape(-1, ends.places.shape[-1])).array[:, chosen]
         own = np.einsum("loso->los", values.reshape(*ends.values.shape, -1))
-        difference: Array = np.abs(own - ends.values).max(axis=2)
-        return difference
+        return np.asarray(np.abs(own - ends.values).max(axis=2))
 
 
 def _require_few(outputs: Sequence[str], domain: Domain) -> None:

@@ -75,7 +75,8 @@ class SparseGrid:
         """
         while True:
             left = self._left()
-            rough = [level for level in self._active if self._is_rough(level)]
+            # nearly all samples of a level as coarse as these could be zeros by symmetry
+            rough = [one for one in self._active if sum(one) == max(one) < _FIRST]
             if not rough and (left <= tolerance * self._scale()).all():
                 return left, True
             if not self._active or len(self.memo) >= budget:
@@ -101,10 +102,6 @@ class SparseGrid:
             self.upper,
         )
 
-    def _is_rough(self, level: Level) -> bool:
-        """True if a level is too coarse: nearly all its samples could be zeros by symmetry."""
-        return max(level) < _FIRST and sum(level) == max(level)
-
     def _worst(self, tolerance: float) -> Level:
         """Level whose samples the surface missed most; the coarsest if it missed none."""
         missed = {
@@ -123,8 +120,7 @@ class SparseGrid:
         held_out = np.abs(self.polynomial()(self._checks) - self.memo(self._checks).array).max(
             axis=0
         )
-        worst: Array = np.max([held_out, *self._active.values()], axis=0)
-        return worst
+        return np.asarray(np.max([held_out, *self._active.values()], axis=0))
 
     def _scale(self) -> Array:
         """Range of each output over all samples, shape (outputs,); 1 where there is none."""

@@ -115,8 +115,7 @@ def corners_suffice(result: FuzzyResult, known: Known) -> Mask:
     """Bounds that corners prove: the output is stated to be monotone in every input."""
     lower, upper = result.domain.boxes
     monotone = known.monotone_in(result.inputs, result.outputs)
-    proved: Mask = (monotone[None] | (lower == upper)[:, None, :]).all(axis=2)
-    return proved
+    return np.asarray((monotone[None] | (lower == upper)[:, None, :]).all(axis=2))
 
 
 @dataclass(frozen=True)

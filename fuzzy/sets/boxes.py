@@ -123,8 +123,7 @@ class Domain:
     def slack(self, points: Array, alpha: float) -> Array:
         """Least room that the interactions leave at points (n, inputs), shape (n,)."""
         rooms = [interaction.slack(points, self.inputs, alpha) for interaction in self.interactions]
-        least: Array = np.min([np.full(len(points), np.inf), *rooms], axis=0)
-        return least
+        return np.asarray(np.min([np.full(len(points), np.inf), *rooms], axis=0))
 
     def require_free(self, plan: str) -> None:
         """Refuse interactions, which the named plan cannot respect.

@@ -183,5 +183,4 @@ def box_scan(lower: Array, upper: Array) -> Array:
     inputs = len(lower)
     spread: Array = qmc.Sobol(inputs, scramble=False).random_base2(_SCAN)
     unit = np.concatenate([corners(inputs), spread]) if inputs <= _CORNERS else spread
-    scan: Array = np.clip(lower + unit * (upper - lower), lower, upper)
-    return scan
+    return np.clip(lower + unit * (upper - lower), lower, upper)

@@ -59,10 +59,8 @@ def moduli_images(first: Array, last: Array, phases: Sequence[ModuliInterval]) -
     for a, b in (divmod(int(pair), len(phases)) for pair in pairs):
         bulks = [(p.lower.bulk, p.upper.bulk) for p in phases[a : b + 1]]
         shears = [(p.lower.shear, p.upper.shear) for p in phases[a : b + 1]]
-        least, greatest = (
-            np.min([bulks, shears], axis=1)[:, 0],
-            np.max([bulks, shears], axis=1)[:, 1],
-        )
+        least = np.min([bulks, shears], axis=1)[:, 0]
+        greatest = np.max([bulks, shears], axis=1)[:, 1]
         tables[:, a, b] = least[0], greatest[0], least[1], greatest[1]
         ends = ((least, 0), (greatest, 1))
         attained = attained and all(

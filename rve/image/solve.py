@@ -83,7 +83,8 @@ def solve_between(
         start=fields,
         pixels=pixels,
     )
-    return CrispBounds(_bounds(lower, upper), upper, lower)
+    bounds = StiffnessBounds(inverse_below(lower.energy.upper[0]), upper.energy.upper[0])
+    return CrispBounds(bounds, upper, lower)
 
 
 def both_sides(
@@ -139,7 +140,3 @@ def both_sides(
         except BaseException:  # Ctrl-C among them, which is not to wait for the solution
             stopped.set()
             raise
-
-
-def _bounds(lower: SideSolution, upper: SideSolution) -> StiffnessBounds:
-    return StiffnessBounds(inverse_below(lower.energy.upper[0]), upper.energy.upper[0])

@@ -31,11 +31,9 @@ class Periodicity:
 
     def linear_injection(self, plane: Triangulation) -> sp.csr_matrix:
         """Matrix that carries values on vertices to all nodes, shape (count, vertices)."""
-        rows, columns, values = (
-            [np.arange(self.vertices)],
-            [np.arange(self.vertices)],
-            [np.ones(self.vertices)],
-        )
+        rows = [np.arange(self.vertices)]
+        columns = [np.arange(self.vertices)]
+        values = [np.ones(self.vertices)]
         midpoint, first = np.unique(self.unknown[plane.vertices :], return_index=True)
         for end in self.unknown[plane.ends[first]].T:
             kept = end >= 0

@@ -193,5 +193,4 @@ def _bend(mesh: PlanarMesh, ends: Integers, weights: Array) -> Array:
     chord = a[:, None] + (b - a)[:, None] * along[:, None]
     bubble = weights.prod(axis=1)
     share = np.divide(bubble, along * (1 - along), out=np.zeros_like(bubble), where=bubble > 1e-14)
-    displacement: Array = (circle - chord) * share[:, None]
-    return displacement
+    return np.asarray((circle - chord) * share[:, None])

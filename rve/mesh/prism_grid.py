@@ -140,10 +140,8 @@ class PrismGrid:
         functions carry them.
         """
         levels, v, (a, b) = self._own_levels(radius), self.plane.vertices, self.plane.ends.T
-        full, half = (
-            self._at(radius, levels),
-            self._at(radius, (levels[1:] + levels[:-1]) / 2).copy(),
-        )
+        full = self._at(radius, levels)
+        half = self._at(radius, (levels[1:] + levels[:-1]) / 2).copy()
         mean = (full[1:] + full[:-1]) / 2
         half[:, v:] = mean[:, v:] + (half[:, a] + half[:, b] - mean[:, a] - mean[:, b]) / 2
         return full, half

@@ -135,10 +135,8 @@ class PlanarCell:
         found = np.empty((len(inclusions), 3, 3))
         for poisson in dict.fromkeys(p.poisson for p in inclusions):
             places = [k for k, p in enumerate(inclusions) if p.poisson == poisson]
-            pencil, moduli = (
-                self._pencil(matrix, poisson),
-                np.array([inclusions[k].modulus for k in places]),
-            )
+            pencil = self._pencil(matrix, poisson)
+            moduli = np.array([inclusions[k].modulus for k in places])
             if share and moduli.size > 2:
                 basis = ModulusBasis(pencil)
                 found[places] = basis.stiffness(moduli)
@@ -156,10 +154,8 @@ class PlanarCell:
     def _pencil(self, matrix: Phase, poisson: float) -> Pencil:
         """The cell's stiffness as an affine function of the particle's modulus."""
         started = perf_counter()
-        fixed, unit = (
-            matrix.modulus * self._stiffness_of(0, matrix.poisson),
-            self._stiffness_of(1, poisson),
-        )
+        fixed = matrix.modulus * self._stiffness_of(0, matrix.poisson)
+        unit = self._stiffness_of(1, poisson)
         self.seconds["assemble"] = self.seconds.get("assemble", 0.0) + perf_counter() - started
         return Pencil(fixed, unit, self.periodic_nodes, self.periodic, self.affine)
 

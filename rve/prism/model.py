@@ -245,12 +245,9 @@ class PrismModel:
                 raise
             direct = PrismTask(task.system, SolverOptions("mumps"), self._loads, task.watch)
             result, displacements = self._certified(direct, phases)
-            return (
-                replace(
-                    result, reason=f"solved by mumps, since by the default solver {_what(failure)}"
-                ),
-                displacements,
-            )
+            why = str(failure).partition(":")[0]  # without its cure
+            told = f"solved by mumps, since by the default solver {why}"
+            return replace(result, reason=told), displacements
 
     def _certified(
         self, task: PrismTask, phases: tuple[Phase, Phase]
@@ -299,11 +296,6 @@ class PrismModel:
             return Limits(algebraic, 0.1 * h)
         locks = max(phase.poisson for phase in phases) > _LOCKING
         return Limits(algebraic, 0.5 * h**2 if locks else 0.1 * h**3)
-
-
-def _what(failure: Exception) -> str:
-    """The failure, without its cure."""
-    return str(failure).partition(":")[0]
 
 
 def certify(means: SliceMeans, phases: tuple[Phase, Phase], loads: Array) -> dict[str, float]:

@@ -157,10 +157,8 @@ def _unit_load(load: str, radius: float, matrix: Phase, inclusion: Phase) -> Uni
     # fields need twice what moduli do
     harmonics = int(square_stiffness(at, matrix, [inclusion]).harmonics.max()) * 2 + 2
     harmonics = min(harmonics, MOST_HARMONICS)
-    kind, a = (
-        family(harmonics, hydrostatic=load == "hydrostatic"),
-        multipoles(load, at, contrast, harmonics=harmonics)[0, 0],
-    )
+    kind = family(harmonics, hydrostatic=load == "hydrostatic")
+    a = multipoles(load, at, contrast, harmonics=harmonics)[0, 0]
     mirror, far = (-1.0 if load == "shear" else 1.0), (1.0 if load == "hydrostatic" else 0.0)
     in_a, in_b, lam = radius**kind.a, radius**kind.b, float(contrast.ratio[0])
     p = kind.to_p * in_b[:, None] @ (in_a * a) + far * radius * (kind.b == 1)
@@ -192,10 +190,8 @@ def _strain(load: str, a: Array, b: Array, radius: float, contrast: Contrast) ->
     kappa, mu = contrast.kappa, contrast.mu
     if load == "hydrostatic":
         return float((kappa - 1 - ZETA_PERIOD * radius * b[0]) / mu)
-    turn, g = (
-        ZETA_PERIOD * radius * a[0],
-        lattice_sums(12 * MOST_HARMONICS + 8).natanzon_period * radius * a[0],
-    )
+    turn = ZETA_PERIOD * radius * a[0]
+    g = lattice_sums(12 * MOST_HARMONICS + 8).natanzon_period * radius * a[0]
     return float(
         (kappa * turn - 1 - g) / mu if load == "deviator" else (kappa * turn + 1 + g) / (2 * mu)
     )

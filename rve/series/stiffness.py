@@ -114,7 +114,8 @@ def square_stiffness(
     contrast = Contrast.of(matrix, inclusions)
 
     def solve(rows: Array, harmonics: int) -> tuple[Array, Array]:
-        parts = _batches(rows, count * harmonics**2)
+        batches = -(-rows.size * count * harmonics**2 // _BATCH)  # so that matrices stay small
+        parts = np.array_split(rows, max(1, batches))
         solved = [_solve_batch(radius[part], contrast, harmonics, loads) for part in parts]
         values, errors = zip(*solved, strict=True)
         return np.concatenate(values), np.concatenate(errors)
@@ -138,11 +139,6 @@ def _first_guess(radius: Array, tolerance: float) -> Array:
     return np.asarray(
         steps[np.minimum(np.searchsorted(steps, np.log(1 / tolerance) / rate), steps.size - 1)]
     )
-
-
-def _batches(rows: Array, entries: int) -> list[Array]:
-    """`rows` cut so that one batch of matrices stays small."""
-    return np.array_split(rows, max(1, -(-rows.size * entries // _BATCH)))
 
 
 def _solve_batch(

@@ -99,13 +99,11 @@ class SlicesModel:
                 (),
                 seconds,
                 {"space": mean_errors(curve, error), "theta": in_theta},
-                self._reason(rule.nodes.size),
+                f"{rule.nodes.size} nodes in θ, elements of order {self.order}, mesh size"
+                f" {self.mesh_size:g}",
             )
             results.append(certified(result, radius_map, matrix, inclusion))
         return results
-
-    def _reason(self, nodes: int) -> str:
-        return f"{nodes} nodes in θ, elements of order {self.order}, mesh size {self.mesh_size:g}"
 
     def _slices(self, radii: Array, matrix: Phase, inclusions: Sequence[Phase]) -> list[Slice]:
         """The cells solved, one for each radius; orders below 4 are judged by the next."""

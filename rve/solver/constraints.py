@@ -140,10 +140,8 @@ class LevelNumbering:
     def unknown_of_node(self) -> Integers:
         """First of the two unknowns of each grid node, −1 on the fixed line, shape (nodes,)."""
         span = self.grid.span
-        planar, vertices = (
-            self.periodicity.unknown,
-            self.periodicity.unknown[: self.grid.plane.vertices],
-        )
+        planar = self.periodicity.unknown
+        vertices = self.periodicity.unknown[: self.grid.plane.vertices]
         level, middle = (np.arange(span.start, span.stop + 1)[:, None], np.array(span)[:, None])
         full = np.where(planar >= 0, 2 * planar + level * self.stride, -1)
         half = np.where(

@@ -17,10 +17,8 @@ _CORNERS = np.array([[1 / 6, 1 / 6], [2 / 3, 1 / 6], [1 / 6, 2 / 3]])
 def gradients(points: Array, nodes: int) -> Array:
     """Derivatives of the shape functions of 3 or 6 nodes at points (q, 2), (q, 2, nodes)."""
     x, y = points.T
-    barycentric, slopes = (
-        np.array([1 - x - y, x, y]),
-        np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]),
-    )
+    barycentric = np.array([1 - x - y, x, y])
+    slopes = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
     if nodes == 3:
         return np.broadcast_to(slopes.T, (len(points), 2, 3))
     corner = (4 * barycentric.T - 1)[:, None, :] * slopes.T

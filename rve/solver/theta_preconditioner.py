@@ -41,7 +41,7 @@ import scipy.sparse as sp
 from alphacut.rve.mesh.triangulation import Integers
 from alphacut.rve.petsc import PETSc
 from alphacut.rve.ranks import Ranks
-from alphacut.rve.solver.constraints import LevelNumbering, LevelShare, Overlap
+from alphacut.rve.solver.constraints import LevelNumbering, Overlap
 from alphacut.rve.solver.level_cholesky import LevelCholesky
 from alphacut.rve.solver.level_ldl import LevelLDL
 from alphacut.rve.solver.level_stiffness import LevelPattern
@@ -147,7 +147,8 @@ class ThetaPreconditioner:
         self.mass = theta_mass(law, grid.levels(law))
         shares = numbering.shares(ranks.size)
         self.levels = shares[ranks.rank].levels
-        self.middles = [list(_middles(share, grid.layers)) for share in shares]
+        tops = [min(share.levels.stop, grid.layers) for share in shares]
+        self.middles = [list(range(s.levels.start, t)) for s, t in zip(shares, tops, strict=True)]
         self.overlap = Overlap(
             ranks, numbering.owned(ranks.size), [numbering.beside(s.levels) for s in shares], shares
         )
@@ -248,11 +249,6 @@ class ThetaPreconditioner:
         paired = np.concatenate([level[: len(middle)], middle], axis=1)
         parts = before, paired, level[len(middle) :]
         return np.concatenate([part.reshape(len(part) * part.shape[1], columns) for part in parts])
-
-
-def _middles(share: LevelShare, layers: int) -> range:
-    """Layers above the levels of one rank."""
-    return range(share.levels.start, min(share.levels.stop, layers))
 
 
 def _in_plane(matrix: sp.csr_matrix, vectors: Array) -> Array:

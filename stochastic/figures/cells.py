@@ -27,10 +27,8 @@ def plot_discs(axes: Axes, discs: Discs, colour: str = BLUE, view: Array | None 
     from matplotlib.collections import EllipseCollection
 
     view = discs.size if view is None else view
-    centres, radii = (
-        np.concatenate([discs.centres + shift for shift in _shifts(discs)]),
-        np.tile(discs.radii, len(_shifts(discs))),
-    )
+    centres = np.concatenate([discs.centres + shift for shift in _shifts(discs)])
+    radii = np.tile(discs.radii, len(_shifts(discs)))
     seen = ((centres > -radii[:, None]) & (centres < view + radii[:, None])).all(axis=1)
     centres, width = centres[seen], 2e3 * radii[seen]
     place = {"offsets": 1e3 * centres, "offset_transform": axes.transData}

@@ -131,10 +131,8 @@ class _Containment:
         """Matrix and right-hand side of rows @ (a2L, a2U, a4L, a4U) ≤ right."""
         up, h2, h4, excess = self.up[chosen], self.h2[chosen], self.h4[chosen], self.excess[chosen]
         zero = np.zeros_like(h2)
-        greatest, least = (
-            np.stack([zero, -h2, h4, zero], axis=1),
-            np.stack([h2, zero, zero, -h4], axis=1),
-        )
+        greatest = np.stack([zero, -h2, h4, zero], axis=1)
+        least = np.stack([h2, zero, zero, -h4], axis=1)
         return np.where(up[:, None], greatest, least), np.where(up, -excess, excess)
 
     def breach(self, ends: Array) -> Array:

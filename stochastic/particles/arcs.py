@@ -41,8 +41,7 @@ class Outline:
         line = circle[:2] - self.points
         distance = np.maximum(np.hypot(*line.T), 1e-9)
         looks = (line * self.inward).sum(1) > ALONG * distance
-        on: NDArray[np.bool_] = looks & (abs(distance - circle[2]) < NEAR)
-        return on
+        return np.asarray(looks & (abs(distance - circle[2]) < NEAR))
 
     def without(self, taken: NDArray[np.bool_]) -> Outline:
         """The other points."""
@@ -184,8 +183,7 @@ def _wrong(circles: Array, mask: NDArray[np.bool_], blur: float) -> NDArray[np.b
 
     beyond = _beyond(circles, mask.shape)
     covered = ndimage.gaussian_filter((beyond < 0).astype(float), blur) > 0.5
-    wrong: NDArray[np.bool_] = (mask != (covered | (beyond < 0))) & (abs(beyond) > NEAR)
-    return wrong
+    return np.asarray((mask != (covered | (beyond < 0))) & (abs(beyond) > NEAR))
 
 
 def _rest(missed: NDArray[np.bool_], free: NDArray[np.bool_], smallest: float) -> Labels:
@@ -195,12 +193,10 @@ def _rest(missed: NDArray[np.bool_], free: NDArray[np.bool_], smallest: float) -
     pieces = ndimage.label(missed)[0]
     sizes = np.bincount(pieces.ravel())
     large = missed & (sizes[pieces] >= np.pi * smallest**2)
-    grown: Labels = ndimage.label(ndimage.binary_dilation(large, iterations=2) & free)[0]
-    return grown
+    return np.asarray(ndimage.label(ndimage.binary_dilation(large, iterations=2) & free)[0])
 
 
 def deepest_in(circles: Array, rows: Labels, columns: Labels) -> Labels:
     """Number of the circle whose edge each pixel lies deepest inside, shape (n,)."""
     away = [np.hypot(rows - one[0], columns - one[1]) - one[2] for one in circles]
-    number: Labels = np.argmin(away, axis=0)
-    return number
+    return np.asarray(np.argmin(away, axis=0))

@@ -273,8 +273,7 @@ def _units() -> Callable[[str], object]:
     """Pint's reader of quantities, which takes long to make."""
     from pint import UnitRegistry
 
-    registry: Callable[[str], object] = UnitRegistry().Quantity
-    return registry
+    return UnitRegistry().Quantity
 
 
 def _number(text: str, path: Path, row: int) -> float:

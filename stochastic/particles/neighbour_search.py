@@ -34,10 +34,8 @@ class Pairs:
         """All pairs of `parts`, grouped by i again."""
         first = np.concatenate([part.first for part in parts])
         order = np.argsort(first, kind="stable")
-        second, apart = (
-            np.concatenate([part.second for part in parts]),
-            np.concatenate([part.apart for part in parts]),
-        )
+        second = np.concatenate([part.second for part in parts])
+        apart = np.concatenate([part.apart for part in parts])
         return Pairs(first[order], second[order], apart[order])
 
 

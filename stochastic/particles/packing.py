@@ -151,9 +151,7 @@ def _law_test(radii: Array, law: RadiusLaw) -> tuple[float, float]:
     values, count = np.unique(radii, return_counts=True)
     at = np.cumsum(count) / len(radii)
     below = np.concatenate([[0.0], at[:-1]])
-    above_step, below_step = (
-        np.abs(law.cdf(values) - at).max(),
-        np.abs(law.cdf(np.nextafter(values, 0)) - below).max(),
-    )
+    above_step = np.abs(law.cdf(values) - at).max()
+    below_step = np.abs(law.cdf(np.nextafter(values, 0)) - below).max()
     distance = float(max(above_step, below_step))
     return distance, float(kstwo.sf(distance, len(radii)))

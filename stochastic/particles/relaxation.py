@@ -115,10 +115,8 @@ def _push(centres: Array, own: Array, growth: float, *, side: float, rule: Relax
     pairs, anchor = None, centres
     for _ in range(rule.steps):
         if pairs is None or 2 * np.abs(_wrapped(centres - anchor, side)).max() * np.sqrt(2) > skin:
-            pairs, anchor = (
-                close_pairs(Discs(centres, own * growth, np.array([side, side])), skin),
-                centres,
-            )
+            pairs = close_pairs(Discs(centres, own * growth, np.array([side, side])), skin)
+            anchor = centres
         force, overlap = _repulsion(centres, own * growth, pairs, side)
         if overlap < (growth - 1) * 2 * float(own.min()):
             return centres
@@ -171,10 +169,8 @@ def _shake(
         first, second = close_pairs(Discs(centres, own, np.array([side, side])), 4 * each * reach)
         limit = own[first] + own[second]
         for _ in range(each):
-            angle, length = (
-                2 * np.pi * generator.random(len(own)),
-                reach * np.sqrt(generator.random(len(own))),
-            )
+            angle = 2 * np.pi * generator.random(len(own))
+            length = reach * np.sqrt(generator.random(len(own)))
             moved = centres + length[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
             stays = np.zeros(len(own), bool)
             for mine, other in ((first, second), (second, first)):

@@ -197,10 +197,8 @@ class _Walls:
         last = np.flatnonzero(np.append(owner[1:] != owner[:-1], True))
         following[last] = np.concatenate([[0], last[:-1] + 1])[: len(last)]
         ahead = np.abs(start[following]) < np.abs(end)
-        on, out = (
-            np.where(ahead, following, np.arange(len(owner))),
-            np.where(ahead, start[following], end),
-        )
+        on = np.where(ahead, following, np.arange(len(owner)))
+        out = np.where(ahead, start[following], end)
         radius = (near[on] + far[on]) / 4 * np.cosh(out) + (near[on] - far[on]) / 4
         largest = np.zeros(len(self.discs))
         np.maximum.at(largest, owner, 1.001 * radius)

@@ -76,8 +76,7 @@ def _points(reach: int) -> Array:
     axis = np.arange(-reach - 1.0, reach + 2)
     points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
     square = (points**2).sum(axis=1)
-    near: Array = points[(square > 0) & (square <= reach * (reach + 1))]
-    return near
+    return np.asarray(points[(square > 0) & (square <= reach * (reach + 1))])
 
 
 def _epstein(angular: Array, points: Array, n: int, power: int) -> float:
