@@ -8,5 +8,4 @@ def counted(number: int, noun: str) -> str:
 
 def ranged(low: float, high: float) -> str:
     """Such as 0.25 … 0.5; one number where both ends read the same."""
-    ends = dict.fromkeys((f"{low:.6g}", f"{high:.6g}"))
-    return " … ".join(ends)
+    return " … ".join(dict.fromkeys((f"{low:.6g}", f"{high:.6g}")))

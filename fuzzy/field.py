@@ -67,8 +67,7 @@ class FuzzyField:
     @property
     def left_out(self) -> float:
         """Largest share of a place's half width that the directions do not reach."""
-        reached = np.minimum(np.linalg.norm(self.shapes, axis=1), 1.0)
-        return float(1 - reached.min())
+        return float(1 - np.minimum(np.linalg.norm(self.shapes, axis=1), 1.0).min())
 
     @property
     def free_shapes(self) -> Array:

@@ -64,8 +64,7 @@ class Jet:
         return Jet(-self.value, -self.first, -self.second)
 
     def __add__(self, other: Jet | ArrayLike) -> Jet:
-        b = self._lift(other)
-        return _paired(self, b, lambda x, y: x + y)
+        return _paired(self, self._lift(other), lambda x, y: x + y)
 
     __radd__ = __add__
 

@@ -75,8 +75,7 @@ class FieldFrame(StoreyFrame):
     @property
     def _parts(self) -> Array:
         """What each direction adds to each place, shape (places, directions)."""
-        parts = self.field.half_width * self.field.free_shapes
-        return np.asarray(parts)
+        return np.asarray(self.field.half_width * self.field.free_shapes)
 
     def _with_places(self, p: Mapping[str, Jet]) -> dict[str, Jet]:
         """The parameters with the field's value at each floor."""

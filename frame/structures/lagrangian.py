@@ -149,8 +149,7 @@ class Equations:
 
     def velocity(self, momentum: Matrix) -> Matrix:
         """Velocities from momenta."""
-        rest = self.momentum.subs({x: 0 for x in self.v})
-        return self.mass.LUsolve(momentum - rest)
+        return self.mass.LUsolve(momentum - self.momentum.subs({x: 0 for x in self.v}))
 
     def acceleration(self) -> Matrix:
         """q̈ from the Euler–Lagrange equations."""

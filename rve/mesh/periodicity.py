@@ -92,5 +92,4 @@ def mismatch(positions: Array, fluctuation: Array) -> float:
 def _along_side(positions: Array, axis: int, end: float) -> Integers:
     """Nodes of one side, in the order of their other coordinates."""
     side = np.flatnonzero(abs(positions[:, axis] - end) < 1e-9)
-    other = np.round(positions[side][:, [1 - axis, 2]], 7)
-    return np.asarray(side[np.lexsort(other.T)])
+    return np.asarray(side[np.lexsort(np.round(positions[side][:, [1 - axis, 2]], 7).T)])

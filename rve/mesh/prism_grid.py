@@ -36,8 +36,7 @@ def moved(mesh: Triangulation, radius: float) -> Array:
 def _across_diagonal(mesh: Triangulation) -> NDArray[np.bool_]:
     """Mask of edges outside the particle that cross a diagonal, shape (edges,)."""
     x, y = mesh.points[mesh.ends].transpose(2, 1, 0)
-    crossed = ((x - y).prod(axis=0) < -1e-12) | ((x + y).prod(axis=0) < -1e-12)
-    return np.asarray(crossed)
+    return np.asarray(((x - y).prod(axis=0) < -1e-12) | ((x + y).prod(axis=0) < -1e-12))
 
 
 def _slide(points: Array, old: float, new: float) -> Array:

@@ -154,5 +154,4 @@ def _product(matrix: PETSc.Mat, vectors: Array) -> Array:
     source.setUp()
     source.getDenseArray()[:] = vectors
     source.assemble()
-    product = matrix.matMult(source)
-    return np.array(product.getDenseArray(readonly=True))
+    return np.array(matrix.matMult(source).getDenseArray(readonly=True))

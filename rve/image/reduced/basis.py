@@ -69,8 +69,7 @@ class ReducedSide:
 
     def coefficients(self, bulk: Array, shear: Array) -> Array:
         """Coefficients of the energies, shape (m, 2 phases), from moduli of shape (m, phases)."""
-        pairs = np.stack(self.side.coefficients(bulk, shear), axis=-1)
-        return pairs.reshape(len(bulk), -1)
+        return np.stack(self.side.coefficients(bulk, shear), axis=-1).reshape(len(bulk), -1)
 
     def combination(self, coefficients: Array) -> Array:
         """Shares of the fields under the three loads, shape (m, 3 + n, 3)."""
