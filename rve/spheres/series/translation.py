@@ -61,7 +61,7 @@ class Multipoles:
         return int(np.flatnonzero((self.kind == kind) & (self.n == n) & (self.m == m))[0])
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=96)  # as many Poisson ratios and degrees as a fuzzy modulus takes
 def couplings(highest: int, poisson: float, *, shear: bool) -> Array:
     """Amplitudes of regular solutions (rows) that the images of unit multipoles (columns) make.
 
