@@ -58,6 +58,11 @@ class Gain:
     exact: float
     exact_least: float
 
+    def shares(self, unit: float) -> list[str]:
+        """All four times a unit, with three digits; what is round-off is 0."""
+        found = (unit * x for x in (self.half, self.half_least, self.exact, self.exact_least))
+        return [f"{0.0 if abs(x) < 1e-8 else x:.3g}" for x in found]
+
 
 @dataclass(frozen=True, repr=False)
 class Advice:
@@ -91,9 +96,7 @@ class Advice:
             " least) and exactly (at least):"
         ]
         lines += [
-            f"  {x.name}: {unit * x.half:.3g} % ({unit * x.half_least:.3g} %),"
-            f" {unit * x.exact:.3g} % ({unit * x.exact_least:.3g} %)"
-            for x in self.gains
+            "  {}: {} % ({} %), {} % ({} %)".format(x.name, *x.shares(unit)) for x in self.gains
         ]
         return "\n".join([*lines, *self._said])
 
@@ -114,10 +117,7 @@ class Advice:
     def _repr_html_(self) -> str:
         """Gains in per cent of the width as a table, for notebooks."""
         unit = 100 / self.width if self.width > 0 else 0.0
-        rows = [
-            (x.name, *(f"{unit * y:.3g}" for y in (x.half, x.half_least, x.exact, x.exact_least)))
-            for x in self.gains
-        ]
+        rows = [(x.name, *x.shares(unit)) for x in self.gains]
         head = ("input", "known twice as well, %", "at least, %", "exactly, %", "at least, %")
         now = f"less width by; now {self.width:.6g} at α = {self.alpha:g}"
         below = "\n".join([now, *self._said])
@@ -219,7 +219,9 @@ def measure_next(
             basis.add(found, output)
             return _width(found, output)
 
-        return replace(advice(answer, numbers, alpha=alpha), basis=str(basis))
+        found = advice(answer, numbers, alpha=alpha)
+        assumed = f"; to tell gains apart, {100 * INNER:g} % of each width is assumed as its error"
+        return replace(found, basis=f"{basis}{assumed if basis.unknown else ''}")
 
 
 def _kept(store: Store | str | Path | None, identity: Identity | None) -> str:

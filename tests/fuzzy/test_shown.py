@@ -283,10 +283,12 @@ def test_shares_and_gains_say_what_their_bounds_are_worth():
     for text in (str(shares), shares._repr_html_(), str(gains), gains._repr_html_()):
         assert "by inner bounds of the plan reduced, whose error is not estimated" in text
     assert "a negative share, -" in str(gains)
+    assert "2 % of each width is assumed as its error" in str(gains)
     assert "wrong by that much at least" in str(gains)
     proved = measure_next(product, X, BranchAndBound(product))
     assert "by guaranteed bounds of the plan branch and bound" in str(proved)
     assert "negative" not in str(proved)
+    assert "assumed" not in str(proved)
 
 
 def test_a_proof_that_ended_at_its_budget_says_its_gap():

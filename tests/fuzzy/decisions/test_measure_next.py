@@ -19,7 +19,7 @@ from alphacut.fuzzy import (
     Triangular,
     from_data,
 )
-from alphacut.fuzzy.decisions.measure_next import advice, measure_next
+from alphacut.fuzzy.decisions.measure_next import Gain, advice, measure_next
 
 Array = np.ndarray
 NAMES = ("a", "b", "c", "d")
@@ -196,3 +196,8 @@ def test_a_wrong_output_is_refused_after_one_sample():
         with pytest.raises(ValueError, match="a, b"):
             measure_next(function, inputs, output=output)
     assert len(calls) <= 2 + 2  # the one sample, and whether it gives the same again
+
+
+def test_gains_that_are_round_off_are_written_as_none() -> None:
+    told = Gain("x", 0.5, 1e-13, 1.0, -2e-14).shares(100 / 2.0)
+    assert told == ["25", "0", "50", "0"]
