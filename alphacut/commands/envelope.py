@@ -17,7 +17,7 @@ from alphacut.case.load import load
 from alphacut.case.sections.vibration import ENVELOPE_METHODS
 from alphacut.case.values import nearest
 from alphacut.commands import options as common
-from alphacut.io.files import Document
+from alphacut.io.files import Document, say
 from alphacut.io.kept_arrays import KeptArrays
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.progress import progress
@@ -80,6 +80,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     handed = common.given_modulus(options.modulus) or stand_in(case)
     task = replace(task_of(case), exclude=excluded(options.exclude))
     contradictions(options, case, task)
+    for line in envelope.wide_gap(case):
+        say(f"warning: {line}")
     wanted = structure(case, handed)
     if case.sections.exceedance:
         outcomes.require_random(case, wanted)  # before anything is computed
@@ -207,7 +209,7 @@ def summary(found: Envelope, tried: Array | None = None, *, own_gap: bool = Fals
         for unit, values in zip(units, columns, strict=True)
     ]
     rows = [(name, *values) for name, values in zip(found.outputs, shown, strict=True)]
-    of_least = "least not below" if tried is None else "of motions tried some peaks at"
+    of_least = "least not below" if tried is None else "least peak of motions tried"
     lines = [
         f"{name:>14}  {low:>12}  {high:>12}   {most}{beyond(error, name)}; {of_least} {least}\n"
         for (name, low, high, least, most), error in zip(rows, errors, strict=True)

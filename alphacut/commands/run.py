@@ -249,6 +249,7 @@ def envelope_lines(name: str, study: Document) -> Iterator[str]:
     largest = largest_by_unit((value, unit) for _, unit, *values in ends for value in values)
     for output, unit, *values in ends:
         low, high = (engineering(value, unit, beside=largest[unit]) for value in values)
-        yield f"{output} from {low} to {high} at the lowest α (study {name})"
+        where = f", at nodes every {study['step']:g} s" if "step" in study else ""
+        yield f"{output} from {low} to {high} at the lowest α{where} (study {name})"
     if study.get("unproved"):
         yield f"these bounds are {study['nature']}, not proved: {study['unproved']}"

@@ -18,7 +18,7 @@ from alphacut.stages.image.reading import expected_modulus, study_of
 from alphacut.stages.material import modulus, spheres
 from alphacut.stages.material.cell import cell_phases, modal_parts, phases_of
 from alphacut.stages.material.references import mean_share
-from alphacut.stages.vibration import update
+from alphacut.stages.vibration import envelope, update
 from alphacut.stages.vibration.accelerogram import cut_short
 from alphacut.stages.vibration.envelope_task import task_of
 from alphacut.stages.vibration.provable import estimated_reason, too_many, unproved_reason
@@ -90,6 +90,7 @@ def ready(case: Case) -> Readiness:
         *dense,
         *plausible.unlikely_material(case),
         *outlasted(case, ground),
+        *envelope.wide_gap(case),
         *slips,
         *plausible.overdamped(case, wanted),
         *fine_steps(case, wanted),

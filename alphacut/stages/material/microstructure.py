@@ -330,12 +330,11 @@ def dense_remark(case: Case) -> Iterator[str]:
         # fitted to packings of log-normal radii over factors of 1.5, 3.1 and 10
         limit = 0.415 - 0.075 * np.log(min(law.largest / law.smallest, 10))
         if spheres.volume_fraction > limit:
-            told = (
-                f"above about {limit:.2f} with these radii a quarter or more of the volume has no"
-            )
+            told = f"above about {limit:.2f} with these radii a quarter or more of the volume may"
             yield (
-                f"microstructure.spheres.volume_fraction: {told} cubic cell, and E will be marked"
-                " not to be published; Hashin–Shtrikman bounds or benchmarks.rve.many_spheres serve"
+                f"microstructure.spheres.volume_fraction: {told} have no cubic cell; run then marks"
+                " E not to be published; Hashin–Shtrikman bounds or benchmarks.rve.many_spheres"
+                " serve"
             )
     if packing is None or packing.area_fraction < CRYSTALLISE:
         return

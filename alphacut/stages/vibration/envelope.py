@@ -196,9 +196,21 @@ def tell_rough(task: EnvelopeTask, dataset: xarray.Dataset) -> None:
         say(f"warning: envelope.tolerance: {what} output; to name a tolerance makes it a failure")
 
 
+def wide_gap(case: Case) -> Iterator[str]:
+    """A remark on a wanted gap that is wider than the tolerance that the case names."""
+    gap, asked = asked_gap(case), asked_tolerance(case)
+    if gap is not None and asked is not None and asked.unit == "m" and gap > asked.value:
+        yield (
+            f"envelope.certify: a gap of {gap:g} m may leave errors above envelope.tolerance,"
+            f" {asked.value:g} m, which fails after the proof; leave that tolerance out"
+        )
+
+
 def cure(case: Case, dataset: xarray.Dataset) -> str:
     """What would bring the declared error of an envelope below the tolerance."""
     auto = by_auto(case, "envelope.method")
+    if case.envelope.certify is not None:
+        return "a narrower gap than envelope.certify, or a larger envelope.tolerance, allows it"
     if case.sections.pendulum is None:
         rough = names_rough_integrator(case)
         return f"{auto}{' --set envelope.integrator=exact' if rough else ''} reaches it"

@@ -166,3 +166,12 @@ def test_a_certificate_that_cannot_become_a_guarantee_is_remarked_on(tmp_path, c
     tower = [str(CASES / "tower.toml"), "--set", "envelope.certify=0.1 mm"]
     assert main(["check", *tower, "--set", "envelope.method=auto"]) == 0
     assert "envelope.certify: the error of the modal model of a tower" in capfd.readouterr().err
+
+
+def test_a_gap_wider_than_the_named_tolerance_is_remarked_on(tmp_path, capfd):
+    text = BUILDING.replace('method = "graph-follower"\ntolerance', 'certify = "3 mm"\ntolerance')
+    assert 'certify = "3 mm"' in text
+    found = told(text, tmp_path, capfd, status=0)
+    assert "a gap of 0.003 m may leave errors above envelope.tolerance, 0.0002 m" in found
+    narrow = told(text.replace('"3 mm"', '"0.1 mm"'), tmp_path, capfd, status=0)
+    assert "may leave errors above" not in narrow

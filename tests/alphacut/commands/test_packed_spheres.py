@@ -223,7 +223,7 @@ def test_circles_over_the_image_and_the_notes_of_a_run_stand_in_its_report(tmp_p
 @pytest.mark.parametrize(("fraction", "said"), [(0.28, False), (0.3, True), (0.38, True)])
 def test_spheres_too_dense_for_cubic_cells_are_told_before(fraction, said, capfd):
     assert main(["check", str(CASE), "--set", f"{SPHERES}.volume_fraction={fraction}"]) == 0
-    assert ("E will be marked not to be published" in capfd.readouterr().err) == said
+    assert ("run then marks E not to be published" in capfd.readouterr().err) == said
 
 
 def test_a_smallest_sphere_below_the_circles_seen_is_told_in_its_unit(tmp_path, capfd):

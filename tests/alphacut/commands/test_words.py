@@ -148,7 +148,7 @@ def test_the_bounds_of_the_stated_nature_are_printed():
     found = Envelope(ends, ends, ("q1",), ("E",), low, high, at, at, "modal", "inner", 7, 0.1)
     assert "−200.0 mm      300.0 mm" in summary(found)
     told = summary(found, np.array([0.25]))
-    assert "300.0 mm; of motions tried some peaks at 250.0 mm" in told
+    assert "300.0 mm; least peak of motions tried 250.0 mm" in told
     assert "…" not in told
     certified = replace(
         found,
