@@ -148,14 +148,10 @@ class Polynomial:
     def _packed(self) -> list[Array]:
         """Coefficients of all first and all second derivatives side by side, without zero rows."""
         d, degree = self.index.shape[1], int(self.index.sum(1).max())
-        pairs = np.triu_indices(d)
-        every = (self.slope, self.curve[pairs])
-        return [
-            np.ascontiguousarray(x[:, : terms(d, max(degree - k, 0))].swapaxes(0, 1)).reshape(
-                terms(d, max(degree - k, 0)), -1
-            )
-            for k, x in enumerate(every, start=1)
-        ]
+        every = (self.slope, self.curve[np.triu_indices(d)])
+        counts = (terms(d, max(degree - k, 0)) for k in (1, 2))
+        both = zip(every, counts, strict=True)
+        return [np.ascontiguousarray(x[:, :n].swapaxes(0, 1)).reshape(n, -1) for x, n in both]
 
 
 def fit(u: Array, data: Jet, degree: int) -> Polynomial:
