@@ -154,4 +154,5 @@ def _product(matrix: PETSc.Mat, vectors: Array) -> Array:
     source.setUp()
     source.getDenseArray()[:] = vectors
     source.assemble()
-    return np.array(matrix.matMult(source).getDenseArray(readonly=True))
+    product = matrix.matMult(source)  # which owns what is copied
+    return np.array(product.getDenseArray(readonly=True))

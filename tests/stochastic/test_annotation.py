@@ -167,7 +167,7 @@ def test_an_accepted_image_warns_of_uneven_light():
             misfit=0.0, unevenness=unevenness, light=light, strange=strange, unsure=unsure
         )
         seen = SimpleNamespace(discs=range(9), read=read)
-        sample = SimpleNamespace(values=range(4))
+        sample = SimpleNamespace(values=range(4), area_fraction=0.39)
         found = SimpleNamespace(fraction_of_map=0.4, sample=sample, sections=[seen])
         return "\n".join(fractions(found, 0.4))
 
