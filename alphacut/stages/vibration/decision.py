@@ -103,16 +103,17 @@ def _decisions(
     progress: Tick | None,
 ) -> dict[str, Exceeding]:
     from alphacut.frame.decisions.exceeding import any_exceeding, exceeding
+    from alphacut.frame.outputs import output_unit
 
     assert wanted.frame is not None
-    failed: list[tuple[float, float, str]] = []  # boxes that no other limit need try again
+    failed: dict[str, list[tuple[float, float, str]]] = {}  # by unit: boxes not to be tried again
     count = len(limits) + 1
-    of = partial(exceeding, wanted.frame, wanted.inputs(task.fuzzy), failed=failed)
-    of = partial(of, duration=task.duration, step=task.step, lowest=task.alpha[0])
-    of = partial(of, workers=workers, progress=False)
+    of = partial(exceeding, wanted.frame, wanted.inputs(task.fuzzy), workers=workers)
+    of = partial(of, duration=task.duration, step=task.step, lowest=task.alpha[0], progress=False)
     each, least = {}, {one.output: one.value for one in sorted(limits, key=lambda x: -x.value)}
     for one in limits:
-        each[one.name] = of({one.output: one.value})
+        alike = failed.setdefault(output_unit(one.output), [])
+        each[one.name] = of({one.output: one.value}, failed=alike)
         if progress:
             progress(len(each) / count)
     if count == 2:
