@@ -130,7 +130,12 @@ def any_exceeding(each: Mapping[str, Exceeding], together: Exceeding | None = No
         together: The decision on all limits at once, where one of them is passed at the nominal
             values; its necessity may be greater than that of each.
     """
-    most = max(each.values(), key=lambda one: one.possibility)
+
+    def rank(one: Exceeding) -> tuple[tuple[float, float], bool]:
+        """By possibility; of limits that are surely passed, one that is proved is enough."""
+        return one.possibility, one.necessity[0] == 1 and one.scale.nature == "guaranteed"
+
+    most = max(each.values(), key=rank)
     lower, upper = (max(one.possibility[side] for one in each.values()) for side in (0, 1))
     least, high = (max(one.necessity[side] for one in each.values()) for side in (0, 1))
     if together is not None:

@@ -68,6 +68,18 @@ def test_any_of_several_limits_and_accelerations_count() -> None:
     assert one.possibility == pytest.approx((0.2, 0.2), abs=0.01)
 
 
+def test_one_proved_excess_proves_that_any_limit_is_passed() -> None:
+    modulus = {"E": Triangular(2e10, 2.5e10, 3e10)}
+    sure = exceeding(ONE, modulus, {"q1": 1e-3}, **TIME)
+    sampled = replace(sure, scale=replace(sure.scale, nature="verified by sampling"))
+    open_ = replace(sampled, necessity=(0.0, 0.0))
+    for each in ({"a": open_, "b": sure}, {"a": sampled, "b": sure, "c": open_}):
+        assert any_exceeding(each).scale.nature == "guaranteed"
+    kept = replace(sampled, possibility=(0.0, 0.0), necessity=(0.0, 0.0))
+    proved = replace(kept, scale=sure.scale)
+    assert any_exceeding({"a": kept, "b": proved}).scale.nature == "verified by sampling"
+
+
 def test_a_box_without_a_proof_is_not_tried_for_every_limit(monkeypatch) -> None:
     tried, mass = [], {"m1": Triangular(800.0, 1000.0, 1200.0)}
 
