@@ -80,6 +80,17 @@ def test_one_proved_excess_proves_that_any_limit_is_passed() -> None:
     assert any_exceeding({"a": kept, "b": proved}).scale.nature == "verified by sampling"
 
 
+def test_a_smaller_box_or_a_wider_gap_may_have_a_proof_all_the_same() -> None:
+    reach = lambda size: (np.array([1e3 - size]), np.array([1e3 + size]))  # noqa: E731
+    failed = [(0.5, 0.1, "too wide")]
+    search = limit_search(ONE, {"m1": 1e3}, reach, {"q1": 1.0}, **TIME, failed=failed)
+    for size, gap, known in ((0.5, 0.1, True), (0.9, 0.01, True), (0.4, 0.1, False)):
+        search.gap = gap
+        assert bool(search.hopeless(size)) == known
+    search.gap = 0.2
+    assert not search.hopeless(0.9)
+
+
 def test_a_box_without_a_proof_is_not_tried_for_every_limit(monkeypatch) -> None:
     tried, mass = [], {"m1": Triangular(800.0, 1000.0, 1200.0)}
 

@@ -196,6 +196,9 @@ def test_every_admissible_case_lies_within_what_is_said_of_an_image(folder, capf
             stiff = ("lower", "upper")[matrix == "22 GPa"]
             grains.append(corner["grains_E_GPa"][stiff] / found["grains_E_GPa"][stiff])
     assert np.allclose(grains, 1, rtol=1e-2)
+    core, support = found["apparent_E_GPa"], found["apparent_E_support_GPa"]
+    assert support["lower"] < core["lower"]
+    assert core["upper"] < support["upper"]
     case = written(folder, **window, modulus=ranges)
     assert main(["run", case, "--out", str(folder / "out"), "--no-figures"]) == 0
     told = capfd.readouterr().out

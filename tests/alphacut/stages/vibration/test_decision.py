@@ -429,3 +429,22 @@ def test_explain_tells_what_decisions_of_many_inputs_may_take(
     monkeypatch.setattr(decision, "MANY", 1)
     (many,) = decision.explained(case, wanted, task_of(case))
     assert "a minute or more for each limit where no proof covers the 1 inputs" in many
+
+
+def test_the_limit_farthest_from_its_peak_is_tried_first_and_told_in_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from alphacut.frame.decisions import exceeding as own
+
+    tried: list[float] = []
+    whole = own.exceeding
+
+    def told(frame: Any, inputs: Any, limits: dict[str, float], **how: Any) -> Any:
+        tried.append(next(iter(limits.values())))
+        return whole(frame, inputs, limits, **how)
+
+    monkeypatch.setattr(own, "exceeding", told)
+    case = load(written(tmp_path, ["q1 <= 5 cm", "drift1 <= 20 %"]))
+    found = decision.decision(case, structure(case, None))
+    assert tried == pytest.approx([0.6, 0.05])
+    assert [*map(str, found["output"].values)] == ["q1", "drift1"]
