@@ -446,5 +446,5 @@ def test_the_limit_farthest_from_its_peak_is_tried_first_and_told_in_its_place(
     monkeypatch.setattr(own, "exceeding", told)
     case = load(written(tmp_path, ["q1 <= 5 cm", "drift1 <= 20 %"]))
     found = decision.decision(case, structure(case, None))
-    assert tried == pytest.approx([0.6, 0.05])
+    assert tried[:2] == pytest.approx([0.6, 0.05])
     assert [*map(str, found["output"].values)] == ["q1", "drift1"]
