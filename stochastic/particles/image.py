@@ -192,8 +192,8 @@ class SectionImage:
             )
         (row, column, radius), (height, width) = np.array(found).T, picture.shape
         centres = np.stack([column + 0.5, height - row - 0.5], axis=1)
-        centres = pushed_apart(centres, radius) * self.pixel
         size = np.array([width, height]) * self.pixel
+        centres = np.clip(pushed_apart(centres, radius) * self.pixel, 0.0, size)
         discs = Discs(centres, radius * self.pixel, size, periodic=False)
         apart = self._unevenness(share, labels, light)
         strange = _strange(picture, share)
@@ -235,6 +235,8 @@ class SectionImage:
             circle = _circle(share, labels, region.label, region.bbox)
             circle = (*centres.get(region.label, circle[:2]), circle[2])
             reason = self._reason(region, circle[2], labels.shape, touching[region.label])
+            if not all(-0.5 <= x <= n - 0.5 for x, n in zip(circle[:2], labels.shape, strict=True)):
+                reason = CUT_OFF
             if not reason:
                 found.append(circle)
                 rows, columns = region.coords.T

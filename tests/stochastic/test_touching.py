@@ -6,7 +6,7 @@ import pytest
 from scipy import ndimage
 
 from alphacut.stochastic.figures.cells import draw_overlay
-from alphacut.stochastic.particles.image import SectionImage
+from alphacut.stochastic.particles.image import CUT_OFF, SectionImage
 from alphacut.stochastic.particles.touching import pushed_apart, roundness, split
 
 
@@ -101,3 +101,17 @@ def test_the_overlay_draws_every_circle_over_its_particle():
     inside = [ndimage.map_coordinates(grey, [[200 - y], [x]], order=1)[0] for x, y in at]
     assert min(inside) > 0.6
     plt.close(drawn)
+
+
+def test_a_disc_whose_centre_lies_beyond_the_image_is_cut_by_its_edge():
+    grey, _ = picture([(30, 40), (80, 60)], [12, 14], 120, np.random.default_rng(3))
+    image = SectionImage("none", 1.0)
+    segmented = image._segmented(grey)
+    whole, *_ = image._sorted(segmented)
+    assert len(whole) == 2
+    label = int(segmented.labels[40, 30])
+    for beyond in ((-1.1, 30.0), (60.0, 120.2)):
+        moved = segmented._replace(centres={label: beyond})
+        kept, rejected, *_ = image._sorted(moved)
+        assert len(kept) == 1
+        assert rejected[label] == CUT_OFF
