@@ -60,7 +60,7 @@ def test_a_part_outside_the_image_is_refused():
         cropped(section(np.random.default_rng(), count=5), (0, 0, 301, 100), "x.png")
 
 
-@pytest.mark.parametrize("dark", [False, True])
+@pytest.mark.parametrize("dark", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_discs_that_touch_are_covered_by_their_circles_and_ellipses_are_not(dark):
     generator = np.random.default_rng()
     kind = "dark" if dark else "bright"

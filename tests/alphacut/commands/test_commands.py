@@ -378,7 +378,9 @@ def test_every_command_has_help_and_takes_quiet(name):
 SHIPPED = [path for path in sorted(CASES.glob("*.toml")) if not path.stem.endswith(".quoted")]
 
 
-DRAWN_ELSEWHERE = ("concrete", "paper-literal")  # cases whose figures are those of the paper's case
+# cases whose figures are of the kinds that others draw
+DRAWN_ELSEWHERE = ("concrete", "paper-literal", "building")
+VARIANTS = ("concrete", "paper-literal")  # of the paper's case, run in the slow tests
 
 
 def quick_run(path, folder, capfd, *more):
@@ -389,7 +391,11 @@ def quick_run(path, folder, capfd, *more):
     return json.loads((folder / "summary.json").read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(x, marks=[pytest.mark.slow] if x.stem in VARIANTS else []) for x in SHIPPED],
+    ids=lambda path: path.stem,
+)
 def test_every_shipped_case_runs_in_its_quick_form(path, tmp_path, capfd):
     pytest.importorskip("dolfinx")
     undrawn = path.stem in DRAWN_ELSEWHERE

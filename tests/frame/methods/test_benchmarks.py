@@ -15,6 +15,7 @@ from benchmarks.frame import integrators as frame_integrators
 from benchmarks.frame import tower as frame_tower
 
 
+@pytest.mark.slow
 def test_envelope_benchmark_ranks_the_methods(tmp_path: Path) -> None:
     wanted = [
         m for m in frame_envelopes.METHODS if m[1] in ("modal", "vertex", "improved-graph-follower")

@@ -216,6 +216,7 @@ def test_outputs_of_different_units_get_their_own_tolerance() -> None:
     assert mixed.to_dataset()["lower"].attrs["units"] == "SI, by output"
 
 
+@pytest.mark.slow
 def test_a_contest_between_neighbouring_nodes_finds_a_basin_that_every_model_missed() -> None:
     from benchmarks.frame.random_frames import TIME, random_frame
 

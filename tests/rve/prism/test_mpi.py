@@ -50,7 +50,7 @@ def solve(ranks, *options):
 
 
 @pytest.mark.skipif(shutil.which("mpirun") is None, reason="no mpirun")
-@pytest.mark.parametrize(("ranks", "layers"), [(2, 4), (3, 2)])
+@pytest.mark.parametrize(("ranks", "layers"), [(2, 4), pytest.param(3, 2, marks=pytest.mark.slow)])
 def test_any_number_of_ranks_gives_the_same_result(ranks, layers):
     code, alone, _ = solve(1, "--layers", str(layers))
     assert code == 0
