@@ -111,7 +111,7 @@ def _grids(model: ModalModel) -> tuple[ChebyshevGrid, LowerGrid]:
 def _grid(
     model: ModalModel, samples: Sequence[Sample], *, patient: bool
 ) -> ChebyshevGrid | LowerGrid:
-    """The points that are taken: fewer than all combinations where these are too many."""
+    """The points that are taken: fewer than all combinations where these cost more."""
     (whole, few), count = _grids(model), len(model.boxes.names)
     middle = np.zeros((1, count))
     sizes = [
@@ -120,7 +120,7 @@ def _grid(
     ]
     width, m = max(sum(size.values()) for size in sizes), len(model.outputs)
     if len(whole) * width <= MOST_NUMBERS:
-        return whole
+        return few if DEAR * len(few) < len(whole) else whole
     if not patient:
         raise dependence.UnprovedError(
             f"with {count} fuzzy inputs a proof takes minutes and is not tried unasked;"

@@ -433,6 +433,7 @@ def test_fewer_points_than_all_combinations_give_the_same_bound(monkeypatch) -> 
     inputs = {"E": Interval(24e9, 26e9), "m1": Interval(19e3, 21e3), "zeta": Interval(0.02, 0.04)}
     frame = replace(SHAKEN, dampers=(), damping_ratio=0.03, outputs=("q3", "drift2"))
     found = model(frame, inputs)
+    monkeypatch.setattr(model_error, "DEAR", 100)
     whole = proved_error(found)
     many = len(ChebyshevGrid((2 * found.degree + 1,) * 3))
     monkeypatch.setattr(model_error, "MOST_NUMBERS", many)
