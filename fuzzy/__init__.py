@@ -13,9 +13,8 @@ from alphacut.fuzzy.plans.branch_and_bound import BranchAndBound
 from alphacut.fuzzy.plans.interval_quasi_monte_carlo import IntervalQuasiMonteCarlo, RandomInput
 from alphacut.fuzzy.plans.metamodel import Metamodel
 from alphacut.fuzzy.plans.monte_carlo import MonteCarlo, QuasiMonteCarlo
-from alphacut.fuzzy.plans.signed import Signed
 from alphacut.fuzzy.plans.sparse_chebyshev import Chebyshev
-from alphacut.fuzzy.plans.transformation import Extended, General, Reduced
+from alphacut.fuzzy.plans.transformation import Extended, General, Reduced, Signed
 from alphacut.fuzzy.propagation import propagate
 from alphacut.fuzzy.random_response import RandomResponse
 from alphacut.fuzzy.sets.arithmetic import DependencyError, apply

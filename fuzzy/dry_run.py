@@ -11,9 +11,9 @@ import numpy as np
 
 from alphacut.fuzzy.arguments import fuzzy_inputs, interaction_list, known_facts, require_plan
 from alphacut.fuzzy.campaign.call import BATCH, Call, Function, named_point
-from alphacut.fuzzy.campaign.memory_check import needed
 from alphacut.fuzzy.campaign.sample_store import Shelf, shelf
 from alphacut.fuzzy.campaign.store import Identity, Store, Stored
+from alphacut.fuzzy.campaign.workers import needed
 from alphacut.fuzzy.counted import counted
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.automatic import Automatic

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Generic, TypeVar
 
 from alphacut.case.key import Key, Section, UnknownValueError, keys_of
+from alphacut.case.schema import Top
 from alphacut.case.sections.material import Cell, Mesh, Modulus, Radius, Response
 from alphacut.case.sections.particles import Microstructure
 from alphacut.case.sections.picture import Picture
 from alphacut.case.sections.questions import Decision, Field, Joint, Update
 from alphacut.case.sections.structures import Frame, Pendulum, Tower
-from alphacut.case.sections.top import Top
 from alphacut.case.sections.vibration import Envelope, Exceedance, Study
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.provenance import door

@@ -14,8 +14,7 @@ from alphacut.case.checks_material import particles, radius, sphere_model
 from alphacut.case.checks_structure import incomplete
 from alphacut.case.idle import idle_envelope
 from alphacut.case.names import floors, others, structures
-from alphacut.case.schema import NEEDED
-from alphacut.case.sections.top import STAGES
+from alphacut.case.schema import NEEDED, STAGES
 from alphacut.case.sections.vibration import ENVELOPE_METHODS, INTEGRATORS, NONLINEAR
 from alphacut.io.output_paths import hint
 from alphacut.io.problem import Problem

@@ -2,15 +2,33 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
+from typing import Annotated, Literal, get_args
 
-from alphacut.case.key import Key, Section, keys_of
+from alphacut.case.key import Key, Range, Section, keys_of
 from alphacut.case.sections import particles
 from alphacut.case.sections.material import CellTable, Mesh, Modulus, Radius, Response
 from alphacut.case.sections.questions import Decision, Field, Joint, Update
 from alphacut.case.sections.structures import Frame, Pendulum, Tower
-from alphacut.case.sections.top import Top
 from alphacut.case.sections.vibration import Envelope, Exceedance, Study
+
+VERSION = 1
+Stage = Literal["microstructure", "modulus", "image", "envelope"]
+STAGES: tuple[str, ...] = get_args(Stage)
+KNOWN_VERSION = Range(f"equal to {VERSION}", lower=VERSION, upper=VERSION, closed=True)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Top(Section):
+    """What the case is."""
+
+    schema: Annotated[int, Key("version of the case format", allowed=KNOWN_VERSION)]
+    title: Annotated[str, Key("one line, for figures and the report")]
+    about: Annotated[str, Key("a paragraph: what the case shows")]
+    source: Annotated[str, Key("where the values come from")] = ""
+    stages: Annotated[tuple[Stage, ...], Key("stages that `alphacut run` computes, in order")]
+
 
 SECTIONS: dict[str, type[Section]] = {
     "": Top,

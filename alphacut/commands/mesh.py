@@ -11,8 +11,7 @@ from alphacut.case.case import Case
 from alphacut.case.idle import require_read
 from alphacut.case.load import load
 from alphacut.commands import options as common
-from alphacut.export.fields import cell_fields
-from alphacut.export.prism_mesh import check_ending, prism_mesh, sphere_mesh, write_mesh
+from alphacut.export.fields import cell_fields, check_ending, prism_mesh, sphere_mesh, write_mesh
 from alphacut.io.problem import BadInput, Problem
 from alphacut.stages.material.cell import modal_parts
 

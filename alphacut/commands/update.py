@@ -63,7 +63,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
 
 def draw(folder: Path, found: Learned, bands: xarray.Dataset | None) -> list[str]:
     """Figures of the inputs and of each output's envelope; names of the files."""
-    from alphacut.figures import update as figures
+    from alphacut.figures import questions as figures
     from alphacut.figures.style import save, style
 
     if found.posterior is None:

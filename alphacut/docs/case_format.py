@@ -11,8 +11,7 @@ import sys
 from collections.abc import Iterator
 
 from alphacut.case.key import Key, about_of, keys_of
-from alphacut.case.schema import SECTIONS
-from alphacut.case.sections.top import VERSION
+from alphacut.case.schema import SECTIONS, VERSION
 from alphacut.case.values import allowed
 from alphacut.io.units import ACCEPTED, QUANTITIES
 

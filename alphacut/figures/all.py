@@ -13,14 +13,11 @@ from typing import TYPE_CHECKING
 from alphacut.figures import envelope as figure_envelope
 from alphacut.figures import follower as figure_follower
 from alphacut.figures import frame as figure_frame
-from alphacut.figures import fuzzy as figure_fuzzy
 from alphacut.figures import image as figure_image
 from alphacut.figures import modulus as figure_modulus
 from alphacut.figures import questions as figure_questions
 from alphacut.figures import radius as figure_radius
-from alphacut.figures import response as figure_response
 from alphacut.figures import shares as figure_shares
-from alphacut.figures import update as figure_update
 from alphacut.figures.mesh import draw_mesh
 from alphacut.figures.style import save, style
 from alphacut.fuzzy.campaign.workers import submitted
@@ -44,7 +41,7 @@ def drawings(results: Results) -> Iterator[Drawing]:
         yield from radius_drawings(results)
     yield from material_drawings(results)
     if results.envelopes:
-        yield "fig20-mapping", lambda: figure_fuzzy.mapping(results)
+        yield "fig20-mapping", lambda: figure_modulus.mapping(results)
     yield from structure_drawings(results)
     if results.envelopes and results.case.sections.envelope:
         yield from follower_drawings(results)
@@ -70,11 +67,11 @@ def material_drawings(results: Results) -> Iterator[Drawing]:
         yield "fig17-mean-stress", lambda: figure_modulus.mean_stress(modulus)
         yield "fig18-modulus", lambda: figure_modulus.fuzzy_modulus(modulus, results.case)
         if results.case.quoted:
-            yield "fig19-membership", lambda: figure_fuzzy.membership(modulus)
+            yield "fig19-membership", lambda: figure_modulus.membership(modulus)
     if (picture := results.image) is not None:
         yield "image", lambda: figure_image.image(picture)
     if (stress := results.response) is not None:
-        yield "response", lambda: figure_response.response(stress)
+        yield "response", lambda: figure_modulus.response(stress)
 
 
 def structure_drawings(results: Results) -> Iterator[Drawing]:
@@ -119,9 +116,9 @@ def update_drawings(results: Results) -> Iterator[Drawing]:
     bands, learned = results.update, results.learned
     if learned is None or bands is None or learned.posterior is None:
         return
-    yield "update-inputs", partial(figure_update.boxes, learned)
+    yield "update-inputs", partial(figure_questions.boxes, learned)
     for output in map(str, bands["output"].values):
-        yield f"update-{output}", partial(figure_update.bands, bands, output)
+        yield f"update-{output}", partial(figure_questions.bands, bands, output)
 
 
 def share_drawings(driving: xarray.Dataset) -> Iterator[Drawing]:

@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from alphacut.case.case import Case
-from alphacut.export.fields import cell_fields
-from alphacut.export.prism_mesh import prism_mesh, write_mesh
+from alphacut.export.fields import cell_fields, prism_mesh, write_mesh
 from alphacut.io.files import say, whole_file
 
 if TYPE_CHECKING:

@@ -1,24 +1,35 @@
-"""The sections of the report, each a piece of HTML."""
+"""The sections of the report, each a piece of HTML: methods and their worth among them."""
 
 from __future__ import annotations
 
+import ast
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from markupsafe import Markup
 
 from alphacut.figures.captions import in_words
+from alphacut.fuzzy.samples.nature import Nature
 from alphacut.io.files import Document
+from alphacut.io.provenance import sources
+from alphacut.io.units import engineering
 from alphacut.report import glossary, tables
 from alphacut.report.decisions import decided, learned, next_measured, together
-from alphacut.report.differences import differences
-from alphacut.report.envelopes import envelopes, natural
+from alphacut.report.envelopes import envelopes, natural, spectrum
 from alphacut.report.figures import gallery, listed
 from alphacut.report.key_results import key_results
 from alphacut.report.material import given, image, microstructure, modulus, stress
-from alphacut.report.methods import methods
-from alphacut.report.spectrum import spectrum
-from alphacut.report.tables import citation, code, details, items, paragraphs, section, table
+from alphacut.report.tables import (
+    citation,
+    code,
+    details,
+    items,
+    paragraphs,
+    section,
+    sentence,
+    table,
+)
 
 
 def sections(summary: Document, folder: Path) -> Iterator[Markup]:
@@ -133,3 +144,104 @@ def versions(summary: Document) -> Markup:
     found = ", ".join(f"{name} {version}" for name, version in summary["versions"].items())
     command = Markup("Made by {} in {:.0f} s.").format(code(summary["command"]), summary["seconds"])
     return section("Versions and citation", paragraphs(command, found), code(citation(), "pre"))
+
+
+PACKAGES = ("stochastic", "rve", "fuzzy", "frame")
+MARK = "This differs from the paper in:"
+
+
+def differences(found: Document | None = None) -> Iterator[tuple[str, str]]:
+    """Subject and differences of each module, "1. … 2. …", that concern a run."""
+    for package in PACKAGES:
+        for name, file in sources(package):
+            if file.suffix != ".py":
+                continue
+            if found is not None and not concerns(
+                f"{package}.{name[:-3].replace('/', '.')}", found
+            ):
+                continue
+            words = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
+            if MARK in words:
+                after = words.partition(MARK)[2].split("\n\n")[0]
+                subject = re.sub(r"\s*\(.*", "", words.partition("\n")[0].rstrip("."))
+                yield subject, " ".join(after.split())
+
+
+def concerns(module: str, found: Document) -> bool:
+    """True if a run used the module, by its summary."""
+    methods = {study["method"] for study in found.get("envelopes", {}).values()}
+    if module == "stochastic.radius_map":
+        return "modulus" in found or "microstructure" in found
+    if module.startswith("stochastic."):
+        return "microstructure" in found
+    if module.startswith("rve."):
+        return "modulus" in found and (
+            module != "rve.prism.model" or found["modulus"]["method"] == "prism"
+        )
+    if module == "frame.methods.graph_follower":
+        return any(method.endswith("graph-follower") for method in methods)
+    return not module.startswith("frame.") or bool(methods)
+
+
+def methods(summary: Document) -> Markup:
+    """Method and cost of each stage."""
+    rows: list[tuple[object, ...]] = []
+    if cell := summary.get("modulus"):
+        how, cost = f"{cell['method']}, plan {cell['plan']}", f"{cell['samples']} samples"
+        rows.append(("fuzzy modulus", how, cell["nature"], cost, f"{cell['seconds']:.1f}"))
+    if picture := summary.get("image"):
+        cost = f"{picture['iterations']} iterations"
+        rows.append(("image", "trial fields", picture["nature"], cost, f"{picture['seconds']:.1f}"))
+    for name, study in summary.get("envelopes", {}).items():
+        how, seconds = study["method"], f"{study['seconds']:.1f}"
+        rows.append((f"envelope {name}", how, study["nature"], effort(study), seconds))
+    words = paragraphs(*explained(rows), *proofs(summary))
+    return section(
+        "Methods and cost",
+        table(("stage", "method", "nature of the bounds", "cost", "seconds"), rows, numbers=3),
+        words,
+    )
+
+
+def explained(rows: Sequence[tuple[object, ...]]) -> Iterator[str]:
+    """Meaning of each nature of bounds in the table."""
+    told = {nature.value: nature.sentence() for nature in Nature}
+    yield from (
+        f"{nature.capitalize()}: {told[nature]}."
+        for nature in dict.fromkeys(str(row[2]) for row in rows)
+        if nature in told
+    )
+
+
+def proofs(summary: Document) -> Iterator[str]:
+    """Gap of each certified envelope, and what it rests on."""
+    from alphacut.frame.outputs import output_unit
+
+    for name, study in summary.get("envelopes", {}).items():
+        if "proved" in study:
+            ends = study["proved"]
+            words = ", ".join(
+                f"{output} {engineering(ends['min'][output], output_unit(output))} …"
+                f" {engineering(ends['max'][output], output_unit(output))}"
+                for output in ends["min"]
+            )
+            yield (
+                f"Beside envelope {name} stand guaranteed bounds of the exact motion at every node"
+                f" and level, on the lowest from least to greatest {words}."
+            )
+        if "gap" in study:
+            of = str(study.get("gap_output", next(iter(study.get("min", {"q": 0})))))
+            gap = engineering(float(study["gap"]), output_unit(of), digits=2)
+            worth = "proved" if "guaranteed" in str(study["nature"]) else "verified by sampling"
+            yield (
+                f"The bounds of envelope {name} are {worth} at every node, and no wider than {gap}"
+                f" of {of} beyond what is attained. {sentence(study['proof'])}"
+            )
+
+
+def effort(study: Document) -> str:
+    """Cost of an envelope: trajectories, or eigen-analyses."""
+    return (
+        f"{study['trajectories']}"
+        f" {'eigen-analyses' if study['method'] == 'modal' else 'trajectories'}"
+    )

@@ -21,8 +21,13 @@ from alphacut.stages.material.references import mean_share
 from alphacut.stages.vibration import envelope, update
 from alphacut.stages.vibration.accelerogram import cut_short
 from alphacut.stages.vibration.envelope_task import task_of
-from alphacut.stages.vibration.provable import estimated_reason, too_many, unproved_reason
-from alphacut.stages.vibration.resolution_checks import rough, wanted_errors
+from alphacut.stages.vibration.resolution_checks import (
+    estimated_reason,
+    rough,
+    too_many,
+    unproved_reason,
+    wanted_errors,
+)
 from alphacut.stages.vibration.structure import Structure, structure
 from alphacut.stages.vibration.studies import fixed_line, left_out, studies
 

@@ -11,10 +11,9 @@ import numpy as np
 
 from alphacut.fuzzy.campaign.call import Call, Failure, Outcome, Sample, named_point
 from alphacut.fuzzy.campaign.dispatch import Task, completed
-from alphacut.fuzzy.campaign.memory_check import require
 from alphacut.fuzzy.campaign.sample_store import Shelf
 from alphacut.fuzzy.campaign.spot_check import RANDOM, SpotCheck, require_same
-from alphacut.fuzzy.campaign.workers import submitted
+from alphacut.fuzzy.campaign.workers import require, submitted
 from alphacut.fuzzy.counted import counted
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.samples.model import Layout, Values

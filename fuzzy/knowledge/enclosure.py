@@ -15,8 +15,7 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from alphacut.fuzzy.knowledge.interval_arithmetic import Pair
-from alphacut.fuzzy.knowledge.trace import Trace, asks_for_types, path, same_path
-from alphacut.fuzzy.knowledge.tracer import KNOWN, Tracer
+from alphacut.fuzzy.knowledge.tracer import KNOWN, Trace, Tracer, asks_for_types, path, same_path
 from alphacut.fuzzy.sets.numbers import Array
 
 Function = Callable[..., object]

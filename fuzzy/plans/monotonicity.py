@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from alphacut.fuzzy.knowledge.contradiction import contradictions, negligible
-from alphacut.fuzzy.knowledge.known import Known, Signs
+from alphacut.fuzzy.knowledge.known import Known, Signs, contradictions, negligible
 from alphacut.fuzzy.samples.design import Design
 from alphacut.fuzzy.samples.model import Memo, Values
 from alphacut.fuzzy.samples.result import FuzzyResult

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from alphacut.fuzzy.counted import counted
 from alphacut.fuzzy.drawing import draw_bands, draw_membership, new_axes
-from alphacut.fuzzy.knowledge.contradiction import contradictions
 from alphacut.fuzzy.knowledge.joint import JointClaim
-from alphacut.fuzzy.knowledge.known import Signs
+from alphacut.fuzzy.knowledge.known import Signs, contradictions
 from alphacut.fuzzy.samples.model import Values
 from alphacut.fuzzy.samples.nature import Nature, condition
 from alphacut.fuzzy.sets.boxes import Domain

@@ -22,7 +22,7 @@ from alphacut.case.sections.picture import Picture
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.stochastic import Beta, ThetaLaw, TruncatedNormal
 from alphacut.stochastic.radius_map import Kind, MapFamily
-from alphacut.stochastic.theta.beta import LARGEST_EXPONENT
+from alphacut.stochastic.theta.law import LARGEST_EXPONENT
 
 CellMethod = Literal["prism", "slices", "table", "series", "image", "auto"]
 PlanName = Literal["general", "reduced", "extended", "signed"]

@@ -1,8 +1,9 @@
-"""Proved bounds of the stiffness of an image, level by level."""
+"""Proved bounds of the stiffness of an image, level by level, and what widens them."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import perf_counter
 
@@ -13,10 +14,57 @@ from alphacut.io.progress import Tick
 from alphacut.rve.image.gap import constitutive_gap
 from alphacut.rve.image.model import ImageCut, ImageModel, reduced_to_pixels
 from alphacut.rve.image.moduli import grain_modulus
-from alphacut.stages.image.error_table import Contribution, contributions
+from alphacut.rve.image.random_threshold import NODES
 from alphacut.stages.image.random_response import RandomResponse, responses
 from alphacut.stages.image.study import ImageStudy, Level
 from alphacut.stochastic.theta.truncated_normal import Array
+
+CURES = {
+    "discretisation": "divide the pixels: cell.division or cell.width",
+    "outline": "take more pixels across: cell.pixels",
+    "finite window": "take a larger window, or another number of tiles",
+    "threshold steps": f"up to {NODES} grey values within four deviations: each is solved",
+    "threshold": "state cell.threshold more closely",
+    "phases": "state the moduli of the phases more closely",
+}
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """Width of E from one source.
+
+    Args:
+        source: A key of `CURES`.
+        width: Width of E that it adds to that of crisp inputs, in Pa; of the discretisation, or of
+            the pixels that an outline cuts, that width itself.
+    """
+
+    source: str
+    width: float
+
+    @property
+    def cure(self) -> str:
+        """Change of the case that narrows it."""
+        return CURES[self.source]
+
+
+def contributions(
+    study: ImageStudy, discretisation: float, width: Callable[[Level, Level], float]
+) -> tuple[Contribution, ...]:
+    """The sources there are, the widest first, by widths of E in Pa: of pixels, and at levels."""
+    base, lowest = width(None, None), study.alpha[0]
+    widths = {"outline" if study.outlined else "discretisation": discretisation}
+    if study.model.boundary == "window":
+        widths["finite window"] = base - discretisation
+    if study.random is not None:
+        widths["threshold steps"] = base - discretisation
+    if study.fuzzy_threshold:
+        widths["threshold"] = width(lowest, None) - base
+    if study.fuzzy_phases:
+        widths["phases"] = width(None, lowest) - base
+    rows = (Contribution(source, max(0.0, value)) for source, value in widths.items())
+    return tuple(sorted(rows, key=lambda row: -row.width))
+
 
 MANY = 500_000  # pixels times pairs of solutions, from which on an image may take minutes
 

@@ -1,7 +1,8 @@
-"""Fuzzy modulus of a case: samples of the cell rearranged into α-cuts."""
+"""Fuzzy modulus of a case: samples of the cell rearranged into α-cuts, or measured values."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alphacut.case.case import Case
-from alphacut.fuzzy import Crisp, FuzzyNumber, General, PiecewiseLinear, propagate
+from alphacut.fuzzy import Crisp, FuzzyNumber, General, PiecewiseLinear, from_data, propagate
 from alphacut.fuzzy import explain as fuzzy_explain
 from alphacut.fuzzy.dry_run import Explanation
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.fuzzy.samples.result import FuzzyResult
+from alphacut.io.csv_rows import CsvFile
 from alphacut.io.files import Document, say, whole_file
 from alphacut.io.netcdf import read_dataset
 from alphacut.io.problem import BadInput, Problem
@@ -22,13 +24,13 @@ from alphacut.io.provenance import attributes, versions
 from alphacut.stages.material.campaign import Campaign, theta_shown
 from alphacut.stages.material.cell import GPA, CellChoice, anisotropy, parts
 from alphacut.stages.material.cell_models import cell_model
-from alphacut.stages.material.measured_modulus import measured_modulus
 from alphacut.stochastic import ThetaLaw, TruncatedNormal
 
 if TYPE_CHECKING:
     import xarray
 
     from alphacut.rve.result import Homogenised
+
 
 MANY = 2000  # samples of the general plan, from which on a cheaper one is named
 QUANTITIES = {"E": ("Pa", "effective Young's modulus"), "nu": ("1", "effective Poisson's ratio")}
@@ -345,3 +347,52 @@ def stand_in(case: Case) -> FuzzyNumber | None:
     if given.file is not None:
         return read_number(case.beside(given.file), "modulus.file")
     return None if given.measured is None else measured_modulus(case, given.measured)
+
+
+HEADER = "E [GPa]"
+NAMES = r"E|E_?c?m?|E_?mod(ul(us)?)?|(young'?s?[\s_-]*)?modul(us|i)|elastic[\s_-]modulus"
+
+
+def measured_modulus(case: Case, file: str) -> FuzzyNumber:
+    """The fuzzy modulus in Pa of measured values, with the claim that the case names.
+
+    Args:
+        case: With the section modulus.
+        file: CSV file, from the case's folder.
+
+    Raises:
+        BadInput: The file is missing, its header has no unit, a row is no positive number, or the
+            values do not decide what is claimed.
+    """
+    key, wanted = "modulus.measured", case.modulus
+    values = measured_values(case.beside(file), key)
+    bounds = None if wanted.bounds is None else wanted.bounds.support
+    try:
+        number = from_data(values, wanted.claim, bounds=bounds, law=wanted.law)
+        number.cut(0.0)
+    except ValueError as error:
+        raise case.refuse(key, str(error), 'bounds such as bounds = "[10, 60] GPa"') from None
+    return number
+
+
+def measured_values(path: Path, key: str = "modulus.measured") -> list[float]:
+    """Measured moduli in Pa, shape (n,).
+
+    Raises:
+        BadInput: The file is missing, its header has no unit, or a row is no positive number.
+    """
+    file = CsvFile(path, key, "file", HEADER)
+    (line, first), *rows = file.rows()
+    scale = file.scale(line, ",".join(first), "a modulus", "Pa", pattern=NAMES)
+    return [scale * positive(file, line, ",".join(row)) for line, row in rows]
+
+
+def positive(file: CsvFile, line: int, text: str) -> float:
+    """One value of the column."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value > 0):
+        raise file.refuse(line, "this row is no positive number", text)
+    return value

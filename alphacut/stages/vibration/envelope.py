@@ -17,8 +17,13 @@ from alphacut.io.progress import Tick
 from alphacut.io.provenance import attributes, versions
 from alphacut.stages.contract import keep
 from alphacut.stages.vibration.envelope_task import EnvelopeTask, task_of
-from alphacut.stages.vibration.provable import estimated_reason, too_many, unproved_reason
-from alphacut.stages.vibration.resolution_checks import WITH_TOLERANCE, guard_against
+from alphacut.stages.vibration.resolution_checks import (
+    WITH_TOLERANCE,
+    estimated_reason,
+    guard_against,
+    too_many,
+    unproved_reason,
+)
 from alphacut.stages.vibration.structure import Structure
 from alphacut.stochastic.theta.truncated_normal import Array
 

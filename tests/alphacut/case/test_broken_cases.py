@@ -13,10 +13,9 @@ from pathlib import Path
 import pytest
 
 from alphacut.case.key import UnknownValueError
-from alphacut.case.load import load, section_of
+from alphacut.case.load import lines_of_keys, load, section_of
 from alphacut.case.schema import every_key
 from alphacut.case.sections.structures import Frame
-from alphacut.case.toml_file import lines_of_keys
 from alphacut.entry import main
 from alphacut.io.problem import BadInput
 from alphacut.stages.readiness import ready

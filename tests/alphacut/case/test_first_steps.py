@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from alphacut.case.toml_file import cure
+from alphacut.case.load import cure
 from alphacut.commands.microstructure import advise
 from alphacut.entry import main
 from alphacut.io import units

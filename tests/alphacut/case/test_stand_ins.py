@@ -11,8 +11,7 @@ import pytest
 from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.io.problem import BadInput
-from alphacut.stages.material.measured_modulus import measured_values
-from alphacut.stages.material.modulus import stand_in
+from alphacut.stages.material.modulus import measured_values, stand_in
 from alphacut.stages.vibration.accelerogram import accelerogram
 from benchmarks.synthetic_record import SyntheticRecord, text
 

@@ -178,7 +178,7 @@ def jacobians(points, cells):
 def test_a_mesh_of_a_sphere_fills_the_periodic_cell(tmp_path, capfd):
     pytest.importorskip("dolfinx")
     meshio = pytest.importorskip("meshio")
-    from alphacut.export.prism_mesh import write_mesh
+    from alphacut.export.fields import write_mesh
 
     path = tmp_path / "cell.vtu"
     words = ("--radius", "0.6", "--mesh-size", "0.5", "--out", str(path))

@@ -18,7 +18,7 @@ from alphacut.figures.captions import FIGURES, caption, core, figure_words
 from alphacut.frame import Envelope
 from alphacut.io.units import engineering, largest_by_unit
 from alphacut.report import material
-from alphacut.report.differences import differences
+from alphacut.report.sections import differences
 from alphacut.report.tables import citation
 from alphacut.stages.summary import crisp_particles
 

@@ -206,7 +206,7 @@ COARSE = ["mesh", PAPER, "--mesh-size", "0.5", "--layers", "3", "--quiet"]
 def test_every_format_gives_points_wedges_and_phase_back(ending, tmp_path):
     pytest.importorskip("gmsh")
     meshio = pytest.importorskip("meshio")
-    from alphacut.export.prism_mesh import MIRRORED, VTK_ORDER, prism_mesh
+    from alphacut.export.fields import MIRRORED, VTK_ORDER, prism_mesh
 
     wanted = prism_mesh(load(PAPER, ["mesh.size=0.5", "mesh.layers=3"]))
     assert main([*COARSE, "--out", str(tmp_path / f"cell{ending}")]) == 0

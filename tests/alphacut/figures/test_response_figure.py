@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray
 
-from alphacut.figures.response import response
+from alphacut.figures.modulus import response
 
 ALPHA, STRESS = np.array([0.0, 0.5, 1.0]), np.linspace(4e8, 7e8, 61)
 

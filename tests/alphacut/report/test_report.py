@@ -153,7 +153,7 @@ def test_a_folder_without_results_is_named(tmp_path, capfd):
 
 
 def test_a_certificate_is_told_with_its_gap_and_what_it_rests_on():
-    from alphacut.report.methods import methods
+    from alphacut.report.sections import methods
 
     study = {
         "method": "modal",

@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 from scipy.stats import qmc
 
 from alphacut.fuzzy import Automatic, General, Interval, Known, Linear, Triangular, propagate
-from alphacut.fuzzy.plans.looks import Purse, SpentError
+from alphacut.fuzzy.plans.automatic import Purse, SpentError
 from alphacut.fuzzy.samples.nature import Nature
 
 KINDS = ("monotone", "inside", "ridge", "kink", "wave")

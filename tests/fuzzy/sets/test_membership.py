@@ -8,9 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from alphacut.fuzzy import Crisp, Interval, Reduced, Triangular, apply, levels, propagate
-from alphacut.fuzzy.plots import figure_36, figure_37, plot_membership
+from alphacut.fuzzy.plots import FuzzySet, figure_36, figure_37, plot_membership
 from alphacut.fuzzy.sets.arithmetic import DependencyError
-from alphacut.fuzzy.sets.membership import FuzzySet
 
 TWO_HUMPS = FuzzySet((0, 1, 2, 3, 4), (0, 0.8, 0.3, 0.6, 0))
 triangles = (
