@@ -155,9 +155,8 @@ def cell_fields(case: Case) -> meshio.Mesh:
     from alphacut.rve.mesh.prism_grid import PrismGrid
     from alphacut.rve.mesh.triangulation import reference_radius, triangulate
     from alphacut.rve.prism.system import PrismSystem
-    from alphacut.rve.prism.task import PrismTask
+    from alphacut.rve.prism.task import PrismTask, Stopwatch
     from alphacut.rve.solver.options import SolverOptions
-    from alphacut.rve.solver.stopwatch import Stopwatch
 
     require_conforming(case)
     radius, matrix, inclusion = modal_parts(case)

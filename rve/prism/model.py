@@ -35,13 +35,12 @@ from alphacut.rve.prism.head_start import HeadStart
 from alphacut.rve.prism.mixed_element import NEARLY_INCOMPRESSIBLE
 from alphacut.rve.prism.modulus_basis import BasisError, ModulusBasis
 from alphacut.rve.prism.system import PrismSystem, SliceMeans
-from alphacut.rve.prism.task import Displacements, PrismTask
+from alphacut.rve.prism.task import Displacements, PrismTask, Stopwatch
 from alphacut.rve.ranks import ALONE, Ranks
 from alphacut.rve.result import Homogenised, StressCurve
 from alphacut.rve.settings import require_mesh_size
 from alphacut.rve.solver.krylov import ConvergenceError
 from alphacut.rve.solver.options import SolverOptions
-from alphacut.rve.solver.stopwatch import Stopwatch
 from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.truncated_normal import Array
 

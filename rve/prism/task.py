@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from time import perf_counter
 
 import numpy as np
 
@@ -13,12 +15,39 @@ from alphacut.rve.prism.system import PrismSystem
 from alphacut.rve.solver.krylov import LinearSolver, SideBySide
 from alphacut.rve.solver.options import SolverOptions
 from alphacut.rve.solver.saddle import Saddle
-from alphacut.rve.solver.stopwatch import Stopwatch
 from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
 from alphacut.stochastic.theta.truncated_normal import Array
 
 CONTRAST_GRID = 1.25
 NO_LOAD = 1e-12  # relative size of a load that is nothing but round-off
+STAGES = ("mesh", "assemble", "setup", "solve", "total", "jit")
+
+
+class Stopwatch:
+    """Adds up wall time by stage."""
+
+    def __init__(self) -> None:
+        self.seconds = dict.fromkeys(STAGES, 0.0)
+
+    @contextmanager
+    def __call__(self, stage: str) -> Iterator[None]:
+        """Add the time of the block to `stage`."""
+        started = perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[stage] = self.seconds.get(stage, 0.0) + perf_counter() - started
+
+    def shift(self, source: str, target: str, seconds: float) -> None:
+        """Book `seconds` under another stage."""
+        self.seconds[source] -= seconds
+        self.seconds[target] += seconds
+
+    def report(self) -> dict[str, float]:
+        """Seconds by stage, just-in-time compilation left out."""
+        self.seconds["total"] = sum(self.seconds[s] for s in ("mesh", "assemble", "setup", "solve"))
+        report, self.seconds = self.seconds, dict.fromkeys(STAGES, 0.0)
+        return report
 
 
 @dataclass(frozen=True)

@@ -15,11 +15,10 @@ from cvxopt import cholmod, matrix, spmatrix
 
 from alphacut.rve.mesh.triangulation import Integers
 from alphacut.rve.solver.krylov import ConvergenceError
-from alphacut.rve.solver.level_cholesky import LevelFactors, permutation
 from alphacut.rve.solver.level_stiffness import LevelPattern
 from alphacut.stochastic.theta.truncated_normal import Array
 
-_SOLVE_L, _SOLVE_LT, _SOLVE_D = 4, 5, 6
+_SOLVE_L, _SOLVE_LT, _SOLVE_D, _PERMUTE = 4, 5, 6, 7
 
 
 @contextmanager
@@ -33,7 +32,7 @@ def _options(**options: int) -> Iterator[None]:
         cholmod.options.update(before)
 
 
-class LevelLDL(LevelFactors):
+class LevelLDL:
     """P S_k Pᵀ = L_k J L_kᵀ with a diagonal J of signs, the same for all k.
 
     Args:
@@ -59,7 +58,7 @@ class LevelLDL(LevelFactors):
                 template.V = matrix(pattern.values(one))
                 self._factors.append(cholmod.symbolic(template, p=matrix(wanted.tolist())))
                 cholmod.numeric(template, self._factors[-1])
-        self._order = permutation(self._factors[0], pattern.size)
+        self._order = _permutation(self._factors[0], pattern.size)
         inverse = [self._inverse_pivots(factor) for factor in self._factors]
         self._root = np.sqrt(np.abs(inverse))[:, :, None]
         self.signs = np.where(self._order < displacements, 1.0, -1.0)[:, None]
@@ -74,6 +73,16 @@ class LevelLDL(LevelFactors):
         cholmod.solve(factor, ones, sys=_SOLVE_D)
         return np.asarray(ones).ravel()
 
+    def _apply(self, vectors: Array, system: int) -> Array:
+        result = np.empty_like(vectors)
+        if not vectors.size:  # no column is left for this rank
+            return result
+        for factor, source, target in zip(self._factors, vectors, result, strict=True):
+            columns = matrix(source)
+            cholmod.solve(factor, columns, sys=system)
+            target[:] = np.asarray(columns)
+        return result
+
     def forward(self, vectors: Array) -> Array:
         """J L_k⁻¹ P v_k for each k and column, shape (matrices, size, columns)."""
         return np.asarray(self.signs * self._root * self._apply(vectors[:, self._order], _SOLVE_L))
@@ -83,6 +92,13 @@ class LevelLDL(LevelFactors):
         result = np.empty_like(vectors)
         result[:, self._order] = self._apply(self._root * vectors, _SOLVE_LT)
         return result
+
+
+def _permutation(factor: object, size: int) -> Integers:
+    """The fill-reducing order of a factor."""
+    place = matrix(np.arange(size, dtype=float))
+    cholmod.solve(factor, place, sys=_PERMUTE)
+    return np.asarray(place).ravel().astype(np.int64)
 
 
 def _order(pattern: LevelPattern, elements: Array, unknowns: Integers) -> Integers:
@@ -98,6 +114,6 @@ def _order(pattern: LevelPattern, elements: Array, unknowns: Integers) -> Intege
     factor = cholmod.symbolic(template)
     cholmod.numeric(template, factor)
     place = np.empty(pattern.size)
-    place[permutation(factor, pattern.size)] = np.arange(pattern.size)
+    place[_permutation(factor, pattern.size)] = np.arange(pattern.size)
     last = np.where(unknowns >= 0, place[unknowns], -1.0).max(axis=1)
     return np.argsort(np.concatenate([place, last + 0.5]), kind="stable")

@@ -54,10 +54,9 @@ def test_a_direct_solver_gives_the_same():
 def test_stresses_at_nodes_follow_the_series():
     from alphacut.rve.cell import LOADS
     from alphacut.rve.prism.model import _system, reference_radius
-    from alphacut.rve.prism.task import PrismTask
+    from alphacut.rve.prism.task import PrismTask, Stopwatch
     from alphacut.rve.series.field import SeriesField
     from alphacut.rve.solver.options import SolverOptions
-    from alphacut.rve.solver.stopwatch import Stopwatch
 
     crisp, phases = HermiteMap(0.5, 0, 0.5, 0), (Phase(20e9, 0.4999), Phase(80e9, 0.3))
     system = _system(0.15, 1, reference_radius(crisp), False)

@@ -72,7 +72,7 @@ from alphacut.rve.mesh.triangulation import reference_radius
 from alphacut.rve.prism.model import PrismModel, _system
 from alphacut.rve.prism.task import PrismTask
 from alphacut.rve.solver.options import SolverOptions
-from alphacut.rve.solver.stopwatch import Stopwatch
+from alphacut.rve.prism.task import Stopwatch
 from alphacut.stochastic import HermiteMap
 
 radii, ranks, found = HermiteMap(0.1337, 0.1, 0.8663, 0.1692), MPI.COMM_WORLD, []
