@@ -17,12 +17,11 @@ from typing import NoReturn
 
 from alphacut.commands.parser import Parser, refuse_petsc, split_petsc
 from alphacut.fuzzy import CampaignError
-from alphacut.io.files import rank, ranks, say, standard_output
+from alphacut.io.files import RANKS, SIZES, rank, ranks, say, standard_output
 from alphacut.io.netcdf import finished
 from alphacut.io.output_paths import check_destinations
 from alphacut.io.problem import BadInput, missing
 from alphacut.io.provenance import door, own_version
-from alphacut.rve.prism.head_start import launched
 from alphacut.rve.solver.options import OptionError
 
 NAMES = (
@@ -167,7 +166,8 @@ def plain_warnings() -> Iterator[None]:
 
 def leave(status: int) -> NoReturn:
     """End the program; its memory is not taken apart first, 0.1 s once DOLFINx is loaded."""
-    if threading.active_count() > 1 or launched():  # waited for, or waiting for it
+    launched = any(name in os.environ for name in (*RANKS, *SIZES))  # by mpirun or its like
+    if threading.active_count() > 1 or launched:  # waited for, or waiting for it
         sys.exit(status)
     try:
         atexit._run_exitfuncs()  # as multiprocessing does

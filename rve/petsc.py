@@ -42,6 +42,13 @@ def clean(comm: MPI.Comm | None) -> None:
         PETSc.garbage_cleanup(comm)
 
 
+def block_values(matrix: PETSc.Mat) -> ctypes.c_void_p:
+    """Where the blocks of a matrix on one rank begin: row by row, each column by column."""
+    first = ctypes.c_void_p()
+    _LIBRARY.MatSeqBAIJGetArray(ctypes.c_void_p(matrix.handle), ctypes.byref(first))
+    return first
+
+
 @contextmanager
 def in_database(options: Mapping[str, str], *, wanted: Collection[str]) -> Iterator[None]:
     """Keep `options` in PETSc's database while the block configures a solver.

@@ -190,7 +190,7 @@ def test_a_package_imports_fast_and_without_dolfinx(package):
 
 @pytest.mark.parametrize(
     ("method", "exclude", "loaded"),
-    [("auto", (), False), ("auto", ("series",), True), ("prism", (), True)],
+    [("auto", (), ""), ("auto", ("series",), "dolfinx"), ("prism", (), "petsc4py.PETSc")],
 )
 def test_what_a_model_may_need_is_loaded_before_its_clock_starts(method, exclude, loaded):
     choice = f"CellChoice({method!r}, exclude={exclude!r})"
@@ -199,9 +199,10 @@ def test_what_a_model_may_need_is_loaded_before_its_clock_starts(method, exclude
         f" cell_model({choice})"
     )
     told = subprocess.run(
-        [sys.executable, "-c", f"{program}; print('dolfinx' in sys.modules)"],
+        [sys.executable, "-c", f"{program}; print(*sys.modules)"],
         capture_output=True,
         text=True,
         check=True,
     )
-    assert told.stdout.split() == [str(loaded)]
+    modules = set(told.stdout.split())
+    assert loaded in modules if loaded else not HEAVY & modules

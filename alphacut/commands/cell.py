@@ -23,7 +23,7 @@ from alphacut.rve.result import Homogenised, error_of_means
 from alphacut.rve.spheres.result import HomogenisedSpheres
 from alphacut.stages.contract import contract, keep_modulus, require_choice
 from alphacut.stages.material import cell, spheres
-from alphacut.stages.material.cell_models import cell_model, started
+from alphacut.stages.material.cell_models import cell_model
 from alphacut.stages.material.references import beside, text_of
 from alphacut.stages.plausible import say_unlikely_material
 
@@ -107,8 +107,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     if pair:
         result, difference = compared(case, choice, pair)
     else:
-        with started(case, choice) as model:
-            result, difference = cell.solve(case, model), None
+        result, difference = cell.solve(case, cell_model(choice)), None
         keep_modulus(case, result.method, result.error, best_effort=options.best_effort)
     if options.export:
         export(result, options.export)

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
+from hashlib import sha256
+from importlib.util import find_spec
+from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +17,7 @@ from alphacut.stochastic import RadiusMap, require_map
 from alphacut.stochastic.theta.truncated_normal import Array
 
 Integers = NDArray[np.int64]
+Triangles = tuple[Array, Integers, NDArray[np.bool_]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,13 +57,14 @@ def reference_radius(radius_map: RadiusMap) -> float:
     return float(np.clip(np.round((radii.min() + radii.max()) * 10) / 20, 0.1, 0.9))
 
 
-def triangulate(*, size: float, radius: float) -> Triangulation:
+def triangulate(*, size: float, radius: float, cache: Path | None = None) -> Triangulation:
     """Mesh the cell with triangles of about `size`, opposite sides matching.
 
     Args:
         size: Wanted edge length, in halves of the cell's side, in (0, 1].
         radius: Radius of the particle in the mesh, in (0, 1), or 0 for a mesh that knows nothing of
             it.
+        cache: Folder where what Gmsh makes is kept; None to ask it every time.
 
     Raises:
         ValueError: `size` or `radius` out of range.
@@ -65,11 +72,32 @@ def triangulate(*, size: float, radius: float) -> Triangulation:
     require_mesh_size(size)
     if not 0 <= radius < 1:
         raise ValueError(f"the reference radius is {radius:g}; it must lie in [0, 1)")
-    points, triangles, inside = _gmsh_triangles(size, radius)
+    points, triangles, inside = _triangles(size, radius, cache)
     return _add_midpoints(points, triangles, inside, radius)
 
 
-def _gmsh_triangles(size: float, radius: float) -> tuple[Array, Integers, NDArray[np.bool_]]:
+def _triangles(size: float, radius: float, cache: Path | None) -> Triangles:
+    """As `_gmsh_triangles`, from the cache where an equal Gmsh was asked the same before."""
+    found = find_spec("gmsh")
+    if cache is None or found is None or found.origin is None:
+        return _gmsh_triangles(size, radius)
+    about = Path(found.origin).stat()
+    code = Path(__file__).read_text(encoding="utf-8")
+    made_by = size, radius, found.origin, about.st_size, about.st_mtime_ns, code
+    cache.mkdir(parents=True, exist_ok=True)
+    kept = cache / f"mesh-{sha256(repr(made_by).encode()).hexdigest()[:24]}.npz"
+    try:
+        with np.load(kept, allow_pickle=False) as archive:
+            return archive["points"], archive["triangles"], archive["inside"]
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile):
+        points, triangles, inside = _gmsh_triangles(size, radius)
+    partial = kept.with_suffix(f".{os.getpid()}.npz")
+    np.savez(partial, points=points, triangles=triangles, inside=inside)
+    partial.replace(kept)
+    return points, triangles, inside
+
+
+def _gmsh_triangles(size: float, radius: float) -> Triangles:
     """Vertices (n, 2), triangles (m, 3) and the particle's triangles (m,), by Gmsh."""
     import gmsh  # here as below: loading it takes a tenth of a second
 

@@ -16,7 +16,6 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 with uninterrupted():
     import basix
-    import basix.ufl
 
 NODES = 15
 PRISM = basix.CellType.prism
@@ -46,13 +45,13 @@ def _points_by_entity() -> list[list[Array]]:
 
 
 @cache
-def wedge() -> basix.ufl._ElementBase:
-    """The scalar element; block it to 2 components for displacements and to 3 for the geometry."""
+def wedge() -> basix.finite_element.FiniteElement:
+    """The scalar element."""
     points = _points_by_entity()
     evaluations = [
         [np.eye(len(p)).reshape(len(p), 1, len(p), 1) for p in entity] for entity in points
     ]
-    return basix.ufl.custom_element(
+    return basix.create_custom_element(
         PRISM,
         [],
         _coefficients(),
@@ -64,12 +63,8 @@ def wedge() -> basix.ufl._ElementBase:
         False,
         1,
         2,
+        basix.PolysetType.standard,
     )
-
-
-def vector_wedge(components: int) -> basix.ufl._ElementBase:
-    """The element blocked to `components` values."""
-    return basix.ufl.blocked_element(wedge(), shape=(components,))
 
 
 def slab_rule(*, planar_degree: int = 4, layer_points: int = 3) -> tuple[Array, Array]:

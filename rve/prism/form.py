@@ -1,107 +1,75 @@
-"""DOLFINx behind the product-space cell: mesh of wedges, stiffness of each phase (eq. 7).
+"""Stiffness of each phase on wedges (eq. 7).
 
-The form has no derivative along θ: div and D act on x alone, while the mesh is three-dimensional.
+The form has no derivative along θ: div and D act on x alone. So a wedge is integrated slice by
+slice, at the Gauss points along θ; a slice is a triangle of six nodes, whose integral FFCx makes. A
+loop in C carries slices to wedges and adds them up.
 """
 
 from __future__ import annotations
 
+import ctypes
+import hashlib
+import os
+import platform
+import sys
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
 from time import perf_counter
+from types import ModuleType
 from typing import Any
 
-from alphacut.rve.interruption import uninterrupted
-from alphacut.rve.petsc import PETSc
-
-with uninterrupted():
-    import basix.ufl
-    import dolfinx
-    from dolfinx import fem
-    from dolfinx.fem import petsc
-
 import numpy as np
-import ufl
-from mpi4py import MPI
+from numpy.typing import NDArray
 
 from alphacut.rve.cell import Phase
+from alphacut.rve.interruption import uninterrupted
+from alphacut.rve.mesh import wedge
 from alphacut.rve.mesh.prism_grid import PrismGrid
-from alphacut.rve.mesh.triangulation import Integers
-from alphacut.rve.mesh.wedge import slab_rule, tabulate, vector_wedge
+from alphacut.rve.petsc import PETSc, block_values
+from alphacut.rve.solver.c_loops import c_loops, kernels
+from alphacut.rve.solver.constraints import WEDGES
 from alphacut.stochastic import RadiusMap, ThetaLaw
 from alphacut.stochastic.theta.law import Array
 
+_CORNERS = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])  # in Basix's order
 # twice as fast as the default -O2, equal to round-off
 JIT = {"cffi_extra_compile_args": ["-O3", "-ffast-math"], "timeout": 120}  # for other processes
 
 
 @dataclass
 class PrismForm:
-    """Wedge mesh and stiffness forms of one grid; positions and phases are set anew for every map.
+    """Integrals over the wedges of one grid; positions and phases are set anew for every map.
 
-    On several ranks each has a mesh of its own wedges; matrices and vectors add up what they give.
+    On several ranks each has its own wedges; matrices and vectors add up what they give.
 
     Args:
         grid: Topology.
+        pairs: Unknown pair of each node of the wedges, −1 where fixed, shape (wedges, 15).
+        works: Unknowns of the levels around them.
+        places: Where their blocks stand in matrices, shape (wedges, 15, 15); None on many ranks.
     """
 
     grid: PrismGrid
+    pairs: NDArray[np.int32]
+    works: range
+    places: NDArray[np.int32] | None
 
     def __post_init__(self) -> None:
-        self.mesh = dolfinx.mesh.create_mesh(
-            MPI.COMM_SELF,
-            cells=self.grid.cells,
-            x=np.zeros((self.grid.nodes, 3)),
-            e=vector_wedge(3),
-        )
-        self.points, self.weights = slab_rule()
-        self.shapes = tabulate(self.points)
+        self.points, self.weights = wedge.slab_rule()
+        self.shapes = wedge.tabulate(self.points)
         started = perf_counter()
-        self.space = fem.functionspace(self.mesh, vector_wedge(2))
-        self._compile()
+        self._integral = planar_integral()
         self.jit_seconds = perf_counter() - started
-
-    def _compile(self) -> None:
-        u, v = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
-        self._load = fem.Constant(self.mesh, np.zeros(3))
-        self._stiffness = [fem.Constant(self.mesh, np.zeros(3)) for _ in range(2)]
-        self._share, self._density = self._point_function(), self._point_function()
-        weight = self._density  # f_Θ of eq. 1
-        shares = (1.0, 1.0) if self.grid.conforming else (1 - self._share, self._share)
-        measure = self._measure()
-        phases = zip(self._stiffness, shares, strict=True)
-        parts = [(c, weight * part, measure(k)) for k, (c, part) in enumerate(phases)]
-        # eq. 7: the Galerkin projection (eq. 4) of −div σ (eq. 2, eq. 5) on wedges (eq. 3)
-        self._forms = [
-            self._jit(w * ufl.inner(_stress(c, _strain(u)), _strain(v)) * dx) for c, w, dx in parts
-        ]
-        self._loads = [
-            self._jit(-w * ufl.inner(_stress(c, self._load), _strain(v)) * dx) for c, w, dx in parts
-        ]
-
-    @staticmethod
-    def _jit(form: ufl.Form) -> fem.Form:
-        # UFL signs a form by the printed quadrature points; they print in full
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", message="Applying str")
-            return fem.form(form, jit_options=JIT)
-
-    def _point_function(self) -> fem.Function:
-        """Function of one value at every quadrature point."""
-        element = basix.ufl.quadrature_element("prism", points=self.points, weights=self.weights)
-        return fem.Function(fem.functionspace(self.mesh, element))
-
-    def _measure(self) -> Any:
-        """Volume measure; part 0 the matrix and part 1 the particle on a conforming mesh."""
-        rule = {
-            "quadrature_rule": "custom",
-            "quadrature_points": self.points,
-            "quadrature_weights": self.weights,
-        }
-        inside = self.grid.inside[self.mesh.topology.original_cell_index]
-        everywhere = np.ones_like(inside)
-        parts = (~inside, inside) if self.grid.conforming else (everywhere, everywhere)
-        data = [(k, np.flatnonzero(part).astype(np.int32)) for k, part in enumerate(parts)]
-        return ufl.Measure("dx", domain=self.mesh, metadata=rule, subdomain_data=data)
+        slices = self.points.reshape(3, -1, 3)[:, 0, 2]
+        corners = [np.column_stack([_CORNERS, np.full(6, place)]) for place in slices]
+        self._traces = np.array([wedge.tabulate(points) for points in corners])
+        self._traces[abs(self._traces) < 1e-14] = 0.0
+        self._heights = 2 * self.weights.reshape(3, -1).sum(axis=1)
+        self._near = np.maximum(self.pairs - self.works.start // 2, -1).astype(np.int32)
+        self._forces: dict[int, Array] = {}
 
     def place(self, radius: RadiusMap) -> Array:
         """Move the nodes to the cone of `radius`; returns their positions, shape (nodes, 3).
@@ -110,12 +78,12 @@ class PrismForm:
             ValueError: The density of θ is not positive at a quadrature point.
         """
         positions = self.grid.positions(radius)
-        self.mesh.geometry.x[:] = positions[self.mesh.geometry.input_global_indices]
+        self._nodes = positions[self.grid.cells]
         self._weigh(radius.distribution)
         return positions
 
     def _weigh(self, law: ThetaLaw) -> None:
-        """Set the density of θ at the quadrature points."""
+        """Set the density of θ at the quadrature points, f_Θ of eq. 1."""
         levels = self.grid.levels(law)
         theta = levels[:-1, None] + np.diff(levels)[:, None] * self.points[:, 2]
         density = law.pdf(theta)
@@ -126,48 +94,107 @@ class PrismForm:
                 " product space needs probability: shorten the support, or take the series or a"
                 " table"
             )
-        wedge = self.grid.own.start + self.mesh.topology.original_cell_index
-        self._density.x.array[:] = density[wedge // len(self.grid.plane.triangles)].ravel()
+        self._density = density[np.array(self.grid.own) // len(self.grid.plane.triangles)]
 
     def mark(self, share: Array) -> None:
         """Set the particle's share at the quadrature points, shape (cells, points)."""
-        self._share.x.array[:] = share[self.mesh.topology.original_cell_index].ravel()
-
-    def node_of_dof(self) -> Integers:
-        """Grid node of every node of the function space."""
-        nodes = np.empty(self.space.dofmap.index_map.size_local, np.int64)
-        nodes[self.space.dofmap.list] = self.mesh.geometry.input_global_indices[
-            self.mesh.geometry.dofmap
-        ]
-        return nodes
+        self._share = share
 
     def set_poisson(self, phases: tuple[Phase, Phase]) -> None:
         """Take the phases' Poisson's ratios; Young's moduli stay 1."""
-        for phase, constants in zip(phases, self._stiffness, strict=True):
-            unit = Phase(1.0, phase.poisson).stiffness
-            constants.value[:] = unit[0, 0], unit[0, 1], unit[2, 2]
+        units = [Phase(1.0, phase.poisson).stiffness for phase in phases]
+        self._constants = [np.array([c[0, 0], c[0, 1], c[2, 2]]) for c in units]
 
     def add_stiffness(self, phase: int, matrix: PETSc.Mat) -> None:
-        """Add K_m (phase 0) or K_i (phase 1) of eq. 7 for a unit modulus."""
-        petsc.assemble_matrix(matrix, self._forms[phase])
+        """Add K_m (phase 0) or K_i (phase 1) of eq. 7 for a unit modulus, and keep its loads."""
+        own, weights = np.arange(len(self.pairs), dtype=np.int32), self._density
+        if self.grid.conforming:
+            own = own[self.grid.inside == bool(phase)]
+            weights = weights[own]
+        else:
+            weights = weights * (self._share if phase else 1 - self._share)
+        forces = self._forces[phase] = np.zeros((len(self.works), 3))
+        alone, elements = self.places is not None, np.empty((len(own), 30, 30))
+        places = None if self.places is None else self.places.ctypes
+        c_loops(WEDGES).add_wedges(
+            self._integral, self._traces.ctypes, self._heights.ctypes, len(own), own.ctypes,
+            weights.ctypes, self._nodes.ctypes, self._constants[phase].ctypes, self._near.ctypes,
+            places, block_values(matrix) if alone else elements.ctypes, forces.ctypes,
+        )  # fmt: skip
+        rows = self.pairs[own[: 0 if alone else None]].astype(PETSc.IntType)
+        for pairs, values in zip(rows, elements, strict=not alone):
+            matrix.setValuesBlocked(pairs, pairs, values, addv=PETSc.InsertMode.ADD_VALUES)
 
     def load(self, phase: int, strain: Array) -> Array:
-        """Nodal forces −⟨Bᵀ E ε̄⟩ of one phase for a unit modulus, shape (nodes · 2,).
+        """Forces −⟨Bᵀ E ε̄⟩ of one phase for a unit modulus, on the unknowns of the wedges' levels.
+
+        They are what its stiffness, which is added before, makes of the displacements ε̄x.
 
         Args:
             phase: 0 the matrix, 1 the particle.
             strain: Macroscopic strain (ε11, ε22, 2 ε12).
         """
-        self._load.value[:] = strain
-        return np.array(fem.assemble_vector(self._loads[phase]).array)
+        return np.asarray(self._forces[phase] @ strain)
+
+
+def planar_integral() -> Callable[..., None]:
+    """FFCx's integral over a triangle of a slice, made once for all runs."""
+    names = ("fenics-dolfinx", "fenics-ffcx", "fenics-ufl", "fenics-basix")
+    sources = [Path(str(file)).read_text(encoding="utf-8") for file in (__file__, wedge.__file__)]
+    parts = [*sources, *map(version, names), platform.machine(), str(sys.implementation.cache_tag)]
+    note = kernels() / f"form-{hashlib.sha256(repr(parts).encode()).hexdigest()[:16]}"
+    try:
+        path, name = note.read_text(encoding="utf-8").split("\n")
+        found: Callable[..., None] = getattr(ctypes.CDLL(path), name)
+        return found
+    except (OSError, ValueError, AttributeError):
+        made = Path(str(_compiled().__file__))
+    source = made.with_name(made.name.partition(".")[0] + ".c").read_text(encoding="utf-8")
+    name = source.partition("void tabulate_tensor_")[2].partition("(")[0]
+    partial = note.with_suffix(f".{os.getpid()}")
+    partial.write_text(f"{made}\ntabulate_tensor_{name}", encoding="utf-8")
+    partial.replace(note)
+    return planar_integral()
+
+
+def _compiled() -> ModuleType:
+    """The form of eq. 7, compiled by FFCx or taken from its cache."""
+    with uninterrupted(), warnings.catch_warnings():
+        import basix.ufl
+        import ufl
+        from dolfinx import jit
+        from mpi4py import MPI
+
+        # UFL signs a form by the printed quadrature points; they print in full
+        warnings.filterwarnings("ignore", message="Applying str")
+        points, weights = basix.make_quadrature(basix.CellType.triangle, 4)  # as `slab_rule`
+        quadratic = basix.ufl.element("P", "triangle", 2, shape=(2,))
+        mesh = ufl.Mesh(quadratic)
+        space = ufl.FunctionSpace(mesh, quadratic)
+        u, v, c = ufl.TrialFunction(space), ufl.TestFunction(space), ufl.Constant(mesh, shape=(3,))
+        at_points = basix.ufl.quadrature_element("triangle", points=points, weights=weights)
+        weight = ufl.Coefficient(ufl.FunctionSpace(mesh, at_points))  # f_Θ of eq. 1
+        rule = {
+            "quadrature_rule": "custom",
+            "quadrature_points": points,
+            "quadrature_weights": weights,
+        }
+        # eq. 7: the Galerkin projection (eq. 4) of −div σ (eq. 2, eq. 5) on wedges (eq. 3)
+        form = weight * ufl.inner(_stress(c, _strain(u)), _strain(v)) * ufl.dx(mesh, metadata=rule)
+        module: ModuleType = jit.ffcx_jit(MPI.COMM_SELF, form, jit_options=JIT)[1]
+        return module
 
 
 def _strain(w: Any) -> Any:
     """In-plane strain (ε11, ε22, 2 ε12) on the product space; θ is not differentiated."""
+    import ufl
+
     gradient = ufl.grad(w)
     return ufl.as_vector([gradient[0, 0], gradient[1, 1], gradient[0, 1] + gradient[1, 0]])
 
 
 def _stress(c: Any, e: Any) -> Any:
     """In-plane stress of the strain `e` from the three constants C11, C12, C33."""
+    import ufl
+
     return ufl.as_vector([c[0] * e[0] + c[1] * e[1], c[1] * e[0] + c[0] * e[1], c[2] * e[2]])

@@ -28,10 +28,9 @@ from alphacut.rve.certificate import (
 )
 from alphacut.rve.mesh.periodicity import mismatch
 from alphacut.rve.mesh.prism_grid import PrismGrid
-from alphacut.rve.mesh.triangulation import Triangulation, reference_radius, triangulate
+from alphacut.rve.mesh.triangulation import reference_radius, triangulate
 from alphacut.rve.petsc import clean
 from alphacut.rve.prism.error_estimate import judged, moduli_of
-from alphacut.rve.prism.head_start import HeadStart
 from alphacut.rve.prism.mixed_element import NEARLY_INCOMPRESSIBLE
 from alphacut.rve.prism.modulus_basis import BasisError, ModulusBasis
 from alphacut.rve.prism.system import PrismSystem, SliceMeans
@@ -66,9 +65,8 @@ class PrismModel:
             seconds, and a companion of a coarser mesh besides.
         moduli: Least and greatest modulus of the particle, in Pa, between which every sample of a
             map is projected on a few solutions; None: each is solved.
-        cache: Folder where the tables that errors are measured against are kept; None keeps them
-            in the process.
-        ahead: Second process that has begun this one cell; None for all work in this one.
+        cache: Folder where meshes and the tables that errors are measured against are kept; None
+            keeps them in the process.
 
     Raises:
         ValueError: An option out of range or unknown.
@@ -84,7 +82,6 @@ class PrismModel:
     estimate: bool = False
     moduli: tuple[float, float] | None = None
     cache: Path | None = None
-    ahead: HeadStart | None = field(default=None, compare=False, repr=False)
     name: ClassVar[str] = "prism"
 
     def __post_init__(self) -> None:
@@ -143,9 +140,7 @@ class PrismModel:
         """The results with their declared errors, whose cost is booked as `estimate`."""
         watch = Stopwatch()
         with watch("estimate"):
-            layers = self.ahead.errors() if self.ahead else None
-            if layers is None:
-                layers = self.errors_of_layers(radius_map, matrix, inclusions)
+            layers = self.errors_of_layers(radius_map, matrix, inclusions)
             found = [
                 judged(
                     result,
@@ -171,7 +166,7 @@ class PrismModel:
 
         Half as many layers, on a mesh twice as coarse, show them.
         """
-        coarse = replace(self, estimate=False, mesh_size=min(1.0, 2 * self.mesh_size), ahead=None)
+        coarse = replace(self, estimate=False, mesh_size=min(1.0, 2 * self.mesh_size))
         thick = replace(coarse, layers=max(1, self.layers // 2))
         try:
             pairs = [one.solve(radius_map, matrix, inclusions) for one in (coarse, thick)]
@@ -186,8 +181,7 @@ class PrismModel:
     def _moved(self, radius_map: RadiusMap, watch: Stopwatch) -> PrismSystem:
         with watch("mesh"):
             radius = reference_radius(radius_map) if self.interface == "conforming" else 0.0
-            plane = self.ahead.mesh() if self.ahead else None
-            system = _system(self.mesh_size, self.layers, radius, self.parallel, plane)
+            system = _system(self.mesh_size, self.layers, radius, self.parallel, self.cache)
             system.move(radius_map)
         watch.shift("mesh", "jit", system.take_jit_seconds())
         return system
@@ -311,9 +305,9 @@ def certify(means: SliceMeans, phases: tuple[Phase, Phase], loads: Array) -> dic
 
 @lru_cache(maxsize=4)
 def _system(
-    mesh_size: float, layers: int, radius: float, parallel: bool, plane: Triangulation | None = None
+    mesh_size: float, layers: int, radius: float, parallel: bool, cache: Path | None = None
 ) -> PrismSystem:
     """Topology, forms and numbering: they do not depend on the map, only on these numbers."""
-    plane = plane or triangulate(size=mesh_size, radius=radius)
+    plane = triangulate(size=mesh_size, radius=radius, cache=cache)
     communicator = MPI.COMM_WORLD if parallel else MPI.COMM_SELF
     return PrismSystem(PrismGrid(plane, layers, radius > 0), communicator)

@@ -96,12 +96,11 @@ class PrismSystem:
         first = [wedges * rank // comm.size for rank in range(comm.size + 1)]
         dealt = [range(*pair) for pair in pairwise(first)]
         self.grid = replace(grid, wedges=dealt[comm.rank])
-        self.form = PrismForm(self.grid)
         self.numbering = LevelNumbering(self.grid, identify(grid.plane))
         around = [self.numbering.around(part) for part in dealt]
         self.overlap = Overlap(self.ranks, self.numbering.owned(comm.size), around)
-        self.local_map = self.numbering.local_map(self.form.node_of_dof(), self.ranks)
-        self.pattern = self.numbering.matrix(self.local_map, self.ranks)
+        self.pattern, places = self.numbering.matrix(self.ranks)
+        self.form = PrismForm(self.grid, self.numbering.pairs, self.overlap.works, places)
         self.mixed: MixedSystem | None = None
         self._jit = self.form.jit_seconds
 
@@ -164,19 +163,19 @@ class PrismSystem:
         if self.mixed is not None and phase in self.mixed.phases:
             return self.mixed.stiffness[phase]
         matrix = self.pattern.duplicate(copy=False)
-        matrix.setLGMap(self.local_map, self.local_map)
         self.form.add_stiffness(phase, matrix)
         matrix.assemble()
         return matrix
 
     def load(self, phase: int, strain: Array) -> PETSc.Vec:
-        """Reduced load of one phase for a unit modulus under a strain (ε11, ε22, 2 ε12)."""
+        """Reduced load under a strain (ε11, ε22, 2 ε12) of a phase whose stiffness was made."""
         if self.mixed is not None and phase in self.mixed.phases:
-            vector = self.pattern.createVecLeft()
             load = self.mixed.loads[phase] @ strain
-            vector.array[:] = self.overlap.give(load[:, None], 1)[:, 0]
-            return vector
-        return self.numbering.vector(self.local_map, self.form.load(phase, strain), self.ranks)
+        else:
+            load = self.form.load(phase, strain)
+        vector = self.pattern.createVecLeft()
+        vector.array[:] = self.overlap.give(load[:, None], 1)[:, 0]
+        return vector
 
     def at_nodes(self, values: Array) -> Array:
         """Displacements of this rank's nodes, shape (nodes, 2, k), from its unknowns (size, k)."""

@@ -14,19 +14,25 @@ from tempfile import TemporaryDirectory
 _FLAGS = ("-O3", "-fno-math-errno", "-shared", "-fPIC")
 
 
+def kernels() -> Path:
+    """Folder of compiled code, kept for other runs."""
+    caches = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
+    folder = caches / "alphacut" / "kernels"
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
 @cache
 def c_loops(source: Path) -> ctypes.CDLL:
-    """The functions of a C file; the compiled file is kept for other runs.
+    """The functions of a C file.
 
     Raises:
         RuntimeError: The compiler is missing or fails.
     """
-    folder = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "alphacut" / "kernels"
     key = "\n".join((*_FLAGS, source.read_text(encoding="utf-8"), _processor()))
-    made = folder / f"{source.stem}-{hashlib.sha256(key.encode()).hexdigest()[:16]}.so"
+    made = kernels() / f"{source.stem}-{hashlib.sha256(key.encode()).hexdigest()[:16]}.so"
     if not made.exists():
-        folder.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(dir=folder) as work:  # renamed when whole, for other processes
+        with TemporaryDirectory(dir=made.parent) as work:  # renamed when whole, for others
             _compile(source, Path(work) / made.name).replace(made)
     return ctypes.CDLL(str(made))
 

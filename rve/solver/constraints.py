@@ -1,7 +1,7 @@
 """Elimination of the periodic constraints from the product-space system: K_per = Pᵀ K P.
 
 P only renumbers: every node becomes one unknown pair or none. So it needs no matrix product;
-PETSc's local-to-global map carries it and element matrices are added where they belong.
+element matrices are added where they belong.
 
 Unknowns are numbered level by level: all planar unknowns of level 0, the vertex unknowns half-way
 to level 1, those of level 1, and so on; two displacement components each. On several ranks each
@@ -14,16 +14,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
-import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from alphacut.rve.mesh.periodicity import Periodicity
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import Integers
 from alphacut.rve.petsc import PETSc
 from alphacut.rve.ranks import Ranks
+from alphacut.rve.solver.c_loops import c_loops
 from alphacut.stochastic.theta.truncated_normal import Array
+
+WEDGES = Path(__file__).with_name("wedges.c")
 
 
 @dataclass(frozen=True)
@@ -205,51 +209,31 @@ class LevelNumbering:
         last = span.stop * self.stride + 2 * self.periodicity.count
         return range(span.start * self.stride, last)
 
-    def local_map(self, nodes: Integers, ranks: Ranks) -> PETSc.LGMap:
-        """Reduced unknowns of DOLFINx's nodes; −1 where dropped."""
-        first = self.unknown_of_node[nodes]
-        return PETSc.LGMap().create(
-            np.where(first >= 0, first // 2, -1).astype(PETSc.IntType), bsize=2, comm=ranks.comm
-        )
+    @cached_property
+    def pairs(self) -> NDArray[np.int32]:
+        """Unknown pair of each node of the wedges, −1 on the fixed line, shape (wedges, 15)."""
+        return (self.unknown_of_node[self.grid.cells] // 2).astype(np.int32)
 
-    def couplings(self, rows: range) -> sp.csr_matrix:
-        """Pattern of unknown pairs that share a wedge, by blocks of 2, in rows of unknowns."""
-        pairs = self.unknown_of_node[self.grid.cells] // 2
-        kept = pairs >= 0
-        cell = np.broadcast_to(np.arange(len(pairs))[:, None], pairs.shape)
-        incidence = sp.csr_matrix(
-            (np.ones(kept.sum(), np.int8), (cell[kept], pairs[kept])),
-            shape=(len(pairs), self.size // 2),
-        )
-        own = incidence.T.tocsr()[rows.start // 2 : rows.stop // 2]
-        return (own @ incidence).astype(bool).tocsr()
+    def matrix(self, ranks: Ranks) -> tuple[PETSc.Mat, NDArray[np.int32] | None]:
+        """Zero matrix in 2 × 2 blocks that keeps Pᵀ K P of element matrices.
 
-    def matrix(self, local_map: PETSc.LGMap, ranks: Ranks) -> PETSc.Mat:
-        """Zero matrix in 2 × 2 blocks that keeps Pᵀ K P of element matrices."""
+        On one rank with the places of the wedges' blocks in it, shape (wedges, 15, 15).
+        """
         own = self.owned(ranks.size)[ranks.rank]
         near = self.near(self.shares(ranks.size)[ranks.rank].levels)
-        rows = replace(self, grid=near).couplings(own)
-        rows.sort_indices()
-        csr = (
-            rows.indptr.astype(PETSc.IntType),
-            rows.indices.astype(PETSc.IntType),
-            np.zeros(4 * rows.nnz),
-        )
-        matrix = PETSc.Mat().createBAIJ(
-            ((len(own), self.size),) * 2, bsize=2, csr=csr, comm=ranks.comm
-        )
-        matrix.setLGMap(local_map, local_map)
-        return matrix
-
-    def vector(self, local_map: PETSc.LGMap, values: Array, ranks: Ranks) -> PETSc.Vec:
-        """Pᵀ f from contributions in DOLFINx's numbering, shape (nodes · 2,)."""
-        own = self.owned(ranks.size)[ranks.rank]
-        vector = PETSc.Vec().createMPI((len(own), self.size), bsize=2, comm=ranks.comm)
-        vector.setLGMap(local_map)
-        nodes = np.arange(len(values) // 2, dtype=PETSc.IntType)
-        vector.setValuesBlockedLocal(nodes, values, addv=PETSc.InsertMode.ADD_VALUES)
-        vector.assemble()
-        return vector
+        pairs = replace(self, grid=near).pairs
+        starts = np.empty(len(own) // 2 + 1, np.int32)
+        columns = np.empty(15 * pairs.size, np.int32)
+        places = np.empty((*pairs.shape, 15), np.int32) if ranks.size == 1 else None
+        if c_loops(WEDGES).couple(
+            len(pairs), pairs.ctypes, own.start // 2, own.stop // 2, self.size // 2,
+            starts.ctypes, columns.ctypes, None if places is None else places.ctypes,
+        ):  # fmt: skip
+            raise MemoryError("no memory is left for the matrix")
+        columns = columns[: starts[-1]].astype(PETSc.IntType)
+        csr = starts.astype(PETSc.IntType), columns, np.zeros(4 * len(columns))
+        layout = ((len(own), self.size),) * 2
+        return PETSc.Mat().createBAIJ(layout, bsize=2, csr=csr, comm=ranks.comm), places
 
     def to_nodes(self, values: Array, start: int) -> Array:
         """Displacements of the nodes, zero on the line, shape (nodes, 2, columns).

@@ -29,7 +29,7 @@ print(status, "{last}" in sys.modules)
     [
         ("basix._basixcpp", "prism", "basix.quadrature"),
         ("dolfinx.cpp", "slices", "dolfinx.fem"),
-        ("dolfinx.cpp", "prism", "dolfinx.fem.petsc"),
+        ("petsc4py.lib", "prism", "petsc4py.PETSc"),
         ("petsc4py.lib", "slices", "petsc4py.PETSc"),
     ],
 )

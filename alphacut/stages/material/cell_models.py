@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 
-from alphacut.case.case import Case
 from alphacut.io.problem import BadInput, Problem, missing
 from alphacut.rve.anisotropy import AveragedPlane, averaged
 from alphacut.rve.auto.model import TABLED, AutoModel, RefinedModel
 from alphacut.rve.cell import Phase
-from alphacut.rve.mesh.triangulation import reference_radius, triangulate
-from alphacut.rve.prism.head_start import HeadStart, possible
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres.series.model import SphereSeriesModel
 from alphacut.rve.spheres.table.model import SphereTableModel
 from alphacut.rve.table.model import TableModel
-from alphacut.stages.material.cell import CellChoice, CellModel, modal_parts
+from alphacut.stages.material.cell import CellChoice, CellModel
 from alphacut.stochastic import RadiusMap
-from alphacut.stochastic.theta.truncated_normal import Array
 
 SHARE = 0.4
 """Of the tolerance, for the series at each θ and again for its rule in θ."""
@@ -95,45 +90,6 @@ def cell_model(choice: CellChoice) -> CellModel:
         keys = {"exclude": "--exclude", "accuracy": "modulus.tolerance"}
         key = next((key for word, key in keys.items() if word in str(error)), "mesh")
         raise BadInput(Problem(key, str(error))) from None
-
-
-@contextmanager
-def started(case: Case, choice: CellChoice) -> Iterator[CellModel]:
-    """`cell_model(choice)` for the cell of a case; a second process begins with it where it can.
-
-    It can where the cell is one of prisms to be judged, see also `prism.head_start.possible`.
-
-    Raises:
-        BadInput: As `cell_model`.
-    """
-    ahead = head_start(case, choice)
-    try:
-        model = cell_model(choice)
-        yield model if ahead is None else replace(model, ahead=ahead)  # type: ignore[type-var]
-    finally:
-        if ahead is not None:
-            ahead.stop()
-
-
-def head_start(case: Case, choice: CellChoice) -> HeadStart | None:
-    """The second process, under way; None where there is none."""
-    judged = choice.method == "prism" and choice.estimate and not choice.averages
-    if not judged or (choice.tolerance is not None and not choice.named) or not possible():
-        return None
-    try:
-        radius, matrix, inclusion = modal_parts(case)
-    except ValueError:
-        return None  # which the model refuses in its own words
-    middle = reference_radius(radius) if choice.interface == "conforming" else 0.0
-
-    def errors() -> list[Array]:
-        from alphacut.rve.prism.model import PrismModel
-
-        model = cell_model(choice)
-        assert isinstance(model, PrismModel)
-        return model.errors_of_layers(radius, matrix, [inclusion])
-
-    return HeadStart(lambda: triangulate(size=choice.size, radius=middle), errors)
 
 
 def made(choice: CellChoice) -> CellModel:

@@ -1,0 +1,121 @@
+/* Sums over wedges: which unknowns share one, and the matrix of one phase. Unknowns count in pairs, a
+   pair for each node of a wedge, -1 where it is fixed. */
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { NODES = 15, DOFS = 30, SLICES = 3, CORNERS = 6, PLANAR = 12, LOADS = 3 };
+
+typedef void (*integral)(double *, const double *, const double *, const double *, const int *,
+                         const uint8_t *, void *);
+
+/* Pairs that share a wedge with each of the pairs `low` to `high`: where each row's begin (high - low +
+   1), and their rising numbers. `place`, if not null, takes where the pairs of each wedge then stand,
+   15 x 15 of them. Returns 2 without memory. */
+int couple(int wedges, const int *pairs, int low, int high, int size, int *starts, int *columns, int *place) {
+    int rows = high - low, words = size / 64 + 1, entries = wedges * NODES;
+    int *begin = calloc(rows + 1, sizeof(int)), *fill = calloc(rows + 1, sizeof(int));
+    int *within = malloc((entries + 1) * sizeof(int)), *found = calloc(size + 1, sizeof(int));
+    uint64_t *marked = calloc(words, sizeof(uint64_t));
+    int status = begin && fill && within && found && marked ? 0 : 2;
+    for (int e = 0; e < entries && !status; e++)
+        if (pairs[e] >= low && pairs[e] < high) begin[pairs[e] - low + 1]++;
+    for (int r = 0; r < rows && !status; r++) fill[r] = begin[r + 1] += begin[r];
+    for (int e = entries - 1; e >= 0 && !status; e--)
+        if (pairs[e] >= low && pairs[e] < high) within[--fill[pairs[e] - low]] = e;
+    starts[0] = 0;
+    for (int r = 0; r < rows && !status; r++) {
+        int count = starts[r], least = words, last = -1;
+        for (int k = begin[r]; k < begin[r + 1]; k++)
+            for (int j = 0, *own = (int *)pairs + within[k] / NODES * NODES; j < NODES; j++)
+                if (own[j] >= 0) {
+                    int word = own[j] / 64;
+                    marked[word] |= (uint64_t)1 << own[j] % 64;
+                    if (word < least) least = word;
+                    if (word > last) last = word;
+                }
+        for (int word = least; word <= last; word++)
+            for (; marked[word]; marked[word] &= marked[word] - 1) {
+                int column = 64 * word + __builtin_ctzll(marked[word]);
+                found[column] = count, columns[count++] = column;
+            }
+        starts[r + 1] = count;
+        for (int k = begin[r]; k < begin[r + 1] && place; k++)
+            for (int j = 0, *own = (int *)pairs + within[k] / NODES * NODES; j < NODES; j++)
+                place[(size_t)within[k] * NODES + j] = own[j] >= 0 ? found[own[j]] : -1;
+    }
+    free(begin), free(fill), free(within), free(found), free(marked);
+    return status;
+}
+
+/* Displacements of a wedge's nodes, the first at rest, under unit strains e11, e22 and 2 e12. */
+static void move(const double *nodes, double (*affine)[LOADS]) {
+    for (int j = 0; j < NODES; j++) {
+        double x = nodes[3 * j] - nodes[0], y = nodes[3 * j + 1] - nodes[1];
+        double u[LOADS] = {x, 0, y / 2}, v[LOADS] = {0, y, x / 2};
+        memcpy(affine[2 * j], u, sizeof u), memcpy(affine[2 * j + 1], v, sizeof v);
+    }
+}
+
+/* Add to the matrix of a wedge those of its slices of constant theta: triangles of six nodes whose
+   displacements follow from the wedge's by `traces`. The third coordinate of nodes is theta. */
+static void slice(integral integrate, const double *weights, const double *nodes, const double *constants,
+                  const double (*traces)[CORNERS][NODES], const double *heights, double (*matrix)[DOFS]) {
+    double height = nodes[3 * 3 + 2] - nodes[2];
+    for (int s = 0; s < SLICES; s++, weights += CORNERS) {
+        double corners[CORNERS][3] = {{0}}, planar[PLANAR][PLANAR] = {{0}}, half[PLANAR][DOFS] = {{0}};
+        for (int a = 0; a < CORNERS; a++)
+            for (int j = 0; j < NODES; j++)
+                for (int d = 0; d < 2; d++) corners[a][d] += traces[s][a][j] * nodes[3 * j + d];
+        integrate(planar[0], weights, constants, corners[0], NULL, NULL, NULL);
+        for (int r = 0; r < PLANAR; r++)
+            for (int b = 0; b < CORNERS; b++)
+                for (int j = 0; j < NODES; j++) {
+                    half[r][2 * j] += planar[r][2 * b] * traces[s][b][j];
+                    half[r][2 * j + 1] += planar[r][2 * b + 1] * traces[s][b][j];
+                }
+        for (int a = 0; a < CORNERS; a++)
+            for (int i = 0; i < NODES; i++) {
+                double factor = heights[s] * height * traces[s][a][i];
+                for (int j = 0; j < DOFS && factor != 0; j++) {
+                    matrix[2 * i][j] += factor * half[2 * a][j];
+                    matrix[2 * i + 1][j] += factor * half[2 * a + 1][j];
+                }
+            }
+    }
+}
+
+/* Add the matrices of some wedges, and take from `forces` (pairs x 2 x 3) what they do to unit strains.
+
+   integrate: over a triangle at one theta; weights: at its 6 points in 3 slices, for each of the wedges.
+   some: numbers of the wedges; nodes, pairs, place: of all wedges, 15 x 3, 15 and 15 x 15.
+   traces, heights: of the slices, 3 x 6 x 15 and 3.
+   values: of blocks of 2 x 2, column by column; where `place` is null, 30 x 30 for each of the wedges. */
+void add_wedges(integral integrate, const double (*traces)[CORNERS][NODES], const double *heights, int count,
+                const int *some, const double *weights, const double *nodes, const double *constants,
+                const int *pairs, const int *place, double *values, double *forces) {
+    double matrix[DOFS][DOFS], affine[DOFS][LOADS];
+    for (int k = 0; k < count; k++) {
+        const double *corners = nodes + (size_t)some[k] * NODES * 3;
+        const int *own = pairs + (size_t)some[k] * NODES;
+        memset(matrix, 0, sizeof matrix);
+        slice(integrate, weights + (size_t)k * SLICES * CORNERS, corners, constants, traces, heights, matrix);
+        if (!place) memcpy(values + (size_t)k * DOFS * DOFS, matrix, sizeof matrix);
+        const int *at = place ? place + (size_t)some[k] * NODES * NODES : NULL;
+        for (int i = 0; i < NODES && place; i++)
+            for (int j = 0; j < NODES; j++, at++) {
+                if (own[i] < 0 || own[j] < 0) continue;
+                double *block = values + 4 * (size_t)*at;
+                block[0] += matrix[2 * i][2 * j], block[1] += matrix[2 * i + 1][2 * j];
+                block[2] += matrix[2 * i][2 * j + 1], block[3] += matrix[2 * i + 1][2 * j + 1];
+            }
+        move(corners, affine);
+        for (int i = 0; i < DOFS; i++) {
+            if (own[i / 2] < 0) continue;
+            double sum[LOADS] = {0};
+            for (int j = 0; j < DOFS; j++)
+                for (int l = 0; l < LOADS; l++) sum[l] += matrix[i][j] * affine[j][l];
+            for (int l = 0; l < LOADS; l++) forces[(2 * own[i / 2] + i % 2) * LOADS + l] -= sum[l];
+        }
+    }
+}

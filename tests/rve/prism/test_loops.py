@@ -1,0 +1,198 @@
+"""Compiled loops beside DOLFINx and NumPy, and what is kept between runs."""
+
+import json
+import subprocess
+import sys
+from dataclasses import fields
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+pytest.importorskip("dolfinx")
+
+from alphacut.entry import main
+from alphacut.rve import Phase
+from alphacut.rve.mesh import triangulation, wedge
+from alphacut.rve.mesh.prism_grid import PrismGrid
+from alphacut.rve.mesh.triangulation import triangulate
+from alphacut.rve.prism import form
+from alphacut.rve.prism.system import PrismSystem
+from alphacut.rve.solver import c_loops
+from alphacut.rve.solver.level_cholesky import LevelCholesky
+from alphacut.rve.solver.level_stiffness import LevelPattern
+from alphacut.stochastic import HermiteMap, TruncatedNormal
+
+MAP = HermiteMap(0.4, 0.1, 0.5, 0.2, TruncatedNormal())
+PHASES = Phase(20e9, 0.3), Phase(80e9, 0.2)
+CASE = "cases/paper.toml"
+
+
+def by_dolfinx(system, poisson, share, strain):
+    """Reduced stiffness and load of one phase, made by DOLFINx on a mesh of whole wedges."""
+    import basix.ufl
+    import dolfinx
+    import ufl
+    from dolfinx import fem
+    from mpi4py import MPI
+
+    grid = system.grid
+    points = wedge._points_by_entity()
+    ones = [[np.eye(len(p)).reshape(len(p), 1, len(p), 1) for p in part] for part in points]
+    kinds = 0, basix.MapType.identity, basix.SobolevSpace.H1, False, 1, 2
+    scalar = basix.ufl.custom_element(wedge.PRISM, [], wedge._coefficients(), points, ones, *kinds)
+    of = {n: basix.ufl.blocked_element(scalar, shape=(n,)) for n in (2, 3)}
+    mesh = dolfinx.mesh.create_mesh(MPI.COMM_SELF, cells=grid.cells, x=system.positions, e=of[3])
+    space = fem.functionspace(mesh, of[2])
+    at, weights = wedge.slab_rule()
+    rule = {
+        "quadrature_rule": "custom",
+        "quadrature_points": at,
+        "quadrature_weights": weights,
+    }
+    element = basix.ufl.quadrature_element("prism", points=at, weights=weights)
+    weight = fem.Function(fem.functionspace(mesh, element))
+    own = mesh.topology.original_cell_index
+    weight.x.array[:] = (share * system.form._density)[own].ravel()
+    u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
+    c = Phase(1.0, poisson).stiffness
+    moduli = ufl.as_matrix(c.tolist())
+
+    def strain_of(w):
+        slope = ufl.grad(w)
+        return ufl.as_vector([slope[0, 0], slope[1, 1], slope[0, 1] + slope[1, 0]])
+
+    dx = ufl.dx(mesh, metadata=rule)
+    stiff = fem.form(weight * ufl.inner(moduli * strain_of(u), strain_of(v)) * dx)
+    given = ufl.as_vector([float(e) for e in strain])
+    force = fem.form(-weight * ufl.inner(moduli * given, strain_of(v)) * dx)
+    nodes = np.empty(space.dofmap.index_map.size_local, np.int64)
+    nodes[space.dofmap.list] = mesh.geometry.input_global_indices[mesh.geometry.dofmap]
+    first = system.numbering.unknown_of_node[nodes]
+    unknowns = np.where(first[:, None] >= 0, first[:, None] + np.arange(2), -1).ravel()
+    kept = unknowns >= 0
+    carry = np.zeros((len(unknowns), system.numbering.size))
+    carry[np.flatnonzero(kept), unknowns[kept]] = 1
+    matrix = fem.assemble_matrix(stiff).to_dense()
+    return carry.T @ matrix @ carry, carry.T @ fem.assemble_vector(force).array
+
+
+@pytest.mark.parametrize("radius", [0.5, 0.0])
+def test_stiffness_and_loads_are_those_of_dolfinx(radius):
+    grid = PrismGrid(triangulate(size=0.7, radius=radius), 2, radius > 0)
+    system = PrismSystem(grid, pytest.importorskip("mpi4py.MPI").COMM_SELF)
+    system.move(MAP)
+    system.set_poisson(PHASES)
+    strain = np.array([0.3, -0.2, 0.7])
+    for phase in (0, 1):
+        share = system.share if phase else 1 - system.share
+        matrix, load = by_dolfinx(system, PHASES[phase].poisson, share, strain)
+        found = system.stiffness(phase)
+        dense = found.convert("dense").getDenseArray()
+        assert abs(dense - matrix).max() < 1e-13 * abs(matrix).max()
+        assert abs(system.load(phase, strain).array - load).max() < 1e-13 * abs(load).max()
+
+
+def spread_matrices(count):
+    """Positive definite matrices of a strip of triangles: their pattern, their entries, dense."""
+    random = np.random.default_rng(7)
+    corners = np.array([[k, k + 1, k + 2, (5 * k) % 23 - 1] for k in range(20)])
+    pattern = LevelPattern(corners)
+    halves = random.standard_normal((count, len(corners), 4, 4))
+    elements = halves @ halves.swapaxes(-1, -2) + 0.1 * np.eye(4)
+    values = [pattern.values(one) for one in elements]
+    dense = np.zeros((count, pattern.size, pattern.size))
+    row, column = pattern.rows_columns
+    dense[:, row, column] = dense[:, column, row] = values
+    return pattern, values, dense
+
+
+@pytest.mark.parametrize(("count", "columns"), [(1, 1), (3, 2), (8, 3), (13, 4), (17, 7), (2, 0)])
+def test_factors_are_those_of_numpy(count, columns):
+    pattern, values, dense = spread_matrices(count)
+    factors = LevelCholesky(pattern, iter(values))
+    vectors = np.random.default_rng(8).standard_normal((count, pattern.size, columns))
+    forward, backward = factors.forward(vectors), factors.backward(vectors)
+    order = factors._order
+    assert sorted(order) == list(range(pattern.size))
+    for k, matrix in enumerate(dense):
+        lower = np.linalg.cholesky(matrix[np.ix_(order, order)])
+        first = scipy.linalg.solve_triangular(lower, vectors[k][order], lower=True)
+        second = np.empty_like(vectors[k])
+        second[order] = scipy.linalg.solve_triangular(lower.T, vectors[k])
+        assert forward[k] == pytest.approx(first, rel=1e-12, abs=1e-12)
+        assert backward[k] == pytest.approx(second, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("bad", [-1e9, np.nan])
+def test_one_matrix_that_is_not_positive_definite_is_refused(bad):
+    pattern, values, _ = spread_matrices(10)
+    values[9][0] = bad
+    with pytest.raises(RuntimeError, match="not positive definite"):
+        LevelCholesky(pattern, iter(values))
+
+
+def same(one, other):
+    """Whether two meshes are alike to the last bit."""
+    return all(
+        np.array_equal(getattr(one, part.name), getattr(other, part.name)) for part in fields(one)
+    )
+
+
+def test_a_mesh_is_kept_to_the_last_bit(tmp_path, monkeypatch):
+    asked, gmsh = [], triangulation._gmsh_triangles
+
+    def counted(*what):
+        asked.append(what)
+        return gmsh(*what)
+
+    monkeypatch.setattr(triangulation, "_gmsh_triangles", counted)
+    meshes = [triangulate(size=0.5, radius=0.4, cache=tmp_path / "new") for _ in range(2)]
+    assert same(*meshes)
+    assert same(meshes[0], triangulate(size=0.5, radius=0.4))
+    assert len(asked) == 2
+    assert not same(meshes[0], triangulate(size=0.5, radius=0.45, cache=tmp_path / "new"))
+    assert not same(meshes[0], triangulate(size=0.6, radius=0.4, cache=tmp_path / "new"))
+    kept = list((tmp_path / "new").iterdir())
+    assert len(kept) == 3
+    for file in kept:
+        file.write_bytes(file.read_bytes()[:100])
+    assert same(meshes[0], triangulate(size=0.5, radius=0.4, cache=tmp_path / "new"))
+    assert len(asked) == 5
+
+
+def test_the_integral_is_found_again_without_ufl_and_made_where_it_is_gone(tmp_path, monkeypatch):
+    monkeypatch.setattr(form, "kernels", lambda: tmp_path)
+    made, compiled = [], form._compiled
+    monkeypatch.setattr(form, "_compiled", lambda: made.append(1) or compiled())
+    form.planar_integral()
+    form.planar_integral()
+    assert len(made) == 1
+    (note,) = tmp_path.iterdir()
+    note.write_text(str(tmp_path / "nowhere.so") + "\ntabulate", encoding="utf-8")
+    form.planar_integral()
+    assert len(made) == 2
+
+
+def test_loops_are_compiled_once_and_need_a_compiler(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    source = tmp_path / "three.c"
+    source.write_text("int three(void) { return 3; }\n", encoding="utf-8")
+    assert c_loops.c_loops.__wrapped__(source).three() == 3
+    monkeypatch.setenv("CC", "no-such-compiler")
+    assert c_loops.c_loops.__wrapped__(source).three() == 3
+    source.write_text("int three(void) { return 4; }\n", encoding="utf-8")
+    with pytest.raises(RuntimeError, match=r"three.c needs a C compiler, as DOLFINx does"):
+        c_loops.c_loops.__wrapped__(source)
+
+
+def test_the_program_gives_what_the_process_gives(capfd):
+    words = ["solve", CASE, "--mesh-size", "0.5", "--layers", "2", "--json", "-"]
+    assert main(words, program="test", names={"solve": "cell"}) == 0
+    here = json.loads(capfd.readouterr().out)
+    run = subprocess.run(
+        [sys.executable, "-m", "rve", *words], capture_output=True, text=True, check=True
+    )
+    there = json.loads(run.stdout)
+    assert here.pop("seconds") != there.pop("seconds")
+    assert here == there
