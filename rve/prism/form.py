@@ -29,8 +29,7 @@ from alphacut.rve.interruption import uninterrupted
 from alphacut.rve.mesh import wedge
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.petsc import PETSc, block_values
-from alphacut.rve.solver.c_loops import c_loops, kernels
-from alphacut.rve.solver.constraints import WEDGES
+from alphacut.rve.solver.c_loops import WEDGES, c_loops, kernels
 from alphacut.stochastic import RadiusMap, ThetaLaw
 from alphacut.stochastic.theta.law import Array
 

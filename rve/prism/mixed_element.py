@@ -98,7 +98,7 @@ def _rule() -> tuple[Array, Array, Array]:
     x, y = points.T
     z = 1 - x - y
     bubble = 27 * np.stack([y * (z - x), x * (z - y)], axis=-1)
-    return points, weights, np.concatenate([gradients(points, 6), bubble[:, :, None]], axis=-1)
+    return points, weights, np.concatenate([gradients(points), bubble[:, :, None]], axis=-1)
 
 
 def _deviator(strain: Array) -> Array:

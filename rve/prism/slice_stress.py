@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import Integers
-from alphacut.rve.mesh.wedge import NODES, tabulate
+from alphacut.rve.mesh.wedge import tabulate
+from alphacut.rve.solver.c_loops import WEDGES, c_loops
 from alphacut.stochastic.theta.truncated_normal import Array
 
 CELL_AREA = 4.0
@@ -106,32 +107,22 @@ class SliceStress:
         Returns:
             (ε11, ε22, 2 ε12) for each load, shape (m, q, 3, loads), and determinants, shape (m, q).
         """
-        table = _planar_derivatives(points)
-        a, b, c, d = self._jacobian(cells, table)
-        determinant = a * d - b * c
-        inverse = (
-            np.stack([d, -b, -c, a], axis=-1).reshape(*a.shape, 2, 2) / determinant[..., None, None]
-        )
-        values = displacement[cells].reshape(len(cells), 1, NODES, -1)
-        # (m, q, ∂, component, load)
-        gradient = (inverse @ table @ values).reshape(*a.shape, 2, 2, -1)
-        shear = gradient[..., 0, 1, :] + gradient[..., 1, 0, :]
-        return (
-            np.stack([gradient[..., 0, 0, :], gradient[..., 1, 1, :], shear], axis=-2),
-            determinant,
-        )
+        loads, table = displacement.shape[2], _planar_derivatives(points)
+        places, values = self.positions[cells], displacement[cells]
+        found = np.empty((len(cells), len(points), 3, loads))
+        determinant = np.empty((len(cells), len(points)))
+        c_loops(WEDGES).strains(
+            len(cells), len(points), loads, table.ctypes, places.ctypes, values.ctypes,
+            found.ctypes, determinant.ctypes,
+        )  # fmt: skip
+        return found, determinant
 
     def determinants(self) -> Array:
         """Planar Jacobian's determinant at all quadrature points, shape (cells, q)."""
-        a, b, c, d = self._jacobian(self.grid.cells, _planar_derivatives(self.points))
-        return np.asarray(a * d - b * c)
-
-    def _jacobian(self, cells: Integers, table: Array) -> tuple[Array, Array, Array, Array]:
-        """∂x1/∂ξ, ∂x2/∂ξ, ∂x1/∂η and ∂x2/∂η, each of shape (m, q)."""
-        jacobian = table @ self.positions[cells, :2].reshape(len(cells), 1, NODES, 2)
-        return jacobian[..., 0, 0], jacobian[..., 0, 1], jacobian[..., 1, 0], jacobian[..., 1, 1]
+        nothing = np.empty((len(self.positions), 2, 0))
+        return self.strain(self.grid.cells, nothing, self.points)[1]
 
 
 def _planar_derivatives(points: Array) -> Array:
     """Derivatives of the shape functions in the plane at points (q, 3), shape (q, 2, 15)."""
-    return np.asarray(tabulate(points, derivatives=True)[:2].transpose(1, 0, 2))
+    return np.ascontiguousarray(tabulate(points, derivatives=True)[:2].transpose(1, 0, 2))

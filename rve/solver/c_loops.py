@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+WEDGES = Path(__file__).with_name("wedges.c")
 _FLAGS = ("-O3", "-fno-math-errno", "-shared", "-fPIC")
 
 

@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +23,8 @@ from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import Integers
 from alphacut.rve.petsc import PETSc
 from alphacut.rve.ranks import Ranks
-from alphacut.rve.solver.c_loops import c_loops
+from alphacut.rve.solver.c_loops import WEDGES, c_loops
 from alphacut.stochastic.theta.truncated_normal import Array
-
-WEDGES = Path(__file__).with_name("wedges.c")
 
 
 @dataclass(frozen=True)

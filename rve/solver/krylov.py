@@ -34,7 +34,7 @@ class Solutions:
         values: This rank's part of the vectors, shape (its unknowns, loads).
         pressures: This rank's part of the pressures of a `Saddle`, shape (its pressures, loads).
         iterations: For each load.
-        residual: The largest relative residual, as it truly is.
+        residual: The largest relative residual, as it truly is; nan where nobody asked.
     """
 
     values: Array
@@ -128,8 +128,12 @@ class LinearSolver:
                 self.krylov.pc.setPythonContext(context)
             self.krylov.setUp()
 
-    def solve(self, loads: Sequence[PETSc.Vec]) -> Solutions:
+    def solve(self, loads: Sequence[PETSc.Vec], *, measured: bool = True) -> Solutions:
         """Solve for all loads.
+
+        Args:
+            loads: Right-hand sides.
+            measured: Whether to find the residual.
 
         Raises:
             ConvergenceError: The tolerance was not reached, or a solution is not finite.
@@ -140,7 +144,7 @@ class LinearSolver:
         solved = [self._solve(group) for group in groups]
         values = np.concatenate([values for values, _ in solved], axis=1) * norms
         iterations = tuple(count for values, count in solved for _ in range(values.shape[1]))
-        residual = max(self._residuals(loads, values))
+        residual = max(self._residuals(loads, values)) if measured else np.nan
         if self.saddle is None:
             return Solutions(values, None, iterations, residual)
         return Solutions(*self.saddle.split(values), iterations, residual)

@@ -8,19 +8,18 @@ from functools import cached_property
 import numpy as np
 
 from alphacut.rve.mesh.triangulation import Integers
+from alphacut.rve.solver.c_loops import WEDGES, c_loops
 from alphacut.stochastic.theta.truncated_normal import Array
 
 # Strang's rule of degree 2, weights 1/6
 _CORNERS = np.array([[1 / 6, 1 / 6], [2 / 3, 1 / 6], [1 / 6, 2 / 3]])
 
 
-def gradients(points: Array, nodes: int) -> Array:
-    """Derivatives of the shape functions of 3 or 6 nodes at points (q, 2), (q, 2, nodes)."""
+def gradients(points: Array) -> Array:
+    """Derivatives of the shape functions of six nodes at points (q, 2), shape (q, 2, 6)."""
     x, y = points.T
     barycentric = np.array([1 - x - y, x, y])
     slopes = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
-    if nodes == 3:
-        return np.broadcast_to(slopes.T, (len(points), 2, 3))
     corner = (4 * barycentric.T - 1)[:, None, :] * slopes.T
     middle = [
         4 * (np.outer(barycentric[i], slopes[j]) + np.outer(barycentric[j], slopes[i]))
@@ -30,35 +29,20 @@ def gradients(points: Array, nodes: int) -> Array:
 
 
 def element_stiffness(positions: Array, stiffness: Array) -> Array:
-    """Stiffness matrices of triangles, straight or curved.
+    """Stiffness matrices of triangles of six nodes, straight or curved.
 
     Args:
-        positions: Nodes of each triangle, shape (m, nodes, 2), nodes 3 or 6.
+        positions: Nodes of each triangle, shape (m, 6, 2).
         stiffness: Voigt stiffness of each, shape (m, 3, 3).
 
     Returns:
-        Shape (m, 2·nodes, 2·nodes), the two components of a node side by side.
+        Shape (m, 12, 12), the two components of a node side by side.
     """
-    table = gradients(_CORNERS, positions.shape[1])
-    jacobian = np.einsum("qan,mnx->mqax", table, positions)
-    determinant = (
-        jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
+    table, found = gradients(_CORNERS), np.empty((len(positions), 12, 12))
+    c_loops(WEDGES).triangle_stiffness(
+        len(positions), table.ctypes, positions.ctypes, stiffness.ctypes, found.ctypes
     )
-    cofactor = np.stack(
-        [jacobian[..., 1, 1], -jacobian[..., 0, 1], -jacobian[..., 1, 0], jacobian[..., 0, 0]],
-        axis=-1,
-    )
-    inverse = cofactor.reshape(*determinant.shape, 2, 2) / determinant[..., None, None]
-    slope = inverse @ table  # (m, q, 2, nodes)
-    strain = np.zeros((*determinant.shape, 3, 2 * positions.shape[1]))
-    strain[..., 0, 0::2] = strain[..., 2, 1::2] = slope[..., 0, :]
-    strain[..., 1, 1::2] = strain[..., 2, 0::2] = slope[..., 1, :]
-    stress = (stiffness[:, None] * determinant[..., None, None] / 6) @ strain
-    columns = strain.shape[-1]
-    return np.asarray(
-        strain.reshape(len(strain), -1, columns).transpose(0, 2, 1)
-        @ stress.reshape(len(strain), -1, columns)
-    )
+    return found
 
 
 @dataclass(frozen=True)

@@ -119,3 +119,81 @@ void add_wedges(integral integrate, const double (*traces)[CORNERS][NODES], cons
         }
     }
 }
+
+/* As `strains`, for a number of displacements that the compiler knows where it is a usual one. */
+static inline __attribute__((always_inline)) void
+strains_of(int loads, int wedges, int points, const double (*table)[2][NODES], const double *positions,
+           const double *displacements, double *found, double *determinants) {
+    int wide = 2 * loads;
+    double slopes[2][wide + 1];
+    for (int m = 0; m < wedges; m++, positions += 3 * NODES, displacements += NODES * wide)
+        for (int q = 0; q < points; q++, found += 3 * loads) {
+            double along[2][2] = {{0}};
+            for (int c = 0; c < wide; c++) slopes[0][c] = slopes[1][c] = 0;
+            for (int j = 0; j < NODES; j++) {
+                double x = table[q][0][j], y = table[q][1][j];
+                for (int d = 0; d < 2; d++) {
+                    along[0][d] += x * positions[3 * j + d];
+                    along[1][d] += y * positions[3 * j + d];
+                }
+                for (int c = 0; c < wide; c++) {
+                    slopes[0][c] += x * displacements[j * wide + c];
+                    slopes[1][c] += y * displacements[j * wide + c];
+                }
+            }
+            double determinant = along[0][0] * along[1][1] - along[0][1] * along[1][0];
+            double a = along[0][0] / determinant, b = along[0][1] / determinant;
+            double c = along[1][0] / determinant, d = along[1][1] / determinant;
+            *determinants++ = determinant;
+            for (int l = 0, k = loads; l < loads; l++, k++) {
+                found[l] = d * slopes[0][l] - b * slopes[1][l];
+                found[loads + l] = a * slopes[1][k] - c * slopes[0][k];
+                found[2 * loads + l] = d * slopes[0][k] - b * slopes[1][k] + a * slopes[1][l] - c * slopes[0][l];
+            }
+        }
+}
+
+/* Strains (e11, e22, 2 e12) at fixed theta, of `loads` displacements, at `points` of each wedge, and the
+   determinants of the planar Jacobian there.
+
+   table: derivatives of the shape functions in the plane, points x 2 x 15.
+   positions, displacements: of the wedges' nodes, 15 x 3 and 15 x 2 x loads for each. */
+void strains(int wedges, int points, int loads, const double (*table)[2][NODES], const double *positions,
+             const double *displacements, double *found, double *determinants) {
+    switch (loads) {
+    case 0: return strains_of(0, wedges, points, table, positions, displacements, found, determinants);
+    case 2: return strains_of(2, wedges, points, table, positions, displacements, found, determinants);
+    case 3: return strains_of(3, wedges, points, table, positions, displacements, found, determinants);
+    case 6: return strains_of(6, wedges, points, table, positions, displacements, found, determinants);
+    default: return strains_of(loads, wedges, points, table, positions, displacements, found, determinants);
+    }
+}
+
+/* Stiffness matrices, 12 x 12 each, of triangles of six nodes: `table` has the derivatives of the shape
+   functions at three points of equal weight, 3 x 2 x 6; positions, moduli: 6 x 2 and 3 x 3 for each. */
+void triangle_stiffness(int triangles, const double (*table)[2][CORNERS], const double *positions,
+                        const double (*moduli)[3][3], double (*found)[PLANAR][PLANAR]) {
+    for (int m = 0; m < triangles; m++, positions += 2 * CORNERS) {
+        memset(found[m], 0, sizeof found[m]);
+        for (int q = 0; q < SLICES; q++) {
+            double along[2][2] = {{0}}, strain[3][PLANAR] = {{0}}, stress[3][PLANAR] = {{0}};
+            for (int k = 0; k < 2; k++)
+                for (int j = 0; j < CORNERS; j++)
+                    for (int d = 0; d < 2; d++) along[k][d] += table[q][k][j] * positions[2 * j + d];
+            double determinant = along[0][0] * along[1][1] - along[0][1] * along[1][0];
+            for (int j = 0; j < CORNERS; j++) {
+                double u = table[q][0][j] / determinant, v = table[q][1][j] / determinant;
+                strain[0][2 * j] = strain[2][2 * j + 1] = along[1][1] * u - along[0][1] * v;
+                strain[1][2 * j + 1] = strain[2][2 * j] = along[0][0] * v - along[1][0] * u;
+            }
+            for (int i = 0; i < 3; i++)
+                for (int k = 0; k < 3; k++) {
+                    double factor = moduli[m][i][k] * determinant / 6;
+                    for (int j = 0; j < PLANAR; j++) stress[i][j] += factor * strain[k][j];
+                }
+            for (int k = 0; k < 3; k++)
+                for (int i = 0; i < PLANAR; i++)
+                    for (int j = 0; j < PLANAR; j++) found[m][i][j] += strain[k][i] * stress[k][j];
+        }
+    }
+}

@@ -17,8 +17,9 @@ from alphacut.rve.mesh import triangulation, wedge
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import triangulate
 from alphacut.rve.prism import form
+from alphacut.rve.prism.slice_stress import SliceStress
 from alphacut.rve.prism.system import PrismSystem
-from alphacut.rve.solver import c_loops
+from alphacut.rve.solver import c_loops, level_stiffness
 from alphacut.rve.solver.level_cholesky import LevelCholesky
 from alphacut.rve.solver.level_stiffness import LevelPattern
 from alphacut.stochastic import HermiteMap, TruncatedNormal
@@ -196,3 +197,45 @@ def test_the_program_gives_what_the_process_gives(capfd):
     there = json.loads(run.stdout)
     assert here.pop("seconds") != there.pop("seconds")
     assert here == there
+
+
+def slopes_by_numpy(table, nodes):
+    """Derivatives of shape functions in the plane, shape (m, q, 2, n), and determinants."""
+    jacobian = np.einsum("qan,mnx->mqax", table, nodes)
+    return np.linalg.inv(jacobian) @ table, np.linalg.det(jacobian)
+
+
+def strains_by_numpy(slopes):
+    """Strains (3) that two components of each node make, shape (m, q, 3, 2 n)."""
+    found = np.zeros((*slopes.shape[:2], 3, 2 * slopes.shape[-1]))
+    found[..., 0, 0::2] = found[..., 2, 1::2] = slopes[:, :, 0]
+    found[..., 1, 1::2] = found[..., 2, 0::2] = slopes[:, :, 1]
+    return found
+
+
+def test_stiffness_of_curved_triangles_is_that_of_numpy():
+    random = np.random.default_rng(9)
+    nodes = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0], [0, 0.5], [0.5, 0.5]])
+    nodes = nodes + 0.03 * random.standard_normal((4, 6, 2))
+    moduli = random.standard_normal((4, 3, 3))
+    slopes, determinant = slopes_by_numpy(
+        level_stiffness.gradients(level_stiffness._CORNERS), nodes
+    )
+    strain = strains_by_numpy(slopes)
+    found = np.einsum("mq,mqai,mab,mqbj->mij", determinant / 6, strain, moduli, strain)
+    assert level_stiffness.element_stiffness(nodes, moduli) == pytest.approx(found, abs=1e-13)
+
+
+@pytest.mark.parametrize("loads", [0, 1, 2, 3, 5, 6])
+def test_strains_are_those_of_numpy(loads):
+    grid = PrismGrid(triangulate(size=0.9, radius=0.5), 2)
+    points, weights = wedge.slab_rule()
+    slices = SliceStress(grid, grid.positions(MAP), points, weights)
+    moved = np.random.default_rng(10).standard_normal((grid.nodes, 2, loads))
+    found, determinant = slices.strain(grid.cells, moved, points)
+    table = wedge.tabulate(points, derivatives=True)[:2].transpose(1, 0, 2)
+    slopes, wanted = slopes_by_numpy(table, slices.positions[grid.cells, :2])
+    values = moved[grid.cells].reshape(len(grid.cells), 1, 30, loads)
+    assert determinant == pytest.approx(wanted, rel=1e-13)
+    assert found == pytest.approx(strains_by_numpy(slopes) @ values, rel=1e-12, abs=1e-12)
+    assert slices.determinants() == pytest.approx(wanted, rel=1e-13)
