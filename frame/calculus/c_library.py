@@ -17,6 +17,8 @@ import numpy as np
 from alphacut.frame.calculus.jet import Array
 
 FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-ffp-contract=off", "-shared", "-fPIC")
+FUSED = ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-shared", "-fPIC")
+"""Where products may be rounded together with the sums that they go into."""
 SECONDS = 60
 """Longest time a compiler may take."""
 

@@ -1,11 +1,12 @@
 """Branch and bound for the modal model: every bound between attained and proved.
 
 All nodes, outputs and sides share one tree of boxes, and each box its polynomials. A box is closed
-for a problem by one of four tests, each on the quadratic Taylor model with the remainder of
-`remainder`: 1. its bound lies below the best known value; 2. the output is monotone along an axis,
-and the neighbouring box, or the face, covers it; 3. a concave function above the quadratic model
-has no higher point; 4. near the best point the same holds for the Taylor model there, made less
-concave by the remainder. Else it is halved.
+for a problem by one of five tests, all but the third on the quadratic Taylor model with the
+remainder of `remainder`: 1. the output is monotone along an axis, and the neighbouring box, or the
+face, covers it; 2. its bound lies below the best known value; 3. so does that of modes which turn
+at rates linear in the parameters, with a remainder that holds only what else they do; 4. a concave
+function above the quadratic model has no higher point; 5. near the best point the same holds for
+the Taylor model there, made less concave by the remainder. Else it is halved.
 """
 
 from __future__ import annotations
@@ -13,11 +14,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.certificate.box_models import BoxModels
+from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.certificate.frontier import Frontier
 from alphacut.frame.certificate.kernel import examination
 from alphacut.frame.certificate.numpy_kernel import bounds
@@ -29,6 +31,8 @@ from alphacut.frame.modal.optima import Optima
 
 PIECE = 30_000
 """Items examined together."""
+ROWS = 1000
+"""Rows whose response to a load is computed together; more would leave the cache."""
 HIGHER = 1e-10
 """Least gain for which a better point is taken over."""
 
@@ -109,7 +113,7 @@ class Tree:
     """Boxes of one domain and the problems that share them.
 
     Args:
-        models: The model over boxes.
+        model: The modal model.
         lower: Lower ends of the domain, shape (d,).
         upper: Upper ends.
         optima: N problems with their best points, which improve.
@@ -117,7 +121,7 @@ class Tree:
         problems: All problems of the model by number; those without a place in `optima` are idle.
     """
 
-    models: BoxModels
+    model: ModalModel
     lower: Array
     upper: Array
     optima: Optima
@@ -131,14 +135,14 @@ class Tree:
         numbers = (optima.node * m + optima.output) * 2 + (optima.side > 0)
         remainder, total = Remainder.of(model, lower, upper), 2 * m * len(model.time)
         tree = cls(
-            BoxModels(model),
+            model,
             lower,
             upper,
             optima,
             numbers,
             Problems(
-                remainder.tensor,
-                remainder.margin,
+                model.time,
+                remainder,
                 np.zeros(total),
                 np.zeros((total, d)),
                 np.zeros((total, 1 + d + d * (d + 1) // 2)),
@@ -184,28 +188,29 @@ class Tree:
         self.optima.value[which] = value[items]
         which = np.unique(which)
         small = self.problems.gap / 100
-        refine(self.models.model, self.optima, which, self.lower, self.upper, small)
+        refine(self.model, self.optima, which, self.lower, self.upper, small)
         self._renew(which)
 
     def _renew(self, which: Array) -> None:
         """Values, points and jets of the problems at places `which` of the optima."""
         optima, own = self.optima, self.numbers[which]
         point = optima.point[which]
-        f, g, H = self.models.model.at(point, optima.node[which], optima.output[which])
+        f, g, H = self.model.at(point, optima.node[which], optima.output[which])
         row, column = np.triu_indices(g.shape[1])
         self.problems.best[own], self.problems.point[own] = optima.value[which], point
         self.problems.jets[own] = np.column_stack([f, g, H[:, row, column]])
 
     def _piece(self, frontier: Frontier, boxes: slice, items: slice) -> Piece:
         """Boxes and items of a frontier with their derivatives and waves."""
-        outputs = len(self.models.model.outputs)
+        outputs = len(self.model.outputs)
         centre, radius, edges = frontier.take(boxes).geometry(self.lower, self.upper)
         box, problem = frontier.box[items] - boxes.start, frontier.problem[items]
         node, column = np.divmod(problem, 2 * outputs)
         fresh = np.append(True, (np.diff(box) != 0) | (np.diff(node) != 0))
         begin = np.flatnonzero(fresh)
         row_box, row_node = box[begin], node[begin]
-        rate, share = self.models.jets(centre)
+        started, together = self._parts
+        jets = together.jets(centre)
         return Piece(
             centre,
             radius,
@@ -214,7 +219,24 @@ class Tree:
             np.append(begin, len(box)),
             row_node,
             column,
-            rate,
-            share,
-            self.models.waves(rate[0], row_box, row_node),
+            jets,
+            self.model.count,
+            started,
+            self._forced(jets[:, 0, : self.model.count], row_box, row_node),
         )
+
+    @cached_property
+    def _parts(self) -> tuple[bool, Polynomial]:
+        """Whether the free motion is one, and eigenvalues and all parts' shares side by side."""
+        model, load = self.model, [] if self.model.load is None else [self.model.load.share]
+        started = not load or bool(model.coefficient.coefficients.any())
+        parts = [model.eigenvalue, *[model.coefficient][: int(started)], *load]
+        return started, Polynomial(parts[0].index, np.hstack([part.coefficients for part in parts]))
+
+    def _forced(self, rate: Array, box: Array, node: Array) -> Array | None:
+        """Waves under a load of boxes `box` (R,) with eigenvalues (B, n) at nodes, (R, 3, n)."""
+        if (load := self.model.load) is None:
+            return None
+        rows = range(0, len(node), ROWS)
+        parts = [load.response(rate[box[k : k + ROWS]], node[k : k + ROWS]) for k in rows]
+        return np.asarray(np.concatenate([np.stack(part, 1) for part in parts]))

@@ -9,13 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.frame.calculus.c_library import c_library
+from alphacut.frame.calculus.c_library import FUSED, c_library
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.certificate.numpy_kernel import examine
 from alphacut.frame.certificate.piece import Piece, Problems
 
 SOURCE = Path(__file__).with_name("kernel.c")
-FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-shared", "-fPIC")
 Examine = Callable[[Piece, Problems], tuple[Array, Array]]
 """Codes (0 closed, 1 + axis split, `FACES` and above confined) and side × output at the centres."""
 
@@ -23,52 +22,31 @@ Examine = Callable[[Piece, Problems], tuple[Array, Array]]
 @cache
 def examination() -> tuple[str, Examine]:
     """The fastest kernel there is, and its name."""
-    library = c_library(SOURCE.read_text(encoding="utf-8"), FLAGS)
+    library = c_library(SOURCE.read_text(encoding="utf-8"), FUSED)
     if library is None:
         return "NumPy", examine
     return "C", lambda piece, problems: _compiled(library, piece, problems)
 
 
 def _compiled(library: ctypes.CDLL, piece: Piece, problems: Problems) -> tuple[Array, Array]:
-    size, boxes, parts, n, m = piece.share.shape
-    d, terms = piece.centre.shape[1], 6 * parts * n
-    table = np.empty((boxes, m, terms, size))
+    over, forced, free = problems.remainder, piece.forced, piece.forced is None
     code, value = np.zeros(len(piece.column), np.int32), np.zeros(len(piece.column))
-    counts = [ctypes.c_long(boxes), *map(ctypes.c_int, (d, n, m, parts, size))]
-    library.compose(*counts, *_pointers((piece.rate, complex), (piece.share, complex)), _at(table))
-    given = _pointers(
-        (piece.row_start, np.int64),
-        (piece.item_start, np.int64),
-        (piece.node, np.int64),
-        (piece.column, np.int32),
-        (table, float),
-        (piece.waves, complex),
-        (problems.third, float),
-        (problems.margin, float),
-        (piece.centre, float),
-        (piece.radius, float),
-        (piece.edges, np.uint8),
-        (problems.best, float),
-        (problems.point, float),
-        (problems.jets, float),
+    (boxes, d), parts = piece.centre.shape, piece.started + (not free)
+    sizes = (d, piece.modes, problems.third.shape[0], parts, piece.started)
+    given = [
+        *((x, np.int64) for x in (piece.row_start, piece.item_start, piece.node)),
+        *((piece.column, np.int32), (piece.jets, complex), (problems.time, float)),
+        *((forced, complex), (problems.third, float), (over.margin, float)),
+        *((piece.centre, float), (piece.radius, float), (piece.edges, np.uint8)),
+        *((x, float) for x in (problems.best, problems.point, problems.jets)),
+        *((x if free else None, float) for x in (*over.rate[2:], *over.share)),
+    ]
+    arrays: list[Array | None] = [
+        None if x is None else np.ascontiguousarray(x, kind) for x, kind in given
+    ]
+    library.examine(
+        *(ctypes.c_long(boxes), ctypes.c_long(len(problems.time)), *map(ctypes.c_int, sizes)),
+        *(None if x is None else ctypes.c_void_p(x.ctypes.data) for x in arrays),
+        *(ctypes.c_double(problems.gap), *(ctypes.c_void_p(x.ctypes.data) for x in (code, value))),
     )
-    counts = [ctypes.c_long(boxes), *map(ctypes.c_int, (d, m, terms, size))]
-    library.examine(*counts, *given, ctypes.c_double(problems.gap), _at(code), _at(value))
     return code, value
-
-
-class _Kept(ctypes.c_void_p):
-    """Address of an array that lives as long as this."""
-
-    array: Array
-
-
-def _at(array: Array) -> ctypes.c_void_p:
-    pointer = _Kept(array.ctypes.data)
-    pointer.array = array
-    return pointer
-
-
-def _pointers(*given: tuple[Array, type]) -> list[ctypes.c_void_p]:
-    """Addresses of arrays of these kinds, copied where they are not contiguous."""
-    return [_at(np.ascontiguousarray(array, kind)) for array, kind in given]

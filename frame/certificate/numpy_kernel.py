@@ -13,6 +13,8 @@ from alphacut.frame.certificate.piece import FACES, Piece, Problems
 SWEEPS = 8
 NEAR = 2.0
 """Radii within which the best point counts as near."""
+TURN = 4.0
+"""Radians within which modes are turned."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,15 +44,15 @@ class Items:
         """The items of a piece."""
         d, row = piece.centre.shape[1], piece.row_of_item
         output, side = piece.column // 2, 2.0 * (piece.column % 2) - 1
-        J = side[:, None] * _taylor(piece, composed(piece))[row, output]
-        node, m = piece.node[row], problems.third.shape[1]
+        J = side[:, None] * _taylor(piece, problems)[row, output]
+        node, m, remainder = piece.node[row], piece.share.shape[-1], problems.remainder
         return cls(
             J[:, 0],
             J[:, 1 : 1 + d],
             _full(J, d),
             piece.radius[piece.box_of_row[row]],
-            problems.third[node, output],
-            problems.margin[node, output],
+            remainder.tensor[node, output],
+            remainder.margin[node, output],
             node * 2 * m + piece.column,
         )
 
@@ -75,22 +77,9 @@ class Items:
         return self.pull / 2 + self.margin[:, 1:]
 
     @property
-    def steepest(self) -> Array:
-        """Upper bounds without regard to signs, shape (I,)."""
-        linear: Array = ((np.abs(self.g) + self.bent / 2) * self.r).sum(-1)
-        return self.f + linear + self.rest
-
-    @property
     def separable(self) -> Array:
         """Upper bounds with mixed terms of the Hessian moved to its diagonal, shape (I,)."""
-        r, slope, diagonal = self.r, np.abs(self.g), np.einsum("nii->ni", self.H)
-        spread = self.bent / np.where(r > 0, r, 1.0) - np.abs(diagonal)
-        bend = diagonal + np.where(r > 0, spread, 0.0)
-        inside = (bend < 0) & (slope < -bend * r)
-        top = np.where(
-            inside, -(slope**2) / np.where(inside, 2 * bend, 1.0), slope * r + 0.5 * bend * r**2
-        )
-        return np.asarray(self.f + top.sum(1) + self.rest)
+        return self.f + separable(self.g, self.H, self.r) + self.rest
 
 
 def examine(piece: Piece, problems: Problems) -> tuple[Array, Array]:
@@ -98,11 +87,13 @@ def examine(piece: Piece, problems: Problems) -> tuple[Array, Array]:
     items, box = Items.of(piece, problems), piece.box_of_row[piece.row_of_item]
     g, r, target = items.g, items.r, problems.best[items.problem] + problems.gap
     code = np.zeros(len(g), np.int32)
-    open_ = items.steepest > target
     rising = (r > 0) & (np.abs(g) > items.bent + items.wander)
     edge = np.where(g > 0, piece.edges[box, 1], piece.edges[box, 0]).astype(bool)
-    open_ &= ~(rising & ~edge).any(1)  # the neighbour holds higher points
+    open_ = ~(rising & ~edge).any(1)  # the neighbour holds higher points
     open_ &= items.separable > target
+    if piece.forced is None:
+        left = np.flatnonzero(open_)
+        open_[left] = ~_below_turning(piece, problems, items, left)
     faces = (np.where(rising, np.where(g > 0, 2, 1), 0) * 3 ** np.arange(g.shape[1])).sum(1)
     faced = open_ & (faces > 0)
     code[faced] = FACES + faces[faced]
@@ -137,11 +128,11 @@ def composed(piece: Piece) -> Array:
     return out
 
 
-def _taylor(piece: Piece, tables: Array) -> Array:
+def _taylor(piece: Piece, problems: Problems) -> Array:
     """Values, gradients and Hessians (upper triangle) of all outputs, (R, m, q)."""
+    tables, wave = composed(piece), piece.waves(problems.time).reshape(len(piece.node), -1)
     *_, m, q = tables.shape
     flat = tables.reshape(len(tables), -1, m * q)
-    wave = piece.waves.reshape(len(piece.waves), -1)
     out = np.empty((len(wave), m * q))
     for box, table in enumerate(flat):
         rows = slice(piece.row_start[box], piece.row_start[box + 1])
@@ -155,6 +146,71 @@ def _full(J: Array, d: int) -> Array:
     row, column = np.triu_indices(d)
     place[row, column] = place[column, row] = 1 + d + np.arange(len(row))
     return J[..., place]
+
+
+def separable(g: Array, H: Array, r: Array) -> Array:
+    """Upper bounds of g·x + x·H·x/2 for |x| ≤ r, mixed terms moved to the diagonal, (I,)."""
+    slope, diagonal = np.abs(g), np.einsum("nii->ni", H)
+    spread = (np.abs(H) * r[:, None]).sum(-1) / np.where(r > 0, r, 1.0) - np.abs(diagonal)
+    bend = diagonal + np.where(r > 0, spread, 0.0)
+    inside = (bend < 0) & (slope < -bend * r)
+    top = np.where(
+        inside, -(slope**2) / np.where(inside, 2 * bend, 1.0), slope * r + 0.5 * bend * r**2
+    )
+    return np.asarray(top.sum(1))
+
+
+def _below_turning(piece: Piece, problems: Problems, items: Items, which: Array) -> Array:
+    """Mask of items below their targets as modes A exp(i s) whose phases s = ω·x are linear.
+
+    About the centre, with |s| ≤ S, Re A exp(i s) exceeds its quadratic Taylor model by at most
+    |Im A| S³/24 + Im A S² s/8 (Chebyshev) + max(Re A, 0) S² s²/24 + |Im A| S⁵/120 + |Re A| S⁶/720.
+    """
+    row, column, r = piece.row_of_item[which], piece.column[which], items.r[which]
+    box, t, d = piece.box_of_row[row], problems.time[piece.node[row]][:, None], r.shape[1]
+    wave = piece.waves(problems.time)[row, 0, 0]
+    share = piece.share[0, box, 0, :, column // 2]
+    A = 2 * (2.0 * (column[:, None] % 2) - 1) * share * wave
+    slope = piece.rate[1 : 1 + d, box].imag * t  # (d, I, n)
+    S = np.einsum("dik,id->ik", np.abs(slope), r)
+    odd, even = np.abs(A.imag), np.abs(A.real)
+    rest = _left_out(piece, problems, (row, column // 2), S) * 2 * np.abs(wave)
+    rest += odd * (S**3 / 24 + S**5 / 120) + even * S**6 / 720
+    room = problems.best[items.problem[which]] + problems.gap - items.margin[which, 0]
+    room -= items.f[which] + rest.sum(1)
+    g = items.g[which] + np.einsum("ik,dik->id", A.imag * S**2 / 8, slope)
+    soft = np.maximum(A.real, 0) * S**2 / 12
+    H = items.H[which] + np.einsum("ik,dik,eik->ide", soft, slope, slope)
+    below: Array = (separable(g, H, r) <= room) | stays_below(g, H, -r, r, room)
+    return below
+
+
+def _left_out(piece: Piece, problems: Problems, at: tuple[Array, Array], reach: Array) -> Array:
+    """What C exp((λ − λ₀ − i ω·x) t) exp(i s) leaves out with C = C₀, λ = λ₀ + i ω·x, (I, n).
+
+    It is a sixth of a bound of the third derivative of their difference, by Leibniz' rule, at `at`:
+    rows and outputs. Beyond `TURN` it is 1e30, which closes nothing.
+    """
+    (row, output), over, r = at, problems.remainder, piece.radius
+    box, t = piece.box_of_row[row], problems.time[piece.node[row]][:, None]
+    e2, e3 = (_along(over.rate[k], r, k)[box] * t for k in (2, 3))
+    c1, c2, c3 = (_along(over.share[k], r, k)[box, :, output] for k in (1, 2, 3))
+    c0 = over.share[0].T[output]
+    e1 = np.einsum("dbn,bd->bn", np.abs(piece.rate[1 : 1 + r.shape[1]].real), r)[box] * t
+    z0, z1 = e1 + e2 / 2, e1 + e2
+    swell, curved = 1 + z0 + z0**2, e2 + z1**2  # the first above exp(z0) up to 1.7
+    p0, p1, p2 = c1 + c0 * z0 * swell, c1 + c0 * z1, c2 + 2 * c1 * z1 + c0 * curved
+    p3 = c3 + 3 * c2 * z1 + 3 * c1 * curved + c0 * (e3 + 3 * e2 * z1 + z1**3)
+    third = reach**3 * p0 + (3 * reach**2 * p1 + 3 * reach * p2 + p3) * swell
+    return np.where((reach < TURN) & (z0 < 1.7), third / 6, 1e30)
+
+
+def _along(bound: Array, r: Array, order: int) -> Array:
+    """A tensor of bounds (d, …, d, …) times radii (B, d) along `order` axes, shape (B, …)."""
+    out = np.broadcast_to(bound, (len(r), *bound.shape))
+    for _ in range(order):
+        out = np.einsum("bi...,bi->b...", out, r)
+    return out
 
 
 def _below_near_best(problems: Problems, items: Items, which: Array, centre: Array) -> Array:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations_with_replacement
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
+from alphacut.frame.certificate.remainder import Remainder
 
 FACES = 16
 """Codes from here on confine an item to faces: plus 3^axis, once for lower and twice for upper."""
@@ -20,20 +22,27 @@ class Problems:
     A problem is an output at a node on a side: number node · 2 m + 2 output + (1 for upper bounds).
 
     Args:
-        third: Bounds of |∂³ output|, shape (T, m, d, d, d).
-        margin: Bounds of rounding in values and slopes, shape (T, m, 1 + d).
+        time: Nodes, shape (T,).
+        remainder: Of quadratic Taylor models over the domain.
         best: Side × output at the best points so far, shape (N,).
         point: These points, shape (N, d).
         jets: Value, gradient and Hessian (upper triangle) of the outputs there, shape (N, q).
         gap: What the bounds may lie above the best values by.
     """
 
-    third: Array
-    margin: Array
+    time: Array
+    remainder: Remainder
     best: Array
     point: Array
     jets: Array
     gap: float
+
+    @cached_property
+    def third(self) -> Array:
+        """Bounds of third derivatives along triples of rising axes, shape (m, triples, T)."""
+        tensor = self.remainder.tensor
+        axes = np.array(list(combinations_with_replacement(range(tensor.shape[-1]), 3))).T
+        return np.ascontiguousarray(np.moveaxis(tensor[:, :, *axes], 0, -1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +57,11 @@ class Piece:
         item_start: First item of each row, and the end, shape (R + 1,).
         node: Node of each row, shape (R,).
         column: 2 output + (1 for upper bounds) of each item, rising within a row, shape (I,).
-        rate: Eigenvalues with derivatives, shape (q, B, n).
-        share: Shares of P parts of the motion with derivatives, shape (q, B, P, n, m).
-        waves: Shape (R, P, 3, n).
+        jets: Eigenvalues, n, and shares of the motion's P parts, P n m, with derivatives, shape (B,
+            q, K).
+        modes: How many, n.
+        started: Whether the first part is the free motion.
+        forced: Waves under a load, the last part, derived by the eigenvalue, shape (R, 3, n).
     """
 
     centre: Array
@@ -60,9 +71,30 @@ class Piece:
     item_start: Array
     node: Array
     column: Array
-    rate: Array
-    share: Array
-    waves: Array
+    jets: Array
+    modes: int
+    started: bool
+    forced: Array | None
+
+    @property
+    def rate(self) -> Array:
+        """Eigenvalues with derivatives, shape (q, B, n)."""
+        return self.jets[..., : self.modes].swapaxes(0, 1)
+
+    @property
+    def share(self) -> Array:
+        """Shares with derivatives, shape (q, B, P, n, m)."""
+        own, parts = self.jets.swapaxes(0, 1), self.started + (self.forced is not None)
+        return own[..., self.modes :].reshape(*own.shape[:2], parts, self.modes, -1)
+
+    def waves(self, time: Array) -> Array:
+        """Waves of all parts at the rows, with nodes (T,), shape (R, P, 3, n)."""
+        found = [] if self.forced is None else [self.forced]
+        if self.started:
+            t = time[self.node][:, None]
+            wave = np.exp(self.rate[0, self.box_of_row] * t)
+            found.insert(0, np.stack([wave, t * wave, t * t * wave], 1))
+        return np.stack(found, 1)
 
     @cached_property
     def row_of_item(self) -> Array:

@@ -67,10 +67,14 @@ class Remainder:
         tensor: |∂³ output / ∂u_i ∂u_j ∂u_k| at most, shape (T, m, d, d, d), symmetric in the last
             three.
         margin: Rounding of values, and of slopes, at most, shape (T, m, 1 + d).
+        rate: Bounds of derivatives of the eigenvalues, orders 0 to 3, shapes (d,) * order + (n,).
+        share: The same of the shares of the last part, shapes (d,) * order + (n, m).
     """
 
     tensor: Array
     margin: Array
+    rate: list[Array]
+    share: list[Array]
 
     @classmethod
     def of(cls, model: ModalModel, lower: Array, upper: Array) -> Remainder:
@@ -102,7 +106,7 @@ class Remainder:
                 margin[..., 0] += noise[:, k, None] * values
                 margin[..., 1:] += noise[:, k, None, None] * np.moveaxis(slopes, -1, 1)
         third[model.time == 0] = _at_rest(model, reach)
-        return cls((1 + 1e-9) * third, margin)
+        return cls((1 + 1e-9) * third, margin, rate, share)
 
 
 def _noise(model: ModalModel, rate: Array, *, forced: bool) -> Array:

@@ -17,7 +17,7 @@ import numpy as np
 from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.modal_jet import Parts, composed
-from alphacut.frame.calculus.polynomial import Polynomial, basis, product
+from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.calculus.threads import each
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.modal.ground_response import LoadTables, decaying
@@ -205,14 +205,13 @@ class ModalModel:
         return values
 
     def _value_at(self, unit: Array, node: Array, output: Array) -> Array:
-        powers, values = basis(unit, self.eigenvalue.index), np.zeros(len(unit))
-        waves = self.waves_alone(product(powers, self.eigenvalue.coefficients), node)
+        values, n = np.zeros(len(unit)), self.count
         for o in np.unique(output):
             rows = np.flatnonzero(output == o)
-            for share, wave in zip(self.shares[o], waves, strict=False):
+            parts = self.of_output[o](unit[rows])
+            for place, wave in enumerate(self.waves_alone(parts[:, :n], node[rows]), 1):
                 if wave is not None:
-                    own = product(powers[rows], share.coefficients)
-                    values[rows] += 2 * (own * wave[rows]).real.sum(1)
+                    values[rows] += 2 * (parts[:, place * n :][:, :n] * wave).real.sum(1)
         return values
 
     def waves_alone(self, rate: Array, node: Array) -> list[Array | None]:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.polynomial.chebyshev import chebvander
 
-from alphacut.frame.calculus.polynomial import ChebyshevGrid, LowerGrid
+from alphacut.frame.calculus import polynomial
+from alphacut.frame.calculus.polynomial import ChebyshevGrid, LowerGrid, Polynomial, exponents
 
 
 @pytest.mark.parametrize(("degrees", "excess"), [((1,), 4), ((1, 0, 2), 3), ((1,) * 6, 4)])
@@ -32,3 +33,22 @@ def test_both_grids_give_one_bound() -> None:
         for x, y in [grid.points.T]
     ]
     assert sums[0] == pytest.approx(sums[1], rel=1e-12)
+
+
+@pytest.mark.parametrize("count", [1, 16, 37])
+@pytest.mark.parametrize(("d", "degree", "columns"), [(1, 0, 1), (2, 5, 4), (4, 7, 3), (6, 2, 8)])
+def test_compiled_sums_are_those_of_numpy(
+    d: int, degree: int, columns: int, count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if polynomial.c_library(polynomial.SOURCE, polynomial.FUSED) is None:
+        pytest.skip("no compiler")
+    rng, index = np.random.default_rng(count), exponents(d, degree)
+    real = rng.standard_normal((2, len(index), columns))
+    u, found = rng.uniform(-1, 1, (count, d)), []
+    for _ in range(2):
+        given = Polynomial(index, real[0] + 1j * real[1]), Polynomial(index, real[0])
+        found.append([*given[0].derivatives(u), given[1](u)])
+        monkeypatch.setattr(polynomial, "c_library", lambda *_: None)
+    for one, other in zip(*found, strict=True):
+        assert one.shape == other.shape
+        assert np.abs(one - other).max(initial=0) <= 1e-13 * np.abs(other).max(initial=1)

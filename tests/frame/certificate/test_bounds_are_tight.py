@@ -10,15 +10,17 @@ import pytest
 from alphacut.frame import Accelerogram, Exact, LinearFlow, StoreyFrame
 from alphacut.frame.boxes import boxes
 from alphacut.frame.calculus.polynomial import Polynomial
-from alphacut.frame.certificate.branch_and_bound import BranchAndBound
+from alphacut.frame.certificate import branch_and_bound
+from alphacut.frame.certificate.branch_and_bound import BranchAndBound, Tree
 from alphacut.frame.certificate.certificate import certify
+from alphacut.frame.certificate.frontier import Frontier
 from alphacut.frame.certificate.numpy_kernel import Items, stays_below
 from alphacut.frame.certificate.remainder import Remainder, largest_growth
 from alphacut.frame.certificate.wave_bounds import parts
 from alphacut.frame.dynamics.spectral import responses
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.model import ModalModel
-from alphacut.frame.modal.optima import Optima
+from alphacut.frame.modal.optima import Optima, problems
 from alphacut.fuzzy import Interval
 from tests.frame.certificate.test_kernels import take
 
@@ -120,6 +122,43 @@ def test_boxes_given_up_within_the_gap_are_in_the_bound(
     optima = Optima(one, 0 * one, np.ones(1), best, best[0] ** 3, np.zeros(1))
     found = BranchAndBound(0.1).run(cube(), -np.ones(1), np.ones(1), optima)
     assert 1 <= found.proved[0] <= 1.02
+
+
+def least_closed(tree: Tree) -> np.ndarray:
+    """Of each problem the least target below which its whole box is closed, shape (N,)."""
+    frontier, given = Frontier.whole(len(tree.lower), tree.numbers), tree.problems
+    piece = tree._piece(frontier, slice(0, 1), slice(0, len(frontier)))
+    low, high = (np.full(len(given.best), end) for end in (-2.5, 2.5))
+    for _ in range(30):
+        target = (low + high) / 2
+        code = branch_and_bound.examination()[1](piece, replace(given, best=target, gap=0.0))[0]
+        low, high = np.where(code, target, low), np.where(code, high, target)
+    return high
+
+
+def turning() -> ModalModel:
+    """The motion cos((1 + 0.05 u) t) + u, highest at an end whatever the phase."""
+    rate, share = np.array([[1j, 0], [0.05j, 0]]), np.array([[0.5 + 0j, 0], [0, 0.5]])
+    index, plain = np.arange(2)[:, None], spring(1.0, None, 12.0, 0.1)
+    return replace(plain, eigenvalue=Polynomial(index, rate), coefficient=Polynomial(index, share))
+
+
+@pytest.mark.parametrize("kernel", ["c", "numpy"])
+@pytest.mark.parametrize("even", [True, False])
+def test_a_box_is_closed_where_its_mode_allows_no_more(
+    kernel: str, even: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At all phases of a mode, whose phase is linear over the box, or is not."""
+    take(kernel, monkeypatch)
+    model, ends = turning() if even else spring(1.0, None, 12.0, 0.1), np.ones(1)
+    optima = problems(np.arange(len(model.time)), 1, 1)
+    optima.point[:] = 9.0  # so that no box is near the best point
+    closed = least_closed(Tree.of(model, -ends, ends, optima, 1e-6)).reshape(-1, 2)
+    values = model.values(np.linspace(-1, 1, 2001)[:, None])[..., 0]
+    truth = np.stack([-values.min(0), values.max(0)], 1)
+    assert (closed >= truth - 1e-7).all()
+    early = model.time <= 6  # up to 0.3 rad from the centre, where little is left out
+    assert (closed - truth)[early].max() <= 4e-3
 
 
 def test_rounding_of_late_phases_is_in_the_margin() -> None:
