@@ -70,20 +70,18 @@ class Frontier:
     def children(self, code: Array) -> Frontier:
         """What the examination's codes (I,) leave open."""
         d = self.place.shape[1]
-        split = (code > 0) & (code < FACES)
-        faced = code >= FACES
-        count = 2 * d + 3**d
-        votes = np.bincount(self.box[split] * d + code[split] - 1, minlength=d * len(self.place))
-        axis = votes.reshape(-1, d).argmax(1)
-        halves = self.box[split] * count + 2 * axis[self.box[split]]
+        split, faced = np.flatnonzero((code > 0) & (code < FACES)), np.flatnonzero(code >= FACES)
+        count, box = 2 * d + 3**d, self.box[split]
+        votes = np.bincount(box * d + code[split] - 1, minlength=d * len(self.place))
+        halves = box * count + 2 * votes.reshape(-1, d).argmax(1)[box]
         faces = self.box[faced] * count + 2 * d + code[faced] - FACES
         keys = np.concatenate([halves, halves + 1, faces])
-        problem = np.concatenate([*[self.problem[split]] * 2, self.problem[faced]])
-        fresh, of = np.unique(keys, return_inverse=True)
-        place, merged = np.unique(self._places(fresh, count), axis=0, return_inverse=True)
+        problem = self.problem[np.concatenate([split, split, faced])]
+        fresh = np.unique(keys)
+        place, merged = _distinct(self._places(fresh, count))
         most = int(problem.max(initial=0)) + 1
-        items = np.unique(merged.ravel()[of] * most + problem)
-        return Frontier(place, items // most, items % most)
+        items = np.unique(merged[np.searchsorted(fresh, keys)] * most + problem)
+        return Frontier(place, *np.divmod(items, most))
 
     def _places(self, keys: Array, count: int) -> Array:
         """Intervals of the children with these keys, shape (K, d)."""
@@ -97,3 +95,12 @@ class Frontier:
         ternary = (local[rows, None] - 2 * d) // 3 ** np.arange(d) % 3
         place[rows] = np.select([ternary == 1, ternary == 2], [LOWER, UPPER], place[rows])
         return np.asarray(place)
+
+
+def _distinct(rows: Array) -> tuple[Array, Array]:
+    """Distinct rows (B, d) of integers, rising, and which of them each row is, as `np.unique`."""
+    order = np.lexsort(rows.T[::-1])
+    fresh = np.any(np.diff(rows[order], axis=0, prepend=-3), axis=1)
+    number = np.empty(len(rows), np.int64)
+    number[order] = np.cumsum(fresh) - 1
+    return rows[order][fresh], number

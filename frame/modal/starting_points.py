@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.threads import each
 from alphacut.frame.modal.optima import Response
 
 NEAR, DECADES = 8, 8.0
@@ -34,5 +35,5 @@ def tensor_points(d: int, most: int) -> Array:
 
 def trajectories(model: Response, points: Array, nodes: Array | None = None) -> Array:
     """Values of the model at points (P, d) and the nodes, all unless given, shape (P, T, m)."""
-    pieces = [model.values(chunk) for chunk in np.array_split(points, -(-len(points) // 256))]
+    pieces = each(model.values, np.array_split(points, -(-len(points) // 64)))
     return np.concatenate([x if nodes is None else x[:, nodes] for x in pieces])

@@ -51,12 +51,12 @@ def model(ground: Accelerogram | None, names: tuple[str, ...]) -> ModalModel:
     return fit_modes(flow, boxes(inputs, (0,)), tolerance=1e-5)
 
 
-def enclosed(found: ModalModel, *, workers: int = 1) -> Enclosed:
+def enclosed(found: ModalModel, *, workers: int = 1, budget: float = 4000) -> Enclosed:
     """Bounds from poor first points, so that boxes improve them too."""
     d = len(found.boxes.names)
     optima = problems(np.arange(len(found.time)), len(found.outputs), d)
     optima.value[:] = optima.side * found.value_at(optima.point, optima.node, optima.output)
-    return BranchAndBound(1e-6).run(found, -np.ones(d), np.ones(d), optima, workers=workers)
+    return BranchAndBound(1e-6, budget).run(found, -np.ones(d), np.ones(d), optima, workers=workers)
 
 
 @pytest.mark.parametrize("ground", [None, PULSE])
@@ -99,7 +99,7 @@ def test_items_of_both_kernels_agree_code_by_code(ground, monkeypatch) -> None:
         return two
 
     monkeypatch.setattr(branch_and_bound, "examination", lambda: ("both", both))
-    enclosed(model(ground, tuple(INPUTS)))
+    enclosed(model(ground, tuple(INPUTS)), budget=200)
     codes = [np.concatenate([pair[k][0] for pair in seen]) for k in (0, 1)]
     values = [np.concatenate([pair[k][1] for pair in seen]) for k in (0, 1)]
     assert (codes[0] != codes[1]).mean() < 1e-3
