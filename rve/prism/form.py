@@ -15,7 +15,6 @@ import sys
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
 from types import ModuleType
@@ -30,6 +29,7 @@ from alphacut.rve.mesh import wedge
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.petsc import PETSc, block_values
 from alphacut.rve.solver.c_loops import WEDGES, c_loops, kernels
+from alphacut.rve.table.cache import version_of
 from alphacut.stochastic import RadiusMap, ThetaLaw
 from alphacut.stochastic.theta.law import Array
 
@@ -112,17 +112,25 @@ class PrismForm:
             weights = weights[own]
         else:
             weights = weights * (self._share if phase else 1 - self._share)
-        forces = self._forces[phase] = np.zeros((len(self.works), 3))
-        alone, elements = self.places is not None, np.empty((len(own), 30, 30))
-        places = None if self.places is None else self.places.ctypes
+        self._forces[phase] = np.zeros((len(self.works), 3))
+        if self.places is not None:
+            self._add(own, weights, phase, block_values(matrix), self.places.ctypes)
+            return
+        for first in range(0, len(own), 1000):
+            some = own[first : first + 1000]
+            elements = np.empty((len(some), 30, 30))
+            self._add(some, weights[first : first + 1000], phase, elements.ctypes, None)
+            for pairs, values in zip(self.pairs[some].astype(PETSc.IntType), elements, strict=True):
+                matrix.setValuesBlocked(pairs, pairs, values, addv=PETSc.InsertMode.ADD_VALUES)
+
+    def _add(
+        self, own: NDArray[np.int32], weights: Array, phase: int, values: object, places: object
+    ) -> None:
         c_loops(WEDGES).add_wedges(
             self._integral, self._traces.ctypes, self._heights.ctypes, len(own), own.ctypes,
             weights.ctypes, self._nodes.ctypes, self._constants[phase].ctypes, self._near.ctypes,
-            places, block_values(matrix) if alone else elements.ctypes, forces.ctypes,
+            places, values, self._forces[phase].ctypes,
         )  # fmt: skip
-        rows = self.pairs[own[: 0 if alone else None]].astype(PETSc.IntType)
-        for pairs, values in zip(rows, elements, strict=not alone):
-            matrix.setValuesBlocked(pairs, pairs, values, addv=PETSc.InsertMode.ADD_VALUES)
 
     def load(self, phase: int, strain: Array) -> Array:
         """Forces −⟨Bᵀ E ε̄⟩ of one phase for a unit modulus, on the unknowns of the wedges' levels.
@@ -140,20 +148,30 @@ def planar_integral() -> Callable[..., None]:
     """FFCx's integral over a triangle of a slice, made once for all runs."""
     names = ("fenics-dolfinx", "fenics-ffcx", "fenics-ufl", "fenics-basix")
     sources = [Path(str(file)).read_text(encoding="utf-8") for file in (__file__, wedge.__file__)]
-    parts = [*sources, *map(version, names), platform.machine(), str(sys.implementation.cache_tag)]
+    parts = [
+        *sources,
+        *map(version_of, names),
+        platform.machine(),
+        str(sys.implementation.cache_tag),
+    ]
     note = kernels() / f"form-{hashlib.sha256(repr(parts).encode()).hexdigest()[:16]}"
     try:
-        path, name = note.read_text(encoding="utf-8").split("\n")
-        found: Callable[..., None] = getattr(ctypes.CDLL(path), name)
-        return found
+        return _function(note.read_text(encoding="utf-8"))
     except (OSError, ValueError, AttributeError):
         made = Path(str(_compiled().__file__))
     source = made.with_name(made.name.partition(".")[0] + ".c").read_text(encoding="utf-8")
     name = source.partition("void tabulate_tensor_")[2].partition("(")[0]
-    partial = note.with_suffix(f".{os.getpid()}")
-    partial.write_text(f"{made}\ntabulate_tensor_{name}", encoding="utf-8")
+    place, partial = f"{made}\ntabulate_tensor_{name}", note.with_suffix(f".{os.getpid()}")
+    partial.write_text(place, encoding="utf-8")
     partial.replace(note)
-    return planar_integral()
+    return _function(place)
+
+
+def _function(place: str) -> Callable[..., None]:
+    """The function that a library's path and a name, one a line, tell."""
+    path, name = place.split("\n")
+    found: Callable[..., None] = getattr(ctypes.CDLL(path), name)
+    return found
 
 
 def _compiled() -> ModuleType:

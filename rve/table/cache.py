@@ -48,10 +48,11 @@ def _provenance() -> str:
     for pattern in _PROGRAMS:
         for path in sorted(here.glob(pattern)):
             code.update(path.read_bytes())
-    return f"{code.hexdigest()} {[f'{name} {_version(name)}' for name in _PACKAGES]}"
+    return f"{code.hexdigest()} {[f'{name} {version_of(name)}' for name in _PACKAGES]}"
 
 
-def _version(package: str) -> str:
+def version_of(package: str) -> str:
+    """The version of an installed package, or "none"."""
     try:
         return version(package)
     except PackageNotFoundError:
