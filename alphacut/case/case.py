@@ -207,14 +207,16 @@ class Case:
                 f": {door('microstructure', self.path)} --out particles makes it from the"
                 " particles, in particles/radius.toml"
             )
-        return BadInput(Problem(section, what, file=str(self.path)))
+        return BadInput.of(section, what, file=str(self.path))
+
+    def problem(self, key: str, what: str, allowed: str = "") -> Problem:
+        """The problem of a key, with the value that is written for it."""
+        value = self.written.get(key)
+        return Problem(key, what, "" if value is None else str(value), allowed)
 
     def refuse(self, key: str, what: str, allowed: str = "") -> BadInput:
         """The error for a key whose value cannot be used after all."""
-        value = self.written.get(key)
-        return BadInput(
-            self.located(Problem(key, what, "" if value is None else str(value), allowed))
-        )
+        return BadInput(self.located(self.problem(key, what, allowed)))
 
     def located(self, problem: Problem) -> Problem:
         """The problem with its file and line; a missing key points at its section."""

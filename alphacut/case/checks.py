@@ -103,10 +103,9 @@ def tolerances(case: Case) -> Iterator[Problem]:
     if forces_only(case):
         for key in ("envelope.tolerance", "envelope.certify"):
             if case.asked(key):
-                yield Problem(
+                yield case.problem(
                     key,
                     "this is a length, and no output is a displacement",
-                    str(case.written[key]),
                     "envelope.relative_tolerance, or an output such as q1 or drift1 besides",
                 )
     if case.sections.pendulum and case.asked("envelope.tolerance"):

@@ -101,7 +101,7 @@ def random_threshold(case: Case) -> Iterator[Problem]:
         yield Problem(key, "a random threshold parts two phases", allowed="one cell.threshold")
     if not given.threshold_deviation.support.lower > 0:
         what = "the deviation of a random threshold is positive"
-        yield Problem(key, what, str(case.written[key]), "no deviation for a crisp threshold")
+        yield case.problem(key, what, "no deviation for a crisp threshold")
     if given.boundary == "window":
         what = "a random threshold is for a periodic image"
         yield Problem(key, what, allowed='boundary = "periodic"')

@@ -67,34 +67,30 @@ def sphere_sizes(case: Case, spheres: PackedSpheres) -> Iterator[Problem]:
     yield from sizes(case, "spheres", spheres)
     for name in ("visible", "level"):
         if case.asked(f"{key}.{name}") and not spheres.circles:
-            yield Problem(
+            yield case.problem(
                 f"{key}.{name}",
                 "this has an effect on the circles of a section alone",
-                str(case.written[f"{key}.{name}"]),
                 f"beside {key}.circles",
             )
     small, large, seen = spheres.smallest_radius, spheres.largest_radius, spheres.visible
     if spheres.circles and small is not None and large is not None:
         if large > WIDEST * small:
-            yield Problem(
+            yield case.problem(
                 f"{key}.largest_radius",
                 f"this is {large / small:.3g} times the smallest, and cubes that hold both kinds"
                 " of spheres would take too many",
-                str(case.written[f"{key}.largest_radius"]),
                 f"at most {WIDEST} times the smallest radius",
             )
         if small == large:
-            yield Problem(
+            yield case.problem(
                 f"{key}.largest_radius",
                 "circles are of spheres between two radii, and these are the same",
-                str(case.written[f"{key}.largest_radius"]),
                 f"more than {key}.smallest_radius",
             )
         if seen is not None and seen >= small:
-            yield Problem(
+            yield case.problem(
                 f"{key}.visible",
                 "circles must be seen from below the smallest sphere's radius on",
-                str(case.written[f"{key}.visible"]),
                 f"less than {key}.smallest_radius",
             )
 
@@ -105,11 +101,8 @@ def sizes(case: Case, source: str, packing: Packing | PackedSpheres) -> Iterator
     low, high = (f"{key}.{end}_radius" for end in ("smallest", "largest"))
     ends = [name for name in (low, high) if case.asked(name)]
     if packing.file and ends:
-        yield Problem(
-            ends[0],
-            "the radii come from a file besides",
-            str(case.written[ends[0]]),
-            f"one of {key}.file and the two ends",
+        yield case.problem(
+            ends[0], "the radii come from a file besides", f"one of {key}.file and the two ends"
         )
     elif not packing.file:
         for name in (low, high):
@@ -121,9 +114,7 @@ def sizes(case: Case, source: str, packing: Packing | PackedSpheres) -> Iterator
                 )
     smallest, largest = packing.smallest_radius, packing.largest_radius
     if smallest is not None and largest is not None and smallest > largest:
-        yield Problem(
-            low, "the smallest radius is greater than the largest", str(case.written[low])
-        )
+        yield case.problem(low, "the smallest radius is greater than the largest")
 
 
 def radius(case: Case, alpha: float) -> Iterator[Problem]:
@@ -157,7 +148,7 @@ def radius(case: Case, alpha: float) -> Iterator[Problem]:
             family(values)
         except ValueError as error:
             key = guilty(family, values)
-            yield Problem(f"radius.{key}", str(error), str(case.written.get(f"radius.{key}", "")))
+            yield case.problem(f"radius.{key}", str(error))
             return
 
 
@@ -166,10 +157,9 @@ def radius_keys(case: Case) -> Iterator[Problem]:
     given = case.radius
     for name in ("a2", "a4"):
         if given.map != "hermite" and case.asked(f"radius.{name}"):
-            yield Problem(
+            yield case.problem(
                 f"radius.{name}",
                 f"map {given.map} has no such slope",
-                str(case.written[f"radius.{name}"]),
                 'radius.map = "hermite" beside it',
             )
     exponents = given.exponents
@@ -201,10 +191,9 @@ def sphere_model(case: Case) -> Iterator[Problem]:
         )
     own = "modulus.average" in case.changed or "cell.particles" not in case.changed
     if case.cell.particles == "spheres" and own and case.asked("modulus.average"):
-        yield Problem(
+        yield case.problem(
             "modulus.average",
             "E of spheres is Hill's isotropic average, and this has an effect on cylinders alone",
-            str(case.written["modulus.average"]),
             'beside cell.particles = "cylinders"',
         )
     if "microstructure" in case.stages and case.sections.microstructure:

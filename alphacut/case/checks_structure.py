@@ -31,11 +31,8 @@ def frame_stiffness(case: Case) -> Iterator[Problem]:
     stiff = given(case, "frame", "stiffness")
     for name in ("modulus", "second_moment", "columns") if stiff else ():
         if given(case, "frame", name):
-            yield Problem(
-                f"frame.{name}",
-                "there is a stiffness besides",
-                str(case.written[f"frame.{name}"]),
-                f"one of stiffness and {name}",
+            yield case.problem(
+                f"frame.{name}", "there is a stiffness besides", f"one of stiffness and {name}"
             )
     for name, what in MAKES.items():
         needed = not stiff or (name == "lengths" and case.frame.p_delta)
@@ -43,10 +40,9 @@ def frame_stiffness(case: Case) -> Iterator[Problem]:
             cure = "one for each floor, or for all" + ("" if stiff else "; or stiffness in N/m")
             yield Problem(f"frame.{name}", f"missing: {what}", allowed=cure)
     if stiff and (makers := [*({"modulus", "image"} & set(case.stages)), *case.stand_ins]):
-        yield Problem(
+        yield case.problem(
             "frame.stiffness",
             f"the frame makes no use of the modulus that {', '.join(sorted(makers))} gives",
-            str(case.written["frame.stiffness"]),
             'one of them; with stiffness, stages = ["envelope"]',
         )
 

@@ -46,11 +46,8 @@ def idle_envelope(case: Case) -> Iterator[Problem]:
         if not case.asked(key) or method in known:
             continue
         if key in case.changed or "envelope.method" not in case.changed:
-            yield Problem(
-                key,
-                f"method {method} has no such option",
-                str(case.written[key]),
-                f"beside method {', '.join(known)}",
+            yield case.problem(
+                key, f"method {method} has no such option", f"beside method {', '.join(known)}"
             )
 
 

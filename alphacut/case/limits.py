@@ -185,10 +185,10 @@ def field(case: Case) -> Iterator[Problem]:
     allowed = "one value for all storeys, with as much below its middle as above"
     if len(set(values)) > 1 or values[0].support.width == 0:
         what = "a field needs one fuzzy value, the same for all"
-        yield Problem(f"frame.{key}", what, str(case.written.get(f"frame.{key}", "")), allowed)
+        yield case.problem(f"frame.{key}", what, allowed)
     elif not symmetric(values[0]):
         what = "a field needs a symmetric fuzzy value"
-        yield Problem(f"frame.{key}", what, str(case.written.get(f"frame.{key}", "")), allowed)
+        yield case.problem(f"frame.{key}", what, allowed)
     if case.sections.update is not None and case.field.of in (x[0] for x in case.update.learn):
         yield Problem("update.learn", "these inputs are a field", case.field.of, "other inputs")
 

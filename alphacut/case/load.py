@@ -322,10 +322,8 @@ def contents(path: Path) -> str:
             FileNotFoundError: "there is no such file",
             IsADirectoryError: "this is a folder",
         }.get(type(error), error.strerror)
-        raise BadInput(
-            Problem(
-                str(path), f"{reason}", allowed=hint(path) or "a case file such as cases/paper.toml"
-            )
+        raise BadInput.of(
+            str(path), f"{reason}", allowed=hint(path) or "a case file such as cases/paper.toml"
         ) from None
     try:
         return data.decode("utf-8-sig")
@@ -333,14 +331,12 @@ def contents(path: Path) -> str:
         before = data[: error.start].decode("utf-8")
         line = before.count("\n") + 1
         key, _ = key_at(data.decode("utf-8", "replace"), line)
-        raise BadInput(
-            Problem(
-                key,
-                f"byte {data[error.start]:#04x} is not UTF-8",
-                allowed="text in UTF-8",
-                file=str(path),
-                line=line,
-            )
+        raise BadInput.of(
+            key,
+            f"byte {data[error.start]:#04x} is not UTF-8",
+            allowed="text in UTF-8",
+            file=str(path),
+            line=line,
         ) from None
 
 

@@ -27,8 +27,8 @@ def apply_changes(raw: Raw, changes: Sequence[str]) -> dict[str, str]:
     for change in changes:
         key = apply_change(raw, change)
         if key in made:
-            raise BadInput(
-                Problem(key, f"changed twice: {made[key]} and {change}", allowed="one of them")
+            raise BadInput.of(
+                key, f"changed twice: {made[key]} and {change}", allowed="one of them"
             )
         made[key] = change
     return made
@@ -45,8 +45,8 @@ def apply_change(raw: Raw, change: str) -> str:
         raise BadInput(no_key(name, change, raw))
     place = _place(raw, full)
     if place is None:
-        raise BadInput(
-            Problem("--set", f"the key {name} is not clear", change, "one of " + ", ".join(full))
+        raise BadInput.of(
+            "--set", f"the key {name} is not clear", change, "one of " + ", ".join(full)
         )
     section, _, key = place.rpartition(".")
     table = table_of(raw, section, make=True)
@@ -57,22 +57,15 @@ def apply_change(raw: Raw, change: str) -> str:
 
 def _require_sense(name: str, equals: str, change: str) -> None:
     if not equals:
-        raise BadInput(
-            Problem(
-                "--set",
-                "there is no = in it",
-                change,
-                "KEY=VALUE, for example cell.matrix_modulus='20 GPa'",
-            )
+        raise BadInput.of(
+            "--set",
+            "there is no = in it",
+            change,
+            "KEY=VALUE, for example cell.matrix_modulus='20 GPa'",
         )
     if re.match(r"study\b", name):
-        raise BadInput(
-            Problem(
-                "--set",
-                "a [[study]] is changed in the case file",
-                change,
-                "keys of the other sections",
-            )
+        raise BadInput.of(
+            "--set", "a [[study]] is changed in the case file", change, "keys of the other sections"
         )
 
 

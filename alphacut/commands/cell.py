@@ -14,7 +14,7 @@ from alphacut.case.sections.material import CELL_METHODS, SPHERE_METHODS
 from alphacut.commands import options as common
 from alphacut.export.material_card import check_format, export
 from alphacut.io.files import ranks, say
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput, Problem, refuse
 from alphacut.rve.anisotropy import ISOTROPIC_ENOUGH, shear_ratio_in_words
 from alphacut.rve.auto.model import ORDER
 from alphacut.rve.cell import STRAIN
@@ -61,9 +61,7 @@ def named_models(option: str, text: str) -> tuple[str, ...]:
     names = tuple(name.strip() for name in text.split(",") if name.strip())
     for name in names:
         if name not in CELL_METHODS:
-            raise BadInput(
-                Problem(option, f"there is no model {name}", text, ", ".join(CELL_METHODS))
-            )
+            raise BadInput.of(option, f"there is no model {name}", text, ", ".join(CELL_METHODS))
     return names
 
 
@@ -71,13 +69,8 @@ def named_pair(text: str) -> tuple[str, ...]:
     """The two models of ``--cross-check``; none if it is not asked for."""
     names = named_models("--cross-check", text)
     if text and (len(names) != 2 or len(set(names)) != 2):
-        raise BadInput(
-            Problem(
-                "--cross-check",
-                "this takes two different models",
-                text,
-                "for example series,slices",
-            )
+        raise BadInput.of(
+            "--cross-check", "this takes two different models", text, "for example series,slices"
         )
     return names
 
@@ -142,8 +135,7 @@ def require_effect(options: argparse.Namespace, case: Case, models: Sequence[str
     if options.stiffness and (options.export or "prism" not in models):
         beside = "--export, which solves it" if options.export else f"method {models[0]}"
         problems.append(Problem("--stiffness", f"this has no effect beside {beside}"))
-    if problems:
-        raise BadInput(problems)
+    refuse(problems)
     if options.cross_check:
         common.refuse_beside(options, "--cross-check", {"--best-effort": ""})
     elif options.best_effort:
@@ -177,7 +169,7 @@ def compared(case: Case, choice: cell.CellChoice, pair: Sequence[str]) -> tuple[
     if first.method == second.method:
         what = f"method auto takes {first.method} here, so both are one model"
         cure = f"auto with --exclude {first.method}, or two names of {', '.join(ORDER)}"
-        raise BadInput(Problem("--cross-check", what, ",".join(pair), cure))
+        raise BadInput.of("--cross-check", what, ",".join(pair), cure)
     return first, cross_check([first], [second], tolerance=case.modulus.tolerance)
 
 

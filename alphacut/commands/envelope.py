@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 
 import numpy as np
 
@@ -17,9 +17,12 @@ from alphacut.case.load import load
 from alphacut.case.sections.vibration import ENVELOPE_METHODS
 from alphacut.case.values import nearest
 from alphacut.commands import options as common
+from alphacut.frame import Envelope
+from alphacut.frame.exceedance import peaks
+from alphacut.frame.outputs import output_unit
 from alphacut.io.files import Document, say
 from alphacut.io.kept_arrays import KeptArrays
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput, Problem, refuse
 from alphacut.io.progress import progress
 from alphacut.io.provenance import fingerprint
 from alphacut.io.units import engineering, largest_by_unit
@@ -32,9 +35,6 @@ from alphacut.stages.vibration.envelope_task import EnvelopeTask, task_of
 from alphacut.stages.vibration.structure import Structure, structure
 from alphacut.stages.vibration.studies import cut_line, fixed_line, left_out
 from alphacut.stochastic.theta.truncated_normal import Array
-
-if TYPE_CHECKING:
-    from alphacut.frame import Envelope
 
 ABOUT = "envelopes of the structure's vibration on every α-cut"
 KEYS = {
@@ -166,8 +166,7 @@ def contradictions(options: argparse.Namespace, case: Case, task: EnvelopeTask) 
     if options.workers > 1 and task.certify is None:
         what = "this has no effect: only a proof is shared by processes"
         problems.append(Problem("--workers", what, str(options.workers), "with --certify"))
-    if problems:
-        raise BadInput(problems)
+    refuse(problems)
     if options.best_effort:
         require_choice(case, modulus=False, envelope=True)
 
@@ -184,15 +183,12 @@ def excluded(text: str) -> tuple[str, ...]:
     if set(names) == set(OF_AUTO):
         what = "no method is left for auto to take"
     if what:
-        raise BadInput(Problem("--exclude", what, text, " or ".join(OF_AUTO), close))
+        raise BadInput.of("--exclude", what, text, " or ".join(OF_AUTO), close)
     return names
 
 
 def summary(found: Envelope, tried: Array | None = None, *, own_gap: bool = False) -> str:
     """Extremes and fuzzy peaks at the lowest level as a small table."""
-    from alphacut.frame.exceedance import peaks
-    from alphacut.frame.outputs import output_unit
-
     of = peaks(found)
     units = [output_unit(name) for name in found.outputs]
     least = of.lower[0] if tried is None else tried
@@ -236,8 +232,6 @@ def unproved(found: Envelope) -> str:
 
 def beyond(error: float | None, output: str) -> str:
     """Words on how far a peak may lie outside its bounds."""
-    from alphacut.frame.outputs import output_unit
-
     if error is None:
         return ""
     return f", between nodes up to {engineering(error, output_unit(output), digits=2)} more"
@@ -245,8 +239,6 @@ def beyond(error: float | None, output: str) -> str:
 
 def error_in_words(found: Envelope) -> str:
     """The largest estimated error of each output; empty where none was estimated."""
-    from alphacut.frame.outputs import output_unit
-
     if found.error is None:
         return ""
     largest = zip(found.outputs, found.error.max((0, 1)), strict=True)
@@ -259,8 +251,6 @@ def error_in_words(found: Envelope) -> str:
 
 def proved(found: Envelope, *, own_gap: bool) -> str:
     """Line on the certificate; empty without one. `own_gap`: the program chose what gap to ask."""
-    from alphacut.frame.outputs import output_unit
-
     if found.proved_lower is not None and found.proved_upper is not None:
         ends = zip(
             found.outputs, found.proved_lower[0].min(0), found.proved_upper[0].max(0), strict=True

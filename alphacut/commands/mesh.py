@@ -12,7 +12,7 @@ from alphacut.case.idle import require_read
 from alphacut.case.load import load
 from alphacut.commands import options as common
 from alphacut.export.fields import cell_fields, check_ending, prism_mesh, sphere_mesh, write_mesh
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput
 from alphacut.stages.material.cell import modal_parts
 
 ABOUT = (
@@ -78,10 +78,10 @@ def require_effect(options: argparse.Namespace, case: Case, *, spheres: bool) ->
         BadInput: One problem for each.
     """
     if spheres and options.fields:
-        raise BadInput(Problem("--fields", "fields are those of cylinders, the case has spheres"))
+        raise BadInput.of("--fields", "fields are those of cylinders, the case has spheres")
     if options.radius is not None and not spheres and case.mesh.interface == "sign":
         what = "prisms that do not follow the interface take no radius"
-        raise BadInput(Problem("--radius", what, options.radius, "mesh.interface = conforming"))
+        raise BadInput.of("--radius", what, options.radius, "mesh.interface = conforming")
     # another kind of particles may need another method to be read at all
     chosen = ("cell.particles", "modulus.method") if "cell.particles" in case.changed else ()
     if spheres:

@@ -11,7 +11,7 @@ from alphacut.case.idle import require_read
 from alphacut.case.load import load
 from alphacut.commands.options import add_common, add_workers, answer, check_workers
 from alphacut.io.files import say
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput
 from alphacut.io.progress import progress
 from alphacut.io.provenance import attributes, door, fingerprint, versions
 from alphacut.stages.material import microstructure
@@ -39,9 +39,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     case = load(options.case, options.set)
     require_read(case, ("microstructure",), "microstructure")
     if options.no_figures and not options.out:
-        raise BadInput(
-            Problem("--no-figures", "there are none without --out", allowed="beside --out")
-        )
+        raise BadInput.of("--no-figures", "there are none without --out", allowed="beside --out")
     for remark in microstructure.dense_remark(case):
         say(f"warning: {remark}")
     with progress("Microstructure", quiet=options.quiet) as tick:

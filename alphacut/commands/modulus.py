@@ -15,7 +15,7 @@ from alphacut.commands import options as common
 from alphacut.commands.cell import named_models, remark
 from alphacut.fuzzy import Store
 from alphacut.io.files import Document, say
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput, refuse
 from alphacut.io.progress import progress
 from alphacut.io.provenance import door, fingerprint
 from alphacut.rve.auto.model import ORDER
@@ -95,8 +95,7 @@ def asked(options: argparse.Namespace) -> Case:
     common.check_workers(options.workers)
     case = load(options.case, common.changes(options, KEYS))
     require_read(case, READ, "modulus")
-    if problems := list(idle_mesh(case, (case.modulus.method,))):
-        raise BadInput(problems)
+    refuse(idle_mesh(case, (case.modulus.method,)))
     if options.explain:
         common.refuse_beside(options, "--explain", UNEXPLAINED)
     elif options.best_effort:
@@ -141,8 +140,8 @@ def store_of(options: argparse.Namespace, case: Case) -> Path | None:
         try:
             Store(path).close()
         except ValueError as error:
-            raise BadInput(
-                Problem("--store", str(error), str(path), "a new file, or a store of this program")
+            raise BadInput.of(
+                "--store", str(error), str(path), "a new file, or a store of this program"
             ) from None
     path.parent.mkdir(parents=True, exist_ok=True)
     return path

@@ -12,7 +12,7 @@ from alphacut.case.sections.material import CELL_METHODS
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io import quantity
 from alphacut.io.files import as_json, write_text
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput, Problem, refuse
 from alphacut.io.quantity import NUMBER
 
 
@@ -147,8 +147,7 @@ def refuse_beside(options: argparse.Namespace, first: str, others: Mapping[str, 
         if value not in (None, False, [], "") and str(value) != default:
             shown = "" if value is True else str(value)
             problems.append(Problem(name, f"this has no effect beside {first}", shown))
-    if problems:
-        raise BadInput(problems)
+    refuse(problems)
 
 
 def answer(
@@ -172,7 +171,7 @@ def answer(
 def check_workers(count: int) -> None:
     """At least one worker."""
     if count < 1:
-        raise BadInput(Problem("--workers", "out of range", str(count), "a whole number 1 or more"))
+        raise BadInput.of("--workers", "out of range", str(count), "a whole number 1 or more")
 
 
 def add_radius(parser: argparse.ArgumentParser) -> None:
@@ -196,14 +195,14 @@ def one_radius(options: argparse.Namespace) -> list[str]:
     refuse_beside(options, "--radius", {f"--{name}": "" for name in slopes})
     for change in options.set:
         if re.match(r"\s*(radius\.)?a[1-4]\s*=", change):
-            raise BadInput(Problem("--set", "this has no effect beside --radius", change))
+            raise BadInput.of("--set", "this has no effect beside --radius", change)
     try:
         inside = 0 < float(options.radius) < 1
     except ValueError:
         inside = False
     if not inside:
         allowed = "a number inside (0, 1), in halves of the cell's side"
-        raise BadInput(Problem("--radius", "out of range", options.radius, allowed))
+        raise BadInput.of("--radius", "out of range", options.radius, allowed)
     r = options.radius
     constant = [f"radius.a1={r}", "radius.a2=0", f"radius.a3={r}", "radius.a4=0"]
     return ["radius.map=hermite", *constant]
@@ -229,14 +228,9 @@ def given_modulus(text: str | None) -> FuzzyNumber | None:
     try:
         number = quantity.fuzzy(text, "Pa")
     except ValueError as error:
-        raise BadInput(
-            Problem(
-                "--modulus",
-                str(error),
-                text,
-                "a stress such as '[22.8, 24.8, 25.8] GPa', or FILE.nc",
-            )
+        raise BadInput.of(
+            "--modulus", str(error), text, "a stress such as '[22.8, 24.8, 25.8] GPa', or FILE.nc"
         ) from None
     if not number.support.lower > 0:
-        raise BadInput(Problem("--modulus", "out of range", text, "greater than 0"))
+        raise BadInput.of("--modulus", "out of range", text, "greater than 0")
     return number

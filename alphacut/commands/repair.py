@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TextIO
 
 from alphacut.fuzzy import Store
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput
 
 ABOUT = "drop what is damaged in a store of samples; the next run computes only that anew"
 
@@ -23,12 +23,12 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     """Repair and report."""
     path = Path(options.file)
     if not path.is_file():
-        raise BadInput(Problem("STORE", "there is no such file", str(path), "a store of samples"))
+        raise BadInput.of("STORE", "there is no such file", str(path), "a store of samples")
     try:
         with Store(path) as store:
             done = store.repair()
     except ValueError as error:
-        raise BadInput(Problem("STORE", str(error), str(path), "a store of samples")) from None
+        raise BadInput.of("STORE", str(error), str(path), "a store of samples") from None
     if not options.quiet:
         out.write(
             f"{done.kept} records are whole; {done.size} bytes at {done.places} places were"

@@ -16,10 +16,11 @@ from alphacut.case.quick import banner, quick, settings
 from alphacut.commands import options as common
 from alphacut.figures.captions import core, in_words
 from alphacut.figures.showing import Showing
+from alphacut.frame.outputs import output_unit
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.io.files import Document, as_json, say, write_text
 from alphacut.io.output_paths import unwritable
-from alphacut.io.problem import BadInput
+from alphacut.io.problem import BadInput, refuse
 from alphacut.io.provenance import door
 from alphacut.io.units import engineering, largest_by_unit
 from alphacut.stages import summary
@@ -130,8 +131,7 @@ def asked(options: argparse.Namespace) -> tuple[Case, Path]:
     require_effect(options, case)
     case = quick(case) if options.quick else case
     folder = folder_of(options)
-    if problems := list(unwritable("--out", folder, folder=True)):
-        raise BadInput(problems)
+    refuse(unwritable("--out", folder, folder=True))
     return case, folder
 
 
@@ -172,8 +172,8 @@ def require_effect(options: argparse.Namespace, case: Case) -> None:
     """
     computed = "modulus" in case.stages and not case.stand_ins
     models = (case.modulus.method,) if computed else ()
-    if computed and (problems := list(idle_mesh(case, models))):
-        raise BadInput(problems)
+    if computed:
+        refuse(idle_mesh(case, models))
     if options.quick:
         common.refuse_beside(options, "--quick", {"--best-effort": ""})
     if options.best_effort:
@@ -240,8 +240,6 @@ def image_lines(found: Document) -> Iterator[str]:
 
 def envelope_lines(name: str, study: Document) -> Iterator[str]:
     """Extremes of each output of a study; outputs of one unit have one prefix."""
-    from alphacut.frame.outputs import output_unit
-
     ends = [
         (output, output_unit(output), float(low), float(study["max"][output]))
         for output, low in study["min"].items()

@@ -12,7 +12,7 @@ import numpy as np
 from alphacut.commands.options import add_quiet, answer, with_unit
 from alphacut.io import quantity
 from alphacut.io.files import Document, write_text
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput
 from alphacut.stages.vibration.accelerogram import accelerogram
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -61,7 +61,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     try:
         found = [response_spectrum(ground, periods, ratio) for ratio in ratios]
     except ValueError as error:
-        raise BadInput(Problem("--shortest, --longest", str(error))) from None
+        raise BadInput.of("--shortest, --longest", str(error)) from None
     if options.out:
         write(found, Path(options.out))
     answer(options, document(found), out, table(found))
@@ -73,12 +73,10 @@ def wanted_periods(options: argparse.Namespace) -> Array:
     ends = [one(option, getattr(options, option[2:])) for option in ("--shortest", "--longest")]
     if not 2 <= options.count <= MOST:
         got = str(options.count)
-        raise BadInput(Problem("--count", "out of range", got, f"from 2 to {MOST}"))
+        raise BadInput.of("--count", "out of range", got, f"from 2 to {MOST}")
     if not 0 < ends[0] < ends[1]:
         got = f"{options.shortest} and {options.longest}"
-        raise BadInput(
-            Problem("--shortest, --longest", "out of range", got, "0 < shortest < longest")
-        )
+        raise BadInput.of("--shortest, --longest", "out of range", got, "0 < shortest < longest")
     return np.asarray(np.geomspace(ends[0], ends[1], options.count))
 
 
@@ -87,7 +85,7 @@ def one(option: str, text: str) -> float:
     try:
         return quantity.number(with_unit(text, "s"), "s")
     except ValueError as error:
-        raise BadInput(Problem(option, str(error), text, 'a time, as "0.05 s"')) from None
+        raise BadInput.of(option, str(error), text, 'a time, as "0.05 s"') from None
 
 
 def wanted_ratios(text: str) -> list[float]:
@@ -96,11 +94,11 @@ def wanted_ratios(text: str) -> list[float]:
     try:
         found = [quantity.number(part, "") for part in text.split(",")]
     except ValueError as error:
-        raise BadInput(Problem("--damping", str(error), text, allowed)) from None
+        raise BadInput.of("--damping", str(error), text, allowed) from None
     if not all(0 <= ratio < 1 for ratio in found):
-        raise BadInput(Problem("--damping", "out of range", text, allowed))
+        raise BadInput.of("--damping", "out of range", text, allowed)
     if len(set(found)) < len(found):
-        raise BadInput(Problem("--damping", "a ratio stands there twice", text, allowed))
+        raise BadInput.of("--damping", "a ratio stands there twice", text, allowed)
     return found
 
 

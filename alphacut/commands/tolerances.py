@@ -9,7 +9,8 @@ from typing import TextIO
 from alphacut.case.idle import require_read
 from alphacut.case.load import load
 from alphacut.commands import options as common
-from alphacut.io.problem import BadInput, Problem
+from alphacut.frame.outputs import output_unit
+from alphacut.io.problem import BadInput
 from alphacut.io.progress import progress
 from alphacut.io.units import engineering
 from alphacut.stages.material.modulus import stand_in
@@ -42,7 +43,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     """Compute and report."""
     common.check_workers(options.workers)
     if not options.most > 0:
-        raise BadInput(Problem("--most", "out of range", f"{options.most:g}", "greater than 0"))
+        raise BadInput.of("--most", "out of range", f"{options.most:g}", "greater than 0")
     case = load(options.case, common.changes(options, KEYS))
     require_read(case, READ, "tolerances")
     handed = common.given_modulus(options.modulus) or stand_in(case)
@@ -54,8 +55,6 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
 
 def text(found: Tolerances) -> str:
     """The safe scale, the safe intervals and the witness, with their units, a line each."""
-    from alphacut.frame.outputs import output_unit
-
     scale = found.found
     kept = [
         f"|{name}| <= {engineering(limit, output_unit(name))}"

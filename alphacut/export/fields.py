@@ -9,7 +9,7 @@ import numpy as np
 
 from alphacut.case.case import Case
 from alphacut.io.files import whole_file
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput
 from alphacut.rve.cell import LOADS, Phase
 from alphacut.stages.material.cell import modal_parts
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -76,7 +76,7 @@ def sphere_mesh(case: Case, radius: float) -> meshio.Mesh:
     try:
         points, cells, inside = whole_cell(radius, size=case.mesh.size)
     except TouchingError as error:
-        raise BadInput(Problem("radius", str(error))) from None
+        raise BadInput.of("radius", str(error)) from None
     phase = inside.astype(np.int64)
     return meshio.Mesh(points, [("tetra10", cells[:, TETRAHEDRON])], cell_data={"phase": [phase]})
 
@@ -96,7 +96,7 @@ def check_ending(path: Path, *, fields: bool = False) -> None:
         if path.suffix in FORMATS
         else "this ending names no format that holds quadratic elements and phases"
     )
-    raise BadInput(Problem("--out", lacks, str(path), ", ".join(allowed)))
+    raise BadInput.of("--out", lacks, str(path), ", ".join(allowed))
 
 
 def write_mesh(mesh: meshio.Mesh, path: Path) -> None:
@@ -183,14 +183,12 @@ def require_conforming(case: Case) -> None:
         BadInput: It does not.
     """
     if case.mesh.interface != "conforming":
-        raise BadInput(
-            Problem(
-                "mesh.interface",
-                "mesh.interface",
-                "fields need a mesh that follows the interface",
-                case.mesh.interface,
-                "conforming",
-            )
+        raise BadInput.of(
+            "mesh.interface",
+            "mesh.interface",
+            "fields need a mesh that follows the interface",
+            case.mesh.interface,
+            "conforming",
         )
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.io.files import as_json, write_text
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput
 from alphacut.rve.anisotropy import AveragedPlane, shear_ratio, shear_ratio_in_words
 from alphacut.rve.fibre_constants import CONSTANTS, FibreConstants, fibre_constants
 from alphacut.rve.result import error_of_means, error_of_ratio, error_of_stiffness
@@ -219,7 +219,7 @@ def check_format(path: str) -> None:
     """Refuse an ending that names no format, before anything is computed."""
     if Path(path).suffix not in FORMATS:
         allowed = ".inp (Abaqus, CalculiX), .comm (Code_Aster), .mac (Ansys), .json"
-        raise BadInput(Problem("--export", "this ending names no format", path, allowed))
+        raise BadInput.of("--export", "this ending names no format", path, allowed)
 
 
 def export(result: Homogenised, path: str) -> None:

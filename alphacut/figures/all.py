@@ -20,6 +20,7 @@ from alphacut.figures import radius as figure_radius
 from alphacut.figures import shares as figure_shares
 from alphacut.figures.mesh import draw_mesh
 from alphacut.figures.style import save, style
+from alphacut.frame.structures.field_frame import FieldFrame
 from alphacut.fuzzy.campaign.workers import submitted
 from alphacut.io.files import as_json, write_text
 from alphacut.io.progress import Tick, progress
@@ -76,8 +77,6 @@ def material_drawings(results: Results) -> Iterator[Drawing]:
 
 def structure_drawings(results: Results) -> Iterator[Drawing]:
     """The structure whose envelopes were computed, and its record."""
-    from alphacut.frame.structures.field_frame import FieldFrame
-
     structure = results.structure
     if results.envelopes and results.case.sections.frame:
         yield "fig26-frame", lambda: figure_frame.frame(results.case)

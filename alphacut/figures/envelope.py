@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.figures import style as look
+from alphacut.frame.dynamics.response_spectrum import ResponseSpectrum
+from alphacut.frame.outputs import output_unit, output_words
+from alphacut.frame.structures.linear import Accelerogram
 from alphacut.io.units import MINUS, axis_prefix, engineering
 from alphacut.stages.vibration.exceedance import event_unit, event_words
 from alphacut.stages.vibration.studies import Study
@@ -17,9 +20,6 @@ from alphacut.stages.vibration.studies import Study
 if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
-
-    from alphacut.frame.dynamics.response_spectrum import ResponseSpectrum
-    from alphacut.frame.structures.linear import Accelerogram
 
 
 WORDS = {
@@ -56,8 +56,6 @@ def drawings(study: Study, dataset: xarray.Dataset) -> Iterator[tuple[str, Calla
 
 def envelope(dataset: xarray.Dataset, output: str, study: Study) -> Figure:
     """Nested bands between lower and upper envelope, and the modal trajectory."""
-    from alphacut.frame.outputs import output_unit, output_words
-
     drawn, axes = look.figure(7.2, 3.6)
     shown = dataset.sel(output=output)
     alpha, time = dataset["alpha"].values, dataset["time"].values

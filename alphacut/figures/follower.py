@@ -5,14 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from alphacut.figures.style import BLUE, GREY, INK, ORANGE, prefix_axis
+from alphacut.frame.boxes import UnitFlow, boxes
+from alphacut.frame.methods.follower_record import FollowerRecord, record_flow
+from alphacut.frame.outputs import output_unit
 from alphacut.stages.pipeline import Results
 from alphacut.stages.vibration.studies import Study
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from alphacut.frame.methods.follower_record import FollowerRecord
 
 DURATION = 5.0  # s
 TITLES = (
@@ -27,8 +28,6 @@ TITLES = (
 def follower(results: Results, study: Study) -> Figure:
     """Five panels: from the first guess to the envelope, for one output at the lowest level."""
     import matplotlib.pyplot as plt
-
-    from alphacut.frame.outputs import output_unit
 
     found, output = recorded(results, study)
     drawn, named = plt.subplot_mosaic("12;34;55", figsize=(8.4, 8.4), sharex=True, sharey=True)
@@ -84,9 +83,6 @@ def base(
 
 def recorded(results: Results, study: Study) -> tuple[FollowerRecord, str]:
     """A run of the Graph Follower that keeps every step, and the output it followed."""
-    from alphacut.frame.boxes import UnitFlow, boxes
-    from alphacut.frame.methods.follower_record import record_flow
-
     wanted = results.structure
     assert wanted is not None
     cuts = boxes(wanted.inputs(study.task.fuzzy), (0.0,))

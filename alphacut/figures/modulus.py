@@ -8,6 +8,7 @@ import numpy as np
 
 from alphacut.case.case import Case
 from alphacut.figures import style as look
+from alphacut.frame.outputs import output_unit
 from alphacut.stages.material.cell import GPA
 from alphacut.stages.material.modulus import AVERAGE
 from alphacut.stages.pipeline import Results
@@ -137,8 +138,6 @@ def membership(dataset: xarray.Dataset) -> Figure:
 
 def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figure:
     """Fig. 20: trajectories for parameters inside an α-cut, and the envelope that encloses them."""
-    from alphacut.frame.outputs import output_unit
-
     study = next((s for s in results.studies if len(s.task.fuzzy) > 1), results.studies[0])
     dataset = results.envelopes[study.name].isel(alpha=0)
     output = str(dataset["output"].values[-1 if "q" in str(dataset["output"].values[-1]) else 0])

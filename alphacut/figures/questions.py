@@ -18,9 +18,11 @@ from alphacut.figures.style import (
     figure,
     prefix_axis,
 )
+from alphacut.frame.outputs import output_unit
 from alphacut.io.files import Document
 from alphacut.io.units import MINUS, axis_prefix
 from alphacut.stages.vibration.decision import degree
+from alphacut.stages.vibration.update import prior_support
 
 if TYPE_CHECKING:
     import xarray
@@ -110,8 +112,6 @@ def gains(found: Document) -> Figure:
 
 def bands(dataset: xarray.Dataset, output: str) -> Figure:
     """Envelope with the priors and with what was learned, at the lowest level."""
-    from alphacut.frame.outputs import output_unit
-
     drawn, axes = figure(7.2, 3.6)
     shown, time = dataset.sel(output=output).isel(alpha=0), dataset["time"].values
     for knowledge, colour, words in (("prior", GREY, "before"), ("posterior", BLUE, "after")):
@@ -136,8 +136,6 @@ def bands(dataset: xarray.Dataset, output: str) -> Figure:
 
 def boxes(learned: Learned) -> Figure:
     """Each input's interval at every level over that of its prior, as shares of its modal value."""
-    from alphacut.stages.vibration.update import prior_support
-
     found = learned.posterior
     assert found is not None
     drawn, axes = figure(7.2, 0.9 + 0.32 * len(found.names))

@@ -9,6 +9,7 @@ import numpy as np
 from alphacut.figures.captions import in_words
 from alphacut.figures.envelope import WORDS
 from alphacut.figures.style import BLUE, GREY, ORANGE, PURPLE, prefix_axis
+from alphacut.frame.outputs import output_unit
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
@@ -59,8 +60,6 @@ def _legend_below(drawn: Figure, axes: Axes) -> None:
 
 def panel(axes: Axes, found: xarray.Dataset, output: str) -> None:
     """The shares in one output's width."""
-    from alphacut.frame.outputs import output_unit
-
     time, width = found["time"].values, found["width"].values
     behind = axes.twinx()
     behind.fill_between(time, 0, width, color="#d9d9d9", lw=0)

@@ -77,7 +77,7 @@ class CsvFile:
 
     def unreadable(self, what: str, allowed: str) -> BadInput:
         """The error of the file as a whole."""
-        return BadInput(Problem(self.key, what, str(self.path), allowed))
+        return BadInput.of(self.key, what, str(self.path), allowed)
 
     def refuse(self, line: int, what: str, value: str = "", allowed: str = "") -> BadInput:
         """The error of one line."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from alphacut.io.files import Document
 from alphacut.io.output_paths import hint
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput
 from alphacut.io.provenance import FORMAT, door, own_version
 
 NEEDED = ("case", "title", "case_text", "command", "versions", "seconds")  # of summary.json
@@ -34,12 +34,10 @@ def require_known(version: object, path: Path, *, key: str, maker: str = "") -> 
         return
     whole = int(str(version)) if str(version).isdecimal() else 0
     if whole < 1:
-        raise BadInput(
-            Problem(
-                key,
-                f"{path} tells no version of its format: {version}",
-                allowed="format_version 1 or more",
-            )
+        raise BadInput.of(
+            key,
+            f"{path} tells no version of its format: {version}",
+            allowed="format_version 1 or more",
         )
     if whole > FORMAT:
         made = f", written by {maker}" if maker else ""
@@ -47,12 +45,10 @@ def require_known(version: object, path: Path, *, key: str, maker: str = "") -> 
             f"install that version, or make the file anew with this one, {own_version()}, by"
             f" {door('run', 'CASE.toml', '--fresh')}"
         )
-        raise BadInput(
-            Problem(
-                key,
-                f"{path} has format {whole}{made}; this program reads formats up to {FORMAT}",
-                allowed=cure,
-            )
+        raise BadInput.of(
+            key,
+            f"{path} has format {whole}{made}; this program reads formats up to {FORMAT}",
+            allowed=cure,
         )
 
 
@@ -66,13 +62,13 @@ def read_dataset(path: Path | str, *, key: str = "file") -> xarray.Dataset:
 
     path = Path(path)
     if not path.is_file():
-        raise BadInput(Problem(key, "there is no such file", str(path), hint(path)))
+        raise BadInput.of(key, "there is no such file", str(path), hint(path))
     try:
         found = xarray.load_dataset(path)
     except (OSError, ValueError) as error:
         what = "this is no NetCDF file, or a damaged one"
-        raise BadInput(
-            Problem(key, what, str(path), "a file of this program, such as modulus.nc of a run")
+        raise BadInput.of(
+            key, what, str(path), "a file of this program, such as modulus.nc of a run"
         ) from error
     version = found.attrs.get("format_version")
     require_known(
@@ -94,12 +90,10 @@ def upgraded(found: xarray.Dataset) -> xarray.Dataset:
 
 def damaged(path: Path, why: str) -> BadInput:
     """The error for a summary that cannot be used."""
-    return BadInput(
-        Problem(
-            str(path),
-            f"this file is damaged: {why}",
-            allowed=f"make it anew: {door('run')} CASE.toml keeps what is computed",
-        )
+    return BadInput.of(
+        str(path),
+        f"this file is damaged: {why}",
+        allowed=f"make it anew: {door('run')} CASE.toml keeps what is computed",
     )
 
 
@@ -123,7 +117,7 @@ def read_summary(folder: Path) -> Document:
         if kept:
             what = f"the run here has not ended: summary.json is missing, and there are {kept}"
             allowed = f"the end of that run, by {door('run')} CASE.toml --out {quote(str(folder))}"
-        raise BadInput(Problem(str(folder), what, allowed=allowed))
+        raise BadInput.of(str(folder), what, allowed=allowed)
     try:
         found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:

@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import Problem, refuse
 
 INSIDE = (
     "inside ./enter only the project, the current folder, home and the temporary folder are visible"
@@ -38,8 +38,7 @@ def check_destinations(parser: argparse.ArgumentParser, options: argparse.Namesp
             option, kind = action.option_strings[-1], str(action.metavar)
             place = list(unwritable(option, Path(given), folder=kind == "FOLDER"))
             problems += place or unknown_ending(option, kind, given)
-    if problems:
-        raise BadInput(problems)
+    refuse(problems)
 
 
 def unknown_ending(option: str, kind: str, given: str) -> Iterator[Problem]:

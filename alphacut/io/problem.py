@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,31 @@ class BadInput(Exception):  # noqa: N818 - it names the input, not the program, 
     def __init__(self, problems: Problem | Sequence[Problem]) -> None:
         self.problems = (problems,) if isinstance(problems, Problem) else tuple(problems)
         super().__init__("\n".join(map(str, self.problems)))
+
+    @classmethod
+    def of(
+        cls,
+        key: str,
+        what: str,
+        value: str = "",
+        allowed: str = "",
+        nearest: str = "",
+        *,
+        file: str = "",
+        line: int = 0,
+    ) -> Self:
+        """The error of one problem, from its fields."""
+        return cls(Problem(key, what, value, allowed, nearest, file, line))
+
+
+def refuse(problems: Iterable[Problem]) -> None:
+    """Raise the problems, where there are any.
+
+    Raises:
+        BadInput: There are.
+    """
+    if found := tuple(problems):
+        raise BadInput(found)
 
 
 EXTRAS = {"skimage": "particles", "gmsh": "mesh", "meshio": "mesh", "h5py": "mesh"}

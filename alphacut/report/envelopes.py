@@ -11,8 +11,9 @@ import numpy as np
 from markupsafe import Markup
 
 from alphacut.figures.captions import caption
+from alphacut.frame.outputs import output_unit
 from alphacut.io.files import Document
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput
 from alphacut.io.provenance import door
 from alphacut.io.units import engineering, largest_by_unit
 from alphacut.report.figures import picture
@@ -52,8 +53,6 @@ def envelopes(summary: Document, exceedance: Markup) -> Markup:
 
 def extremes(studies: Document) -> list[tuple[str, ...]]:
     """Least and greatest value of each output, and the error where one was estimated."""
-    from alphacut.frame.outputs import output_unit
-
     each = [
         (name, study, output, output_unit(output))
         for name, study in studies.items()
@@ -95,8 +94,6 @@ def natural(summary: Document) -> Markup:
 
 def peaks(summary: Document) -> Markup:
     """Fuzzy peaks of every study, and the fuzzy probability of exceeding the case's limit."""
-    from alphacut.frame.outputs import output_unit
-
     each = [
         (name, output, output_unit(output), of)
         for name, study in summary["envelopes"].items()
@@ -182,7 +179,7 @@ def spectrum(folder: Path) -> Markup:
         values = np.array(rows).reshape(-1, len(np.unique(np.array(rows)[:, 1])), len(COLUMNS))
     except (OSError, ValueError, KeyError, TypeError, IndexError):
         cure = f"the file of `{door('spectrum', 'RECORD.csv', '--out', folder)}`, or none"
-        raise BadInput(Problem("FOLDER", "this is no response spectrum", str(path), cure)) from None
+        raise BadInput.of("FOLDER", "this is no response spectrum", str(path), cure) from None
     ratios = [f"{100 * one[0, 0]:.3g} %" for one in values]
     periods = values[0, :, 1]
     places = np.unique(np.linspace(0, len(periods) - 1, ROWS).round().astype(int))

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from markupsafe import Markup
 
 from alphacut.figures.captions import core
+from alphacut.frame.outputs import output_unit
 from alphacut.io.files import Document
 from alphacut.io.units import engineering, largest_by_unit
 from alphacut.report import envelopes
@@ -90,8 +91,6 @@ def between(lower: float, upper: float) -> str:
 
 def peaks(summary: Document) -> Iterator[Line]:
     """Largest magnitude of each output of the study with the most fuzzy inputs."""
-    from alphacut.frame.outputs import output_unit
-
     studies = summary.get("envelopes", {})
     if not studies:
         return

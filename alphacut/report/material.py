@@ -7,6 +7,7 @@ from markupsafe import Markup
 from alphacut.figures.captions import core, in_words
 from alphacut.io.files import Document
 from alphacut.report.tables import code, paragraphs, section, sentence, table
+from alphacut.rve.anisotropy import shear_ratio_in_words
 from alphacut.stages.image.document import interval, own_of_window
 from alphacut.stages.material import response
 from alphacut.stages.material.micrograph import compared
@@ -172,8 +173,6 @@ def random_threshold(found: Document) -> Markup:
 
 def isotropy(found: Document) -> str:
     """Sentence on the array's anisotropy; empty where it was not computed."""
-    from alphacut.rve.anisotropy import shear_ratio_in_words
-
     return (
         sentence(shear_ratio_in_words(float(found["shear_ratio"]), meaning(found)))
         if found.get("shear_ratio") is not None

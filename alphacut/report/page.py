@@ -12,6 +12,7 @@ import numpy as np
 from markupsafe import Markup, escape
 
 from alphacut.case.quick import banner
+from alphacut.frame.outputs import output_unit
 from alphacut.io.files import Document
 from alphacut.io.netcdf import damaged, read_dataset, read_summary
 from alphacut.report.glossary import explained
@@ -75,8 +76,6 @@ def plots(summary: Document, folder: Path) -> list[Document]:
 
 def plot(name: str, study: Document, dataset: xarray.Dataset) -> Document:
     """One study: lower and upper bounds by level and output, in base64."""
-    from alphacut.frame.outputs import output_unit
-
     time = dataset["time"].values
     bounds = {
         side: dataset[side].transpose("alpha", "output", "time").values

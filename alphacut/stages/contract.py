@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from alphacut.case.case import Case
 from alphacut.case.limits import asked_tolerance, by_auto
 from alphacut.io.files import say
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput
 
 STEERED = ("auto", "table", "series")
 """Models of the cell that a tolerance always steers."""
@@ -79,10 +79,8 @@ def require_choice(case: Case, *, modulus: bool, envelope: bool) -> None:
     own = envelope and (asked_tolerance(case) is not None or case.envelope.certify is not None)
     own = own and (case.envelope.method != "auto" or case.envelope.certify is not None)
     if not fixed and not own:
-        raise BadInput(
-            Problem(
-                "--best-effort",
-                "no tolerance can be missed here",
-                allowed="beside a tolerance and a method of a named resolution",
-            )
+        raise BadInput.of(
+            "--best-effort",
+            "no tolerance can be missed here",
+            allowed="beside a tolerance and a method of a named resolution",
         )

@@ -12,7 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from alphacut import frame
 from alphacut.case.case import Case
+from alphacut.frame.outputs import output_unit
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval
 from alphacut.fuzzy.decisions.measure_next import Advice, Answer, advice
 from alphacut.fuzzy.knowledge.joint import joined_once
@@ -49,13 +51,13 @@ def measure_next(
     cell = campaign(case) if handed is None and "modulus" in case.stages else None
     if "envelope" not in case.stages:
         if cell is None or output is not None:
-            raise BadInput(Problem("stages", "there is no envelope", allowed="stage envelope"))
+            raise BadInput.of("stages", "there is no envelope", allowed="stage envelope")
         return "E", 0.0, _advice(lambda x: _moduli(cell, x), cell.inputs, 0.0, progress), []
     wanted, task = structure(case, handed or _expected(case, cell)), task_of(case)
     if case.sections.update is not None:
         wanted = learned(case, wanted).structure
     if wanted.linear is None:
-        raise BadInput(Problem("pendulum", "widths are compared for linear structures"))
+        raise BadInput.of("pendulum", "widths are compared for linear structures")
     column = _column(case, wanted, output)
     inputs, of_cell = wanted.inputs(task.fuzzy), dict(cell.inputs) if cell else {}
     if cell is not None and "E" in inputs:
@@ -108,8 +110,6 @@ def _width(
     every: float,
 ) -> tuple[float, float]:
     """Mean width of an output's envelope at nodes every so many seconds, and its error."""
-    from alphacut import frame
-
     assert wanted.linear is not None
     if all(isinstance(number, Crisp) for number in inputs.values()):
         return 0.0, 0.0
@@ -147,8 +147,6 @@ def _advice(
 
 def advice_document(found: Advice, answer: str, fixed: Sequence[str] = ()) -> Document:
     """The advice as it is printed with ``--json``; gains as shares of the width."""
-    from alphacut.frame.outputs import output_unit
-
     unit = 1 / found.width if found.width > 0 else 0.0
     return {
         "answer": answer,

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from alphacut.case.case import Case
 from alphacut.case.names import named_inputs
+from alphacut.frame import Accelerogram
+from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import FuzzyNumber, Interval, Triangular
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput, Problem, refuse
 from alphacut.io.units import STANDARD_GRAVITY, engineering
 from alphacut.stages import plausible
 from alphacut.stages.image.phases import contradicted
@@ -30,9 +31,6 @@ from alphacut.stages.vibration.resolution_checks import (
 )
 from alphacut.stages.vibration.structure import Structure, structure
 from alphacut.stages.vibration.studies import fixed_line, left_out, studies
-
-if TYPE_CHECKING:
-    from alphacut.frame import Accelerogram
 
 FINE = 0.005  # rad of the fastest mode in a step, below which a step is needlessly short
 MANY_STEPS = 50_000  # fewer cost little
@@ -72,15 +70,12 @@ def ready(case: Case) -> Readiness:
         if "modulus" in case.stages and (given := ", ".join(case.stand_ins)):
             what = f"there is nothing to compute: {given} stands in for stage modulus"
             cure = 'stages = ["modulus", "envelope"], with a structure'
-            raise BadInput(Problem("stages", what, str(list(case.stages)), cure))
+            raise BadInput.of("stages", what, str(list(case.stages)), cure)
         return Readiness((*shape(case), *dense, *plausible.unlikely_material(case)))
-    if problems := list(lacking(case)):
-        raise BadInput(problems)
+    refuse(lacking(case))
     wanted = structure(case, stand_in or expected(case))
-    if problems := [*crisp_names(case, wanted)] or [*unlearned(case, wanted)]:
-        raise BadInput(problems)
-    if problems := [*unprovable(case, wanted)]:
-        raise BadInput(problems)
+    refuse([*crisp_names(case, wanted)] or [*unlearned(case, wanted)])
+    refuse([*unprovable(case, wanted)])
     update.require_readable(case, wanted.frame)
     period = first_period(wanted)
     ground = None if wanted.linear is None else wanted.linear.ground
@@ -122,8 +117,6 @@ def coarse(case: Case, wanted: Structure, slips: Iterable[str]) -> tuple[Problem
 
 def fine_steps(case: Case, wanted: Structure) -> Iterator[str]:
     """A remark on a step that is far shorter than the fastest mode needs."""
-    from alphacut.frame.structures.linear import frequencies
-
     if wanted.linear is None:
         return
     step, fastest = case.envelope.step, float(frequencies(wanted.linear)[-1])
@@ -157,8 +150,6 @@ def shape(case: Case) -> Iterator[str]:
 
 def first_period(wanted: Structure) -> float | None:
     """First natural period of a linear structure, in s: a wrong unit shows there at once."""
-    from alphacut.frame.structures.linear import frequencies
-
     return None if wanted.linear is None else 2 * math.pi / float(frequencies(wanted.linear)[0])
 
 

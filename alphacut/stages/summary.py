@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alphacut.case.case import Case
+from alphacut.frame import StoreyFrame
+from alphacut.frame.structures.linear import LinearSystem, frequencies
 from alphacut.io.files import Document
 from alphacut.io.provenance import FORMAT, command, versions
 from alphacut.rve.spheres.result import volume_fraction
@@ -27,8 +29,6 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     import xarray
-
-    from alphacut.frame.structures.linear import LinearSystem
 
 Row = dict[str, Any]
 # attributes of an envelope
@@ -201,8 +201,6 @@ def given(results: Results) -> Row:
 
 def structure_numbers(results: Results) -> Document:
     """The structure in words, and natural frequencies at the modal values where it has any."""
-    from alphacut.frame.structures.linear import frequencies
-
     wanted = results.structure
     assert wanted is not None
     words = {"words": structure_words(results.case, wanted)}
@@ -221,8 +219,6 @@ def structure_numbers(results: Results) -> Document:
 
 def counted(model: LinearSystem) -> int:
     """Parameters of the structure, as the paper counts them: initial conditions included."""
-    from alphacut.frame import StoreyFrame
-
     left_out: set[str] = set()
     if isinstance(model, StoreyFrame):
         each = (f"{name}{floor + 1}" for name in "cI" for floor in range(model.floors))

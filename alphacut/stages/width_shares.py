@@ -14,8 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from alphacut import frame
 from alphacut.case.case import Case
+from alphacut.frame import Envelope
+from alphacut.frame.structures.linear import LinearSystem
+from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy import Crisp, FuzzyNumber, Reduced, propagate
+from alphacut.fuzzy.width_contributions import width_shares
 from alphacut.io.files import Document, say
 from alphacut.io.progress import Tick
 from alphacut.stages.material.campaign import Campaign, campaign
@@ -28,8 +33,6 @@ from alphacut.stochastic.theta.truncated_normal import Array
 if TYPE_CHECKING:
     import xarray
 
-    from alphacut.frame import Envelope
-    from alphacut.frame.structures.linear import LinearSystem
     from alphacut.fuzzy.width_contributions import Shares
 
 
@@ -38,8 +41,6 @@ OF_CELL = ("E", "nu")
 
 def modulus_shares(case: Case, progress: Tick | None = None) -> Shares:
     """Shares of the cell's fuzzy inputs in the widths of E and ν, shape (inputs, levels, 2)."""
-    from alphacut.fuzzy.width_contributions import width_shares
-
     wanted = campaign(case)
     return width_shares(
         lambda inputs: cell_range(wanted, inputs, wanted.alpha),
@@ -90,9 +91,6 @@ def envelope_shares(
     Raises:
         ModalError: The modal method cannot treat the structure.
     """
-    from alphacut import frame
-    from alphacut.fuzzy.width_contributions import width_shares
-
     wanted = results.structure
     assert wanted is not None
     assert wanted.linear is not None
@@ -146,8 +144,6 @@ ACCURACY = 1e-2  # wanted error of the envelopes, of each peak: shares need two 
 
 def explained(wanted: Structure, task: EnvelopeTask) -> list[str]:
     """A line on what the shares of a study cost; none where there are none."""
-    from alphacut import frame
-
     if wanted.linear is None or len(task.fuzzy) < 2:
         return []
     given = {"inputs": wanted.inputs(task.fuzzy), **asked(task, wanted.linear)}
@@ -164,8 +160,6 @@ def explained(wanted: Structure, task: EnvelopeTask) -> list[str]:
 def dataset(results: Results, progress: Tick | None = None) -> xarray.Dataset:
     """Shares of every input, by level and by time, where there are two or more."""
     import xarray
-
-    from alphacut.frame.structures.modes import ModalError
 
     variables: dict[str, Any] = {}
     notes: list[str] = []

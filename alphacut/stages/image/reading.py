@@ -95,7 +95,7 @@ def _solver(accuracy: float, petsc: Mapping[str, str]) -> Solver:
     except ImportError:
         what = "PETSc is not installed"
         allowed = "no option of PETSc, or python3-petsc4py-real"
-        raise BadInput(Problem(f"-rve_{min(petsc)}", what, allowed=allowed)) from None
+        raise BadInput.of(f"-rve_{min(petsc)}", what, allowed=allowed) from None
     return PetscSolver(accuracy, petsc)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from alphacut.case.case import Case
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import Document
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput
 from alphacut.io.provenance import versions
 from alphacut.rve.anisotropy import directional_shear, directional_young, shear_ratio
 from alphacut.rve.cell import Phase
@@ -142,7 +142,7 @@ def cell_choice(
     method, mesh = case.modulus.method, case.mesh
     if exclude and method != "auto":
         what = f"the method is {method}, and only method auto leaves a choice"
-        raise BadInput(Problem("--exclude", what, ", ".join(exclude), "beside --method auto"))
+        raise BadInput.of("--exclude", what, ", ".join(exclude), "beside --method auto")
     return CellChoice(
         method,
         mesh.layers,
@@ -190,7 +190,7 @@ def solve(case: Case, model: CellModel) -> Homogenised:
     try:
         radius, matrix, inclusion = modal_parts(case)
     except ValueError as error:
-        raise BadInput(Problem("radius", str(error), file=str(case.path))) from None
+        raise BadInput.of("radius", str(error), file=str(case.path)) from None
     return model.solve(radius, matrix, [inclusion])[0]
 
 

@@ -81,15 +81,13 @@ def cell_model(choice: CellChoice) -> CellModel:
             import_module("alphacut.rve.spheres.fem.stiffness")
         return made(choice)
     except ImportError as error:
-        raise BadInput(
-            Problem(
-                "modulus.method", missing(error), choice.method, "series, which needs none of it"
-            )
+        raise BadInput.of(
+            "modulus.method", missing(error), choice.method, "series, which needs none of it"
         ) from None
     except ValueError as error:
         keys = {"exclude": "--exclude", "accuracy": "modulus.tolerance"}
         key = next((key for word, key in keys.items() if word in str(error)), "mesh")
-        raise BadInput(Problem(key, str(error))) from None
+        raise BadInput.of(key, str(error)) from None
 
 
 def made(choice: CellChoice) -> CellModel:

@@ -18,7 +18,7 @@ from alphacut.case.sections.material import Radius
 from alphacut.case.sections.particles import PackedSpheres
 from alphacut.case.sections.particles import Packing as PackingSection
 from alphacut.io.files import as_json, say, whole_file, write_text
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput
 from alphacut.io.progress import Tick
 from alphacut.io.units import engineering
 from alphacut.stages.material.micrograph import crop_of, fractions
@@ -169,7 +169,7 @@ def study_of(case: Case) -> Study:
             sampling=given.sampling,
         )
     except ValueError as error:
-        raise BadInput(Problem("microstructure", str(error), file=str(case.path))) from None
+        raise BadInput.of("microstructure", str(error), file=str(case.path)) from None
 
 
 def require_readable(case: Case) -> Study:
@@ -272,7 +272,7 @@ def compute(
         try:
             found = work(wanted, executor=executor, progress=progress)
         except ValueError as error:
-            raise BadInput(Problem("microstructure", str(error), file=str(case.path))) from None
+            raise BadInput.of("microstructure", str(error), file=str(case.path)) from None
     for remark in (
         () if quiet else (*left_out(found), *given_sizes(case), *crisp_slopes(fragment(found)))
     ):

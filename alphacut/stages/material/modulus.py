@@ -18,7 +18,7 @@ from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.io.csv_rows import CsvFile
 from alphacut.io.files import Document, say, whole_file
 from alphacut.io.netcdf import read_dataset
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput
 from alphacut.io.progress import Tick
 from alphacut.io.provenance import attributes, versions
 from alphacut.stages.material.campaign import Campaign, theta_shown
@@ -320,13 +320,11 @@ def read_number(path: Path | str, option: str = "--modulus", *, warn: bool = Tru
     try:
         alpha, ends = dataset["alpha"].values, dataset["E"].transpose("alpha", "bound").values
     except (ValueError, KeyError) as error:
-        raise BadInput(
-            Problem(
-                option,
-                f"the file holds no α-cuts of a modulus ({error})",
-                str(path),
-                "a modulus.nc of this program",
-            )
+        raise BadInput.of(
+            option,
+            f"the file holds no α-cuts of a modulus ({error})",
+            str(path),
+            "a modulus.nc of this program",
         ) from None
     if warn and (warned := dataset.attrs.get("outside")):
         say(f"warning: {option}: {warned}")

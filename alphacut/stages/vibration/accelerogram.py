@@ -5,16 +5,13 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from alphacut.frame import Accelerogram
 from alphacut.io.csv_rows import CsvFile
 from alphacut.io.units import factor
 from alphacut.stochastic.theta.truncated_normal import Array
-
-if TYPE_CHECKING:
-    from alphacut.frame import Accelerogram
 
 COLUMNS = {"time": "s", "acceleration": "m/s^2"}
 PATTERNS = {"time": "time|t", "acceleration": r"acceleration|acc\.?|a"}
@@ -32,8 +29,6 @@ def accelerogram(path: Path, key: str = "frame.accelerogram") -> Accelerogram:
         BadInput: The file is missing, a unit is wrong, a row is no pair of numbers, or the steps
             are not even.
     """
-    from alphacut.frame import Accelerogram
-
     file = CsvFile(path, key, "record", ALLOWED)
     lines = file.lines()
     for head, text in enumerate(lines[:9]):

@@ -9,10 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from alphacut import frame
 from alphacut.case.case import Case
 from alphacut.case.limits import Limit, limits_of
+from alphacut.frame.decisions.exceeding import Exceeding, any_exceeding, exceeding
+from alphacut.frame.outputs import output_unit
+from alphacut.frame.structures.modes import ModalError
 from alphacut.io.files import Document
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput
 from alphacut.io.progress import Tick
 from alphacut.io.units import engineering
 from alphacut.stages.vibration import envelope
@@ -23,8 +27,6 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     import xarray
-
-    from alphacut.frame.decisions.exceeding import Exceeding
 
 ANY = "any of them"
 
@@ -49,8 +51,6 @@ def decision(
     Raises:
         BadInput: The motion has no model that a proof could rest on.
     """
-    from alphacut.frame.structures.modes import ModalError
-
     limits, task = limits_of(case), task_of(case)
     peaks = _peaks([one.output for one in limits], wanted, task, peaks)
     reached = peaks["peak"].sel(bound="upper").max("alpha")
@@ -62,7 +62,7 @@ def decision(
     try:
         found = _decisions(wanted, task, sorted(limits, key=near), workers, progress)
     except (ValueError, ModalError) as error:
-        raise BadInput(Problem("decision", str(error), file=str(case.path))) from None
+        raise BadInput.of("decision", str(error), file=str(case.path)) from None
     names = [one.name for one in limits]
     in_order = {name: found[name] for name in (*names, ANY) if name in found}
     return _dataset(in_order, limits, peaks, task)
@@ -102,9 +102,6 @@ def _decisions(
     workers: int,
     progress: Tick | None,
 ) -> dict[str, Exceeding]:
-    from alphacut.frame.decisions.exceeding import any_exceeding, exceeding
-    from alphacut.frame.outputs import output_unit
-
     assert wanted.frame is not None
     failed: dict[str, list[tuple[float, float, str]]] = {}  # by unit: boxes not to be tried again
     count = len(limits) + 1
@@ -124,8 +121,6 @@ def _decisions(
 
 def explained(case: Case, wanted: Structure, task: EnvelopeTask) -> list[str]:
     """A line on what the decisions cost: each limit takes models of its own, and their proofs."""
-    from alphacut import frame
-
     if wanted.frame is None:
         return []
     limits, lowest = limits_of(case), replace(task, method="modal", alpha=task.alpha[:1])
@@ -224,8 +219,6 @@ HOLDS = "holds by the {} envelope"
 
 def decision_document(found: xarray.Dataset) -> Document:
     """Decisions as they are printed with ``--json``, in SI."""
-    from alphacut.frame.outputs import output_unit
-
     limits, margins = {}, {}
     told = zip(found.attrs["verdict"].split(", "), found.attrs["nature"].split(", "), strict=True)
     for name, (verdict, nature) in zip(map(str, found["limit"].values), told, strict=True):

@@ -8,11 +8,15 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from alphacut import frame
 from alphacut.case.case import Case
 from alphacut.case.limits import asked_gap, asked_tolerance, by_auto, names_rough_integrator
+from alphacut.frame import Envelope
+from alphacut.frame.exceedance import peaks
+from alphacut.frame.methods.named import options_of
 from alphacut.io.files import Document, say, whole_file
 from alphacut.io.kept_arrays import KeptArrays
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput, refuse
 from alphacut.io.progress import Tick
 from alphacut.io.provenance import attributes, versions
 from alphacut.stages.contract import keep
@@ -29,8 +33,6 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     import xarray
-
-    from alphacut.frame import Envelope
 
 
 def compute(
@@ -52,8 +54,6 @@ def compute(
         progress: Told the share done.
         kept: Keeps what is found so far, until the envelope is whole; None for nothing.
     """
-    from alphacut import frame
-
     require_affordable(wanted, task)
     guard_against(wanted, task, strict=strict)
     given = arguments(wanted, task)
@@ -63,7 +63,7 @@ def compute(
         with told_once():
             found = frame.envelope(wanted.model, progress=progress or False, kept=kept, **given)
     except ValueError as error:
-        raise BadInput(Problem("envelope", str(error))) from None
+        raise BadInput.of("envelope", str(error)) from None
     return found
 
 
@@ -73,8 +73,8 @@ def require_affordable(wanted: Structure, task: EnvelopeTask) -> None:
     Raises:
         BadInput: It is asked for.
     """
-    if task.certify is not None and (problems := list(too_many("certify", wanted, task))):
-        raise BadInput(problems)
+    if task.certify is not None:
+        refuse(too_many("certify", wanted, task))
 
 
 def explain(wanted: Structure, task: EnvelopeTask) -> list[str]:
@@ -82,8 +82,6 @@ def explain(wanted: Structure, task: EnvelopeTask) -> list[str]:
 
     Before them the reason why a certificate that is asked for will not be proved.
     """
-    from alphacut import frame
-
     require_affordable(wanted, task)
     reason = unproved_reason(wanted, task) if task.certify is not None else ""
     told = [f"certify: verified by sampling, not proved: {reason}"] if reason else []
@@ -92,7 +90,7 @@ def explain(wanted: Structure, task: EnvelopeTask) -> list[str]:
     try:
         told += [str(one) for one in frame.plan(wanted.model, **arguments(wanted, task))]
     except ValueError as error:
-        raise BadInput(Problem("envelope", str(error))) from None
+        raise BadInput.of("envelope", str(error)) from None
     return told
 
 
@@ -124,8 +122,6 @@ def told_once() -> Iterator[None]:
 
 def method_options(task: EnvelopeTask) -> Document:
     """Those of the task's options that its method has."""
-    from alphacut.frame.methods.named import options_of
-
     taken = options_of(task.method)
     offered = {"order": task.order, "tolerance": task.resolution, "exclude": task.exclude}
     if task.certify is not None:
@@ -140,8 +136,6 @@ def document(found: Envelope, tried: Array) -> Document:
         found: The envelope.
         tried: Least peak among trajectories tried, shape (A, m).
     """
-    from alphacut.frame.exceedance import peaks
-
     of = peaks(found)
     return {
         "alpha": found.alpha,

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from alphacut.case.case import Case
 from alphacut.case.checks import forces_only
 from alphacut.case.idle import FOLLOWERS
+from alphacut.frame.methods.modal import FINE
 
 SHARE = 1e-3  # the tolerance where no output is a displacement: of their peaks
 
@@ -48,8 +49,6 @@ class EnvelopeTask:
     @property
     def resolution(self) -> float:
         """Tolerance of the method itself, of a Graph Follower the gain worth a trajectory."""
-        from alphacut.frame.methods.modal import FINE
-
         shares = {"modal": 1 / FINE, **dict.fromkeys(FOLLOWERS, self.gain)}
         return self.tolerance * shares.get(self.method, 1.0)
 

@@ -10,9 +10,14 @@ import numpy as np
 
 from alphacut.case.case import Case
 from alphacut.case.limits import exceeded_limits
+from alphacut.frame import Envelope
+from alphacut.frame import exceedance as probabilities
+from alphacut.frame.boxes import boxes
+from alphacut.frame.exceedance import ANY, FuzzyProbability, peaks, tried_peaks
+from alphacut.frame.outputs import output_unit
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import Document
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput
 from alphacut.io.progress import Tick
 from alphacut.io.units import engineering
 from alphacut.stages.vibration.resolution_checks import shares_of_tolerance
@@ -22,8 +27,6 @@ from alphacut.stochastic.theta.truncated_normal import Array
 if TYPE_CHECKING:
     import xarray
 
-    from alphacut.frame import Envelope
-    from alphacut.frame.exceedance import FuzzyProbability
     from alphacut.stages.vibration.envelope_task import EnvelopeTask
 
 Sampler = Callable[[np.random.Generator, int], Array]
@@ -41,9 +44,6 @@ def with_peaks(found: Envelope, wanted: Structure, task: EnvelopeTask) -> xarray
     what it may lie outside them by, and ``peak_tried`` (alpha, output) the least one among some
     trajectories.
     """
-    from alphacut.frame.boxes import boxes
-    from alphacut.frame.exceedance import peaks, tried_peaks
-
     of, cuts = peaks(found), boxes(wanted.inputs(task.fuzzy), task.alpha)
     tried = tried_peaks(
         wanted.flow(
@@ -128,8 +128,8 @@ def require_random(case: Case, wanted: Structure) -> None:
                 if name == "E" and name in wanted.numbers
                 else problem.what
             )
-            raise BadInput(
-                Problem("exceedance.random", what, name, problem.allowed, file=str(case.path))
+            raise BadInput.of(
+                "exceedance.random", what, name, problem.allowed, file=str(case.path)
             ) from None
 
 
@@ -164,8 +164,6 @@ def exceedance(case: Case, wanted: Structure, progress: Tick | None = None) -> x
     Raises:
         BadInput: The structure has no such output.
     """
-    from alphacut.frame import exceedance as probabilities
-
     limited, over, limits = case.exceedance, case.envelope, exceeded_limits(case)
     model = wanted.model
     if wanted.frame is not None:
@@ -274,16 +272,11 @@ def events(found: xarray.Dataset) -> Iterator[xarray.Dataset]:
 
 def event_unit(output: str) -> str:
     """SI unit of an output's limit; shares of their limits where any of several is meant."""
-    from alphacut.frame.exceedance import ANY
-    from alphacut.frame.outputs import output_unit
-
     return "" if output == ANY else output_unit(output)
 
 
 def event_words(output: str, of: str = "") -> str:
     """What exceeds a limit, ``|drift1|``, or any of several; then `of`, its limit."""
-    from alphacut.frame.exceedance import ANY
-
     return "any of them" if output == ANY else f"|{output}|{of}"
 
 

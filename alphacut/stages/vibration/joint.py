@@ -9,16 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.case.case import Case
+from alphacut.frame.dynamics.flow import Flow
+from alphacut.frame.outputs import output_unit
+from alphacut.fuzzy.joint_outputs import joint_outputs
 from alphacut.io.files import Document
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput
 from alphacut.stages.vibration.envelope_task import task_of
 from alphacut.stages.vibration.structure import Structure
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     import xarray
-
-    from alphacut.frame.dynamics.flow import Flow
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +72,6 @@ def joint(case: Case, wanted: Structure) -> xarray.Dataset:
     """
     import xarray
 
-    from alphacut.frame.outputs import output_unit
-    from alphacut.fuzzy.joint_outputs import joint_outputs
-
     task, given = task_of(case), case.joint
     inputs = wanted.inputs(task.fuzzy)
     scheme = task.scheme if wanted.linear is not None else task.integrator
@@ -86,7 +84,7 @@ def joint(case: Case, wanted: Structure) -> xarray.Dataset:
     try:
         found = joint_outputs(pair, inputs, alpha=task.alpha, vectorised=True, progress=False)
     except ValueError as error:
-        raise BadInput(Problem("joint", str(error), file=str(case.path))) from None
+        raise BadInput.of("joint", str(error), file=str(case.path)) from None
     words = [
         f"{given.outputs[k % len(columns)]} at {given.times[k % len(nodes)]:g} s" for k in (0, 1)
     ]

@@ -9,6 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from alphacut.frame import guard
+from alphacut.frame.boxes import UnitFlow, boxes
+from alphacut.frame.certificate.remainder import MOST_PARAMETERS
+from alphacut.frame.checks.between_nodes import stray
+from alphacut.frame.checks.tolerance import tolerance_guard
+from alphacut.frame.exceedance import within_steps
+from alphacut.frame.outputs import output_unit
+from alphacut.frame.propagation import absolute
+from alphacut.frame.structures.linear import frequencies
+from alphacut.frame.structures.polynomial_dependence import UnprovedError, degrees
 from alphacut.io.files import say
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.units import engineering
@@ -35,9 +45,6 @@ def rough(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
 
 def shares_of_tolerance(wanted: Structure, task: EnvelopeTask) -> Array:
     """Factor on the tolerance for each output, shape (m,): what its own error is measured by."""
-    from alphacut.frame.boxes import UnitFlow, boxes
-    from alphacut.frame.propagation import absolute
-
     if wanted.frame is not None:  # bounds of accelerations are found as absolute ones
         wanted = replace(wanted, model=absolute(wanted.frame))
     cuts = boxes(wanted.inputs(task.fuzzy), task.alpha)
@@ -48,8 +55,6 @@ def shares_of_tolerance(wanted: Structure, task: EnvelopeTask) -> Array:
 
 def wanted_errors(wanted: Structure, task: EnvelopeTask) -> Iterator[str]:
     """A line on the error, or gap, that is wanted of each output; none without a tolerance."""
-    from alphacut.frame.outputs import output_unit
-
     if task.method not in WITH_TOLERANCE:
         return
     asked = task.tolerance if task.certify is None else task.certify
@@ -62,8 +67,6 @@ def wanted_errors(wanted: Structure, task: EnvelopeTask) -> Iterator[str]:
 
 def coarse_step(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
     """Step that cannot resolve the fastest mode, with its phase error."""
-    from alphacut.frame import guard
-
     if wanted.linear is None or task.scheme == "exact":
         return
     found = guard(wanted.linear, task.step, task.duration)
@@ -73,9 +76,6 @@ def coarse_step(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
 
 def coarse_tolerance(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
     """Tolerance or gap that exceeds a hundredth of an output's peak."""
-    from alphacut.frame.boxes import UnitFlow, boxes
-    from alphacut.frame.checks.tolerance import tolerance_guard
-
     if task.method not in WITH_TOLERANCE:
         return
     inputs = wanted.inputs(task.fuzzy)
@@ -102,8 +102,6 @@ def coarse_tolerance(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]
 
 def coarse_nodes(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
     """Nodes so far apart that peaks may lie between them by over a hundredth."""
-    from alphacut.frame.structures.linear import frequencies
-
     if wanted.linear is None:
         return
     slowest = float(frequencies(wanted.linear)[0])
@@ -120,9 +118,6 @@ def coarse_nodes(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
 
 def coarse_outputs(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
     """Outputs whose peaks are bounded between nodes some hundredths higher than at them."""
-    from alphacut.frame.checks.between_nodes import stray
-    from alphacut.frame.exceedance import within_steps
-
     if wanted.linear is None:
         return
     flow = wanted.flow((), task.duration, task.step, "exact")
@@ -157,8 +152,6 @@ MANY = 5
 
 def too_many(key: str, wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
     """The problem that a proof is asked for with too many inputs, by the key that asks."""
-    from alphacut.frame.certificate.remainder import MOST_PARAMETERS
-
     names = wanted.inputs(task.fuzzy)
     if len(names) > MOST_PARAMETERS:
         what = f"proofs are affordable up to {MOST_PARAMETERS} fuzzy inputs, and there are"
@@ -177,8 +170,6 @@ BY_PEAKS = (
 
 def estimated_reason(wanted: Structure, task: EnvelopeTask) -> str:
     """Why bounds will be estimated where no proof is asked for; empty where one will be tried."""
-    from alphacut.frame.certificate.remainder import MOST_PARAMETERS
-
     count = len(wanted.inputs(task.fuzzy))
     if wanted.linear is None or task.certify is not None or task.method != "auto":
         return ""
@@ -198,9 +189,6 @@ def estimated_reason(wanted: Structure, task: EnvelopeTask) -> str:
 
 def unproved_reason(wanted: Structure, task: EnvelopeTask) -> str:
     """Why the bounds of a linear structure will not be guaranteed; empty if that is not known."""
-    from alphacut.frame.boxes import boxes
-    from alphacut.frame.structures.polynomial_dependence import UnprovedError, degrees
-
     if wanted.linear is None:
         return ""
     cuts = boxes(wanted.inputs(task.fuzzy), task.alpha)

@@ -4,24 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from alphacut.case.case import Case
 from alphacut.case.sections.structures import Frame, Pendulum, Tower
+from alphacut.frame import INTEGRATORS, LinearFlow, StoreyFrame
+from alphacut.frame.dynamics.flow import Flow
+from alphacut.frame.dynamics.nonlinear import LagrangianFlow
+from alphacut.frame.reduced.beam import BeamFrame
+from alphacut.frame.reduced.reduction import ReducedStructure
+from alphacut.frame.structures.field_frame import FieldFrame
+from alphacut.frame.structures.lagrangian import LagrangianSystem
+from alphacut.frame.structures.lagrangian import pendulum as make
+from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.io.problem import BadInput, Problem
+from alphacut.fuzzy.field import FuzzyField
+from alphacut.io.problem import BadInput
 from alphacut.io.provenance import door
 from alphacut.io.units import STANDARD_GRAVITY
 from alphacut.stages.vibration.accelerogram import accelerogram
-
-if TYPE_CHECKING:
-    from alphacut.frame import StoreyFrame
-    from alphacut.frame.dynamics.flow import Flow
-    from alphacut.frame.reduced.reduction import ReducedStructure
-    from alphacut.frame.structures.lagrangian import LagrangianSystem
-    from alphacut.frame.structures.linear import LinearSystem
 
 
 @dataclass(frozen=True)
@@ -39,15 +41,11 @@ class Structure:
     @property
     def frame(self) -> StoreyFrame | None:
         """The model if it is a storey frame, else None."""
-        from alphacut.frame import StoreyFrame
-
         return self.model if isinstance(self.model, StoreyFrame) else None
 
     @property
     def linear(self) -> LinearSystem | None:
         """The model if it is linear, else None."""
-        from alphacut.frame.structures.lagrangian import LagrangianSystem
-
         return None if isinstance(self.model, LagrangianSystem) else self.model
 
     @property
@@ -71,22 +69,18 @@ class Structure:
             members = self.frame.group(name) if self.frame else (name,)
             found = tuple(member for member in members if self.numbers[member].support.width > 0)
         except (ValueError, KeyError) as error:
-            raise BadInput(
-                Problem(
-                    "envelope.fuzzy",
-                    " ".join(str(error.args[0]).split()),
-                    name,
-                    ", ".join(self.numbers),
-                )
+            raise BadInput.of(
+                "envelope.fuzzy",
+                " ".join(str(error.args[0]).split()),
+                name,
+                ", ".join(self.numbers),
             ) from None
         if not found:
-            raise BadInput(
-                Problem(
-                    "envelope.fuzzy",
-                    "this input is crisp in the case",
-                    name,
-                    "an input with a triangle or an interval",
-                )
+            raise BadInput.of(
+                "envelope.fuzzy",
+                "this input is crisp in the case",
+                name,
+                "an input with a triangle or an interval",
             )
         return found
 
@@ -98,10 +92,6 @@ class Structure:
         self, names: Sequence[str], duration: float, step: float, integrator: str | None = None
     ) -> Flow:
         """Trajectories as a function of parameters, by the midpoint rule by default."""
-        from alphacut.frame import INTEGRATORS, LinearFlow
-        from alphacut.frame.dynamics.nonlinear import LagrangianFlow
-        from alphacut.frame.structures.lagrangian import LagrangianSystem
-
         scheme, model = integrator or "midpoint", self.model
         if isinstance(model, LagrangianSystem):
             return LagrangianFlow(model, tuple(names), duration, step, scheme)
@@ -119,13 +109,11 @@ def structure(case: Case, handed: FuzzyNumber | None) -> Structure:
             return pendulum(case.pendulum)
         return tower(case) if case.sections.tower else storey_frame(case, modulus_of(case, handed))
     except ValueError as error:
-        raise BadInput(Problem("frame", str(error), file=str(case.path))) from None
+        raise BadInput.of("frame", str(error), file=str(case.path)) from None
 
 
 def pendulum(given: Pendulum) -> Structure:
     """A damped pendulum."""
-    from alphacut.frame.structures.lagrangian import pendulum as make
-
     model = make(
         mass=given.mass.modal,
         length=given.length.modal,
@@ -147,8 +135,6 @@ def pendulum(given: Pendulum) -> Structure:
 
 def tower(case: Case) -> Structure:
     """Plane beam frame, reduced for the whole supports of its fuzzy inputs."""
-    from alphacut.frame.reduced.beam import BeamFrame
-
     given, numbers = case.tower, tower_parameters(case.tower)
     frame = BeamFrame(
         given.storeys,
@@ -187,8 +173,6 @@ def tower_parameters(given: Tower) -> dict[str, FuzzyNumber]:
 
 def storey_frame(case: Case, modulus: FuzzyNumber | None) -> Structure:
     """A storey frame."""
-    from alphacut.frame import StoreyFrame
-
     given = case.frame
 
     def modal(values: tuple[FuzzyNumber, ...] | None) -> tuple[float, ...]:
@@ -229,9 +213,6 @@ def storey_frame(case: Case, modulus: FuzzyNumber | None) -> Structure:
 def with_field(case: Case, model: StoreyFrame, numbers: Mapping[str, FuzzyNumber]) -> Structure:
     """The frame with directions of [field] in place of the values of its storeys."""
     from dataclasses import fields
-
-    from alphacut.frame.structures.field_frame import FieldFrame
-    from alphacut.fuzzy.field import FuzzyField
 
     if not model.lengths:
         raise ValueError("a field needs the height of each storey: frame.lengths")
@@ -293,13 +274,11 @@ def modulus_of(case: Case, given: FuzzyNumber | None) -> FuzzyNumber | None:
     if given is not None:
         return given
     if case.frame.modulus is None:
-        raise BadInput(
-            Problem(
-                "frame.modulus",
-                "missing: give it here, or by --modulus modulus.nc from"
-                f" `{door('modulus', case.path)} --out modulus.nc`; `{door('run', case.path)}` does"
-                " both",
-                file=str(case.path),
-            )
+        raise BadInput.of(
+            "frame.modulus",
+            "missing: give it here, or by --modulus modulus.nc from"
+            f" `{door('modulus', case.path)} --out modulus.nc`; `{door('run', case.path)}` does"
+            " both",
+            file=str(case.path),
         )
     return case.frame.modulus

@@ -10,6 +10,10 @@ import numpy as np
 from alphacut.case.case import Case
 from alphacut.case.names import OTHERS
 from alphacut.case.sections.structures import Frame
+from alphacut.frame.calculus.jet import Jet
+from alphacut.frame.structures.field_frame import FieldFrame
+from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.storey_springs import softening, springs
 from alphacut.fuzzy import Crisp, FuzzyNumber, PiecewiseLinear
 from alphacut.io.files import Document
 from alphacut.io.units import MINUS, shown
@@ -17,7 +21,6 @@ from alphacut.stages.vibration.structure import Structure, per_floor
 from alphacut.stages.vibration.studies import cut_line, fixed_line, left_out, studies
 
 if TYPE_CHECKING:
-    from alphacut.frame.structures.linear import Accelerogram
     from alphacut.fuzzy.field import FuzzyField
 
 PLACEMENT = {"ground": "from each floor to the ground", "storey": "between neighbouring floors"}
@@ -83,8 +86,6 @@ def inputs(case: Case) -> Iterator[list[str]]:
 
 def frame_sentences(given: Frame, wanted: Structure) -> Iterator[str]:
     """Stiffness, damping, and what moves the frame."""
-    from alphacut.frame.structures.field_frame import FieldFrame
-
     assert wanted.frame is not None
     yield stiffness_words(given, wanted)
     if wanted.frame.gravity:
@@ -126,9 +127,6 @@ def stiffness_words(given: Frame, wanted: Structure) -> str:
 
 def springs_at_modal(wanted: Structure) -> tuple[list[float], list[float]]:
     """Stiffness of each storey at the modal values, and what weights take of it, in N/m."""
-    from alphacut.frame.calculus.jet import Jet
-    from alphacut.frame.structures.storey_springs import softening, springs
-
     frame = wanted.frame
     assert frame is not None
     at = {name: Jet.constant([low], 0) for name, (low, _) in frame.ranges({}).items()}

@@ -9,25 +9,23 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from alphacut.case.case import Case
 from alphacut.case.limits import exceeded_limits
-from alphacut.fuzzy import FuzzyNumber, Interval, Signed, propagate
+from alphacut.frame import StoreyFrame
+from alphacut.frame.decisions.safe_scale import SafeScale, safe_scale
+from alphacut.frame.outputs import output_unit
+from alphacut.fuzzy import FuzzyNumber, Interval, Signed, Triangular, propagate
 from alphacut.io.files import Document
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput
 from alphacut.io.progress import Tick
 from alphacut.stages.material.campaign import Campaign, campaign
 from alphacut.stages.vibration.envelope_task import task_of
 from alphacut.stages.vibration.structure import Structure, structure
 from alphacut.stages.vibration.studies import left_out
 from alphacut.stochastic.theta.truncated_normal import Array
-
-if TYPE_CHECKING:
-    from alphacut.frame import StoreyFrame
-    from alphacut.frame.decisions.safe_scale import SafeScale
 
 Range = Callable[[float], tuple[float, float]]
 SCALES = 13
@@ -88,8 +86,6 @@ class Tolerances:
 
     def document(self) -> Document:
         """The result as it is printed with ``--json``, in SI."""
-        from alphacut.frame.outputs import output_unit
-
         found = self.found
         witness = (
             None if found.witness is None else dict(zip(found.names, found.witness, strict=True))
@@ -137,8 +133,6 @@ def tolerances(
     Raises:
         BadInput: The structure is no storey frame, or has no such output.
     """
-    from alphacut.frame.decisions.safe_scale import safe_scale
-
     limits, over = exceeded_limits(case), case.envelope
     given = handed is not None or case.frame.modulus is not None or case.frame.stiffness is not None
     cell = None if given else campaign(case)
@@ -146,7 +140,7 @@ def tolerances(
     modulus = handed if cell is None or modulus_range is None else _triangle(modulus_range)
     wanted = structure(case, modulus)
     if wanted.frame is None:
-        raise BadInput(Problem("frame", "missing: safe tolerances are those of a storey frame"))
+        raise BadInput.of("frame", "missing: safe tolerances are those of a storey frame")
     inputs = wanted.inputs(over.fuzzy)
     own = {name: x for name, x in inputs.items() if modulus_range is None or name != "E"}
     frame = Supports(own)
@@ -219,8 +213,6 @@ def _cell_range(cell: Campaign, most: float) -> Range:
 
 def _triangle(modulus: Range) -> FuzzyNumber:
     """The modulus at scale 0 and 1 as a triangle, for the structure."""
-    from alphacut.fuzzy import Triangular
-
     (low, high), (modal, _) = modulus(1.0), modulus(0.0)
     return Triangular(low, modal, high)
 

@@ -10,9 +10,10 @@ import numpy as np
 
 from alphacut.case.case import Case
 from alphacut.case.names import frame_outputs
+from alphacut.frame import Exact, LinearFlow, StoreyFrame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import Document
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput
 from alphacut.io.progress import Tick
 from alphacut.stages.vibration import envelope
 from alphacut.stages.vibration.envelope_task import task_of
@@ -22,7 +23,6 @@ from alphacut.stages.vibration.structure import Structure
 if TYPE_CHECKING:
     import xarray
 
-    from alphacut.frame import StoreyFrame
     from alphacut.frame.update.measured import MeasuredMode
     from alphacut.frame.update.motion import MotionPosterior
     from alphacut.frame.update.posterior import Posterior
@@ -154,7 +154,7 @@ def learned(case: Case, wanted: Structure) -> Learned:
     from alphacut.frame.update.posterior import RefutedError, update
 
     if wanted.frame is None:
-        raise BadInput(Problem("update", "natural modes are learned from for a storey frame"))
+        raise BadInput.of("update", "natural modes are learned from for a storey frame")
     given = case.update
     if given.recorded is not None:
         return _from_motion(case, wanted, wanted.frame)
@@ -167,7 +167,7 @@ def learned(case: Case, wanted: Structure) -> Learned:
     except RefutedError as error:
         return Learned(None, str(error), prior, (), wanted)
     except ValueError as error:
-        raise BadInput(Problem("update", str(error), file=str(case.path))) from None
+        raise BadInput.of("update", str(error), file=str(case.path)) from None
     low, high = found.frequencies
     predicted = tuple(
         HeldOut(
@@ -227,7 +227,6 @@ def require_readable(case: Case, frame: StoreyFrame | None) -> None:
 
 def _from_motion(case: Case, wanted: Structure, frame: StoreyFrame) -> Learned:
     """The inputs after a recorded motion."""
-    from alphacut.frame import Exact, LinearFlow
     from alphacut.frame.update.motion import RecordedMotion, learn_from_motion
 
     rows, prior = recorded_motion(case, frame), inputs(case, wanted)
@@ -237,7 +236,7 @@ def _from_motion(case: Case, wanted: Structure, frame: StoreyFrame) -> Learned:
         record = RecordedMotion(flow, rows.values)
         found = learn_from_motion(record, prior, alpha=case.update.alpha)
     except ValueError as error:
-        raise BadInput(Problem("update", str(error), file=str(case.path))) from None
+        raise BadInput.of("update", str(error), file=str(case.path)) from None
     after = replace(wanted, numbers={**wanted.numbers, **found.numbers})
     return Learned(found, "", prior, (), after)
 
@@ -287,14 +286,12 @@ def envelopes(
     task = replace(task_of(case), alpha=case.update.alpha)
     missing = sorted(set(found.prior) - set(wanted.inputs(task.fuzzy)))
     if missing:
-        raise BadInput(
-            Problem(
-                "envelope.fuzzy",
-                f"{', '.join(missing)} of [update] learn are missing",
-                ", ".join(task.fuzzy),
-                "all inputs that are learned, among others",
-                file=str(case.path),
-            )
+        raise BadInput.of(
+            "envelope.fuzzy",
+            f"{', '.join(missing)} of [update] learn are missing",
+            ", ".join(task.fuzzy),
+            "all inputs that are learned, among others",
+            file=str(case.path),
         )
     sides = []
     for share, structure in enumerate((wanted, found.structure)):

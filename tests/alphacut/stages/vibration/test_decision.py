@@ -434,16 +434,14 @@ def test_explain_tells_what_decisions_of_many_inputs_may_take(
 def test_the_limit_farthest_from_its_peak_is_tried_first_and_told_in_its_place(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from alphacut.frame.decisions import exceeding as own
-
     tried: list[float] = []
-    whole = own.exceeding
+    whole = decision.exceeding
 
     def told(frame: Any, inputs: Any, limits: dict[str, float], **how: Any) -> Any:
         tried.append(next(iter(limits.values())))
         return whole(frame, inputs, limits, **how)
 
-    monkeypatch.setattr(own, "exceeding", told)
+    monkeypatch.setattr(decision, "exceeding", told)
     case = load(written(tmp_path, ["q1 <= 5 cm", "drift1 <= 20 %"]))
     found = decision.decision(case, structure(case, None))
     assert tried[:2] == pytest.approx([0.6, 0.05])
