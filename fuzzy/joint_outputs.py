@@ -51,7 +51,7 @@ class JointOutputs:
 
     def area(self, level: int = 0) -> tuple[float, float]:
         """Areas of the inner and the outer polygon of a level."""
-        return _area(self.inner[level]), _area(self.outer[level])
+        return area(self.inner[level]), area(self.outer[level])
 
 
 def joint_outputs(
@@ -176,7 +176,8 @@ def _turn(a: Array, b: Array, c: Array) -> float:
     return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 
 
-def _area(corners: Array) -> float:
+def area(corners: Array) -> float:
+    """Area of a polygon (corners, 2)."""
     if len(corners) < 3:
         return 0.0
     x, y = corners.T

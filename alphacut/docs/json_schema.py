@@ -43,7 +43,10 @@ def section_schema(section: type[Section]) -> Document:
     return {
         "type": "object",
         "description": about_of(section),
-        "properties": {name: key_schema(key) for name, key in keys_of(section).items()},
+        "properties": {
+            name: {"description": f"{key.about}; {allowed(key)}", **value_schema(key)}
+            for name, key in keys_of(section).items()
+        },
         **(
             {"anyOf": [{"required": way} for way in ways]}
             if section.unless
@@ -53,13 +56,8 @@ def section_schema(section: type[Section]) -> Document:
     }
 
 
-def key_schema(key: Key) -> Document:
-    """One key: its type as far as JSON Schema can tell it; units are left to `alphacut check`."""
-    return {"description": f"{key.about}; {allowed(key)}", **value_schema(key)}
-
-
 def value_schema(key: Key) -> Document:
-    """JSON Schema of a key's value."""
+    """JSON Schema of a key's value, as far as it can tell; units are left to `alphacut check`."""
     if key.kind == "text":
         return {"type": "string"}
     if key.kind == "flag":

@@ -126,14 +126,10 @@ def write_mesh(mesh: meshio.Mesh, path: Path) -> None:
 
 VERTICES = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1)]
 EDGES = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5)]  # Basix's order
+NODES = np.array([*VERTICES, *((np.add(VERTICES[a], VERTICES[b]) / 2) for a, b in EDGES)], float)
+"""The 15 nodes of the reference wedge in Basix's order of vertices and edges, shape (15, 3)."""
 COMPONENTS = ("11", "22", "12")
 SIZES = (("displacement", 2), ("stress", 3))
-
-
-def reference_nodes() -> Array:
-    """The 15 nodes of the reference wedge in Basix's order of vertices and edges, shape (15, 3)."""
-    vertices = np.array(VERTICES, float)
-    return np.concatenate([vertices, [(vertices[a] + vertices[b]) / 2 for a, b in EDGES]])
 
 
 def cell_fields(case: Case) -> meshio.Mesh:
@@ -167,7 +163,7 @@ def cell_fields(case: Case) -> meshio.Mesh:
         (matrix, inclusion)
     )
     phase = np.tile(plane.inside.astype(np.int64), system.grid.layers)
-    stress = system.stress(solved.total, (matrix, inclusion), reference_nodes(), solved.pressure)
+    stress = system.stress(solved.total, (matrix, inclusion), NODES, solved.pressure)
     nodes, cells, mean = by_phase(system, phase, stress)
     data = point_data(solved.total[nodes], mean)
     topological_dimension.setdefault("wedge15", 3)  # see alphacut.export.fields
@@ -183,13 +179,8 @@ def require_conforming(case: Case) -> None:
         BadInput: It does not.
     """
     if case.mesh.interface != "conforming":
-        raise BadInput.of(
-            "mesh.interface",
-            "mesh.interface",
-            "fields need a mesh that follows the interface",
-            case.mesh.interface,
-            "conforming",
-        )
+        what = "fields need a mesh that follows the interface"
+        raise case.refuse("mesh.interface", what, "conforming")
 
 
 def point_data(displacement: Array, stress: Array) -> dict[str, Array]:

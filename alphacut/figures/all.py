@@ -120,17 +120,12 @@ def update_drawings(results: Results) -> Iterator[Drawing]:
         yield f"update-{output}", partial(figure_questions.bands, bands, output)
 
 
-def share_drawings(driving: xarray.Dataset) -> Iterator[Drawing]:
-    """Figures of what drives the widths."""
-    if "modulus_share" in driving:
-        yield "shares-modulus", lambda: figure_shares.of_modulus(driving)
-    if "share" in driving:
-        yield "shares-over-time", lambda: figure_shares.over_time(driving)
-
-
 def draw_shares(driving: xarray.Dataset, results: Results) -> list[str]:
     """Draw what drives the widths; names of the files."""
-    return drawn_now(share_drawings(driving), results)
+    every = {"modulus_share": "shares-modulus", "share": "shares-over-time"}
+    make = {"modulus_share": figure_shares.of_modulus, "share": figure_shares.over_time}
+    todo = [(name, partial(make[of], driving)) for of, name in every.items() if of in driving]
+    return drawn_now(todo, results)
 
 
 def file_stem(name: str, results: Results) -> str:
@@ -179,15 +174,10 @@ def kept(folder: Path, key: str) -> list[str] | None:
     try:
         told = json.loads((folder / KEPT).read_text(encoding="utf-8"))
         names = [str(name) for name in told["figures"]]
-        return names if told["fingerprint"] == key and all_there(folder, names) else None
+        there = all((folder / name).stat().st_size for name in names)
+        return names if told["fingerprint"] == key and there else None
     except (OSError, ValueError, KeyError, TypeError):
         return None
-
-
-def all_there(folder: Path, names: Iterable[str]) -> bool:
-    """Whether every file is there and holds something."""
-    files = [folder / name for name in names]
-    return all(file.is_file() and file.stat().st_size for file in files)
 
 
 def drawn_in_parts(results: Results, executor: Executor | None, *, quiet: bool) -> list[str]:

@@ -11,6 +11,8 @@ from alphacut.io.files import Document
 _TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 FIGURES: dict[str, str] = _TABLES["figures"]
 WORDS: dict[str, str] = _TABLES["words"]
+INPUTS: dict[str, str] = _TABLES["inputs"]
+"""Inputs of a structure by their symbols."""
 
 
 def in_words(name: str) -> str:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.figures import style as look
+from alphacut.figures.captions import INPUTS
 from alphacut.frame.dynamics.response_spectrum import ResponseSpectrum
 from alphacut.frame.outputs import output_unit, output_words
 from alphacut.frame.structures.linear import Accelerogram
@@ -20,30 +21,6 @@ from alphacut.stages.vibration.studies import Study
 if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
-
-
-WORDS = {
-    "E": "modulus",
-    "m": "masses",
-    "l": "lengths",
-    "c": "columns",
-    "d": "dampers",
-    "q0": "initial displacements",
-    "v0": "initial velocities",
-}
-WORDS |= {
-    "E_columns": "lower columns",
-    "E_columns_top": "upper columns",
-    "E_beams": "beams",
-    "mass": "floor mass",
-}
-WORDS |= {
-    "rayleigh_mass": "mass damping",
-    "rayleigh_stiffness": "stiffness damping",
-    "I": "second moment",
-    "k": "stiffnesses",
-    "zeta": "damping ratio",
-}
 
 
 def drawings(study: Study, dataset: xarray.Dataset) -> Iterator[tuple[str, Callable[[], Figure]]]:
@@ -69,7 +46,7 @@ def envelope(dataset: xarray.Dataset, output: str, study: Study) -> Figure:
     look.prefix_axis(axes, output, output_unit(output))
     axes.set_xlim(time[0], time[-1])
     # letters mean something else in a pendulum
-    known = WORDS if output.startswith(("q", "v", "a", "drift", "shear", "base", "roof")) else {}
+    known = INPUTS if output.startswith(("q", "v", "a", "drift", "shear", "base", "roof")) else {}
     words = ", ".join(known.get(name, name) for name in study.task.fuzzy)
     title = f"{output_words(output)}; fuzzy: {words}"
     axes.set_title(fill(title, 84), loc="left", fontsize=10)

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.figures.captions import in_words
-from alphacut.figures.envelope import WORDS
+from alphacut.figures.captions import INPUTS, in_words
 from alphacut.figures.style import BLUE, GREY, ORANGE, PURPLE, prefix_axis
 from alphacut.frame.outputs import output_unit
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -78,7 +77,7 @@ def panel(axes: Axes, found: xarray.Dataset, output: str) -> None:
             color=colour,
             ls=dashes,
             lw=1.3,
-            label=WORDS.get(str(name)) or in_words(str(name)),
+            label=INPUTS.get(str(name)) or in_words(str(name)),
         )
     axes.set_xlim(time[0], time[-1])
     axes.set_ylim(0, 1)

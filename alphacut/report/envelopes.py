@@ -17,34 +17,18 @@ from alphacut.io.problem import BadInput
 from alphacut.io.provenance import door
 from alphacut.io.units import engineering, largest_by_unit
 from alphacut.report.figures import picture
-from alphacut.report.tables import items, paragraphs, section, table
+from alphacut.report.tables import fragment, items, paragraphs, section, table
 from alphacut.stages.vibration import exceedance as outcomes
 
 
 def envelopes(summary: Document, exceedance: Markup) -> Markup:
     """The interactive plot and the extremes; the picture of the exceedance where there is one."""
-    controls = Markup(
-        '<div class="controls"><label>study <select id="study"></select></label><label>output'
-        ' <select id="output"></select></label><label>α <input type="range" id="alpha" min="0"'
-        ' max="1" step="0.01" value="0.5"><output id="alpha-shown">0.50</output></label><button'
-        ' type="button" id="reset">whole range</button></div>'
-    )
-    hint = Markup(
-        '<p class="hint">The shaded bands are the computed α-cuts, the darker the higher α; the'
-        " orange line is the cut at the slider's α, between computed levels by linear"
-        " interpolation. Drag or turn the wheel to zoom, double click to see everything.</p>"
-    )
     rows = extremes(summary["envelopes"])
-    svg = Markup(
-        '<svg id="plot" role="img" aria-label="Envelopes over time"></svg><div id="readout"></div>'
-    )
     lowest = f"{min(study['alpha'][0] for study in summary['envelopes'].values()):g}"
     head = ("study", "output", f"least at α = {lowest}", f"greatest at α = {lowest}", "error up to")
     return section(
         "Envelopes",
-        controls,
-        svg,
-        hint,
+        fragment("plot"),
         table(head[: len(rows[0])], rows, numbers=2),
         peaks(summary),
         exceedance,

@@ -42,6 +42,10 @@ def report(folder: Path) -> str:
 def page(summary: Document, folder: Path) -> str:
     """The page for a summary."""
     text = {name: (HERE / f"report.{name}").read_text(encoding="utf-8") for name in ("css", "js")}
+    data = [  # of the interactive plot
+        plot(name, study, read_dataset(folder / f"envelope_{name}.nc", key=str(folder)))
+        for name, study in summary.get("envelopes", {}).items()
+    ]
     about = escape(" ".join(summary.get("about", "").split()))
     return (
         environment()
@@ -54,28 +58,14 @@ def page(summary: Document, folder: Path) -> str:
             css=Markup(text["css"]),
             js=Markup(text["js"]),
             sections=explained(Markup("\n").join(sections(summary, folder))),
-            envelopes=embedded(plots(summary, folder)),
+            # JSON that may stand inside a script element
+            envelopes=Markup(json.dumps(data, ensure_ascii=False).replace("<", "\\u003c")),
         )
     )
 
 
-def embedded(document: object) -> Markup:
-    """JSON that may stand inside a script element."""
-    return Markup(json.dumps(document, ensure_ascii=False).replace("<", "\\u003c"))
-
-
-def plots(summary: Document, folder: Path) -> list[Document]:
-    """The data of the interactive plot: every study's bounds as 32-bit floats."""
-    found = []
-    for name, study in summary.get("envelopes", {}).items():
-        found.append(
-            plot(name, study, read_dataset(folder / f"envelope_{name}.nc", key=str(folder)))
-        )
-    return found
-
-
 def plot(name: str, study: Document, dataset: xarray.Dataset) -> Document:
-    """One study: lower and upper bounds by level and output, in base64."""
+    """One study: lower and upper bounds by level and output as 32-bit floats, in base64."""
     time = dataset["time"].values
     bounds = {
         side: dataset[side].transpose("alpha", "output", "time").values

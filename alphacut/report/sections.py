@@ -9,7 +9,7 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from alphacut.figures.captions import in_words
+from alphacut.figures.captions import INPUTS, in_words
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.io.files import Document
 from alphacut.io.provenance import sources
@@ -80,8 +80,6 @@ def built(words: Document, periods: Markup) -> Markup:
 
 def shares(found: Document, notes: Sequence[str] = ()) -> Markup:
     """Contributions of the inputs to the widths."""
-    from alphacut.figures.envelope import WORDS
-
     words = paragraphs(
         "Share of the width at α = 0 that is lost when an input is fixed at its modal value and"
         " all others are kept.",
@@ -93,7 +91,7 @@ def shares(found: Document, notes: Sequence[str] = ()) -> Markup:
         of = [name for name, entry in found.items() if tuple(entry) == inputs]
         rows = [
             (
-                WORDS.get(name) or in_words(name),
+                INPUTS.get(name) or in_words(name),
                 *(f"{found[quantity][name]:.1%}" for quantity in of),
             )
             for name in inputs

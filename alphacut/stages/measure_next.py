@@ -53,7 +53,9 @@ def measure_next(
         if cell is None or output is not None:
             raise BadInput.of("stages", "there is no envelope", allowed="stage envelope")
         return "E", 0.0, _advice(lambda x: _moduli(cell, x), cell.inputs, 0.0, progress), []
-    wanted, task = structure(case, handed or _expected(case, cell)), task_of(case)
+    # of the cell's modal values, fuzzy so that it may be named as an input
+    expected = None if cell is None else _interval(*_ends(cell, cell.inputs))
+    wanted, task = structure(case, handed or expected), task_of(case)
     if case.sections.update is not None:
         wanted = learned(case, wanted).structure
     if wanted.linear is None:
@@ -72,13 +74,6 @@ def measure_next(
     every = task.step if wanted.linear.ground is None else thinned(task.duration, task.step)
     found = _advice(answer, {**of_cell, **inputs}, task.alpha[0], progress)
     return wanted.outputs[column], every, found, left_out(wanted, [task])
-
-
-def _expected(case: Case, cell: Campaign | None) -> FuzzyNumber | None:
-    """Modulus that the cell's modal values give, fuzzy so that it may be named as an input."""
-    if cell is None:
-        return None
-    return _interval(*_ends(cell, cell.inputs))
 
 
 def _ends(cell: Campaign, inputs: Mapping[str, FuzzyNumber]) -> tuple[float, float]:

@@ -77,8 +77,9 @@ def ready(case: Case) -> Readiness:
     refuse([*crisp_names(case, wanted)] or [*unlearned(case, wanted)])
     refuse([*unprovable(case, wanted)])
     update.require_readable(case, wanted.frame)
-    period = first_period(wanted)
-    ground = None if wanted.linear is None else wanted.linear.ground
+    model = wanted.linear
+    period = None if model is None else 2 * math.pi / float(frequencies(model)[0])
+    ground = None if model is None else model.ground
     slips = (
         *plausible.unlikely(case, ground, period),
         *plausible.odd(case),
@@ -146,11 +147,6 @@ def shape(case: Case) -> Iterator[str]:
         share, phases = mean_share(radius, "cylinders"), (both[0], both[1])
     if told := spheres.remark(case, share, *phases):
         yield told
-
-
-def first_period(wanted: Structure) -> float | None:
-    """First natural period of a linear structure, in s: a wrong unit shows there at once."""
-    return None if wanted.linear is None else 2 * math.pi / float(frequencies(wanted.linear)[0])
 
 
 def unprovable(case: Case, wanted: Structure) -> Iterator[Problem]:

@@ -54,16 +54,11 @@ def _causes(failures: list[tuple[dict[str, float], str]]) -> list[str]:
         places.setdefault(error, []).append(place)
     told = []
     for error, points in places.items():
-        few = points if len(points) <= 2 else points[:1]
-        told += [f"at {point}: {_one_line(error)}" for point in few]
+        few, first = points if len(points) <= 2 else points[:1], error.strip().partition("\n")[0]
+        line = first if first == error and len(first) <= _LONG else f"{first[:_LONG]} …"
+        told += [f"at {point}: {line}" for point in few]
         told[-1] += f" (the same at {len(points) - 1} more)" if len(points) > 2 else ""
     return told
-
-
-def _one_line(error: str) -> str:
-    """The first line of an error, and no more than some hundred letters of it."""
-    first = error.strip().partition("\n")[0]
-    return first if first == error and len(first) <= _LONG else f"{first[:_LONG]} …"
 
 
 @dataclass

@@ -58,7 +58,10 @@ def windows(n: int, quantile: float | None, side: Side, open_ends: tuple[bool, b
         side: Ends that move: "upper" is an upper limit, "lower" a lower one.
         open_ends: Ends without a physical bound: their gaps go first.
     """
-    inside = np.full(n + 1, 1 / (n + 1)) if quantile is None else _binomial(n, quantile)
+    from scipy.stats import binom
+
+    places = np.arange(n + 1)
+    inside = np.full(n + 1, 1 / (n + 1)) if quantile is None else binom.pmf(places, n, quantile)
     outside = (
         (lambda low, high: (low + n - high) / (n + 1)) if quantile is None else _tails(n, quantile)
     )
@@ -77,12 +80,6 @@ def windows(n: int, quantile: float | None, side: Side, open_ends: tuple[bool, b
     ]
     level, first, final = zip(*last, strict=True)
     return Windows(np.array(level), np.array(first), np.array(final))
-
-
-def _binomial(n: int, quantile: float) -> Array:
-    from scipy.stats import binom
-
-    return np.asarray(binom.pmf(np.arange(n + 1), n, quantile))
 
 
 def _tails(n: int, quantile: float) -> Callable[[int, int], float]:

@@ -11,7 +11,7 @@ import numpy as np
 from alphacut.case.case import Case
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.outputs import output_unit
-from alphacut.fuzzy.joint_outputs import joint_outputs
+from alphacut.fuzzy.joint_outputs import area, joint_outputs
 from alphacut.io.files import Document
 from alphacut.io.problem import BadInput
 from alphacut.stages.vibration.envelope_task import task_of
@@ -103,12 +103,6 @@ def _padded(polygons: list[Array]) -> Array:
     most = max(len(corners) for corners in polygons)
     rows = [np.vstack([x, np.repeat(x[-1:], most - len(x), axis=0)]) for x in polygons]
     return np.array(rows)
-
-
-def area(corners: Array) -> float:
-    """Area of a polygon (corners, 2)."""
-    x, y = corners.T
-    return abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1))) / 2
 
 
 def joint_document(found: xarray.Dataset) -> Document:

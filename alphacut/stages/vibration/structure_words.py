@@ -89,9 +89,10 @@ def frame_sentences(given: Frame, wanted: Structure) -> Iterator[str]:
     assert wanted.frame is not None
     yield stiffness_words(given, wanted)
     if wanted.frame.gravity:
+        taken = max(soft / k for k, soft in zip(*springs_at_modal(wanted), strict=True))
         yield (
             "P-Delta: the weight P of the floors above reduces the stiffness of each storey by P"
-            f" over its height, at the modal values by up to {softened(wanted):.2g} %."
+            f" over its height, at the modal values by up to {100 * taken:.2g} %."
         )
     if isinstance(wanted.frame, FieldFrame):
         yield field_words(wanted.frame.field)
@@ -132,11 +133,6 @@ def springs_at_modal(wanted: Structure) -> tuple[list[float], list[float]]:
     at = {name: Jet.constant([low], 0) for name, (low, _) in frame.ranges({}).items()}
     soft = [float(x.value[0]) for x in softening(frame, at)] if frame.gravity else []
     return [float(k.value[0]) for k in springs(frame, at)], soft or [0.0] * frame.floors
-
-
-def softened(wanted: Structure) -> float:
-    """Largest share of a storey's stiffness that weights take, in percent."""
-    return 100 * max(taken / k for k, taken in zip(*springs_at_modal(wanted), strict=True))
 
 
 def field_words(field: FuzzyField) -> str:
