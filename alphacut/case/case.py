@@ -49,16 +49,10 @@ class Sections:
     joint: Joint | None = None
 
     @property
-    def files(self) -> tuple[Section | None, ...]:
-        """The sections that may name files."""
-        return (
-            self.microstructure,
-            self.picture,
-            self.modulus,
-            self.frame,
-            self.tower,
-            self.update,
-        )
+    def files(self) -> tuple[Section, ...]:
+        """The sections that may name files, in the order of the fields."""
+        every = (getattr(self, field.name) for field in fields(self))
+        return tuple(section for section in every if isinstance(section, Section))
 
 
 class Needed(Generic[S]):

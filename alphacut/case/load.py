@@ -7,19 +7,16 @@ import tomllib
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from alphacut.case.case import Case, Sections
 from alphacut.case.checks import checks
 from alphacut.case.key import Key, Section, UnknownValueError, keys_of
 from alphacut.case.overrides import Raw, apply_changes, table_of
 from alphacut.case.schema import IMPLIED, SECTIONS, Top, dotted, every_key
-from alphacut.case.sections.material import Cell, Mesh, Modulus, Radius, Response
-from alphacut.case.sections.particles import Microstructure
+from alphacut.case.sections.material import Cell
 from alphacut.case.sections.picture import PICTURES, Picture
-from alphacut.case.sections.questions import Decision, Field, Joint, Update
-from alphacut.case.sections.structures import Frame, Pendulum, Tower
-from alphacut.case.sections.vibration import Envelope, Exceedance, Study
+from alphacut.case.sections.vibration import Study
 from alphacut.case.values import Unfit, allowed, nearest, read
 from alphacut.io.output_paths import hint
 from alphacut.io.problem import BadInput, Problem
@@ -87,29 +84,14 @@ def built(tables: Tables, written: Collection[str], broken: Collection[str]) -> 
     }
     pictured = any(f"cell.{name}" in written for name in PICTURES)
 
-    def given(section: type[S], name: str) -> S | None:
-        return section_of(section, name, sound) if name in sound else None
-
-    return Sections(
-        top=section_of(Top, "", sound),
-        microstructure=given(Microstructure, "microstructure"),
-        radius=given(Radius, "radius"),
-        cell=None if pictured else given(Cell, "cell"),
-        picture=given(Picture, "cell") if pictured else None,
-        mesh=given(Mesh, "mesh"),
-        modulus=given(Modulus, "modulus"),
-        response=given(Response, "response"),
-        frame=given(Frame, "frame"),
-        pendulum=given(Pendulum, "pendulum"),
-        tower=given(Tower, "tower"),
-        envelope=given(Envelope, "envelope"),
-        exceedance=given(Exceedance, "exceedance"),
-        update=given(Update, "update"),
-        field=given(Field, "field"),
-        decision=given(Decision, "decision"),
-        joint=given(Joint, "joint"),
-        study=tuple(section_of(Study, name, sound) for name in sound if name.startswith("study[")),
-    )
+    kinds = {**SECTIONS, "cell": Picture if pictured else Cell}
+    made: dict[str, Any] = {
+        "picture" if name == "cell" and pictured else name: section_of(kinds[name], name, sound)
+        for name in sound
+        if name and name.isidentifier()  # those inside others, and studies, have names of their own
+    }
+    studies = (section_of(Study, name, sound) for name in sound if name.startswith("study["))
+    return Sections(top=section_of(Top, "", sound), study=tuple(studies), **made)
 
 
 def section_of(section: type[S], name: str, tables: Tables) -> S:

@@ -38,11 +38,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     common.add_keys(parser, KEYS)
     common.add_exclude(parser, ", ".join(ORDER))
     common.add_radius(parser)
-    parser.add_argument(
-        "--stiffness",
-        action="store_true",
-        help="a third load for the whole planar stiffness: prism",
-    )
+    common.add_flag(parser, "--stiffness", "a third load for the whole planar stiffness: prism")
     parser.add_argument(
         "--export",
         metavar="FILE",

@@ -61,12 +61,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     common.add_modulus(parser)
     common.add_exclude(parser, " or ".join(OF_AUTO))
     common.add_workers(parser, "the proof of --certify")
-    parser.add_argument(
-        "--strict", action="store_true", help="refuse a step or tolerance too coarse for the motion"
-    )
-    parser.add_argument(
-        "--explain", action="store_true", help="say what would be run, in seconds; run nothing"
-    )
+    common.add_flag(parser, "--strict", "refuse a step or tolerance too coarse for the motion")
+    common.add_flag(parser, "--explain", "say what would be run, in seconds; run nothing")
     parser.add_argument("--out", metavar="FILE.nc", help="write the envelopes as NetCDF")
 
 

@@ -27,10 +27,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     common.add_common(parser)
     common.add_keys(parser, common.MESH)
     common.add_radius(parser)
-    parser.add_argument(
+    common.add_flag(
+        parser,
         "--fields",
-        action="store_true",
-        help="solve, and write displacements and stresses as well (not with .inp): cylinders",
+        "solve, and write displacements and stresses as well (not with .inp): cylinders",
     )
     parser.add_argument(
         "--out",

@@ -9,7 +9,7 @@ from typing import TextIO
 
 from alphacut.case.idle import require_read
 from alphacut.case.load import load
-from alphacut.commands.options import add_common, add_workers, answer, check_workers
+from alphacut.commands.options import add_common, add_flag, add_workers, answer, check_workers
 from alphacut.io.files import say
 from alphacut.io.problem import BadInput
 from alphacut.io.progress import progress
@@ -28,7 +28,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="write radius.toml (a case fragment), microstructure.nc and figures here",
     )
-    parser.add_argument("--no-figures", action="store_true", help="numbers only")
+    add_flag(parser, "--no-figures", "numbers only")
 
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:

@@ -50,12 +50,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="keep every sample; the same command goes on where it was stopped",
     )
-    place.add_argument(
-        "--resume", action="store_true", help="the same in results/NAME-OF-THE-CASE/samples.db"
-    )
-    parser.add_argument(
-        "--explain", action="store_true", help="say what would be run and why, and run nothing"
-    )
+    common.add_flag(place, "--resume", "the same in results/NAME-OF-THE-CASE/samples.db")
+    common.add_flag(parser, "--explain", "say what would be run and why, and run nothing")
 
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:

@@ -51,6 +51,11 @@ MODEL = {
 }
 
 
+def add_flag(place: argparse._ActionsContainer, name: str, about: str) -> None:
+    """An option that takes no value."""
+    place.add_argument(name, action="store_true", help=about)
+
+
 def add_common(parser: argparse.ArgumentParser) -> None:
     """The case and the options that every command on it takes."""
     parser.add_argument("case", metavar="CASE", help="case file, for example cases/paper.toml")
@@ -71,9 +76,7 @@ def add_quiet(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="write the result as JSON; - for standard output, with nothing else on it",
     )
-    parser.add_argument(
-        "--quiet", action="store_true", help="no progress and no table, as with --json -"
-    )
+    add_flag(parser, "--quiet", "no progress and no table, as with --json -")
 
 
 def add_keys(parser: argparse.ArgumentParser, keys: Mapping[str, KeyOption]) -> None:
@@ -94,11 +97,7 @@ def add_exclude(parser: argparse.ArgumentParser, known: str) -> None:
 
 def add_best_effort(parser: argparse.ArgumentParser) -> None:
     """``--best-effort``."""
-    parser.add_argument(
-        "--best-effort",
-        action="store_true",
-        help="take a result whose error is above the tolerance",
-    )
+    add_flag(parser, "--best-effort", "take a result whose error is above the tolerance")
 
 
 def add_workers(parser: argparse.ArgumentParser, what: str = "the samples") -> None:

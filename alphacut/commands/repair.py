@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TextIO
 
+from alphacut.commands.options import add_flag
 from alphacut.fuzzy import Store
 from alphacut.io.problem import BadInput
 
@@ -16,7 +17,7 @@ ABOUT = "drop what is damaged in a store of samples; the next run computes only 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the command."""
     parser.add_argument("file", metavar="STORE", help="as results/NAME/samples.db")
-    parser.add_argument("--quiet", action="store_true", help="print nothing")
+    add_flag(parser, "--quiet", "print nothing")
 
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:

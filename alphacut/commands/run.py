@@ -48,24 +48,18 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--out", metavar="FOLDER", help="where results go (default: results/NAME-OF-THE-CASE)"
     )
     again = parser.add_mutually_exclusive_group()
-    again.add_argument(
+    common.add_flag(
+        again,
         "--resume",
-        action="store_true",
-        help="go on from what an earlier run has left, where nothing changed: the default",
+        "go on from what an earlier run has left, where nothing changed: the default",
     )
-    again.add_argument(
-        "--fresh",
-        action="store_true",
-        help="compute everything anew instead of taking what is up to date",
+    common.add_flag(
+        again, "--fresh", "compute everything anew instead of taking what is up to date"
     )
-    parser.add_argument(
-        "--strict", action="store_true", help="refuse a step or tolerance too coarse for the motion"
-    )
+    common.add_flag(parser, "--strict", "refuse a step or tolerance too coarse for the motion")
     common.add_best_effort(parser)
-    parser.add_argument(
-        "--quick", action="store_true", help="all stages in seconds, coarse: numbers mean nothing"
-    )
-    parser.add_argument("--no-figures", action="store_true", help="numbers only")
+    common.add_flag(parser, "--quick", "all stages in seconds, coarse: numbers mean nothing")
+    common.add_flag(parser, "--no-figures", "numbers only")
 
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from alphacut.figures import all as figures
 from alphacut.fuzzy.campaign.workers import submitted
-from alphacut.io.files import say, whole_file
-from alphacut.io.netcdf import load_dataset
+from alphacut.io.files import say
+from alphacut.io.netcdf import load_dataset, write_dataset
 from alphacut.io.progress import progress
 from alphacut.io.provenance import NESTED, attributes, fingerprint, version_of
 from alphacut.stages import width_shares as shares
@@ -122,5 +122,4 @@ def write_shares(
     """Compute shares.nc, with the attributes of every result."""
     with progress("What drives the width", quiet=quiet) as tick:
         found = shares.dataset(results, tick)
-    with whole_file(file) as partial:
-        found.assign_attrs(told).to_netcdf(partial)
+    write_dataset(found, file, told)

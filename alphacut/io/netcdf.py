@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any
 
-from alphacut.io.files import Document
+from alphacut.io.files import Document, whole_file
 from alphacut.io.output_paths import hint
 from alphacut.io.problem import BadInput
 from alphacut.io.provenance import FORMAT, door, own_version
@@ -18,38 +19,39 @@ if TYPE_CHECKING:
     import xarray
 
 
-def require_known(version: object, path: Path, *, key: str, maker: str = "") -> None:
+def require_known(told: Mapping[str, object], path: Path, *, key: str) -> None:
     """Refuse a format that this program does not know; older ones are read.
 
     Args:
-        version: What the file says.
+        told: What the file says of itself, among it its version and the program that wrote it.
         path: The file.
         key: Key or option that names it, for the message.
-        maker: Program that wrote it.
 
     Raises:
         BadInput: The format is newer than this program, or no version at all.
     """
+    version = told.get("format_version")
     if version is None:
         return
     whole = int(str(version)) if str(version).isdecimal() else 0
     if whole < 1:
-        raise BadInput.of(
-            key,
-            f"{path} tells no version of its format: {version}",
-            allowed="format_version 1 or more",
-        )
+        what = f"{path} tells no version of its format: {version}"
+        raise BadInput.of(key, what, allowed="format_version 1 or more")
     if whole > FORMAT:
+        maker = told.get("created_by")
         made = f", written by {maker}" if maker else ""
+        what = f"{path} has format {whole}{made}; this program reads formats up to {FORMAT}"
         cure = (
             f"install that version, or make the file anew with this one, {own_version()}, by"
             f" {door('run', 'CASE.toml', '--fresh')}"
         )
-        raise BadInput.of(
-            key,
-            f"{path} has format {whole}{made}; this program reads formats up to {FORMAT}",
-            allowed=cure,
-        )
+        raise BadInput.of(key, what, allowed=cure)
+
+
+def write_dataset(dataset: xarray.Dataset, path: Path | str, facts: Mapping[str, object]) -> None:
+    """Write a NetCDF file with `facts` among its attributes, whole or not at all."""
+    with whole_file(path) as partial:
+        dataset.assign_attrs(facts).to_netcdf(partial)
 
 
 def read_dataset(path: Path | str, *, key: str = "file") -> xarray.Dataset:
@@ -67,16 +69,9 @@ def read_dataset(path: Path | str, *, key: str = "file") -> xarray.Dataset:
         found = xarray.load_dataset(path)
     except (OSError, ValueError) as error:
         what = "this is no NetCDF file, or a damaged one"
-        raise BadInput.of(
-            key, what, str(path), "a file of this program, such as modulus.nc of a run"
-        ) from error
-    version = found.attrs.get("format_version")
-    require_known(
-        None if version is None else str(version),
-        path,
-        key=key,
-        maker=str(found.attrs.get("created_by", "")),
-    )
+        allowed = "a file of this program, such as modulus.nc of a run"
+        raise BadInput.of(key, what, str(path), allowed) from error
+    require_known(found.attrs, path, key=key)
     return upgraded(found)
 
 
@@ -126,12 +121,8 @@ def read_summary(folder: Path) -> Document:
         raise damaged(path, "it holds no object")
     told = found.get("versions")
     version = told.get("alphacut") if isinstance(told, dict) else None
-    require_known(
-        found.get("format_version"),
-        path,
-        key=str(folder),
-        maker=f"alphacut {version}" if version else "",
-    )
+    maker = f"alphacut {version}" if version else ""
+    require_known({"created_by": maker, **found}, path, key=str(folder))
     if missing := [name for name in NEEDED if name not in found]:
         raise damaged(path, f"it holds no {missing[0]}")
     return found
@@ -157,8 +148,5 @@ def fingerprint_of(path: Path) -> str:
             told = dict(dataset.attrs)
     except (OSError, ValueError):
         return ""
-    if "format_version" in told:
-        require_known(
-            str(told["format_version"]), path, key="--out", maker=str(told.get("created_by", ""))
-        )
+    require_known(told, path, key="--out")
     return str(told.get("fingerprint", ""))

@@ -59,17 +59,13 @@ def versions() -> dict[str, str]:
 
 
 def sources(package: str) -> list[tuple[str, Path]]:
-    """Source files of one of this project's packages with their names relative to it, sorted."""
+    """Sources, Python and C, of one of this project's packages by name relative to it, sorted."""
     root = Path(__file__).resolve().parents[1]
     folder = root if package == "alphacut" else (root / package).resolve()
-    files = ((file.relative_to(folder).as_posix(), file) for file in code(folder))
+    every = (file for kind in ("*.py", "*.c") for file in folder.rglob(kind))
+    files = ((file.relative_to(folder).as_posix(), file) for file in every)
     other = () if package != "alphacut" else NESTED
     return sorted(pair for pair in files if pair[0].partition("/")[0] not in other)
-
-
-def code(folder: Path) -> list[Path]:
-    """Files of Python and C in a folder."""
-    return [file for kind in ("*.py", "*.c") for file in folder.rglob(kind)]
 
 
 @cache

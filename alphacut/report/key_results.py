@@ -11,6 +11,7 @@ from alphacut.frame.outputs import output_unit
 from alphacut.io.files import Document
 from alphacut.io.units import engineering, largest_by_unit
 from alphacut.report import envelopes
+from alphacut.report.material import meaning
 from alphacut.report.tables import paragraphs, section, sentence, table
 from alphacut.stages.vibration import exceedance as outcomes
 from alphacut.stages.vibration.decision import degree, verdict_of, worth
@@ -57,7 +58,7 @@ def moduli(summary: Document) -> Iterator[Line]:
 
 def of_cell(found: Document) -> Iterator[Line]:
     """E and ν of a computed cell with what they are of, and the bounds of E in space."""
-    mean = MEANS[str(found.get("average", found.get("particles", "cylinders")))]
+    mean = MEANS[meaning(found)]
     flag = ": outside the bounds of spheres, see below" if found.get("outside") else ""
     ends, nature = between(found["lower_GPa"], found["upper_GPa"]), f"{found['nature']}{flag}"
     yield f"Young's modulus E {mean}", core(found), ends, nature

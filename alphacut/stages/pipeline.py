@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from alphacut.case.case import Case
-from alphacut.case.key import Section
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.io.files import Document, say, whole_file
+from alphacut.io.files import Document, say
 from alphacut.io.kept_arrays import KeptArrays
-from alphacut.io.netcdf import fingerprint_of, load_dataset
+from alphacut.io.netcdf import fingerprint_of, load_dataset, write_dataset
 from alphacut.io.progress import Tick, progress
 from alphacut.io.provenance import attributes, fingerprint
 from alphacut.stages.contract import keep_modulus
@@ -77,11 +77,11 @@ class Chain:
         """The stages from the radius map on."""
         handed = modulus.stand_in(self.case)
         cell = self.modulus() if "modulus" in self.case.stages and handed is None else None
-        handed = (
-            modulus.read_number(self.file("modulus.nc"), warn=False) if cell is not None else handed
-        )
+        if cell is not None:
+            handed = modulus.read_number(self.file("modulus.nc"), warn=False)
         picture = self.image() if "image" in self.case.stages else None
-        handed = modulus.read_number(self.file("image.nc")) if picture is not None else handed
+        if picture is not None:
+            handed = modulus.read_number(self.file("image.nc"))
         found = Results(self.case, self.folder, cell, {}, handed, image=picture)
         if cell is not None and self.case.sections.response:
             found = replace(found, response=self.response(cell))
@@ -94,37 +94,21 @@ class Chain:
         if asked.update is not None:
             learned = update.learned(case, wanted)
             before, wanted = wanted, learned.structure
-            bands = self.asked(
-                "update",
-                asked.update,
-                handed,
-                lambda tick: update.dataset(case, before, learned, tick),
-            )
+            bands = self.asked("update", found, lambda t: update.dataset(case, before, learned, t))
             found = replace(found, learned=learned, update=bands)
         found = replace(found, structure=wanted)
         found = replace(found, envelopes=self.envelopes(found, wanted))
         if asked.exceedance:
-            told = self.asked(
-                "exceedance",
-                asked.exceedance,
-                handed,
-                lambda tick: outcomes.exceedance(case, wanted, tick),
-            )
+            told = self.asked("exceedance", found, lambda t: outcomes.exceedance(case, wanted, t))
             found = replace(found, exceedance=told)
         if asked.decision:
             same = (x.name for x in studies(case) if x.task == task_of(case))
             peaks = found.envelopes.get(next(same, ""))
-            told = self.asked(
-                "decision",
-                asked.decision,
-                handed,
-                lambda tick: decision.decision(
-                    case, wanted, peaks, workers=self.workers, progress=tick
-                ),
-            )
+            make = partial(decision.decision, case, wanted, peaks, workers=self.workers)
+            told = self.asked("decision", found, lambda t: make(progress=t))
             found = replace(found, decision=told)
         if asked.joint:
-            told = self.asked("joint", asked.joint, handed, lambda _: joint.joint(case, wanted))
+            told = self.asked("joint", found, lambda _: joint.joint(case, wanted))
             found = replace(found, joint=told)
         return found
 
@@ -160,11 +144,8 @@ class Chain:
             with progress("Fuzzy modulus", quiet=self.quiet) as tick:
                 wanted = campaign(self.case, petsc=self.petsc, store=store)
                 found = modulus.compute(wanted, workers=self.workers, progress=tick)
-            text, warned = (
-                self.case.text_of_file,
-                references.of_modulus(self.case, found)["outside"],
-            )
-            modulus.write(found, path, case_text=text, key=key, outside=warned)
+            warned = references.of_modulus(case, found)["outside"]
+            modulus.write(found, path, case_text=case.text_of_file, key=key, outside=warned)
 
         found = self.stored("modulus.nc", key, compute)
         error = modulus.listed(found, "error")
@@ -194,10 +175,8 @@ class Chain:
         )
 
         def compute(path: Path) -> None:
-            with whole_file(path) as partial:
-                response.dataset(self.case, cell).assign_attrs(
-                    attributes(self.case.text_of_file, key)
-                ).to_netcdf(partial)
+            facts = attributes(self.case.text_of_file, key)
+            write_dataset(response.dataset(self.case, cell), path, facts)
 
         return self.stored("response.nc", key, compute)
 
@@ -255,20 +234,16 @@ class Chain:
         self.begun(study, key).done()
 
     def asked(
-        self,
-        name: str,
-        section: Section,
-        handed: FuzzyNumber | None,
-        make: Callable[[Tick | None], xarray.Dataset],
+        self, name: str, found: Results, make: Callable[[Tick | None], xarray.Dataset]
     ) -> xarray.Dataset:
-        """What a section asks of the motion of [envelope], in NAME.nc."""
+        """What the section `name` asks of the motion of [envelope], in NAME.nc."""
         motion = replace(self.case.envelope, shares=True)  # which changes nothing here
-        key = self.vibration({"wanted": [section, motion]}, handed)
+        key = self.vibration({"wanted": [getattr(self.case, name), motion]}, found.handed)
 
         def compute(path: Path) -> None:
             with progress(name.capitalize(), quiet=self.quiet) as tick:
-                found = make(tick)
-            envelope.write(found, path, case_text=self.case.text_of_file, key=key)
+                made = make(tick)
+            envelope.write(made, path, case_text=self.case.text_of_file, key=key)
 
         return self.stored(f"{name}.nc", key, compute)
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from alphacut.io.files import Document
+from alphacut.io.files import Document, as_json
+from alphacut.io.netcdf import write_dataset
 from alphacut.io.provenance import versions
 from alphacut.rve.image.directions import directions
 from alphacut.rve.image.model import ImageCut
@@ -173,8 +174,4 @@ def random_variables(found: RandomResponse) -> Document:
 
 def write(found: FuzzyImage, path: Path, attributes: dict[str, str | int]) -> None:
     """Write ``image.nc``, whole or not at all."""
-    from alphacut.io.files import as_json, whole_file
-
-    numbers = as_json(document(found))
-    with whole_file(path) as partial:
-        dataset(found).assign_attrs(attributes | {"document": numbers}).to_netcdf(partial)
+    write_dataset(dataset(found), path, attributes | {"document": as_json(document(found))})

@@ -65,23 +65,13 @@ class CellTask:
         outputs: list[dict[str, float | Array]] = []
         for result in results:
             s11, s12 = result.curve.mean
-            means = {
-                "E": result.modulus,
-                "nu": result.poisson,
-                "s11": s11,
-                "s12": s12,
-                "systems": len(result.iterations),
-            }
-            curves = {
-                name: self.resampled(result.curve.theta, stress)
-                for name, stress in (("curve11", result.curve.s11), ("curve12", result.curve.s12))
-            }
-            errors = {f"error:{source}": result.error.get(source, 0.0) for source in SOURCES}
             outputs.append(
                 {
-                    **means,
-                    **curves,
-                    **errors,
+                    **{"E": result.modulus, "nu": result.poisson, "s11": s11, "s12": s12},
+                    "systems": len(result.iterations),
+                    "curve11": self.resampled(result.curve.theta, result.curve.s11),
+                    "curve12": self.resampled(result.curve.theta, result.curve.s12),
+                    **{f"error:{source}": result.error.get(source, 0.0) for source in SOURCES},
                     **{f"check:{name}": value for name, value in result.checks.items()},
                 }
             )
@@ -203,23 +193,12 @@ def known(case: Case, inputs: Mapping[str, FuzzyNumber]) -> Known:
     poisson = {cell.matrix_poisson.support, cell.inclusion_poisson.support}
     stiffer, softer = inclusion.lower >= matrix.upper, inclusion.upper <= matrix.lower
     one = next(iter(poisson))
-    if (
-        case.modulus.method == "prism"
-        or len(poisson) > 1
-        or one.width
-        or one.lower < 0
-        or not (stiffer or softer)
-    ):
+    unlike = len(poisson) > 1 or one.width or one.lower < 0
+    if case.modulus.method == "prism" or unlike or not (stiffer or softer):
         return Known()
     way = 1 if stiffer else -1
-    signs = {
-        "a1": way,
-        "a2": way,
-        "a3": way,
-        "a4": -way,
-        "matrix_modulus": 1,
-        "inclusion_modulus": 1,
-    }
+    signs = {"a1": way, "a2": way, "a3": way, "a4": -way}
+    signs |= {"matrix_modulus": 1, "inclusion_modulus": 1}
     of_inputs = {name: {"E": sign} for name, sign in signs.items() if name in inputs}
     return Known(signs=of_inputs, source="as mechanics proves of exact cells")
 

@@ -17,7 +17,8 @@ from alphacut.case.load import section_from
 from alphacut.case.sections.material import Radius
 from alphacut.case.sections.particles import PackedSpheres
 from alphacut.case.sections.particles import Packing as PackingSection
-from alphacut.io.files import as_json, say, whole_file, write_text
+from alphacut.io.files import as_json, say, write_text
+from alphacut.io.netcdf import write_dataset
 from alphacut.io.problem import BadInput
 from alphacut.io.progress import Tick
 from alphacut.io.units import engineering
@@ -427,8 +428,7 @@ def write(
     write_text(folder / "microstructure.json", as_json(numbers, indent=2))
     drawn = draw(found, folder / "figures") if figures else {}
     write_text(folder / "radius.toml", fragment(found))
-    with whole_file(folder / "microstructure.nc") as partial:
-        to_dataset(found).assign_attrs(said).to_netcdf(partial)
+    write_dataset(to_dataset(found), folder / "microstructure.nc", said)
     names = ["microstructure.json", "microstructure.nc", "radius.toml"]
     if isinstance(found, Microstructure) and found.sections[0].read.phase_fraction is not None:
         write_text(folder / "circles.csv", circles_of(found))

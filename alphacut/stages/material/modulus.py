@@ -16,8 +16,8 @@ from alphacut.fuzzy.dry_run import Explanation
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.io.csv_rows import CsvFile
-from alphacut.io.files import Document, say, whole_file
-from alphacut.io.netcdf import read_dataset
+from alphacut.io.files import Document, say
+from alphacut.io.netcdf import read_dataset, write_dataset
 from alphacut.io.problem import BadInput
 from alphacut.io.progress import Tick
 from alphacut.io.provenance import attributes, versions
@@ -294,10 +294,8 @@ def write(
         key: Fingerprint of what it depends on.
         outside: Warning to whoever reads E that it leaves bounds, or ''.
     """
-    dataset = modulus.dataset().assign_attrs(attributes(case_text, key))
-    dataset = dataset.assign_attrs(outside=outside) if outside else dataset
-    with whole_file(path) as partial:
-        dataset.to_netcdf(partial)
+    facts = attributes(case_text, key) | ({"outside": outside} if outside else {})
+    write_dataset(modulus.dataset(), path, facts)
 
 
 def listed(dataset: xarray.Dataset, kind: str) -> dict[str, float]:

@@ -14,8 +14,9 @@ from alphacut.case.limits import asked_gap, asked_tolerance, by_auto, names_roug
 from alphacut.frame import Envelope
 from alphacut.frame.exceedance import peaks
 from alphacut.frame.methods.named import options_of
-from alphacut.io.files import Document, say, whole_file
+from alphacut.io.files import Document, say
 from alphacut.io.kept_arrays import KeptArrays
+from alphacut.io.netcdf import write_dataset
 from alphacut.io.problem import BadInput, refuse
 from alphacut.io.progress import Tick
 from alphacut.io.provenance import attributes, versions
@@ -222,5 +223,4 @@ def cure(case: Case, dataset: xarray.Dataset) -> str:
 
 def write(dataset: xarray.Dataset, path: Path | str, *, case_text: str, key: str) -> None:
     """Write an envelope as NetCDF, whole or not at all."""
-    with whole_file(path) as partial:
-        dataset.assign_attrs(attributes(case_text, key)).to_netcdf(partial)
+    write_dataset(dataset, path, attributes(case_text, key))
