@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from alphacut.case.case import Case
 from alphacut.case.names import OUTPUTS, frame_outputs, structures
@@ -132,14 +133,8 @@ def storey_height(case: Case, output: str) -> float | None:
     return lengths[index].modal if 0 <= index < len(lengths) else None
 
 
-@dataclass(frozen=True)
-class AskedTolerance:
-    """Tolerance of envelopes that a case names.
-
-    Args:
-        value: In SI, or a share of a peak.
-        unit: Its unit in words, such as ``m`` or ``shares of the peaks``.
-    """
+class AskedTolerance(NamedTuple):
+    """Tolerance of envelopes in SI or as a share, and the unit: ``m``, ``shares of the peaks``."""
 
     value: float
     unit: str

@@ -44,15 +44,9 @@ def input_unit(name: str) -> str:
     return UNITS.get(re.sub(r"\d+(_0)?$", "", name), "")
 
 
-@dataclass(frozen=True)
-class Supports:
-    """Nominal values and supports of inputs: fuzzy numbers by name, in SI."""
-
-    numbers: dict[str, FuzzyNumber]
-
-    def at(self, scale: float) -> dict[str, tuple[float, float]]:
-        """Intervals of the inputs at a scale of their supports about the nominal values."""
-        return {name: _scaled(number, scale) for name, number in self.numbers.items()}
+def _all_scaled(numbers: Mapping[str, FuzzyNumber], scale: float) -> dict[str, tuple[float, float]]:
+    """Intervals of inputs at a scale of their supports about the nominal values."""
+    return {name: _scaled(number, scale) for name, number in numbers.items()}
 
 
 def _scaled(number: FuzzyNumber, scale: float) -> tuple[float, float]:
@@ -67,22 +61,22 @@ class Tolerances:
     Args:
         found: Scale, box and witness of the frame's parameters.
         limits: Largest magnitude of each limited output, in SI.
-        frame: Supports of the frame's parameters; without E where the cell gives it.
-        cell: Supports of the cell's inputs; empty where the modulus is given.
+        frame: The frame's parameters by name, in SI; without E where the cell gives it.
+        cell: The cell's inputs, likewise; empty where the modulus is given.
         fixed: Fuzzy inputs that are held fixed.
     """
 
     found: SafeScale
     limits: Mapping[str, float]
-    frame: Supports
-    cell: Supports
+    frame: Mapping[str, FuzzyNumber]
+    cell: Mapping[str, FuzzyNumber]
     fixed: Sequence[str] = ()
 
     @property
     def intervals(self) -> dict[str, tuple[float, float]]:
         """Safe interval of every input, the cell's first, in SI; of scale 0 where nothing is."""
         scale = self.found.safe or 0.0
-        return {**self.cell.at(scale), **self.frame.at(scale)}
+        return _all_scaled({**self.cell, **self.frame}, scale)
 
     def document(self) -> Document:
         """The result as it is printed with ``--json``, in SI."""
@@ -143,10 +137,9 @@ def tolerances(
         raise BadInput.of("frame", "missing: safe tolerances are those of a storey frame")
     inputs = wanted.inputs(over.fuzzy)
     own = {name: x for name, x in inputs.items() if modulus_range is None or name != "E"}
-    frame = Supports(own)
 
     def reach(scale: float) -> tuple[Array, Array]:
-        ends = frame.at(scale)
+        ends = _all_scaled(own, scale)
         if modulus_range is not None and "E" in inputs:
             ends["E"] = modulus_range(scale)
         both = np.array([ends[name] for name in inputs], float)
@@ -166,7 +159,7 @@ def tolerances(
     if cell is not None and found.safe and "E" in inputs:
         found = _within_cell(found, cell, list(inputs).index("E"))
     fixed = left_out(wanted, [task_of(case)])
-    return Tolerances(found, limits, frame, Supports(dict(cell.inputs) if cell else {}), fixed)
+    return Tolerances(found, limits, own, cell.inputs if cell else {}, fixed)
 
 
 def _limited(wanted: Structure, outputs: tuple[str, ...], case: Case) -> StoreyFrame:
