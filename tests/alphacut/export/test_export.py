@@ -11,6 +11,8 @@ import pytest
 
 from alphacut.case.load import load
 from alphacut.entry import main
+from alphacut.export.fields import require_conforming
+from alphacut.io.problem import BadInput
 
 ROOT = Path(__file__).parents[3]
 PAPER = str(ROOT / "cases" / "paper.toml")
@@ -167,6 +169,13 @@ def test_fields_of_a_homogeneous_cell_are_uniform(tmp_path):
     assert mesh.point_data["displacement_1_in_half_sides"][:, 0] == pytest.approx(
         0.01 * mesh.points[:, 0], abs=1e-10
     )
+
+
+def test_fields_name_the_interface_that_they_need():
+    with pytest.raises(
+        BadInput, match=r"mesh.interface = sign: fields need .*; allowed: conforming$"
+    ):
+        require_conforming(load(PAPER, ["mesh.interface=sign"]))
 
 
 def test_stress_jumps_across_the_interface_and_displacement_does_not():
