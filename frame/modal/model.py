@@ -16,7 +16,13 @@ import numpy as np
 
 from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.calculus.modal_jet import Parts, composed
+from alphacut.frame.calculus.modal_jet import (
+    Parts,
+    composed,
+    composed_quadratics,
+    packed,
+    quadratics,
+)
 from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.calculus.threads import each
 from alphacut.frame.dynamics.flow import LinearFlow
@@ -127,22 +133,17 @@ class ModalModel:
             waves: Those of the start and, under a load, of the ground, each w, w' and w'' of shape
                 (N, n), where better ones than by the polynomials λ_k are known.
         """
-        d = unit.shape[1]
-        f, g, H = np.empty(len(unit)), np.empty((len(unit), d)), np.empty((len(unit), d, d))
-        rates = self.eigenvalue.quadratic(unit) if self.degree <= 2 else None
-        if rates is not None and waves is None:
-            waves = self._waves(rates[0], node)
+        count, d = unit.shape
+        out = np.zeros(count), np.zeros((count, d)), np.zeros((count, d, d))
+        if self.degree <= 2:
+            self._quadratic(unit, node, output, waves, out)
+            return out
         for o in np.unique(output):
             rows = np.flatnonzero(output == o)
-            if rates is None:
-                found = self._taylor(self.of_output[o].derivatives(unit[rows]), node[rows])
-            else:
-                assert waves is not None
-                own = [None if w is None else (w[0][rows], w[1][rows], w[2][rows]) for w in waves]
-                slopes = (rates[1][rows], rates[2])
-                found = self._quadratic(self.shares[o], unit[rows], slopes, own)
-            f[rows], g[rows], H[rows] = found
-        return f, g, H
+            found = self._taylor(self.of_output[o].derivatives(unit[rows]), node[rows])
+            for total, part in zip(out, found, strict=True):
+                total[rows] = part
+        return out
 
     def _waves(self, rate: Array, node: Array) -> Waves:
         """What the start and the ground excite at eigenvalues (N, n); None of what does not."""
@@ -158,27 +159,23 @@ class ModalModel:
         return [[Polynomial(x.index, x.coefficients[:, o::m]) for x in given] for o in range(m)]
 
     def _quadratic(
-        self, shares: Sequence[Polynomial], unit: Array, slopes: tuple[Array, Array], waves: Waves
-    ) -> tuple[Array, Array, Array]:
-        """As `_taylor`, for degree 2, whose second derivatives are the same everywhere."""
-        slope, bent = slopes
-        f, g = np.zeros(len(unit)), np.zeros(slope.shape[:2])
-        crossed, turned = np.zeros_like(slope), np.zeros_like(slope[:, 0])
-        weights, seconds = [], []
-        for own, wave in zip(shares, waves, strict=False):
-            if wave is None:
-                continue
-            (share, first, second), (w, dw, ddw) = own.quadratic(unit), wave
-            f = f + 2 * (share * w).real.sum(1)
-            g = g + 2 * (first * w[:, None] + slope * (share * dw)[:, None]).real.sum(2)
-            weights.append(w)
-            seconds.append(second)
-            turned += share * dw
-            crossed += first * dw[:, None] + slope * (share * ddw)[:, None] / 2
-        H = 2 * _real_product(crossed, slope.swapaxes(1, 2))
-        weight, all_bent = np.hstack([turned, *weights]), np.concatenate([bent, *seconds], -1)
-        curved = 2 * _real_product(weight, all_bent.reshape(-1, all_bent.shape[-1]).T)
-        return f, g, H + H.swapaxes(1, 2) + curved.reshape(H.shape)
+        self, unit: Array, node: Array, output: Array, waves: Waves | None, out: Parts
+    ) -> None:
+        """Add to `out` as `at`, for degree 2, whose second derivatives are the same everywhere."""
+        rate, shares = self._planes
+        value, slope = quadratics(self.eigenvalue, rate, unit)
+        if waves is None:
+            waves = self._waves(value, node)
+        for place, (planes, wave) in enumerate(zip(shares, waves, strict=False)):
+            if wave is not None:
+                own = [share[place] for share in self.shares], planes
+                composed_quadratics(unit, (self.eigenvalue, rate, slope), own, output, wave, out)
+
+    @cached_property
+    def _planes(self) -> tuple[Array, list[Array]]:
+        """Coefficients of λ_k and of the shares, as `composed_quadratics` takes them."""
+        columns = zip(*self.shares, strict=True)
+        return packed(self.eigenvalue), [np.stack([packed(x) for x in own]) for own in columns]
 
     def _taylor(self, parts: Parts, node: Array) -> Parts:
         (count, d), rate = parts[1].shape[:2], parts[0][:, : self.count]
@@ -219,9 +216,3 @@ class ModalModel:
         started = self.coefficient.coefficients.any()
         free = np.exp(rate * self.time[node][:, None]) if started else None
         return [free, None if self.load is None else self.load.response_alone(rate, node)]
-
-
-def _real_product(a: Array, b: Array) -> Array:
-    """Real part of a @ b for complex arrays."""
-    left, right = np.concatenate([a.real, -a.imag], -1), np.concatenate([b.real, b.imag], -2)
-    return np.asarray(left @ right)

@@ -9,7 +9,7 @@ from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.threads import each
 from alphacut.frame.modal.optima import Optima, Response
 
-PIECE = 2000
+PIECE = 6000
 """Problems treated together; more would leave the cache."""
 USUAL = 6
 """Newton steps after which quadratic models are maximised over all faces: the rest is on ridges."""
@@ -21,7 +21,7 @@ def refine(
     model: Response, optima: Optima, which: Array, lower: Array, upper: Array, small: float
 ) -> None:
     """Newton's method in the box on `which`, until none promises more than `small`."""
-    size = int(np.clip(PIECE * 36 / lower.size**2, PIECE // 2, PIECE))
+    size = min(PIECE, PIECE * 6 // lower.size)
     pieces = np.array_split(which, -(-len(which) // size) or 1)
     each(lambda piece: _newton(model, optima, piece, lower, upper, small), pieces)
 
@@ -48,9 +48,10 @@ def _newton(
         optima.left[which] = promised
         held = np.abs(step).max(1, initial=0.0) >= 0.999 * radius
         open_ = (promised > small) | (held & (promised > 1e-3 * small))
-        which, radius, step, promised, g, H, bend = (
-            x[open_] for x in (which, radius, step, promised, g, H, bend)
-        )
+        if not open_.all():
+            which, radius, step, promised, g, H, bend = (
+                x[open_] for x in (which, radius, step, promised, g, H, bend)
+            )
         if not len(which):
             return
         trial = np.clip(optima.point[which] + step, lower, upper)

@@ -47,17 +47,7 @@ class Slopes:
             points: Their values, shape (S, d).
             observed: Whether the rows are wanted; else they and their derivatives are empty.
         """
-        (total, d), fixed = points.shape, [name for name in system.parameters if name not in names]
-        modal = [system.parameters[name] for name in fixed]
-        values = np.hstack([points, np.tile(modal, (total, 1))])
-        p = {
-            name: Jet(
-                np.tile(values[:, k], d),
-                np.repeat(np.arange(d) == k, total).astype(float)[None],
-                np.zeros((1, 1, d * total)),
-            )
-            for k, name in enumerate([*names, *fixed])
-        }
+        (total, d), p = points.shape, one_by_one(system, names, points)
         matrices = system.matrices(p)
         n, m = matrices.mass.value.shape[-1], len(system.outputs)
         still = Jet.constant(np.zeros((0, m, 2 * n)), 1)
@@ -122,6 +112,27 @@ class Slopes:
         if self.observation.any():
             total += np.einsum("dns,ns->nd", self.observation[:, own, output], seen)
         return total
+
+
+def one_by_one(
+    system: LinearSystem, names: Sequence[str], points: Array, *, derivatives: bool = True
+) -> dict[str, Jet]:
+    """All parameters at `points` (S, d), d times: the k-th time with derivatives by the k-th name.
+
+    Without derivatives they are there once.
+    """
+    total, d = points.shape
+    times, one = (d, 1) if derivatives else (1, 0)
+    still = np.zeros((one, one, times * total))
+    values = {name: np.full(total, float(x)) for name, x in system.parameters.items()}
+    values |= dict(zip(names, points.T, strict=True))
+    p = {}
+    for name, value in values.items():
+        first = np.zeros((one, times, total))
+        if derivatives and name in names:
+            first[:, list(names).index(name)] = 1.0
+        p[name] = Jet(np.tile(value, times), first.reshape(one, times * total), still)
+    return p
 
 
 def _inner(derivative: Array, own: Array, by: Array) -> Array:

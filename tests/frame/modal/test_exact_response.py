@@ -146,6 +146,47 @@ def test_the_answer_to_the_ground_is_the_same_compiled_and_not(
         assert not np.array_equal(a, b)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_compiled_modes_give_what_eigenvectors_give(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng, n = np.random.default_rng((seed, 31)), 1 + seed
+    kinds = [f"{kind}{z + 1}" for z in range(n) for kind in ("q", "v", "a", "drift", "shear")]
+    damped = (tuple(10 ** rng.uniform(1, 4, n)), ("storey", "ground")[seed % 2])
+    system = StoreyFrame(
+        tuple(rng.uniform(1e4, 3e4, n)),
+        tuple(rng.uniform(2.5, 3.5, n)),
+        25e9,
+        2e-5,
+        *damped,  # type: ignore[arg-type]
+        tuple(rng.uniform(0.01, 0.1, n)),
+        tuple(rng.uniform(0.01, 0.1, n)),
+        tuple(rng.choice(kinds, 4, replace=False)),
+        (0.1, 1e-3) if seed % 3 else (0.0, 0.0),
+        RECORD if seed % 2 else None,
+        gravity=9.81 if seed > 3 else 0.0,
+    )
+    names = ("E", "m1", "d1", f"l{n}", f"q{n}_0", "rayleigh_mass")[: 6 if seed % 3 else 5]
+    flow = unit_flow(system, names, 0.1)
+    model = fit_modes(flow.flow, flow.boxes, tolerance=1e-1, budget=60)  # type: ignore[arg-type]
+    points, node = rng.uniform(-1, 1, (200, len(names))), rng.integers(81, size=200)
+    points[20:40], output = points[20], rng.integers(4, size=200)
+    own, every = flow.boxes.to_physical(points), np.arange(200)
+    fast = ExactResponse.of(model, np.ones(4))
+    assert fast._compiled(own, every, node, output, deep=True) is not None
+    found = (*fast.at(points, node, output), fast.value_at(points, node, output))
+    monkeypatch.setenv("ALPHACUT_KERNEL", "numpy")
+    c_library.cache_clear()
+    slow = ExactResponse.of(model, np.ones(4))
+    assert slow._compiled(own, every, node, output, deep=True) is None
+    twin = (*slow.at(points, node, output), slow.value_at(points, node, output))
+    c_library.cache_clear()
+    for a, b in zip(found, twin, strict=True):
+        for o in range(4):
+            mine = output == o
+            assert np.abs(a[mine] - b[mine]).max() < 1e-11 * np.abs(b[mine]).max()
+
+
 def test_bounds_of_eight_inputs_hold_all_samples_within_their_error() -> None:
     system = replace(FRAME, outputs=("q1", "q3"))
     inputs = {n: Interval(0.9 * FRAME.parameters[n], 1.1 * FRAME.parameters[n]) for n in MANY[:-1]}
