@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.frame.calculus.c_library import FLAGS, address, c_library
+from alphacut.frame.calculus.c_library import FUSED, address, c_library
 from alphacut.frame.calculus.jet import Array
 
 SOURCE = Path(__file__).with_name("damped_modes.c").read_text(encoding="utf-8")
 
 
 def _library() -> ctypes.CDLL | None:
-    return c_library(SOURCE, (*FLAGS, "-fcx-limited-range"))
+    return c_library(SOURCE, (*FUSED, "-fcx-limited-range"))
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.frame.calculus.c_library import address, c_library
+from alphacut.frame.calculus.c_library import FUSED, address, c_library
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial
 
@@ -31,7 +31,7 @@ def composed(parts: Parts, place: int, waves: Parts, out: Parts) -> None:
 
 
 def _compiled(parts: Parts, place: int, waves: Parts, out: Parts) -> bool:
-    library = c_library(SOURCE)
+    library = c_library(SOURCE, FUSED)
     if library is None:
         return False
     (count, d), n = out[1].shape, waves[0].shape[1]
@@ -78,7 +78,7 @@ def quadratics(given: Polynomial, planes: Array, unit: Array) -> tuple[Array, Ar
         Values, and first derivatives in planes, shape (N, K, 2, d), which are complex, shape
         (N, d, K), without a compiler.
     """
-    library = c_library(SOURCE)
+    library = c_library(SOURCE, FUSED)
     if library is None:
         return given.quadratic(unit)[:2]
     (count, d), K = unit.shape, len(planes)
@@ -107,7 +107,7 @@ def composed_quadratics(
         waves: w, w' and w'' at λ_k, each (N, n).
         out: What is added to.
     """
-    library, (count, d), n = c_library(SOURCE), unit.shape, waves[0].shape[1]
+    library, (count, d), n = c_library(SOURCE, FUSED), unit.shape, waves[0].shape[1]
     if library is not None:
         points, which = (np.ascontiguousarray(x, float) for x in (unit, output))
         given = (points, rate[1], rate[2], shares[1], which, np.stack(waves).view(float), *out)
