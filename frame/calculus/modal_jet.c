@@ -1,5 +1,7 @@
 /* 2 Re sum of C_k w(lambda_k) with gradient and Hessian: the twin of modal_jet.py. */
 
+#include <stdlib.h>
+
 typedef struct { double re, im; } z;
 
 static z times(z a, z b) { z c = {a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re}; return c; }
@@ -71,19 +73,17 @@ int quadratic_values(long count, int d, int K, const double *unit, const double 
     return 1;
 }
 
-#define MOST 256
-
 /* As modal_jet for quadratics: rate (n, 2, 1 + d + d d) with its first
    derivatives at the points, slopes (count, n, 2, d), share (outputs, n, 2, 1 + d + d d), output
-   (count), waves (3, count, n). f, g and H are added; H is even. 0 for too many parameters. */
+   (count), waves (3, count, n). f, g and H are added; H is even. 0 without memory. */
 int quadratic_jet(long count, int d, int n, const double *unit, const double *rate,
                   const double *slopes, const double *share, const double *output,
                   const double *waves, double *f, double *g, double *H)
 {
     int width = 1 + d + d * d;
     const z *w = (const z *)waves, *dw = w + count * n, *ddw = dw + count * n;
-    double sr[MOST], si[MOST];
-    if (d > MOST) return 0;
+    double *sr = malloc(2 * d * sizeof(double)), *si = sr + d;
+    if (!sr) return 0;
     for (long p = 0; p < count; p++) {
         const double *u = unit + p * d;
         double *gp = g + p * d, *Hp = H + p * d * d;
@@ -115,5 +115,6 @@ int quadratic_jet(long count, int d, int n, const double *unit, const double *ra
     for (long p = 0; p < count; p++)
         for (int i = 0; i < d; i++)
             for (int j = 0; j < i; j++) H[(p * d + i) * d + j] = H[(p * d + j) * d + i];
+    free(sr);
     return 1;
 }

@@ -75,12 +75,11 @@ def quadratics(given: Polynomial, planes: Array, unit: Array) -> tuple[Array, Ar
         unit: Points, shape (N, d).
 
     Returns:
-        Values, and first derivatives in planes, shape (N, K, 2, d), which are complex, shape
-        (N, d, K), without a compiler.
+        Values, and first derivatives in planes, shape (N, K, 2, d), for compiled code alone.
     """
     library = c_library(SOURCE, FUSED)
     if library is None:
-        return given.quadratic(unit)[:2]
+        return given.quadratic(unit)[0], np.empty(0)
     (count, d), K = unit.shape, len(planes)
     out, first = np.empty((count, K), complex), np.empty((count, K, 2, d))
     sizes = ctypes.c_long(count), ctypes.c_int(d), ctypes.c_int(K)
@@ -114,7 +113,7 @@ def composed_quadratics(
         sizes = ctypes.c_long(count), ctypes.c_int(d), ctypes.c_int(n)
         if library.quadratic_jet(*sizes, *map(address, given)):
             return
-    slope, bent = rate[2], rate[0].curve[:, :, 0]
+    _, slope, bent = rate[0].quadratic(unit)
     for o in np.unique(output):
         rows = np.flatnonzero(output == o)
         own = waves[0][rows], waves[1][rows], waves[2][rows]
