@@ -15,10 +15,10 @@ from matplotlib import pyplot
 import alphacut.figures.all
 import alphacut.figures.style
 import alphacut.frame
-import alphacut.frame.decisions.safe_scale
 import alphacut.fuzzy.campaign.workers
 import alphacut.io.progress
 import alphacut.stages.material.modulus
+import alphacut.stages.vibration.tolerances
 import alphacut.stochastic.figures.all
 from alphacut.commands import options
 from alphacut.rve.series.model import SeriesModel
@@ -31,7 +31,7 @@ def watch(command_modules: Iterable[object], events: list, monkeypatch) -> None:
     for place, function in _pure():
         monkeypatch.setattr(place, function, _remembered(getattr(place, function)))
     for name, module in (
-        ("safe scale", alphacut.frame.decisions.safe_scale),
+        ("safe scale", alphacut.stages.vibration.tolerances),
         ("envelope", alphacut.frame),
         ("propagate", alphacut.stages.material.modulus),
     ):
