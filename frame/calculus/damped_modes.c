@@ -147,26 +147,29 @@ static z rayleigh(int n, const double *C, const double *mu, const z *u, z near)
     return length(one - near) < length(two - near) ? one : two;
 }
 
-/* Iterates a mode whose shape hardly leaves the k-th undamped one, u_k = 1; 0 where that fails. */
-static int weakly_coupled(int n, int k, const double *C, const double *mu, z *rate, z *u, z *next)
+/* Iterates a mode whose shape hardly leaves the k-th undamped one, u_k = 1; 0 where that fails.
+   What is left of each row is divided by its own entry at the first rate. */
+static int weakly_coupled(int n, int k, const double *C, const double *mu, z *rate, z *u, z *work)
 {
-    z l = *rate;
-    for (int turns = 0; turns < 12; turns++) {
+    double *re = (double *)work, *im = re + n;
+    z *over = work + n, l = *rate;
+    for (int j = 0; j < n; j++) over[j] = j == k ? 0 : 1 / (l * l + l * C[j * n + j] + mu[j]);
+    for (int turns = 0; turns < 15; turns++) {
         double moved = 0;
+        for (int j = 0; j < n; j++) re[j] = im[j] = 0;
+        for (int i = 0; i < n; i++) {  /* C u: C is symmetric */
+            double a = creal(u[i]), b = cimag(u[i]);
+            for (int j = 0; j < n; j++) re[j] += C[i * n + j] * a;
+            for (int j = 0; j < n; j++) im[j] += C[i * n + j] * b;
+        }
+        z half = (re[k] + I * im[k]) / 2, turn = root(half * half - mu[k]);
+        *rate = cimag(turn) < 0 ? -half - turn : -half + turn;
         for (int j = 0; j < n; j++) {
-            z sum = 0;
-            for (int i = 0; i < n; i++) sum += C[j * n + i] * u[i];
-            sum -= C[j * n + j] * u[j];
-            if (j == k) {
-                z half = (C[k * n + k] + sum) / 2;
-                z turn = root(half * half - mu[k]);
-                *rate = cimag(turn) < 0 ? -half - turn : -half + turn;
-                next[j] = 1;
-            } else next[j] = -l * sum / (l * l + l * C[j * n + j] + mu[j]);
-            moved = fmax(moved, size(next[j] - u[j]));
+            z step = ((l * l + mu[j]) * u[j] + l * (re[j] + I * im[j])) * over[j];
+            moved = fmax(moved, size(step));
+            u[j] -= step;
         }
         moved = fmax(moved, size(*rate - l) / size(l));
-        memcpy(u, next, n * sizeof(z));
         l = *rate;
         if (!(moved < 1e-2)) return 0;
         if (moved < 1e-15) return cimag(l) > 1e-9 * length(l);
@@ -185,7 +188,7 @@ static int mode(int n, int k, const double *C, const double *mu, z *rate, z *u, 
         u[j] = j == k ? 1 : -l * C[j * n + k] / own;
         if (j != k && !(size(u[j]) < 1)) u[j] = 0;
     }
-    z *kept = work + n * n;
+    z *kept = work + 2 * n;
     *rate = l;
     memcpy(kept, u, n * sizeof(z));
     if (weakly_coupled(n, k, C, mu, rate, u, work)) return 1;
@@ -218,10 +221,9 @@ static int mode(int n, int k, const double *C, const double *mu, z *rate, z *u, 
 static int complete(int n, const double *C, const z *rate, const z *u, z *work)
 {
     for (int k = 0; k < n; k++)
-        for (int a = 0; a < n; a++) {
-            z sum = 0;
-            for (int b = 0; b < n; b++) sum += C[a * n + b] * u[k * n + b];
-            work[k * n + a] = sum;
+        for (int b = 0; b < n; b++) {
+            z own = u[k * n + b];
+            for (int a = 0; a < n; a++) work[k * n + a] = (b ? work[k * n + a] : 0) + C[b * n + a] * own;
         }
     for (int j = 0; j < n; j++)
         for (int k = 0; k <= j; k++) {
@@ -248,7 +250,7 @@ int damped_modes(long points, int n, const double *M, const double *D, const dou
     long nn = (long)n * n;
     double *real = calloc(6 * nn + n, sizeof(double)), *L = real, *W = real + nn, *A = W + nn;
     double *C = A + nn, *work = C + nn, *mu = work + nn, *V = mu + n;
-    z *both = calloc(3 * nn + 3 * n, sizeof(z)), *u = both, *rest = u + nn, *l = rest + nn + n;
+    z *both = calloc(3 * nn + 5 * n, sizeof(z)), *u = both, *rest = u + nn, *l = rest + nn + 3 * n;
     int *order = calloc(n, sizeof(int)), good = real && both && order;
     for (long p = 0; p < points && good; p++) {
         const double *Mp = M + p * nn, *Dp = D + p * nn, *Kp = K + p * nn;

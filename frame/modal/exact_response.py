@@ -26,7 +26,7 @@ from alphacut.frame.structures.factors import Factors, factors
 from alphacut.frame.structures.linear import evaluate
 from alphacut.frame.structures.slopes import Slopes
 
-PIECE = 3000
+PIECE = 1500
 """Points treated together; more would leave the cache."""
 NEAR = 1e-3
 """Phase between two eigenvalues (rad) below which their divided difference is a derivative."""

@@ -11,6 +11,8 @@ from alphacut.frame.modal.optima import Optima, Response
 
 PIECE = 6000
 """Problems treated together; more would leave the cache."""
+LEAST = 250
+"""Problems below which a piece costs more than it saves."""
 USUAL = 6
 """Newton steps after which quadratic models are maximised over all faces: the rest is on ridges."""
 ITERATIONS = 300
@@ -21,7 +23,7 @@ def refine(
     model: Response, optima: Optima, which: Array, lower: Array, upper: Array, small: float
 ) -> None:
     """Newton's method in the box on `which`, until none promises more than `small`."""
-    size = min(PIECE, PIECE * 6 // lower.size)
+    size = min(PIECE * 6 // max(lower.size, 6), max(LEAST, -(-len(which) // 2)))
     pieces = np.array_split(which, -(-len(which) // size) or 1)
     each(lambda piece: _newton(model, optima, piece, lower, upper, small), pieces)
 

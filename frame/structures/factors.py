@@ -43,6 +43,7 @@ class Factors:
         rows: Into the observation rows, shape (J, m, 2n).
         over: Factor by which a row is divided, shape (m,); 0 for none.
         rigid: How the unknowns move rigidly with the ground, shape (n,).
+        modal: All parameters with their modal values.
     """
 
     monomials: Sequence[Monomial]
@@ -52,6 +53,7 @@ class Factors:
     rows: Array
     over: Array
     rigid: Array
+    modal: Mapping[str, float]
 
     def at(
         self, system: LinearSystem, names: Sequence[str], points: Array, *, derivatives: bool
@@ -64,7 +66,7 @@ class Factors:
             points: Their values.
             derivatives: Whether derivatives are wanted; else there are none.
         """
-        given = {**system.parameters, **dict(zip(names, points.T, strict=True))}
+        given = {**self.modal, **dict(zip(names, points.T, strict=True))}
         value, slopes = np.empty((len(points), len(self.parts))), list[Slope]()
         place = {name: k for k, name in enumerate(names) if derivatives}
         for j, (coefficient, powers) in enumerate(self.monomials):
@@ -73,7 +75,7 @@ class Factors:
             for name in (name for name in powers if name in place):
                 others = prod((x for key, x in terms.items() if key != name), start=coefficient)
                 own = powers[name] * given[name] ** (powers[name] - 1) * others
-                slopes.append((j, place[name], np.broadcast_to(own, len(points))))
+                slopes.append((j, place[name], np.zeros(len(points)) + own))
         if self.others is not None:
             p = one_by_one(system, names, points, derivatives=derivatives)
             for j, entry in enumerate(self.others(p), start=len(self.monomials)):
@@ -145,7 +147,7 @@ def _(system: MatrixStructure, names: Sequence[str]) -> Factors | None:
     rigid = np.ones(n) if system.pattern is None else np.asarray(system.pattern, float)
     others = (lambda p: [f(p) for _, f, _ in functions]) if functions else None
     over = np.zeros(len(system.outputs), int)
-    return Factors(monomials, others, parts, start, rows, over, rigid)
+    return Factors(monomials, others, parts, start, rows, over, rigid, system.parameters)
 
 
 @factors.register
@@ -180,7 +182,7 @@ def _(system: StoreyFrame, names: Sequence[str]) -> Factors | None:
     for place, (kind, arrays) in enumerate(blocks):
         parts[1 + n * place : 1 + n * (place + 1), kind] = arrays
     rows, over = _rows(system, parts)
-    return Factors(monomials, others, parts, start, rows, over, np.ones(n))
+    return Factors(monomials, others, parts, start, rows, over, np.ones(n), given)
 
 
 def _link(frame: StoreyFrame, z: int) -> Monomial:
