@@ -151,15 +151,9 @@ def _(system: MatrixStructure, names: Sequence[str]) -> Factors | None:
 
 
 @factors.register
-def _(system: FieldFrame, names: Sequence[str]) -> Factors | None:
-    del system, names  # its places are sums of parameters
-    return None
-
-
-@factors.register
 def _(system: StoreyFrame, names: Sequence[str]) -> Factors | None:
     n, given = system.floors, system.parameters
-    if system.ratios:
+    if system.ratios or isinstance(system, FieldFrame):  # whose places are sums of parameters
         return None
     damped = [bool(given[name]) or name in names for name in RAYLEIGH]
     links = [_link(system, z) for z in range(1, n + 1)]
