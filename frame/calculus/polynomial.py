@@ -112,17 +112,15 @@ def sums(u: Array, index: Index, parts: Sequence[Columns]) -> Array:
         B = basis(u, index)
         return np.hstack([product(B[:, : len(part.own)], part.own) for part in parts])
     widths = [part.own.shape[1] for part in parts]
-    out, points = (
-        np.empty((len(u), sum(widths)), parts[0].own.dtype),
-        np.ascontiguousarray(u, float),
-    )
+    out, points = np.empty((len(u), sum(widths)), parts[0].own.dtype), np.ascontiguousarray(u, float)
+    blocks = [part.blocks for part in parts]  # another thread may replace those that are kept
     reals, longs = out.itemsize // 8, ctypes.c_long * len(parts)
     library.monomial_sums(
         *(ctypes.c_long(len(u)), *map(ctypes.c_int, index.shape[::-1])),
         *(part.ctypes.data_as(ctypes.c_void_p) for part in (axis, parent)),
         *(address(points), len(parts), longs(*(len(part.own) for part in parts))),
         longs(*(reals * width for width in widths)),
-        (ctypes.c_void_p * len(parts))(*(part.blocks.ctypes.data for part in parts)),
+        (ctypes.c_void_p * len(parts))(*(block.ctypes.data for block in blocks)),
         ctypes.c_void_p(out.ctypes.data),
     )
     return out
