@@ -112,7 +112,8 @@ def sums(u: Array, index: Index, parts: Sequence[Columns]) -> Array:
         B = basis(u, index)
         return np.hstack([product(B[:, : len(part.own)], part.own) for part in parts])
     widths = [part.own.shape[1] for part in parts]
-    out, points = np.empty((len(u), sum(widths)), parts[0].own.dtype), np.ascontiguousarray(u, float)
+    out = np.empty((len(u), sum(widths)), parts[0].own.dtype)
+    points = np.ascontiguousarray(u, float)
     blocks = [part.blocks for part in parts]  # another thread may replace those that are kept
     reals, longs = out.itemsize // 8, ctypes.c_long * len(parts)
     library.monomial_sums(
