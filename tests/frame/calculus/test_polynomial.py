@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import weakref
+
 import numpy as np
 import pytest
 from numpy.polynomial.chebyshev import chebvander
@@ -52,3 +54,22 @@ def test_compiled_sums_are_those_of_numpy(
     for one, other in zip(*found, strict=True):
         assert one.shape == other.shape
         assert np.abs(one - other).max(initial=0) <= 1e-13 * np.abs(other).max(initial=1)
+
+
+def test_coefficients_live_while_compiled_code_reads_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another thread may put its own in the place of those that are kept."""
+    made: list[weakref.ref[np.ndarray]] = []  # type: ignore[type-arg]
+
+    def fresh(part: polynomial.Columns) -> np.ndarray:  # type: ignore[type-arg]
+        array = np.zeros((1, len(part.own), polynomial.WIDE))
+        made.append(weakref.ref(array))
+        return array
+
+    class Library:
+        def monomial_sums(self, *_: object) -> None:
+            assert all(one() is not None for one in made)
+
+    monkeypatch.setattr(polynomial.Columns, "blocks", property(fresh))
+    monkeypatch.setattr(polynomial, "c_library", lambda *_: Library())
+    Polynomial(exponents(2, 3), np.ones((10, 2))).jets(np.zeros((4, 2)))
+    assert len(made) == 3
