@@ -18,7 +18,8 @@ import numpy as np
 from scipy.stats import t as students_t
 
 from alphacut.rve.cell import Phase
-from alphacut.rve.spheres.many.stiffness import grid_stiffness
+from alphacut.rve.spheres.many.stiffness import stiffness_of
+from alphacut.rve.spheres.many.voxels import voxels_of
 from alphacut.stochastic.errors import RefusedError
 from alphacut.stochastic.spheres.packing import SpherePacking
 from alphacut.stochastic.spheres.spheres import Spheres
@@ -114,7 +115,7 @@ class RandomCells:
         grids = self.grids if number < self.refined else self.grids[:1]
         return np.array(
             [
-                grid_stiffness(spheres, matrix, inclusion, grid=grid, accuracy=SOLVER).moduli
+                stiffness_of(voxels_of(spheres, grid), matrix, inclusion, accuracy=SOLVER).moduli
                 for grid in grids
             ]
         )

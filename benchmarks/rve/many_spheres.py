@@ -27,7 +27,8 @@ from alphacut.case.load import load
 from alphacut.rve.cell import Phase
 from alphacut.rve.spheres.bounds import hashin_shtrikman
 from alphacut.rve.spheres.cubic import hill_average
-from alphacut.rve.spheres.many.stiffness import grid_stiffness
+from alphacut.rve.spheres.many.stiffness import stiffness_of
+from alphacut.rve.spheres.many.voxels import voxels_of
 from alphacut.rve.spheres.series.stiffness import cubic_stiffness
 from alphacut.stages.material import modulus
 from alphacut.stages.material.campaign import campaign
@@ -70,7 +71,7 @@ def calibrate(draws: int, seed: int) -> Calibration:
         radii = rng.uniform(0.4, 0.85, CELLS)
         spheres = [Spheres(rng.uniform(0, 2, (1, 3)), np.array([r]), 2.0) for r in radii]
         found = np.array(
-            [[grid_stiffness(one, *phases, grid=n).moduli for n in GRIDS] for one in spheres]
+            [[stiffness_of(voxels_of(one, n), *phases).moduli for n in GRIDS] for one in spheres]
         )
         cell = cubic_stiffness(radii, phases[0], [phases[1]], tolerance=1e-8)
         exact = np.array([own[:, 0].mean() for own in (cell.bulk, cell.deviator, cell.shear)])

@@ -32,7 +32,8 @@ from alphacut.rve.spheres.bounds import (
     hashin_shtrikman,
     shear_against_trace_bounds,
 )
-from alphacut.rve.spheres.many.stiffness import grid_stiffness
+from alphacut.rve.spheres.many.stiffness import stiffness_of
+from alphacut.rve.spheres.many.voxels import voxels_of
 from alphacut.rve.spheres.result import volume_fraction
 from alphacut.rve.spheres.series.stiffness import cubic_stiffness
 from alphacut.stochastic.spheres.spheres import Spheres
@@ -198,7 +199,10 @@ def voxels(seed: int) -> Iterator[Check]:
         places = rng.uniform(0, 2, (4, 1, 3))
         cells = [Spheres(place, np.array([radius]), 2.0) for place in places]
         found = np.mean(
-            [[grid_stiffness(c, MATRIX, inclusion, grid=n).moduli for n in GRIDS] for c in cells],
+            [
+                [stiffness_of(voxels_of(c, n), MATRIX, inclusion).moduli for n in GRIDS]
+                for c in cells
+            ],
             axis=0,
         )
         limit, error = limit_of_grids(found, GRIDS)

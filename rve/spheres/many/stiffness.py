@@ -15,8 +15,7 @@ from alphacut.rve.cell import Phase
 from alphacut.rve.spheres.bounds import bulk_and_shear
 from alphacut.rve.spheres.many.fourier import FourierGrid
 from alphacut.rve.spheres.many.laminate import VoxelStiffness, voxel_stiffness
-from alphacut.rve.spheres.many.voxels import Voxels, voxels_of
-from alphacut.stochastic.spheres.spheres import Spheres
+from alphacut.rve.spheres.many.voxels import Voxels
 from alphacut.stochastic.theta.truncated_normal import Array
 
 LIMIT = 1000  # iterations of one load
@@ -49,31 +48,23 @@ class GridStiffness:
     grid: int
 
 
-def grid_stiffness(
-    spheres: Spheres, matrix: Phase, inclusion: Phase, *, grid: int, accuracy: float = 1e-6
+def stiffness_of(
+    voxels: Voxels, matrix: Phase, inclusion: Phase, *, accuracy: float = 1e-6
 ) -> GridStiffness:
     """Moduli of a periodic cube of spheres, on one grid.
 
     Args:
-        spheres: Spheres that do not overlap.
-        matrix: Material between them.
+        voxels: The cube.
+        matrix: Material between the spheres.
         inclusion: Material of the spheres.
-        grid: Voxels along an edge, odd, at least 3.
         accuracy: Relative error of the energy allowed to the solver, in (0, 0.1].
 
     Raises:
-        ValueError: A value lies outside its range.
+        ValueError: The accuracy lies outside its range.
         RuntimeError: The iteration does not converge.
     """
     if not 0 < accuracy <= 0.1:
         raise ValueError(f"the solver's accuracy is {accuracy:g}; it must lie in (0, 0.1]")
-    return stiffness_of(voxels_of(spheres, grid), matrix, inclusion, accuracy=accuracy)
-
-
-def stiffness_of(
-    voxels: Voxels, matrix: Phase, inclusion: Phase, *, accuracy: float = 1e-6
-) -> GridStiffness:
-    """The same for given voxels."""
     material = voxel_stiffness(voxels, matrix, inclusion)
     softest = np.min([bulk_and_shear(phase) for phase in (matrix, inclusion)], axis=0)
     bulk, shear = (float(modulus) for modulus in softest)

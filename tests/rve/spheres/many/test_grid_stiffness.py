@@ -5,8 +5,8 @@ from alphacut.rve import Phase
 from alphacut.rve.spheres.bounds import bulk_and_shear
 from alphacut.rve.spheres.many import stiffness
 from alphacut.rve.spheres.many.laminate import voxel_stiffness
-from alphacut.rve.spheres.many.stiffness import grid_stiffness, stiffness_of
-from alphacut.rve.spheres.many.voxels import Voxels
+from alphacut.rve.spheres.many.stiffness import stiffness_of
+from alphacut.rve.spheres.many.voxels import Voxels, voxels_of
 from alphacut.rve.spheres.series.stiffness import cubic_stiffness
 from alphacut.stochastic.spheres.spheres import Spheres
 from benchmarks.rve.many_random_cells import limit_of_grids
@@ -25,7 +25,7 @@ def exact(radius, matrix, inclusion):
 
 
 def test_homogeneous_cell_is_the_matrix():
-    found = grid_stiffness(one(0.7, (0.3, 1.1, 0.2)), MATRIX, MATRIX, grid=9)
+    found = stiffness_of(voxels_of(one(0.7, (0.3, 1.1, 0.2)), 9), MATRIX, MATRIX)
     bulk, shear = bulk_and_shear(MATRIX)
     np.testing.assert_allclose(found.moduli, [bulk, shear, shear], rtol=1e-12)
 
@@ -38,7 +38,8 @@ def test_equal_shear_moduli_give_hills_bulk_modulus():
         for k in bulks
     ]
     hill = 1 / ((1 - share) / (bulks[0] + 4 / 3 * shear) + share / (bulks[1] + 4 / 3 * shear))
-    found = grid_stiffness(one(0.7, (0.3, 1.1, 0.2)), *phases, grid=9, accuracy=1e-11).moduli
+    voxels = voxels_of(one(0.7, (0.3, 1.1, 0.2)), 9)
+    found = stiffness_of(voxels, *phases, accuracy=1e-11).moduli
     np.testing.assert_allclose(found, [hill - 4 / 3 * shear, shear, shear], rtol=1e-9)
 
 
@@ -71,7 +72,9 @@ def test_grids_reach_the_series_within_the_declared_error(inclusion):
     rng = np.random.default_rng(int(inclusion.modulus % 997))
     radii = rng.uniform(0.5, 0.8, 4)
     cells, grids = [one(r, rng.uniform(0, 2, 3)) for r in radii], (9, 13, 17)
-    found = [[grid_stiffness(c, MATRIX, inclusion, grid=n).moduli for n in grids] for c in cells]
+    found = [
+        [stiffness_of(voxels_of(c, n), MATRIX, inclusion).moduli for n in grids] for c in cells
+    ]
     truth = np.mean([exact(r, MATRIX, inclusion) for r in radii], axis=0)
     means = np.mean(found, axis=0)
     limit, declared = limit_of_grids(means, grids)
@@ -83,8 +86,8 @@ def test_grids_reach_the_series_within_the_declared_error(inclusion):
 
 def test_the_solver_lacks_no_more_than_it_says():
     sphere = one(0.8, (0.4, 0.9, 1.3))
-    rough = grid_stiffness(sphere, MATRIX, Phase(20e11), grid=7, accuracy=0.03)
-    fine = grid_stiffness(sphere, MATRIX, Phase(20e11), grid=7, accuracy=1e-10)
+    rough = stiffness_of(voxels_of(sphere, 7), MATRIX, Phase(20e11), accuracy=0.03)
+    fine = stiffness_of(voxels_of(sphere, 7), MATRIX, Phase(20e11), accuracy=1e-10)
     excess = rough.moduli / fine.moduli - 1
     assert (excess >= 0).all()
     assert 1e-6 < excess.max() <= rough.solver_error
@@ -100,4 +103,4 @@ def test_a_solver_that_does_not_end_raises(monkeypatch):
 @pytest.mark.parametrize("accuracy", [0, 0.2, np.nan])
 def test_an_accuracy_out_of_range_is_refused(accuracy):
     with pytest.raises(ValueError, match=r"it must lie in \(0, 0\.1\]"):
-        grid_stiffness(one(0.5, (1, 1, 1)), MATRIX, STIFF, grid=5, accuracy=accuracy)
+        stiffness_of(voxels_of(one(0.5, (1, 1, 1)), 5), MATRIX, STIFF, accuracy=accuracy)
