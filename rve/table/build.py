@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
+from functools import lru_cache, partial
 from time import perf_counter
 from typing import Protocol
 
@@ -12,7 +12,6 @@ import numpy as np
 
 from alphacut.rve.cell import Phase, square_moduli
 from alphacut.rve.ranks import ALONE, Ranks
-from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.rve.slices.model import solve_slice
 from alphacut.rve.table.interpolant import Table, TableRange, coefficients, tail
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -42,26 +41,6 @@ class Source(Protocol):
 
     def rough(self, radius: float, modulus: Array) -> Array:
         """The same, a few digits being enough."""
-
-
-@dataclass
-class SeriesSource:
-    """Moduli by multipole series: for tests of the table itself."""
-
-    span: TableRange
-    accuracy: float
-    mesh_size: float = 0.0
-    space: Array = field(default_factory=lambda: np.array([[0.5]] + 4 * [[1e-13]]))
-    unknowns: int = 0
-    systems: int = 0
-
-    def moduli(self, radius: float, modulus: Array) -> Array:
-        """To round-off."""
-        phases = [Phase(float(e), self.span.poisson) for e in modulus]
-        cell = square_stiffness(np.array([radius]), self.span.matrix, phases)
-        return np.stack([cell.bulk[0], cell.deviator[0], cell.shear[0]], axis=-1)
-
-    rough = moduli
 
 
 @dataclass
@@ -110,16 +89,9 @@ class PlanarSource:
 
     def _errors(self, radius: float, size: float) -> Array:
         """Declared relative errors at one radius of both extreme inclusions, shape (4,)."""
-        phases = self._phases(np.unique(self.span.moduli))
-        solved = solve_slice(
-            radius,
-            self.span.matrix,
-            phases,
-            orders=(_ORDER - 2, _ORDER - 1, _ORDER),
-            mesh_size=size,
-        )
-        self.systems += 3 * solved.factorisations
-        return np.asarray(solved.error.max(axis=0))
+        errors, factorisations = _errors_of(self.span, radius, size)
+        self.systems += 3 * factorisations
+        return errors
 
     def _phases(self, modulus: Array) -> list[Phase]:
         return [Phase(float(e), self.span.poisson) for e in modulus]
@@ -146,18 +118,23 @@ class PlanarSource:
         return square_moduli(solved.stiffness)
 
 
-SOURCES: dict[str, Callable[[TableRange, float], Source]] = {
-    "planar": PlanarSource,
-    "series": SeriesSource,
-}
+@lru_cache(maxsize=64)
+def _errors_of(span: TableRange, radius: float, size: float) -> tuple[Array, int]:
+    """Declared relative errors, shape (4,), and how many systems were factorised.
+
+    A mesh is tried at one radius before all, and by tables of one range and several accuracies.
+    """
+    phases = [Phase(e, span.poisson) for e in dict.fromkeys(span.moduli)]
+    orders = _ORDER - 2, _ORDER - 1, _ORDER
+    solved = solve_slice(radius, span.matrix, phases, orders=orders, mesh_size=size)
+    return np.asarray(solved.error.max(axis=0)), solved.factorisations
 
 
 def build_table(
     span: TableRange,
     *,
     accuracy: float,
-    source: str = "planar",
-    make: Callable[[TableRange, float], Source] | None = None,
+    make: Callable[[TableRange, float], Source] = PlanarSource,
     progress: Callable[[float], None] | None = None,
     ranks: Ranks = ALONE,
 ) -> Table:
@@ -166,8 +143,7 @@ def build_table(
     Args:
         span: What to cover.
         accuracy: Relative error allowed, mesh and interpolation together.
-        source: "planar" or "series"; another name beside `make`.
-        make: Maker of the source from range and accuracy, in place of that of its name.
+        make: Maker of the source from range and accuracy.
         progress: Called with the fraction done of the present degree.
         ranks: Those that share the radii, each of which solves its own.
 
@@ -175,7 +151,7 @@ def build_table(
         TableError: The accuracy is not reached.
     """
     started = perf_counter()
-    supply = (make or SOURCES[source])(span, accuracy * _SPACE_SHARE)
+    supply = make(span, accuracy * _SPACE_SHARE)
     allowed = accuracy * (1 - _SPACE_SHARE)
     counts = (
         _LEAST if span.radii[1] > span.radii[0] * (1 + 1e-12) else 1,

@@ -16,7 +16,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from alphacut.rve.ranks import ALONE, Ranks
-from alphacut.rve.table.build import Source, build_table
+from alphacut.rve.table.build import PlanarSource, Source, build_table
 from alphacut.rve.table.interpolant import Table, TableRange
 
 # The code a table comes from.
@@ -64,8 +64,7 @@ def stored_table(
     folder: Path | None,
     *,
     accuracy: float,
-    source: str = "planar",
-    make: Callable[[TableRange, float], Source] | None = None,
+    make: Callable[[TableRange, float], Source] = PlanarSource,
     progress: Callable[[float], None] | None = None,
     ranks: Ranks = ALONE,
 ) -> tuple[Table, bool]:
@@ -76,12 +75,10 @@ def stored_table(
     Raises:
         TableError: The accuracy is not reached.
     """
-    key = table_key(span, accuracy=accuracy, source=source)
+    key = table_key(span, accuracy=accuracy, source=getattr(make, "func", make).__name__)
     file = folder / f"table-{key}.npz" if folder else None
     found = ranks.first(lambda: _in_process.get(key) or (_read(file, span) if file else None))
-    fresh = found or build_table(
-        span, accuracy=accuracy, source=source, make=make, progress=progress, ranks=ranks
-    )
+    fresh = found or build_table(span, accuracy=accuracy, make=make, progress=progress, ranks=ranks)
     if file and not found:
         ranks.first(lambda: _write(fresh, file))
     _in_process[key] = fresh

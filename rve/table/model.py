@@ -15,6 +15,7 @@ from alphacut.rve.result import Homogenised
 from alphacut.rve.settings import require_accuracy, require_parts
 from alphacut.rve.slices.curve import certified, mean_errors, with_errors
 from alphacut.rve.slices.theta_rule import extreme_radii, settle_rule
+from alphacut.rve.table.build import PlanarSource
 from alphacut.rve.table.cache import stored_table
 from alphacut.rve.table.interpolant import Table, TableRange
 from alphacut.stochastic import RadiusMap
@@ -36,7 +37,6 @@ class TableModel:
             maps share a table.
         moduli: Moduli of the particle that it covers, in Pa; None: those asked for, rounded
             outwards if they are several.
-        source: "planar", or "series" to test the table itself.
         progress: Called with the fraction done while a table is built.
 
     Raises:
@@ -47,16 +47,11 @@ class TableModel:
     cache: Path | None = None
     radii: tuple[float, float] | None = None
     moduli: tuple[float, float] | None = None
-    source: str = "planar"
     progress: Callable[[float], None] | None = None
     name = "table"
 
     def __post_init__(self) -> None:
         require_accuracy(self.accuracy, 1e-9, "accuracy of the table")
-        if self.source not in ("planar", "series"):
-            raise ValueError(
-                f"the source of the table is {self.source!r}; it must be planar or series"
-            )
 
     def solve(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
@@ -74,7 +69,7 @@ class TableModel:
             started = perf_counter()
             span = self._span(radius_map, matrix, poisson, moduli)
             table, found = stored_table(
-                span, self.cache, accuracy=self.accuracy, source=self.source, progress=self.progress
+                span, self.cache, accuracy=self.accuracy, make=PlanarSource, progress=self.progress
             )
             built = perf_counter() - started
             return self._evaluate(table, radius_map, moduli, built=built, found=found)

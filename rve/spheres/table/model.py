@@ -167,7 +167,6 @@ class SphereTableModel:
                 self._span(radius_map, matrix, poisson, moduli),
                 None if self.parallel else self.cache,  # ranks might not all find it
                 accuracy=self.accuracy,
-                source="octant",
                 make=partial(OctantSource, parallel=self.parallel),
             )
             built = perf_counter() - started
