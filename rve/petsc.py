@@ -16,6 +16,9 @@ from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from alphacut.rve.interruption import uninterrupted
 from alphacut.rve.solver.options import PREFIX, OptionError
 
@@ -47,6 +50,14 @@ def block_values(matrix: PETSc.Mat) -> ctypes.c_void_p:
     first = ctypes.c_void_p()
     _LIBRARY.MatSeqBAIJGetArray(ctypes.c_void_p(matrix.handle), ctypes.byref(first))
     return first
+
+
+def ghosts(matrix: PETSc.Mat) -> NDArray[np.int32 | np.int64]:
+    """Numbers of other ranks' blocks that a matrix on several ranks multiplies on this one."""
+    count, first = np.zeros(1, PETSc.IntType), ctypes.c_void_p()
+    _LIBRARY.MatGetGhosts(ctypes.c_void_p(matrix.handle), count.ctypes, ctypes.byref(first))
+    data = ctypes.string_at(first, int(count[0]) * count.itemsize) if count[0] else b""
+    return np.frombuffer(data, PETSc.IntType)
 
 
 @contextmanager

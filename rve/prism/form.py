@@ -48,13 +48,14 @@ class PrismForm:
         grid: Topology.
         pairs: Unknown pair of each node of the wedges, −1 where fixed, shape (wedges, 15).
         works: Unknowns of the levels around them.
-        places: Where their blocks stand in matrices, shape (wedges, 15, 15); None on many ranks.
+        places: Where their blocks stand in the diagonal part of matrices, shape (wedges, 15, 15);
+            −1 where they do not.
     """
 
     grid: PrismGrid
     pairs: NDArray[np.int32]
     works: range
-    places: NDArray[np.int32] | None
+    places: NDArray[np.int32]
 
     def __post_init__(self) -> None:
         self.points, self.weights = wedge.slab_rule()
@@ -69,6 +70,9 @@ class PrismForm:
         self._heights = 2 * self.weights.reshape(3, -1).sum(axis=1)
         self._near = np.maximum(self.pairs - self.works.start // 2, -1).astype(np.int32)
         self._forces: dict[int, Array] = {}
+        free = self.pairs >= 0
+        placed = (self.places >= 0) | ~(free[:, :, None] & free[:, None])
+        self._placed: NDArray[np.bool_] = np.all(placed, axis=(1, 2))
 
     def place(self, radius: RadiusMap) -> Array:
         """Move the nodes to the cone of `radius`; returns their positions, shape (nodes, 3).
@@ -104,24 +108,26 @@ class PrismForm:
         units = [Phase(1.0, phase.poisson).stiffness for phase in phases]
         self._constants = [np.array([c[0, 0], c[0, 1], c[2, 2]]) for c in units]
 
-    def add_stiffness(self, phase: int, matrix: PETSc.Mat) -> None:
-        """Add K_m (phase 0) or K_i (phase 1) of eq. 7 for a unit modulus, and keep its loads."""
-        own, weights = np.arange(len(self.pairs), dtype=np.int32), self._density
+    def add_stiffness(self, phase: int, matrix: PETSc.Mat, modulus: float = 1.0) -> None:
+        """Add K_m (phase 0) or K_i (phase 1) of eq. 7, times a modulus, and keep its loads."""
+        own, weights = np.arange(len(self.pairs), dtype=np.int32), modulus * self._density
         if self.grid.conforming:
             own = own[self.grid.inside == bool(phase)]
             weights = weights[own]
         else:
             weights = weights * (self._share if phase else 1 - self._share)
         self._forces[phase] = np.zeros((len(self.works), 3))
-        if self.places is not None:
-            self._add(own, weights, phase, block_values(matrix), self.places.ctypes)
-            return
-        for first in range(0, len(own), 1000):
-            some = own[first : first + 1000]
+        placed = self._placed[own]
+        diagonal = block_values(matrix.getDiagonalBlock())
+        self._add(own[placed], weights[placed], phase, diagonal, self.places.ctypes)
+        others, weights = own[~placed], weights[~placed]
+        for first in range(0, len(others), 1000):
+            some = others[first : first + 1000]
             elements = np.empty((len(some), 30, 30))
             self._add(some, weights[first : first + 1000], phase, elements.ctypes, None)
             for pairs, values in zip(self.pairs[some].astype(PETSc.IntType), elements, strict=True):
                 matrix.setValuesBlocked(pairs, pairs, values, addv=PETSc.InsertMode.ADD_VALUES)
+        self._forces[phase] /= modulus
 
     def _add(
         self, own: NDArray[np.int32], weights: Array, phase: int, values: object, places: object

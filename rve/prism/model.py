@@ -115,7 +115,7 @@ class PrismModel:
         """The results without declared errors; matrices and factors do not outlive them."""
         watch = Stopwatch()
         system = self._moved(radius_map, watch)
-        task = PrismTask(system, self.options, self._loads, watch)
+        task = PrismTask(system, self.options, self._loads, watch, self.moduli is not None)
         bases: dict[float, ModulusBasis | None] = {}
         results = []
         for inclusion in inclusions:

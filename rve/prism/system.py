@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -167,6 +168,14 @@ class PrismSystem:
         matrix.assemble()
         return matrix
 
+    def stiffness_of(self, phases: tuple[Phase, Phase]) -> PETSc.Mat:
+        """Reduced stiffness of ordinary phases, in the one matrix that this system always has."""
+        self.pattern.zeroEntries()
+        for k, phase in enumerate(phases):
+            self.form.add_stiffness(k, self.pattern, phase.modulus)
+        self.pattern.assemble()
+        return self.pattern
+
     def load(self, phase: int, strain: Array) -> PETSc.Vec:
         """Reduced load under a strain (ε11, ε22, 2 ε12) of a phase whose stiffness was made."""
         if self.mixed is not None and phase in self.mixed.phases:
@@ -295,14 +304,14 @@ class PrismSystem:
         between = share.reshape(len(grid.span), len(grid.plane.triangles), -1).mean(axis=2)
         on = (np.concatenate([between[:1], between]) + np.concatenate([between, between[-1:]])) / 2
         own = levels, range(levels.start, min(levels.stop, grid.layers))
-        elements: list[list[Array]] = []
+        elements: list[Iterable[Array]] = []
         pressures: LevelPressures | None = None
         for planes, share, places in zip(grid.planes(self.map), (on, between), own, strict=True):
             at = [k - grid.span.start for k in places]
             corners = [planes[k][grid.plane.triangles] for k in at]
-            stiffness = _mixed(share, phases)
-            found = [element_stiffness(x, stiffness[k]) for k, x in zip(at, corners, strict=True)]
+            found: Iterable[Array] = map(element_stiffness, corners, _mixed(share[at], phases))
             if self.mixed is not None:
+                found = list(found)
                 mixed = self.mixed.at_levels(found, corners, phases)
                 pressures = pressures or mixed
             elements.append(found)

@@ -12,9 +12,9 @@ import numpy as np
 from alphacut.rve.cell import Phase
 from alphacut.rve.petsc import PETSc
 from alphacut.rve.prism.system import PrismSystem
-from alphacut.rve.solver.krylov import LinearSolver, SideBySide
+from alphacut.rve.solver.krylov import LinearSolver
+from alphacut.rve.solver.operators import Saddle, SideBySide
 from alphacut.rve.solver.options import SolverOptions
-from alphacut.rve.solver.saddle import Saddle
 from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -71,22 +71,28 @@ class Displacements:
     pressure: Array | None = None
 
 
+@dataclass(eq=False)
 class PrismTask:
     """Reduced matrices and loads of one map, K = E_m K_m + E_i K_i.
 
     Args:
         system: Mesh and forms, already moved to the map.
         options: Linear solver.
-        loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3).
+        strains: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3).
         watch: Takes the times.
+        units: Whether matrices for unit moduli are kept, for `fluctuations`; they take most of the
+            memory.
     """
 
-    def __init__(
-        self, system: PrismSystem, options: SolverOptions, loads: Array, watch: Stopwatch
-    ) -> None:
-        self.system, self.options, self.strains, self.watch = system, options, loads, watch
-        self.affine = system.affine(loads)
-        self.poissons: tuple[float, float] | None = None
+    system: PrismSystem
+    options: SolverOptions
+    strains: Array
+    watch: Stopwatch
+    units: bool = False
+
+    def __post_init__(self) -> None:
+        self.affine = self.system.affine(self.strains)
+        self.assembled: tuple[Phase, Phase] | tuple[float, float] | None = None
 
     def solve(self, phases: tuple[Phase, Phase]) -> Displacements:
         """Solution for a matrix and an inclusion; earlier work serves again where it can.
@@ -134,12 +140,13 @@ class PrismTask:
         ]
 
     def _assemble(self, phases: tuple[Phase, Phase]) -> None:
-        poissons = phases[0].poisson, phases[1].poisson
-        if poissons == self.poissons:
+        system, key = self.system, (phases[0].poisson, phases[1].poisson) if self.units else phases
+        if key == self.assembled:
             return
-        system, self.poissons = self.system, poissons
+        self.assembled = key
         system.set_poisson(phases)
-        self.matrices = [system.stiffness(k) for k in range(2)]
+        self.whole = None if self.units or system.mixed else system.stiffness_of(phases)
+        self.matrices = [] if self.whole else [system.stiffness(k) for k in range(2)]
         self.loads = [[system.load(k, strain) for strain in self.strains] for k in range(2)]
         self.theta: tuple[int, ThetaPreconditioner] | None = None
 
@@ -156,14 +163,14 @@ class PrismTask:
         return soft
 
     def _solver(self, phases: tuple[Phase, Phase]) -> LinearSolver:
-        operator = self._stiffness(phases)
+        operator = self.whole or self._stiffness(phases)
         if self.options.all["pc_type"] == "python":
             whole = operator if self.system.mixed is None else self._saddle(operator, phases)
             options = self.options if self.system.mixed is None else self.options.indefinite
             return LinearSolver(whole, options, self._theta(phases), together=len(self.strains))
         if self.system.mixed is not None:
             return LinearSolver(self._saddle(operator, phases), self.options, None)
-        operator = operator.convert("aij")  # PETSc's own preconditioners want it
+        operator = operator.convert("aij", PETSc.Mat())  # PETSc's own preconditioners want it
         operator.setOption(PETSc.Mat.Option.SPD, True)
         return LinearSolver(operator, self.options, None)
 

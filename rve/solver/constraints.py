@@ -211,26 +211,31 @@ class LevelNumbering:
         """Unknown pair of each node of the wedges, −1 on the fixed line, shape (wedges, 15)."""
         return (self.unknown_of_node[self.grid.cells] // 2).astype(np.int32)
 
-    def matrix(self, ranks: Ranks) -> tuple[PETSc.Mat, NDArray[np.int32] | None]:
+    def matrix(self, ranks: Ranks) -> tuple[PETSc.Mat, NDArray[np.int32]]:
         """Zero matrix in 2 × 2 blocks that keeps Pᵀ K P of element matrices.
 
-        On one rank with the places of the wedges' blocks in it, shape (wedges, 15, 15).
+        With the places, shape (wedges, 15, 15), of the wedges' blocks in its diagonal part, whose
+        rows and columns this rank owns; −1 where a node is fixed or another rank's.
         """
         own = self.owned(ranks.size)[ranks.rank]
         near = self.near(self.shares(ranks.size)[ranks.rank].levels)
         pairs = replace(self, grid=near).pairs
         starts = np.empty(len(own) // 2 + 1, np.int32)
         columns = np.empty(15 * pairs.size, np.int32)
-        places = np.empty((*pairs.shape, 15), np.int32) if ranks.size == 1 else None
+        places = np.empty((*pairs.shape, 15), np.int32)
         if c_loops(WEDGES).couple(
             len(pairs), pairs.ctypes, own.start // 2, own.stop // 2, self.size // 2,
-            starts.ctypes, columns.ctypes, None if places is None else places.ctypes,
+            starts.ctypes, columns.ctypes, places.ctypes,
         ):  # fmt: skip
             raise MemoryError("no memory is left for the matrix")
-        columns = columns[: starts[-1]].astype(PETSc.IntType)
-        csr = starts.astype(PETSc.IntType), columns, np.zeros(4 * len(columns))
+        csr = [x.astype(PETSc.IntType, copy=False) for x in (starts, columns[: starts[-1]])]
         layout = ((len(own), self.size),) * 2
-        return PETSc.Mat().createBAIJ(layout, bsize=2, csr=csr, comm=ranks.comm), places
+        matrix = PETSc.Mat().createBAIJ(layout, bsize=2, csr=csr, comm=ranks.comm)
+        if near.own == self.grid.own:
+            return matrix, places
+        mine: NDArray[np.int32] = np.full((*self.pairs.shape, 15), -1, np.int32)
+        mine[_common(self.grid.own, near.own)] = places[_common(near.own, self.grid.own)]
+        return matrix, mine
 
     def to_nodes(self, values: Array, start: int) -> Array:
         """Displacements of the nodes, zero on the line, shape (nodes, 2, columns).

@@ -10,8 +10,8 @@ import numpy as np
 
 from alphacut.rve.interruption import uninterrupted
 from alphacut.rve.petsc import PETSc, in_database
+from alphacut.rve.solver.operators import Saddle, SideBySide
 from alphacut.rve.solver.options import PREFIX, SolverOptions
-from alphacut.rve.solver.saddle import Saddle
 from alphacut.stochastic.theta.truncated_normal import Array
 
 
@@ -48,42 +48,6 @@ class Operator(Protocol):
 
     def matrix(self, columns: int = 1) -> PETSc.Mat:
         """PETSc's matrix for so many vectors side by side."""
-
-
-class SideBySide:
-    """The operator I ⊗ K: several vectors side by side, entry by entry, as one; called by PETSc.
-
-    Args:
-        matrices: One K, or several of one layout for as many groups of vectors.
-        columns: Vectors of each.
-    """
-
-    def __init__(self, matrices: Sequence[PETSc.Mat], columns: int) -> None:
-        self.matrices, self.columns = matrices, columns
-        rows, size = matrices[0].getSizes()[0]
-        self.source = PETSc.Mat().createDense(
-            ((rows, size), (None, columns)), comm=matrices[0].comm
-        )
-        self.source.setUp()
-        self.source.assemble()
-        self.target = matrices[0].matMult(self.source)
-
-    def matrix(self, columns: int = 1) -> PETSc.Mat:
-        """PETSc's matrix of all groups side by side."""
-        sizes = [columns * size for size in self.matrices[0].getSizes()[0]]
-        operator = PETSc.Mat().createPython((sizes, sizes), self, comm=self.matrices[0].comm)
-        operator.setUp()
-        return operator
-
-    def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Y = (I ⊗ K) x; K is read once for all vectors."""
-        source = self.source.getDenseArray()
-        shape = len(source), len(self.matrices), self.columns
-        values, result = x.array_r.reshape(shape), y.array.reshape(shape)
-        for k, matrix in enumerate(self.matrices):
-            source[:] = values[:, k]
-            matrix.matMult(self.source, result=self.target)
-            result[:, k] = self.target.getDenseArray(readonly=True)
 
 
 class LinearSolver:

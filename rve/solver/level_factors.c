@@ -1,18 +1,21 @@
-/* Cholesky factors of matrices of one pattern, eight of them side by side: L Lᵀ = A, every operation
-   one on eight numbers. Columns of L of one pattern below their common triangle are a group, and are
-   taken four at a time. Inverse pivots stand in the place of the pivots. */
+/* Factors of matrices of one pattern, eight of them side by side: L J Lᵀ = A with a diagonal J of signs,
+   every operation one on eight numbers. Columns of L of one pattern below their common triangle are a
+   group, which is treated as a dense block; solves take four of its columns at a time. Inverse pivots
+   stand in the place of the pivots. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 
-enum { LANES = 8, AT_ONCE = 4 };
+enum { LANES = 8, AT_ONCE = 4, HIGH = 4 };
 typedef double lanes __attribute__((vector_size(LANES * sizeof(double))));
 
 typedef struct {
     int size, entries, count, batches;
     int *start, *rows;  /* columns of L: where they begin (size + 1), and their rising rows */
     int *first, *last;  /* the group of each column: its first column, and the one after its last */
-    int *place;         /* in L of every entry of A */
+    int *begin, *entry; /* entries of A, column by column, and where columns begin (size + 1) */
+    int *place;         /* in L of each of them */
     lanes *values;      /* of L, batch after batch */
 } factors;
 
@@ -22,22 +25,17 @@ static int *integers(size_t count) { return calloc(count + 1, sizeof(int)); }
 
 /* Rows of L, column by column: those of A's column and of the columns whose first row below the
    diagonal it is. */
-static int fill_in(factors *f, const int *row, const int *column) {
+static int fill_in(factors *f, const int *row) {
     int n = f->size, room = 4 * f->entries + n;
-    int *begin = integers(n), *below = integers(f->entries), *mark = integers(n);
-    int *child = integers(n), *next = integers(n);
+    int *mark = integers(n), *child = integers(n), *next = integers(n);
     f->rows = malloc(room * sizeof(int));
-    for (int e = 0; e < f->entries; e++) begin[column[e] + 1]++;
-    for (int j = 0; j < n; j++) begin[j + 1] += begin[j];
-    memcpy(next, begin, n * sizeof(int));
-    for (int e = 0; e < f->entries; e++) below[next[column[e]]++] = row[e];
     memset(child, -1, n * sizeof(int)), memset(mark, -1, n * sizeof(int));
     for (int j = 0; j < n && f->rows; j++) {
         int count = f->start[j];
         if (count + n > room) f->rows = realloc(f->rows, (room = 2 * room + n) * sizeof(int));
         if (!f->rows) break;
-        for (int k = begin[j]; k < begin[j + 1]; k++)
-            if (mark[below[k]] != j) mark[f->rows[count++] = below[k]] = j;
+        for (int k = f->begin[j], r; k < f->begin[j + 1]; k++)
+            if (mark[r = row[f->entry[k]]] != j) mark[f->rows[count++] = r] = j;
         for (int c = child[j]; c >= 0; c = next[c])
             for (int k = f->start[c] + 1; k < f->start[c + 1]; k++)
                 if (mark[f->rows[k]] != j) mark[f->rows[count++] = f->rows[k]] = j;
@@ -48,8 +46,25 @@ static int fill_in(factors *f, const int *row, const int *column) {
             next[j] = child[parent], child[parent] = j;
         }
     }
-    free(begin), free(below), free(mark), free(child), free(next);
+    free(mark), free(child), free(next);
     return f->rows != NULL;
+}
+
+static void sort_entries(factors *f, const int *column) {
+    int n = f->size, *next = integers(n);
+    for (int e = 0; e < f->entries; e++) f->begin[column[e] + 1]++;
+    for (int j = 0; j < n; j++) f->begin[j + 1] += f->begin[j];
+    memcpy(next, f->begin, n * sizeof(int));
+    for (int e = 0; e < f->entries; e++) f->entry[next[column[e]]++] = e;
+    free(next);
+}
+
+static void find_places(factors *f, const int *row) {
+    for (int j = 0; j < f->size; j++) {
+        int *from = f->rows + f->start[j], *to = f->rows + f->start[j + 1];
+        for (int k = f->begin[j]; k < f->begin[j + 1]; k++)
+            f->place[k] = (int *)bsearch(row + f->entry[k], from, to - from, sizeof(int), rising) - f->rows;
+    }
 }
 
 static void find_groups(factors *f) {
@@ -65,8 +80,8 @@ static void find_groups(factors *f) {
 }
 
 void discard(factors *f) {
-    free(f->start), free(f->rows), free(f->first), free(f->last), free(f->place), free(f->values);
-    free(f);
+    free(f->start), free(f->rows), free(f->first), free(f->last), free(f->values);
+    free(f->begin), free(f->entry), free(f->place), free(f);
 }
 
 /* Factors for matrices of entries in the lower triangle, `row` >= `column`, each named once and all
@@ -75,93 +90,147 @@ factors *prepare(int size, int entries, const int *row, const int *column) {
     factors *f = calloc(1, sizeof(factors));
     f->size = size, f->entries = entries;
     f->start = integers(size), f->first = integers(size), f->last = integers(size);
-    f->place = integers(entries);
-    if (!fill_in(f, row, column)) return discard(f), NULL;
+    f->begin = integers(size), f->entry = integers(entries), f->place = integers(entries);
+    sort_entries(f, column);
+    if (!fill_in(f, row)) return discard(f), NULL;
     find_groups(f);
-    for (int e = 0; e < entries; e++) {
-        int *from = f->rows + f->start[column[e]], *to = f->rows + f->start[column[e] + 1];
-        f->place[e] = (int *)bsearch(row + e, from, to - from, sizeof(int), rising) - f->rows;
-    }
+    find_places(f, row);
     return f;
 }
 
-/* Take from `sum` what `count` columns, each from the row `rows[0]` on, give to that row's column. */
-static void subtract(lanes *restrict sum, const int *rows, int length, lanes **from, int count) {
-    for (; count >= AT_ONCE; from += AT_ONCE, count -= AT_ONCE) {
-        const lanes *a = from[0], *b = from[1], *c = from[2], *d = from[3];
-        lanes p = *a, q = *b, r = *c, s = *d;
-        for (int k = 0; k < length; k++) sum[rows[k]] -= a[k] * p + b[k] * q + (c[k] * r + d[k] * s);
+#define INLINE static inline __attribute__((always_inline))
+
+/* Take products of `high` rows with two columns from both columns, in rows `p`; `from` are the
+   factors, column by column, from the row of the first column on. */
+INLINE void block(lanes *one, lanes *two, const int *p, lanes **from, const double *sign, int count, int c, int r,
+                  int high) {
+    lanes sums[HIGH][2];
+    for (int i = 0; i < high; i++) sums[i][0] = sums[i][1] = (lanes){0};
+    for (int k = 0; k < count; k++) {
+        const lanes *own = from[k];
+        lanes a = own[c] * sign[k], b = own[c + 1] * sign[k];
+        for (int i = 0; i < high; i++) sums[i][0] += own[r + i] * a, sums[i][1] += own[r + i] * b;
     }
-    for (; count >= 2; from += 2, count -= 2) {
-        const lanes *a = from[0], *b = from[1];
-        lanes p = *a, q = *b;
-        for (int k = 0; k < length; k++) sum[rows[k]] -= a[k] * p + b[k] * q;
-    }
-    if (count) {
-        const lanes *a = from[0];
-        lanes p = *a;
-        for (int k = 0; k < length; k++) sum[rows[k]] -= a[k] * p;
+    for (int i = 0; i < high; i++) one[p[r + i]] -= sums[i][0], two[p[r + i]] -= sums[i][1];
+}
+
+static void single(lanes *one, const int *p, lanes **from, const double *sign, int count, int c, int r, int rows) {
+    for (; r < rows; r++) {
+        lanes sum = {0};
+        for (int k = 0; k < count; k++) sum += from[k][r] * (from[k][c] * sign[k]);
+        one[p[r]] -= sum;
     }
 }
 
-/* One batch from its entries in `values`; 0 where a pivot is not positive. Groups wait in the list of
-   the next row that they give to. */
-static int eliminate(const factors *f, lanes *values, lanes *sum, int *list, lanes **from) {
-    int n = f->size, *waiting = list, *next = list + n, *given = list + 2 * n;
-    memset(waiting, -1, n * sizeof(int)), memset(sum, 0, n * sizeof(lanes));
-    for (int j = 0; j < n; j++) {
-        int begin = f->start[j], end = f->start[j + 1], length = end - begin;
-        const int *rows = f->rows + begin;
-        for (int k = 0; k < length; k++) sum[rows[k]] = values[begin + k];
-        for (int k = f->first[j]; k < j; k++) from[k - f->first[j]] = values + f->start[k] + j - k;
-        subtract(sum, rows, length, from, j - f->first[j]);
-        for (int g = waiting[j], after; g >= 0; g = after) {
-            int last = f->last[g], at = given[g]++, stop = f->start[last] - f->start[last - 1] - 1;
-            after = next[g];
-            for (int k = g; k < last; k++) from[k - g] = values + f->start[k] + last - k + at;
-            const int *below = f->rows + f->start[last - 1] + 1 + at;
-            subtract(sum, below, stop - at, from, last - g);
-            if (at + 1 < stop) next[g] = waiting[below[1]], waiting[below[1]] = g;
+/* Take from columns of a group what `count` columns give to them. Both have `rows` rows, of which
+   the first `wide` are columns of the group; they stand at `p` in it. */
+static void subtract(lanes **column, const int *p, int rows, int wide, lanes **from, const double *sign, int count) {
+    int c = 0;
+    for (; c + 1 < wide; c += 2) {
+        lanes *one = column[p[c]], *two = column[p[c + 1]];
+        int r = c + 1;
+        single(one, p, from, sign, count, c, c, r);
+        for (; r + HIGH <= rows; r += HIGH) block(one, two, p, from, sign, count, c, r, HIGH);
+        for (; r < rows; r++) block(one, two, p, from, sign, count, c, r, 1);
+    }
+    if (c < wide) single(column[p[c]], p, from, sign, count, c, c, rows);
+}
+
+/* Factor of `wide` columns of a group, one by one; 0 where a pivot has the wrong sign. */
+static int triangle(lanes **column, const double *sign, int first, int wide, int rows) {
+    for (int j = first; j < first + wide; j++) {
+        lanes *own = column[j], pivot;
+        for (int k = first; k < j; k++) {
+            lanes factor = column[k][j] * sign[k];
+            for (int r = j; r < rows; r++) own[r] -= column[k][r] * factor;
         }
-        lanes pivot = sum[j];
+        pivot = own[j] * sign[j];
         for (int k = 0; k < LANES; k++) {
             if (!(pivot[k] > 0)) return 0;
             pivot[k] = 1 / sqrt(pivot[k]);
         }
-        values[begin] = pivot;
-        for (int k = 1; k < length; k++) values[begin + k] = sum[rows[k]] * pivot;
-        if (j + 1 == f->last[j] && length > 1) {
-            int g = f->first[j];
-            given[g] = 0, next[g] = waiting[rows[1]], waiting[rows[1]] = g;
-        }
+        own[j] = pivot;
+        for (int r = j + 1; r < rows; r++) own[r] *= pivot * sign[j];
     }
     return 1;
 }
 
-/* Factors of `count` matrices, `entries` of each; 0, 1 where one is not positive definite, 2 without
-   memory. */
-int factorise(factors *f, int count, const double *entries) {
+/* Entries of columns `first` to `last` - 1, of the matrices `own`, into an empty batch. */
+static void scatter(const factors *f, lanes *values, const double **own, int first, int last) {
+    memset(values + f->start[first], 0, (f->start[last] - f->start[first]) * sizeof(lanes));
+    for (int e = f->begin[first]; e < f->begin[last]; e++)
+        for (int k = 0; k < LANES; k++) values[f->place[e]][k] = own[k][f->entry[e]];
+}
+
+/* One batch of matrices `own`, group by group; 0 where a pivot has the wrong sign. A group that is
+   done waits in the list of the next row that it gives to. */
+static int eliminate(const factors *f, lanes *values, const double **own, const double *sign, int *list,
+                     lanes **column) {
+    lanes **from = column + f->size;
+    int n = f->size, *waiting = list, *next = list + n, *given = list + 2 * n;
+    int *place = list + 3 * n, *p = list + 4 * n;
+    memset(waiting, -1, n * sizeof(int));
+    for (int first = 0, last; first < n; first = last) {
+        last = f->last[first];
+        int wide = last - first, begin = f->start[first], rows = f->start[first + 1] - begin;
+        const int *row = f->rows + begin;
+        scatter(f, values, own, first, last);
+        for (int k = 0; k < wide; k++) column[k] = values + f->start[first + k] - k;
+        for (int r = 0; r < rows; r++) place[row[r]] = r;
+        for (int j = first; j < last; j++)
+            for (int g = waiting[j], after; g >= 0; g = after) {
+                int end = f->last[g], at = given[g], columns = 0;
+                int left = f->start[end] - f->start[end - 1] - 1 - at;
+                const int *below = f->rows + f->start[end - 1] + 1 + at;
+                after = next[g];
+                for (int r = 0; r < left; r++) p[r] = place[below[r]], columns += below[r] < last;
+                for (int k = g; k < end; k++) from[k - g] = values + f->start[k] + end - k + at;
+                subtract(column, p, left, columns, from, sign + g, end - g);
+                given[g] += columns;
+                if (columns < left) next[g] = waiting[below[columns]], waiting[below[columns]] = g;
+            }
+        for (int k = 0, some; k < wide; k += some) {
+            some = wide - k < AT_ONCE ? wide - k : AT_ONCE;
+            for (int r = 0; r < rows - k; r++) p[r] = k + r;
+            for (int i = 0; i < k; i++) from[i] = column[i] + k;
+            subtract(column, p, rows - k, some, from, sign + first, k);
+            if (!triangle(column, sign + first, k, some, rows)) return 0;
+        }
+        if (wide < rows) given[first] = 0, next[first] = waiting[row[wide]], waiting[row[wide]] = first;
+    }
+    return 1;
+}
+
+/* Room for lanes, in large pages where there are any: most of the time goes to page faults else. */
+static lanes *room_for(size_t count) {
+    size_t page = (size_t)2 << 20, bytes = (count * sizeof(lanes) + page - 1) / page * page;
+    void *made = aligned_alloc(page, bytes);
+#ifdef MADV_HUGEPAGE
+    if (made) madvise(made, bytes, MADV_HUGEPAGE);
+#endif
+    return made;
+}
+
+/* Factors of `count` matrices, `entries` of each, with pivots of given signs; 0, 1 where one has another,
+   2 without memory. */
+int factorise(factors *f, int count, const double *entries, const double *sign) {
     size_t n = f->size, length = f->start[n];
     f->count = count, f->batches = (count + LANES - 1) / LANES;
     free(f->values);
-    f->values = aligned_alloc(sizeof(lanes), f->batches * length * sizeof(lanes));
-    lanes *sum = aligned_alloc(sizeof(lanes), n * sizeof(lanes)), **from = malloc(n * sizeof(lanes *));
-    int *list = integers(3 * n), status = f->values && sum && from && list ? 0 : 2;
+    f->values = room_for(f->batches * length);
+    lanes **pointers = malloc(2 * n * sizeof(lanes *));
+    int *list = integers(5 * n), status = f->values && pointers && list ? 0 : 2;
     for (int b = 0; b < f->batches && !status; b++) {
-        lanes *values = f->values + b * length;
-        memset(values, 0, length * sizeof(lanes));
+        const double *own[LANES];
         for (int k = 0; k < LANES; k++) {
             int one = b * LANES + k < count ? b * LANES + k : count - 1;
-            const double *own = entries + (size_t)one * f->entries;
-            for (int e = 0; e < f->entries; e++) values[f->place[e]][k] = own[e];
+            own[k] = entries + (size_t)one * f->entries;
         }
-        status = !eliminate(f, values, sum, list, from);
+        status = !eliminate(f, f->values + b * length, own, sign, list, pointers);
     }
-    free(sum), free(from), free(list);
+    free(pointers), free(list);
     return status;
 }
-
-#define INLINE static inline __attribute__((always_inline))
 
 /* L x = x for `columns` vectors, from column j of L and `wide` - 1 more of its group on. */
 INLINE void lower(const factors *f, const lanes *values, lanes *x, int j, int wide, int columns) {

@@ -31,7 +31,7 @@ the loads.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -42,8 +42,7 @@ from alphacut.rve.mesh.triangulation import Integers
 from alphacut.rve.petsc import PETSc
 from alphacut.rve.ranks import Ranks
 from alphacut.rve.solver.constraints import LevelNumbering, Overlap
-from alphacut.rve.solver.level_cholesky import LevelCholesky
-from alphacut.rve.solver.level_ldl import LevelLDL
+from alphacut.rve.solver.level_factors import LevelFactors, saddle_factors
 from alphacut.rve.solver.level_stiffness import LevelPattern
 from alphacut.stochastic.theta.law import Array, ThetaLaw
 
@@ -136,8 +135,8 @@ class ThetaPreconditioner:
     def __init__(
         self,
         numbering: LevelNumbering,
-        on: Sequence[Array],
-        between: Sequence[Array],
+        on: Iterable[Array],
+        between: Iterable[Array],
         law: ThetaLaw,
         ranks: Ranks,
         pressures: LevelPressures | None = None,
@@ -157,16 +156,21 @@ class ThetaPreconditioner:
         unknowns = _with_components(periodicity.unknown[triangles])
         self.pressures = 0 if pressures is None else len(pressures.triangles)
         self.pressed = numbering.on_levels(self.pressures, ranks)
-        self.quadratic: LevelCholesky | LevelLDL
-        if pressures is None:
-            quadratic = LevelPattern(unknowns)
-            self.quadratic = LevelCholesky(quadratic, (quadratic.values(k) for k in on))
-        else:
-            self.quadratic = LevelLDL(unknowns, pressures.triangles, pressures.saddles(on))
         linear = LevelPattern(_with_components(periodicity.unknown[triangles[:, :3]]))
-        self.linear = LevelCholesky(
-            linear, (linear.values(_LINEAR.T @ k @ _LINEAR) for k in (*on, *between))
-        )
+
+        def reduced(elements: Array) -> Array:
+            return linear.values(_LINEAR.T @ elements @ _LINEAR)
+
+        if pressures is None:  # elements are large: one level after another
+            quadratic = LevelPattern(unknowns)
+            levels = [(quadratic.values(one), reduced(one)) for one in on]
+            self.quadratic = LevelFactors(quadratic, [entries for entries, _ in levels])
+            coarse = [entries for _, entries in levels]
+        else:
+            whole = list(on)
+            self.quadratic = saddle_factors(unknowns, pressures.triangles, pressures.saddles(whole))
+            coarse = [reduced(one) for one in whole]
+        self.linear = LevelFactors(linear, [*coarse, *map(reduced, between)])
 
     def apply(self, _pc: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
         """Result = P⁻¹ residual, called by PETSc; several loads side by side."""

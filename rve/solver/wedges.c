@@ -10,14 +10,15 @@ typedef void (*integral)(double *, const double *, const double *, const double 
                          const uint8_t *, void *);
 
 /* Pairs that share a wedge with each of the pairs `low` to `high`: where each row's begin (high - low +
-   1), and their rising numbers. `place`, if not null, takes where the pairs of each wedge then stand,
-   15 x 15 of them. Returns 2 without memory. */
+   1), and their rising numbers. `place` takes where the pairs of each wedge then stand, 15 x 15 of them,
+   among those whose columns lie in that range too, and -1 elsewhere. Returns 2 without memory. */
 int couple(int wedges, const int *pairs, int low, int high, int size, int *starts, int *columns, int *place) {
     int rows = high - low, words = size / 64 + 1, entries = wedges * NODES;
     int *begin = calloc(rows + 1, sizeof(int)), *fill = calloc(rows + 1, sizeof(int));
     int *within = malloc((entries + 1) * sizeof(int)), *found = calloc(size + 1, sizeof(int));
     uint64_t *marked = calloc(words, sizeof(uint64_t));
-    int status = begin && fill && within && found && marked ? 0 : 2;
+    int status = begin && fill && within && found && marked ? 0 : 2, square = 0;
+    for (size_t e = 0; e < (size_t)entries * NODES; e++) place[e] = -1;
     for (int e = 0; e < entries && !status; e++)
         if (pairs[e] >= low && pairs[e] < high) begin[pairs[e] - low + 1]++;
     for (int r = 0; r < rows && !status; r++) fill[r] = begin[r + 1] += begin[r];
@@ -37,10 +38,11 @@ int couple(int wedges, const int *pairs, int low, int high, int size, int *start
         for (int word = least; word <= last; word++)
             for (; marked[word]; marked[word] &= marked[word] - 1) {
                 int column = 64 * word + __builtin_ctzll(marked[word]);
-                found[column] = count, columns[count++] = column;
+                found[column] = column >= low && column < high ? square++ : -1;
+                columns[count++] = column;
             }
         starts[r + 1] = count;
-        for (int k = begin[r]; k < begin[r + 1] && place; k++)
+        for (int k = begin[r]; k < begin[r + 1]; k++)
             for (int j = 0, *own = (int *)pairs + within[k] / NODES * NODES; j < NODES; j++)
                 place[(size_t)within[k] * NODES + j] = own[j] >= 0 ? found[own[j]] : -1;
     }

@@ -20,7 +20,7 @@ from alphacut.rve.prism import form
 from alphacut.rve.prism.slice_stress import SliceStress
 from alphacut.rve.prism.system import PrismSystem
 from alphacut.rve.solver import c_loops, level_stiffness
-from alphacut.rve.solver.level_cholesky import LevelCholesky
+from alphacut.rve.solver.level_factors import LevelFactors, saddle_factors
 from alphacut.rve.solver.level_stiffness import LevelPattern
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 
@@ -111,7 +111,7 @@ def spread_matrices(count):
 @pytest.mark.parametrize(("count", "columns"), [(1, 1), (3, 2), (8, 3), (13, 4), (17, 7), (2, 0)])
 def test_factors_are_those_of_numpy(count, columns):
     pattern, values, dense = spread_matrices(count)
-    factors = LevelCholesky(pattern, iter(values))
+    factors = LevelFactors(pattern, iter(values))
     vectors = np.random.default_rng(8).standard_normal((count, pattern.size, columns))
     forward, backward = factors.forward(vectors), factors.backward(vectors)
     order = factors._order
@@ -125,12 +125,44 @@ def test_factors_are_those_of_numpy(count, columns):
         assert backward[k] == pytest.approx(second, rel=1e-12, abs=1e-12)
 
 
+def test_factors_of_saddle_points_are_those_of_elimination_row_by_row():
+    random, triangles = np.random.default_rng(9), np.array([1, 2, 4])
+    unknowns = (5 * np.arange(6)[:, None] + random.permutation(12)) % 30
+    unknowns[0, 0] = -1
+    halves = random.standard_normal((3, 6, 12, 12))
+    elements = np.zeros((3, 6, 13, 13))
+    elements[:, :, :12, :12] = halves @ halves.swapaxes(-1, -2) + np.eye(12)
+    beside = random.standard_normal((3, len(triangles), 12))
+    elements[:, triangles, 12, :12] = elements[:, triangles, :12, 12] = beside
+    elements[:, triangles, 12, 12] = -1e-3
+    factors = saddle_factors(unknowns, triangles, elements)
+    whole = np.column_stack([unknowns, np.full(6, -1)])
+    whole[triangles, 12] = 30 + np.arange(3)
+    vectors = random.standard_normal((3, 33, 2))
+    forward, backward = factors.forward(vectors), factors.backward(vectors)
+    order = factors._order
+    for k, parts in enumerate(elements):
+        dense = np.zeros((34, 34))  # what is fixed goes into the last row and column
+        for own, part in zip(whole, parts, strict=True):
+            dense[np.ix_(own, own)] += part
+        rest, signs = dense[np.ix_(order, order)], np.where(order < 30, 1.0, -1.0)
+        lower = np.zeros((33, 33))
+        for j in range(33):
+            lower[:, j] = rest[:, j] * signs[j] / np.sqrt(rest[j, j] * signs[j])
+            rest = rest - signs[j] * np.outer(lower[:, j], lower[:, j])
+        first = signs[:, None] * scipy.linalg.solve_triangular(lower, vectors[k][order], lower=True)
+        second = np.empty_like(vectors[k])
+        second[order] = scipy.linalg.solve_triangular(lower.T, vectors[k])
+        assert forward[k] == pytest.approx(first, rel=1e-10, abs=1e-10)
+        assert backward[k] == pytest.approx(second, rel=1e-10, abs=1e-10)
+
+
 @pytest.mark.parametrize("bad", [-1e9, np.nan])
 def test_one_matrix_that_is_not_positive_definite_is_refused(bad):
     pattern, values, _ = spread_matrices(10)
     values[9][0] = bad
-    with pytest.raises(RuntimeError, match="not positive definite"):
-        LevelCholesky(pattern, iter(values))
+    with pytest.raises(RuntimeError, match="wrong sign"):
+        LevelFactors(pattern, iter(values))
 
 
 def same(one, other):

@@ -1,0 +1,174 @@
+"""Operators that PETSc calls: a matrix for several vectors side by side, and a saddle point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.sparse as sp
+
+from alphacut.rve.petsc import PETSc, ghosts
+from alphacut.rve.solver.constraints import Overlap
+from alphacut.stochastic.theta.truncated_normal import Array
+
+
+class SideBySide:
+    """The operator I ⊗ K: several vectors side by side, entry by entry, as one; called by PETSc.
+
+    PETSc's product of a matrix on several ranks with a dense one takes twice as long as the product
+    of what lies on this rank's diagonal, where nearly all entries lie; so the rest is added here.
+
+    Args:
+        matrices: One K, or several of one layout for as many groups of vectors.
+        columns: Vectors of each.
+    """
+
+    def __init__(self, matrices: Sequence[PETSc.Mat], columns: int) -> None:
+        self.matrices, self.columns = matrices, columns
+        self.inner = [matrix.getDiagonalBlock() for matrix in matrices]
+        sizes = self.inner[0].getSize()[0], columns
+        self.source = PETSc.Mat().createDense(sizes, comm=self.inner[0].comm)
+        self.source.setUp()
+        self.source.assemble()
+        self.target = self.inner[0].matMult(self.source)
+        self.rest = _Rest(matrices, columns) if matrices[0].comm.size > 1 else None
+
+    def matrix(self, columns: int = 1) -> PETSc.Mat:
+        """PETSc's matrix of all groups side by side."""
+        sizes = [columns * size for size in self.matrices[0].getSizes()[0]]
+        operator = PETSc.Mat().createPython((sizes, sizes), self, comm=self.matrices[0].comm)
+        operator.setUp()
+        return operator
+
+    def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Y = (I ⊗ K) x."""
+        self.times(x.array_r, y.array)
+
+    def times(self, vectors: Array, products: Array) -> None:
+        """K times this rank's part of vectors into its part of the products; K is read once."""
+        source = self.source.getDenseArray()
+        shape = len(source), len(self.inner), self.columns
+        values, result = vectors.reshape(shape), products.reshape(shape)
+        for k, matrix in enumerate(self.inner):
+            source[:] = values[:, k]
+            matrix.matMult(self.source, result=self.target)
+            result[:, k] = self.target.getDenseArray(readonly=True)
+        if self.rest is not None:
+            self.rest.add(values, result)
+
+
+class _Rest:
+    """Products with unknowns of other ranks, which few rows have."""
+
+    def __init__(self, matrices: Sequence[PETSc.Mat], columns: int) -> None:
+        first, wide = matrices[0], len(matrices) * columns
+        (rows, _), block, others = first.getSizes()[0], first.getBlockSize(), ghosts(first)
+        start = first.getOwnershipRange()[0]
+        own = PETSc.IS().createStride(rows, start, 1, comm=PETSc.COMM_SELF)
+        far = PETSc.IS().createBlock(block, others, comm=PETSc.COMM_SELF)
+        self.parts = [
+            sp.csr_matrix(part.convert("aij").getValuesCSR()[::-1], shape=part.getSize())
+            for matrix in matrices
+            for part in matrix.createSubMatrices(own, far)
+        ]
+        self.rows = np.flatnonzero(np.diff(self.parts[0].indptr))
+        self.parts = [part[self.rows] for part in self.parts]
+        self.near = PETSc.Vec().createMPI((wide * rows, None), comm=first.comm)
+        self.fetched = PETSc.Vec().createSeq(wide * block * len(others))
+        wanted = PETSc.IS().createBlock(wide * block, others, comm=PETSc.COMM_SELF)
+        self.scatter = PETSc.Scatter().create(self.near, wanted, self.fetched, None)
+
+    def add(self, values: Array, result: Array) -> None:
+        """Add to products, shape (rows, matrices, columns), of this rank's vectors `values`."""
+        self.near.array[:] = values.ravel()
+        self.scatter.begin(self.near, self.fetched)
+        self.scatter.end(self.near, self.fetched)
+        far = self.fetched.array_r.reshape(-1, *values.shape[1:])
+        for k, part in enumerate(self.parts):
+            result[self.rows, k] += part @ far[:, k]
+
+
+class Saddle:
+    """The matrix [K, Bᵀ; B, −C]; called by PETSc, any number of vectors side by side.
+
+    A rank's part of a vector holds its displacements, then the pressures of its levels.
+
+    Args:
+        stiffness: K, distributed.
+        flux: What this rank's wedges give of B, in the rows and columns that it works on.
+        compliance: What they give of C.
+        displacements: Those that each rank owns and works on.
+        pressures: Likewise.
+    """
+
+    def __init__(
+        self,
+        stiffness: PETSc.Mat,
+        flux: sp.csr_matrix,
+        compliance: sp.csr_matrix,
+        displacements: Overlap,
+        pressures: Overlap,
+    ) -> None:
+        self.stiffness, self._flux, self._compliance = stiffness, flux, compliance
+        self._displacements, self._pressures = displacements, pressures
+        self._transposed = flux.T.tocsr()
+        self._products: SideBySide | None = None
+
+    @property
+    def local_size(self) -> int:
+        """Entries of a vector on this rank."""
+        return len(self._displacements.own) + len(self._pressures.own)
+
+    def matrix(self, columns: int = 1) -> PETSc.Mat:
+        """PETSc's matrix of this operator for so many vectors side by side."""
+        sizes = (columns * self.local_size, None)
+        shell = PETSc.Mat().createPython((sizes, sizes), self, comm=self.stiffness.comm)
+        shell.setUp()
+        return shell
+
+    def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Matrix times vectors side by side, entry by entry."""
+        values = x.array_r.reshape(self.local_size, -1)
+        own = self.split(values)
+        u, p = self._displacements.fetch(own[0]), self._pressures.fetch(own[1])
+        cut, columns = len(own[0]), values.shape[1]
+        result = y.array.reshape(values.shape)
+        pushed = self._displacements.give(self._transposed @ p, columns)
+        result[:cut] = self._stiff(own[0]) + pushed
+        result[cut:] = self._pressures.give(self._flux @ u - self._compliance @ p, columns)
+
+    def _stiff(self, values: Array) -> Array:
+        columns, result = values.shape[1], np.empty(values.shape)
+        if self._products is None or self._products.columns != columns:
+            self._products = SideBySide([self.stiffness], columns)
+        self._products.times(values, result)
+        return result
+
+    def split(self, values: Array) -> tuple[Array, Array]:
+        """Displacements and pressures of this rank's part of vectors (local size, k)."""
+        cut = len(self._displacements.own)
+        return values[:cut], values[cut:]
+
+    def vector(self, displacements: PETSc.Vec, pressures: Array) -> PETSc.Vec:
+        """Vector of displacements and this rank's pressures."""
+        found = self.matrix().createVecLeft()
+        found.array[:] = np.concatenate([displacements.array_r, pressures])
+        return found
+
+    def assembled(self) -> PETSc.Mat:
+        """The whole matrix, for direct solvers.
+
+        Raises:
+            RuntimeError: On several ranks.
+        """
+        if self.stiffness.comm.size > 1:
+            raise RuntimeError(
+                "nearly incompressible phases have a direct solver on one rank only; take the"
+                " default solver, or one rank"
+            )
+        rows, columns, values = self.stiffness.convert("aij").getValuesCSR()
+        stiffness = sp.csr_matrix((values, columns, rows), shape=self.stiffness.getSize())
+        whole = sp.bmat([[stiffness, self._flux.T], [self._flux, -self._compliance]], format="csr")
+        whole.sort_indices()
+        csr = whole.indptr.astype(PETSc.IntType), whole.indices.astype(PETSc.IntType), whole.data
+        return PETSc.Mat().createAIJ(whole.shape, csr=csr, comm=self.stiffness.comm)
