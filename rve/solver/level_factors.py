@@ -2,7 +2,7 @@
 
 One fill-reducing order serves all matrices, so that L is a smooth function of the entries:
 neighbouring levels have neighbouring L. Of one pattern the matrices are treated side by side, eight
-at a time, by the loops of `level_factors.c`. J has the signs of the pivots: all 1 without pressures.
+at a time, by the loops of `level_factors.c`. J has the signs of the pivots, 1 without pressures.
 
 A pressure is eliminated after all displacements of its triangle. Its pivot is then negative and of
 the size of the triangle's flexibility, however small the compressibility: L stays bounded and is a
