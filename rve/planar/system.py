@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy.sparse as sp
+from cvxopt import cholmod, matrix, spmatrix
 
 from alphacut.rve.mesh.triangulation import Integers
-from alphacut.rve.petsc import PETSc
 from alphacut.stochastic.theta.truncated_normal import Array
 
-SOLVER = "MUMPS Cholesky"
+SOLVER = "CHOLMOD"
 AREA = 4.0
 _BASIS_TOLERANCE = 1e-11  # relative change of the stiffness by one more solution in the basis
 
@@ -71,37 +71,32 @@ class Cholesky:
     """
 
     def __init__(self, rows: Integers, columns: Integers) -> None:
-        size = rows.size - 1
-        self._system = sp.csr_matrix((np.ones(columns.size), columns, rows), shape=(size, size))
-        self._rows, self._columns = rows.astype(PETSc.IntType), columns.astype(PETSc.IntType)
-        self._matrix = PETSc.Mat().createAIJ(
-            (size, size), csr=(self._rows, self._columns, self._system.data), comm=PETSc.COMM_SELF
-        )
-        self._matrix.setOption(PETSc.Mat.Option.SPD, True)
-        self._factor = PETSc.PC().create(PETSc.COMM_SELF)
-        self._factor.setOptionsPrefix("rve_planar_")
-        self._factor.setType("cholesky")
-        self._factor.setFactorSolverType("mumps")
+        self._size, self._shape = rows.size - 1, (columns, rows)
+        row = np.repeat(np.arange(self._size), np.diff(rows))
+        self._upper = columns >= row  # row by row: the lower triangle, column by column
+        low, high = columns[self._upper], row[self._upper]
+        self._matrix = spmatrix(1.0, low, high, (self._size, self._size))
+        self._factor = cholmod.symbolic(self._matrix)
 
     def solve(self, values: Array, loads: Array) -> Array:
         """Solutions of the columns of `loads` for the matrix with these `values`.
 
         Raises:
-            PlanarError: The residual is no good.
+            PlanarError: The matrix is not positive definite, or the residual is no good.
         """
         scale = np.abs(values).max()
-        self._system.data[:] = values / scale
-        self._matrix.setValuesCSR(self._rows, self._columns, self._system.data)
-        self._matrix.assemble()
-        self._factor.setOperators(self._matrix)
-        self._factor.setUp()
-        right, left = self._matrix.createVecs()
-        solutions = np.empty_like(loads)
-        for k in range(loads.shape[1]):
-            left.array = loads[:, k] / scale
-            self._factor.apply(left, right)
-            solutions[:, k] = right.array
-        residual = float(np.linalg.norm(scale * (self._system @ solutions) - loads)) / max(
+        self._matrix.V = matrix(values[self._upper] / scale)
+        found = matrix(loads / scale)
+        try:
+            cholmod.numeric(self._matrix, self._factor)
+            cholmod.solve(self._factor, found)
+        except ArithmeticError:
+            raise PlanarError(
+                "the stiffness has no Cholesky factor: check the moduli, or take the series"
+            ) from None
+        solutions = np.asarray(found)
+        product = sp.csr_matrix((values, *self._shape), shape=(self._size,) * 2) @ solutions
+        residual = float(np.linalg.norm(product - loads)) / max(
             float(np.linalg.norm(loads)), 1e-300
         )
         if not residual < 1e-8:  # also catches nan
