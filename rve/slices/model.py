@@ -26,6 +26,7 @@ _FADE, _LOCKED_FADE, _IRREGULAR_FADE = 0.03, 0.05, 0.08
 _LOCKING = 0.45  # Poisson's ratio above which order 2 locks
 _ORDERS = 2, 3, 4
 _ROUND_OFF = 1e-13
+_CANCELLED = 1e-14  # relative round-off for each unit of radius and contrast
 _SAFETY = 3.3
 _COARSE, _COARSE_SAFETY = 0.6, 5.5  # mesh size above which orders do not yet leave what they should
 _POINTWISE = 1.5  # safety of a single θ, where errors do not average
@@ -139,6 +140,8 @@ class Slice:
         seconds: Wall time: mesh, jit, assemble, solve.
         locks: Whether a phase is nearly incompressible.
         mesh_size: Edge length of the mesh, in halves of the cell's side.
+        cancelled: Relative round-off that a stiff particle's forces leave of each inclusion where
+            they cancel, shape (m, 1).
     """
 
     orders: tuple[int, ...]
@@ -150,6 +153,7 @@ class Slice:
     seconds: dict[str, float]
     locks: bool
     mesh_size: float
+    cancelled: Array
 
     @property
     def stiffness(self) -> Array:
@@ -190,7 +194,7 @@ class Slice:
         safety = _SAFETY if self.mesh_size <= _COARSE else _COARSE_SAFETY
         found = safety * gaps[-1] * fade / (1 - fade)
         shared = _SHARED * found[:, :3].max(axis=1, keepdims=True)
-        return np.asarray(np.maximum(found, shared) + _ROUND_OFF)
+        return np.asarray(np.maximum(found, shared) + _ROUND_OFF + self.cancelled)
 
 
 def solve_slice(
@@ -232,4 +236,5 @@ def solve_slice(
         seconds,
         max(phase.poisson for phase in (matrix, *inclusions)) > _LOCKING,
         mesh_size,
+        _CANCELLED * radius * np.array([[one.modulus / matrix.modulus] for one in inclusions]),
     )

@@ -200,6 +200,18 @@ def test_an_order_below_4_is_judged_by_order_4(order, most):
     assert (solved.error[0] <= most * true).all()
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_the_error_counts_what_cancels_about_a_stiff_particle(seed):
+    """Contrasts from 1e7 to 1e10: two orders agree by chance, and both are off."""
+    rng = np.random.default_rng(seed)
+    radius, contrast, size = rng.uniform(0.1, 0.9), 10 ** rng.uniform(7, 10), rng.uniform(0.1, 0.3)
+    given = Phase(20e9), [Phase(20e9 * contrast)]
+    found = solve_slice(radius, *given, orders=(2, 3, 4), mesh_size=size)
+    cell = square_stiffness(np.array([radius]), *given)
+    exact = np.array([cell.bulk[0, 0], cell.deviator[0, 0], cell.shear[0, 0]])
+    assert (abs(square_moduli(found.stiffness)[0] / exact - 1) <= found.error[0, :3]).all()
+
+
 def test_the_error_counts_what_locking_hides_of_the_decay():
     """Order 2 locks, so its change to order 3 is large and tells of too fast a decay."""
     matrix, soft = Phase(20e9, 0.4993), Phase(28e6, 0.468)
