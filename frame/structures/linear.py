@@ -131,10 +131,8 @@ def evaluate(
         points: Their values, shape (S, d).
         derivatives: Whether to differentiate by `names`.
     """
-    fixed = [name for name in system.parameters if name not in names]
-    values = np.hstack(
-        [points, np.tile([system.parameters[name] for name in fixed], (len(points), 1))]
-    )
+    fixed = {name: x for name, x in system.parameters.items() if name not in names}
+    values = np.hstack([points, np.tile(list(fixed.values()), (len(points), 1))])
     p = variables(values, [*names, *fixed], names if derivatives else ())
     return system.matrices(p), system.observation(p)
 

@@ -226,8 +226,8 @@ class StoreyFrame:
 
     def observation(self, p: Mapping[str, Jet]) -> Jet:
         """Rows C(p) with output = C(p) [q; v], shape (S, outputs, 2n)."""
-        links = springs(self, p)
         kinds = [self._output(output) for output in self.outputs]
+        links = springs(self, p) if any(kind == "shear" for kind, _ in kinds) else []
         at = self.matrices(p) if any(kind in ("a", "ar") for kind, _ in kinds) else None
         rows: list[list[Entry]] = []
         for kind, z in kinds:
