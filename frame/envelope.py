@@ -90,7 +90,7 @@ class Envelope:
     - dominant_error: Said where time stepping adds more to an output than the search.
     - gain: What the Graph Follower computed a graph for, in the unit.
       judged_by: What `error` was found with, where the method itself has no estimate.
-      order: Degree of its Taylor models. recomputed: Derivatives computed again.
+      order: Degree of its Taylor models.
       corners: Trajectories at corners, beside `trajectories`.
     - degree: Of the polynomials of the modes. model_error: What trajectories of theirs are wrong by
       at most at held-out parameters, the optima found and the corners of the box, over all outputs;

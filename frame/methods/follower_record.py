@@ -87,7 +87,7 @@ def record_flow(flow: UnitFlow, *, output: int = 0, tolerance: float = 1e-4) -> 
         )
     followed = GraphFollower(tolerance=tolerance, record=True).follow(flow)
     steps = tuple(step for step in followed.steps if step.output == output and step.level == 0)
-    graphs = followed.storage.values[:, output].T
+    graphs = np.array(followed.storage.graphs)[..., output]
     local = {+1: np.full(len(flow.time), -np.inf), -1: np.full(len(flow.time), np.inf)}
     for step in steps:
         seen = [graphs[k, step.node] for k in (step.guess, step.found) if k >= 0]

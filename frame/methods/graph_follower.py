@@ -19,9 +19,7 @@ from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.box_quadratic import gain, linear_maximum, local_maximum
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.envelope import Envelope, signed_envelope
-from alphacut.frame.methods.graph_storage import Storage
-
-Index = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
+from alphacut.frame.methods.graph_storage import Index, Storage
 
 
 class FollowerStep(NamedTuple):
@@ -107,7 +105,6 @@ class GraphFollower:
         facts: dict[str, float | str] = {
             "order": self.order,
             "gain": self.tolerance,
-            "recomputed": followed.storage.recomputed,
         }
         if followed.exhausted:
             facts["reason"] = f"stopped at the budget of {self.budget} trajectories"
@@ -124,70 +121,76 @@ class GraphFollower:
 
     def follow(self, flow: UnitFlow, progress: Callable[[float], None] | None = None) -> Followed:
         """Follows the graphs on all levels of `flow.boxes`."""
-        storage = Storage(flow)
+        storage = Storage(flow, self.record)
         storage.add(flow.boxes.to_unit(flow.boxes.modal)[None])
-        shape = (len(flow.boxes.alpha), len(flow.time), len(flow.outputs), 2)
-        out = Followed(np.empty(shape), np.empty(shape, np.int64), storage)
         levels = len(flow.boxes.alpha)
+        shape = (levels, *storage.top.shape)
+        out = Followed(np.empty(shape), np.empty(shape, np.int64), storage)
         for done, level in enumerate(reversed(range(levels))):
             self._sweep(out, level, progress, done / levels)
-            signed = _signed(storage.values)
-            out.best[level] = signed.argmax(
-                -1
-            )  # post-processing: the best of all graphs at every node (Fig. 24)
-            out.bounds[level] = np.take_along_axis(signed, out.best[level][..., None], -1)[..., 0]
+            # post-processing: the best of all graphs at every node (Fig. 24)
+            out.bounds[level], out.best[level] = storage.top, storage.best
         return out
 
     def _sweep(
         self, out: Followed, level: int, progress: Callable[[float], None] | None, start: float
     ) -> None:
-        box = out.storage.flow.boxes.unit(level)
+        storage, box = out.storage, out.storage.flow.boxes.unit(level)
         if not (box[1] > box[0]).any():
             return
         levels, nodes = out.bounds.shape[:2]
+        promise, target = storage.top.copy(), np.zeros((*storage.top.shape, len(box[0])))
+        self._ask(storage, np.ones(promise.shape, bool), box, promise, target)
         for node in range(nodes):
             if progress and node % 100 == 0:
                 progress(start + node / nodes / levels)
-            if self.budget is not None and len(out.storage) >= self.budget:
+            if self.budget is not None and len(storage) >= self.budget:
                 out.exhausted = True
                 return
-            self._node(out, level, node, box)
+            guess = storage.best[node].flatten()
+            tried, new = self._tried(storage, node, promise, target)
+            if new:
+                won = storage.add(np.array(new))
+                won[: node + 1] = False
+                self._ask(storage, won, box, promise, target)
+            if self.record:
+                _note(out, level, node, guess, tried)
 
-    def _node(self, out: Followed, level: int, node: int, box: tuple[Array, Array]) -> None:
-        storage = out.storage
-        signed = _signed(storage.values[node]).reshape(-1, len(storage))  # (2m, G)
-        guess = signed.argmax(1)
-        base, x, promised = self._optima(storage, node, guess, box)
-        limit = self.tolerance * np.repeat(storage.flow.scale, 2)
-        new: list[Array] = []
+    def _tried(
+        self, storage: Storage, node: int, promise: Array, target: Array
+    ) -> tuple[dict[int, tuple[int, float]], list[Array]]:
+        """New graphs for bounds of a node, and what was promised for each, as in `FollowerStep`."""
+        limit = self.tolerance * storage.flow.scale[:, None]
         tried: dict[int, tuple[int, float]] = {}
-        for k in np.flatnonzero(base + promised > signed.max(1) + limit):
-            point = np.clip(storage.points[guess[k]] + x[k], *box)
+        new: list[Array] = []
+        for k in np.flatnonzero(promise[node] > storage.top[node] + limit):
+            point = target[node, k // 2, k % 2]
             fresh = not storage.holds(point) and all(
                 np.abs(point - other).max() > 1e-9 for other in new
             )
-            tried[int(k)] = (len(storage) + len(new) if fresh else -1, float((base + promised)[k]))
+            graph = len(storage) + len(new) if fresh else -1
+            tried[int(k)] = graph, float(promise[node, k // 2, k % 2])
             if fresh:
                 new.append(point)
-        if new:
-            storage.add(np.array(new))
-        if self.record:
-            _note(out, level, node, guess, tried)
+        return tried, new
 
-    def _optima(
-        self, storage: Storage, node: int, guess: Index, box: tuple[Array, Array]
-    ) -> tuple[Array, Array, Array]:
-        """Values, steps to the optima of the Taylor models (eq. 22), and promised gains."""
-        m = len(guess) // 2
-        side = np.tile([-1.0, 1.0], m)
-        g, H = (np.empty((2 * m, *shape)) for shape in ((len(box[0]),), (len(box[0]),) * 2))
-        for k, graph in enumerate(guess):
-            model = storage.derivatives(int(graph))
-            g[k], H[k] = side[k] * model.first[node, k // 2], side[k] * model.second[node, k // 2]
-        base = side * storage.values[node, np.arange(2 * m) // 2, guess]
-        lower, upper = box[0] - storage.points[guess], box[1] - storage.points[guess]
-        x = self._maximise(g, H, lower, upper)
-        return base, x, gain(g, H if self.order == 2 else 0 * H, x)
+    def _ask(
+        self,
+        storage: Storage,
+        where: Array,
+        box: tuple[Array, Array],
+        promise: Array,
+        target: Array,
+    ) -> None:
+        """Sets what the Taylor models of the best graphs promise at places, and at which points."""
+        places = np.nonzero(where)
+        side = 2.0 * places[2] - 1
+        _, first, second = storage.held.models(0, places)
+        g, H = side[:, None] * first, side[:, None, None] * second
+        at = storage.points[storage.best[places]]
+        x = self._maximise(g, H, box[0] - at, box[1] - at)  # optima of eq. 22
+        promised = gain(g, H if self.order == 2 else 0 * H, x)
+        promise[places], target[places] = storage.top[places] + promised, np.clip(at + x, *box)
 
     def _maximise(self, g: Array, H: Array, lower: Array, upper: Array) -> Array:
         if self.order == 1:
@@ -202,8 +205,3 @@ def _note(
         side = 2 * (k % 2) - 1
         graph, value = tried.get(k, (-1, float("nan")))
         out.steps.append(FollowerStep(level, node, k // 2, side, int(best), graph, side * value))
-
-
-def _signed(values: Array) -> Array:
-    """(−values, values) on a new axis before the last, (…, G) to (…, 2, G)."""
-    return np.stack([-values, values], -2)

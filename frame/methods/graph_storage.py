@@ -1,110 +1,63 @@
-"""Storage of computed graphs with parameters and, while memory lasts, derivatives."""
+"""Storage of computed graphs: parameters, and the best at every place with its derivatives."""
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.jet import Array
+from alphacut.frame.methods.held_models import HeldModels
 
-
-@dataclass(frozen=True, eq=False)
-class Derivatives:
-    """First and second derivatives of one graph by the unit coordinates.
-
-    Args:
-        first: Shape (T, outputs, d).
-        second: Shape (T, outputs, d, d).
-    """
-
-    first: Array
-    second: Array
+Index = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 
 
 @dataclass(eq=False)
 class Storage:
-    """All graphs computed so far.
-
-    Derivatives are kept for the graphs used last and computed again when an older graph is best
-    once more.
+    """All graphs computed so far; arrays over places have shape (T, m, 2), (−output, output) last.
 
     Args:
         flow: Computes graphs.
-        memory: Bytes that derivatives may take.
+        record: Whether to keep the graphs themselves.
+        points: Their unit coordinates, shape (G, d).
+        graphs: They, each of shape (T, m), where they are kept.
+        top: The best value at each place.
+        best: Which graph has it, the first where several do.
+        held: Derivatives of that graph.
     """
 
     flow: UnitFlow
-    memory: float = 4e8
-    recomputed: int = 0
-    _points: Array = field(init=False)
-    _values: Array = field(init=False)
-    _count: int = 0
-    _derivatives: OrderedDict[int, Derivatives] = field(default_factory=OrderedDict)
+    record: bool = False
+    points: Array = field(init=False)
+    graphs: list[Array] = field(default_factory=list)
+    top: Array = field(init=False)
+    best: Index = field(init=False)
+    held: HeldModels = field(init=False)
 
     def __post_init__(self) -> None:
-        d, shape = len(self.flow.boxes.names), (len(self.flow.time), len(self.flow.outputs))
-        self._points, self._values = np.empty((64, d)), np.empty((*shape, 64))
+        d, shape = len(self.flow.boxes.names), (len(self.flow.time), len(self.flow.outputs), 2)
+        self.points, self.top = np.empty((0, d)), np.full(shape, -np.inf)
+        self.best, self.held = np.zeros(shape, np.int64), HeldModels.empty((0,), shape, d)
 
     def __len__(self) -> int:
-        return self._count
-
-    @property
-    def points(self) -> Array:
-        """Unit coordinates of the graphs, shape (G, d)."""
-        return self._points[: self._count]
-
-    @property
-    def values(self) -> Array:
-        """The graphs, shape (T, outputs, G)."""
-        return self._values[..., : self._count]
+        return len(self.points)
 
     def holds(self, point: Array) -> bool:
         """True if the graph of `point` is stored."""
         return bool((np.abs(self.points - point).max(1, initial=0.0) < 1e-9).any())
 
-    def add(self, points: Array) -> None:
-        """Computes and stores the graphs at unit coordinates (S, d)."""
-        jet = self.flow.taylor(points)
-        self._reserve(self._count + len(points))
-        for s, point in enumerate(points):
-            self._points[self._count], self._values[..., self._count] = point, jet.value[s]
-            self._keep(
-                self._count,
-                Derivatives(
-                    np.moveaxis(jet.first[:, s], 0, -1),
-                    np.moveaxis(jet.second[:, :, s], (0, 1), (-2, -1)),
-                ),
-            )
-            self._count += 1
-
-    def derivatives(self, graph: int) -> Derivatives:
-        """Derivatives of a stored graph."""
-        if graph not in self._derivatives:
-            self.recomputed += 1
-            jet = self.flow.taylor(self.points[graph][None])
-            self._keep(
-                graph,
-                Derivatives(
-                    np.moveaxis(jet.first[:, 0], 0, -1),
-                    np.moveaxis(jet.second[:, :, 0], (0, 1), (-2, -1)),
-                ),
-            )
-        self._derivatives.move_to_end(graph)
-        return self._derivatives[graph]
-
-    def _keep(self, graph: int, derivatives: Derivatives) -> None:
-        self._derivatives[graph] = derivatives
-        size = derivatives.first.nbytes + derivatives.second.nbytes
-        while len(self._derivatives) > max(8, self.memory / size):
-            self._derivatives.popitem(last=False)
-
-    def _reserve(self, count: int) -> None:
-        if count > len(self._points):
-            room = max(count, 2 * len(self._points))
-            points = np.empty((room, self._points.shape[1]))
-            values = np.empty((*self._values.shape[:2], room))
-            points[: self._count], values[..., : self._count] = self.points, self.values
-            self._points, self._values = points, values
+    def add(self, points: Array) -> Array:
+        """Computes and stores the graphs at unit coordinates (S, d); where one of them is best."""
+        jet, holder = self.flow.taylor(points), np.full(self.top.shape, -1)
+        for s, value in enumerate(jet.value):
+            signed = np.stack([-value, value], -1)
+            better = signed > self.top
+            self.top[better], holder[better] = signed[better], s
+        won = holder >= 0
+        self.best[won] = len(self) + holder[won]
+        self.held.keep(jet, holder)
+        self.points = np.vstack([self.points, points])
+        if self.record:
+            self.graphs += list(jet.value)
+        return won

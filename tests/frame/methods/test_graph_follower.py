@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -20,6 +22,49 @@ MASSES = {f"m{i + 1}": Triangular(0.95 * m, m, 1.05 * m) for i, m in enumerate(F
 @pytest.fixture(scope="module")
 def short() -> Envelope:
     return envelope(FRAME, {**E, **MASSES}, duration=5, step=0.02, method="graph-follower")
+
+
+def followed_plainly(flow: UnitFlow, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of the widest box and points of all graphs, by section 5.3 word for word."""
+    points = [flow.boxes.to_unit(flow.boxes.modal)]
+    jets = [flow.taylor(points[0][None])]
+    for level, node in product(reversed(range(len(flow.boxes.alpha))), range(len(flow.time))):
+        low, high = flow.boxes.unit(level)
+        new = []
+        for output, sign in product(range(len(flow.outputs)), (-1, 1)):
+            best = int(np.argmax([sign * jet.value[0, node, output] for jet in jets]))
+            g = sign * jets[best].first[:, 0, node, output]
+            H = sign * jets[best].second[:, :, 0, node, output]
+            at = points[best]
+            x = local_maximum(g[None], H[None], (low - at)[None], (high - at)[None])
+            if gain(g[None], H[None], x)[0] > tolerance:
+                point = np.clip(at + x[0], low, high)
+                if all(np.abs(point - other).max() > 1e-9 for other in [*points, *new]):
+                    new.append(point)
+        points += new
+        jets += [flow.taylor(point[None]) for point in new]
+    values = np.array([jet.value[0] for jet in jets])
+    return np.stack([values.min(0), values.max(0)]), np.array(points)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_same_graphs_as_when_every_node_asks_every_graph(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    n = seed + 1
+    masses, heights = rng.uniform(5e3, 1e4, n), rng.uniform(2.3, 3.2, n)
+    start = {"q0": rng.uniform(-0.03, 0.03, n), "v0": rng.uniform(-0.2, 0.2, n)}
+    system = frame.StoreyFrame(masses, heights, 25e9, 1e-5, (2e3,) * n, **start)
+    inputs = {"E": Triangular(23e9, 25e9, 28e9), "d1": Triangular(1e3, 2e3, 4e3)}
+    inputs["m1"] = Triangular(0.9 * masses[0], masses[0], 1.1 * masses[0])
+    cuts = boxes(inputs, (0.0, 0.5, 1.0))
+    flow = UnitFlow(frame.LinearFlow(system, cuts.names, 2, 0.02), cuts)
+    found = GraphFollower(tolerance=2e-4).follow(flow)
+    bounds, points = followed_plainly(flow, 2e-4)
+    assert len(points) > 10
+    assert found.storage.points == pytest.approx(points, abs=1e-9)
+    assert np.abs(found.bounds[0] * [-1, 1] - np.moveaxis(bounds, 0, -1)).max() < 1e-12
+    assert (found.best[-1] == 0).all()
+    assert (found.best[:, 0] == 0).all()  # of equal graphs the first
 
 
 def test_minima_quoted_in_the_paper() -> None:
