@@ -108,6 +108,24 @@ def test_items_of_both_kernels_agree_code_by_code(ground, monkeypatch) -> None:
     assert (codes[0] >= 16).any()
 
 
+def test_both_kernels_close_items_at_the_same_bounds(monkeypatch) -> None:
+    """Whatever the best so far is, so that every term of the bounds decides some items."""
+    take("c", monkeypatch)
+    compiled, found, pairs = kernel.examination()[1], model(None, ("E", "m1")), []
+
+    def both(piece, given):
+        for share in np.linspace(0, 1.5, 301) if len(pairs) < 1800 else ():
+            moved = replace(given, best=given.best + share * np.abs(given.best).max())
+            pairs.append((compiled(piece, moved)[0], examine(piece, moved)[0]))
+        return examine(piece, given)
+
+    monkeypatch.setattr(branch_and_bound, "examination", lambda: ("both", both))
+    enclosed(found, budget=200)
+    one, two = (np.concatenate([pair[k] for pair in pairs]) for k in (0, 1))
+    assert len(one) > 5e5
+    assert (one != two).sum() <= 1
+
+
 def test_children_cover_their_parent_and_no_more() -> None:
     lower, upper = np.array([-1.0, 0.0]), np.array([1.0, 3.0])
     root = Frontier.whole(2, np.arange(3))
