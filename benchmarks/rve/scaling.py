@@ -116,7 +116,7 @@ def modelled(one: Mapping[str, float], ranks: int) -> dict[str, float]:
 
 
 def on_ranks(
-    counts: Sequence[int], mesh_size: float, repeat: int
+    counts: Sequence[int], mesh_size: float, repeat: int = 1
 ) -> tuple[list[dict[str, Any]], int]:
     """Rows of the table, printed, the fastest of the repetitions each, and the number of faults."""
     rows: list[dict[str, Any]] = []
