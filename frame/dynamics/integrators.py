@@ -78,8 +78,9 @@ class Midpoint:
     def step_map(self, matrices: Matrices, step: float) -> StepMap:
         """The map of one step; its velocity is M⁻¹ times the discrete momentum."""
         m, h = matrices, step
-        left = inverse(m.mass * (1 / h) + m.damping * 0.5 + m.stiffness * (h / 4))
-        forward = left @ (m.mass * (1 / h) + m.damping * 0.5 - m.stiffness * (h / 4))
+        inertia, spring = m.mass * (1 / h) + m.damping * 0.5, m.stiffness * (h / 4)
+        left = inverse(inertia + spring)
+        forward = left @ (inertia - spring)
         kick = left @ m.mass
         push = kick @ (m.rigid * np.full(2, -h / 4))  # half a step of the mean ground acceleration
         eye = np.eye(m.mass.value.shape[-1])

@@ -19,7 +19,7 @@ from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.box_quadratic import gain, linear_maximum, local_maximum
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.envelope import Envelope, signed_envelope
-from alphacut.frame.methods.graph_storage import Index, Storage
+from alphacut.frame.methods.graph_storage import Index, Places, Storage
 
 
 class FollowerStep(NamedTuple):
@@ -140,7 +140,7 @@ class GraphFollower:
             return
         levels, nodes = out.bounds.shape[:2]
         promise, target = storage.top.copy(), np.zeros((*storage.top.shape, len(box[0])))
-        self._ask(storage, np.ones(promise.shape, bool), box, promise, target)
+        self._ask(storage, tuple(np.indices(promise.shape).reshape(3, -1)), box, promise, target)
         for node in range(nodes):
             if progress and node % 100 == 0:
                 progress(start + node / nodes / levels)
@@ -151,8 +151,8 @@ class GraphFollower:
             tried, new = self._tried(storage, node, promise, target)
             if new:
                 won = storage.add(np.array(new))
-                won[: node + 1] = False
-                self._ask(storage, won, box, promise, target)
+                ahead = tuple(place[won[0] > node] for place in won)
+                self._ask(storage, ahead, box, promise, target)
             if self.record:
                 _note(out, level, node, guess, tried)
 
@@ -177,13 +177,12 @@ class GraphFollower:
     def _ask(
         self,
         storage: Storage,
-        where: Array,
+        places: Places,
         box: tuple[Array, Array],
         promise: Array,
         target: Array,
     ) -> None:
         """Sets what the Taylor models of the best graphs promise at places, and at which points."""
-        places = np.nonzero(where)
         side = 2.0 * places[2] - 1
         _, first, second = storage.held.models(0, places)
         g, H = side[:, None] * first, side[:, None, None] * second

@@ -11,6 +11,8 @@ from alphacut.frame.calculus.jet import Array
 from alphacut.frame.methods.held_models import HeldModels
 
 Index = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
+Places = tuple[Array, ...]
+"""Indices of nodes, outputs and sides, one of each for a place."""
 
 
 @dataclass(eq=False)
@@ -47,17 +49,18 @@ class Storage:
         """True if the graph of `point` is stored."""
         return bool((np.abs(self.points - point).max(1, initial=0.0) < 1e-9).any())
 
-    def add(self, points: Array) -> Array:
-        """Computes and stores the graphs at unit coordinates (S, d); where one of them is best."""
-        jet, holder = self.flow.taylor(points), np.full(self.top.shape, -1)
+    def add(self, points: Array) -> Places:
+        """Computes and stores the graphs at unit coordinates (S, d); places where one is best."""
+        jet, top = self.flow.taylor(points), self.top.reshape(-1)
+        holder = np.full(top.shape, -1)
         for s, value in enumerate(jet.value):
-            signed = np.stack([-value, value], -1)
-            better = signed > self.top
-            self.top[better], holder[better] = signed[better], s
-        won = holder >= 0
-        self.best[won] = len(self) + holder[won]
-        self.held.keep(jet, holder)
+            signed = np.stack([-value, value], -1).ravel()
+            better = np.flatnonzero(signed > top)
+            top[better], holder[better] = signed[better], s
+        won = np.flatnonzero(holder >= 0)
+        self.best.reshape(-1)[won] = len(self) + holder[won]
+        self.held.keep(jet, holder.reshape(self.top.shape))
         self.points = np.vstack([self.points, points])
         if self.record:
             self.graphs += list(jet.value)
-        return won
+        return np.unravel_index(won, self.top.shape)

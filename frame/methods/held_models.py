@@ -41,7 +41,7 @@ class HeldModels:
             jet: Trajectories, V = (S, T, m).
             holder: Which of them holds a place now, shape (T, m, 2); −1 for none.
         """
-        t, o, side = np.nonzero(holder >= 0)
+        t, o, side = np.unravel_index(np.flatnonzero(holder >= 0), holder.shape)
         for shift, parts in self.kept.items():
             near = np.clip(t + shift, 0, len(holder) - 1)
             for part, model in zip(
