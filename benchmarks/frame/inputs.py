@@ -116,8 +116,9 @@ def main() -> None:
         row = {"inputs": count, **measured(count, samples=o.samples, starts=o.starts)}
         rows.append(row)
         print(
-            f"{count:2d} inputs: {row['seconds']:.1f} s, {row['method']}, error {row['error']:.1e},"
-            f" declared {row['declared']:.1e}, {row['above_declared']} of {row['values']} above it",
+            f"{count:2d} inputs: {row['wall_seconds']:.1f} s, {row['seconds']:.1f} s of processor,"
+            f" {row['method']}, error {row['error']:.1e}, declared {row['declared']:.1e},"
+            f" {row['above_declared']} of {row['values']} above it",
             flush=True,
         )
     late = [row for row in rows if row["inputs"] >= 6]

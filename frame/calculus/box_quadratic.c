@@ -5,24 +5,32 @@
 #define MOST 64
 #define FACES 6
 
+/* g + H x for a symmetric H. */
+static void slopes(int d, const double *g, const double *H, const double *x, double *s)
+{
+    memcpy(s, g, d * sizeof(double));
+    for (int j = 0; j < d; j++)
+        if (x[j] != 0)
+            for (int i = 0; i < d; i++) s[i] += H[j * d + i] * x[j];
+}
+
 static double gain(int d, const double *g, const double *H, const double *x)
 {
-    double total = 0;
-    for (int i = 0; i < d; i++) {
-        double row = 0;
-        for (int j = 0; j < d; j++) row += H[i * d + j] * x[j];
-        total += (g[i] + 0.5 * row) * x[i];
-    }
+    double total = 0, s[MOST];
+    slopes(d, g, H, x, s);
+    for (int i = 0; i < d; i++) total += 0.5 * (g[i] + s[i]) * x[i];
     return total;
 }
 
-static void slopes(int d, const double *g, const double *H, const double *x, double *s)
+static double largest(long count, const double *H)
 {
-    for (int i = 0; i < d; i++) {
-        double row = g[i];
-        for (int j = 0; j < d; j++) row += H[i * d + j] * x[j];
-        s[i] = row;
-    }
+    double most[8] = {0}, found = 0;
+    long k = 0;
+    for (; k + 8 <= count; k += 8)
+        for (int l = 0; l < 8; l++) most[l] = fabs(H[k + l]) > most[l] ? fabs(H[k + l]) : most[l];
+    for (; k < count; k++) most[0] = fabs(H[k]) > most[0] ? fabs(H[k]) : most[0];
+    for (int l = 0; l < 8; l++) found = most[l] > found ? most[l] : found;
+    return found;
 }
 
 static void axes_ascent(int d, const double *g, const double *H, const double *low,
@@ -39,7 +47,7 @@ static void axes_ascent(int d, const double *g, const double *H, const double *l
             new = level * (high[i] - low[i]) + 0.5 * c * (high[i] * high[i] - low[i] * low[i]) > 0
                       ? high[i] : low[i];
         if (new != x[i]) {
-            for (int j = 0; j < d; j++) s[j] += H[j * d + i] * (new - x[i]);
+            for (int j = 0; j < d; j++) s[j] += H[i * d + j] * (new - x[i]);
             x[i] = new;
         }
     }
@@ -82,11 +90,10 @@ static void newton(int d, const double *g, const double *H, const double *low,
     slopes(d, g, H, x, s);
     for (int i = 0; i < d; i++)
         if (!((x[i] <= low[i] && s[i] <= 0) || (x[i] >= high[i] && s[i] >= 0))) free[m++] = i;
-    for (int a = 0; a < m; a++) {
+    for (int a = 0; a < m; a++) step[a] = -s[free[a]];
+    for (int a = 0; a < m; a++)
         for (int b = 0; b < m; b++)
             A[a * m + b] = H[free[a] * d + free[b]] - (a == b ? shift : 0);
-        step[a] = -s[free[a]];
-    }
     if (!m || !solved(m, A, step)) return;
     top = gain(d, g, H, x);
     memcpy(best, x, d * sizeof(double));
@@ -113,10 +120,7 @@ int local_maximum(long count, int d, int rounds, const double *g, const double *
     for (long n = 0; n < count; n++) {
         const double *gn = g + n * d, *Hn = H + n * d * d;
         const double *low = lower + n * d, *high = upper + n * d;
-        double *xn = x + n * d, shift = 0, before = gain(d, gn, Hn, xn);
-        for (int k = 0; k < d * d; k++)
-            if (fabs(Hn[k]) > shift) shift = fabs(Hn[k]);
-        shift *= 1e-13;
+        double *xn = x + n * d, shift = 1e-13 * largest(d * d, Hn), before = gain(d, gn, Hn, xn);
         for (int r = 0; r < rounds; r++) {
             axes_ascent(d, gn, Hn, low, high, xn);
             newton(d, gn, Hn, low, high, xn, shift);
