@@ -5,7 +5,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
 
 enum { LANES = 8, AT_ONCE = 4, HIGH = 4 };
 typedef double lanes __attribute__((vector_size(LANES * sizeof(double))));
@@ -201,23 +200,13 @@ static int eliminate(const factors *f, lanes *values, const double **own, const 
     return 1;
 }
 
-/* Room for lanes, in large pages where there are any: most of the time goes to page faults else. */
-static lanes *room_for(size_t count) {
-    size_t page = (size_t)2 << 20, bytes = (count * sizeof(lanes) + page - 1) / page * page;
-    void *made = aligned_alloc(page, bytes);
-#ifdef MADV_HUGEPAGE
-    if (made) madvise(made, bytes, MADV_HUGEPAGE);
-#endif
-    return made;
-}
-
 /* Factors of `count` matrices, `entries` of each, with pivots of given signs; 0, 1 where one has another,
    2 without memory. */
 int factorise(factors *f, int count, const double *entries, const double *sign) {
     size_t n = f->size, length = f->start[n];
     f->count = count, f->batches = (count + LANES - 1) / LANES;
     free(f->values);
-    f->values = room_for(f->batches * length);
+    f->values = aligned_alloc(sizeof(lanes), f->batches * length * sizeof(lanes));
     lanes **pointers = malloc(2 * n * sizeof(lanes *));
     int *list = integers(5 * n), status = f->values && pointers && list ? 0 : 2;
     for (int b = 0; b < f->batches && !status; b++) {
