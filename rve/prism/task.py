@@ -92,7 +92,9 @@ class PrismTask:
 
     def __post_init__(self) -> None:
         self.affine = self.system.affine(self.strains)
-        self.assembled: tuple[Phase, Phase] | tuple[float, float] | None = None
+        self.assembled: tuple[Phase, Phase] | None = None
+        self.poissons: tuple[float, float] | None = None
+        self.whole: PETSc.Mat | None = None
 
     def solve(self, phases: tuple[Phase, Phase]) -> Displacements:
         """Solution for a matrix and an inclusion; earlier work serves again where it can.
@@ -140,15 +142,16 @@ class PrismTask:
         ]
 
     def _assemble(self, phases: tuple[Phase, Phase]) -> None:
-        system, key = self.system, (phases[0].poisson, phases[1].poisson) if self.units else phases
-        if key == self.assembled:
+        system, poissons = self.system, (phases[0].poisson, phases[1].poisson)
+        if poissons != self.poissons:
+            self.theta: tuple[int, ThetaPreconditioner] | None = None
+        elif self.whole is None or phases == self.assembled:
             return
-        self.assembled = key
+        self.poissons, self.assembled = poissons, phases
         system.set_poisson(phases)
         self.whole = None if self.units or system.mixed else system.stiffness_of(phases)
         self.matrices = [] if self.whole else [system.stiffness(k) for k in range(2)]
         self.loads = [[system.load(k, strain) for strain in self.strains] for k in range(2)]
-        self.theta: tuple[int, ThetaPreconditioner] | None = None
 
     @staticmethod
     def _combined(

@@ -7,6 +7,7 @@ pytest.importorskip("dolfinx")
 
 from alphacut.rve.cell import Phase
 from alphacut.rve.prism.model import PrismModel
+from alphacut.rve.prism.system import PrismSystem
 from alphacut.stochastic import HermiteMap
 
 PAPER = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
@@ -56,6 +57,33 @@ def test_one_set_up_serves_many_inclusions():
     alone = [solve(particle=p, mesh_size=0.3, layers=4) for p in particles]
     # bit for bit: a resumed campaign must not differ
     assert [r.modulus for r in together] == [r.modulus for r in alone]
+
+
+def test_inclusions_of_near_moduli_share_a_preconditioner(monkeypatch):
+    made, own = [], PrismSystem.preconditioner
+
+    def counted(*given):
+        made.append(given)
+        return own(*given)
+
+    monkeypatch.setattr(PrismSystem, "preconditioner", counted)
+    moduli = (79e9, 80e9, 81e9, 20e9)
+    PrismModel(0.5, 2).solve(PAPER, MATRIX, [Phase(modulus) for modulus in moduli])
+    assert len(made) == 2
+
+
+@pytest.mark.parametrize(("poisson", "times"), [(0.3, 0), (0.49, 2)])
+def test_matrices_of_single_moduli_are_made_once_where_they_are_wanted(poisson, times, monkeypatch):
+    made, own = [], PrismSystem.stiffness
+
+    def counted(*given):
+        made.append(given)
+        return own(*given)
+
+    monkeypatch.setattr(PrismSystem, "stiffness", counted)
+    particles = [Phase(modulus, poisson) for modulus in (40e9, 80e9)]
+    PrismModel(0.5, 2).solve(PAPER, Phase(20e9, poisson), particles)
+    assert len(made) == times
 
 
 def test_a_result_does_not_depend_on_what_was_solved_before():
