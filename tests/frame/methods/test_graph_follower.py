@@ -10,6 +10,7 @@ import pytest
 from alphacut import frame
 from alphacut.frame import Envelope, GraphFollower, envelope
 from alphacut.frame.boxes import UnitFlow, boxes
+from alphacut.frame.calculus import box_quadratic
 from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_maximum
 from alphacut.fuzzy import Triangular
 from benchmarks.frame.envelopes import FRAME
@@ -151,7 +152,10 @@ def test_record_tells_how_every_bound_came_about() -> None:
             assert step.side * (step.predicted - told.graphs[step.guess, step.node]) > 1e-4
 
 
-def test_quadratics_over_boxes() -> None:
+@pytest.mark.parametrize("kernel", ["c", "numpy"])
+def test_quadratics_over_boxes(kernel: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    if kernel == "numpy":
+        monkeypatch.setattr(box_quadratic, "_compiled_maximum", lambda *_: False)
     rng = np.random.default_rng(5)
     g, A = rng.standard_normal((300, 3)), rng.standard_normal((300, 3, 3))
     H, low, high = A + A.swapaxes(1, 2), -rng.uniform(0, 2, (300, 3)), rng.uniform(0, 2, (300, 3))
@@ -163,6 +167,18 @@ def test_quadratics_over_boxes() -> None:
     near = gain(g, H, local_maximum(g, H, low, high))
     assert (near <= best + 1e-9).all()
     assert (np.abs(near - best) < 1e-9).mean() > 0.6
+
+
+@pytest.mark.parametrize("d", [1, 2, 5, 12, 30])
+def test_both_kernels_go_uphill_to_the_same_points(d: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(d)
+    g, A = rng.standard_normal((200, d)), rng.standard_normal((200, d, d))
+    H, ends = A + A.swapaxes(1, 2) - 2 * np.sqrt(d) * np.eye(d), rng.uniform(0, 1, (2, 200, d))
+    compiled = local_maximum(g, H, -ends[0], ends[1], rounds=2)
+    monkeypatch.setattr(box_quadratic, "_compiled_maximum", lambda *_: False)
+    plain = local_maximum(g, H, -ends[0], ends[1], rounds=2)
+    apart = np.abs(gain(g, H, compiled) - gain(g, H, plain))
+    assert (apart < 1e-9).mean() > 0.98  # a tie of two corners may go either way
 
 
 @pytest.mark.parametrize(
