@@ -9,6 +9,7 @@ from alphacut.rve import Phase
 from alphacut.rve.cell import with_ratio
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
+from alphacut.rve.slices.model import solve_slice
 from alphacut.rve.table.build import TableError, build_table
 from alphacut.rve.table.cache import table_key
 from alphacut.rve.table.interpolant import TableRange, coefficients, leja, tail
@@ -141,6 +142,16 @@ def test_planar_table_reaches_its_accuracy():
     assert true < declared < 1e-5
     assert table.systems > 0
     assert table.unknowns > 1000
+
+
+def test_a_table_declares_what_three_orders_declare_of_its_cells():
+    span = TableRange(Phase(20e9, 0.48), 0.3, (0.3, 0.6), (80e9, 80e9))
+    table = build_table(span, accuracy=1e-3)
+    for radius, *declared in table.space.T:
+        cell = solve_slice(
+            radius, span.matrix, [Phase(80e9)], orders=(2, 3, 4), mesh_size=table.mesh_size
+        )
+        assert declared == pytest.approx(cell.error[0], rel=1e-6)
 
 
 def test_degenerate_ranges_take_one_node():
