@@ -14,9 +14,10 @@ import ctypes
 import os
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from alphacut.rve.interruption import uninterrupted
@@ -45,19 +46,64 @@ def clean(comm: MPI.Comm | None) -> None:
         PETSc.garbage_cleanup(comm)
 
 
-def block_values(matrix: PETSc.Mat) -> ctypes.c_void_p:
-    """Where the blocks of a matrix on one rank begin: row by row, each column by column."""
+def give_back() -> None:
+    """Give the system the memory that is free, which MPI has told the C library to keep."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:  # glibc has it
+        trim(0)
+
+
+def block_values(matrix: PETSc.Mat) -> tuple[ctypes.c_void_p, ctypes.c_void_p]:
+    """Where the blocks of this rank's rows begin: row by row, each column by column.
+
+    First those whose columns it owns too, then the others.
+    """
+    own, other = ctypes.c_void_p(matrix.getDiagonalBlock().handle), ctypes.c_void_p()
+    if matrix.comm.size > 1:
+        other = _beside_diagonal(matrix)[0]
+    return _first_block(own), _first_block(other) if other else other
+
+
+def _first_block(part: ctypes.c_void_p) -> ctypes.c_void_p:
     first = ctypes.c_void_p()
-    _LIBRARY.MatSeqBAIJGetArray(ctypes.c_void_p(matrix.handle), ctypes.byref(first))
+    _LIBRARY.MatSeqBAIJGetArray(part, ctypes.byref(first))
     return first
 
 
-def ghosts(matrix: PETSc.Mat) -> NDArray[np.int32 | np.int64]:
-    """Numbers of other ranks' blocks that a matrix on several ranks multiplies on this one."""
-    count, first = np.zeros(1, PETSc.IntType), ctypes.c_void_p()
-    _LIBRARY.MatGetGhosts(ctypes.c_void_p(matrix.handle), count.ctypes, ctypes.byref(first))
-    data = ctypes.string_at(first, int(count[0]) * count.itemsize) if count[0] else b""
-    return np.frombuffer(data, PETSc.IntType)
+def _beside_diagonal(matrix: PETSc.Mat) -> tuple[ctypes.c_void_p, ctypes.c_void_p]:
+    """PETSc's part of a matrix whose columns other ranks own, and where their numbers begin."""
+    part, numbers = ctypes.c_void_p(), ctypes.c_void_p()
+    _LIBRARY.MatMPIBAIJGetSeqBAIJ(
+        ctypes.c_void_p(matrix.handle), None, ctypes.byref(part), ctypes.byref(numbers)
+    )
+    return part, numbers
+
+
+def beside_diagonal(matrix: PETSc.Mat) -> tuple[sp.csr_matrix, NDArray[np.int32]]:
+    """What this rank's rows of a matrix in blocks multiply of other ranks, and the blocks' numbers.
+
+    Its columns are those blocks' alone.
+    """
+    part, numbers = _beside_diagonal(matrix)
+    rows, done = np.zeros(1, PETSc.IntType), ctypes.c_int()
+    starts, columns = ctypes.c_void_p(), ctypes.c_void_p()
+    found = rows.ctypes, ctypes.byref(starts), ctypes.byref(columns), ctypes.byref(done)
+    _LIBRARY.MatGetRowIJ(part, 0, 0, 1, *found)
+    pointers = _copied(starts, int(rows[0]) + 1, PETSc.IntType)
+    place, block = _copied(columns, pointers[-1], PETSc.IntType), matrix.getBlockSize()
+    values = _copied(_first_block(part), len(place) * block**2, PETSc.ScalarType).reshape(
+        -1, block, block
+    )
+    others = _copied(numbers, place.max(initial=-1) + 1, PETSc.IntType)
+    shape = block * int(rows[0]), block * len(others)
+    by_row = values.transpose(0, 2, 1)  # PETSc's run column by column
+    return sp.bsr_matrix((by_row, place, pointers), shape=shape).tocsr(), others
+
+
+def _copied(first: ctypes.c_void_p, count: int, kind: type) -> Any:
+    """So many numbers of PETSc's from there on."""
+    size = int(count) * np.dtype(kind).itemsize
+    return np.frombuffer(ctypes.string_at(first, size) if size else b"", kind)
 
 
 @contextmanager

@@ -7,6 +7,7 @@ translation u = c(θ) costs no energy at any θ.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,7 +16,7 @@ from alphacut.rve.mesh.triangulation import Integers, Triangulation
 from alphacut.stochastic.theta.truncated_normal import Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Periodicity:
     """Unknowns of a planar mesh after identification, vertices before edge midpoints.
 
@@ -46,6 +47,7 @@ class Periodicity:
         return sp.csr_matrix(triplet, shape=(self.count, self.vertices))
 
 
+@lru_cache(maxsize=4)
 def identify(plane: Triangulation) -> Periodicity:
     """Pair the nodes on opposite sides of the cell.
 

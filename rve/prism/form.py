@@ -42,19 +42,18 @@ JIT = {"cffi_extra_compile_args": ["-O3", "-ffast-math"], "timeout": 120}  # for
 class PrismForm:
     """Integrals over the wedges of one grid; positions and phases are set anew for every map.
 
-    On several ranks each has its own wedges; matrices and vectors add up what they give.
+    On several ranks each adds up what the wedges around its rows give to these.
 
     Args:
-        grid: Topology.
-        pairs: Unknown pair of each node of the wedges, −1 where fixed, shape (wedges, 15).
-        works: Unknowns of the levels around them.
-        places: Where their blocks stand in the diagonal part of matrices, shape (wedges, 15, 15);
-            −1 where they do not.
+        grid: Topology of those wedges.
+        pairs: Unknown pair of each of their nodes, −1 where fixed, shape (wedges, 15).
+        rows: The unknowns of the rank.
+        places: Where blocks stand in matrices, shape (wedges, 15, 15); see `LevelNumbering.matrix`.
     """
 
     grid: PrismGrid
     pairs: NDArray[np.int32]
-    works: range
+    rows: range
     places: NDArray[np.int32]
 
     def __post_init__(self) -> None:
@@ -68,11 +67,11 @@ class PrismForm:
         self._traces = np.array([wedge.tabulate(points) for points in corners])
         self._traces[abs(self._traces) < 1e-14] = 0.0
         self._heights = 2 * self.weights.reshape(3, -1).sum(axis=1)
-        self._near = np.maximum(self.pairs - self.works.start // 2, -1).astype(np.int32)
+        first, stop = self.rows.start // 2, self.rows.stop // 2
+        own = (self.pairs >= first) & (self.pairs < stop)
+        self._pairs = np.where(own, self.pairs - first, -1).astype(np.int32)
+        self._giving = np.flatnonzero(own.any(axis=1)).astype(np.int32)
         self._forces: dict[int, Array] = {}
-        free = self.pairs >= 0
-        placed = (self.places >= 0) | ~(free[:, :, None] & free[:, None])
-        self._placed: NDArray[np.bool_] = np.all(placed, axis=(1, 2))
 
     def place(self, radius: RadiusMap) -> Array:
         """Move the nodes to the cone of `radius`; returns their positions, shape (nodes, 3).
@@ -110,36 +109,21 @@ class PrismForm:
 
     def add_stiffness(self, phase: int, matrix: PETSc.Mat, modulus: float = 1.0) -> None:
         """Add K_m (phase 0) or K_i (phase 1) of eq. 7, times a modulus, and keep its loads."""
-        own, weights = np.arange(len(self.pairs), dtype=np.int32), modulus * self._density
+        own, weights = self._giving, modulus * self._density
         if self.grid.conforming:
-            own = own[self.grid.inside == bool(phase)]
-            weights = weights[own]
+            own = own[self.grid.inside[own] == bool(phase)]
         else:
             weights = weights * (self._share if phase else 1 - self._share)
-        self._forces[phase] = np.zeros((len(self.works), 3))
-        placed = self._placed[own]
-        diagonal = block_values(matrix.getDiagonalBlock())
-        self._add(own[placed], weights[placed], phase, diagonal, self.places.ctypes)
-        others, weights = own[~placed], weights[~placed]
-        for first in range(0, len(others), 1000):
-            some = others[first : first + 1000]
-            elements = np.empty((len(some), 30, 30))
-            self._add(some, weights[first : first + 1000], phase, elements.ctypes, None)
-            for pairs, values in zip(self.pairs[some].astype(PETSc.IntType), elements, strict=True):
-                matrix.setValuesBlocked(pairs, pairs, values, addv=PETSc.InsertMode.ADD_VALUES)
-        self._forces[phase] /= modulus
-
-    def _add(
-        self, own: NDArray[np.int32], weights: Array, phase: int, values: object, places: object
-    ) -> None:
+        weights, forces = weights[own], np.zeros((len(self.rows), 3))
         c_loops(WEDGES).add_wedges(
             self._integral, self._traces.ctypes, self._heights.ctypes, len(own), own.ctypes,
-            weights.ctypes, self._nodes.ctypes, self._constants[phase].ctypes, self._near.ctypes,
-            places, values, self._forces[phase].ctypes,
+            weights.ctypes, self._nodes.ctypes, self._constants[phase].ctypes, self._pairs.ctypes,
+            self.places.ctypes, *block_values(matrix), forces.ctypes,
         )  # fmt: skip
+        self._forces[phase] = forces / modulus
 
     def load(self, phase: int, strain: Array) -> Array:
-        """Forces −⟨Bᵀ E ε̄⟩ of one phase for a unit modulus, on the unknowns of the wedges' levels.
+        """Forces −⟨Bᵀ E ε̄⟩ of one phase for a unit modulus, on the unknowns of the rank.
 
         They are what its stiffness, which is added before, makes of the displacements ε̄x.
 

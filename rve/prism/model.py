@@ -29,7 +29,7 @@ from alphacut.rve.certificate import (
 from alphacut.rve.mesh.periodicity import mismatch
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import reference_radius, triangulate
-from alphacut.rve.petsc import clean
+from alphacut.rve.petsc import clean, give_back
 from alphacut.rve.prism.error_estimate import judged, moduli_of
 from alphacut.rve.prism.mixed_element import NEARLY_INCOMPRESSIBLE
 from alphacut.rve.prism.modulus_basis import BasisError, ModulusBasis
@@ -141,6 +141,7 @@ class PrismModel:
         watch = Stopwatch()
         with watch("estimate"):
             layers = self.errors_of_layers(radius_map, matrix, inclusions)
+            give_back()
             found = [
                 judged(
                     result,
@@ -303,11 +304,14 @@ def certify(means: SliceMeans, phases: tuple[Phase, Phase], loads: Array) -> dic
     return {"hill_mandel": gap, **bounds}
 
 
+_plane = lru_cache(maxsize=4)(triangulate)
+
+
 @lru_cache(maxsize=4)
 def _system(
     mesh_size: float, layers: int, radius: float, parallel: bool, cache: Path | None = None
 ) -> PrismSystem:
     """Topology, forms and numbering: they do not depend on the map, only on these numbers."""
-    plane = triangulate(size=mesh_size, radius=radius, cache=cache)
+    plane = _plane(size=mesh_size, radius=radius, cache=cache)
     communicator = MPI.COMM_WORLD if parallel else MPI.COMM_SELF
     return PrismSystem(PrismGrid(plane, layers, radius > 0), communicator)

@@ -19,17 +19,18 @@ from alphacut.rve.solver.c_loops import WEDGES, c_loops
 from alphacut.stochastic.theta.truncated_normal import Array
 
 CELL_AREA = 4.0
+_AT_ONCE = 500  # wedges
 
 
 @dataclass(frozen=True)
 class LayerStress:
-    """Stresses at the quadrature points of one layer.
+    """Stresses at the quadrature points of wedges of one layer.
 
     Args:
         stress: (σ11, σ22, σ12) for each load, shape (triangles, slices, points, 3, loads), in Pa.
         strain: (ε11, ε22, 2 ε12), same shape.
-        area: Planar quadrature weights, shape (triangles, slices, points); they sum to 4 in each
-            slice.
+        area: Planar quadrature weights, shape (triangles, slices, points); of a whole layer they
+            sum to 4 in each slice.
     """
 
     stress: Array
@@ -42,12 +43,12 @@ class LayerStress:
 
     @property
     def mean(self) -> Array:
-        """Homogenised stress of each slice, shape (slices, 3, loads)."""
+        """Part in the homogenised stress of each slice, shape (slices, 3, loads)."""
         return np.asarray((self.area[..., None, None] * self.stress).sum(axis=(0, 2)) / CELL_AREA)
 
     @property
     def energy(self) -> Array:
-        """Mean of σ_a : ε_b over each slice, shape (slices, loads, loads)."""
+        """Part in the mean of σ_a : ε_b over each slice, shape (slices, loads, loads)."""
         slices, loads = self.area.shape[1], self.stress.shape[-1]
         weighted = self.area[..., None, None] * self.stress
         left, right = (
@@ -74,8 +75,10 @@ class SliceStress:
     weights: Array
     slices: int = 3
 
-    def layers(self, displacement: Array, stiffness: Array) -> Iterator[LayerStress]:
-        """Layer by layer of the grid's span, what it has of them.
+    def layers(
+        self, displacement: Array, stiffness: Array
+    ) -> Iterator[tuple[int, slice, LayerStress]]:
+        """The grid's layers, some wedges after others: layer, which of the grid's, what they have.
 
         Args:
             displacement: Total displacement of the nodes for each load, shape (nodes, 2, loads).
@@ -83,7 +86,8 @@ class SliceStress:
         """
         for layer in self.grid.span:
             part = self.grid.within(layer)[1]
-            yield self._layer(self.grid.cells[part], displacement, stiffness[part])
+            for some in _split(part):
+                yield layer, some, self._layer(self.grid.cells[some], displacement, stiffness[some])
 
     def _layer(self, cells: Integers, displacement: Array, stiffness: Array) -> LayerStress:
         strain, determinant = self.strain(cells, displacement, self.points)
@@ -119,8 +123,15 @@ class SliceStress:
 
     def determinants(self) -> Array:
         """Planar Jacobian's determinant at all quadrature points, shape (cells, q)."""
-        nothing = np.empty((len(self.positions), 2, 0))
-        return self.strain(self.grid.cells, nothing, self.points)[1]
+        nothing, cells = np.empty((len(self.positions), 2, 0)), self.grid.cells
+        parts = _split(slice(0, len(cells)))
+        return np.concatenate([self.strain(cells[some], nothing, self.points)[1] for some in parts])
+
+
+def _split(part: slice) -> list[slice]:
+    """The wedges of a part so many at a time that what is found of them stays in the cache."""
+    stops = range(part.start + _AT_ONCE, part.stop + _AT_ONCE, _AT_ONCE)
+    return [slice(stop - _AT_ONCE, min(stop, part.stop)) for stop in stops]
 
 
 def _planar_derivatives(points: Array) -> Array:

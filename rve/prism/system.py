@@ -100,8 +100,9 @@ class PrismSystem:
         self.numbering = LevelNumbering(self.grid, identify(grid.plane))
         around = [self.numbering.around(part) for part in dealt]
         self.overlap = Overlap(self.ranks, self.numbering.owned(comm.size), around)
-        self.pattern, places = self.numbering.matrix(self.ranks)
-        self.form = PrismForm(self.grid, self.numbering.pairs, self.overlap.works, places)
+        near = self.numbering.around_rows(self.ranks)
+        self.pattern, places = near.matrix(self.ranks)
+        self.form = PrismForm(near.grid, near.pairs, self.overlap.own, places)
         self.mixed: MixedSystem | None = None
         self._jit = self.form.jit_seconds
 
@@ -117,10 +118,11 @@ class PrismSystem:
             FoldedMeshError: An element is inverted.
         """
         self.map = radius_map
-        self.positions = self.form.place(radius_map)
+        near, places = self.form.grid, self.form.place(radius_map)
+        self.positions = places if near is self.grid else self.grid.positions(radius_map)
         self.share = self._share(self.grid, self.positions)
         if not self.grid.conforming:
-            self.form.mark(self.share)
+            self.form.mark(self.share if near is self.grid else self._share(near, places))
         elif not all(self.ranks.all(bool((self.slice_stress.determinants() > 0).all()))):
             raise FoldedMeshError(
                 f"the mesh folds over where it follows the radius through {self.grid.layers} layers"
@@ -178,12 +180,12 @@ class PrismSystem:
 
     def load(self, phase: int, strain: Array) -> PETSc.Vec:
         """Reduced load under a strain (ε11, ε22, 2 ε12) of a phase whose stiffness was made."""
+        vector = self.pattern.createVecLeft()
         if self.mixed is not None and phase in self.mixed.phases:
             load = self.mixed.loads[phase] @ strain
+            vector.array[:] = self.overlap.give(load[:, None], 1)[:, 0]
         else:
-            load = self.form.load(phase, strain)
-        vector = self.pattern.createVecLeft()
-        vector.array[:] = self.overlap.give(load[:, None], 1)[:, 0]
+            vector.array[:] = self.form.load(phase, strain)
         return vector
 
     def at_nodes(self, values: Array) -> Array:
@@ -218,19 +220,18 @@ class PrismSystem:
         loads, count = displacement.shape[2], self.grid.layers * slices.slices
         stress, fraction = np.zeros((count, 3, loads)), np.zeros(count)
         energy = np.zeros((loads, loads))
-        layers = zip(self.grid.span, slices.layers(displacement, stiffness), strict=True)
-        for k, layer in layers:
+        for k, some, layer in slices.layers(displacement, stiffness):
             own = slice(k * slices.slices, (k + 1) * slices.slices)
-            share = shares[self.grid.within(k)[1]].reshape(layer.area.shape)
-            fraction[own] = np.einsum("msp,msp->s", layer.area, share) / CELL_AREA
-            mean, work = layer.mean, layer.energy
-            if self.mixed is not None and pressure is not None:
-                more = self.mixed.means(k, displacement, pressure, phases)
-                mean, work = (
-                    own + part / CELL_AREA for own, part in zip((mean, work), more, strict=True)
-                )
-            stress[own] = mean
-            energy += np.tensordot(weights[own], work, axes=1)
+            share = shares[some].reshape(layer.area.shape)
+            fraction[own] += np.einsum("msp,msp->s", layer.area, share) / CELL_AREA
+            stress[own] += layer.mean
+            energy += np.tensordot(weights[own], layer.energy, axes=1)
+        if self.mixed is not None and pressure is not None:
+            for k in self.grid.span:
+                own = slice(k * slices.slices, (k + 1) * slices.slices)
+                mean, work = self.mixed.means(k, displacement, pressure, phases)
+                stress[own] += mean / CELL_AREA
+                energy += np.tensordot(weights[own], work, axes=1) / CELL_AREA
         parts = zip(*self.ranks.all((stress, fraction, energy)), strict=True)
         return SliceMeans(
             ThetaRule(rule.nodes, weights), *(sum(part[1:], part[0]) for part in parts)
@@ -243,27 +244,22 @@ class PrismSystem:
             displacement: The fields.
             phases: Their Poisson's ratios count; moduli are 1 Pa.
         """
-        slices, inside = self.slice_stress, self.grid.plane.inside
+        slices, inside, fields = self.slice_stress, self.grid.inside, displacement.shape[2]
         stiffness = self.stiffness_at_points(
             (replace(phases[0], modulus=1.0), replace(phases[1], modulus=1.0))
         )
         rule = layered_rule(self.map.distribution, layers=self.grid.layers, points=slices.slices)
-        weights = rule.weights / rule.weights.sum()
-        stress: tuple[list[Array], list[Array]] = ([], [])
-        energy = np.zeros((2, *(displacement.shape[2],) * 2))
-        fraction = []
-        for k, layer in enumerate(slices.layers(displacement, stiffness)):
-            own = weights[k * slices.slices : (k + 1) * slices.slices]
-            for phase, part in enumerate((layer.of(~inside), layer.of(inside))):
-                stress[phase].append(part.mean)
-                energy[phase] += np.tensordot(own, part.energy, axes=1)
-            fraction.append(layer.of(inside).area.sum(axis=(0, 2)) / CELL_AREA)
-        return PhaseMeans(
-            ThetaRule(rule.nodes, weights),
-            np.array([np.concatenate(part) for part in stress]),
-            np.concatenate(fraction),
-            energy,
-        )
+        weights, count = rule.weights / rule.weights.sum(), len(rule.nodes)
+        stress, energy = np.zeros((2, count, 3, fields)), np.zeros((2, fields, fields))
+        fraction = np.zeros(count)
+        for k, some, layer in slices.layers(displacement, stiffness):
+            own = slice(k * slices.slices, (k + 1) * slices.slices)
+            within = layer.of(inside[some])
+            for phase, part in enumerate((layer.of(~inside[some]), within)):
+                stress[phase, own] += part.mean
+                energy[phase] += np.tensordot(weights[own], part.energy, axes=1)
+            fraction[own] += within.area.sum(axis=(0, 2)) / CELL_AREA
+        return PhaseMeans(ThetaRule(rule.nodes, weights), stress, fraction, energy)
 
     def stress(
         self,
@@ -299,7 +295,7 @@ class PrismSystem:
         Pressures count in units of the matrix's modulus.
         """
         levels = self.numbering.shares(self.ranks.size)[self.ranks.rank].levels
-        grid = self.numbering.near(levels)
+        grid = self.form.grid
         share = self.share if grid is self.grid else self._share(grid)
         between = share.reshape(len(grid.span), len(grid.plane.triangles), -1).mean(axis=2)
         on = (np.concatenate([between[:1], between]) + np.concatenate([between, between[-1:]])) / 2

@@ -211,15 +211,19 @@ class LevelNumbering:
         """Unknown pair of each node of the wedges, −1 on the fixed line, shape (wedges, 15)."""
         return (self.unknown_of_node[self.grid.cells] // 2).astype(np.int32)
 
-    def matrix(self, ranks: Ranks) -> tuple[PETSc.Mat, NDArray[np.int32]]:
-        """Zero matrix in 2 × 2 blocks that keeps Pᵀ K P of element matrices.
-
-        With the places, shape (wedges, 15, 15), of the wedges' blocks in its diagonal part, whose
-        rows and columns this rank owns; −1 where a node is fixed or another rank's.
-        """
-        own = self.owned(ranks.size)[ranks.rank]
+    def around_rows(self, ranks: Ranks) -> LevelNumbering:
+        """The same of the wedges around this rank's rows."""
         near = self.near(self.shares(ranks.size)[ranks.rank].levels)
-        pairs = replace(self, grid=near).pairs
+        return self if near is self.grid else replace(self, grid=near)
+
+    def matrix(self, ranks: Ranks) -> tuple[PETSc.Mat, NDArray[np.int32]]:
+        """Zero matrix in 2 × 2 blocks that keeps this rank's rows of Pᵀ K P of element matrices.
+
+        With the places of the blocks of the wedges, all of which lie around those rows, shape
+        (wedges, 15, 15): n in the part whose columns this rank owns too, −2 − n in the other, −1
+        where a node is fixed or the row another rank's.
+        """
+        own, pairs = self.owned(ranks.size)[ranks.rank], self.pairs
         starts = np.empty(len(own) // 2 + 1, np.int32)
         columns = np.empty(15 * pairs.size, np.int32)
         places = np.empty((*pairs.shape, 15), np.int32)
@@ -230,12 +234,7 @@ class LevelNumbering:
             raise MemoryError("no memory is left for the matrix")
         csr = [x.astype(PETSc.IntType, copy=False) for x in (starts, columns[: starts[-1]])]
         layout = ((len(own), self.size),) * 2
-        matrix = PETSc.Mat().createBAIJ(layout, bsize=2, csr=csr, comm=ranks.comm)
-        if near.own == self.grid.own:
-            return matrix, places
-        mine: NDArray[np.int32] = np.full((*self.pairs.shape, 15), -1, np.int32)
-        mine[_common(self.grid.own, near.own)] = places[_common(near.own, self.grid.own)]
-        return matrix, mine
+        return PETSc.Mat().createBAIJ(layout, bsize=2, csr=csr, comm=ranks.comm), places
 
     def to_nodes(self, values: Array, start: int) -> Array:
         """Displacements of the nodes, zero on the line, shape (nodes, 2, columns).

@@ -17,7 +17,6 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
-from cvxopt import amd, spmatrix
 
 from alphacut.rve.mesh.triangulation import Integers
 from alphacut.rve.solver.c_loops import c_loops
@@ -50,7 +49,7 @@ class LevelFactors:
     ) -> None:
         self._loops = c_loops(_SOURCE)
         self._loops.prepare.restype = ctypes.c_void_p
-        self._order = np.asarray(fill_reducing(pattern) if order is None else order, np.int32)
+        self._order = np.asarray(pattern.fill_reducing if order is None else order, np.int32)
         self._signs = np.where(self._order < pattern.size - pressures, 1.0, -1.0)
         ends = np.argsort(self._order)[np.stack(pattern.rows_columns)]
         low, high = np.sort(ends, axis=0).astype(np.int32)
@@ -83,13 +82,6 @@ class LevelFactors:
         return self._solve(vectors, 1)
 
 
-def fill_reducing(pattern: LevelPattern) -> Integers:
-    """Which row comes where, so that few entries of L are not zero."""
-    row, column = pattern.rows_columns
-    template = spmatrix(1.0, row, column, (pattern.size, pattern.size))
-    return np.array(amd.order(template, uplo="L"), np.int64).ravel()
-
-
 def saddle_factors(
     unknowns: Integers, triangles: Integers, elements: Iterable[Array]
 ) -> LevelFactors:
@@ -107,7 +99,7 @@ def saddle_factors(
     pressures = np.full((len(unknowns), 1), -1)
     pressures[triangles, 0] = displacements + np.arange(len(triangles))
     pattern = LevelPattern(np.concatenate([unknowns, pressures], axis=1))
-    place = np.argsort(fill_reducing(LevelPattern(unknowns)))
+    place = np.argsort(LevelPattern(unknowns).fill_reducing)
     beside = unknowns[triangles]
     last = np.where(beside >= 0, place[beside], -1).max(axis=1)  # of a triangle's displacements
     order = np.argsort(np.concatenate([place, last + 0.5]), kind="stable")

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from cvxopt import amd, spmatrix
+from numpy.typing import NDArray
 
 from alphacut.rve.mesh.triangulation import Integers
 from alphacut.rve.solver.c_loops import WEDGES, c_loops
@@ -61,21 +63,35 @@ class LevelPattern:
         return int(self.unknowns.max()) + 1
 
     @cached_property
-    def _targets(self) -> tuple[Integers, Integers, Integers]:
-        row, column = np.broadcast_arrays(self.unknowns[:, :, None], self.unknowns[:, None, :])
-        kept = np.flatnonzero((column >= 0) & (row >= column))
-        keys, target = np.unique(
-            column.ravel()[kept] * self.size + row.ravel()[kept], return_inverse=True
-        )
-        return kept, target, keys
+    def _entries(self) -> list[NDArray[np.int32]]:
+        """Entries of the elements that make stored ones, where they begin, and rows and columns."""
+        unknowns = self.unknowns.astype(np.int32)
+        elements, k = unknowns.shape
+        kept, starts, rows, columns = (np.empty(unknowns.size * k + 1, np.int32) for _ in range(4))
+        count = c_loops(WEDGES).lower_triangle(
+            elements, k, self.size, unknowns.ctypes,
+            kept.ctypes, starts.ctypes, rows.ctypes, columns.ctypes,
+        )  # fmt: skip
+        if count < 0:
+            raise MemoryError("no memory is left for the pattern of the levels")
+        found = kept[: starts[count]], starts[: count + 1], rows[:count], columns[:count]
+        return [one.copy() for one in found]
 
     @property
-    def rows_columns(self) -> tuple[Integers, Integers]:
+    def rows_columns(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Row and column of each stored entry, column by column."""
-        column, row = np.divmod(self._targets[2], self.size)
-        return row, column
+        return self._entries[2], self._entries[3]
+
+    @cached_property
+    def fill_reducing(self) -> Integers:
+        """Which row comes where, so that few entries of factors are not zero."""
+        row, column = (one.astype(int) for one in self.rows_columns)
+        template = spmatrix(1.0, row, column, (self.size, self.size))
+        return np.array(amd.order(template, uplo="L"), np.int64).ravel()
 
     def values(self, elements: Array) -> Array:
         """Stored entries from the element matrices, shape (m, k, k)."""
-        kept, target, keys = self._targets
-        return np.bincount(target, weights=elements.ravel()[kept], minlength=len(keys))
+        kept, starts, rows, _ = self._entries
+        elements, found = np.ascontiguousarray(elements), np.empty(len(rows))
+        c_loops(WEDGES).gather(len(rows), kept.ctypes, starts.ctypes, elements.ctypes, found.ctypes)
+        return found

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse as sp
 
-from alphacut.rve.petsc import PETSc, ghosts
+from alphacut.rve.petsc import PETSc, beside_diagonal
 from alphacut.rve.solver.constraints import Overlap
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -61,18 +61,11 @@ class _Rest:
     """Products with unknowns of other ranks, which few rows have."""
 
     def __init__(self, matrices: Sequence[PETSc.Mat], columns: int) -> None:
-        first, wide = matrices[0], len(matrices) * columns
-        (rows, _), block, others = first.getSizes()[0], first.getBlockSize(), ghosts(first)
-        start = first.getOwnershipRange()[0]
-        own = PETSc.IS().createStride(rows, start, 1, comm=PETSc.COMM_SELF)
-        far = PETSc.IS().createBlock(block, others, comm=PETSc.COMM_SELF)
-        self.parts = [
-            sp.csr_matrix(part.convert("aij").getValuesCSR()[::-1], shape=part.getSize())
-            for matrix in matrices
-            for part in matrix.createSubMatrices(own, far)
-        ]
-        self.rows = np.flatnonzero(np.diff(self.parts[0].indptr))
-        self.parts = [part[self.rows] for part in self.parts]
+        parts, numbers = zip(*map(beside_diagonal, matrices), strict=True)
+        self.rows = np.flatnonzero(np.diff(parts[0].indptr))
+        self.parts = [part[self.rows] for part in parts]
+        first, others, wide = matrices[0], numbers[0], len(matrices) * columns
+        rows, block = first.getSizes()[0][0], first.getBlockSize()
         self.near = PETSc.Vec().createMPI((wide * rows, None), comm=first.comm)
         self.fetched = PETSc.Vec().createSeq(wide * block * len(others))
         wanted = PETSc.IS().createBlock(wide * block, others, comm=PETSc.COMM_SELF)

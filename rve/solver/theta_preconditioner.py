@@ -33,12 +33,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
 
-from alphacut.rve.mesh.triangulation import Integers
+from alphacut.rve.mesh.periodicity import Periodicity
+from alphacut.rve.mesh.triangulation import Integers, Triangulation
 from alphacut.rve.petsc import PETSc
 from alphacut.rve.ranks import Ranks
 from alphacut.rve.solver.constraints import LevelNumbering, Overlap
@@ -86,6 +88,14 @@ def theta_mass(law: ThetaLaw, levels: Array) -> ThetaMass:
 
 # a linear field on six nodes
 _LINEAR = np.kron(np.vstack([np.eye(3), [[0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5]]]), np.eye(2))
+
+
+@lru_cache(maxsize=4)
+def _patterns(periodicity: Periodicity, plane: Triangulation) -> tuple[LevelPattern, LevelPattern]:
+    """Of a level's matrices on quadratic and on linear triangles."""
+    nodes = plane.triangles, plane.triangles[:, :3]
+    quadratic, linear = (_with_components(periodicity.unknown[own]) for own in nodes)
+    return LevelPattern(quadratic), LevelPattern(linear)
 
 
 def _with_components(unknown: Integers) -> Integers:
@@ -152,23 +162,25 @@ class ThetaPreconditioner:
             ranks, numbering.owned(ranks.size), [numbering.beside(s.levels) for s in shares], shares
         )
         self.injection = sp.kron(periodicity.linear_injection(grid.plane), np.eye(2), format="csr")
-        triangles = grid.plane.triangles
-        unknowns = _with_components(periodicity.unknown[triangles])
+        quadratic, linear = _patterns(periodicity, grid.plane)
         self.pressures = 0 if pressures is None else len(pressures.triangles)
         self.pressed = numbering.on_levels(self.pressures, ranks)
-        linear = LevelPattern(_with_components(periodicity.unknown[triangles[:, :3]]))
 
         def reduced(elements: Array) -> Array:
             return linear.values(_LINEAR.T @ elements @ _LINEAR)
 
+        def both(elements: Array) -> tuple[Array, Array]:
+            return quadratic.values(elements), reduced(elements)
+
         if pressures is None:  # elements are large: one level after another
-            quadratic = LevelPattern(unknowns)
-            levels = [(quadratic.values(one), reduced(one)) for one in on]
+            levels = list(map(both, on))
             self.quadratic = LevelFactors(quadratic, [entries for entries, _ in levels])
             coarse = [entries for _, entries in levels]
         else:
             whole = list(on)
-            self.quadratic = saddle_factors(unknowns, pressures.triangles, pressures.saddles(whole))
+            self.quadratic = saddle_factors(
+                quadratic.unknowns, pressures.triangles, pressures.saddles(whole)
+            )
             coarse = [reduced(one) for one in whole]
         self.linear = LevelFactors(linear, [*coarse, *map(reduced, between)])
 

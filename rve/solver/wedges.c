@@ -10,14 +10,15 @@ typedef void (*integral)(double *, const double *, const double *, const double 
                          const uint8_t *, void *);
 
 /* Pairs that share a wedge with each of the pairs `low` to `high`: where each row's begin (high - low +
-   1), and their rising numbers. `place` takes where the pairs of each wedge then stand, 15 x 15 of them,
-   among those whose columns lie in that range too, and -1 elsewhere. Returns 2 without memory. */
+   1), and their rising numbers. `place` takes where the pairs of each wedge then stand, 15 x 15 of them: n
+   as the one of number n of those rows whose column lies in that range too, -2 - n among the others, -1
+   where the row is another's or one of them is fixed. Returns 2 without memory. */
 int couple(int wedges, const int *pairs, int low, int high, int size, int *starts, int *columns, int *place) {
     int rows = high - low, words = size / 64 + 1, entries = wedges * NODES;
     int *begin = calloc(rows + 1, sizeof(int)), *fill = calloc(rows + 1, sizeof(int));
     int *within = malloc((entries + 1) * sizeof(int)), *found = calloc(size + 1, sizeof(int));
     uint64_t *marked = calloc(words, sizeof(uint64_t));
-    int status = begin && fill && within && found && marked ? 0 : 2, square = 0;
+    int status = begin && fill && within && found && marked ? 0 : 2, square = 0, others = 0;
     for (size_t e = 0; e < (size_t)entries * NODES; e++) place[e] = -1;
     for (int e = 0; e < entries && !status; e++)
         if (pairs[e] >= low && pairs[e] < high) begin[pairs[e] - low + 1]++;
@@ -38,7 +39,7 @@ int couple(int wedges, const int *pairs, int low, int high, int size, int *start
         for (int word = least; word <= last; word++)
             for (; marked[word]; marked[word] &= marked[word] - 1) {
                 int column = 64 * word + __builtin_ctzll(marked[word]);
-                found[column] = column >= low && column < high ? square++ : -1;
+                found[column] = column >= low && column < high ? square++ : -2 - others++;
                 columns[count++] = column;
             }
         starts[r + 1] = count;
@@ -90,24 +91,23 @@ static void slice(integral integrate, const double *weights, const double *nodes
 /* Add the matrices of some wedges, and take from `forces` (pairs x 2 x 3) what they do to unit strains.
 
    integrate: over a triangle at one theta; weights: at its 6 points in 3 slices, for each of the wedges.
-   some: numbers of the wedges; nodes, pairs, place: of all wedges, 15 x 3, 15 and 15 x 15.
+   some: numbers of the wedges; nodes, pairs, place: of all wedges, 15 x 3, 15 and 15 x 15; pairs count
+   from the first of the rows, -1 where they are none of them.
    traces, heights: of the slices, 3 x 6 x 15 and 3.
-   values: of blocks of 2 x 2, column by column; where `place` is null, 30 x 30 for each of the wedges. */
+   values, others: blocks of 2 x 2, column by column, where `place` is not negative, and below -1. */
 void add_wedges(integral integrate, const double (*traces)[CORNERS][NODES], const double *heights, int count,
                 const int *some, const double *weights, const double *nodes, const double *constants,
-                const int *pairs, const int *place, double *values, double *forces) {
+                const int *pairs, const int *place, double *values, double *others, double *forces) {
     double matrix[DOFS][DOFS], affine[DOFS][LOADS];
     for (int k = 0; k < count; k++) {
         const double *corners = nodes + (size_t)some[k] * NODES * 3;
-        const int *own = pairs + (size_t)some[k] * NODES;
+        const int *own = pairs + (size_t)some[k] * NODES, *at = place + (size_t)some[k] * NODES * NODES;
         memset(matrix, 0, sizeof matrix);
         slice(integrate, weights + (size_t)k * SLICES * CORNERS, corners, constants, traces, heights, matrix);
-        if (!place) memcpy(values + (size_t)k * DOFS * DOFS, matrix, sizeof matrix);
-        const int *at = place ? place + (size_t)some[k] * NODES * NODES : NULL;
-        for (int i = 0; i < NODES && place; i++)
+        for (int i = 0; i < NODES; i++)
             for (int j = 0; j < NODES; j++, at++) {
-                if (own[i] < 0 || own[j] < 0) continue;
-                double *block = values + 4 * (size_t)*at;
+                if (*at == -1) continue;
+                double *block = *at >= 0 ? values + 4 * (size_t)*at : others + 4 * (size_t)(-2 - *at);
                 block[0] += matrix[2 * i][2 * j], block[1] += matrix[2 * i + 1][2 * j];
                 block[2] += matrix[2 * i][2 * j + 1], block[3] += matrix[2 * i + 1][2 * j + 1];
             }
@@ -197,5 +197,57 @@ void triangle_stiffness(int triangles, const double (*table)[2][CORNERS], const 
                 for (int i = 0; i < PLANAR; i++)
                     for (int j = 0; j < PLANAR; j++) found[m][i][j] += strain[k][i] * stress[k][j];
         }
+    }
+}
+
+/* Lower triangle of a matrix to which triangles add, column by column: rows and columns of its entries, and
+   the entries of the triangles, k x k each, that make them: those of number n are `kept` from starts[n] on.
+   unknowns: k of each triangle, -1 where there is none. Returns how many entries it has, -1 without memory. */
+int lower_triangle(int triangles, int k, int size, const int *unknowns, int *kept, int *starts, int *rows,
+                   int *columns) {
+    int count = triangles * k * k, total = 0;
+    int *begin = calloc(size + 2, sizeof(int)), *mark = malloc((size + 1) * sizeof(int));
+    int *place = malloc((size + 1) * sizeof(int)), *sorted = malloc((count + 1) * sizeof(int));
+    int enough = begin && mark && place && sorted;
+    for (int pass = 0; pass < 2 && enough; pass++) {
+        for (int e = 0; e < count; e++) {
+            int row = unknowns[e / k], column = unknowns[e / k / k * k + e % k];
+            if (column < 0 || row < column) continue;
+            if (pass) kept[begin[column + 1]++] = e;
+            else begin[column + 2]++;
+        }
+        for (int c = 0; c < size && !pass; c++) begin[c + 2] += begin[c + 1];
+    }
+    if (enough) memset(mark, -1, (size + 1) * sizeof(int));
+    starts[0] = 0;
+    for (int c = 0, first = 0, last; c < size && enough; c++, first = last) {
+        int found = total;
+        last = begin[c + 1];
+        for (int e = first; e < last; e++) {
+            int row = unknowns[kept[e] / k];
+            if (mark[row] != c) {
+                int at = found++;
+                for (; at > total && rows[at - 1] > row; at--) rows[at] = rows[at - 1];
+                rows[at] = row, mark[row] = c, place[row] = 0;
+            }
+            place[row]++;
+        }
+        for (; total < found; total++) {
+            int row = rows[total], here = starts[total];
+            columns[total] = c, starts[total + 1] = here + place[row], place[row] = here;
+        }
+        for (int e = first; e < last; e++) sorted[place[unknowns[kept[e] / k]]++] = kept[e];
+        memcpy(kept + first, sorted + first, (last - first) * sizeof(int));
+    }
+    free(begin), free(mark), free(place), free(sorted);
+    return enough ? total : -1;
+}
+
+/* Entries of such a matrix from those of the triangles. */
+void gather(int count, const int *kept, const int *starts, const double *elements, double *values) {
+    for (int n = 0; n < count; n++) {
+        double sum = 0;
+        for (int e = starts[n]; e < starts[n + 1]; e++) sum += elements[kept[e]];
+        values[n] = sum;
     }
 }
