@@ -49,20 +49,30 @@ class Ranks:
         function: Callable[[S], T],
         items: Sequence[S],
         progress: Callable[[float], None] | None = None,
+        costs: Sequence[float] | None = None,
     ) -> list[T]:
         """The function of every item, each computed on one rank and known to all.
 
-        `progress` is called with the share done of this rank's.
+        `progress` is called with the share done of this rank's; `costs` are about those of items.
         """
         own: list[T] = []
-        mine = items[self.rank :: self.size]
+        owners = self._owners(costs or [1.0] * len(items))
+        mine = [item for item, owner in zip(items, owners, strict=True) if owner == self.rank]
         with self.together():
             for item in mine:
                 own.append(function(item))
                 if progress:
                     progress(len(own) / len(mine))
-        dealt = self.all(own)
-        return [dealt[k % self.size][k // self.size] for k in range(len(items))]
+        dealt = [iter(part) for part in self.all(own)]
+        return [next(dealt[owner]) for owner in owners]
+
+    def _owners(self, costs: Sequence[float]) -> list[int]:
+        """Rank of each item: the dearest first, to the one that has least to do."""
+        owners, loads = [0] * len(costs), [0.0] * self.size
+        for k in sorted(range(len(costs)), key=lambda k: -costs[k]):
+            owners[k] = loads.index(min(loads))
+            loads[owners[k]] += costs[k]
+        return owners
 
     def all(self, own: T) -> list[T]:
         """What every rank has, known to all."""

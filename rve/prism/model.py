@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import ClassVar
 
@@ -165,12 +165,17 @@ class PrismModel:
     ) -> list[Array]:
         """About the relative errors that layers leave in the mean moduli and the ratio, shape (4,).
 
-        Half as many layers, on a mesh twice as coarse, show them.
+        Half as many layers, on a mesh twice as coarse, show them; of two ranks each solves one.
         """
+        alone = Ranks(self._ranks.comm if self._ranks.size == 2 else None)
         coarse = replace(self, estimate=False, mesh_size=min(1.0, 2 * self.mesh_size))
+        coarse = replace(coarse, parallel=self.parallel and alone.size == 1)
         thick = replace(coarse, layers=max(1, self.layers // 2))
         try:
-            pairs = [one.solve(radius_map, matrix, inclusions) for one in (coarse, thick)]
+            solve = partial(
+                PrismModel.solve, radius_map=radius_map, matrix=matrix, inclusions=inclusions
+            )
+            pairs = alone.each(solve, (coarse, thick))
         except RuntimeError:  # folded, or not solved: the share stays unknown, the sum does not
             return [np.zeros(4) for _ in inclusions]
         means = [

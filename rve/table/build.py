@@ -18,7 +18,7 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 _ORDER = 4
 _ROUGH, _FINEST = 0.5, 0.04  # mesh sizes
-_RATE = 7.5  # of the moduli in the mesh size
+_RATES = 7.5, 6.0  # of the moduli in the mesh size: hoped for, and likely
 _LEAST, _MOST_NODES = 7, 65  # radii
 _JUDGED = 0.03, 0.1, 0.3, 0.6, 0.72, 0.85  # radii, at which a mesh is judged
 _SPACE_SHARE = 0.6  # of the accuracy; the rest is for interpolation
@@ -63,14 +63,14 @@ class PlanarSource:
         size, found = _ROUGH, self._all_errors(radii, _ROUGH)
         while found[:, :3].max() > self.accuracy:  # a finer mesh gains more at one than at another
             worst = int(found[:, :3].max(axis=1).argmax())
-            finer = partial(self._fine_enough, radii[worst], size, found[worst])
-            size = self.ranks.first(finer)
-            found = self._all_errors(radii, size)
+            size, errors = self._fine_enough(radii[worst], size, found[worst])
+            rest = self._all_errors(np.delete(radii, worst), size)
+            found = np.insert(rest, worst, errors, axis=0)
         self.mesh_size = size
         self.space = np.vstack([radii, found.T])
 
-    def _fine_enough(self, radius: float, size: float, errors: Array) -> float:
-        """Mesh size at which one radius keeps the accuracy, from a rougher one and its errors."""
+    def _fine_enough(self, radius: float, size: float, errors: Array) -> tuple[float, Array]:
+        """Mesh size at which one radius keeps the accuracy, and its errors, from a rougher one."""
         while errors[:3].max() > self.accuracy:
             if size <= _FINEST:
                 raise TableError(
@@ -78,14 +78,19 @@ class PlanarSource:
                     f" {errors[:3].max():.1e} on the finest mesh ({_FINEST:g}) and"
                     f" {self.accuracy:.1e} is wanted: allow a larger error, or take the series"
                 )
-            finer = min(0.9, (0.8 * self.accuracy / errors[:3].max()) ** (1 / _RATE))
-            size = max(_FINEST, size * finer)
-            errors = self._errors(radius, size)
-        return size
+            wanted = 0.8 * self.accuracy / errors[:3].max()
+            finer = [max(_FINEST, size * min(0.9, wanted ** (1 / rate))) for rate in _RATES]
+            sizes = list(dict.fromkeys(finer))
+            found = self.ranks.each(partial(self._errors, radius), sizes)
+            kept = [one[:3].max() <= self.accuracy for one in found]
+            best = kept.index(True) if True in kept else -1
+            size, errors = sizes[best], found[best]
+        return size, errors
 
     def _all_errors(self, radii: Array, size: float) -> Array:
         """Declared relative errors at all radii, shape (radii, 4)."""
-        return np.array(self.ranks.each(partial(self._errors, size=size), list(radii)))
+        errors = partial(self._errors, size=size)
+        return np.reshape(self.ranks.each(errors, list(radii), costs=_costs(radii)), (-1, 4))
 
     def _errors(self, radius: float, size: float) -> Array:
         """Declared relative errors at one radius of both extreme inclusions, shape (4,)."""
@@ -118,11 +123,16 @@ class PlanarSource:
         return square_moduli(solved.stiffness)
 
 
+def _costs(radii: Array) -> list[float]:
+    """About what cells cost: those about small particles have finer meshes."""
+    return [3 + 1 / float(radius) for radius in radii]
+
+
 @lru_cache(maxsize=64)
 def _errors_of(span: TableRange, radius: float, size: float) -> tuple[Array, int]:
     """Declared relative errors, shape (4,), and how many systems were factorised.
 
-    A mesh is tried at one radius before all, and by tables of one range and several accuracies.
+    Tables of one range and several accuracies try the same meshes.
     """
     phases = [Phase(e, span.poisson) for e in dict.fromkeys(span.moduli)]
     orders = _ORDER - 2, _ORDER - 1, _ORDER
@@ -162,7 +172,8 @@ def build_table(
         radii, moduli = span.nodes(counts)
         fresh = [float(radius) for radius in radii if radius not in known]
         solve = partial(_logarithms, span, supply.moduli, modulus=moduli)
-        known.update(zip(fresh, ranks.each(solve, fresh, progress), strict=True))
+        costs = _costs(np.array(fresh))
+        known.update(zip(fresh, ranks.each(solve, fresh, progress, costs), strict=True))
         found = coefficients(np.array([known[radius] for radius in radii]))
         noise = supply.space[1:].max(axis=1)
         tails = tail(found, 0, noise=noise), tail(found, 1, noise=noise)
