@@ -190,7 +190,7 @@ def test_a_package_imports_fast_and_without_dolfinx(package):
 
 @pytest.mark.parametrize(
     ("method", "exclude", "loaded"),
-    [("auto", (), ""), ("auto", ("series",), "dolfinx"), ("prism", (), "petsc4py.PETSc")],
+    [("auto", (), ""), ("auto", ("series",), "basix"), ("prism", (), "petsc4py.PETSc")],
 )
 def test_what_a_model_may_need_is_loaded_before_its_clock_starts(method, exclude, loaded):
     choice = f"CellChoice({method!r}, exclude={exclude!r})"

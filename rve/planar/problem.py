@@ -1,4 +1,4 @@
-"""Planar cell problem in DOLFINx: one mesh, any materials, three loads at once."""
+"""Planar cell problem: one mesh, any materials, three loads at once."""
 
 from __future__ import annotations
 
@@ -7,23 +7,15 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
 
-import alphacut.rve.petsc  # noqa: F401
-from alphacut.rve.interruption import uninterrupted
-
-with uninterrupted():
-    import basix.ufl
-    import dolfinx
-    from dolfinx import fem
-
 import numpy as np
-import scipy.sparse as sp
-import ufl
-from mpi4py import MPI
 
 from alphacut.rve.cell import Phase
 from alphacut.rve.mesh.planar import PlanarMesh, curved_nodes
 from alphacut.rve.mesh.triangulation import Integers
-from alphacut.rve.planar.system import ModulusBasis, Pencil
+from alphacut.rve.planar.system import Cholesky, ModulusBasis, Pencil
+from alphacut.rve.solver.c_loops import WEDGES, c_loops
+from alphacut.rve.solver.integrals import triangle_integral
+from alphacut.rve.solver.level_stiffness import LevelPattern, with_components
 from alphacut.stochastic.theta.truncated_normal import Array
 
 
@@ -52,73 +44,31 @@ class PlanarCell:
                 f"the order of the planar elements is {self.order}; it must be 1, 2, 3 or 4"
             )
         started = perf_counter()
-        points, cells = curved_nodes(self.mesh, self.order)
-        element = basix.ufl.element("Lagrange", "triangle", self.order, shape=(2,))
-        self.domain = dolfinx.mesh.create_mesh(MPI.COMM_SELF, cells=cells, x=points, e=element)
-        self.space = fem.functionspace(self.domain, element)
-        self.seconds["mesh"] = perf_counter() - started
-        self._compile()
+        self.coordinates, self.cells = curved_nodes(self.mesh, self.order)  # (n, 2), (m, nodes)
+        self.pattern = LevelPattern(with_components(self.unknown[self.cells]))
+        meshed = perf_counter()
+        self._integral = triangle_integral(self.order)
+        self.seconds = {"mesh": meshed - started, "jit": perf_counter() - meshed}
 
     @cached_property
-    def tags(self) -> dolfinx.mesh.MeshTags:
-        """Cell tags: 0 in the matrix, 1 in the particle."""
-        inside = self.mesh.inside[self.domain.topology.original_cell_index].astype(np.int32)
-        return dolfinx.mesh.meshtags(self.domain, 2, np.arange(inside.size, dtype=np.int32), inside)
-
-    def _compile(self) -> None:
-        """The stiffness form of each phase, Lamé's constants left open."""
-        started = perf_counter()
-        trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
-        self._lame = [fem.Constant(self.domain, np.float64(1)) for _ in range(2)]
-        degree = 2 * self.order if self.order > 1 else 1
-        dx = ufl.Measure(
-            "dx",
-            domain=self.domain,
-            subdomain_data=self.tags,
-            metadata={"quadrature_degree": degree},
-        )
-        density = self._lame[0] * ufl.div(trial) * ufl.div(test)
-        # eq. 7
-        density += 2 * self._lame[1] * ufl.inner(ufl.sym(ufl.grad(trial)), ufl.sym(ufl.grad(test)))
-        self._forms = [fem.form(density * dx(tag)) for tag in (0, 1)]
-        self.seconds["jit"] = perf_counter() - started
-
-    def _stiffness_of(self, tag: int, poisson: float) -> sp.bsr_matrix:
-        """Unreduced stiffness of one phase for a modulus of 1 Pa."""
-        unit = Phase(1.0, poisson).stiffness
-        self._lame[0].value, self._lame[1].value = unit[0, 1], unit[2, 2]
-        return fem.assemble_matrix(self._forms[tag]).to_scipy()
-
-    @cached_property
-    def coordinates(self) -> Array:
-        """Positions of the nodes, shape (n, 2)."""
-        return np.asarray(self.space.tabulate_dof_coordinates()[:, :2])
-
-    @cached_property
-    def periodic(self) -> sp.csr_matrix:
-        """P of K_per = Pᵀ K P: nodes at 1 follow those at −1, the first node is fixed."""
-        node = self.periodic_nodes
-        target = (2 * node[:, None] + np.arange(2)).ravel() - 2
-        free = np.flatnonzero(target >= 0)
-        return sp.csr_matrix(
-            (np.ones(free.size), (free, target[free])), shape=(target.size, 2 * int(node.max()))
-        )
-
-    @cached_property
-    def periodic_nodes(self) -> Integers:
-        """Number of each node in the periodic cell, shape (n,)."""
+    def unknown(self) -> Integers:
+        """Pair of unknowns of each node, (n,): those at 1 follow those at −1, the corner is −1."""
         wrapped = np.where(self.coordinates > 1 - 1e-9, -1.0, self.coordinates)
-        _, node = np.unique(np.round(wrapped * 1e8).astype(np.int64), axis=0, return_inverse=True)
-        return node.ravel()
+        across, along = np.round((wrapped + 1) * 1e8).astype(np.int64).T
+        return np.asarray(np.unique(across * 10**9 + along, return_inverse=True)[1] - 1)
 
     @cached_property
     def affine(self) -> Array:
-        """Displacements of the three unit strains (11, 22, 12 with 2 ε12 = 1), shape (2n, 3)."""
+        """Displacements of the three unit strains (11, 22, 12 with 2 ε12 = 1), shape (n, 2, 3)."""
         x, y = self.coordinates.T
         zero = np.zeros_like(x)
         return np.stack(
             [np.stack([x, zero, y / 2], axis=-1), np.stack([zero, y, x / 2], axis=-1)], axis=1
-        ).reshape(-1, 3)
+        )
+
+    @cached_property
+    def _factor(self) -> Cholesky:
+        return Cholesky(self.pattern)
 
     def stiffness(
         self, matrix: Phase, inclusions: Sequence[Phase], *, share: bool = False
@@ -148,18 +98,42 @@ class PlanarCell:
 
     def displacement(self, matrix: Phase, inclusion: Phase) -> Array:
         """Displacements under the three unit strains at the nodes, shape (2n, 3)."""
-        pencil = self._pencil(matrix, inclusion.poisson)
-        return np.asarray(self.affine - self.periodic @ pencil.solve(inclusion.modulus)[0])
+        found = self._pencil(matrix, inclusion.poisson).solve(inclusion.modulus)[0]
+        fixed = np.concatenate([found.reshape(-1, 2, 3), np.zeros((1, 2, 3))])  # −1: the last
+        return np.asarray((self.affine - fixed[self.unknown]).reshape(-1, 3))
 
     def _pencil(self, matrix: Phase, poisson: float) -> Pencil:
         """The cell's stiffness as an affine function of the particle's modulus."""
         started = perf_counter()
-        fixed = matrix.modulus * self._stiffness_of(0, matrix.poisson)
-        unit = self._stiffness_of(1, poisson)
+        elements = self.elements(matrix.poisson, poisson)
+        moved = self.affine[self.cells].reshape(*elements.shape[:2], 3)
+        forces, kept = elements @ moved, self.pattern.unknowns >= 0
+        values, loads, uniform = [], [], []
+        for scales in (np.where(self.mesh.inside, 0.0, matrix.modulus), 1.0 * self.mesh.inside):
+            own = scales[:, None, None] * forces
+            values.append(self.pattern.values(elements, scales))
+            sums = (
+                np.bincount(self.pattern.unknowns[kept], part[kept])
+                for part in np.moveaxis(own, 2, 0)
+            )
+            loads.append(np.stack(list(sums), axis=1))
+            uniform.append(np.einsum("mia,mib->ab", moved, own))
         self.seconds["assemble"] = self.seconds.get("assemble", 0.0) + perf_counter() - started
-        return Pencil(fixed, unit, self.periodic_nodes, self.periodic, self.affine)
+        return Pencil(self._factor, tuple(values), tuple(loads), tuple(uniform))
+
+    def elements(self, *poissons: float) -> Array:
+        """Stiffness of the triangles for 1 Pa and Poisson's ratios of both phases, (m, 2k, 2k)."""
+        units = [Phase(1.0, poisson).stiffness for poisson in poissons]
+        constants = np.array([[c[0, 0], c[0, 1], c[2, 2]] for c in units])
+        (m, k), inside = self.cells.shape, self.mesh.inside.astype(np.uint8)
+        places, found = np.zeros((m, k, 3)), np.empty((m, 2 * k, 2 * k))
+        places[:, :, :2] = self.coordinates[self.cells]
+        c_loops(WEDGES).integrate_triangles(
+            self._integral, m, k, places.ctypes, constants.ctypes, inside.ctypes, found.ctypes
+        )
+        return found
 
     @property
     def unknowns(self) -> int:
         """Unknowns after elimination."""
-        return int(self.periodic.shape[1])
+        return self.pattern.size

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from cvxopt import cholmod, matrix, spmatrix
 
-from alphacut.rve.mesh.triangulation import Integers
+from alphacut.rve.solver.level_stiffness import LevelPattern
 from alphacut.stochastic.theta.truncated_normal import Array
 
 SOLVER = "CHOLMOD"
@@ -20,63 +20,31 @@ class PlanarError(RuntimeError):
     """The linear system of a planar cell was not solved."""
 
 
-class PeriodicPattern:
-    """K ↦ the entries of Pᵀ K P, for several K of 2 × 2 blocks and one sparsity pattern.
-
-    Args:
-        nodes: Periodic number of each node, two degrees of freedom on each; those of node 0 are
-            fixed.
-        matrices: Unreduced matrices, one for each pattern to come.
-    """
-
-    def __init__(self, nodes: Integers, matrices: Sequence[sp.bsr_matrix]) -> None:
-        size = int(nodes.max())
-        keys, self._kept = [], []
-        for full in matrices:
-            row, column = np.repeat(nodes - 1, np.diff(full.indptr)), nodes[full.indices] - 1
-            self._kept.append((row >= 0) & (column >= 0))
-            keys.append((row * size + column)[self._kept[-1]])
-        united, place = np.unique(np.concatenate(keys), return_inverse=True)
-        self._place = np.split(place, np.cumsum([k.size for k in keys])[:-1])
-        starts = np.searchsorted(united, np.arange(size + 1) * size)
-        self._blocks = united % size, starts
-        entries = self._csr(np.arange(4.0 * united.size).reshape(-1, 2, 2))
-        self.rows, self.columns, self._order = (
-            entries.indptr,
-            entries.indices,
-            entries.data.astype(np.int64),
-        )
-
-    def _csr(self, blocks: Array) -> sp.csr_matrix:
-        size = 2 * (self._blocks[1].size - 1)
-        return sp.bsr_matrix((blocks, *self._blocks), shape=(size, size)).tocsr()
-
-    def __call__(self, which: int, full: sp.bsr_matrix) -> Array:
-        """Entries in CSR order of the matrix whose pattern is number `which`."""
-        kept, place, count = full.data[self._kept[which]], self._place[which], self._blocks[0].size
-        sums = [
-            np.bincount(place, weights=kept[:, i, j], minlength=count)
-            for i in (0, 1)
-            for j in (0, 1)
-        ]
-        return np.asarray(np.stack(sums, axis=-1).ravel()[self._order])
-
-
 class Cholesky:
     """Sparse factorisation that keeps its ordering while values change.
 
     Args:
-        rows: CSR row pointer.
-        columns: CSR column indices.
+        pattern: Lower triangle of the matrix.
     """
 
-    def __init__(self, rows: Integers, columns: Integers) -> None:
-        self._size, self._shape = rows.size - 1, (columns, rows)
-        row = np.repeat(np.arange(self._size), np.diff(rows))
-        self._upper = columns >= row  # row by row: the lower triangle, column by column
-        low, high = columns[self._upper], row[self._upper]
-        self._matrix = spmatrix(1.0, low, high, (self._size, self._size))
+    def __init__(self, pattern: LevelPattern) -> None:
+        self._rows, columns = (part.astype(np.int64) for part in pattern.rows_columns)
+        self._size, self._starts = (
+            pattern.size,
+            np.searchsorted(columns, np.arange(pattern.size + 1)),
+        )
+        self._matrix = spmatrix(1.0, self._rows, columns, (self._size, self._size))
         self._factor = cholmod.symbolic(self._matrix)
+
+    def product(self, values: Array, vectors: Array) -> Array:
+        """The symmetric matrix with these `values` times vectors, shape (size, k)."""
+        above = values.copy()
+        above[self._starts[:-1]] = 0.0  # the diagonal, first in its column
+        lower, rest = (
+            sp.csc_matrix((part, self._rows, self._starts), shape=(self._size,) * 2)
+            for part in (values, above)
+        )
+        return np.asarray(lower @ vectors + rest.T @ vectors)
 
     def solve(self, values: Array, loads: Array) -> Array:
         """Solutions of the columns of `loads` for the matrix with these `values`.
@@ -85,7 +53,7 @@ class Cholesky:
             PlanarError: The matrix is not positive definite, or the residual is no good.
         """
         scale = np.abs(values).max()
-        self._matrix.V = matrix(values[self._upper] / scale)
+        self._matrix.V = matrix(values / scale)
         found = matrix(loads / scale)
         try:
             cholmod.numeric(self._matrix, self._factor)
@@ -95,10 +63,8 @@ class Cholesky:
                 "the stiffness has no Cholesky factor: check the moduli, or take the series"
             ) from None
         solutions = np.asarray(found)
-        product = sp.csr_matrix((values, *self._shape), shape=(self._size,) * 2) @ solutions
-        residual = float(np.linalg.norm(product - loads)) / max(
-            float(np.linalg.norm(loads)), 1e-300
-        )
+        residual = float(np.linalg.norm(self.product(values, solutions) - loads))
+        residual /= max(float(np.linalg.norm(loads)), 1e-300)
         if not residual < 1e-8:  # also catches nan
             raise PlanarError(
                 f"the Cholesky factorisation leaves a relative residual of {residual:.1e}; 1e-8 is"
@@ -107,47 +73,33 @@ class Cholesky:
         return solutions
 
 
+@dataclass(frozen=True)
 class Pencil:
     """One cell's system (fixed + E · unit) for any modulus E of the particle.
 
     Args:
-        fixed: Unreduced stiffness of the matrix.
-        unit: Unreduced stiffness of the particle for a modulus of 1 Pa.
-        nodes: Periodic number of each node.
-        periodic: P, shape (2n, unknowns).
-        affine: Displacements of the three unit strains, shape (2n, 3).
+        factor: Solves it.
+        values: Stored entries of the matrix's stiffness, and of the particle's for 1 Pa.
+        loads: Of both, forces of the three unit strains, shape (unknowns, 3).
+        uniform: Of both, energy without fluctuation, shape (3, 3).
     """
 
-    def __init__(
-        self,
-        fixed: sp.bsr_matrix,
-        unit: sp.bsr_matrix,
-        nodes: Integers,
-        periodic: sp.csr_matrix,
-        affine: Array,
-    ) -> None:
-        pattern = PeriodicPattern(nodes, [fixed, unit])
-        self._values = pattern(0, fixed), pattern(1, unit)
-        self._shape = pattern.columns, pattern.rows
-        self._factor = Cholesky(pattern.rows, pattern.columns)
-        forces = fixed @ affine, unit @ affine
-        self.loads = tuple(np.asarray(periodic.T @ force) for force in forces)
-        # 3 × 3: energy without fluctuation
-        self.uniform = tuple(np.asarray(affine.T @ force) for force in forces)
+    factor: Cholesky
+    values: tuple[Array, ...]
+    loads: tuple[Array, ...]
+    uniform: tuple[Array, ...]
 
     def solve(self, modulus: float) -> tuple[Array, Array]:
         """Negative fluctuations, shape (unknowns, 3), and stiffness in Pa, shape (3, 3)."""
-        load = self.loads[0] + modulus * self.loads[1]
-        correction = self._factor.solve(self._values[0] + modulus * self._values[1], load)
-        uniform = self.uniform[0] + modulus * self.uniform[1]
+        values, load, uniform = (
+            fixed + modulus * unit for fixed, unit in (self.values, self.loads, self.uniform)
+        )
+        correction = self.factor.solve(values, load)
         return correction, (uniform - load.T @ correction) / AREA  # ⟨σ⟩ by Hill–Mandel
 
-    def applied(self, vectors: Array) -> tuple[Array, Array]:
+    def applied(self, vectors: Array) -> tuple[Array, ...]:
         """K V of both parts for vectors of shape (unknowns, k)."""
-        fixed, unit = (
-            np.asarray(sp.csr_matrix((values, *self._shape)) @ vectors) for values in self._values
-        )
-        return fixed, unit
+        return tuple(self.factor.product(values, vectors) for values in self.values)
 
 
 class ModulusBasis:

@@ -7,35 +7,22 @@ loop in C carries slices to wedges and adds them up.
 
 from __future__ import annotations
 
-import ctypes
-import hashlib
-import os
-import platform
-import sys
-import warnings
-from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from time import perf_counter
-from types import ModuleType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from alphacut.rve.cell import Phase
-from alphacut.rve.interruption import uninterrupted
 from alphacut.rve.mesh import wedge
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.petsc import PETSc, block_values
-from alphacut.rve.solver.c_loops import WEDGES, c_loops, kernels
-from alphacut.rve.table.cache import version_of
+from alphacut.rve.solver.c_loops import WEDGES, c_loops
+from alphacut.rve.solver.integrals import triangle_integral
 from alphacut.stochastic import RadiusMap, ThetaLaw
 from alphacut.stochastic.theta.law import Array
 
 _CORNERS = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])  # in Basix's order
-# twice as fast as the default -O2, equal to round-off
-JIT = {"cffi_extra_compile_args": ["-O3", "-ffast-math"], "timeout": 120}  # for other processes
 
 
 @dataclass
@@ -60,7 +47,7 @@ class PrismForm:
         self.points, self.weights = wedge.slab_rule()
         self.shapes = wedge.tabulate(self.points)
         started = perf_counter()
-        self._integral = planar_integral()
+        self._integral = triangle_integral(2, weighted=True)
         self.jit_seconds = perf_counter() - started
         slices = self.points.reshape(3, -1, 3)[:, 0, 2]
         corners = [np.column_stack([_CORNERS, np.full(6, place)]) for place in slices]
@@ -132,76 +119,3 @@ class PrismForm:
             strain: Macroscopic strain (ε11, ε22, 2 ε12).
         """
         return np.asarray(self._forces[phase] @ strain)
-
-
-def planar_integral() -> Callable[..., None]:
-    """FFCx's integral over a triangle of a slice, made once for all runs."""
-    names = ("fenics-dolfinx", "fenics-ffcx", "fenics-ufl", "fenics-basix")
-    sources = [Path(str(file)).read_text(encoding="utf-8") for file in (__file__, wedge.__file__)]
-    parts = [
-        *sources,
-        *map(version_of, names),
-        platform.machine(),
-        str(sys.implementation.cache_tag),
-    ]
-    note = kernels() / f"form-{hashlib.sha256(repr(parts).encode()).hexdigest()[:16]}"
-    try:
-        return _function(note.read_text(encoding="utf-8"))
-    except (OSError, ValueError, AttributeError):
-        made = Path(str(_compiled().__file__))
-    source = made.with_name(made.name.partition(".")[0] + ".c").read_text(encoding="utf-8")
-    name = source.partition("void tabulate_tensor_")[2].partition("(")[0]
-    place, partial = f"{made}\ntabulate_tensor_{name}", note.with_suffix(f".{os.getpid()}")
-    partial.write_text(place, encoding="utf-8")
-    partial.replace(note)
-    return _function(place)
-
-
-def _function(place: str) -> Callable[..., None]:
-    """The function that a library's path and a name, one a line, tell."""
-    path, name = place.split("\n")
-    found: Callable[..., None] = getattr(ctypes.CDLL(path), name)
-    return found
-
-
-def _compiled() -> ModuleType:
-    """The form of eq. 7, compiled by FFCx or taken from its cache."""
-    with uninterrupted(), warnings.catch_warnings():
-        import basix.ufl
-        import ufl
-        from dolfinx import jit
-        from mpi4py import MPI
-
-        # UFL signs a form by the printed quadrature points; they print in full
-        warnings.filterwarnings("ignore", message="Applying str")
-        points, weights = basix.make_quadrature(basix.CellType.triangle, 4)  # as `slab_rule`
-        quadratic = basix.ufl.element("P", "triangle", 2, shape=(2,))
-        mesh = ufl.Mesh(quadratic)
-        space = ufl.FunctionSpace(mesh, quadratic)
-        u, v, c = ufl.TrialFunction(space), ufl.TestFunction(space), ufl.Constant(mesh, shape=(3,))
-        at_points = basix.ufl.quadrature_element("triangle", points=points, weights=weights)
-        weight = ufl.Coefficient(ufl.FunctionSpace(mesh, at_points))  # f_Θ of eq. 1
-        rule = {
-            "quadrature_rule": "custom",
-            "quadrature_points": points,
-            "quadrature_weights": weights,
-        }
-        # eq. 7: the Galerkin projection (eq. 4) of −div σ (eq. 2, eq. 5) on wedges (eq. 3)
-        form = weight * ufl.inner(_stress(c, _strain(u)), _strain(v)) * ufl.dx(mesh, metadata=rule)
-        module: ModuleType = jit.ffcx_jit(MPI.COMM_SELF, form, jit_options=JIT)[1]
-        return module
-
-
-def _strain(w: Any) -> Any:
-    """In-plane strain (ε11, ε22, 2 ε12) on the product space; θ is not differentiated."""
-    import ufl
-
-    gradient = ufl.grad(w)
-    return ufl.as_vector([gradient[0, 0], gradient[1, 1], gradient[0, 1] + gradient[1, 0]])
-
-
-def _stress(c: Any, e: Any) -> Any:
-    """In-plane stress of the strain `e` from the three constants C11, C12, C33."""
-    import ufl
-
-    return ufl.as_vector([c[0] * e[0] + c[1] * e[1], c[1] * e[0] + c[0] * e[1], c[2] * e[2]])

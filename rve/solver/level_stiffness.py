@@ -47,6 +47,12 @@ def element_stiffness(positions: Array, stiffness: Array) -> Array:
     return found
 
 
+def with_components(unknown: Integers) -> Integers:
+    """Two degrees of freedom for each unknown of a triangle, −1 where fixed, (m, 2·nodes)."""
+    pairs = np.where(unknown[:, :, None] >= 0, 2 * unknown[:, :, None] + np.arange(2), -1)
+    return pairs.reshape(len(unknown), -1)
+
+
 @dataclass(frozen=True)
 class LevelPattern:
     """Lower triangle of a planar matrix: where the entries of every element matrix go.
@@ -89,9 +95,13 @@ class LevelPattern:
         template = spmatrix(1.0, row, column, (self.size, self.size))
         return np.array(amd.order(template, uplo="L"), np.int64).ravel()
 
-    def values(self, elements: Array) -> Array:
-        """Stored entries from the element matrices, shape (m, k, k)."""
+    def values(self, elements: Array, scales: Array | None = None) -> Array:
+        """Stored entries from the element matrices, shape (m, k, k), times scales, shape (m,)."""
         kept, starts, rows, _ = self._entries
         elements, found = np.ascontiguousarray(elements), np.empty(len(rows))
-        c_loops(WEDGES).gather(len(rows), kept.ctypes, starts.ctypes, elements.ctypes, found.ctypes)
+        scales = np.ones(len(elements)) if scales is None else scales
+        c_loops(WEDGES).gather(
+            len(rows), kept.ctypes, starts.ctypes, elements[0].size, scales.ctypes,
+            elements.ctypes, found.ctypes,
+        )  # fmt: skip
         return found

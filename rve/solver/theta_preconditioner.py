@@ -45,7 +45,7 @@ from alphacut.rve.petsc import PETSc
 from alphacut.rve.ranks import Ranks
 from alphacut.rve.solver.constraints import LevelNumbering, Overlap
 from alphacut.rve.solver.level_factors import LevelFactors, saddle_factors
-from alphacut.rve.solver.level_stiffness import LevelPattern
+from alphacut.rve.solver.level_stiffness import LevelPattern, with_components
 from alphacut.stochastic.theta.law import Array, ThetaLaw
 
 
@@ -94,14 +94,8 @@ _LINEAR = np.kron(np.vstack([np.eye(3), [[0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 
 def _patterns(periodicity: Periodicity, plane: Triangulation) -> tuple[LevelPattern, LevelPattern]:
     """Of a level's matrices on quadratic and on linear triangles."""
     nodes = plane.triangles, plane.triangles[:, :3]
-    quadratic, linear = (_with_components(periodicity.unknown[own]) for own in nodes)
+    quadratic, linear = (with_components(periodicity.unknown[own]) for own in nodes)
     return LevelPattern(quadratic), LevelPattern(linear)
-
-
-def _with_components(unknown: Integers) -> Integers:
-    """Two degrees of freedom for each unknown of a triangle, −1 where fixed, (m, 2·nodes)."""
-    pairs = np.where(unknown[:, :, None] >= 0, 2 * unknown[:, :, None] + np.arange(2), -1)
-    return pairs.reshape(len(unknown), -1)
 
 
 @dataclass(frozen=True)

@@ -243,11 +243,21 @@ int lower_triangle(int triangles, int k, int size, const int *unknowns, int *kep
     return enough ? total : -1;
 }
 
-/* Entries of such a matrix from those of the triangles. */
-void gather(int count, const int *kept, const int *starts, const double *elements, double *values) {
+/* Entries of such a matrix from those of the triangles, `size` of each, times the triangle's scale. */
+void gather(int count, const int *kept, const int *starts, int size, const double *scales, const double *elements,
+            double *values) {
     for (int n = 0; n < count; n++) {
         double sum = 0;
-        for (int e = starts[n]; e < starts[n + 1]; e++) sum += elements[kept[e]];
+        for (int e = starts[n]; e < starts[n + 1]; e++) sum += scales[kept[e] / size] * elements[kept[e]];
         values[n] = sum;
     }
+}
+
+/* Matrices, 2 k x 2 k each, of triangles of k nodes that stand at `places`, three coordinates each; constants
+   are those of the phase that a triangle is `inside`. */
+void integrate_triangles(integral integrate, int triangles, int k, const double *places,
+                         const double (*constants)[3], const uint8_t *inside, double *found) {
+    memset(found, 0, (size_t)triangles * 4 * k * k * sizeof(double));
+    for (int m = 0; m < triangles; m++, places += 3 * k, found += 4 * k * k)
+        integrate(found, NULL, constants[inside[m]], places, NULL, NULL, NULL);
 }

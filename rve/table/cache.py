@@ -9,13 +9,13 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import asdict
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from zipfile import BadZipFile
 
 import numpy as np
 
 from alphacut.rve.ranks import ALONE, Ranks
+from alphacut.rve.solver.integrals import version_of
 from alphacut.rve.table.build import PlanarSource, Source, build_table
 from alphacut.rve.table.interpolant import Table, TableRange
 
@@ -28,6 +28,7 @@ _PROGRAMS = (
     "planar/*.py",
     "series/*.py",
     "slices/*.py",
+    "solver/*.c",
     "solver/*.py",
     "spheres/**/*.py",
     "table/*.py",
@@ -49,14 +50,6 @@ def _provenance() -> str:
         for path in sorted(here.glob(pattern)):
             code.update(path.read_bytes())
     return f"{code.hexdigest()} {[f'{name} {version_of(name)}' for name in _PACKAGES]}"
-
-
-def version_of(package: str) -> str:
-    """The version of an installed package, or "none"."""
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "none"
 
 
 def stored_table(

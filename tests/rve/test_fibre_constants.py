@@ -34,13 +34,13 @@ def stiffness_of(values):
 @pytest.mark.parametrize(("matrix", "inclusion"), PAIRS)
 def test_stresses_along_the_fibres_are_those_of_finite_elements(matrix, inclusion):
     """C13 and C33 from the field under ε33, which the cell's models do not solve."""
-    planar = pytest.importorskip("alphacut.rve.planar.problem")
+    reference = pytest.importorskip("tests.rve.slices.by_dolfinx")
     from scipy.sparse.linalg import spsolve
 
     from alphacut.rve.mesh.planar import planar_mesh
 
-    cell, phases = planar.PlanarCell(planar_mesh(0.7, size=0.2), 4), (matrix, inclusion)
-    parts = [p.modulus * cell._stiffness_of(k, p.poisson) for k, p in enumerate(phases)]
+    cell, phases = reference.ByDolfinx(planar_mesh(0.7, size=0.2), 4), (matrix, inclusion)
+    parts = [cell.stiffness_of(k, phase) for k, phase in enumerate(phases)]
     periodic, uniform = cell.periodic, cell.affine[:, 0] + cell.affine[:, 1]
     system = (periodic.T @ (parts[0] + parts[1]) @ periodic).tocsc()
     force = sum(p.poisson * (part @ uniform) for p, part in zip(phases, parts, strict=True))

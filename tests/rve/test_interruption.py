@@ -1,6 +1,7 @@
 """Ctrl-C while basix and DOLFINx are imported waits for their end, and is one line then."""
 
 import ast
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -28,12 +29,18 @@ print(status, "{last}" in sys.modules)
     ("at", "method", "last"),
     [
         ("basix._basixcpp", "prism", "basix.quadrature"),
+        ("basix._basixcpp", "slices", "basix.quadrature"),
         ("dolfinx.cpp", "slices", "dolfinx.fem"),
         ("petsc4py.lib", "prism", "petsc4py.PETSc"),
-        ("petsc4py.lib", "slices", "petsc4py.PETSc"),
     ],
 )
-def test_it_ends_with_the_usual_status_once_the_import_is_done(at, method, last):
+def test_it_ends_with_the_usual_status_once_the_import_is_done(
+    at, method, last, tmp_path, monkeypatch
+):
+    if at == "dolfinx.cpp":  # which is imported where FFCx's integral was not made before
+        caches = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
+        (tmp_path / "fenics").symlink_to(caches / "fenics")
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     program = PROGRAM.format(at=at, method=method, last=last)
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT, check=False

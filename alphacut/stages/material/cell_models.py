@@ -74,7 +74,7 @@ def cell_model(choice: CellChoice) -> CellModel:
             return AveragedModel(cell_model(replace(choice, average="axes")))
         meshed = choice.method == "auto" and "series" in choice.exclude
         if choice.method in ("slices", "prism") or (meshed and choice.particles == "cylinders"):
-            # DOLFINx is loaded before the clock starts: times are those of computing
+            # libraries are loaded before the clock starts: times are those of computing
             room = "prism.model" if choice.method == "prism" else "planar.problem"
             import_module(f"alphacut.rve.{room}")
         if choice.particles == "spheres" and (meshed or choice.method == "table"):

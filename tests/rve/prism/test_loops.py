@@ -16,10 +16,9 @@ from alphacut.rve import Phase
 from alphacut.rve.mesh import triangulation, wedge
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import triangulate
-from alphacut.rve.prism import form
 from alphacut.rve.prism.slice_stress import SliceStress
 from alphacut.rve.prism.system import PrismSystem
-from alphacut.rve.solver import c_loops, level_stiffness
+from alphacut.rve.solver import c_loops, integrals, level_stiffness
 from alphacut.rve.solver.level_factors import LevelFactors, saddle_factors
 from alphacut.rve.solver.level_stiffness import LevelPattern
 from alphacut.stochastic import HermiteMap, TruncatedNormal
@@ -195,15 +194,16 @@ def test_a_mesh_is_kept_to_the_last_bit(tmp_path, monkeypatch):
 
 
 def test_the_integral_is_found_again_without_ufl_and_made_where_it_is_gone(tmp_path, monkeypatch):
-    monkeypatch.setattr(form, "kernels", lambda: tmp_path)
-    made, compiled = [], form._compiled
-    monkeypatch.setattr(form, "_compiled", lambda: made.append(1) or compiled())
-    form.planar_integral()
-    form.planar_integral()
+    monkeypatch.setattr(integrals, "kernels", lambda: tmp_path)
+    made, compiled = [], integrals._compiled
+    monkeypatch.setattr(integrals, "_compiled", lambda *which: made.append(1) or compiled(*which))
+    find = integrals.triangle_integral.__wrapped__
+    find(2, weighted=True)
+    find(2, weighted=True)
     assert len(made) == 1
     (note,) = tmp_path.iterdir()
     note.write_text(str(tmp_path / "nowhere.so") + "\ntabulate", encoding="utf-8")
-    form.planar_integral()
+    find(2, weighted=True)
     assert len(made) == 2
 
 

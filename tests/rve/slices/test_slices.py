@@ -70,6 +70,15 @@ def test_full_stiffness_is_exact_for_other_poissons_ratios():
     )
 
 
+def test_stiffness_is_that_of_dolfinx():
+    reference = pytest.importorskip("tests.rve.slices.by_dolfinx")
+    for radius, order, matrix, inclusion, size in reference.cells():
+        mesh = planar_mesh.planar_mesh(radius, size=size)
+        found = planar.PlanarCell(mesh, order).stiffness(matrix, [inclusion])[0]
+        exact = reference.ByDolfinx(mesh, order).stiffness(matrix, inclusion)
+        assert found == pytest.approx(exact, rel=1e-10, abs=1e-10 * matrix.modulus)
+
+
 def test_many_moduli_share_a_few_solutions():
     cell = planar.PlanarCell(planar_mesh.planar_mesh(0.7, size=0.4), 3)
     inclusions = [Phase(e) for e in np.geomspace(2e6, 2e14, 15)]

@@ -1,0 +1,108 @@
+"""FFCx's integrals of the stiffness over a triangle, made once for all runs."""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+import platform
+import sys
+import warnings
+from collections.abc import Callable
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from alphacut.rve.interruption import uninterrupted
+from alphacut.rve.solver.c_loops import kernels
+
+# twice as fast as the default -O2, equal to round-off
+JIT = {"cffi_extra_compile_args": ["-O3", "-ffast-math"], "timeout": 120}  # for other processes
+_MADE_BY = "fenics-dolfinx", "fenics-ffcx", "fenics-ufl", "fenics-basix"
+
+
+@cache
+def triangle_integral(order: int, *, weighted: bool = False) -> Callable[..., None]:
+    """Stiffness matrix of a triangle, straight or curved, for three constants C11, C12, C33.
+
+    Args:
+        order: Of its Lagrange functions and of its geometry, 1 to 4.
+        weighted: Whether a weight is given at each of the points of degree 4, of order 2.
+    """
+    source = Path(__file__).read_text(encoding="utf-8")
+    machine = platform.machine(), str(sys.implementation.cache_tag)
+    parts = [source, *map(version_of, _MADE_BY), *machine, order, weighted]
+    note = kernels() / f"form-{hashlib.sha256(repr(parts).encode()).hexdigest()[:16]}"
+    try:
+        return _function(note.read_text(encoding="utf-8"))
+    except (OSError, ValueError, AttributeError):
+        made = Path(str(_compiled(order, weighted).__file__))
+    code = made.with_name(made.name.partition(".")[0] + ".c").read_text(encoding="utf-8")
+    name = code.partition("void tabulate_tensor_")[2].partition("(")[0]
+    place, partial = f"{made}\ntabulate_tensor_{name}", note.with_suffix(f".{os.getpid()}")
+    partial.write_text(place, encoding="utf-8")
+    partial.replace(note)
+    return _function(place)
+
+
+def version_of(package: str) -> str:
+    """The version of an installed package, or "none"."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "none"
+
+
+def _function(place: str) -> Callable[..., None]:
+    """The function that a library's path and a name, one a line, tell."""
+    path, name = place.split("\n")
+    found: Callable[..., None] = getattr(ctypes.CDLL(path), name)
+    return found
+
+
+def _compiled(order: int, weighted: bool) -> ModuleType:
+    """The form of eq. 7 without its weight, compiled by FFCx or taken from its cache."""
+    with uninterrupted(), warnings.catch_warnings():
+        import basix.ufl
+        import ufl
+        from dolfinx import jit
+        from mpi4py import MPI
+
+        # UFL signs a form by the printed quadrature points; they print in full
+        warnings.filterwarnings("ignore", message="Applying str")
+        element = basix.ufl.element("P", "triangle", order, shape=(2,))
+        mesh = ufl.Mesh(element)
+        space = ufl.FunctionSpace(mesh, element)
+        u, v, c = ufl.TrialFunction(space), ufl.TestFunction(space), ufl.Constant(mesh, shape=(3,))
+        # eq. 7: the Galerkin projection (eq. 4) of −div σ (eq. 2, eq. 5) on wedges (eq. 3)
+        density = ufl.inner(_stress(c, _strain(u)), _strain(v))
+        rule: dict[str, Any] = {"quadrature_degree": max(2 * order - (order == 1), 1)}
+        if weighted:
+            points, weights = basix.make_quadrature(basix.CellType.triangle, 4)  # as `slab_rule`
+            at = basix.ufl.quadrature_element("triangle", points=points, weights=weights)
+            density *= ufl.Coefficient(ufl.FunctionSpace(mesh, at))  # f_Θ of eq. 1
+            rule = {
+                "quadrature_rule": "custom",
+                "quadrature_points": points,
+                "quadrature_weights": weights,
+            }
+        form = density * ufl.dx(mesh, metadata=rule)
+        module: ModuleType = jit.ffcx_jit(MPI.COMM_SELF, form, jit_options=JIT)[1]
+        return module
+
+
+def _strain(w: Any) -> Any:
+    """In-plane strain (ε11, ε22, 2 ε12) on the product space; θ is not differentiated."""
+    import ufl
+
+    gradient = ufl.grad(w)
+    return ufl.as_vector([gradient[0, 0], gradient[1, 1], gradient[0, 1] + gradient[1, 0]])
+
+
+def _stress(c: Any, e: Any) -> Any:
+    """In-plane stress of the strain `e` from the three constants C11, C12, C33."""
+    import ufl
+
+    return ufl.as_vector([c[0] * e[0] + c[1] * e[1], c[1] * e[0] + c[0] * e[1], c[2] * e[2]])
