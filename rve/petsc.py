@@ -46,13 +46,6 @@ def clean(comm: MPI.Comm | None) -> None:
         PETSc.garbage_cleanup(comm)
 
 
-def give_back() -> None:
-    """Give the system the memory that is free, which MPI has told the C library to keep."""
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
-    if trim is not None:  # glibc has it
-        trim(0)
-
-
 def block_values(matrix: PETSc.Mat) -> tuple[ctypes.c_void_p, ctypes.c_void_p]:
     """Where the blocks of this rank's rows begin: row by row, each column by column.
 
@@ -79,31 +72,36 @@ def _beside_diagonal(matrix: PETSc.Mat) -> tuple[ctypes.c_void_p, ctypes.c_void_
     return part, numbers
 
 
-def beside_diagonal(matrix: PETSc.Mat) -> tuple[sp.csr_matrix, NDArray[np.int32]]:
-    """What this rank's rows of a matrix in blocks multiply of other ranks, and the blocks' numbers.
+def beside_diagonal(
+    matrix: PETSc.Mat,
+) -> tuple[NDArray[np.int32], sp.bsr_matrix, NDArray[np.int32]]:
+    """What this rank's rows of a matrix in blocks multiply of other ranks.
 
-    Its columns are those blocks' alone.
+    Rows of blocks that have some, these rows times the other ranks' blocks that they need, and the
+    numbers of those blocks.
     """
     part, numbers = _beside_diagonal(matrix)
     rows, done = np.zeros(1, PETSc.IntType), ctypes.c_int()
     starts, columns = ctypes.c_void_p(), ctypes.c_void_p()
     found = rows.ctypes, ctypes.byref(starts), ctypes.byref(columns), ctypes.byref(done)
     _LIBRARY.MatGetRowIJ(part, 0, 0, 1, *found)
-    pointers = _copied(starts, int(rows[0]) + 1, PETSc.IntType)
-    place, block = _copied(columns, pointers[-1], PETSc.IntType), matrix.getBlockSize()
-    values = _copied(_first_block(part), len(place) * block**2, PETSc.ScalarType).reshape(
-        -1, block, block
-    )
-    others = _copied(numbers, place.max(initial=-1) + 1, PETSc.IntType)
-    shape = block * int(rows[0]), block * len(others)
-    by_row = values.transpose(0, 2, 1)  # PETSc's run column by column
-    return sp.bsr_matrix((by_row, place, pointers), shape=shape).tocsr(), others
+    pointers = _numbers(starts, int(rows[0]) + 1, PETSc.IntType)
+    place, block = _numbers(columns, int(pointers[-1]), PETSc.IntType), matrix.getBlockSize()
+    values = _numbers(_first_block(part), len(place) * block**2, PETSc.ScalarType)
+    by_row = values.reshape(-1, block, block).transpose(0, 2, 1)  # PETSc's run column by column
+    some = np.flatnonzero(np.diff(pointers))
+    kept = np.append(pointers[some], pointers[-1])
+    others = _numbers(numbers, int(place.max(initial=-1)) + 1, PETSc.IntType)
+    shape = block * len(some), block * len(others)
+    return some, sp.bsr_matrix((by_row.copy(), place.copy(), kept), shape=shape), others.copy()
 
 
-def _copied(first: ctypes.c_void_p, count: int, kind: type) -> Any:
-    """So many numbers of PETSc's from there on."""
-    size = int(count) * np.dtype(kind).itemsize
-    return np.frombuffer(ctypes.string_at(first, size) if size else b"", kind)
+def _numbers(first: ctypes.c_void_p, count: int, kind: type) -> Any:
+    """So many numbers of PETSc's from there on; they are PETSc's own."""
+    if not count:
+        return np.empty(0, kind)
+    held = (ctypes.c_char * (int(count) * np.dtype(kind).itemsize)).from_address(first.value or 0)
+    return np.frombuffer(memoryview(held), kind)
 
 
 @contextmanager

@@ -29,7 +29,7 @@ from alphacut.rve.certificate import (
 from alphacut.rve.mesh.periodicity import mismatch
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import reference_radius, triangulate
-from alphacut.rve.petsc import clean, give_back
+from alphacut.rve.petsc import clean
 from alphacut.rve.prism.error_estimate import judged, moduli_of
 from alphacut.rve.prism.mixed_element import NEARLY_INCOMPRESSIBLE
 from alphacut.rve.prism.modulus_basis import BasisError, ModulusBasis
@@ -141,7 +141,6 @@ class PrismModel:
         watch = Stopwatch()
         with watch("estimate"):
             layers = self.errors_of_layers(radius_map, matrix, inclusions)
-            give_back()
             found = [
                 judged(
                     result,

@@ -61,11 +61,11 @@ class _Rest:
     """Products with unknowns of other ranks, which few rows have."""
 
     def __init__(self, matrices: Sequence[PETSc.Mat], columns: int) -> None:
-        parts, numbers = zip(*map(beside_diagonal, matrices), strict=True)
-        self.rows = np.flatnonzero(np.diff(parts[0].indptr))
-        self.parts = [part[self.rows] for part in parts]
-        first, others, wide = matrices[0], numbers[0], len(matrices) * columns
+        beside = [beside_diagonal(matrix) for matrix in matrices]
+        (some, _, others), first, wide = beside[0], matrices[0], len(matrices) * columns
         rows, block = first.getSizes()[0][0], first.getBlockSize()
+        self.rows = (block * some[:, None] + np.arange(block)).ravel()
+        self.parts = [part for _, part, _ in beside]
         self.near = PETSc.Vec().createMPI((wide * rows, None), comm=first.comm)
         self.fetched = PETSc.Vec().createSeq(wide * block * len(others))
         wanted = PETSc.IS().createBlock(wide * block, others, comm=PETSc.COMM_SELF)
