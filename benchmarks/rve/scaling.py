@@ -106,7 +106,7 @@ def modelled(one: Mapping[str, float], ranks: int) -> dict[str, float]:
     share = {
         "start": 1.0,
         "mesh": 1 / ranks,
-        "assemble": 1 / ranks,
+        "assemble": min(levels + 1 / (_LEVELS - 1), 1.0),
         "setup": levels,
         "solve": levels / min(max(ranks // _LEVELS, 1), _LOADS),
         "estimate": max(radii, levels),

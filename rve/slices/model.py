@@ -35,7 +35,7 @@ _SHARED = np.array([0.03, 0.5, 0.5, 0.5])  # C11 + C12 is the easiest by far
 
 @dataclass(frozen=True)
 class SlicesModel:
-    """Planar DOLFINx solves with curved elements at the nodes of a Gauss rule in θ.
+    """Planar finite elements with curved sides at the nodes of a Gauss rule in θ.
 
     Args:
         order: Polynomial degree of the elements, 2 to 4.
