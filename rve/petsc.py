@@ -74,7 +74,7 @@ def _beside_diagonal(matrix: PETSc.Mat) -> tuple[ctypes.c_void_p, ctypes.c_void_
 
 def beside_diagonal(
     matrix: PETSc.Mat,
-) -> tuple[NDArray[Any], sp.bsr_matrix, NDArray[Any]]:
+) -> tuple[NDArray[np.int64], sp.bsr_matrix, NDArray[np.int32 | np.int64]]:
     """What this rank's rows of a matrix in blocks multiply of other ranks.
 
     Rows of blocks that have some, these rows times the other ranks' blocks that they need, and the
