@@ -29,7 +29,7 @@ class Ranks:
         failure: Exception | None = None
         try:
             yield
-        except (ArithmeticError, OSError, RuntimeError, ValueError) as error:
+        except (ArithmeticError, MemoryError, OSError, RuntimeError, ValueError) as error:
             failure = error
         for raised in self.all(failure):
             if raised is not None:

@@ -24,12 +24,13 @@ assert own == list(range(5))[MPI.COMM_WORLD.rank :: 3], own
 assert sum(ranks.all(len(own))) == 5
 assert ranks.first(lambda: MPI.COMM_WORLD.rank) == 0
 failures = 0
-for work in (lambda: ranks.first(lambda: 1 / 0), lambda: ranks.each(lambda k: 1 / (k - 1), range(3))):
+lacking = lambda: ranks.first(lambda: bytearray(2**62))
+for work in (lacking, lambda: ranks.first(lambda: 1 / 0), lambda: ranks.each(lambda k: 1 / (k - 1), range(3))):
     try:
         work()
-    except ZeroDivisionError:
+    except (ZeroDivisionError, MemoryError):
         failures += 1
-assert failures == 2, failures
+assert failures == 3, failures
 print("done", flush=True)
 """
 
