@@ -20,6 +20,9 @@ from alphacut.rve.solver.c_loops import kernels
 
 # twice as fast as the default -O2, equal to round-off
 JIT = {"cffi_extra_compile_args": ["-O3", "-ffast-math"], "timeout": 120}  # for other processes
+# FFCx's own: a file of the caller's folder could ask for single precision, and stay in the cache
+_TABLES = {"epsilon": 1e-14, "table_rtol": 1e-6, "table_atol": 1e-9}
+_FFCX = {"scalar_type": "float64", "sum_factorization": False, **_TABLES}
 _MADE_BY = "fenics-dolfinx", "fenics-ffcx", "fenics-ufl", "fenics-basix"
 
 
@@ -89,7 +92,7 @@ def _compiled(order: int, weighted: bool) -> ModuleType:
                 "quadrature_weights": weights,
             }
         form = density * ufl.dx(mesh, metadata=rule)
-        module: ModuleType = jit.ffcx_jit(MPI.COMM_SELF, form, jit_options=JIT)[1]
+        module: ModuleType = jit.ffcx_jit(MPI.COMM_SELF, form, _FFCX, JIT)[1]
         return module
 
 

@@ -45,11 +45,7 @@ def by_dolfinx(system, poisson, share, strain):
     mesh = dolfinx.mesh.create_mesh(MPI.COMM_SELF, cells=grid.cells, x=system.positions, e=of[3])
     space = fem.functionspace(mesh, of[2])
     at, weights = wedge.slab_rule()
-    rule = {
-        "quadrature_rule": "custom",
-        "quadrature_points": at,
-        "quadrature_weights": weights,
-    }
+    rule = {"quadrature_rule": "custom", "quadrature_points": at, "quadrature_weights": weights}
     element = basix.ufl.quadrature_element("prism", points=at, weights=weights)
     weight = fem.Function(fem.functionspace(mesh, element))
     own = mesh.topology.original_cell_index
@@ -202,9 +198,12 @@ def test_the_integral_is_found_again_without_ufl_and_made_where_it_is_gone(tmp_p
     find(2, weighted=True)
     assert len(made) == 1
     (note,) = tmp_path.iterdir()
+    told, asked = note.read_text(encoding="utf-8"), {"scalar_type": "float32", "table_rtol": 0.1}
+    monkeypatch.setattr("ffcx.options._load_options", lambda: ({}, asked))  # of folder or home
     note.write_text(str(tmp_path / "nowhere.so") + "\ntabulate", encoding="utf-8")
     find(2, weighted=True)
     assert len(made) == 2
+    assert note.read_text(encoding="utf-8") == told
 
 
 def test_loops_are_compiled_once_and_need_a_compiler(tmp_path, monkeypatch):
