@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 from typing import ClassVar
 
@@ -138,19 +138,12 @@ class PrismModel:
         results: list[Homogenised],
     ) -> list[Homogenised]:
         """The results with their declared errors, whose cost is booked as `estimate`."""
-        watch = Stopwatch()
+        watch, ranks = Stopwatch(), self._ranks
         with watch("estimate"):
             layers = self.errors_of_layers(radius_map, matrix, inclusions)
             found = [
-                judged(
-                    result,
-                    radius_map,
-                    (matrix, phase),
-                    layers=left,
-                    cache=self.cache,
-                    ranks=self._ranks,
-                )
-                for result, phase, left in zip(results, inclusions, layers, strict=True)
+                judged(one, radius_map, (matrix, phase), layers=left, cache=self.cache, ranks=ranks)
+                for one, phase, left in zip(results, inclusions, layers, strict=True)
             ]
         seconds = watch.seconds["estimate"] / len(results)
         for result in found:
@@ -170,18 +163,16 @@ class PrismModel:
         coarse = replace(self, estimate=False, mesh_size=min(1.0, 2 * self.mesh_size))
         coarse = replace(coarse, parallel=self.parallel and alone.size == 1)
         thick = replace(coarse, layers=max(1, self.layers // 2))
+
+        def means(model: PrismModel) -> list[Array]:  # not the results: some maps cannot be sent
+            curves = [one.curve for one in model.solve(radius_map, matrix, inclusions)]
+            return [with_ratio(curve.weights @ moduli_of(curve)) for curve in curves]
+
         try:
-            solve = partial(
-                PrismModel.solve, radius_map=radius_map, matrix=matrix, inclusions=inclusions
-            )
-            pairs = alone.each(solve, (coarse, thick))
+            pairs = alone.each(means, (coarse, thick))
         except RuntimeError:  # folded, or not solved: the share stays unknown, the sum does not
             return [np.zeros(4) for _ in inclusions]
-        means = [
-            [with_ratio(one.curve.weights @ moduli_of(one.curve)) for one in results]
-            for results in pairs
-        ]
-        return [abs(two / one - 1) / _GAIN for one, two in zip(*means, strict=True)]
+        return [abs(two / one - 1) / _GAIN for one, two in zip(*pairs, strict=True)]
 
     def _moved(self, radius_map: RadiusMap, watch: Stopwatch) -> PrismSystem:
         with watch("mesh"):

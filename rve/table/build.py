@@ -110,13 +110,9 @@ class PlanarSource:
         return self._solve(radius, modulus, _ORDER - 1, _ROUGH)
 
     def _solve(self, radius: float, modulus: Array, order: int, size: float) -> Array:
+        phases = self._phases(modulus)
         solved = solve_slice(
-            radius,
-            self.span.matrix,
-            self._phases(modulus),
-            orders=(order,),
-            mesh_size=size,
-            share=True,
+            radius, self.span.matrix, phases, orders=(order,), mesh_size=size, share=True
         )
         self.systems += 3 * solved.factorisations
         self.unknowns = max(self.unknowns, solved.unknowns)

@@ -1,7 +1,6 @@
 """The product-space model on several MPI ranks gives what it gives on one."""
 
 import json
-import os
 import shutil
 import subprocess
 import sys
@@ -19,28 +18,11 @@ from alphacut.rve.prism.system import PrismSystem
 from alphacut.rve.solver.constraints import LevelNumbering
 
 ROOT = Path(__file__).parents[3]
-SOLVE = [
-    "-m",
-    "rve",
-    "solve",
-    "cases/paper.toml",
-    "--mesh-size",
-    "0.3",
-    "--json",
-    "-",
-]
+SOLVE = ["-m", "rve", "solve", "cases/paper.toml", "--mesh-size", "0.3", "--json", "-"]
 
 
-def run(command, **environment):
-    done = subprocess.run(
-        command,
-        cwd=ROOT,
-        env={**os.environ, **environment},
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
+def run(command):
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
     return done.returncode, done.stdout, done.stderr
 
 
@@ -70,9 +52,8 @@ from mpi4py import MPI
 from alphacut.rve.cell import LOADS, Phase
 from alphacut.rve.mesh.triangulation import reference_radius
 from alphacut.rve.prism.model import PrismModel, _system
-from alphacut.rve.prism.task import PrismTask
+from alphacut.rve.prism.task import PrismTask, Stopwatch
 from alphacut.rve.solver.options import SolverOptions
-from alphacut.rve.prism.task import Stopwatch
 from alphacut.stochastic import HermiteMap
 
 radii, ranks, found = HermiteMap(0.1337, 0.1, 0.8663, 0.1692), MPI.COMM_WORLD, []
@@ -110,6 +91,28 @@ def test_more_ranks_than_levels_give_the_same_and_none_has_the_whole():
     assert sum(four[4]) == unknowns
     assert max(four[3]) < 0.5 * nodes
     assert max(four[4]) < 0.4 * unknowns
+
+
+ESTIMATE = """
+from mpi4py import MPI
+from alphacut.rve.cell import Phase
+from alphacut.rve.prism.model import PrismModel
+from alphacut.stochastic import HermiteMap
+
+radii, ranks = HermiteMap(0.4, 0.1, 0.5, 0.2), MPI.COMM_WORLD
+object.__setattr__(radii, "unsendable", lambda: 0)
+model = PrismModel(0.5, 2, parallel=ranks.size > 1, estimate=True)
+errors = model.solve(radii, Phase(20e9), [Phase(80e9)])[0].errors
+if ranks.rank == 0:
+    print(*errors["theta"][[0, 2]], *errors["space"][[0, 2]])
+"""
+
+
+@pytest.mark.skipif(shutil.which("mpirun") is None, reason="no mpirun")
+def test_two_ranks_declare_the_errors_of_one_for_a_map_that_cannot_be_sent():
+    one, two = (run(["mpirun", "-n", n, sys.executable, "-c", ESTIMATE]) for n in "12")
+    assert (one[0], two[0]) == (0, 0), two[2]
+    assert [*map(float, two[1].split())] == pytest.approx([*map(float, one[1].split())], rel=1e-6)
 
 
 @pytest.mark.parametrize("layers", [1, 2, 3, 12])
