@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
+from numpy.typing import NDArray
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.modal.exact_response import ExactResponse
@@ -75,7 +76,7 @@ def best_of_pool(pool: Array, values: Array, nodes: Array, starts: int) -> list[
     for column, sign in enumerate((-1.0, 1.0)):
         left: Array = chosen
         for optima in out:
-            best = left.argmin(0) if sign < 0 else left.argmax(0)
+            best = _first_extreme(left, sign)
             optima.point[column::2], optima.value[column::2] = (
                 pool[best],
                 sign * chosen[best, np.arange(len(best))],
@@ -85,6 +86,12 @@ def best_of_pool(pool: Array, values: Array, nodes: Array, starts: int) -> list[
                 near = np.stack([np.abs(pool - pool[k]).max(1) < reach for k in unique], 1)
                 left = np.where(near[:, index], -sign * np.inf, left)
     return out
+
+
+def _first_extreme(values: Array, sign: float) -> NDArray[np.intp]:
+    """The row with the least or greatest value of each column; few columns at a time, in cache."""
+    parts = (values[:, first : first + 64] for first in range(0, values.shape[1], 64))
+    return np.concatenate([x.argmin(0) if sign < 0 else x.argmax(0) for x in parts])
 
 
 def best_of_few(

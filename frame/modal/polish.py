@@ -157,11 +157,12 @@ class Polish:
             _take(found, best_of_pool(known, trajectories(exact, known), nodes, 1)[0])
         fresh = fresh_points(rng, lower, upper, graphs)
         values = trajectories(exact, fresh)
-        _take(found, best_of_pool(fresh, values, nodes, 1)[0])
+        best = best_of_pool(fresh, values, nodes, 1)[0]
+        _take(found, best)
         tick(0.1)
         if count:
             some = rng.permutation(len(before))[:anew]
-            rivals = [best_of_pool(fresh, values, nodes, 1)[0]]
+            rivals = [best]
             rivals += [best_of_few(fresh, values, nodes, few, rng) for few in FEW]
             for place, rival in enumerate(rivals):
                 refine(exact, rival, some, lower, upper, self.small)

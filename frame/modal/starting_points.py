@@ -35,5 +35,11 @@ def tensor_points(d: int, most: int) -> Array:
 
 def trajectories(model: Response, points: Array, nodes: Array | None = None) -> Array:
     """Values of the model at points (P, d) and the nodes, all unless given, shape (P, T, m)."""
-    pieces = each(model.values, np.array_split(points, -(-len(points) // 64)))
-    return np.concatenate([x if nodes is None else x[:, nodes] for x in pieces])
+    wanted = slice(None) if nodes is None else nodes
+    found = np.empty((len(points), len(model.time[wanted]), len(model.outputs)))
+
+    def fill(rows: slice) -> None:
+        found[rows] = model.values(points[rows])[:, wanted]
+
+    each(fill, [slice(first, first + 64) for first in range(0, len(points), 64)])
+    return found
