@@ -46,6 +46,13 @@ def clean(comm: MPI.Comm | None) -> None:
         PETSc.garbage_cleanup(comm)
 
 
+def give_back() -> None:
+    """Give the system the memory that is free, which MPI has told the C library to keep."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:  # glibc has it
+        trim(0)
+
+
 def block_values(matrix: PETSc.Mat) -> tuple[ctypes.c_void_p, ctypes.c_void_p]:
     """Where the blocks of this rank's rows begin: row by row, each column by column.
 

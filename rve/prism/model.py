@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import lru_cache, partial
+from importlib import import_module
 from pathlib import Path
 from typing import ClassVar
 
@@ -28,8 +29,8 @@ from alphacut.rve.certificate import (
 )
 from alphacut.rve.mesh.periodicity import mismatch
 from alphacut.rve.mesh.prism_grid import PrismGrid
-from alphacut.rve.mesh.triangulation import reference_radius, triangulate
-from alphacut.rve.petsc import clean
+from alphacut.rve.mesh.triangulation import Triangulation, reference_radius, triangulate
+from alphacut.rve.petsc import clean, give_back
 from alphacut.rve.prism.error_estimate import judged, moduli_of
 from alphacut.rve.prism.mixed_element import NEARLY_INCOMPRESSIBLE
 from alphacut.rve.prism.modulus_basis import BasisError, ModulusBasis
@@ -166,9 +167,13 @@ class PrismModel:
 
         def means(model: PrismModel) -> list[Array]:  # not the results: some maps cannot be sent
             curves = [one.curve for one in model.solve(radius_map, matrix, inclusions)]
+            if self._ranks.rank:  # which the next step loads Gmsh on, while the first may solve
+                give_back()
+                import_module("alphacut.rve.mesh.planar")
             return [with_ratio(curve.weights @ moduli_of(curve)) for curve in curves]
 
         try:
+            coarse._plane(radius_map, self._ranks)  # made by the first, kept by both
             pairs = alone.each(means, (coarse, thick))
         except RuntimeError:  # folded, or not solved: the share stays unknown, the sum does not
             return [np.zeros(4) for _ in inclusions]
@@ -176,11 +181,15 @@ class PrismModel:
 
     def _moved(self, radius_map: RadiusMap, watch: Stopwatch) -> PrismSystem:
         with watch("mesh"):
-            radius = reference_radius(radius_map) if self.interface == "conforming" else 0.0
-            system = _system(self.mesh_size, self.layers, radius, self.parallel, self.cache)
+            plane = self._plane(radius_map, self._ranks)
+            system = _system(plane, self.layers, self.parallel)
             system.move(radius_map)
         watch.shift("mesh", "jit", system.take_jit_seconds())
         return system
+
+    def _plane(self, radius_map: RadiusMap, ranks: Ranks) -> Triangulation:
+        radius = reference_radius(radius_map) if self.interface == "conforming" else 0.0
+        return _plane(self.mesh_size, radius, self.cache, ranks)
 
     @property
     def _loads(self) -> Array:
@@ -299,14 +308,23 @@ def certify(means: SliceMeans, phases: tuple[Phase, Phase], loads: Array) -> dic
     return {"hill_mandel": gap, **bounds}
 
 
-_plane = lru_cache(maxsize=4)(triangulate)
+_PLANES: dict[tuple[float, float, Path | None], Triangulation] = {}
+_MOST_PLANES = 4  # that are kept
+
+
+def _plane(size: float, radius: float, cache: Path | None, ranks: Ranks) -> Triangulation:
+    """Planar mesh, kept; of several ranks the first alone makes it, and loads Gmsh."""
+    key = size, radius, cache
+    if not all(ranks.all(key in _PLANES)):
+        made = ranks.first(partial(triangulate, size=size, radius=radius, cache=cache))
+        while len(_PLANES) >= _MOST_PLANES:
+            del _PLANES[next(iter(_PLANES))]
+        _PLANES[key] = made
+    return _PLANES[key]
 
 
 @lru_cache(maxsize=4)
-def _system(
-    mesh_size: float, layers: int, radius: float, parallel: bool, cache: Path | None = None
-) -> PrismSystem:
-    """Topology, forms and numbering: they do not depend on the map, only on these numbers."""
-    plane = _plane(size=mesh_size, radius=radius, cache=cache)
+def _system(plane: Triangulation, layers: int, parallel: bool) -> PrismSystem:
+    """Topology, forms and numbering: they do not depend on the map, only on these."""
     communicator = MPI.COMM_WORLD if parallel else MPI.COMM_SELF
-    return PrismSystem(PrismGrid(plane, layers, radius > 0), communicator)
+    return PrismSystem(PrismGrid(plane, layers, plane.radius > 0), communicator)

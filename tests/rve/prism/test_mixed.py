@@ -53,13 +53,13 @@ def test_a_direct_solver_gives_the_same():
 
 def test_stresses_at_nodes_follow_the_series():
     from alphacut.rve.cell import LOADS
-    from alphacut.rve.prism.model import _system, reference_radius
+    from alphacut.rve.prism.model import _system, reference_radius, triangulate
     from alphacut.rve.prism.task import PrismTask, Stopwatch
     from alphacut.rve.series.field import SeriesField
     from alphacut.rve.solver.options import SolverOptions
 
     crisp, phases = HermiteMap(0.5, 0, 0.5, 0), (Phase(20e9, 0.4999), Phase(80e9, 0.3))
-    system = _system(0.15, 1, reference_radius(crisp), False)
+    system = _system(triangulate(size=0.15, radius=reference_radius(crisp)), 1, False)
     system.move(crisp)
     solved = PrismTask(system, SolverOptions(), LOADS, Stopwatch()).solve(phases)
     centre = np.array([[1 / 3, 1 / 3, 0.0], [1 / 3, 1 / 3, 1.0]])

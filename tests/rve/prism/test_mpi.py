@@ -50,7 +50,7 @@ import json, sys
 import numpy as np
 from mpi4py import MPI
 from alphacut.rve.cell import LOADS, Phase
-from alphacut.rve.mesh.triangulation import reference_radius
+from alphacut.rve.mesh.triangulation import reference_radius, triangulate
 from alphacut.rve.prism.model import PrismModel, _system
 from alphacut.rve.prism.task import PrismTask, Stopwatch
 from alphacut.rve.solver.options import SolverOptions
@@ -65,7 +65,7 @@ for layers, matrix, options in (
     model = PrismModel(0.4, layers, parallel=ranks.size > 1, **options)
     curve = model.solve(radii, matrix, [Phase(80e9)])[0].curve
     found.append([*curve.mean, *curve.s11, *curve.s12])
-system = _system(0.4, 5, reference_radius(radii), ranks.size > 1)
+system = _system(triangulate(size=0.4, radius=reference_radius(radii)), 5, ranks.size > 1)
 system.move(radii)
 solved = PrismTask(system, SolverOptions(), LOADS, Stopwatch()).solve((Phase(20e9), Phase(80e9)))
 found.append(ranks.gather(len(solved.total)))
