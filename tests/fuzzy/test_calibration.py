@@ -81,6 +81,16 @@ def test_error_of_a_response_surface(degree):
     require_tight(surface.error[0], true)
 
 
+def test_error_of_a_response_surface_is_that_at_samples_left_out():
+    points = np.random.default_rng(3).uniform(-1, 1, 7)
+    values, left_out = np.exp(2 * points), []
+    for k in range(len(points)):
+        others = np.delete(points, k), np.delete(values, k)
+        left_out.append(values[k] - np.polyval(np.polyfit(*others, 3), points[k]))
+    surface = ResponseSurface.fit(points[:, None], values[:, None], degree=3)
+    assert surface.error[0] == pytest.approx(np.sqrt(np.mean(np.square(left_out))), rel=1e-9)
+
+
 @pytest.mark.parametrize("boxes", [20, 40])
 def test_error_of_a_metamodel(boxes):
     inputs = {"x": Triangular(0, 0.4, 1), "y": Triangular(0, 0.5, 1)}
