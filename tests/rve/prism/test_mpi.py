@@ -22,8 +22,15 @@ SOLVE = ["-m", "rve", "solve", "cases/paper.toml", "--mesh-size", "0.3", "--json
 
 
 def run(command):
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
-    return done.returncode, done.stdout, done.stderr
+    made = subprocess.Popen(
+        command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    try:
+        printed, errors = made.communicate(timeout=300)
+    except subprocess.TimeoutExpired:
+        made.terminate()  # mpirun, which ends its ranks; killed, it would leave them spinning
+        raise
+    return made.returncode, printed, errors
 
 
 def solve(ranks, *options):
