@@ -23,7 +23,7 @@ JIT = {"cffi_extra_compile_args": ["-O3", "-ffast-math"], "timeout": 120}  # for
 # FFCx's own: a file of the caller's folder could ask for single precision, and stay in the cache
 _TABLES = {"epsilon": 1e-14, "table_rtol": 1e-6, "table_atol": 1e-9}
 _FFCX = {"scalar_type": "float64", "sum_factorization": False, **_TABLES}
-_MADE_BY = "fenics-dolfinx", "fenics-ffcx", "fenics-ufl", "fenics-basix"
+MADE_BY = "fenics-dolfinx", "fenics-ffcx", "fenics-ufl", "fenics-basix"
 
 
 @cache
@@ -36,7 +36,7 @@ def triangle_integral(order: int, *, weighted: bool = False) -> Callable[..., No
     """
     source = Path(__file__).read_text(encoding="utf-8")
     machine = platform.machine(), str(sys.implementation.cache_tag)
-    parts = [source, *map(version_of, _MADE_BY), *machine, order, weighted]
+    parts = [source, *map(version_of, MADE_BY), *machine, order, weighted]
     note = kernels() / f"form-{hashlib.sha256(repr(parts).encode()).hexdigest()[:16]}"
     try:
         return _function(note.read_text(encoding="utf-8"))

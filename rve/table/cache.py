@@ -15,7 +15,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from alphacut.rve.ranks import ALONE, Ranks
-from alphacut.rve.solver.integrals import version_of
+from alphacut.rve.solver.integrals import MADE_BY, version_of
 from alphacut.rve.table.build import PlanarSource, Source, build_table
 from alphacut.rve.table.interpolant import Table, TableRange
 
@@ -33,7 +33,7 @@ _PROGRAMS = (
     "spheres/**/*.py",
     "table/*.py",
 )
-_PACKAGES = ("numpy", "scipy", "fenics-dolfinx", "fenics-basix", "fenics-ffcx", "petsc4py", "gmsh")
+_PACKAGES = "numpy", "scipy", "cvxopt", "petsc4py", "gmsh", *MADE_BY
 
 
 def table_key(span: TableRange, *, accuracy: float, source: str) -> str:
