@@ -6,6 +6,7 @@ import pytest
 from alphacut.frame.calculus import modal_jet
 from alphacut.frame.calculus.modal_jet import composed
 from alphacut.frame.calculus.polynomial import Polynomial, exponents
+from tests.frame.compiler import compiled
 
 
 def drawn(seed, d, n, degree, count=20):
@@ -26,6 +27,7 @@ def jet(both, unit, n, place=2):
     return out
 
 
+@compiled
 @pytest.mark.parametrize(("d", "n", "degree"), [(1, 1, 1), (2, 3, 4), (6, 2, 3), (3, 1, 2)])
 def test_compiled_derivatives_are_those_of_numpy(d, n, degree, monkeypatch):
     both, unit = drawn(31 * d + n, d, n, degree)

@@ -12,6 +12,7 @@ from alphacut.frame.calculus.c_library import c_library
 from alphacut.frame.calculus.jet import Jet, cos
 from alphacut.frame.dynamics.flow import StepError
 from alphacut.frame.dynamics.nonlinear import SCHEMES
+from tests.frame.compiler import compiled
 
 SPRINGS = LagrangianSystem(
     2,
@@ -35,6 +36,7 @@ def twins(scheme: str) -> tuple[LagrangianFlow, LagrangianFlow]:
     return compiled, plain
 
 
+@compiled
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_compiled_trajectories_and_derivatives_are_those_of_numpy(scheme: str) -> None:
     compiled, plain = twins(scheme)
@@ -47,6 +49,7 @@ def test_compiled_trajectories_and_derivatives_are_those_of_numpy(scheme: str) -
     assert np.abs(compiled.values(POINTS) - slow.value).max() < 1e-11
 
 
+@compiled
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_compiled_trajectory_does_not_depend_on_those_beside_it(scheme: str) -> None:
     flow = LagrangianFlow(SPRINGS, NAMES, 2.0, 0.02, scheme)
@@ -72,6 +75,7 @@ def test_a_compiled_step_that_fails_names_the_step_and_the_parameters() -> None:
         LagrangianFlow(pendulum(phi0=3.0), ("l", "m", "d"), 400.0, 4.0).values(point)
 
 
+@compiled
 def test_many_trajectories_cost_a_fraction_of_numpy() -> None:
     compiled, plain = twins("midpoint")
     many = np.tile(POINTS, (10, 1))

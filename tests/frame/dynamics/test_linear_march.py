@@ -14,6 +14,7 @@ from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.dynamics import transfer_powers
 from alphacut.frame.dynamics.integrators import StepMap
 from alphacut.frame.structures.linear import evaluate
+from tests.frame.compiler import compiled
 
 FULL = [(1, 1), (2, 9), (3, 4), (6, 3), (8, 8), (9, 2), (16, 1), (19, 17)]
 """Numbers of states and outputs: with constants in the code and without, whole vectors and not."""
@@ -77,6 +78,7 @@ def twins(monkeypatch: pytest.MonkeyPatch, march: Callable[[], Jet]) -> tuple[Je
         return fast, march()
 
 
+@compiled
 @pytest.mark.parametrize(("method", "shaken"), product(INTEGRATORS, [False, True]))
 def test_structures_move_as_in_numpy(
     monkeypatch: pytest.MonkeyPatch, method: str, shaken: bool
@@ -93,6 +95,7 @@ def test_structures_move_as_in_numpy(
         assert np.abs(flow.values(points) - slow.value).max() <= 1e-12 * np.abs(slow.value).max()
 
 
+@compiled
 @pytest.mark.parametrize("d", [0, 1, 2, 5])
 @pytest.mark.parametrize(("states", "outputs"), FULL)
 @pytest.mark.parametrize("loaded", [False, True])
@@ -113,6 +116,7 @@ def test_full_jets_of_any_size_agree(
         assert alike(fast, slow, (-3, -2, -1))
 
 
+@compiled
 def test_parts_that_are_zero_at_some_sets_alone_are_not_left_out(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -137,6 +141,7 @@ def test_parts_that_are_zero_at_some_sets_alone_are_not_left_out(
         assert np.array_equal(one.second[:, :, 0], fast.second[:, :, s])
 
 
+@compiled
 @pytest.mark.parametrize("damper", [0.0, 60.0])
 def test_rounding_hardly_grows_over_many_steps(
     monkeypatch: pytest.MonkeyPatch, damper: float
@@ -156,6 +161,7 @@ def test_rounding_hardly_grows_over_many_steps(
     assert errors[1] < 1e-11
 
 
+@compiled
 def test_numpy_marches_where_the_code_finds_no_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     step, start, rows = random_motion(np.random.default_rng(2), 4, 2, 2)
 

@@ -23,6 +23,7 @@ from alphacut.frame.modal.search import QUIET
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy import Interval
+from tests.frame.compiler import compiled
 
 RECORD = Accelerogram(0.017, np.random.default_rng(4).normal(size=150))
 FRAME = StoreyFrame(
@@ -126,6 +127,7 @@ def test_modes_that_do_not_couple_give_what_all_give_in_many_parameters() -> Non
     assert np.abs(gradient - other.at(points, node, output)[1]).max() < 1e-10
 
 
+@compiled
 def test_the_answer_to_the_ground_is_the_same_compiled_and_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -146,6 +148,7 @@ def test_the_answer_to_the_ground_is_the_same_compiled_and_not(
         assert not np.array_equal(a, b)
 
 
+@compiled
 @pytest.mark.parametrize("seed", range(6))
 def test_compiled_modes_give_what_eigenvectors_give(
     seed: int, monkeypatch: pytest.MonkeyPatch
@@ -249,6 +252,7 @@ def test_points_of_analysis_are_nested_and_hopeless_degrees_are_not_begun() -> N
     assert hopeless([1e-2, 1e-2, 2e-2, 3e-2], 1e-6, 3, 280)
 
 
+@compiled
 @pytest.mark.parametrize("d", [1, 4, 12, 30])
 def test_compiled_maxima_of_quadratics_are_those_of_numpy(
     d: int, monkeypatch: pytest.MonkeyPatch
