@@ -241,3 +241,17 @@ def test_a_mesh_that_folds_over_is_refused_with_its_cure():
     ):
         solve(bent, mesh_size=0.4, layers=2)
     assert solve(bent, mesh_size=0.4, layers=8).modulus > 20e9
+
+
+@pytest.mark.parametrize("layers", [2, 4, 6])
+@pytest.mark.parametrize("modulus", [80e9, 400e9])
+def test_errors_of_layers_are_about_what_eight_times_as_many_take_away(layers, modulus):
+    radii, matrix, particle = PAPER, Phase(20e9), [Phase(modulus)]
+    (told,) = PrismModel(0.25, layers).errors_of_layers(radii, matrix, particle)
+    few, many = (
+        PrismModel(0.25, n).solve(radii, matrix, particle)[0].curve for n in (layers, 8 * layers)
+    )
+    for own, name in ((told[0], "s11"), (told[2], "s12")):
+        means = [one.weights @ getattr(one, name) for one in (few, many)]
+        true = abs(means[0] / means[1] - 1)
+        assert true < own < 5 * true
