@@ -7,74 +7,127 @@
 
 typedef double complex z;
 
-/* Lower Cholesky factor of A (n, n) in place; 0 where A is not positive definite. */
-static int cholesky(int n, double *A)
+/* Eight sets side by side, one in each lane. */
+#define LANES 8
+typedef double v __attribute__((vector_size(8 * LANES)));
+typedef long long flags __attribute__((vector_size(8 * LANES)));
+typedef struct { v re, im; } c;
+
+static v pick(flags which, v yes, v no) { return (v)(((flags)yes & which) | ((flags)no & ~which)); }
+static v magnitude(v x) { return pick(x < 0, -x, x); }
+static v larger(v x, v y) { return pick(x > y, x, y); }
+
+static v roots(v x)
+{
+    union { v all; double each[LANES]; } r = {x};
+    for (int i = 0; i < LANES; i++) r.each[i] = sqrt(r.each[i]);
+    return r.all;
+}
+
+static int any(flags which)
+{
+    long long found = 0;
+    for (int i = 0; i < LANES; i++) found |= which[i];
+    return found != 0;
+}
+
+static c both(v re, v im) { c x = {re, im}; return x; }
+static c sum(c x, c y) { return both(x.re + y.re, x.im + y.im); }
+static c product(c x, c y) { return both(x.re * y.re - x.im * y.im, x.re * y.im + x.im * y.re); }
+static c times(v f, c x) { return both(f * x.re, f * x.im); }
+static c choice(flags which, c x, c y) { return both(pick(which, x.re, y.re), pick(which, x.im, y.im)); }
+static v size(c x) { return magnitude(x.re) + magnitude(x.im); }
+static v length(c x) { return roots(x.re * x.re + x.im * x.im); }
+static c inverse(c x) { v f = 1 / (x.re * x.re + x.im * x.im); return both(f * x.re, -f * x.im); }
+
+/* Square root with a real part that is not negative; plain: x is neither huge nor tiny. */
+static c complex_root(c x)
+{
+    v most = roots((length(x) + magnitude(x.re)) / 2);
+    v other = pick(most > 0, magnitude(x.im) / (2 * most), most), turned = pick(x.im < 0, -most, most);
+    return choice(x.re >= 0, both(most, pick(x.im < 0, -other, other)), both(other, turned));
+}
+
+/* Lower Cholesky factor of A (n, n) in place; 0 where one is not positive definite. */
+static int cholesky(int n, v *A)
 {
     for (int j = 0; j < n; j++) {
+        v one = {0};
         for (int i = j; i < n; i++) {
-            double s = A[i * n + j];
+            v s = A[i * n + j];
             for (int k = 0; k < j; k++) s -= A[i * n + k] * A[j * n + k];
             if (i == j) {
-                if (!(s > 0)) return 0;
-                A[j * n + j] = sqrt(s);
-            } else A[i * n + j] = s / A[j * n + j];
+                if (any(~(s > 0))) return 0;
+                A[j * n + j] = roots(s);
+                one = 1 / A[j * n + j];
+            } else A[i * n + j] = s * one;
         }
     }
     return 1;
 }
 
-/* B := Wt A W with W (n, n); `work` holds n * n numbers. */
-static void congruent(int n, const double *restrict A, const double *restrict W,
-                      double *restrict B, double *restrict work)
+/* B := Wt A W with W (n, n) and symmetric A; `work` holds n * n lanes. */
+static void congruent(int n, const v *restrict A, const v *restrict W, v *restrict B, v *restrict work)
 {
-    for (int i = 0; i < n * n; i++) B[i] = work[i] = 0;
     for (int i = 0; i < n; i++)
-        for (int k = 0; k < n; k++)
-            for (int j = 0; j < n; j++) work[i * n + j] += A[i * n + k] * W[k * n + j];
-    for (int k = 0; k < n; k++)
-        for (int i = 0; i < n; i++)
-            for (int j = 0; j < n; j++) B[i * n + j] += W[k * n + i] * work[k * n + j];
+        for (int j = 0; j < n; j++) {
+            v s = {0};
+            for (int k = 0; k < n; k++) s += A[i * n + k] * W[k * n + j];
+            work[i * n + j] = s;
+        }
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j <= i; j++) {
+            v s = {0};
+            for (int k = 0; k < n; k++) s += W[k * n + i] * work[k * n + j];
+            B[i * n + j] = B[j * n + i] = s;
+        }
 }
 
 /* W := L^-T V with L lower. */
-static void lifted(int n, const double *restrict L, const double *restrict V, double *restrict W)
+static void lifted(int n, const v *restrict L, const v *restrict V, v *restrict W)
 {
     for (int i = n - 1; i >= 0; i--) {
-        for (int j = 0; j < n; j++) W[i * n + j] = V[i * n + j];
-        for (int k = i + 1; k < n; k++)
-            for (int j = 0; j < n; j++) W[i * n + j] -= L[k * n + i] * W[k * n + j];
-        double one = 1 / L[i * n + i];
-        for (int j = 0; j < n; j++) W[i * n + j] *= one;
+        v one = 1 / L[i * n + i];
+        for (int j = 0; j < n; j++) {
+            v s = V[i * n + j];
+            for (int k = i + 1; k < n; k++) s -= L[k * n + i] * W[k * n + j];
+            W[i * n + j] = s * one;
+        }
     }
 }
 
-/* Jacobi's rotations: W := W V with Vt A V diagonal; A becomes it. 0 where they do not end. */
-static int diagonal(int n, double *A, double *W)
+/* x, y := c x - s y, s x + c y. */
+static void turn(v c, v s, v *x, v *y)
+{
+    v before = *x;
+    *x = c * before - s * *y;
+    *y = s * before + c * *y;
+}
+
+/* Jacobi's rotations: V := V R with Rt A R diagonal; A becomes it. 0 where they do not end. */
+static int diagonal(int n, v *A, v *V)
 {
     for (int sweep = 0; sweep < 40; sweep++) {
         int turned = 0;
         for (int p = 0; p < n; p++)
             for (int q = p + 1; q < n; q++) {
-                double off = A[p * n + q], a = A[p * n + p], b = A[q * n + q];
-                if (fabs(off) <= 1e-16 * sqrt(fabs(a * b)) || fabs(off) < 1e-290) continue;
+                v off = A[p * n + q], a = A[p * n + p], b = A[q * n + q], far = magnitude(off);
+                flags open = (far > 1e-16 * roots(magnitude(a * b))) & (far >= 1e-290);
+                if (!any(open)) continue;
                 turned = 1;
-                double h = (b - a) / (2 * off);
-                double t = (h >= 0 ? 1 : -1) / (fabs(h) + sqrt(1 + h * h));
-                double c = 1 / sqrt(1 + t * t), s = t * c;
+                v h = pick(open, (b - a) / (2 * off), off), steep = 1 / (magnitude(h) + roots(1 + h * h));
+                v t = pick(open, pick(h < 0, -steep, steep), off * 0);
+                v cosine = 1 / roots(1 + t * t), sine = t * cosine;
                 for (int k = 0; k < n; k++) {
-                    double x = A[p * n + k], y = A[q * n + k];
-                    A[p * n + k] = c * x - s * y;
-                    A[q * n + k] = s * x + c * y;
+                    turn(cosine, sine, V + k * n + p, V + k * n + q);
+                    if (k == p || k == q) continue;
+                    turn(cosine, sine, A + k * n + p, A + k * n + q);
+                    A[p * n + k] = A[k * n + p];
+                    A[q * n + k] = A[k * n + q];
                 }
-                for (int k = 0; k < n; k++) {
-                    double x = A[k * n + p], y = A[k * n + q];
-                    A[k * n + p] = c * x - s * y;
-                    A[k * n + q] = s * x + c * y;
-                    x = W[k * n + p], y = W[k * n + q];
-                    W[k * n + p] = c * x - s * y;
-                    W[k * n + q] = s * x + c * y;
-                }
-                A[p * n + q] = A[q * n + p] = 0;
+                A[p * n + p] = a - t * off;
+                A[q * n + q] = b + t * off;
+                A[p * n + q] = A[q * n + p] = pick(open, off * 0, off);
             }
         if (!turned) return 1;
     }
@@ -82,15 +135,15 @@ static int diagonal(int n, double *A, double *W)
 }
 
 /* Plain formulas: what they are of is neither huge nor tiny. */
-static double length(z x) { return sqrt(creal(x) * creal(x) + cimag(x) * cimag(x)); }
+static double modulus(z x) { return sqrt(creal(x) * creal(x) + cimag(x) * cimag(x)); }
 
 static z root(z x)
 {
-    double most = sqrt((length(x) + fabs(creal(x))) / 2), other = most > 0 ? fabs(cimag(x)) / (2 * most) : 0;
+    double most = sqrt((modulus(x) + fabs(creal(x))) / 2), other = most > 0 ? fabs(cimag(x)) / (2 * most) : 0;
     return creal(x) >= 0 ? most + I * copysign(other, cimag(x)) : other + I * copysign(most, cimag(x));
 }
 
-static double size(z x) { return fabs(creal(x)) + fabs(cimag(x)); }
+static double span(z x) { return fabs(creal(x)) + fabs(cimag(x)); }
 
 /* x := B^-1 x by elimination with pivots, none below `least`; B (n, n) is lost. */
 static void solved(int n, z *B, z *x, double least)
@@ -98,7 +151,7 @@ static void solved(int n, z *B, z *x, double least)
     for (int j = 0; j < n; j++) {
         int best = j;
         for (int i = j + 1; i < n; i++)
-            if (size(B[i * n + j]) > size(B[best * n + j])) best = i;
+            if (span(B[i * n + j]) > span(B[best * n + j])) best = i;
         if (best != j) {
             for (int k = j; k < n; k++) {
                 z t = B[j * n + k];
@@ -109,7 +162,7 @@ static void solved(int n, z *B, z *x, double least)
             x[j] = x[best];
             x[best] = t;
         }
-        if (size(B[j * n + j]) < least) B[j * n + j] = least;
+        if (span(B[j * n + j]) < least) B[j * n + j] = least;
         z one = 1 / B[j * n + j];
         for (int i = j + 1; i < n; i++) {
             z f = B[i * n + j] * one;
@@ -128,7 +181,7 @@ static void solved(int n, z *B, z *x, double least)
 static double largest(int n, const z *u)
 {
     double most = 0;
-    for (int j = 0; j < n; j++) most = size(u[j]) > most ? size(u[j]) : most;
+    for (int j = 0; j < n; j++) most = span(u[j]) > most ? span(u[j]) : most;
     return most;
 }
 
@@ -144,56 +197,13 @@ static z rayleigh(int n, const double *C, const double *mu, const z *u, z near)
         m += mu[i] * u[i] * u[i];
     }
     z turn = root(c * c - 4 * a * m), one = (-c + turn) / (2 * a), two = (-c - turn) / (2 * a);
-    return length(one - near) < length(two - near) ? one : two;
+    return modulus(one - near) < modulus(two - near) ? one : two;
 }
 
-/* Iterates a mode whose shape hardly leaves the k-th undamped one, u_k = 1; 0 where that fails.
-   What is left of each row is divided by its own entry at the first rate. */
-static int weakly_coupled(int n, int k, const double *C, const double *mu, z *rate, z *u, z *work)
+/* The mode of l^2 + l C + mu that grows out of u at l, by inverse iteration; 0 where none is found. */
+static int strongly_coupled(int n, const double *C, const double *mu, z *rate, z *u, z *work)
 {
-    double *re = (double *)work, *im = re + n;
-    z *over = work + n, l = *rate;
-    for (int j = 0; j < n; j++) over[j] = j == k ? 0 : 1 / (l * l + l * C[j * n + j] + mu[j]);
-    for (int turns = 0; turns < 15; turns++) {
-        double moved = 0;
-        for (int j = 0; j < n; j++) re[j] = im[j] = 0;
-        for (int i = 0; i < n; i++) {  /* C u: C is symmetric */
-            double a = creal(u[i]), b = cimag(u[i]);
-            for (int j = 0; j < n; j++) re[j] += C[i * n + j] * a;
-            for (int j = 0; j < n; j++) im[j] += C[i * n + j] * b;
-        }
-        z half = (re[k] + I * im[k]) / 2, turn = root(half * half - mu[k]);
-        *rate = cimag(turn) < 0 ? -half - turn : -half + turn;
-        for (int j = 0; j < n; j++) {
-            z step = ((l * l + mu[j]) * u[j] + l * (re[j] + I * im[j])) * over[j];
-            moved = fmax(moved, size(step));
-            u[j] -= step;
-        }
-        moved = fmax(moved, size(*rate - l) / size(l));
-        l = *rate;
-        if (!(moved < 1e-2)) return 0;
-        if (moved < 1e-15) return cimag(l) > 1e-9 * length(l);
-    }
-    return 0;
-}
-
-/* The mode of l^2 + l C + mu that grows out of the k-th undamped one; 0 where it is not found. */
-static int mode(int n, int k, const double *C, const double *mu, z *rate, z *u, z *work)
-{
-    double decay = C[k * n + k] / 2, turn = mu[k] - decay * decay;
-    if (!(turn > 0)) return 0;
-    z l = -decay + I * sqrt(turn);
-    for (int j = 0; j < n; j++) {
-        z own = l * l + l * C[j * n + j] + mu[j];
-        u[j] = j == k ? 1 : -l * C[j * n + k] / own;
-        if (j != k && !(size(u[j]) < 1)) u[j] = 0;
-    }
-    z *kept = work + 2 * n;
-    *rate = l;
-    memcpy(kept, u, n * sizeof(z));
-    if (weakly_coupled(n, k, C, mu, rate, u, work)) return 1;
-    memcpy(u, kept, n * sizeof(z));
-    l = rayleigh(n, C, mu, u, l);
+    z l = rayleigh(n, C, mu, u, *rate);
     for (int turns = 0; turns < 12; turns++) {
         z *B = work, *w = work + n * n, before = l;
         for (int i = 0; i < n; i++) {
@@ -203,109 +213,217 @@ static int mode(int n, int k, const double *C, const double *mu, z *rate, z *u, 
                 w[i] += C[i * n + j] * u[j];
             }
         }
-        solved(n, B, w, 1e-17 * length(l) * length(l));
+        solved(n, B, w, 1e-17 * modulus(l) * modulus(l));
         double most = largest(n, w);
         if (!(most > 0) || !isfinite(most)) return 0;
         for (int i = 0; i < n; i++) u[i] = w[i] * (1 / most);
         l = rayleigh(n, C, mu, u, l);
         if (!isfinite(creal(l)) || !isfinite(cimag(l))) return 0;
-        if (length(l - before) < 1e-12 * length(l)) {
+        if (modulus(l - before) < 1e-12 * modulus(l)) {
             *rate = l;
-            return cimag(l) > 1e-9 * length(l);
+            return cimag(l) > 1e-9 * modulus(l);
         }
     }
     return 0;
 }
 
-/* Whether the scaled modes are different ones, and all: Y X = 1 to 1e-9; work (n, n). */
-static int complete(int n, const double *C, const z *rate, const z *u, z *work)
+/* Iterates modes whose shapes hardly leave the k-th undamped one, u_k = 1; returns where that ends.
+   What is left of each row is divided by its own entry at the first rate. work: 2 n. */
+static flags weakly_coupled(int n, int k, const v *C, const v *mu, c *rate, c *u, c *work)
 {
+    c *over = work, *Cu = work + n, l = *rate, square = product(l, l);
+    flags open = mu[k] == mu[k], done = ~open;
+    for (int j = 0; j < n; j++)
+        over[j] = inverse(both(square.re + l.re * C[j * n + j] + mu[j], square.im + l.im * C[j * n + j]));
+    over[k] = times(0 * mu[k], l);
+    for (int turns = 0; turns < 15 && any(open); turns++) {
+        for (int j = 0; j < n; j++) {
+            c s = times(C[j * n], u[0]);
+            for (int i = 1; i < n; i++) s = sum(s, times(C[j * n + i], u[i]));
+            Cu[j] = s;
+        }
+        c half = times(mu[k] * 0 + 0.5, Cu[k]), inner = product(half, half), next;
+        inner.re -= mu[k];
+        next = complex_root(inner);
+        v sign = pick(next.im < 0, mu[k] * 0 - 1, mu[k] * 0 + 1), moved = {0};
+        next = both(sign * next.re - half.re, sign * next.im - half.im);
+        square = product(l, l);
+        for (int j = 0; j < n; j++) {
+            c own = both(square.re + mu[j], square.im);
+            c step = product(sum(product(own, u[j]), product(l, Cu[j])), over[j]);
+            moved = larger(moved, size(step));
+            u[j] = choice(open, both(u[j].re - step.re, u[j].im - step.im), u[j]);
+        }
+        moved = larger(moved, size(both(next.re - l.re, next.im - l.im)) / size(l));
+        l = choice(open, next, l);
+        done |= open & (moved < 1e-15) & (l.im > 1e-9 * length(l));
+        open &= (moved < 1e-2) & ~(moved < 1e-15);
+    }
+    *rate = l;
+    return done;
+}
+
+/* The modes of l^2 + l C + mu that grow out of the k-th undamped one; 0 where one is not found.
+   work: 3 n lanes; single: n (2 n + 3) numbers of each kind. */
+static int mode(int n, int k, const v *C, const v *mu, c *rate, c *u, c *work, double *real, z *single)
+{
+    v decay = C[k * n + k] / 2, stiff = mu[k] - decay * decay;
+    if (any(~(stiff > 0))) return 0;
+    c l = both(-decay, roots(stiff)), square = product(l, l), *first = work + 2 * n;
+    for (int j = 0; j < n; j++) {
+        c own = both(square.re + l.re * C[j * n + j] + mu[j], square.im + l.im * C[j * n + j]);
+        c share = product(times(-C[j * n + k], l), inverse(own));
+        u[j] = j == k ? both(0 * decay + 1, 0 * decay) : choice(size(share) < 1, share, times(0 * decay, l));
+        first[j] = u[j];
+    }
+    *rate = l;
+    flags done = weakly_coupled(n, k, C, mu, rate, u, work);
+    for (int p = 0; p < LANES; p++) {
+        if (done[p]) continue;
+        z *own = single, one = l.re[p] + I * l.im[p];
+        for (int i = 0; i < n * n; i++) real[i] = C[i][p];
+        for (int j = 0; j < n; j++) {
+            real[n * n + j] = mu[j][p];
+            own[j] = first[j].re[p] + I * first[j].im[p];
+        }
+        if (!strongly_coupled(n, real, real + n * n, &one, own, single + n)) return 0;
+        rate->re[p] = creal(one), rate->im[p] = cimag(one);
+        for (int j = 0; j < n; j++) u[j].re[p] = creal(own[j]), u[j].im[p] = cimag(own[j]);
+    }
+    return 1;
+}
+
+/* u := u / root(ut (2 l + C) u), what Y [x; lambda x] = 1 asks for; 0 where that nearly vanishes. */
+static int scaled(int n, const v *C, c rate, c *u)
+{
+    c scale = times(0 * rate.re, rate);
+    v total = {0};
+    for (int i = 0; i < n; i++) {
+        c s = times(2 * (0 * total + 1), product(rate, u[i]));
+        for (int j = 0; j < n; j++) s = sum(s, times(C[i * n + j], u[j]));
+        scale = sum(scale, product(u[i], s));
+        total += u[i].re * u[i].re + u[i].im * u[i].im;
+    }
+    if (any(~(length(scale) > 1e-6 * length(rate) * total))) return 0;
+    scale = inverse(complex_root(scale));
+    for (int i = 0; i < n; i++) u[i] = product(scale, u[i]);
+    return 1;
+}
+
+/* Whether the scaled modes are different ones, and all: Y X = 1 to 1e-9; work (n, n). */
+static int complete(int n, const v *C, const c *rate, const c *u, c *work)
+{
+    v most = {0};
     for (int k = 0; k < n; k++)
-        for (int b = 0; b < n; b++) {
-            z own = u[k * n + b];
-            for (int a = 0; a < n; a++) work[k * n + a] = (b ? work[k * n + a] : 0) + C[b * n + a] * own;
+        for (int a = 0; a < n; a++) {
+            c s = times(C[a * n], u[k * n]);
+            for (int b = 1; b < n; b++) s = sum(s, times(C[a * n + b], u[k * n + b]));
+            work[k * n + a] = s;
         }
     for (int j = 0; j < n; j++)
         for (int k = 0; k <= j; k++) {
-            z both = 0, cross = 0, damped = 0, other = 0;
-            for (int a = 0; a < n; a++) {
-                z own = u[j * n + a];
-                both += own * u[k * n + a];
-                damped += own * work[k * n + a];
-                cross += own * conj(u[k * n + a]);
-                other += own * conj(work[k * n + a]);
+            v rr = {0}, ii = rr, ri = rr, ir = rr, RR = rr, II = rr, RI = rr, IR = rr;
+            for (int a = 0; a < n; a++) {  /* of real and imaginary parts */
+                c own = u[j * n + a], other = u[k * n + a], damped = work[k * n + a];
+                rr += own.re * other.re, ii += own.im * other.im;
+                ri += own.re * other.im, ir += own.im * other.re;
+                RR += own.re * damped.re, II += own.im * damped.im;
+                RI += own.re * damped.im, IR += own.im * damped.re;
             }
-            if (j != k && !(size((rate[j] + rate[k]) * both + damped) < 1e-9)) return 0;
-            if (!(size((rate[j] + conj(rate[k])) * cross + other) < 1e-9)) return 0;
+            c same = both(rr - ii, ri + ir), across = both(rr + ii, ir - ri);
+            c plus = both(rate[j].re + rate[k].re, rate[j].im + rate[k].im);
+            c minus = both(plus.re, rate[j].im - rate[k].im);
+            v one = size(sum(product(plus, same), both(RR - II, RI + IR)));
+            v two = size(sum(product(minus, across), both(RR + II, IR - RI)));
+            if (j != k) most = pick(one <= most, most, one);
+            most = pick(two <= most, most, two);
+            if (any(~(most < 1e-9))) return 0;
         }
     return 1;
 }
 
-/* Modes by rising |lambda| at `points` sets, M, D, K (points, n, n): rate (points, n), right vectors
-   (points, n modes, n), left ones (points, n modes, 2n) with Y [x; lambda x] = 1.
+/* Up to eight sets from M, D, K (sets, 3, n, n) into lanes, the last again where they are fewer. */
+static void gathered(long sets, int n, const double *parts, v *out)
+{
+    for (int p = 0; p < LANES; p++) {
+        const double *own = parts + (p < sets ? p : sets - 1) * 3L * n * n;
+        for (int i = 0; i < 3 * n * n; i++) out[i][p] = own[i];
+    }
+}
+
+/* out := A x with a real A. */
+static void applied(int n, const v *A, const c *x, c *out)
+{
+    for (int i = 0; i < n; i++) {
+        c s = times(A[i * n], x[0]);
+        for (int j = 1; j < n; j++) s = sum(s, times(A[i * n + j], x[j]));
+        out[i] = s;
+    }
+}
+
+/* Right and left vectors of lanes' modes (n of 3 n each: x, M x, l M x + D x) in their place. */
+static void placed(long sets, int n, const c *l, const c *found, double *rates, double *right, double *left)
+{
+    for (int p = 0; p < sets; p++)
+        for (int k = 0; k < n; k++) {
+            int place = 0;  /* by rising |l| */
+            double own = l[k].re[p] * l[k].re[p] + l[k].im[p] * l[k].im[p];
+            for (int j = 0; j < n; j++) {
+                double other = l[j].re[p] * l[j].re[p] + l[j].im[p] * l[j].im[p];
+                place += other < own || (other == own && j < k);
+            }
+            long at = p * n + place;
+            double *x = right + 2 * at * n, *y = left + 4 * at * n;
+            const c *from = found + 3 * k * n;
+            rates[2 * at] = l[k].re[p], rates[2 * at + 1] = l[k].im[p];
+            for (int i = 0; i < n; i++) {
+                x[2 * i] = from[i].re[p], x[2 * i + 1] = from[i].im[p];
+                y[2 * (n + i)] = from[n + i].re[p], y[2 * (n + i) + 1] = from[n + i].im[p];
+                y[2 * i] = from[2 * n + i].re[p], y[2 * i + 1] = from[2 * n + i].im[p];
+            }
+        }
+}
+
+/* Modes by rising |lambda| at `points` sets of M, D, K (points, 3, n, n): rate (points, n), right
+   vectors (points, n modes, n), left ones (points, n modes, 2n) with Y [x; lambda x] = 1.
    Returns 0 where a set's are not found: not oscillating, nearly equal or nearly critical. */
-int damped_modes(long points, int n, const double *M, const double *D, const double *K,
-                 double *rates, double *right, double *left)
+int damped_modes(long points, int n, const double *parts, double *rates, double *right, double *left)
 {
     long nn = (long)n * n;
-    double *real = calloc(6 * nn + n, sizeof(double)), *L = real, *W = real + nn, *A = W + nn;
-    double *C = A + nn, *work = C + nn, *mu = work + nn, *V = mu + n;
-    z *both = calloc(3 * nn + 5 * n, sizeof(z)), *u = both, *rest = u + nn, *l = rest + nn + 3 * n;
-    int *order = calloc(n, sizeof(int)), good = real && both && order;
-    for (long p = 0; p < points && good; p++) {
-        const double *Mp = M + p * nn, *Dp = D + p * nn, *Kp = K + p * nn;
-        if (p % 16 == 0)  /* before round-off adds up */
-            for (int i = 0; i < nn; i++) V[i] = i % (n + 1) == 0;
-        memcpy(L, Mp, nn * sizeof(double));
+    v *all = aligned_alloc(sizeof(v), (19 * nn + 9 * n) * sizeof(v)), *M = all, *D = M + nn, *K = D + nn;
+    v *L = K + nn, *W = L + nn, *A = W + nn, *C = A + nn, *work = C + nn, *V = work + nn, *mu = V + nn;
+    c *u = (c *)(mu + n), *rest = u + nn, *l = rest + nn + 3 * n, *found = l + n;
+    double *real = calloc(nn + n, sizeof(double));
+    z *single = calloc(nn + 2 * n, sizeof(z));
+    int good = all && real && single;
+    for (long p = 0; p < points && good; p += LANES) {
+        long sets = points - p < LANES ? points - p : LANES;
+        gathered(sets, n, parts + 3 * p * nn, M);
+        if (p % (16 * LANES) == 0)  /* before round-off adds up */
+            for (int i = 0; i < nn; i++) V[i] = 0 * M[i] + (i % (n + 1) == 0);
+        memcpy(L, M, nn * sizeof(v));
         if (!(good = cholesky(n, L))) break;
-        lifted(n, L, V, W);  /* the basis of the last set first */
-        congruent(n, Kp, W, A, work);
+        lifted(n, L, V, W);  /* the basis of the last sets first */
+        congruent(n, K, W, A, work);
         if (!(good = diagonal(n, A, V))) break;
         lifted(n, L, V, W);
-        congruent(n, Dp, W, C, work);
+        congruent(n, D, W, C, work);
         for (int k = 0; k < n; k++) mu[k] = A[k * n + k];
-        for (int k = 0; k < n && good; k++) {
-            z *own = u + k * n, scale = 0;
-            if (!(good = mode(n, k, C, mu, l + k, own, rest))) break;
-            double sum = 0;
-            for (int i = 0; i < n; i++) {
-                z s = 2 * l[k] * own[i];
-                for (int j = 0; j < n; j++) s += C[i * n + j] * own[j];
-                scale += own[i] * s;
-                sum += creal(own[i] * conj(own[i]));
-            }
-            if (!(good = length(scale) > 1e-6 * length(l[k]) * sum)) break;
-            scale = 1 / root(scale);
-            for (int i = 0; i < n; i++) own[i] *= scale;
-        }
+        for (int k = 0; k < n && good; k++)
+            good = mode(n, k, C, mu, l + k, u + k * n, rest, real, single) && scaled(n, C, l[k], u + k * n);
         if (!good || !(good = complete(n, C, l, u, rest))) break;
         for (int k = 0; k < n; k++) {
-            int place = k;
-            for (; place > 0 && length(l[order[place - 1]]) > length(l[k]); place--)
-                order[place] = order[place - 1];
-            order[place] = k;
+            c *x = found + 3 * k * n, *mass = x + n, *damping = mass + n;
+            applied(n, W, u + k * n, x);
+            applied(n, M, x, mass);
+            applied(n, D, x, damping);
+            for (int i = 0; i < n; i++) damping[i] = sum(damping[i], product(l[k], mass[i]));
         }
-        for (int k = 0; k < n; k++) {
-            z *x = (z *)right + (p * n + k) * n, *y = (z *)left + (p * n + k) * 2 * n;
-            const z *own = u + order[k] * n, rate = ((z *)rates)[p * n + k] = l[order[k]];
-            for (int i = 0; i < n; i++) {
-                x[i] = 0;
-                for (int j = 0; j < n; j++) x[i] += W[i * n + j] * own[j];
-            }
-            for (int i = 0; i < n; i++) {
-                z mass = 0, damping = 0;
-                for (int j = 0; j < n; j++) {
-                    mass += Mp[i * n + j] * x[j];
-                    damping += Dp[i * n + j] * x[j];
-                }
-                y[i] = rate * mass + damping;
-                y[n + i] = mass;
-            }
-        }
+        placed(sets, n, l, found, rates + 2 * p * n, right + 2 * p * nn, left + 4 * p * nn);
     }
+    free(all);
     free(real);
-    free(both);
-    free(order);
+    free(single);
     return good;
 }
 
@@ -362,7 +480,7 @@ int damped_outputs(long problems, int n, int deep, int shaken, double near, cons
         for (int j = 0; j < n; j++)
             for (int k = 0; k < n; k++) {
                 z gap = rate[j] - rate[k], across = rate[j] - conj(rate[k]);
-                int close = length(gap) * t < near, beside = length(across) * t < near;
+                int close = modulus(gap) * t < near, beside = modulus(across) * t < near;
                 z w = start[k] * divided(gap, close, wave[j], wave[k], t * wave[j], t * wave[k]);
                 z c = conj(start[k]) * divided(across, beside, wave[j], conj(wave[k]), t * wave[j],
                                                t * conj(wave[k]));

@@ -34,16 +34,16 @@ class DampedModes:
 
     @classmethod
     def of(cls, parts: Array) -> DampedModes | None:
-        """Of M, D and K, shape (3, S, n, n); None without a compiler, or where a mode is not found.
+        """Of M, D and K, shape (S, 3, n, n); None without a compiler, or where a mode is not found.
 
         That is one that does not oscillate, or two that nearly coincide.
         """
-        library, (_, count, n, _) = _library(), parts.shape
+        library, (count, _, n, _) = _library(), parts.shape
         if library is None:
             return None
         rate, right = np.empty((count, n), complex), np.empty((count, n, n), complex)
         left, whole = np.empty((count, n, 2 * n), complex), np.ascontiguousarray(parts)
-        given = [*map(address, whole), *(address(x.view(float)) for x in (rate, right, left))]
+        given = map(address, (whole, *(x.view(float) for x in (rate, right, left))))
         good = library.damped_modes(ctypes.c_long(count), ctypes.c_int(n), *given)
         return cls(rate, right, left) if good else None
 

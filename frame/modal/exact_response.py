@@ -158,7 +158,7 @@ class ExactResponse:
         value, slopes = law.at(flow.system, flow.names, physical, derivatives=deep)
         shape = (len(value), *law.parts.shape[1:])
         arrays = (value @ law.parts.reshape(value.shape[1], -1)).reshape(shape)
-        modes = DampedModes.of(arrays.swapaxes(0, 1))
+        modes = DampedModes.of(arrays)
         if modes is None:
             return None
         ground = None if self.load is None else self.load.response(modes.rate[own], node)[:2]

@@ -11,6 +11,7 @@ from alphacut.frame import Accelerogram, Exact, LinearFlow, MatrixStructure, Sto
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus import box_quadratic
 from alphacut.frame.calculus.c_library import c_library
+from alphacut.frame.calculus.damped_modes import DampedModes
 from alphacut.frame.methods.auto import Auto, ToleranceError
 from alphacut.frame.methods.modal import Modal
 from alphacut.frame.methods.plan import candidates
@@ -84,6 +85,28 @@ def test_values_and_gradients_are_those_of_exact_trajectories(system: StoreyFram
     assert np.abs(value - true).max() < 1e-9 * np.abs(jet.value).max()
     assert np.abs(exact.value_at(points, node, output) - true).max() < 1e-9 * np.abs(true).max()
     assert np.abs(gradient - slope).max() < 1e-8 * np.abs(slope).max()
+
+
+@compiled
+@pytest.mark.parametrize("share", [1e-3, 0.03, 0.5], ids=["light", "usual", "heavy"])
+@pytest.mark.parametrize("n", [1, 2, 6, 11])
+def test_damped_modes_are_those_of_the_companion_matrix(n: int, share: float) -> None:
+    rng = np.random.default_rng(n)
+    roots, sets = rng.normal(size=(3, n, n)), 19  # no multiple of the sets taken together
+    middle = roots @ roots.swapaxes(1, 2) + 0.2 * np.eye(n)
+    slowest = np.sqrt(np.linalg.eigvals(np.linalg.solve(middle[0], middle[2])).real.min())
+    middle[1] *= share * slowest / np.linalg.norm(np.linalg.solve(middle[0], middle[1]), 2)
+    parts = middle * rng.uniform(0.9, 1.1, (sets, 3, 1, 1))
+    modes = DampedModes.of(parts)
+    assert modes is not None
+    for (M, D, K), rate, x, y in zip(parts, modes.rate, modes.right, modes.left, strict=True):
+        A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, np.hstack([K, D]))]])
+        true = np.linalg.eigvals(A)
+        true = true[true.imag > 0]
+        assert np.allclose(rate, true[np.argsort(np.abs(true))], rtol=1e-10)
+        state = np.hstack([x, rate[:, None] * x])
+        assert np.allclose(y @ state.T, np.eye(n), atol=1e-9)
+        assert np.allclose(y @ state.conj().T, 0, atol=1e-9)
 
 
 def test_gradients_of_modes_with_one_frequency() -> None:
