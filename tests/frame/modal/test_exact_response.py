@@ -12,6 +12,7 @@ from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus import box_quadratic
 from alphacut.frame.calculus.c_library import c_library
 from alphacut.frame.calculus.damped_modes import DampedModes
+from alphacut.frame.calculus.jet import Array
 from alphacut.frame.methods.auto import Auto, ToleranceError
 from alphacut.frame.methods.modal import Modal
 from alphacut.frame.methods.plan import candidates
@@ -96,8 +97,35 @@ def test_damped_modes_are_those_of_the_companion_matrix(n: int, share: float) ->
     middle = roots @ roots.swapaxes(1, 2) + 0.2 * np.eye(n)
     slowest = np.sqrt(np.linalg.eigvals(np.linalg.solve(middle[0], middle[2])).real.min())
     middle[1] *= share * slowest / np.linalg.norm(np.linalg.solve(middle[0], middle[1]), 2)
-    parts = middle * rng.uniform(0.9, 1.1, (sets, 3, 1, 1))
-    modes = DampedModes.of(parts)
+    require_modes(middle * rng.uniform(0.9, 1.1, (sets, 3, 1, 1)))
+
+
+@compiled
+def test_close_frequencies_coupled_by_damping_have_their_own_modes() -> None:
+    M, coupled = np.eye(3), np.array([[1.0, 0.9, 0.0], [0.9, 1.0, 0.2], [0.0, 0.2, 1.0]])
+    parts = [
+        [M, strength * coupled, np.diag([1.0, apart, 9.0])]
+        for strength in (1e-3, 0.05, 0.2)  # each beside the others
+        for apart in (1.2, 1.5, 2.0, 4.0)
+    ]
+    require_modes(np.array(parts))
+
+
+@compiled
+@pytest.mark.parametrize("place", [0, 5, 8])
+def test_no_damped_modes_where_one_does_not_oscillate_or_two_are_not_told_apart(place: int) -> None:
+    parts = np.array([[np.eye(2), 0.01 * np.eye(2), np.diag([1.0, 2.0])]] * 9)
+    alone = (np.diag([3.0, 0.1]), np.eye(2)), (np.full((2, 2), 0.1), np.eye(2))
+    twice = np.array([[0.596, -0.535], [-0.535, 0.832]]), np.diag([1.0, 1.4])
+    indefinite = (0.01 * np.eye(2), np.diag([-1.0, 2.0]))
+    for damping, stiffness in (*alone, twice, indefinite):
+        parts[place, 1:] = damping, stiffness
+        assert DampedModes.of(parts) is None
+
+
+def require_modes(parts: Array) -> None:
+    """Hold compiled modes of M, D and K, shape (S, 3, n, n), to NumPy's."""
+    modes, n = DampedModes.of(parts), parts.shape[-1]
     assert modes is not None
     for (M, D, K), rate, x, y in zip(parts, modes.rate, modes.right, modes.left, strict=True):
         A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, np.hstack([K, D]))]])
