@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from alphacut.rve.mesh.periodicity import Periodicity
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import Integers
-from alphacut.rve.petsc import PETSc
+from alphacut.rve.petsc import PETSc, zero_matrix
 from alphacut.rve.ranks import Ranks
 from alphacut.rve.solver.c_loops import WEDGES, c_loops
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -232,9 +232,7 @@ class LevelNumbering:
             starts.ctypes, columns.ctypes, places.ctypes,
         ):  # fmt: skip
             raise MemoryError("no memory is left for the matrix")
-        csr = [x.astype(PETSc.IntType, copy=False) for x in (starts, columns[: starts[-1]])]
-        layout = ((len(own), self.size),) * 2
-        return PETSc.Mat().createBAIJ(layout, bsize=2, csr=csr, comm=ranks.comm), places
+        return zero_matrix(starts, columns[: starts[-1]], self.size, 2, ranks), places
 
     def to_nodes(self, values: Array, start: int) -> Array:
         """Displacements of the nodes, zero on the line, shape (nodes, 2, columns).
