@@ -224,12 +224,6 @@ class Envelope:
         """Greatest value over time, shape (A, m)."""
         return np.asarray(self.upper.max(1))
 
-    def nesting_violation(self) -> float:
-        """By how much an α-cut leaves the next wider one, at most; 0 when nested."""
-        low = np.diff(self.lower, axis=0).min(initial=0.0)
-        high = np.diff(self.upper, axis=0).max(initial=0.0)
-        return float(max(-low, high, 0.0))
-
     def to_csv(self, path: str | Path) -> None:
         """Write a CSV file with a row for each output, level and node.
 

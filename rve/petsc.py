@@ -49,24 +49,15 @@ def clean(comm: MPI.Comm | None) -> None:
 
 def give_back() -> None:
     """Give the system the memory that is free, which MPI has told the C library to keep."""
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
-    if trim is not None:  # glibc has it
-        trim(0)
+    getattr(ctypes.CDLL(None), "malloc_trim", bool)(0)  # glibc has it
 
 
 def zero_matrix(
     starts: NDArray[np.int32], columns: NDArray[np.int32], size: int, block: int, ranks: Ranks
 ) -> PETSc.Mat:
-    """Square matrix of zeros in blocks, of which each rank gives its own rows of a pattern.
+    """Square matrix of zeros in blocks; each rank gives the pattern of its own, consecutive rows.
 
-    Without the search for a place that PETSc starts for each block that is set.
-
-    Args:
-        starts: Where rows of blocks begin in `columns`, and where they end.
-        columns: Rising numbers of blocks, row by row.
-        size: Rows of the whole matrix.
-        block: Rows of a block.
-        ranks: Own consecutive rows.
+    Rows begin at `starts` in the rising `columns`; `size` counts all ranks' rows, not in blocks.
     """
     rows = len(starts) - 1
     found = PETSc.Mat().create(ranks.comm)
@@ -79,8 +70,8 @@ def zero_matrix(
         first = sum(ranks.all(rows)[: ranks.rank])
         own = (columns >= first) & (columns < first + rows)
         counts = np.diff(np.append(0, np.cumsum(own, dtype=np.int32))[starts])
-        shares = [x.astype(PETSc.IntType) for x in (counts, np.diff(starts) - counts)]
-        found.setPreallocationNNZ(shares)
+        shares = counts, np.diff(starts) - counts
+        found.setPreallocationNNZ([x.astype(PETSc.IntType) for x in shares])
         _set_columns(found.getDiagonalBlock().handle, columns[own] - np.int32(first))
         _set_columns(_beside_diagonal(found)[0].value, columns[~own])
     found.assemble()
@@ -88,8 +79,8 @@ def zero_matrix(
 
 
 def _set_columns(part: int | None, columns: NDArray[np.int32]) -> None:
-    numbers = columns.astype(PETSc.IntType, copy=False)
-    _LIBRARY.MatSeqBAIJSetColumnIndices(ctypes.c_void_p(part), numbers.ctypes)
+    given = columns.astype(PETSc.IntType, copy=False).ctypes
+    _LIBRARY.MatSeqBAIJSetColumnIndices(ctypes.c_void_p(part), given)
 
 
 def block_values(matrix: PETSc.Mat) -> tuple[ctypes.c_void_p, ctypes.c_void_p]:
@@ -152,11 +143,9 @@ def _numbers(first: ctypes.c_void_p, count: int, kind: type) -> Any:
 
 @contextmanager
 def in_database(options: Mapping[str, str], *, wanted: Collection[str]) -> Iterator[None]:
-    """Keep `options` in PETSc's database while the block configures a solver.
+    """Keep `options`, names without prefix to values, in PETSc's database during the block.
 
-    Args:
-        options: Names without prefix to values.
-        wanted: Those that somebody asked for, and that must not go unused.
+    Somebody asked for those `wanted`, which must not go unused.
 
     Raises:
         OptionError: PETSc refuses an option, or has not asked for a wanted one by the end of the

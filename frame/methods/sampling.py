@@ -17,13 +17,7 @@ Progress = Callable[[float], None]
 
 
 def sample(flow: UnitFlow, points_of: Callable[[Array, Array], Array], method: str) -> Envelope:
-    """Envelope of the trajectories at given points of each box, nested.
-
-    Args:
-        flow: The trajectories.
-        points_of: From lower and upper ends (d,) to unit coordinates (S, d).
-        method: Name for the result.
-    """
+    """Nested envelope of trajectories at points (S, d) from each box's unit ends (d,), named."""
     begun = time.perf_counter()
     shape = (len(flow.boxes.alpha), len(flow.time), len(flow.outputs), 2)
     bounds, at, runs = np.full(shape, -np.inf), np.zeros((*shape, len(flow.boxes.names))), 0
@@ -61,34 +55,20 @@ class Vertex:
 
 @dataclass(frozen=True)
 class MonteCarlo:
-    """Envelope of uniform random trajectories.
-
-    Args:
-        samples: On each level.
-        seed: Of the points.
-    """
+    """Envelope of uniform random trajectories: so many samples on each level, from a seed."""
 
     samples: int = 1000
     seed: int = 0
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Envelope of all outputs on all levels."""
-        rng = np.random.default_rng(self.seed)
-
-        def points(lower: Array, upper: Array) -> Array:
-            return rng.uniform(lower, upper, (self.samples, len(lower)))
-
-        return sample(flow, points, "monte-carlo")
+        draw = np.random.default_rng(self.seed).uniform
+        return sample(flow, lambda a, b: draw(a, b, (self.samples, len(a))), "monte-carlo")
 
 
 @dataclass(frozen=True)
 class QuasiMonteCarlo:
-    """Envelope of a scrambled Sobol sequence of Chebyshev density.
-
-    Args:
-        samples: On each level.
-        seed: Of the scrambling.
-    """
+    """Envelope of a Sobol sequence of Chebyshev density, scrambled by a seed, on each level."""
 
     samples: int = 1024
     seed: int = 0

@@ -31,6 +31,7 @@ from alphacut.frame.modal.search import ModalSearch
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy import Triangular
 from benchmarks.frame.envelopes import FRAME
+from tests.frame.nesting import nesting_violation
 
 INPUTS = {"E": Triangular(22.7626e9, 24.7561e9, 25.8312e9)} | {
     f"m{i + 1}": Triangular(0.95 * m, m, 1.05 * m) for i, m in enumerate(FRAME.masses)
@@ -270,7 +271,7 @@ def test_what_is_proved_on_a_wide_box_is_taken_up_on_those_inside(
     found = envelope(
         FRAME, INPUTS, duration=3, step=0.1, alpha=(0, 0.001, 0.002), method="modal", certify=2e-3
     )
-    assert found.nesting_violation() == 0
+    assert nesting_violation(found) == 0
 
 
 def test_at_tolerances_that_no_double_keeps_rounding_is_declared():
