@@ -65,22 +65,20 @@ def zero_matrix(
     found.setType("baij")
     if ranks.size == 1:
         found.setPreallocationNNZ(np.diff(starts).astype(PETSc.IntType))
-        _set_columns(found.handle, columns)
+        parts = [(found.handle, columns)]
     else:
         first = sum(ranks.all(rows)[: ranks.rank])
         own = (columns >= first) & (columns < first + rows)
         counts = np.diff(np.append(0, np.cumsum(own, dtype=np.int32))[starts])
-        shares = counts, np.diff(starts) - counts
-        found.setPreallocationNNZ([x.astype(PETSc.IntType) for x in shares])
-        _set_columns(found.getDiagonalBlock().handle, columns[own] - np.int32(first))
-        _set_columns(_beside_diagonal(found)[0].value, columns[~own])
+        shares = [x.astype(PETSc.IntType) for x in (counts, np.diff(starts) - counts)]
+        found.setPreallocationNNZ(shares)
+        place = found.getDiagonalBlock().handle, _beside_diagonal(found)[0].value or 0
+        parts = list(zip(place, (columns[own] - np.int32(first), columns[~own]), strict=True))
+    for part, numbers in parts:
+        given = numbers.astype(PETSc.IntType, copy=False).ctypes
+        _LIBRARY.MatSeqBAIJSetColumnIndices(ctypes.c_void_p(part), given)
     found.assemble()
     return found
-
-
-def _set_columns(part: int | None, columns: NDArray[np.int32]) -> None:
-    given = columns.astype(PETSc.IntType, copy=False).ctypes
-    _LIBRARY.MatSeqBAIJSetColumnIndices(ctypes.c_void_p(part), given)
 
 
 def block_values(matrix: PETSc.Mat) -> tuple[ctypes.c_void_p, ctypes.c_void_p]:

@@ -20,6 +20,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from alphacut.entry import leave
 from alphacut.rve.cell import Phase
 from benchmarks.rve.solvers import MATRIX, PAPER_MAP, PARTICLE, Timing, measure
 
@@ -172,7 +173,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _options(arguments)
     if options.cell:
         on_rank(options.cell)
-        return 0
+        leave(0)
     together, faults = on_ranks(
         [int(k) for k in options.ranks.split(",")], CHANGES["mesh size"][-1], options.repeat
     )

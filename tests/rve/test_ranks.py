@@ -9,6 +9,7 @@ import pytest
 
 from alphacut.rve.ranks import ALONE
 
+with_mpirun = pytest.mark.skipif(shutil.which("mpirun") is None, reason="no mpirun")
 SCRIPT = """
 from mpi4py import MPI
 from alphacut.rve.ranks import Ranks
@@ -35,14 +36,30 @@ print("done", flush=True)
 """
 
 
-@pytest.mark.skipif(shutil.which("mpirun") is None, reason="no mpirun")
-def test_ranks_deal_out_work_and_raise_what_one_of_them_raises():
+def on_ranks(count: int, script: str) -> subprocess.CompletedProcess[str]:
     pytest.importorskip("mpi4py")
-    command = ["mpirun", "-n", "3", sys.executable, "-c", SCRIPT]
-    done = subprocess.run(
-        command, cwd=Path(__file__).parents[2], capture_output=True, text=True, timeout=60
-    )
+    command = ["mpirun", "-n", str(count), sys.executable, "-c", script]
+    folder = Path(__file__).parents[2]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60)
+
+
+@with_mpirun
+def test_ranks_deal_out_work_and_raise_what_one_of_them_raises():
+    done = on_ranks(3, SCRIPT)
     assert done.stdout.split() == 3 * ["done"], done.stderr
+
+
+@with_mpirun
+@pytest.mark.parametrize("status", [0, 3])
+def test_ranks_end_with_their_status_and_no_word_of_mpirun_about_a_good_one(status):
+    done = on_ranks(
+        2,
+        "from mpi4py import MPI; from alphacut.entry import leave; print('said', end=' ');"
+        f" leave({status})",
+    )
+    assert done.returncode == status
+    assert done.stdout.split() == 2 * ["said"]
+    assert bool(done.stderr) == bool(status)
 
 
 def test_a_process_by_itself_does_everything():
