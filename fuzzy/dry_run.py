@@ -17,9 +17,9 @@ from alphacut.fuzzy.campaign.workers import needed
 from alphacut.fuzzy.counted import counted
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.automatic import Automatic
-from alphacut.fuzzy.plans.plan import Plan
 from alphacut.fuzzy.plans.transformation import Extended, General, Reduced
 from alphacut.fuzzy.samples.model import Values
+from alphacut.fuzzy.samples.result import Plan
 from alphacut.fuzzy.sets.boxes import Domain, levels
 from alphacut.fuzzy.sets.interaction import Interaction
 from alphacut.fuzzy.sets.numbers import Array, FuzzyNumber

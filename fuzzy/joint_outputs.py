@@ -13,10 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.fuzzy.knowledge.known import Known
-from alphacut.fuzzy.plans.plan import Plan
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.propagation import on_interrupt, propagate
-from alphacut.fuzzy.samples.result import FuzzyResult
+from alphacut.fuzzy.samples.result import FuzzyResult, Plan
 from alphacut.fuzzy.sets.numbers import Array, FuzzyNumber
 
 Pair = Callable[..., tuple[object, object]]

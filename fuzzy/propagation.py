@@ -27,9 +27,8 @@ from alphacut.fuzzy.campaign.workers import pool, require_executor, require_work
 from alphacut.fuzzy.counted import counted
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.automatic import Automatic
-from alphacut.fuzzy.plans.plan import Plan
 from alphacut.fuzzy.progress_bar import Progress, told
-from alphacut.fuzzy.samples.result import FuzzyResult
+from alphacut.fuzzy.samples.result import FuzzyResult, Plan
 from alphacut.fuzzy.sets.boxes import Domain, levels
 from alphacut.fuzzy.sets.interaction import Interaction
 from alphacut.fuzzy.sets.numbers import FuzzyNumber

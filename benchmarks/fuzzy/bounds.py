@@ -42,7 +42,7 @@ from alphacut.fuzzy import (
     levels,
     propagate,
 )
-from alphacut.fuzzy.plans.plan import Plan
+from alphacut.fuzzy.samples.result import Plan
 
 Array = NDArray[np.float64]
 Function = Callable[..., Array]

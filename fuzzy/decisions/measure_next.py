@@ -22,11 +22,10 @@ from alphacut.fuzzy.campaign.workers import pool, require_executor, require_work
 from alphacut.fuzzy.counted import counted
 from alphacut.fuzzy.knowledge.joint import joined_once
 from alphacut.fuzzy.knowledge.known import Known
-from alphacut.fuzzy.plans.plan import Plan
 from alphacut.fuzzy.plans.transformation import Reduced
 from alphacut.fuzzy.progress_bar import Progress, part, told
 from alphacut.fuzzy.propagation import on_interrupt, propagate
-from alphacut.fuzzy.samples.result import FuzzyResult
+from alphacut.fuzzy.samples.result import FuzzyResult, Plan
 from alphacut.fuzzy.sets.numbers import Crisp, Cut, FuzzyNumber, Interval
 from alphacut.fuzzy.tables import html_table
 from alphacut.fuzzy.width_contributions import Basis, widened

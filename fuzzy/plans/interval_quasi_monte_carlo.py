@@ -18,11 +18,10 @@ from alphacut.fuzzy.arguments import fuzzy_inputs, known_facts
 from alphacut.fuzzy.campaign.call import Call, Function
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.knowledge.known import Known
-from alphacut.fuzzy.plans.plan import Plan
 from alphacut.fuzzy.plans.transformation import Reduced
 from alphacut.fuzzy.progress_bar import Progress, told
 from alphacut.fuzzy.samples.nature import Nature
-from alphacut.fuzzy.samples.result import FuzzyResult
+from alphacut.fuzzy.samples.result import FuzzyResult, Plan
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.given import require_fields
 from alphacut.fuzzy.sets.numbers import Array, Crisp, FuzzyNumber, PiecewiseLinear

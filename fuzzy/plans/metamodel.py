@@ -12,11 +12,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from alphacut.fuzzy.plans.plan import Plan
 from alphacut.fuzzy.plans.transformation import Extended, General, Reduced
 from alphacut.fuzzy.samples.model import Memo, Model
 from alphacut.fuzzy.samples.nature import Nature
-from alphacut.fuzzy.samples.result import FuzzyResult
+from alphacut.fuzzy.samples.result import FuzzyResult, Plan
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.given import require_fields
 from alphacut.fuzzy.sets.numbers import Array, Interval, Rows

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from alphacut.fuzzy.counted import counted
 from alphacut.fuzzy.drawing import draw_bands, draw_membership, new_axes
 from alphacut.fuzzy.knowledge.joint import JointClaim
 from alphacut.fuzzy.knowledge.known import Signs, contradictions
-from alphacut.fuzzy.samples.model import Values
+from alphacut.fuzzy.samples.model import Model, Values
 from alphacut.fuzzy.samples.nature import Nature, condition
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.claimed import Claimed
@@ -405,3 +405,14 @@ class FuzzyResult:
             {**{name: getattr(self, name) for name in told}, "nature": str(self.nature)}
             | {"claim": str(self.claim)},
         )
+
+
+class Plan(Protocol):
+    """A way to search the boxes of the inputs for the extremes of a model."""
+
+    @property
+    def stepwise(self) -> bool:
+        """True if samples depend on those before, so that the plan reports its progress."""
+
+    def run(self, model: Model, domain: Domain) -> FuzzyResult:
+        """Bounds of every output of the model on every level."""

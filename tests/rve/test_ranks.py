@@ -5,9 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from alphacut.rve.ranks import ALONE
+from alphacut.rve.ranks import ALONE, Ranks
 
 with_mpirun = pytest.mark.skipif(shutil.which("mpirun") is None, reason="no mpirun")
 SCRIPT = """
@@ -60,6 +61,16 @@ def test_ranks_end_with_their_status_and_no_word_of_mpirun_about_a_good_one(stat
     assert done.returncode == status
     assert done.stdout.split() == 2 * ["said"]
     assert bool(done.stderr) == bool(status)
+
+
+class Two:
+    size, rank = 2, 0
+
+
+def test_few_items_are_dealt_as_evenly_as_can_be():
+    costs = [4.0, 4.0, 3.0, 3.0, 3.0]  # the dearest first would give 7 and 10
+    owners = np.array(Ranks(Two())._owners(costs))
+    assert sorted(np.bincount(owners, costs)) == [8, 9]
 
 
 def test_a_process_by_itself_does_everything():
