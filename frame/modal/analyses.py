@@ -104,6 +104,8 @@ def _by_energy(matrices: Matrices, rows: Array, X: Array, state: Array, upper: A
     """
     M, K = matrices.mass.value[0], matrices.stiffness.value[0]
     n = len(M)
+    if not np.linalg.cond(K) < 1 / np.finfo(float).eps:
+        raise ModalError("a mode does not oscillate: the stiffness lets the structure drift")
     reading = [
         np.einsum("oi,io->o", part, np.linalg.solve(matrix, part.T))
         for part, matrix in ((rows[:, :n], K), (rows[:, n:], M))

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.frame import Exact, LinearFlow, StoreyFrame, envelope
+from alphacut.frame import Exact, LinearFlow, MatrixStructure, StoreyFrame, envelope
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.methods.modal import Modal, model_with_error
 from alphacut.fuzzy import Triangular
@@ -85,3 +85,17 @@ def test_followers_have_guaranteed_bounds_beside_their_own(method: str) -> None:
     assert (found.proved_upper - found.upper <= found.error + 1e-15).all()
     assert float(found.facts["proved_gap"]) <= 0.25e-4
     assert found.to_dataset()["proved_upper"].dims == ("alpha", "time", "output")
+
+
+def test_a_structure_free_to_drift_is_followed_though_round_off_lets_its_drift_oscillate() -> None:
+    spring = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    system = MatrixStructure(
+        {"k": 123.0},
+        [(1.0, np.diag([3.0, 2.0]))],
+        damping=[(0.123, spring)],
+        stiffness=[("k", spring)],
+        v0=[1.0, 0.0],
+        observed={"q1": [1, 0, 0, 0]},
+    )
+    found = envelope(system, {"k": Triangular(110.7, 123.0, 135.3)}, duration=1, step=0.1)
+    assert "does not oscillate" in str(found.facts["reason"])
