@@ -386,7 +386,7 @@ static void placed(long sets, int n, const c *l, const c *found, double *rates, 
 
 /* Modes by rising |lambda| at `points` sets of M, D, K (points, 3, n, n): rate (points, n), right
    vectors (points, n modes, n), left ones (points, n modes, 2n) with Y [x; lambda x] = 1.
-   Returns 0 where a set's are not found: not oscillating, nearly equal or nearly critical. */
+   Returns 0 where a set's are not found: not oscillating but by round-off, nearly equal or nearly critical. */
 int damped_modes(long points, int n, const double *parts, double *rates, double *right, double *left)
 {
     long nn = (long)n * n;
@@ -408,7 +408,9 @@ int damped_modes(long points, int n, const double *parts, double *rates, double 
         if (!(good = diagonal(n, A, V))) break;
         lifted(n, L, V, W);
         congruent(n, D, W, C, work);
-        for (int k = 0; k < n; k++) mu[k] = A[k * n + k];
+        v most = 0 * A[0];
+        for (int k = 0; k < n; k++) mu[k] = A[k * n + k], most = larger(mu[k], most);
+        for (int k = 0; k < n; k++) good = good && !any(~(mu[k] > 1e-12 * most));  /* not by round-off */
         for (int k = 0; k < n && good; k++)
             good = mode(n, k, C, mu, l + k, u + k * n, rest, real, single) && scaled(n, C, l[k], u + k * n);
         if (!good || !(good = complete(n, C, l, u, rest))) break;

@@ -123,6 +123,17 @@ def test_no_damped_modes_where_one_does_not_oscillate_or_two_are_not_told_apart(
         assert DampedModes.of(parts) is None
 
 
+@compiled
+def test_no_damped_modes_where_round_off_alone_makes_one_oscillate() -> None:
+    rng = np.random.default_rng(2)
+    for n in (2, 3, 8):
+        for _ in range(10):
+            k, m = rng.uniform(0.5, 2, (2, n))
+            k[0] = 0.0  # free to drift
+            K = np.diag(k + np.append(k[1:], 0)) - np.diag(k[1:], 1) - np.diag(k[1:], -1)
+            assert DampedModes.of(np.array([[np.diag(m), 1e-3 * K, K]])) is None
+
+
 def require_modes(parts: Array) -> None:
     """Hold compiled modes of M, D and K, shape (S, 3, n, n), to NumPy's."""
     modes, n = DampedModes.of(parts), parts.shape[-1]
