@@ -119,8 +119,9 @@ def _noise(model: ModalModel, rate: Array, *, forced: bool) -> Array:
     polynomial = count + model.degree + 2
     turned = rate * model.time[:, None]
     steps = polynomial * (2 + turned) + 12 * model.count + 4 * d**3 + 50
-    if forced:
-        steps = steps + (len(model.time) + MOST_TERMS) * np.exp(REACH)
+    if forced and model.load is not None:
+        longest = max(len(table.time) for table in model.load.tables)
+        steps = steps + (longest + MOST_TERMS) * np.exp(REACH)
     return np.finfo(float).eps * steps
 
 

@@ -16,10 +16,13 @@ from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.dynamics.record_load import load_rule, parts_of
 from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.modes import ModalError
 
 SOURCE = Path(__file__).with_name("ground_response.c").read_text(encoding="utf-8")
 REACH = 6.0
 """Largest change of phase (rad) over the box within a window."""
+MOST_STEPS = 40_000
+"""Steps of a table, at most."""
 FADED = 37.0
 """Exponent at which what is left of a window has fallen below round-off."""
 Waves = tuple[Array, Array, Array]
@@ -31,14 +34,16 @@ class LoadTable:
 
     Time is cut into windows so short that phases change little over the box within one. The part of
     R that arises in the window of t_j is Σ_i moment[j, k, i] x^i with x = (λ − λ_k) / scale; what
-    earlier windows leave behind goes on as exp(λ (t_j − their end)).
+    earlier windows leave behind goes on as exp(λ (t_j − their end)). Nodes too far apart for one
+    window have others between them.
 
     Args:
         middle: λ_k in the middle of the box, shape (n,).
         scale: Length that makes the coefficients of order one, in 1/s.
         moment: Coefficients, shape (T, n, order).
         starts: First node of every window, rising from 0, shape (W,).
-        time: Nodes, shape (T,), in s.
+        time: Nodes, those between included, shape (T,), in s.
+        every: Steps from one of the caller's nodes to the next.
         share: What one unit of R_k puts into the outputs, n m polynomials.
         truncation: Bound of what the series leave out of R, as a share of ∫ |a(s)| exp(Re λ (t −
             s)) ds.
@@ -49,6 +54,7 @@ class LoadTable:
     moment: Array
     starts: Array
     time: Array
+    every: int
     share: Polynomial
     truncation: float
 
@@ -56,9 +62,21 @@ class LoadTable:
     def build(
         cls, ground: Accelerogram, time: Array, rate: Polynomial, share: Polynomial
     ) -> LoadTable:
-        """The table for modes whose eigenvalues are `rate` over the unit box."""
+        """The table for modes whose eigenvalues are `rate` over the unit box.
+
+        Raises:
+            ModalError: Phases change by thousands over the box within one step.
+        """
         middle = rate.coefficients[0]
         spread = float(np.abs(rate.coefficients[1:]).sum(0).max())
+        every = max(1, ceil(spread * (time[1] - time[0]) / REACH))
+        if every > max(1, MOST_STEPS // len(time)):
+            raise ModalError(
+                f"modal: under a record phases change by {every * REACH:.3g} rad over the box"
+                f" within a step of {time[1] - time[0]:.4g} s; take a smaller one"
+            )
+        if every > 1:
+            time = np.linspace(time[0], time[-1], every * (len(time) - 1) + 1)
         length = min(len(time) - 1, max(1, int(REACH / max(spread, 1e-12) / (time[1] - time[0]))))
         starts = np.arange(0, len(time) - 1, length)
         window = length * (time[1] - time[0])
@@ -70,6 +88,7 @@ class LoadTable:
             _moments(ground, middle, time, starts, window, spread, order),
             starts,
             time,
+            every,
             share,
             left,
         )
@@ -90,10 +109,11 @@ class LoadTable:
                 first = np.exp(rate * h) * left
                 out[:, rows] += decaying(rate, first[..., None] * share, h, count)
             left = np.exp(rate * (count * h)) * left + own[:, -1]
-        return out
+        return out[:, :: self.every]
 
     def response(self, rate: Array, node: Array) -> Waves:
         """R, dR/dλ and d²R/dλ² at one node per point, each shape (N, n), for eigenvalues (N, n)."""
+        node = self.every * node
         compiled = self._compiled(rate, node, 3)
         if compiled is not None:
             return compiled[0], compiled[1], compiled[2]
@@ -111,6 +131,7 @@ class LoadTable:
 
     def response_alone(self, rate: Array, node: Array) -> Array:
         """R without its derivatives."""
+        node = self.every * node
         compiled = self._compiled(rate, node, 1)
         if compiled is not None:
             alone: Array = compiled[0]
