@@ -5,18 +5,28 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.calculus.numbers import require_numbers
 from alphacut.frame.dynamics.flow import Flow
-from alphacut.frame.modal.kept import Kept
 from alphacut.frame.outputs import output_unit
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arguments import fuzzy_inputs
 
 ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)
+
+
+class Kept(Protocol):
+    """Keeps arrays by name, for one search and no other."""
+
+    def load(self, name: str) -> Mapping[str, Array] | None:
+        """What was saved under a name; None if nothing was."""
+
+    def save(self, name: str, found: Mapping[str, Array]) -> None:
+        """Keep arrays under a name, in place of what it had."""
 
 
 @dataclass(frozen=True, eq=False)

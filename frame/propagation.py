@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from alphacut.frame.boxes import ALPHA, UnitFlow, boxes
+from alphacut.frame.boxes import ALPHA, Kept, UnitFlow, boxes
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.checks.admissible import require_admissible
 from alphacut.frame.checks.between_nodes import ground_stray, with_stray
@@ -23,7 +23,6 @@ from alphacut.frame.methods.foreseen import foreseen
 from alphacut.frame.methods.judged import judged
 from alphacut.frame.methods.named import Method, named, options_of
 from alphacut.frame.methods.plan import Candidate
-from alphacut.frame.modal.kept import Kept
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem, relative_to_ground
 from alphacut.frame.structures.storey import StoreyFrame

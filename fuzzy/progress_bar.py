@@ -14,6 +14,19 @@ _EVERY = 0.2  # seconds between its moves
 _WIDTH = 30
 
 
+def share(progress: Progress | None, first: float, last: float) -> Progress:
+    """Progress of a part of a task, from `first` to `last` of the whole."""
+    if progress is None:
+        return lambda done: None
+    return lambda done: progress(first + (last - first) * done)
+
+
+def stage(progress: Progress | None, what: str) -> None:
+    """Tell a progress that shows it what is being done from now on."""
+    if (tell := getattr(progress, "stage", None)) is not None:
+        tell(what)
+
+
 @contextmanager
 def told(progress: Progress | bool | None) -> Iterator[Progress | None]:
     """What to tell the share done to.

@@ -11,7 +11,6 @@ the Taylor model there, made less concave by the remainder. Else it is halved.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
@@ -28,6 +27,7 @@ from alphacut.frame.certificate.remainder import Remainder
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.newton import refine
 from alphacut.frame.modal.optima import Optima
+from alphacut.fuzzy.progress_bar import Progress
 
 PIECE = 30_000
 """Items examined together."""
@@ -35,8 +35,6 @@ ROWS = 1000
 """Rows whose response to a load is computed together; more would leave the cache."""
 HIGHER = 1e-10
 """Least gain for which a better point is taken over."""
-
-Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True, eq=False)

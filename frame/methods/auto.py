@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,12 +14,11 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.batch_graph_follower import BatchFollower
 from alphacut.frame.methods.modal import FINE, GapError, Modal, guaranteed
 from alphacut.frame.methods.plan import Candidate, candidates
-from alphacut.frame.modal.kept import stage
 from alphacut.frame.outputs import output_unit
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
+from alphacut.fuzzy.progress_bar import Progress, stage
 
-Progress = Callable[[float], None]
 TOLERANCE = 1e-4
 """Wanted error unless one is given, in m."""
 SHARE = 1e-3

@@ -10,7 +10,6 @@ are for; the points spread at the start look for basins independently of any mod
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,8 +21,8 @@ from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.checks.corners import taken_in
 from alphacut.frame.envelope import Envelope, signed_envelope
 from alphacut.frame.methods.held_models import HeldModels, models_at
+from alphacut.fuzzy.progress_bar import Progress
 
-Progress = Callable[[float], None]
 APART = 100_003
 """Points of the sequence between those that two seeds spread."""
 

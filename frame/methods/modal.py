@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,10 +22,11 @@ from alphacut.frame.modal.levels import polished_levels, search_levels
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.polynomial_error import judged_at_optima, polynomial_error
 from alphacut.frame.modal.proportional_response import exact_response
+from alphacut.frame.structures.linear import frequencies
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
+from alphacut.fuzzy.progress_bar import Progress
 
-Progress = Callable[[float], None]
 FINE = 8
 """Wanted error of an envelope over the tolerance of the polynomials that keeps it."""
 SAFETY = 3.0
@@ -49,6 +49,8 @@ over."""
 ROUGH = 0.3
 """Error of the polynomials, as a share of an output's peak, above which they lead nowhere, and
 Newton's method learns second derivatives from gradients."""
+APART = 3.0
+"""Change of phase (rad) over the box between nodes from which on they do not guide each other."""
 GUIDED = 0.3
 """Share of the time that the polynomials' search takes before that, for the progress alone."""
 EXACT = "values of exact trajectories at the parameters given; polynomials only led there"
@@ -143,7 +145,7 @@ class Modal:
             bounds,
             at,
             method="modal",
-            nature=_nature(flow, exact),
+            nature=_nature(flow, exact, model),
             error=error,
             facts=facts,
             trajectories=model.analyses,
@@ -177,18 +179,20 @@ class Modal:
 def rounding(model: ModalModel, peak: Array) -> Array:
     """Least error of trajectories in doubles, given their peaks (m,), shape (T, m).
 
-    Squared eigenvalues carry the rounding of the largest, by which a slow mode runs early or late.
+    Squared eigenvalues carry the rounding of the largest of all, by which slow modes run late.
     """
     rates, t = np.abs(model.eigenvalue.coefficients[0]), model.time
-    late = rates.max() ** 2 * np.minimum(t**2, t / max(rates.min(), 1e-300)) / 2
+    largest = max(rates.max(), frequencies(model.flow.system).max())
+    late = largest**2 * np.minimum(t**2, t / max(rates.min(), 1e-300)) / 2
     share: Array = np.finfo(float).eps * (64 + late)
     return share[:, None] * peak
 
 
-def _nature(flow: UnitFlow, exact: ExactResponse | None) -> str:
-    """Worth of the error: that of a search without a guide, or in many dimensions, is less."""
+def _nature(flow: UnitFlow, exact: ExactResponse | None, model: ModalModel) -> str:
+    """Worth of the error: less without a guide, in many dimensions, or with nodes far apart."""
     led = len(flow.boxes.names) <= MANY and (exact is None or exact.bent)
-    return "estimated" if led else "searched"
+    alone = model.turned(flow.time[1] - flow.time[0]) > APART
+    return "searched" if not led or alone else "estimated"
 
 
 def _judged(

@@ -12,8 +12,7 @@ from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.low_discrepancy import corners
 from alphacut.frame.envelope import Envelope, signed_envelope
-
-Progress = Callable[[float], None]
+from alphacut.fuzzy.progress_bar import Progress
 
 
 def sample(flow: UnitFlow, points_of: Callable[[Array, Array], Array], method: str) -> Envelope:

@@ -75,8 +75,7 @@ class LoadTable:
                 f"modal: under a record phases change by {every * REACH:.3g} rad over the box"
                 f" within a step of {time[1] - time[0]:.4g} s; take a smaller one"
             )
-        if every > 1:
-            time = np.linspace(time[0], time[-1], every * (len(time) - 1) + 1)
+        time = np.linspace(time[0], time[-1], every * (len(time) - 1) + 1) if every > 1 else time
         length = min(len(time) - 1, max(1, int(REACH / max(spread, 1e-12) / (time[1] - time[0]))))
         starts = np.arange(0, len(time) - 1, length)
         window = length * (time[1] - time[0])

@@ -10,10 +10,10 @@ import numpy as np
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.modal.exact_response import ExactResponse
-from alphacut.frame.modal.kept import Progress, share
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.polish import Polish
 from alphacut.frame.modal.search import ModalSearch
+from alphacut.fuzzy.progress_bar import Progress, share
 
 Found = tuple[Array, Array, Array]
 """As `Levels`, of one level, in units of the outputs."""

@@ -85,12 +85,11 @@ class ModalModel:
         """Largest |λ| in the middle of the box, in 1/s."""
         return float(np.abs(self.eigenvalue.coefficients[0]).max())
 
-    @property
-    def turned(self) -> float:
-        """Largest change of a lasting mode's phase over the box, in rad."""
+    def turned(self, duration: float) -> float:
+        """Largest change of a lasting mode's phase over the box within a time (s), in rad."""
         middle, rest = self.eigenvalue.coefficients[0], self.eigenvalue.coefficients[1:]
         # a mode that has died down has no basins
-        lasting = np.minimum(self.time[-1], 5 / np.maximum(-middle.real, 1e-300))
+        lasting = np.minimum(duration, 5 / np.maximum(-middle.real, 1e-300))
         return float((np.abs(rest).sum(0) * lasting).max())
 
     def in_units(self, scale: Array) -> ModalModel:

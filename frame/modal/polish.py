@@ -7,14 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alphacut.frame.boxes import Kept
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.modal.contest import contest
 from alphacut.frame.modal.exact_response import ExactResponse
-from alphacut.frame.modal.kept import Kept, Progress, share
 from alphacut.frame.modal.newton import refine
 from alphacut.frame.modal.optima import FEW, Optima, best_of_few, best_of_pool, problems
 from alphacut.frame.modal.probes import probe
 from alphacut.frame.modal.starting_points import fresh_points, trajectories
+from alphacut.fuzzy.progress_bar import Progress, share
 
 CALM_PASSES = 2
 """Passes one after the other that must gain too little before the search ends."""

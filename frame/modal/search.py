@@ -1,9 +1,8 @@
 """Global optimisation of the modal model over a box, for all nodes, outputs and sides together.
 
 Samples of the whole box start Newton's method on every stride-th node; what is found there is tried
-at the nodes around (the idea of
-the Graph Follower: envelopes consist of segments of graphs) until nothing improves, and carried to
-    the nodes between.
+at the nodes around (the idea of the Graph Follower: envelopes consist of segments of graphs) until
+nothing improves, and carried to the nodes between.
 """
 
 from __future__ import annotations
@@ -15,12 +14,12 @@ import numpy as np
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.modal.contest import contest
-from alphacut.frame.modal.kept import Progress, share
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.newton import refine
 from alphacut.frame.modal.optima import FEW, Optima, Response, best_of_few, best_of_pool, problems
 from alphacut.frame.modal.probes import probe
 from alphacut.frame.modal.starting_points import fresh_points, tensor_points, trajectories
+from alphacut.fuzzy.progress_bar import Progress, share
 
 RIVAL = 0.05
 """Share of the largest bound by which a rival basin may lie behind and still be followed."""
@@ -67,7 +66,7 @@ class ModalSearch:
     @classmethod
     def suited(cls, model: ModalModel, seed: int = 0, wanted: float = 1e-6) -> ModalSearch:
         """More samples and starts where phases vary much over the box."""
-        more = int(np.clip(np.log2(max(model.turned, 1.0) / CALM), 0, 2))
+        more = int(np.clip(np.log2(max(model.turned(model.time[-1]), 1.0) / CALM), 0, 2))
         return cls(512 * 2**more, 2 + more, SMALL * wanted, QUIET * wanted, seed=seed)
 
     def run(

@@ -102,12 +102,7 @@ def sphere_study(
     executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> SphereMicrostructure:
-    """Do all of it for spheres: packings, power cells, distribution, limits, fit, p-box.
-
-    Args:
-        case: What to do.
-        executor: Runs the packings; one after the other if None. The result is the same.
-        progress: Told the share done, 0 to 1.
+    """As `study`, for spheres: packings, power cells, distribution, limits, fit, p-box.
 
     Raises:
         ValueError: The source is not one of spheres.

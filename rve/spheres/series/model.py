@@ -20,13 +20,9 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 @dataclass(frozen=True)
 class SphereSeriesModel:
-    """Multipole series at the nodes of a Gauss rule in θ.
+    """Multipole series at the nodes of a Gauss rule in θ, as `SeriesModel`.
 
-    Args:
-        points: Nodes of the rule, or None: as many as bring two successive rules within `accuracy`
-            of one another.
-        accuracy: Relative error allowed, of the series at each θ and, without `points`, of the mean
-            moduli by the rule in θ; in [1e-11, 0.1].
+    `accuracy`, in [1e-11, 0.1], is that of the mean moduli.
 
     Raises:
         ValueError: A value lies outside its range.

@@ -129,11 +129,8 @@ class OctantSource:
 class SphereTableModel:
     """Chebyshev interpolant of elements over (r, E_i), averaged over θ.
 
-    Args:
+    Args, the others as of `TableModel`:
         accuracy: Relative error of the moduli allowed, in [1e-5, 0.1].
-        cache: Folder where tables are kept from run to run; None keeps them in the process.
-        moduli: Moduli of the particle that the table covers, in Pa; None: those asked for, rounded
-            outwards if they are several.
         parallel: Whether all MPI ranks share each mesh; a cache is then none.
 
     Raises:

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from alphacut.frame.modal.kept import stage
+from alphacut.fuzzy.progress_bar import stage
 from alphacut.io import progress as told
 from alphacut.io.progress import progress
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -10,8 +11,9 @@ import pytest
 
 from alphacut.frame import Exact, LinearFlow, MatrixStructure, StoreyFrame, envelope
 from alphacut.frame.boxes import UnitFlow, boxes
+from alphacut.frame.calculus.jet import Array
 from alphacut.frame.methods.modal import Modal, model_with_error
-from alphacut.fuzzy import Triangular
+from alphacut.fuzzy import Interval, Triangular
 
 FRAME = StoreyFrame((2e4, 1e4), (3.0, 3.0), 25e9, 1e-6, (50.0, 50.0), q0=(0.0, 0.01))
 INPUTS = {"E": Triangular(24e9, 25e9, 26e9), "m1": Triangular(1.9e4, 2e4, 2.1e4)}
@@ -99,3 +101,42 @@ def test_a_structure_free_to_drift_is_followed_though_round_off_lets_its_drift_o
     )
     found = envelope(system, {"k": Triangular(110.7, 123.0, 135.3)}, duration=1, step=0.1)
     assert "does not oscillate" in str(found.facts["reason"])
+
+
+@pytest.mark.parametrize("stiffer", [1e4, 1e7, 1e9])
+def test_a_declared_error_holds_the_round_off_beside_nearly_rigid_storeys(stiffer: float) -> None:
+    masses, k = (1e4, 1e4, 1e4), (4e7, 4e7 * stiffer, 4e7)
+    frame = StoreyFrame(masses, stiffness=k, q0=(0.01, 0.01, 0.01), outputs=("q1", "q3"))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        way = {"method": "modal", "tolerance": 1e-9}
+        found = envelope(
+            frame, {"k1": Interval(3.9e7, 4.1e7)}, duration=3, step=0.25, alpha=(0,), **way
+        )
+    said = [str(one.message) for one in caught]
+    assert any("round-off alone" in one for one in said) is (stiffer > 1e8)
+    assert not any("period is" in one and "0.186" not in one for one in said)
+    for k1 in (3.9e7, 3.97e7, 4.1e7):
+        true = exact_chain((k1, *k[1:]), masses[0], 0.01, found.time)[:, [0, 2]]
+        assert (true - found.upper[0] <= found.error[0]).all()
+        assert (found.lower[0] - true <= found.error[0]).all()
+
+
+def exact_chain(k: tuple[float, ...], mass: float, start: float, time: Array) -> Array:
+    """Free motion of a chain of equal masses from one place, to 60 digits, shape (T, n)."""
+    mpmath = pytest.importorskip("mpmath")
+    with mpmath.workdps(60):
+        springs = [mpmath.mpf(x) / mpmath.mpf(mass) for x in (*k, 0)]
+        n, A = len(k), mpmath.zeros(len(k))
+        for i in range(n):
+            A[i, i] = springs[i] + springs[i + 1]
+            if i:
+                A[i, i - 1] = A[i - 1, i] = -springs[i]
+        squared, V = mpmath.eigsy(A)
+        shares = [start * sum(V[:, a]) for a in range(n)]
+        waves = [
+            [shares[a] * mpmath.cos(mpmath.sqrt(squared[a]) * t) for a in range(n)] for t in time
+        ]
+        return np.array(
+            [[float(sum(V[i, a] * w[a] for a in range(n))) for i in range(n)] for w in waves]
+        )

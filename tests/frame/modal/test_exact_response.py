@@ -88,6 +88,48 @@ def test_values_and_gradients_are_those_of_exact_trajectories(system: StoreyFram
     assert np.abs(gradient - slope).max() < 1e-8 * np.abs(slope).max()
 
 
+COARSE = StoreyFrame(
+    (18575.0, 6118.0, 17379.0),
+    stiffness=(1.219e8, 2.44e8, 1.319e8),
+    dampers=(3010.0, 2444.0, 3028.0),
+    damper_placement="storey",
+    outputs=("shear1", "q3", "a2"),
+    ground=Accelerogram(0.3, np.array([-3.3, 1.9, 4.7, -5.0, -1.1])),
+)
+
+
+@pytest.mark.parametrize("step", [0.05, 0.384, 2.0])
+def test_values_under_a_record_are_exact_with_nodes_however_far_apart(step: float) -> None:
+    modal, names = COARSE.parameters, ("m1", "m2", "m3", "k1", "k2", "k3", "d1")
+    cuts = boxes({n: Interval(0.64 * modal[n], 1.36 * modal[n]) for n in names}, (0,))
+    flow = UnitFlow(LinearFlow(COARSE, names, 4 * step, step, Exact()), cuts)
+    model = fit_modes(flow.flow, cuts, tolerance=1e-2, budget=60)  # type: ignore[arg-type]
+    rng = np.random.default_rng(int(100 * step))
+    points, node, output = rng.uniform(-1, 1, (40, 7)), rng.integers(5, size=40), np.arange(40) % 3
+    true = flow.values(points)
+    for exact in (ExactResponse.of(model, np.ones(3)), exact_response(model, np.ones(3))):
+        found = exact.value_at(points, node, output)
+        peak = np.abs(true).max((0, 1))[output]
+        assert (np.abs(found - true[np.arange(40), node, output]) < 1e-8 * peak).all()
+        value, gradient, _ = exact.at(points, node, output)
+        assert (np.abs(value - found) < 1e-9 * peak).all()
+        ahead = exact.value_at(points + 1e-6 * np.eye(7)[0], node, output)
+        behind = exact.value_at(points - 1e-6 * np.eye(7)[0], node, output)
+        turned = step * 4 * model.fastest
+        assert (np.abs((ahead - behind) / 2e-6 - gradient[:, 0]) < 1e-6 * turned * peak).all()
+
+
+def test_extremes_at_nodes_that_do_not_guide_each_other_are_only_searched() -> None:
+    inputs = {n: Interval(0.64 * x, 1.36 * x) for n, x in COARSE.parameters.items() if n in "k1 m2"}
+    told = {}
+    for step in (0.01, 0.384):
+        found = envelope(
+            COARSE, inputs, duration=3 * step, step=step, alpha=(0,), method="modal", tolerance=1
+        )
+        told[step] = found.nature
+    assert told == {0.01: "estimated", 0.384: "searched"}
+
+
 @compiled
 @pytest.mark.parametrize("share", [1e-3, 0.03, 0.5], ids=["light", "usual", "heavy"])
 @pytest.mark.parametrize("n", [1, 2, 6, 11])
