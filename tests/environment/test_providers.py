@@ -38,6 +38,7 @@ DIRECT = {
     "rich": "python3-rich",
     "scipy": "python3-scipy",
     "skimage": "python3-skimage",
+    "mpmath": "python3-sympy",  # which needs it
     "sympy": "python3-sympy",
     "ufl": "python3-dolfinx",
     "xarray": "python3-xarray",
