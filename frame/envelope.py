@@ -60,9 +60,9 @@ class Envelope:
         upper_at: Parameters that reach the upper bounds, shape (A, T, m, d).
         method: Name of the method.
         nature: "inner": attained by the given parameters; "estimated": with `error`; "searched":
-            with `error`, but that no better optimum is left rests on samples alone, since there are
-            more than six parameters, the motion is not linear, or polynomials of the modes do not
-            lead; "verified by sampling" or "guaranteed": certified.
+            with `error`, but that no better optimum is left rests on samples alone: more than six
+            parameters, motion that is not linear, modes without polynomials that lead, or nodes far
+            apart; "verified by sampling" or "guaranteed": certified.
         trajectories: Number of trajectories (or eigen-analyses) computed.
         seconds: Wall time of computing.
         error: Estimated envelope error, shape (A, T, m), in the units of the outputs; None where
