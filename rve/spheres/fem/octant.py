@@ -15,7 +15,10 @@ from alphacut.rve.settings import require_mesh_size, require_radius
 from alphacut.stochastic.theta.truncated_normal import Array
 
 with uninterrupted():
-    from dolfinx.io import gmshio
+    try:
+        from dolfinx.io import gmsh as gmshio  # from 0.10 on
+    except ImportError:
+        from dolfinx.io import gmshio
 
 _CLOSEST = 0.97
 _FINER = (1.0, 0.8, 0.65, 0.5, 0.4, 0.3, 0.2)

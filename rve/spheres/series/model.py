@@ -20,9 +20,7 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 @dataclass(frozen=True)
 class SphereSeriesModel:
-    """Multipole series at the nodes of a Gauss rule in θ, as `SeriesModel`.
-
-    `accuracy`, in [1e-11, 0.1], is that of the mean moduli.
+    """As `SeriesModel`, for spheres; `accuracy`, in [1e-11, 0.1], is that of the mean moduli.
 
     Raises:
         ValueError: A value lies outside its range.

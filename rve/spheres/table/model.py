@@ -129,9 +129,8 @@ class OctantSource:
 class SphereTableModel:
     """Chebyshev interpolant of elements over (r, E_i), averaged over θ.
 
-    Args, the others as of `TableModel`:
-        accuracy: Relative error of the moduli allowed, in [1e-5, 0.1].
-        parallel: Whether all MPI ranks share each mesh; a cache is then none.
+    As `TableModel`, but `accuracy`, in [1e-5, 0.1], is that of the moduli, and all MPI ranks share
+    each mesh if `parallel`; a cache is then none.
 
     Raises:
         ValueError: A value lies outside its range.
