@@ -48,7 +48,7 @@ def decision(found: xarray.Dataset) -> Figure:
         axes.barh(place, left_out, left=wide[0], height=0.66, fc="none", ec=GREY, hatch="///", lw=0)
         axes.plot([low[-1], high[-1]], [place, place], color=INK, lw=2)
         words, across = degrees(found.sel(limit=name)), axes.get_yaxis_transform()
-        words += ": exceeded for sure" + ", not where hatched" * (left_out > 0) if sure else ""
+        words += ": exceeded for sure" + ", not where hatched" * int(left_out > 0) if sure else ""
         axes.text(0.01, place + 0.38, words, fontsize=8, transform=across)
     axes.axvline(1.0, color=ORANGE, lw=1.4, ls="--")
     axes.set_ylim(-0.5, len(names) - 0.2)
