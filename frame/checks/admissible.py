@@ -12,7 +12,7 @@ from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.checks.step_error import probes
 from alphacut.frame.structures.lagrangian import LagrangianSystem
-from alphacut.frame.structures.linear import LinearSystem, evaluate
+from alphacut.frame.structures.linear import LinearSystem, evaluate, round_off
 from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.frame.structures.storey import StoreyFrame
 
@@ -108,7 +108,7 @@ def require_motion(
     system: LinearSystem, names: tuple[str, ...], points: Array, duration: float, step: float
 ) -> None:
     """As `require_admissible`, at parameters `points` (S, d) of a linear structure."""
-    periods, rounding = [], 0.0  # the longest natural one at each point
+    periods, rounding = [], [0.0]  # the longest natural one at each point
     moved = system.ground is not None and np.any(system.ground.acceleration)
     growing: dict[str, str] = {}
     for point in points:
@@ -125,8 +125,8 @@ def require_motion(
             )
         squares = np.linalg.eigvals(np.linalg.solve(found.mass.value[0], found.stiffness.value[0]))
         periods.append(_longest_period(squares.real))
-        late = min(duration**2, duration * periods[-1] / (2 * np.pi)) / 2
-        rounding = max(rounding, np.finfo(float).eps * np.abs(squares).max() * late)
+        slowest = 2 * np.pi / periods[-1] if periods[-1] else np.inf
+        rounding.append(float(round_off(np.abs(squares).max(), slowest, np.array(duration))))
         moved = moved or found.q0.value.any() or found.v0.value.any()
         for kind, jet in (("stiffness", found.stiffness), ("damping", found.damping)):
             rates = np.linalg.eigvalsh((jet.value[0] + jet.value[0].T) / 2)
@@ -137,18 +137,18 @@ def require_motion(
             "nothing moves the structure: q0 and v0 are zero, and there is no ground motion; give"
             " q0 or v0 that is not zero, or ground=Accelerogram(step, acceleration)"
         )
-    if rounding > ROUNDING:
-        warnings.warn(
-            f"stiffness: beside its stiffest parts round-off alone may leave {rounding:.0e} of each"
-            " peak, or twenty times as much with a follower; make nearly rigid parts softer",
-            stacklevel=4,
+    said = [
+        f"{kind}: the matrix has the negative eigenvalue {seen}, so that motions may grow without"
+        " end; check its entries and their signs"
+        for kind, seen in growing.items()
+    ]
+    if (share := max(rounding)) > ROUNDING:
+        what = f"stiffness: beside its stiffest parts round-off alone may leave {share:.0e} of each"
+        said.append(
+            f"{what} peak, or twenty times as much with a follower; soften nearly rigid parts"
         )
-    for kind, seen in growing.items():
-        warnings.warn(
-            f"{kind}: the matrix has the negative eigenvalue {seen}, so that motions may grow"
-            " without end; check its entries and their signs",
-            stacklevel=4,
-        )
+    for line in said:
+        warnings.warn(line, stacklevel=4)
     every = system.ground.step if moved and system.ground is not None else 0.0
     _warn_of_units(min(periods, default=np.inf), max(periods, default=0.0), duration, step, every)
 

@@ -22,7 +22,7 @@ from alphacut.frame.modal.levels import polished_levels, search_levels
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.polynomial_error import judged_at_optima, polynomial_error
 from alphacut.frame.modal.proportional_response import exact_response
-from alphacut.frame.structures.linear import frequencies
+from alphacut.frame.structures.linear import frequencies, round_off
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.progress_bar import Progress
@@ -177,14 +177,10 @@ class Modal:
 
 
 def rounding(model: ModalModel, peak: Array) -> Array:
-    """Least error of trajectories in doubles, given their peaks (m,), shape (T, m).
-
-    Squared eigenvalues carry the rounding of the largest of all, by which slow modes run late.
-    """
-    rates, t = np.abs(model.eigenvalue.coefficients[0]), model.time
+    """Least error of trajectories in doubles, given their peaks (m,), shape (T, m)."""
+    rates = np.abs(model.eigenvalue.coefficients[0])
     largest = max(rates.max(), frequencies(model.flow.system).max())
-    late = largest**2 * np.minimum(t**2, t / max(rates.min(), 1e-300)) / 2
-    share: Array = np.finfo(float).eps * (64 + late)
+    share: Array = 64 * np.finfo(float).eps + round_off(largest**2, rates.min(), model.time)
     return share[:, None] * peak
 
 

@@ -21,8 +21,7 @@ from alphacut.frame.structures.modes import ModalError
 SOURCE = Path(__file__).with_name("ground_response.c").read_text(encoding="utf-8")
 REACH = 6.0
 """Largest change of phase (rad) over the box within a window."""
-MOST_STEPS = 40_000
-"""Steps of a table, at most."""
+MOST_STEPS = 40_000  # of a table
 FADED = 37.0
 """Exponent at which what is left of a window has fallen below round-off."""
 Waves = tuple[Array, Array, Array]
@@ -34,8 +33,7 @@ class LoadTable:
 
     Time is cut into windows so short that phases change little over the box within one. The part of
     R that arises in the window of t_j is Σ_i moment[j, k, i] x^i with x = (λ − λ_k) / scale; what
-    earlier windows leave behind goes on as exp(λ (t_j − their end)). Nodes too far apart for one
-    window have others between them.
+    earlier windows leave behind goes on as exp(λ (t_j − their end)). Far nodes have more between.
 
     Args:
         middle: λ_k in the middle of the box, shape (n,).
@@ -70,7 +68,7 @@ class LoadTable:
         middle = rate.coefficients[0]
         spread = float(np.abs(rate.coefficients[1:]).sum(0).max())
         every = max(1, ceil(spread * (time[1] - time[0]) / REACH))
-        if every > max(1, MOST_STEPS // len(time)):
+        if every > max(4, MOST_STEPS // len(time)):
             raise ModalError(
                 f"modal: under a record phases change by {every * REACH:.3g} rad over the box"
                 f" within a step of {time[1] - time[0]:.4g} s; take a smaller one"

@@ -162,6 +162,12 @@ def _members(system: LinearSystem, name: str) -> str:
     )
 
 
+def round_off(largest: float, slowest: float, time: Array) -> Array:
+    """Share of a peak by which round-off of the largest ω² (1/s²) moves the slowest ω (rad/s)."""
+    late = np.minimum(time**2, time / max(slowest, 1e-300)) / 2
+    return np.asarray(np.finfo(float).eps * largest * late)
+
+
 def frequencies(system: LinearSystem) -> Array:
     """Undamped angular frequencies at the modal parameters, rising, shape (n,), in rad/s."""
     from scipy.linalg import eigh

@@ -19,6 +19,7 @@ from alphacut.frame.methods.plan import candidates
 from alphacut.frame.modal import fitting
 from alphacut.frame.modal.exact_response import ExactResponse
 from alphacut.frame.modal.fitting import fit_modes, fit_points, hopeless
+from alphacut.frame.modal.ground_response import LoadTables
 from alphacut.frame.modal.levels import ENDS, UNSEEN
 from alphacut.frame.modal.proportional_response import ProportionalResponse, exact_response
 from alphacut.frame.modal.search import QUIET
@@ -117,6 +118,15 @@ def test_values_under_a_record_are_exact_with_nodes_however_far_apart(step: floa
         behind = exact.value_at(points - 1e-6 * np.eye(7)[0], node, output)
         turned = step * 4 * model.fastest
         assert (np.abs((ahead - behind) / 2e-6 - gradient[:, 0]) < 1e-6 * turned * peak).all()
+
+
+def test_a_table_of_a_record_of_too_many_steps_is_refused() -> None:
+    modal, names = COARSE.parameters, ("k1", "m1")
+    cuts = boxes({n: Interval(0.7 * modal[n], 1.3 * modal[n]) for n in names}, (0,))
+    flow = LinearFlow(COARSE, names, 1.0, 0.05, Exact())
+    model = fit_modes(flow, cuts, tolerance=1e-2, budget=60)
+    with pytest.raises(ModalError, match="within a step of 25 s; take a smaller one"):
+        LoadTables.build(RECORD, 25.0 * np.arange(2001), model.eigenvalue, model.coefficient)
 
 
 def test_extremes_at_nodes_that_do_not_guide_each_other_are_only_searched() -> None:
