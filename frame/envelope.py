@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,28 +19,12 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-    from alphacut.frame.boxes import Boxes
+    from alphacut.frame.boxes import UnitFlow
 
 
 def error_name(*, inside: bool) -> str:
     """What the error of certified bounds, which hold it, and that of others are called."""
     return "error within the bounds" if inside else "error to be added"
-
-
-class Trajectories(Protocol):
-    """Trajectories as an envelope needs them."""
-
-    @property
-    def boxes(self) -> Boxes:
-        """The parameters' boxes."""
-
-    @property
-    def time(self) -> Array:
-        """Nodes, shape (T,), in s."""
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names of the observed quantities."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -280,7 +264,7 @@ class Envelope:
 
 
 def signed_envelope(
-    flow: Trajectories,
+    flow: UnitFlow,
     bounds: Array,
     at: Array,
     *,

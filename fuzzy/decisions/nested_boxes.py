@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -13,16 +12,6 @@ from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.numbers import Array
 from alphacut.fuzzy.tables import html_table
-
-
-class Growing(Protocol):
-    """A family of nested boxes."""
-
-    def at(self, size: float) -> tuple[Array, Array]:
-        """Lower and upper corner of the box of a size, two arrays of shape (inputs,)."""
-
-    def size_of(self, point: Array) -> float:
-        """Least size whose box holds a point, shape (inputs,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +130,7 @@ class Threshold:
 
 
 def threshold(
-    family: Growing,
+    family: Scaled | ByLevel,
     judge: Judge,
     *,
     most: float = 1.0,
