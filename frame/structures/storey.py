@@ -5,14 +5,19 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, cast
+from typing import cast
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, stack
 from alphacut.frame.structures.damping import modal_damping
-from alphacut.frame.structures.linear import Accelerogram, Matrices
-from alphacut.frame.structures.storey_checks import check_numbers, check_springs, check_values
+from alphacut.frame.structures.linear import Matrices
+from alphacut.frame.structures.storey_checks import (
+    StoreyValues,
+    check_numbers,
+    check_springs,
+    check_values,
+)
 from alphacut.frame.structures.storey_springs import (
     Ends,
     Entry,
@@ -24,7 +29,7 @@ from alphacut.frame.structures.storey_springs import (
 
 
 @dataclass(frozen=True)
-class StoreyFrame:
+class StoreyFrame(StoreyValues):
     """Chain of n floors with k_z = 12 c_z E I / l_z³ for c_z clamped columns (2 by default).
 
     Parameters that can be uncertain: "E", "I" or "I1" …, "m1" … "mn", "l1" …, "c1" … (columns of a
@@ -65,22 +70,6 @@ class StoreyFrame:
             number of columns is not positive, a damper or gravity is negative, a ratio is outside
             [0, 1), the weight buckles a storey, or a stiffness stands beside what makes one.
     """
-
-    masses: Sequence[float]
-    lengths: Sequence[float] = ()
-    modulus: float | None = None
-    second_moment: float | Sequence[float] | None = None
-    dampers: Sequence[float] = ()
-    damper_placement: Literal["ground", "storey"] = "ground"
-    q0: Sequence[float] = ()
-    v0: Sequence[float] = ()
-    outputs: tuple[str, ...] = ()
-    rayleigh: tuple[float, float] = (0.0, 0.0)
-    ground: Accelerogram | None = None
-    damping_ratio: float | Sequence[float] = ()
-    columns: Sequence[float] = ()
-    stiffness: Sequence[float] = ()
-    gravity: float = 0.0
 
     def __post_init__(self) -> None:
         check_numbers(self)
@@ -128,24 +117,9 @@ class StoreyFrame:
         return {name: ends.get(name, (x, x)) for name, x in self.parameters.items()}
 
     @property
-    def moments(self) -> tuple[float, ...]:
-        """Second moments of area: one for all storeys, one for each, or none beside stiffness."""
-        if self.second_moment is None:
-            return ()
-        return tuple(float(x) for x in np.atleast_1d(self.second_moment))
-
-    @property
     def floors(self) -> int:
         """Number of floors n."""
         return len(self.masses)
-
-    @property
-    def ratios(self) -> dict[str, float]:
-        """Damping ratios by the names of their parameters; empty where there are none."""
-        values = np.atleast_1d(self.damping_ratio)
-        return {
-            "zeta" if len(values) == 1 else f"zeta{k + 1}": float(x) for k, x in enumerate(values)
-        }
 
     @property
     def parameters(self) -> dict[str, float]:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from alphacut.frame.calculus.numbers import require_number, require_numbers
+from alphacut.frame.structures.linear import Accelerogram
 
 UNITS = {
     "masses": "kg",
@@ -27,56 +29,40 @@ UNITS |= {
 }
 
 
-class StoreyValues(Protocol):
-    """A storey frame as its springs and its checks see it; see `StoreyFrame`."""
+@dataclass(frozen=True)
+class StoreyValues:
+    """What is given of a storey frame, as its springs and its checks see it; see `StoreyFrame`."""
+
+    masses: Sequence[float]
+    lengths: Sequence[float] = ()
+    modulus: float | None = None
+    second_moment: float | Sequence[float] | None = None
+    dampers: Sequence[float] = ()
+    damper_placement: Literal["ground", "storey"] = "ground"
+    q0: Sequence[float] = ()
+    v0: Sequence[float] = ()
+    outputs: tuple[str, ...] = ()
+    rayleigh: tuple[float, float] = (0.0, 0.0)
+    ground: Accelerogram | None = None
+    damping_ratio: float | Sequence[float] = ()
+    columns: Sequence[float] = ()
+    stiffness: Sequence[float] = ()
+    gravity: float = 0.0
 
     @property
-    def masses(self) -> Sequence[float]:
-        """Floors from below, in kg."""
-
-    @property
-    def lengths(self) -> Sequence[float]:
-        """Heights of the storeys, in m."""
-
-    @property
-    def modulus(self) -> float | None:
-        """Young's modulus, in Pa; None beside stiffness."""
-
-    @property
-    def second_moment(self) -> float | Sequence[float] | None:
-        """Second moment of area, in m⁴; None beside stiffness."""
-
-    @property
-    def moments(self) -> Sequence[float]:
-        """Second moments of area, in m⁴."""
-
-    @property
-    def columns(self) -> Sequence[float]:
-        """Columns of each storey."""
-
-    @property
-    def stiffness(self) -> Sequence[float]:
-        """Stiffness of each storey, in N/m; empty where columns make it."""
-
-    @property
-    def gravity(self) -> float:
-        """Acceleration of gravity, in m/s²; 0 where weights do not press."""
-
-    @property
-    def dampers(self) -> Sequence[float]:
-        """Damping constants, in N s/m."""
-
-    @property
-    def damper_placement(self) -> str:
-        """Where the dampers stand."""
-
-    @property
-    def rayleigh(self) -> Sequence[float]:
-        """Factors of M and K, in 1/s and s."""
+    def moments(self) -> tuple[float, ...]:
+        """Second moments of area: one for all storeys, one for each, or none beside stiffness."""
+        if self.second_moment is None:
+            return ()
+        return tuple(float(x) for x in np.atleast_1d(self.second_moment))
 
     @property
     def ratios(self) -> dict[str, float]:
-        """Damping ratios by the names of their parameters."""
+        """Damping ratios by the names of their parameters; empty where there are none."""
+        values = np.atleast_1d(self.damping_ratio)
+        return {
+            "zeta" if len(values) == 1 else f"zeta{k + 1}": float(x) for k, x in enumerate(values)
+        }
 
 
 def check_numbers(frame: StoreyValues) -> None:
