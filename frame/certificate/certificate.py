@@ -16,7 +16,7 @@ from alphacut.frame.certificate.remainder import Remainder, largest_growth, supr
 from alphacut.frame.certificate.wave_bounds import parts
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.newton import refine
-from alphacut.frame.modal.optima import Optima, problems
+from alphacut.frame.modal.optima import Optima, best_of_pool
 from alphacut.frame.modal.starting_points import trajectories
 
 SAMPLES = 256
@@ -211,11 +211,7 @@ def first_optima(model: ModalModel, lower: Array, upper: Array, gap: float) -> O
 
 def _sampled(model: ModalModel, lower: Array, upper: Array) -> Optima:
     """The best points of a sample for every problem."""
-    d, optima = len(lower), problems(np.arange(len(model.time)), len(model.outputs), len(lower))
+    d, nodes = len(lower), np.arange(len(model.time))
     unit = np.vstack([np.zeros((1, d)), chebyshev_points(d, SAMPLES)])
     points = (lower + upper) / 2 + (upper - lower) / 2 * unit
-    values = trajectories(model, points)  # (S, T, m)
-    best = np.stack([values.argmin(0), values.argmax(0)], axis=-1)  # (T, m, 2)
-    optima.point[:] = points[best.ravel()]
-    optima.value[:] = np.stack([-values.min(0), values.max(0)], axis=-1).ravel()
-    return optima
+    return best_of_pool(points, trajectories(model, points), nodes, 1)[0]

@@ -5,21 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.certificate.branch_and_bound import BranchAndBound
 from alphacut.frame.checks.admissible import require_admissible
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.methods.modal import Modal, model_with_error
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.newton import refine
-from alphacut.frame.modal.optima import Optima, problems
-from alphacut.frame.modal.starting_points import trajectories
+from alphacut.frame.modal.optima import Optima, best_of_pool, problems
+from alphacut.frame.modal.starting_points import spread_points, trajectories
 
 REFINED = 64
 """Motions of a search that are driven to their local extreme."""
@@ -140,15 +138,8 @@ class LimitSearch:
 
 def _worst(model: ModalModel, lower: Array, upper: Array) -> Optima:
     """The largest magnitudes of the model over a box, in units of the limits."""
-    d = len(lower)
-    corners = np.array(list(product((-1.0, 1.0), repeat=d))) if d <= 8 else np.zeros((0, d))
-    points = np.vstack([np.zeros((1, d)), corners, chebyshev_points(d, 256)])
-    points = (lower + upper) / 2 + (upper - lower) / 2 * points
-    values = trajectories(model, points)
-    best = np.stack([values.argmin(0), values.argmax(0)], axis=-1)  # (T, m, 2)
-    found = problems(np.arange(len(model.time)), len(model.outputs), d)
-    found.point[:] = points[best.ravel()]
-    found.value[:] = np.stack([-values.min(0), values.max(0)], axis=-1).ravel()
+    points, nodes = spread_points(lower, upper, 256), np.arange(len(model.time))
+    found = best_of_pool(points, trajectories(model, points), nodes, 1)[0]
     top = found.take(np.argsort(-found.value)[:REFINED])
     refine(model, top, np.arange(len(top.value)), lower, upper, 1e-7)
     return top

@@ -8,15 +8,13 @@ that keeps all limits ends the proof; the least box that holds one bounds the ne
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 from scipy.optimize import minimize
 
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.decisions.limit_search import LimitSearch, enclosed
-from alphacut.frame.modal.starting_points import trajectories
+from alphacut.frame.modal.starting_points import spread_points, trajectories
 
 PARTS = 200
 """Parts of a box that are looked at before its proof is given up."""
@@ -83,7 +81,7 @@ def sure_exceeding(search: LimitSearch, most: float, precision: float = 1e-3) ->
 def keeping(search: LimitSearch, size: float) -> Array | None:
     """Parameters in the box whose true motion keeps all limits, pulled to the nominal ones."""
     lower, upper = search.unit(size)
-    points = _points(lower, upper, 4 * POINTS)
+    points = spread_points(lower, upper, 4 * POINTS)
     share = np.abs(trajectories(search.model, points)).max((1, 2))
 
     def peak(point: Array) -> float:
@@ -109,7 +107,7 @@ def surely(search: LimitSearch, size: float) -> tuple[bool, Array | None]:
     while parts and looked < PARTS:
         lower, upper = parts.pop()
         looked += 1
-        points = _points(lower, upper, POINTS)
+        points = spread_points(lower, upper, POINTS)
         values = trajectories(search.model, points)  # (S, T, m)
         calm = int(np.abs(values).max((1, 2)).argmin())
         if np.abs(values[calm]).max() <= 1:
@@ -133,12 +131,3 @@ def _beyond(search: LimitSearch, values: Array, lower: Array, upper: Array) -> b
     allowed = np.array([-1 - search.error.flat[number // 2]]) - 1e-9
     opposite = np.array([number ^ 1])
     return not len(enclosed(search, lower, upper, opposite, allowed, 1000)[0])
-
-
-def _points(lower: Array, upper: Array, spread: int) -> Array:
-    """Middle, corners and a spread of points of a box."""
-    d = len(lower)
-    corners = np.array(list(product((-1.0, 1.0), repeat=d))) if d <= 8 else np.zeros((0, d))
-    unit = np.vstack([np.zeros((1, d)), corners, chebyshev_points(d, spread)])
-    points: Array = (lower + upper) / 2 + (upper - lower) / 2 * unit
-    return points
