@@ -64,7 +64,8 @@ class Jet:
         return Jet(-self.value, -self.first, -self.second)
 
     def __add__(self, other: Jet | ArrayLike) -> Jet:
-        return _paired(self, self._lift(other), lambda x, y: x + y)
+        a, b = _matched(self, self._lift(other))
+        return Jet(a.value + b.value, a.first + b.first, a.second + b.second)
 
     __radd__ = __add__
 
@@ -131,13 +132,6 @@ def _padded(a: Jet, ndim: int) -> Jet:
 
 def _matched(a: Jet, b: Jet) -> tuple[Jet, Jet]:
     return _padded(a, b.value.ndim), _padded(b, a.value.ndim)
-
-
-def _paired(a: Jet, b: Jet, operation: Callable[[Array, Array], Array]) -> Jet:
-    a, b = _matched(a, b)
-    return Jet(
-        operation(a.value, b.value), operation(a.first, b.first), operation(a.second, b.second)
-    )
 
 
 def _product(a: Jet, b: Jet, bilinear: Callable[[Array, Array], Array]) -> Jet:

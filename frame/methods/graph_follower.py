@@ -187,14 +187,11 @@ class GraphFollower:
         _, first, second = storage.held.models(0, places)
         g, H = side[:, None] * first, side[:, None, None] * second
         at = storage.points[storage.best[places]]
-        x = self._maximise(g, H, box[0] - at, box[1] - at)  # optima of eq. 22
+        low, high = box[0] - at, box[1] - at
+        # optima of eq. 22
+        x = local_maximum(g, H, low, high) if self.order == 2 else linear_maximum(g, low, high)
         promised = gain(g, H if self.order == 2 else 0 * H, x)
         promise[places], target[places] = storage.top[places] + promised, np.clip(at + x, *box)
-
-    def _maximise(self, g: Array, H: Array, lower: Array, upper: Array) -> Array:
-        if self.order == 1:
-            return linear_maximum(g, lower, upper)
-        return local_maximum(g, H, lower, upper)
 
 
 def _note(

@@ -13,7 +13,7 @@ from alphacut.rve.bounds import mori_tanaka
 from alphacut.rve.cell import Phase, square_moduli, with_ratio
 from alphacut.rve.result import StressCurve
 from alphacut.rve.slices.curve import curve_of
-from alphacut.stochastic import RadiusMap, ThetaLaw, ThetaRule, gauss_rule, require_map
+from alphacut.stochastic import RadiusMap, ThetaRule, gauss_rule, require_map
 from alphacut.stochastic.theta.law import Array
 
 _SAMPLES = 2049
@@ -24,14 +24,7 @@ SAFETY = 1.6  # of the estimates in θ
 _NOISE = 1e-13  # of a declared error: what rounding leaves
 DIGITS = 12  # radii equal to so many decimals are one slice
 
-
-def _gauss_rule(law: ThetaLaw, points: int) -> ThetaRule:
-    return _kept_rule(law, points) if can_hash(law) else gauss_rule(law, points=points)
-
-
-@lru_cache(maxsize=256)
-def _kept_rule(law: ThetaLaw, points: int) -> ThetaRule:
-    return gauss_rule(law, points=points)
+_kept_rule = lru_cache(maxsize=256)(gauss_rule)
 
 
 def can_hash(of: object) -> TypeGuard[Hashable]:
@@ -69,9 +62,7 @@ def breaks(radius_map: RadiusMap) -> Array:
     return found[np.append(True, np.diff(found) > step)] if found.size else found
 
 
-@lru_cache(maxsize=64)
-def _kept_breaks(radius_map: RadiusMap) -> Array:
-    return breaks(radius_map)
+_kept_breaks = lru_cache(maxsize=64)(breaks)
 
 
 def _bisect_jump(radius_map: RadiusMap, low: float, high: float) -> float | None:
@@ -102,7 +93,9 @@ def theta_rule(radius_map: RadiusMap, *, points: int) -> ThetaRule:
     law = radius_map.distribution
     cuts = _kept_breaks(radius_map) if can_hash(radius_map) else breaks(radius_map)
     if cuts.size == 0:
-        return _gauss_rule(law, points)
+        if can_hash(law):
+            return _kept_rule(law, points=points)
+        return gauss_rule(law, points=points)
     edges = [law.lower, *(float(cut) for cut in cuts), law.upper]
     shares = np.diff(law.cdf(edges))
     pieces = [
@@ -115,17 +108,13 @@ def theta_rule(radius_map: RadiusMap, *, points: int) -> ThetaRule:
     return ThetaRule(nodes, weights / weights.sum())
 
 
-def _square_moduli_and_ratio(stiffness: Array) -> Array:
-    return with_ratio(square_moduli(stiffness))
-
-
 def settle_rule(
     radius_map: RadiusMap,
     stiffness_at: Callable[[Array], Array],
     *,
     points: int | None,
     accuracy: float,
-    moduli: Callable[[Array], Array] = _square_moduli_and_ratio,
+    moduli: Callable[[Array], Array] = lambda stiffness: with_ratio(square_moduli(stiffness)),
 ) -> tuple[list[StressCurve], list[Array], list[StressCurve]]:
     """Curves whose nodes are added until the mean moduli settle, and their declared errors.
 

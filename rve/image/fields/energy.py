@@ -39,9 +39,8 @@ class Energy:
     @property
     def upper(self) -> Array:
         """A matrix above the true one in the Loewner order, shape (tiles, fields, fields)."""
-        return self.value + _diagonal(
-            self.rounding.sum(axis=-1) * SAFETY + 4 * UNIT * np.abs(self.value).sum(axis=-1)
-        )
+        above = self.rounding.sum(axis=-1) * SAFETY + 4 * UNIT * np.abs(self.value).sum(axis=-1)
+        return np.asarray(self.value + above[..., None] * np.eye(above.shape[-1]))
 
 
 def energy(
@@ -141,7 +140,3 @@ def _weights(element: Element, bulk: Array, shear: Array) -> Array:
 
 def _outer(first: Array, second: Array) -> Array:
     return first[:, :, None] * second[:, None, :]
-
-
-def _diagonal(entries: Array) -> Array:
-    return np.asarray(entries[..., None] * np.eye(entries.shape[-1]))
