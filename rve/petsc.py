@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import ctypes
 import os
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -41,7 +41,7 @@ _INTEGER = ctypes.POINTER(ctypes.c_int)
 _LIBRARY.PetscOptionsUsed.argtypes = [ctypes.c_void_p, ctypes.c_char_p, _INTEGER]
 
 
-def clean(comm: MPI.Comm | None) -> None:
+def clean(comm: MPI.Intracomm | None) -> None:
     """Free what ranks shared and nothing refers to any more; petsc4py keeps it until all ask."""
     if comm is not None:
         PETSc.garbage_cleanup(comm)
@@ -53,27 +53,29 @@ def give_back() -> None:
 
 
 def zero_matrix(
-    starts: NDArray[np.int32], columns: NDArray[np.int32], size: int, block: int, ranks: Ranks
+    starts: Sequence[NDArray[np.int32]],
+    columns: Sequence[NDArray[np.int32]],
+    size: int,
+    block: int,
+    ranks: Ranks,
 ) -> PETSc.Mat:
     """Square matrix of zeros in blocks; each rank gives the pattern of its own, consecutive rows.
 
-    Rows begin at `starts` in the rising `columns`; `size` counts all ranks' rows, not in blocks.
+    Args:
+        starts: Where its rows begin in the columns that this rank owns, and in those of others.
+        columns: Rising, shape (n,) at the least; those that it owns are counted from the first.
+        size: Rows of all ranks, not in blocks.
+        block: Rows of a block.
+        ranks: The ranks.
     """
-    rows = len(starts) - 1
-    found = PETSc.Mat().create(ranks.comm)
-    found.setSizes([(block * rows, size)] * 2, block)
+    found, counts = PETSc.Mat().create(ranks.comm), [np.diff(own) for own in starts]
+    found.setSizes([(block * len(counts[0]), size)] * 2, block)
     found.setType("baij")
-    if ranks.size == 1:
-        found.setPreallocationNNZ(np.diff(starts).astype(PETSc.IntType))
-        parts = [(found.handle, columns)]
-    else:
-        first = sum(ranks.all(rows)[: ranks.rank])
-        own = (columns >= first) & (columns < first + rows)
-        counts = np.diff(np.append(0, np.cumsum(own, dtype=np.int32))[starts])
-        shares = [x.astype(PETSc.IntType) for x in (counts, np.diff(starts) - counts)]
-        found.setPreallocationNNZ(shares)
-        place = found.getDiagonalBlock().handle, _beside_diagonal(found)[0].value or 0
-        parts = list(zip(place, (columns[own] - np.int32(first), columns[~own]), strict=True))
+    shares = [count.astype(PETSc.IntType) for count in counts]
+    found.setPreallocationNNZ(shares if ranks.size > 1 else shares[0])
+    parts = [(found.getDiagonalBlock().handle, columns[0][: starts[0][-1]])]
+    if ranks.size > 1:
+        parts.append((_beside_diagonal(found)[0].value or 0, columns[1][: starts[1][-1]]))
     for part, numbers in parts:
         given = numbers.astype(PETSc.IntType, copy=False).ctypes
         _LIBRARY.MatSeqBAIJSetColumnIndices(ctypes.c_void_p(part), given)

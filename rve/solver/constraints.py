@@ -224,15 +224,17 @@ class LevelNumbering:
         where a node is fixed or the row another rank's.
         """
         own, pairs = self.owned(ranks.size)[ranks.rank], self.pairs
-        starts = np.empty(len(own) // 2 + 1, np.int32)
-        columns = np.empty(15 * pairs.size, np.int32)
+        starts, columns = (
+            [np.empty(size, np.int32) for _ in range(2)]
+            for size in (len(own) // 2 + 1, 15 * pairs.size)
+        )
         places = np.empty((*pairs.shape, 15), np.int32)
         if c_loops(WEDGES).couple(
             len(pairs), pairs.ctypes, own.start // 2, own.stop // 2, self.size // 2,
-            starts.ctypes, columns.ctypes, places.ctypes,
+            starts[0].ctypes, columns[0].ctypes, starts[1].ctypes, columns[1].ctypes, places.ctypes,
         ):  # fmt: skip
             raise MemoryError("no memory is left for the matrix")
-        return zero_matrix(starts, columns[: starts[-1]], self.size, 2, ranks), places
+        return zero_matrix(starts, columns, self.size, 2, ranks), places
 
     def to_nodes(self, values: Array, start: int) -> Array:
         """Displacements of the nodes, zero on the line, shape (nodes, 2, columns).

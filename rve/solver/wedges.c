@@ -9,11 +9,12 @@ enum { NODES = 15, DOFS = 30, SLICES = 3, CORNERS = 6, PLANAR = 12, LOADS = 3 };
 typedef void (*integral)(double *, const double *, const double *, const double *, const int *,
                          const uint8_t *, void *);
 
-/* Pairs that share a wedge with each of the pairs `low` to `high`: where each row's begin (high - low +
-   1), and their rising numbers. `place` takes where the pairs of each wedge then stand, 15 x 15 of them: n
+/* Pairs that share a wedge with each of the pairs `low` to `high`, rising: those in that range, counted
+   from `low`, and the others; and where each row's begin among either (high - low + 1). `place` takes where the pairs of each wedge then stand, 15 x 15 of them: n
    as the one of number n of those rows whose column lies in that range too, -2 - n among the others, -1
    where the row is another's or one of them is fixed. Returns 2 without memory. */
-int couple(int wedges, const int *pairs, int low, int high, int size, int *starts, int *columns, int *place) {
+int couple(int wedges, const int *pairs, int low, int high, int size, int *inner_starts, int *inner,
+           int *outer_starts, int *outer, int *place) {
     int rows = high - low, words = size / 64 + 1, entries = wedges * NODES;
     int *begin = calloc(rows + 1, sizeof(int)), *fill = calloc(rows + 1, sizeof(int));
     int *within = malloc((entries + 1) * sizeof(int)), *found = calloc(size + 1, sizeof(int));
@@ -25,9 +26,9 @@ int couple(int wedges, const int *pairs, int low, int high, int size, int *start
     for (int r = 0; r < rows && !status; r++) fill[r] = begin[r + 1] += begin[r];
     for (int e = entries - 1; e >= 0 && !status; e--)
         if (pairs[e] >= low && pairs[e] < high) within[--fill[pairs[e] - low]] = e;
-    starts[0] = 0;
+    inner_starts[0] = outer_starts[0] = 0;
     for (int r = 0; r < rows && !status; r++) {
-        int count = starts[r], least = words, last = -1;
+        int least = words, last = -1;
         for (int k = begin[r]; k < begin[r + 1]; k++)
             for (int j = 0, *own = (int *)pairs + within[k] / NODES * NODES; j < NODES; j++)
                 if (own[j] >= 0) {
@@ -39,10 +40,10 @@ int couple(int wedges, const int *pairs, int low, int high, int size, int *start
         for (int word = least; word <= last; word++)
             for (; marked[word]; marked[word] &= marked[word] - 1) {
                 int column = 64 * word + __builtin_ctzll(marked[word]);
-                found[column] = column >= low && column < high ? square++ : -2 - others++;
-                columns[count++] = column;
+                if (column >= low && column < high) found[column] = square, inner[square++] = column - low;
+                else found[column] = -2 - others, outer[others++] = column;
             }
-        starts[r + 1] = count;
+        inner_starts[r + 1] = square, outer_starts[r + 1] = others;
         for (int k = begin[r]; k < begin[r + 1]; k++)
             for (int j = 0, *own = (int *)pairs + within[k] / NODES * NODES; j < NODES; j++)
                 place[(size_t)within[k] * NODES + j] = own[j] >= 0 ? found[own[j]] : -1;
