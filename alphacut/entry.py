@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import argparse
-import atexit
 import os
 import sys
-import threading
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import NoReturn
 
 from alphacut.commands.parser import Parser, refuse_petsc, split_petsc
 from alphacut.fuzzy import CampaignError
-from alphacut.io.files import RANKS, SIZES, rank, ranks, say, standard_output
+from alphacut.io.files import leave as leave
+from alphacut.io.files import rank, ranks, say, standard_output
 from alphacut.io.netcdf import finished
 from alphacut.io.output_paths import check_destinations
 from alphacut.io.problem import BadInput, missing
@@ -162,22 +160,6 @@ def plain_warnings() -> Iterator[None]:
     with warnings.catch_warnings():
         warnings.showwarning = show
         yield
-
-
-def leave(status: int) -> NoReturn:
-    """End the program; its memory is not taken apart first, up to 0.2 s once PETSc is loaded."""
-    mpi = sys.modules.get("mpi4py.MPI")
-    if threading.active_count() > 1:  # waited for
-        sys.exit(status)
-    try:
-        atexit._run_exitfuncs()  # as multiprocessing does
-        sys.stdout.flush()
-        sys.stderr.flush()
-    except OSError:
-        sys.exit(status)
-    if mpi and not mpi.Is_finalized() and any(name in os.environ for name in (*RANKS, *SIZES)):
-        mpi.Finalize()  # for mpirun or its like
-    os._exit(status)
 
 
 def interrupted(options: argparse.Namespace) -> str:

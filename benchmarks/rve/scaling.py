@@ -20,14 +20,14 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from alphacut.entry import leave
+from alphacut.io.files import leave
 from alphacut.rve.cell import Phase
 from benchmarks.rve.solvers import MATRIX, PAPER_MAP, PARTICLE, Timing, measure
 
 FACTOR = 1.5
 SAME = 1e-12
 MODELLED = (2, 13, 26, 1000)  # ranks
-_LEVELS, _LOADS, _RADII = 13, 2, 6  # radii of a table that are solved at once
+_LEVELS, _LOADS, _RADII = 13, 2, 10  # radii of a table that are solved at once
 PHASES = ("start", "mesh", "assemble", "setup", "solve", "estimate")
 CHANGES: Mapping[str, tuple[float, ...]] = {
     "mesh size": (0.15, 0.08, 0.04),
