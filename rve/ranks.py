@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import product
+from functools import cache
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
@@ -24,7 +24,7 @@ class Ranks:
     All ranks call every method in the same order.
     """
 
-    comm: MPI.Comm | None = None
+    comm: MPI.Intracomm | None = None
 
     @contextmanager
     def together(self) -> Iterator[None]:
@@ -56,29 +56,36 @@ class Ranks:
     ) -> list[T]:
         """The function of every item, each computed on one rank and known to all.
 
-        `progress` is called with the share done of this rank's; `costs` are about those of items.
+        Ranks of one machine take the dearest that is left; others are dealt theirs beforehand.
+        `progress` is called with the share of the items taken; `costs` are about those of items.
         """
-        own: list[T] = []
-        owners = self._owners(costs or [1.0] * len(items))
-        mine = [item for item, owner in zip(items, owners, strict=True) if owner == self.rank]
+        own: dict[int, T] = {}
+        order = sorted(range(len(items)), key=lambda k: -costs[k] if costs else k)
         with self.together():
-            for item in mine:
-                own.append(function(item))
+            for k in self._drawn(len(items)):
+                own[order[k]] = function(items[order[k]])
                 if progress:
-                    progress(len(own) / len(mine))
-        dealt = [iter(part) for part in self.all(own)]
-        return [next(dealt[owner]) for owner in owners]
+                    progress((k + 1) / len(items))
+        found = {k: one for part in self.all(own) for k, one in part.items()}
+        return [found[k] for k in range(len(items))]
 
-    def _owners(self, costs: Sequence[float]) -> list[int]:
-        """Rank of each item: the dearest first, to the idlest; few items as evenly as can be."""
-        if self.size == 2 and 2 < len(costs) < 10:
-            deals = list(product((0, 1), repeat=len(costs)))
-            return list(deals[int(np.abs(np.array(deals) @ costs - sum(costs) / 2).argmin())])
-        owners, loads = [0] * len(costs), [0.0] * self.size
-        for k in sorted(range(len(costs)), key=lambda k: -costs[k]):
-            owners[k] = loads.index(min(loads))
-            loads[owners[k]] += costs[k]
-        return owners
+    def _drawn(self, count: int) -> Iterator[int]:
+        """Numbers below `count`, in rising order, each for the rank that asks first."""
+        counter = _counter(self.comm.handle) if self.comm and count > self.size > 1 else None
+        if self.comm is None or counter is None:
+            yield from range(self.rank, count, self.size)
+            return
+        if self.rank == 0:
+            counter.tomemory()[:] = bytes(8)
+        self.comm.Barrier()
+        one, number = np.ones(1, np.int64), np.zeros(1, np.int64)
+        while True:
+            counter.Lock(0)
+            counter.Fetch_and_op(one, number, 0)
+            counter.Unlock(0)
+            if number[0] >= count:
+                return
+            yield int(number[0])
 
     def all(self, own: T) -> list[T]:
         """What every rank has, known to all."""
@@ -101,6 +108,18 @@ class Ranks:
     def size(self) -> int:
         """Number of ranks."""
         return self.comm.size if self.comm else 1
+
+
+@cache
+def _counter(handle: int) -> MPI.Win | None:
+    """A number that ranks of one machine count up; None on several machines."""
+    from mpi4py import MPI
+
+    comm = MPI.Intracomm.fromhandle(handle)
+    near = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    if near.size < comm.size or not isinstance(near, MPI.Intracomm):
+        return None
+    return MPI.Win.Allocate_shared(8 if near.rank == 0 else 0, 8, comm=near)
 
 
 ALONE = Ranks()

@@ -43,7 +43,9 @@ def refined_slices(
     for poisson in {p.poisson for p in inclusions}:
         moduli = [p.modulus for p in inclusions if p.poisson == poisson]
         span = TableRange(matrix, poisson, (low, high), (min(moduli), max(moduli)))
-        sizes.append(PlanarSource(span, _SPACE_SHARE * tolerance).mesh_size)
+        source = PlanarSource(span, _SPACE_SHARE * tolerance)
+        source.moduli((), np.array(span.moduli))  # it chooses its mesh
+        sizes.append(source.mesh_size)
         counts.append(
             _count_nodes(
                 build_table(span, accuracy=_SKETCH),

@@ -28,8 +28,9 @@ from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.truncated_normal import Array
 
 _FINE = 128  # nodes in θ that leave nothing out
-_ACCURACIES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # of the reference
-_SHARE = 0.2  # of an error, that the reference may leave
+_ACCURACIES = [float(f"{d}e-{k}") for k in (4, 5, 6, 7) for d in (10, 5, 2)] + [1e-7]
+_FIRST = 0.18  # accuracy of the first reference over the expected error
+_SHARE, _SHARE_OF_EACH = 0.2, 0.5  # of the largest and of each error, which a reference may leave
 
 Moduli = Callable[[Array], Array]  # at radii (n,), shape (n, 3)
 
@@ -40,6 +41,7 @@ def judged(
     phases: tuple[Phase, Phase],
     *,
     layers: Array,
+    expected: float = 1.0,
     cache: Path | None = None,
     ranks: Ranks = ALONE,
 ) -> Homogenised:
@@ -51,43 +53,69 @@ def judged(
         phases: Its matrix and inclusion.
         layers: About the relative errors that the layers in θ leave in the mean moduli and the
             ratio, shape (4,); the rest is booked to the mesh.
+        expected: About the largest error, for which the first reference is accurate enough.
         cache: Folder where tables are kept; None keeps them in the process.
         ranks: Those that share the making of tables.
     """
-    enough = _ACCURACIES[0]  # accuracy that is thought to do
-    for accuracy in _ACCURACIES:
-        if accuracy > enough and accuracy > _ACCURACIES[-1]:
-            continue
-        try:
-            exact, left = _reference(radius_map, phases, accuracy, cache, ranks)
-        except RuntimeError:  # no planar mesh, or none fine enough
-            mean, nodes = _within_bounds(result.curve, radius_map, phases)
-            break
-        fine = theta_rule(radius_map, points=_FINE)
-        moduli = moduli_of(result.curve)
-        slices, noise = exact(radius_map(fine.nodes)), left(radius_map(fine.nodes))
-        other = with_ratio(fine.weights @ slices)
-        noise = np.append(noise[:, :3].max(axis=0), ratio_error(fine.weights, slices, noise))
-        # σ11 is printed, the whole stiffness exported: on a mesh x1 is not quite x2
-        both = (
-            moduli,
-            moduli if result.curve.stiffness is None else square_moduli(result.curve.stiffness),
-        )
-        means = [with_ratio(result.curve.weights @ one) for one in both]
-        mean = np.max([_apart(one, other) for one in means], axis=0)
-        nodes = _apart(moduli, exact(radius_map(result.curve.theta)))
-        nodes = (1 + nodes) * (1 + left(radius_map(result.curve.theta))[:, :3]) - 1
-        settled = (noise <= _SHARE * mean)[:3][np.isfinite(mean[:3])].all()
-        enough = accuracy * float(np.nanmin((_SHARE * mean / noise)[:3]))
-        mean = (1 + mean) * (1 + noise) - 1
-        if settled:
-            break
+    source = partial(_reference, radius_map, phases, cache=cache, ranks=ranks)
+    mean, nodes = _distances(result.curve, radius_map, source, expected) or _within_bounds(
+        result.curve, radius_map, phases
+    )
     layers = np.minimum(layers, mean)
     return replace(
         result,
         curve=replace(result.curve, error=nodes[:, [0, 2]]),
         errors={"space": (1 + mean) / (1 + layers) - 1, "theta": layers},
     )
+
+
+def _distances(
+    curve: StressCurve,
+    radius_map: RadiusMap,
+    source: Callable[[float], tuple[Moduli, Moduli]],
+    expected: float,
+) -> tuple[Array, Array] | None:
+    """Errors of the mean moduli and ratio, and of those at nodes, by a reference of `source`.
+
+    It gets more accurate until it tells them; None where there is none.
+    """
+    wanted, found, failed = _FIRST * expected, None, False
+    while True:
+        step = next((k for k, least in enumerate(_ACCURACIES) if least <= wanted), -1)
+        try:
+            mean, nodes, noise = _distance(curve, radius_map, *source(_ACCURACIES[step]))
+        except RuntimeError:  # no planar mesh, or none fine enough
+            if found or step == 0:
+                return found
+            failed, wanted = True, 10 * _ACCURACIES[step]
+            continue
+        found = (1 + mean) * (1 + noise) - 1, nodes
+        allowed = np.fmin(_SHARE * np.nanmax(mean[:3]), _SHARE_OF_EACH * mean[:3])
+        left = float((noise[:3] / np.maximum(allowed, 1e-300)).max())
+        if failed or left <= 1 or _ACCURACIES[step] == _ACCURACIES[-1]:
+            return found
+        wanted = _ACCURACIES[step] / max(left, 2.0)
+
+
+def _distance(
+    curve: StressCurve, radius_map: RadiusMap, exact: Moduli, left: Moduli
+) -> tuple[Array, Array, Array]:
+    """Distances from a reference, of means and at nodes, and what the former owe to its error."""
+    fine = theta_rule(radius_map, points=_FINE)
+    moduli = moduli_of(curve)
+    slices, noise = exact(radius_map(fine.nodes)), left(radius_map(fine.nodes))
+    other = with_ratio(fine.weights @ slices)
+    noise = np.append(noise[:, :3].max(axis=0), ratio_error(fine.weights, slices, noise))
+    # σ11 is printed, the whole stiffness exported: on a mesh x1 is not quite x2
+    both = moduli, moduli if curve.stiffness is None else square_moduli(curve.stiffness)
+    mean = np.max([_apart(with_ratio(curve.weights @ one), other) for one in both], axis=0)
+    nodes = _apart(moduli, exact(radius_map(curve.theta)))
+    return mean, (1 + nodes) * (1 + left(radius_map(curve.theta))[:, :3]) - 1, noise
+
+
+def mean_moduli(curve: StressCurve) -> Array:
+    """C11 + C12, C11 − C12, C33 and the ratio of the last two, by their means, shape (4,)."""
+    return with_ratio(curve.weights @ moduli_of(curve))
 
 
 def moduli_of(curve: StressCurve) -> Array:
@@ -107,6 +135,7 @@ def _reference(
     radius_map: RadiusMap,
     phases: tuple[Phase, Phase],
     accuracy: float,
+    *,
     cache: Path | None,
     ranks: Ranks,
 ) -> tuple[Moduli, Moduli]:

@@ -17,7 +17,7 @@ from typing import ClassVar
 import numpy as np
 from mpi4py import MPI
 
-from alphacut.rve.cell import LOADS, THREE_LOADS, Cell, Phase, with_ratio
+from alphacut.rve.cell import LOADS, THREE_LOADS, Cell, Phase
 from alphacut.rve.certificate import (
     ROUND_OFF,
     WHAT,
@@ -31,7 +31,7 @@ from alphacut.rve.mesh.periodicity import mismatch
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import Triangulation, reference_radius, triangulate
 from alphacut.rve.petsc import clean, give_back
-from alphacut.rve.prism.error_estimate import judged, moduli_of
+from alphacut.rve.prism.error_estimate import judged, mean_moduli
 from alphacut.rve.prism.mixed_element import NEARLY_INCOMPRESSIBLE
 from alphacut.rve.prism.modulus_basis import BasisError, ModulusBasis
 from alphacut.rve.prism.system import PrismSystem, SliceMeans
@@ -139,12 +139,12 @@ class PrismModel:
         results: list[Homogenised],
     ) -> list[Homogenised]:
         """The results with their declared errors, whose cost is booked as `estimate`."""
-        watch, ranks = Stopwatch(), self._ranks
+        watch = Stopwatch()
         with watch("estimate"):
-            layers = self.errors_of_layers(radius_map, matrix, inclusions)
+            coarser = self.coarser(radius_map, matrix, inclusions)
             found = [
-                judged(one, radius_map, (matrix, phase), layers=left, cache=self.cache, ranks=ranks)
-                for one, phase, left in zip(results, inclusions, layers, strict=True)
+                self._with_errors(one, radius_map, (matrix, phase), *means)
+                for one, phase, means in zip(results, inclusions, coarser, strict=True)
             ]
         seconds = watch.seconds["estimate"] / len(results)
         for result in found:
@@ -153,12 +153,35 @@ class PrismModel:
             require(result.checks, Limits(discretisation=allowed))
         return [replace(r, seconds={**r.seconds, "estimate": seconds}) for r in found]
 
-    def errors_of_layers(
+    def _with_errors(
+        self,
+        result: Homogenised,
+        radius_map: RadiusMap,
+        phases: tuple[Phase, Phase],
+        coarse: Array,
+        thick: Array,
+    ) -> Homogenised:
+        """The result against a reference as accurate as its means and `coarser` ones ask for."""
+        layers = error_of_layers(coarse, thick)
+        change = np.nan_to_num(abs(coarse / mean_moduli(result.curve) - 1)).max()
+        gain = np.clip(0.75 / self.mesh_size, 4, 15) if self.interface == "conforming" else 1.0
+        expected = float(max(change / gain, layers.max(), 0.02 * self.mesh_size**3))
+        return judged(
+            result,
+            radius_map,
+            phases,
+            layers=layers,
+            expected=expected,
+            cache=self.cache,
+            ranks=self._ranks,
+        )
+
+    def coarser(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
     ) -> list[Array]:
-        """About the relative errors that layers leave in the mean moduli and the ratio, shape (4,).
+        """Mean moduli and ratio of a mesh twice as coarse, and with half the layers, shape (2, 4).
 
-        Half as many layers, on a mesh twice as coarse, show them; of two ranks each solves one.
+        Of two ranks each solves one; nan where they cannot be solved.
         """
         alone = Ranks(self._ranks.comm if self._ranks.size == 2 else None)
         coarse = replace(self, estimate=False, mesh_size=min(1.0, 2 * self.mesh_size))
@@ -166,18 +189,18 @@ class PrismModel:
         thick = replace(coarse, layers=max(1, self.layers // 2))
 
         def means(model: PrismModel) -> list[Array]:  # not the results: some maps cannot be sent
-            curves = [one.curve for one in model.solve(radius_map, matrix, inclusions)]
+            found = [mean_moduli(one.curve) for one in model.solve(radius_map, matrix, inclusions)]
             if self._ranks.rank:  # which the next step loads Gmsh on, while the first may solve
                 give_back()
                 import_module("alphacut.rve.mesh.planar")
-            return [with_ratio(curve.weights @ moduli_of(curve)) for curve in curves]
+            return found
 
         try:
             coarse._plane(radius_map, self._ranks)  # made by the first, kept by both
             pairs = alone.each(means, (coarse, thick))
         except RuntimeError:  # folded, or not solved: the share stays unknown, the sum does not
-            return [np.zeros(4) for _ in inclusions]
-        return [abs(two / one - 1) / _GAIN for one, two in zip(*pairs, strict=True)]
+            return [np.full((2, 4), np.nan) for _ in inclusions]
+        return list(map(np.stack, zip(*pairs, strict=True)))
 
     def _moved(self, radius_map: RadiusMap, watch: Stopwatch) -> PrismSystem:
         with watch("mesh"):
@@ -294,6 +317,11 @@ class PrismModel:
             return Limits(algebraic, 0.1 * h)
         locks = max(phase.poisson for phase in phases) > _LOCKING
         return Limits(algebraic, 0.5 * h**2 if locks else 0.1 * h**3)
+
+
+def error_of_layers(coarse: Array, thick: Array) -> Array:
+    """About the relative errors that layers leave, 0 if unknown, from `PrismModel.coarser`."""
+    return np.asarray(np.nan_to_num(abs(thick / coarse - 1) / _GAIN))
 
 
 def certify(means: SliceMeans, phases: tuple[Phase, Phase], loads: Array) -> dict[str, float]:

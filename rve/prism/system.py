@@ -87,7 +87,7 @@ class PrismSystem:
         ValueError: There are more ranks than wedges.
     """
 
-    def __init__(self, grid: PrismGrid, comm: MPI.Comm) -> None:
+    def __init__(self, grid: PrismGrid, comm: MPI.Intracomm) -> None:
         self.ranks, wedges = Ranks(comm), len(grid.own)
         if comm.size > wedges:
             raise ValueError(

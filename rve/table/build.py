@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from time import perf_counter
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -20,7 +20,9 @@ _ORDER = 4
 _ROUGH, _FINEST = 0.5, 0.04  # mesh sizes
 _RATES = 7.5, 6.0  # of the moduli in the mesh size: hoped for, and likely
 _LEAST, _MOST_NODES = 7, 65  # radii
-_JUDGED = 0.03, 0.1, 0.3, 0.6, 0.72, 0.85  # radii, at which a mesh is judged
+_JUDGED_AT = 0.03, 0.1, 0.3, 0.6, 0.72, 0.85  # radii, at which a mesh is judged
+_JUDGES = 1.5  # cost of a cell that judges, over that of others
+_NONE = np.array([])
 _SPACE_SHARE = 0.6  # of the accuracy; the rest is for interpolation
 
 
@@ -29,111 +31,143 @@ class TableError(RuntimeError):
 
 
 class Source(Protocol):
-    """Source of a table's moduli."""
+    """Source of a table's moduli; its errors are known once it has been asked for some."""
 
     mesh_size: float
     space: Array
     unknowns: int
     systems: int
+    progress: Callable[[float], None] | None
 
-    def moduli(self, radius: float, modulus: Array) -> Array:
-        """C11 + C12, C11 − C12 and C33 in Pa, shape (m, 3)."""
+    def moduli(self, radii: Sequence[float], modulus: Array) -> list[Array]:
+        """C11 + C12, C11 − C12 and C33 in Pa at each radius, shape (m, 3) each."""
 
     def rough(self, radius: float, modulus: Array) -> Array:
-        """The same, a few digits being enough."""
+        """The same at one, a few digits being enough."""
+
+
+class SolvedCell(NamedTuple):
+    """Moduli of a cell in Pa, shape (m, 3), declared errors where it judges a mesh, shape (4,)."""
+
+    moduli: Array
+    errors: Array
+    factorisations: int
+
+    @property
+    def error(self) -> float:
+        """The largest of the moduli."""
+        return float(self.errors[:3].max())
 
 
 @dataclass
 class PlanarSource:
     """Moduli by planar cells of order 4 on meshes as fine as `accuracy` needs.
 
-    `ranks` share the radii at which a mesh is judged.
+    The mesh is judged beside the first cells that are asked for. `ranks` share all of them.
     """
 
     span: TableRange
     accuracy: float
     ranks: Ranks = ALONE
-    mesh_size: float = field(init=False)
+    mesh_size: float = field(init=False, default=0.0)
     space: Array = field(init=False)
     unknowns: int = 0
     systems: int = 0
+    progress: Callable[[float], None] | None = None
 
-    def __post_init__(self) -> None:
-        radii = np.unique(np.clip([*_JUDGED, *self.span.radii], *self.span.radii))
-        size, found = _ROUGH, self._all_errors(radii, _ROUGH)
-        while found[:, :3].max() > self.accuracy:  # a finer mesh gains more at one than at another
-            worst = int(found[:, :3].max(axis=1).argmax())
-            size, errors = self._fine_enough(radii[worst], size, found[worst])
-            rest = self._all_errors(np.delete(radii, worst), size)
-            found = np.insert(rest, worst, errors, axis=0)
-        self.mesh_size = size
-        self.space = np.vstack([radii, found.T])
+    def moduli(self, radii: Sequence[float], modulus: Array) -> list[Array]:
+        """At the chosen mesh size, which the first call chooses."""
+        found = self._cells((), radii, modulus) if self.mesh_size else self._first(radii, modulus)
+        return [one.moduli for one in found]
 
-    def _fine_enough(self, radius: float, size: float, errors: Array) -> tuple[float, Array]:
-        """Mesh size at which one radius keeps the accuracy, and its errors, from a rougher one."""
-        while errors[:3].max() > self.accuracy:
-            if size <= _FINEST:
+    def _first(self, radii: Sequence[float], modulus: Array) -> list[SolvedCell]:
+        """Cells beside those that judge their mesh, which gets finer until all are accurate."""
+        ends = self.span.radii
+        places = [float(r) for r in np.unique(np.clip([*_JUDGED_AT, *ends], *ends))]
+        others = [r for r in radii if modulus.size > 1 or r not in places]
+        self.mesh_size, solved = _ROUGH, {}
+        found = dict(zip(places, self._cells(places), strict=True))
+        while (most := max((cell.error, r) for r, cell in found.items()))[0] > self.accuracy:
+            worst = most[1]
+            best = self._fine_enough(worst, found[worst])
+            rest = [r for r in places if r != worst]  # a finer mesh gains more at one than another
+            cells = self._cells(rest, others, modulus)
+            found = dict(zip(rest, cells, strict=False)) | {worst: best}
+            solved = dict(zip(others, cells[len(rest) :], strict=True))
+        self.space = np.vstack([places, np.transpose([found[r].errors for r in places])])
+        known = found | (solved or dict(zip(others, self._cells((), others, modulus), strict=True)))
+        return [known[radius] for radius in radii]
+
+    def _fine_enough(self, radius: float, found: SolvedCell) -> SolvedCell:
+        """One cell on a mesh that keeps the accuracy and is taken, from a rougher one."""
+        while found.error > self.accuracy:
+            if self.mesh_size <= _FINEST:
                 raise TableError(
                     f"planar cells at r = {radius:.4g} leave a relative error of"
-                    f" {errors[:3].max():.1e} on the finest mesh ({_FINEST:g}) and"
+                    f" {found.error:.1e} on the finest mesh ({_FINEST:g}) and"
                     f" {self.accuracy:.1e} is wanted: allow a larger error, or take the series"
                 )
-            wanted = 0.8 * self.accuracy / errors[:3].max()
-            finer = [max(_FINEST, size * min(0.9, wanted ** (1 / rate))) for rate in _RATES]
+            wanted = 0.8 * self.accuracy / found.error
+            finer = [
+                max(_FINEST, self.mesh_size * min(0.9, wanted ** (1 / rate))) for rate in _RATES
+            ]
             sizes = list(dict.fromkeys(finer))
-            found = self.ranks.each(partial(self._errors, radius), sizes)
-            kept = [one[:3].max() <= self.accuracy for one in found]
+            tried = self.ranks.each(partial(self._judge, radius), sizes)
+            kept = [one.error <= self.accuracy for one in tried]
             best = kept.index(True) if True in kept else -1
-            size, errors = sizes[best], found[best]
-        return size, errors
+            self.mesh_size, found = sizes[best], tried[best]
+        return found
 
-    def _all_errors(self, radii: Array, size: float) -> Array:
-        """Declared relative errors at all radii, shape (radii, 4)."""
-        errors = partial(self._errors, size=size)
-        return np.reshape(self.ranks.each(errors, list(radii), costs=_costs(radii)), (-1, 4))
+    def _cells(
+        self, places: Sequence[float], radii: Sequence[float] = (), modulus: Array = _NONE
+    ) -> list[SolvedCell]:
+        """Cells that judge the mesh, then cells of given moduli, dealt out together."""
 
-    def _errors(self, radius: float, size: float) -> Array:
-        """Declared relative errors at one radius of both extreme inclusions, shape (4,)."""
-        errors, factorisations = _errors_of(self.span, radius, size)
-        self.systems += 3 * factorisations
-        return errors
+        def solve(number: int) -> SolvedCell:
+            if number < len(places):
+                return self._judge(places[number], self.mesh_size)
+            radius = radii[number - len(places)]
+            return self._solve(radius, modulus, _ORDER, self.mesh_size)
 
-    def _phases(self, modulus: Array) -> list[Phase]:
-        return [Phase(float(e), self.span.poisson) for e in modulus]
+        costs = [_JUDGES * cost for cost in _costs(places)] + _costs(radii)
+        return self.ranks.each(solve, range(len(costs)), self.progress, costs)
 
-    def moduli(self, radius: float, modulus: Array) -> Array:
-        """At the chosen mesh size."""
-        return self._solve(radius, modulus, _ORDER, self.mesh_size)
+    def _judge(self, radius: float, size: float) -> SolvedCell:
+        """The cell of both extreme inclusions."""
+        found = _judged(self.span, radius, size)
+        self.systems += 3 * found.factorisations
+        return found
 
     def rough(self, radius: float, modulus: Array) -> Array:
         """At the first mesh size, one order less."""
-        return self._solve(radius, modulus, _ORDER - 1, _ROUGH)
+        return self._solve(radius, modulus, _ORDER - 1, _ROUGH).moduli
 
-    def _solve(self, radius: float, modulus: Array, order: int, size: float) -> Array:
-        phases = self._phases(modulus)
+    def _solve(self, radius: float, modulus: Array, order: int, size: float) -> SolvedCell:
+        phases = [Phase(float(e), self.span.poisson) for e in modulus]
         solved = solve_slice(
             radius, self.span.matrix, phases, orders=(order,), mesh_size=size, share=True
         )
         self.systems += 3 * solved.factorisations
         self.unknowns = max(self.unknowns, solved.unknowns)
-        return square_moduli(solved.stiffness)
+        return SolvedCell(square_moduli(solved.stiffness), _NONE, solved.factorisations)
 
 
-def _costs(radii: Array) -> list[float]:
+def _costs(radii: Sequence[float]) -> list[float]:
     """About what cells cost: those about small particles have finer meshes."""
     return [3 + 1 / float(radius) for radius in radii]
 
 
 @lru_cache(maxsize=64)
-def _errors_of(span: TableRange, radius: float, size: float) -> tuple[Array, int]:
-    """Declared relative errors, shape (4,), and how many systems were factorised.
+def _judged(span: TableRange, radius: float, size: float) -> SolvedCell:
+    """A cell by three orders, of the extreme inclusions.
 
     Tables of one range and several accuracies try the same meshes.
     """
     phases = [Phase(e, span.poisson) for e in dict.fromkeys(span.moduli)]
     orders = _ORDER - 2, _ORDER - 1, _ORDER
     solved = solve_slice(radius, span.matrix, phases, orders=orders, mesh_size=size)
-    return np.asarray(solved.error.max(axis=0)), solved.factorisations
+    errors = np.asarray(solved.error.max(axis=0))
+    return SolvedCell(square_moduli(solved.stiffness), errors, solved.factorisations)
 
 
 def build_table(
@@ -158,6 +192,7 @@ def build_table(
     """
     started = perf_counter()
     supply = make(span, accuracy * _SPACE_SHARE)
+    supply.progress = progress
     allowed = accuracy * (1 - _SPACE_SHARE)
     counts = (
         _LEAST if span.radii[1] > span.radii[0] * (1 + 1e-12) else 1,
@@ -167,9 +202,8 @@ def build_table(
     while True:
         radii, moduli = span.nodes(counts)
         fresh = [float(radius) for radius in radii if radius not in known]
-        solve = partial(_logarithms, span, supply.moduli, modulus=moduli)
-        costs = _costs(np.array(fresh))
-        known.update(zip(fresh, ranks.each(solve, fresh, progress, costs), strict=True))
+        for radius, solved in zip(fresh, supply.moduli(fresh, moduli), strict=True):
+            known[radius] = _logarithms(span, radius, moduli, solved)
         found = coefficients(np.array([known[radius] for radius in radii]))
         noise = supply.space[1:].max(axis=1)
         tails = tail(found, 0, noise=noise), tail(found, 1, noise=noise)
@@ -196,12 +230,9 @@ def build_table(
             counts, known = (counts[0], counts[1] + 2), {}
 
 
-def _logarithms(
-    span: TableRange, moduli: Callable[[float, Array], Array], radius: float, modulus: Array
-) -> Array:
-    """Logarithms of the moduli over those of Mori and Tanaka at one radius, shape (m, 3)."""
-    dilute = span.dilute(np.array([radius]), modulus)[0]
-    return np.asarray(np.log(moduli(radius, modulus) / dilute))
+def _logarithms(span: TableRange, radius: float, modulus: Array, solved: Array) -> Array:
+    """Logarithms of solved moduli over those of Mori and Tanaka at one radius, shape (m, 3)."""
+    return np.asarray(np.log(solved / span.dilute(np.array([radius]), modulus)[0]))
 
 
 def _moduli_needed(span: TableRange, supply: Source, allowed: float) -> int:
@@ -211,7 +242,9 @@ def _moduli_needed(span: TableRange, supply: Source, allowed: float) -> int:
     found: list[Array] = []
     for count in range(2, _MOST_NODES):
         _, moduli = span.nodes((1, count))
-        found.extend(_logarithms(span, supply.rough, span.radii[1], moduli[len(found) :]))
+        fresh = moduli[len(found) :]
+        solved = supply.rough(span.radii[1], fresh)
+        found.extend(_logarithms(span, span.radii[1], fresh, solved))
         if tail(coefficients(np.array(found)[None]), 1)[:3].max() <= allowed:
             return count
     return _MOST_NODES

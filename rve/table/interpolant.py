@@ -92,6 +92,7 @@ class TableRange:
             for (a, b), n in zip(((u0, u1), (t0, t1)), counts, strict=True)
         )
         radii = np.clip(np.sqrt((1 - u) * (1 + u)), *self.radii)
+        radii[:2] = self.radii[:-3:-1] if counts[0] > 1 else radii
         return radii, np.clip(self.matrix.modulus * np.exp(t), *self.moduli)
 
     def dilute(self, radius: Array, modulus: Array) -> Array:

@@ -71,7 +71,7 @@ class Meshes:
         *,
         size: float,
         basis: Sequence[Phase] = (),
-        comm: MPI.Comm = MPI.COMM_SELF,
+        comm: MPI.Intracomm = MPI.COMM_SELF,
     ) -> None:
         self._radius, self._matrix, self._basis, self._comm = radius, matrix, basis, comm
         self._cells = [OctantCell(radius, size=size, comm=comm)]

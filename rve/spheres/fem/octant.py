@@ -31,7 +31,7 @@ class CurvedMeshError(RuntimeError):
     """Curved elements that overlap themselves."""
 
 
-def octant(radius: float, *, size: float, comm: MPI.Comm = MPI.COMM_SELF) -> gmshio.MeshData:
+def octant(radius: float, *, size: float, comm: MPI.Intracomm = MPI.COMM_SELF) -> gmshio.MeshData:
     """Mesh of [0, 1]³ with the sphere about the origin, cell tags `MATRIX` and `SPHERE`.
 
     Args:

@@ -64,7 +64,7 @@ class OctantCell:
         TouchingError: Spheres nearly touch.
     """
 
-    def __init__(self, radius: float, *, size: float, comm: MPI.Comm = MPI.COMM_SELF) -> None:
+    def __init__(self, radius: float, *, size: float, comm: MPI.Intracomm = MPI.COMM_SELF) -> None:
         self.mesh, self._tags = octant(radius, size=size, comm=comm)[:2]
         self.fine, self.coarse = (
             fem.functionspace(self.mesh, ("Lagrange", degree, (3,))) for degree in (2, 1)

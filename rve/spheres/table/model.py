@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -57,6 +57,7 @@ class OctantSource:
     unknowns: int = 0
     systems: int = 0
     parallel: bool = False
+    progress: Callable[[float], None] | None = None
 
     def __post_init__(self) -> None:
         from alphacut.rve.spheres.fem.modulus_basis import basis_between
@@ -76,12 +77,20 @@ class OctantSource:
             error=_BASIS_SHARE * self.accuracy,
         )
 
-    def moduli(self, radius: float, modulus: Array) -> Array:
-        """K, (C11 − C12)/2 and C44 in Pa, shape (m, 3).
+    def moduli(self, radii: Sequence[float], modulus: Array) -> list[Array]:
+        """K, (C11 − C12)/2 and C44 in Pa at each radius, shape (m, 3) each.
 
         Raises:
             TableError: The finest mesh is not fine enough.
         """
+        found = []
+        for radius in radii:
+            found.append(self._at(radius, modulus))
+            if self.progress:
+                self.progress(len(found) / len(radii))
+        return found
+
+    def _at(self, radius: float, modulus: Array) -> Array:
         from alphacut.rve.spheres.fem.extrapolation import Meshes
 
         meshes = Meshes(radius, self.span.matrix, size=_ROUGH, basis=self._basis, comm=self._comm)

@@ -6,8 +6,10 @@ import pytest
 pytest.importorskip("dolfinx")
 
 from alphacut.rve.cell import Phase
-from alphacut.rve.prism.model import PrismModel
+from alphacut.rve.prism import error_estimate
+from alphacut.rve.prism.model import PrismModel, error_of_layers
 from alphacut.rve.prism.system import PrismSystem
+from alphacut.rve.table.cache import stored_table
 from alphacut.stochastic import HermiteMap
 
 PAPER = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
@@ -230,6 +232,61 @@ def test_the_declared_error_covers_particles_that_the_mesh_cannot_see():
     assert abs(result.modulus / exact - 1) <= result.estimated_error
 
 
+@pytest.fixture
+def references(monkeypatch):
+    """Accuracies of the tables that errors are measured against; finer ones than `least` fail."""
+    asked, least = [], [0.0]
+
+    def table(*arguments, accuracy, **options):
+        asked.append(accuracy)
+        if accuracy < least[0]:
+            raise RuntimeError("none so fine")
+        return stored_table(*arguments, accuracy=accuracy, **options)
+
+    monkeypatch.setattr(error_estimate, "stored_table", table)
+    return asked, least
+
+
+@pytest.mark.parametrize(
+    ("size", "layers", "modulus"),
+    [(0.4, 6, 80e9), (0.25, 12, 80e9), (0.25, 2, 80e9), (0.12, 9, 80e9), (0.25, 6, 1e6)],
+)
+def test_one_reference_does_where_coarser_means_foretell_its_accuracy(
+    references, size, layers, modulus
+):
+    result = solve(PAPER, Phase(modulus), mesh_size=size, layers=layers, estimate=True)
+    told = max(np.nanmax(result.errors[name]) for name in ("space", "theta"))
+    assert len(references[0]) == 1
+    assert 0.01 * told < references[0][0] < told
+
+
+@pytest.mark.parametrize("size", [0.15, 0.5])
+def test_a_reference_gets_more_accurate_until_its_own_error_hardly_counts(references, size):
+    result, still = solve(mesh_size=size, layers=12), np.zeros(4)
+    told, sharp = (
+        error_estimate.judged(
+            result, PAPER, (MATRIX, PARTICLE), layers=still, expected=expected
+        ).errors["space"]
+        for expected in (1.0, 1e-9)
+    )
+    assert references[0][0] == 1e-3
+    assert references[0][-1] == 1e-7
+    assert (told[[0, 2]] < 1.5 * sharp[[0, 2]]).all()
+    assert told[2] < 1.2 * sharp[2]
+
+
+def test_a_reference_that_fails_gives_way_to_one_less_accurate(references):
+    sharp = solve(mesh_size=0.25, layers=12, estimate=True).estimated_error
+    asked, least = references
+    asked.clear()
+    least[0] = 2e-4
+    told = solve(mesh_size=0.25, layers=12, estimate=True).estimated_error
+    assert asked[-1] >= 2e-4 > min(asked)
+    assert sharp < told < 2 * sharp + 5e-4
+    least[0] = 1.0  # bounds take its place
+    assert solve(mesh_size=0.25, layers=12, estimate=True).estimated_error > 1e-2
+
+
 def test_a_mesh_that_folds_over_is_refused_with_its_cure():
     bent = HermiteMap(0.235, 0.0138, 0.1165, 0.932)  # down to 0.004 and up again at the end
     with pytest.raises(
@@ -247,7 +304,8 @@ def test_a_mesh_that_folds_over_is_refused_with_its_cure():
 @pytest.mark.parametrize("modulus", [80e9, 400e9])
 def test_errors_of_layers_are_about_what_eight_times_as_many_take_away(layers, modulus):
     radii, matrix, particle = PAPER, Phase(20e9), [Phase(modulus)]
-    (told,) = PrismModel(0.25, layers).errors_of_layers(radii, matrix, particle)
+    ((coarse, thick),) = PrismModel(0.25, layers).coarser(radii, matrix, particle)
+    told = error_of_layers(coarse, thick)
     few, many = (
         PrismModel(0.25, n).solve(radii, matrix, particle)[0].curve for n in (layers, 8 * layers)
     )

@@ -30,12 +30,13 @@ class SeriesSource:
     mesh_size, unknowns, systems = 0.0, 0, 0
     space = np.array([[0.5], *4 * [[1e-13]]])
 
-    def moduli(self, radius, modulus):
+    def moduli(self, radii, modulus):
+        return [self.rough(radius, modulus) for radius in radii]
+
+    def rough(self, radius, modulus):
         phases = [Phase(float(e), self.span.poisson) for e in modulus]
         cell = square_stiffness(np.array([radius]), self.span.matrix, phases)
         return np.stack([cell.bulk[0], cell.deviator[0], cell.shear[0]], axis=-1)
-
-    rough = moduli
 
 
 @pytest.fixture

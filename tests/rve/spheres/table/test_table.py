@@ -41,12 +41,13 @@ class SeriesSource:
     def __init__(self, span, accuracy, parallel):
         self.span = span
 
-    def moduli(self, radius, modulus):
+    def moduli(self, radii, modulus):
+        return [self.rough(radius, modulus) for radius in radii]
+
+    def rough(self, radius, modulus):
         phases = [Phase(float(e), self.span.poisson) for e in modulus]
         cell = cubic_stiffness(np.array([radius]), self.span.matrix, phases, tolerance=1e-10)
         return np.stack([cell.bulk[0], cell.deviator[0], cell.shear[0]], axis=-1)
-
-    rough = moduli
 
 
 def test_interpolation_keeps_what_it_declares(monkeypatch):
