@@ -2,8 +2,9 @@
 
 One process, one thread; set-up and both loads. Then a cell of mesh size 0.04 with its error
 estimate, from a start without tables, on each number of ranks, and what the model of docs/theory.md
-makes of one rank's times for others. Writes benchmarks/results/cell_scaling.csv; exit status 1
-where a factor exceeds 1.5, or an E of several ranks differs by more than 1e-12.
+makes of one rank's times for others; after each run as many loops of arithmetic at once tell
+whether the machine is quiet. Writes benchmarks/results/cell_scaling.csv; exit status 1 where a
+factor exceeds 1.5, or an E of several ranks differs by more than 1e-12.
 """
 
 from __future__ import annotations
@@ -28,6 +29,14 @@ FACTOR = 1.5
 SAME = 1e-12
 MODELLED = (2, 13, 26, 1000)  # ranks
 _LEVELS, _LOADS, _RADII = 13, 2, 10  # radii of a table that are solved at once
+_ARITHMETIC = """
+from time import perf_counter
+started, total = perf_counter(), 0
+for k in range(2_000_000):
+    total += k
+print(perf_counter() - started)
+"""
+QUIET = 1.1  # crowding that says nothing
 PHASES = ("start", "mesh", "assemble", "setup", "solve", "estimate")
 CHANGES: Mapping[str, tuple[float, ...]] = {
     "mesh size": (0.15, 0.08, 0.04),
@@ -97,8 +106,23 @@ def shared(ranks: int, mesh_size: float) -> dict[str, float]:
         ["mpirun", "-n", str(ranks), *own], capture_output=True, text=True, check=True
     )
     found: dict[str, float] = {"seconds": perf_counter() - started, **json.loads(done.stdout)}
+    found["crowding"] = crowding(ranks)
     found["start"] = found["seconds"] - sum(found[phase] for phase in PHASES[1:])
     return found
+
+
+def crowding(processes: int) -> float:
+    """Seconds of arithmetic that fits a core's own memory, so many at once over one alone.
+
+    1 on a quiet machine; 1.5 and more where what looks like cores shares one, or others work.
+    """
+
+    def loops(count: int) -> float:
+        own = [sys.executable, "-c", _ARITHMETIC]
+        all_of_them = [subprocess.Popen(own, stdout=subprocess.PIPE) for _ in range(count)]
+        return max(float(one.communicate()[0]) for one in all_of_them)
+
+    return loops(processes) / loops(1)
 
 
 def modelled(one: Mapping[str, float], ranks: int) -> dict[str, float]:
@@ -138,6 +162,11 @@ def on_ranks(
         faults += apart > SAME
         print(f"{row['value']} ranks: {wall:.2f} of the time, {memory:.2f} of the memory of")
         print(f"  {first['value']}; E differs by {apart:.1e}")
+        if row["crowding"] > QUIET:
+            print(
+                "  not a quiet machine: so many loops of arithmetic at once take"
+                f" {row['crowding']:.2f} of the time of one"
+            )
     if first["value"] == 1:
         modelled_rows = [(count, modelled(first, count)) for count in MODELLED]
         rows += [{"change": "ranks, modelled", "value": k, **row} for k, row in modelled_rows]
@@ -199,7 +228,7 @@ def _write(
     with path.open("w", newline="") as file:
         names = ["change", "value", "unknowns", "iterations", "seconds", *PHASES]
         writer = csv.DictWriter(
-            file, [*names, "megabytes", "processor"], restval="", extrasaction="ignore"
+            file, [*names, "megabytes", "processor", "crowding"], restval="", extrasaction="ignore"
         )
         writer.writeheader()
         writer.writerows(

@@ -53,17 +53,20 @@ def test_iterations_hardly_change_with_layers_and_contrast():
     assert max(count for _, count in found.values()) <= 1.5
 
 
-def test_ranks_are_judged_by_the_result_of_one_and_the_model_starts_from_its_times(monkeypatch):
+def test_ranks_are_judged_by_the_result_of_one_and_the_model_starts_from_its_times(
+    monkeypatch, capsys
+):
     phases = dict.fromkeys(cell_scaling.PHASES, 1.0)
     moduli = {1: 1.0, 2: 1 + 1e-9, 3: 1 + 1e-14}
 
     def shared(count, size):
         whole = {"seconds": 6.0, "megabytes": 9.0, "processor": 5.0, "E": moduli[count]}
-        return phases | whole
+        return phases | whole | {"crowding": 1.0 if count < 3 else 1.4}
 
     monkeypatch.setattr(cell_scaling, "shared", shared)
     rows, faults = cell_scaling.on_ranks([1, 2, 3], 0.5)
     assert faults == 1
+    assert capsys.readouterr().out.count("at once take 1.40 of the time of one") == 1
     assert [row["value"] for row in rows] == [1, 2, 3, *cell_scaling.MODELLED]
     assert cell_scaling.modelled(phases, 1)["seconds"] == pytest.approx(6.0)
     assert all(row["seconds"] < 6 for row in rows[3:])
