@@ -199,6 +199,7 @@ def build_table(
         _moduli_needed(span, supply, allowed / 2),
     )
     known: dict[float, Array] = {}
+    before = np.inf
     while True:
         radii, moduli = span.nodes(counts)
         fresh = [float(radius) for radius in radii if radius not in known]
@@ -225,7 +226,8 @@ def build_table(
                 " less, or allow a larger error"
             )
         if tails[0][:3].max() >= tails[1][:3].max():
-            counts = (counts[0] + 2, counts[1])
+            more = np.log(allowed / both) / np.log(both / before) if both < before < np.inf else 1
+            counts, before = (counts[0] + 2 * min(3, int(np.ceil(more))), counts[1]), both
         else:
             counts, known = (counts[0], counts[1] + 2), {}
 
