@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
+from math import log
 from time import perf_counter
 from typing import NamedTuple, Protocol
 
@@ -153,8 +154,8 @@ class PlanarSource:
 
 
 def _costs(radii: Sequence[float]) -> list[float]:
-    """About what cells cost: those about small particles have finer meshes."""
-    return [3 + 1 / float(radius) for radius in radii]
+    """About what cells cost: small particles and narrow gaps between them have finer meshes."""
+    return [1 - log(r) + 0.65 * max(0.0, log(0.25 / (1 - r))) for r in radii]
 
 
 @lru_cache(maxsize=64)
