@@ -61,12 +61,8 @@ def zero_matrix(
 ) -> PETSc.Mat:
     """Square matrix of zeros in blocks; each rank gives the pattern of its own, consecutive rows.
 
-    Args:
-        starts: Where its rows begin in the columns that this rank owns, and in those of others.
-        columns: Rising, shape (n,) at the least; those that it owns are counted from the first.
-        size: Rows of all ranks, not in blocks.
-        block: Rows of a block.
-        ranks: The ranks.
+    Rows begin at `starts` in the rising `columns`: of those that this rank owns, counted from its
+    first, and of others; `size` counts all ranks' rows, not in blocks.
     """
     found, counts = PETSc.Mat().create(ranks.comm), [np.diff(own) for own in starts]
     found.setSizes([(block * len(counts[0]), size)] * 2, block)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
+from sys import byteorder
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
@@ -76,8 +77,9 @@ class Ranks:
             yield from range(self.rank, count, self.size)
             return
         if self.rank == 0:
-            counter.tomemory()[:] = bytes(8)
+            counter.tomemory()[:] = self.size.to_bytes(8, byteorder)
         self.comm.Barrier()
+        yield self.rank  # so the first ones go to the same ranks in every run
         one, number = np.ones(1, np.int64), np.zeros(1, np.int64)
         while True:
             counter.Lock(0)

@@ -131,6 +131,12 @@ def moduli_of(curve: StressCurve) -> Array:
     return moduli
 
 
+def reference_range(radius_map: RadiusMap, phases: tuple[Phase, Phase]) -> TableRange:
+    """What a reference covers."""
+    low, high = (float(r) for r in extreme_radii(radius_map))
+    return TableRange(phases[0], phases[1].poisson, (low, high), (phases[1].modulus,) * 2)
+
+
 def _reference(
     radius_map: RadiusMap,
     phases: tuple[Phase, Phase],
@@ -140,9 +146,7 @@ def _reference(
     ranks: Ranks,
 ) -> tuple[Moduli, Moduli]:
     """Moduli at radii by a table of planar cells, and their declared relative errors."""
-    matrix, inclusion = phases
-    low, high = (float(r) for r in extreme_radii(radius_map))
-    span = TableRange(matrix, inclusion.poisson, (low, high), (inclusion.modulus,) * 2)
+    span, inclusion = reference_range(radius_map, phases), phases[1]
     make = partial(PlanarSource, ranks=ranks)
     table, _ = stored_table(span, cache, accuracy=accuracy, make=make, ranks=ranks)
     modulus = np.array([inclusion.modulus])

@@ -7,12 +7,12 @@ whole line of one periodic corner over θ.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from importlib import import_module
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from mpi4py import MPI
@@ -31,7 +31,7 @@ from alphacut.rve.mesh.periodicity import mismatch
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import Triangulation, reference_radius, triangulate
 from alphacut.rve.petsc import clean, give_back
-from alphacut.rve.prism.error_estimate import judged, mean_moduli
+from alphacut.rve.prism.error_estimate import judged, mean_moduli, reference_range
 from alphacut.rve.prism.mixed_element import NEARLY_INCOMPRESSIBLE
 from alphacut.rve.prism.modulus_basis import BasisError, ModulusBasis
 from alphacut.rve.prism.system import PrismSystem, SliceMeans
@@ -41,6 +41,7 @@ from alphacut.rve.result import Homogenised, StressCurve
 from alphacut.rve.settings import require_mesh_size
 from alphacut.rve.solver.krylov import ConvergenceError
 from alphacut.rve.solver.options import SolverOptions
+from alphacut.rve.table.build import first_cells, keep
 from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -143,7 +144,7 @@ class PrismModel:
         with watch("estimate"):
             coarser = self.coarser(radius_map, matrix, inclusions)
             found = [
-                self._with_errors(one, radius_map, (matrix, phase), *means)
+                self._with_errors(one, radius_map, (matrix, phase), means)
                 for one, phase, means in zip(results, inclusions, coarser, strict=True)
             ]
         seconds = watch.seconds["estimate"] / len(results)
@@ -154,34 +155,24 @@ class PrismModel:
         return [replace(r, seconds={**r.seconds, "estimate": seconds}) for r in found]
 
     def _with_errors(
-        self,
-        result: Homogenised,
-        radius_map: RadiusMap,
-        phases: tuple[Phase, Phase],
-        coarse: Array,
-        thick: Array,
+        self, result: Homogenised, radius_map: RadiusMap, phases: tuple[Phase, Phase], means: Array
     ) -> Homogenised:
         """The result against a reference as accurate as its means and `coarser` ones ask for."""
+        coarse, thick = means
         layers = error_of_layers(coarse, thick)
         change = np.nan_to_num(abs(coarse / mean_moduli(result.curve) - 1)).max()
         gain = np.clip(0.75 / self.mesh_size, 4, 15) if self.interface == "conforming" else 1.0
         expected = float(max(change / gain, layers.max(), 0.02 * self.mesh_size**3))
-        return judged(
-            result,
-            radius_map,
-            phases,
-            layers=layers,
-            expected=expected,
-            cache=self.cache,
-            ranks=self._ranks,
-        )
+        told = partial(judged, cache=self.cache, ranks=self._ranks)
+        return told(result, radius_map, phases, layers=layers, expected=expected)
 
     def coarser(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
     ) -> list[Array]:
         """Mean moduli and ratio of a mesh twice as coarse, and with half the layers, shape (2, 4).
 
-        Of two ranks each solves one; nan where they cannot be solved.
+        Of two ranks each solves one, and the cells that the reference begins with; nan where they
+        cannot be solved.
         """
         alone = Ranks(self._ranks.comm if self._ranks.size == 2 else None)
         coarse = replace(self, estimate=False, mesh_size=min(1.0, 2 * self.mesh_size))
@@ -195,12 +186,16 @@ class PrismModel:
                 import_module("alphacut.rve.mesh.planar")
             return found
 
+        spans = [reference_range(radius_map, (matrix, one)) for one in inclusions]
+        first = {k: v for span in spans for k, v in first_cells(span).items() if alone.size > 1}
         try:
             coarse._plane(radius_map, self._ranks)  # made by the first, kept by both
-            pairs = alone.each(means, (coarse, thick))
+            cells: list[Callable[[], Any]] = [partial(means, coarse), partial(means, thick)]
+            one, two, *rest = alone.each(lambda cell: cell(), [*cells, *first.values()])
         except RuntimeError:  # folded, or not solved: the share stays unknown, the sum does not
             return [np.full((2, 4), np.nan) for _ in inclusions]
-        return list(map(np.stack, zip(*pairs, strict=True)))
+        keep(dict(zip(first, rest, strict=True)))
+        return list(map(np.stack, zip(one, two, strict=True)))
 
     def _moved(self, radius_map: RadiusMap, watch: Stopwatch) -> PrismSystem:
         with watch("mesh"):

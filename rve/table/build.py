@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache, partial
+from functools import partial
 from math import log
 from time import perf_counter
 from typing import NamedTuple, Protocol
@@ -83,8 +83,7 @@ class PlanarSource:
 
     def _first(self, radii: Sequence[float], modulus: Array) -> list[SolvedCell]:
         """Cells beside those that judge their mesh, which gets finer until all are accurate."""
-        ends = self.span.radii
-        places = [float(r) for r in np.unique(np.clip([*_JUDGED_AT, *ends], *ends))]
+        places = judging_radii(self.span)
         others = [r for r in radii if modulus.size > 1 or r not in places]
         self.mesh_size, solved = _ROUGH, {}
         found = dict(zip(places, self._cells(places), strict=True))
@@ -158,17 +157,38 @@ def _costs(radii: Sequence[float]) -> list[float]:
     return [1 - log(r) + 0.65 * max(0.0, log(0.25 / (1 - r))) for r in radii]
 
 
-@lru_cache(maxsize=64)
-def _judged(span: TableRange, radius: float, size: float) -> SolvedCell:
-    """A cell by three orders, of the extreme inclusions.
+Place = tuple[TableRange, float, float]  # with the radius and the mesh size
+_known: dict[Place, SolvedCell] = {}
 
-    Tables of one range and several accuracies try the same meshes.
-    """
+
+def _judged(span: TableRange, radius: float, size: float) -> SolvedCell:
+    """A cell by three orders, of the extreme inclusions."""
+    if (known := _known.get((span, radius, size))) is not None:
+        return known
     phases = [Phase(e, span.poisson) for e in dict.fromkeys(span.moduli)]
     orders = _ORDER - 2, _ORDER - 1, _ORDER
     solved = solve_slice(radius, span.matrix, phases, orders=orders, mesh_size=size)
     errors = np.asarray(solved.error.max(axis=0))
-    return SolvedCell(square_moduli(solved.stiffness), errors, solved.factorisations)
+    found = SolvedCell(square_moduli(solved.stiffness), errors, solved.factorisations)
+    keep({(span, radius, size): found})
+    return found
+
+
+def keep(cells: Mapping[Place, SolvedCell]) -> None:
+    """Keep cells that some rank has solved."""
+    if len(_known) > 64:  # tables of one range and several accuracies try the same meshes
+        _known.clear()
+    _known.update(cells)
+
+
+def first_cells(span: TableRange) -> dict[Place, Callable[[], SolvedCell]]:
+    """What solves the cells that every table of a range begins with, by what to `keep` them."""
+    return {(span, r, _ROUGH): partial(_judged, span, r, _ROUGH) for r in judging_radii(span)}
+
+
+def judging_radii(span: TableRange) -> list[float]:
+    """Radii at which a mesh is judged, rising, both ends among them."""
+    return [float(r) for r in np.unique(np.clip([*_JUDGED_AT, *span.radii], *span.radii))]
 
 
 def build_table(
