@@ -75,10 +75,7 @@ def _distances(
     source: Callable[[float], tuple[Moduli, Moduli]],
     expected: float,
 ) -> tuple[Array, Array] | None:
-    """Errors of the mean moduli and ratio, and of those at nodes, by a reference of `source`.
-
-    It gets more accurate until it tells them; None where there is none.
-    """
+    """Errors of means and ratio, and at nodes, by ever better references; None without any."""
     wanted, found, failed = _FIRST * expected, None, False
     while True:
         step = next((k for k, least in enumerate(_ACCURACIES) if least <= wanted), -1)

@@ -187,8 +187,9 @@ def first_cells(span: TableRange) -> dict[Place, Callable[[], SolvedCell]]:
 
 
 def judging_radii(span: TableRange) -> list[float]:
-    """Radii at which a mesh is judged, rising, both ends among them."""
-    return [float(r) for r in np.unique(np.clip([*_JUDGED_AT, *span.radii], *span.radii))]
+    """Radii at which a mesh is judged, rising, both ends among them; meshes differ by chance."""
+    places = np.unique(np.clip([*_JUDGED_AT, *span.radii], *span.radii))
+    return list(map(float, places if len(places) > 3 else np.unique(np.linspace(*span.radii, 4))))
 
 
 def build_table(

@@ -155,6 +155,15 @@ def test_a_table_declares_what_three_orders_declare_of_its_cells():
         assert declared == pytest.approx(cell.error[0], rel=1e-6)
 
 
+def test_meshes_of_a_narrow_range_are_judged_between_its_ends_too():
+    """Errors of one rough mesh and the next differ threefold; drawn by the calibration."""
+    matrix, particle = Phase(20e9, 0.433756752943451), Phase(8.006285984e9, 0.437920942616843)
+    bent = HermiteMap(0.18152259879, -0.05140253720, 0.23140204727, 0.41588731573)
+    exact = SeriesModel().solve(bent, matrix, [particle])[0]
+    found = TableModel(accuracy=1e-4).solve(bent, matrix, [particle])[0]
+    assert abs(found.modulus / exact.modulus - 1) <= found.estimated_error
+
+
 def test_degenerate_ranges_take_one_node():
     table = build_table(
         TableRange(MATRIX, 0.3, (0.5, 0.5), (80e9, 80e9)), accuracy=1e-9, make=SeriesSource
