@@ -1,11 +1,13 @@
 """The product-space model against exact values, itself refined, and other solvers."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 pytest.importorskip("dolfinx")
 
-from alphacut.rve.cell import Phase
+from alphacut.rve.cell import STRAIN, Phase
 from alphacut.rve.prism import error_estimate
 from alphacut.rve.prism.model import PrismModel, error_of_layers
 from alphacut.rve.prism.system import PrismSystem
@@ -273,6 +275,27 @@ def test_a_reference_gets_more_accurate_until_its_own_error_hardly_counts(refere
     assert references[0][-1] == 1e-7
     assert (told[[0, 2]] < 1.5 * sharp[[0, 2]]).all()
     assert told[2] < 1.2 * sharp[2]
+
+
+@pytest.mark.parametrize(("small", "large"), [(1e-6, 1e-4), (1e-4, 1e-2), (4.5e-5, 4.5e-5)])
+def test_a_reference_hardly_counts_beside_errors_large_and_small(small, large):
+    """Moduli of a made-up cell, off by `small` in the one and `large` in the other."""
+    curve, off = solve(mesh_size=0.5, layers=2).curve, np.array([small, np.nan, large])
+    moduli = error_estimate.moduli_of(curve).mean(axis=0)
+    flat = replace(
+        curve,
+        s11=np.full_like(curve.s11, moduli[0] * (1 + off[0]) * STRAIN),
+        s12=np.full_like(curve.s12, moduli[2] * (1 + off[2]) * 2 * STRAIN),
+    )
+
+    def source(accuracy):
+        exact = np.where(np.isnan(moduli), 1.0, moduli)
+        return lambda r: np.tile(exact, (r.size, 1)), lambda r: np.full((r.size, 4), accuracy)
+
+    declared, _ = error_estimate._distances(flat, PAPER, source, 1.0)
+    assert (declared[[0, 2]] > off[[0, 2]] * (1 - 1e-6)).all()
+    assert declared[0] < 1.6 * off[0]
+    assert declared[2] < 1.3 * off[2]
 
 
 def test_a_reference_that_fails_gives_way_to_one_less_accurate(references):
