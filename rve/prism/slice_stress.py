@@ -111,7 +111,8 @@ class SliceStress:
         Returns:
             (ε11, ε22, 2 ε12) for each load, shape (m, q, 3, loads), and determinants, shape (m, q).
         """
-        loads, table = displacement.shape[2], _planar_derivatives(points)
+        table = np.ascontiguousarray(tabulate(points, derivatives=True)[:2].transpose(1, 0, 2))
+        loads = displacement.shape[2]
         places, values = self.positions[cells], displacement[cells]
         found = np.empty((len(cells), len(points), 3, loads))
         determinant = np.empty((len(cells), len(points)))
@@ -132,8 +133,3 @@ def _split(part: slice) -> list[slice]:
     """The wedges of a part so many at a time that what is found of them stays in the cache."""
     stops = range(part.start + _AT_ONCE, part.stop + _AT_ONCE, _AT_ONCE)
     return [slice(stop - _AT_ONCE, min(stop, part.stop)) for stop in stops]
-
-
-def _planar_derivatives(points: Array) -> Array:
-    """Derivatives of the shape functions in the plane at points (q, 3), shape (q, 2, 15)."""
-    return np.ascontiguousarray(tabulate(points, derivatives=True)[:2].transpose(1, 0, 2))

@@ -52,7 +52,8 @@ def lattice_sums(highest: int) -> LatticeSums:
     for n in range(4, highest + 1, 4):
         plain[n] = _eisenstein(n) if n < 40 else _near_points(n, conjugate=False)
     for n in range(7, highest + 1, 4):
-        conjugate[n] = _conjugate_eisenstein(n) if n < 40 else _near_points(n, conjugate=True)
+        # Σ conj(p) p^-n with conj(p) = p − 2 i j, where Σ p^(1−n) vanishes
+        conjugate[n] = 4 * _lipschitz(n, 2) if n < 40 else _near_points(n, conjugate=True)
     return LatticeSums(plain, conjugate)
 
 
@@ -75,11 +76,6 @@ def _lipschitz(n: int, power: int) -> float:
 def _eisenstein(n: int) -> float:
     """Σ p^-n over p = m + i j, n a multiple of 4, by Riemann's ζ and Lipschitz' formula."""
     return 2 * float(zeta(n)) + 2 * _lipschitz(n, 1)
-
-
-def _conjugate_eisenstein(n: int) -> float:
-    """Σ conj(p) p^-n over p = m + i j, n ≡ 3 mod 4: conj(p) = p − 2 i j, and Σ p^(1−n) vanishes."""
-    return 4 * _lipschitz(n, 2)
 
 
 def _near_points(n: int, *, conjugate: bool) -> float:

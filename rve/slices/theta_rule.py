@@ -8,6 +8,7 @@ from functools import lru_cache
 from typing import TypeGuard
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebvander
 
 from alphacut.rve.bounds import mori_tanaka
 from alphacut.rve.cell import Phase, square_moduli, with_ratio
@@ -144,7 +145,7 @@ def settle_rule(
         counts = [count, _finer(count), _finer(_finer(count))]
         _add_curves(known, [n for n in counts if n not in known], radius_map, stiffness_at)
         gaps = [
-            _gap(*(_mean_moduli(curve, moduli) for curve in three))
+            _gap(*(moduli(np.tensordot(c.weights, np.asarray(c.stiffness), axes=1)) for c in three))
             for three in zip(*(known[n] for n in counts), strict=True)
         ]
         for k, (curve, gap) in enumerate(zip(known[count], gaps, strict=True)):
@@ -180,11 +181,6 @@ def _add_curves(
 def _finer(count: int) -> int:
     """Nodes of the next finer rule: a third more."""
     return count + max(2, count // 3)
-
-
-def _mean_moduli(curve: StressCurve, moduli: Callable[[Array], Array]) -> Array:
-    """The moduli of the mean stiffness of a curve, shape (3,) or (4,), in Pa."""
-    return moduli(np.tensordot(curve.weights, np.asarray(curve.stiffness), axes=1))
 
 
 def _gap(value: Array, finer: Array, finest: Array) -> Array:
@@ -242,9 +238,10 @@ def theta_error(
     scale, logarithm = _dilute(between, phases), np.log(moduli / _dilute(radii, phases))
     low, high, span = logarithm.min(axis=0), logarithm.max(axis=0), np.ptp(logarithm, axis=0)
     touch, target = np.sqrt(1 - radii**2), np.sqrt(1 - between**2)
+    ends, width = touch.min() + touch.max(), max(np.ptp(touch), 1e-12)
     own, gaps = with_ratio(rule.weights @ moduli[places]), []
     for degree in range(min(max(0, radii.size - 4), 9), min(radii.size, 15)):
-        basis, carried = (_chebyshev(x, touch.min(), touch.max(), degree) for x in (touch, target))
+        basis, carried = (chebvander((2 * x - ends) / width, degree) for x in (touch, target))
         coefficients = np.linalg.lstsq(basis * root, logarithm * root, rcond=1e-14)[0]
         refined = scale * np.exp(np.clip(carried @ coefficients, low - span, high + span))
         gaps.append(with_ratio(fine.weights @ refined) / own - 1)
@@ -254,8 +251,3 @@ def theta_error(
 def _dilute(radii: Array, phases: tuple[Phase, Phase]) -> Array:
     """The moduli of Mori and Tanaka at radii, shape (n, 3)."""
     return mori_tanaka(np.pi / 4 * radii**2, *phases)
-
-
-def _chebyshev(x: Array, low: float, high: float, degree: int) -> Array:
-    """Chebyshev polynomials of [low, high] up to `degree` at `x`."""
-    return np.polynomial.chebyshev.chebvander((2 * x - low - high) / max(high - low, 1e-12), degree)

@@ -22,30 +22,40 @@ static int rising(const void *a, const void *b) { return *(const int *)a - *(con
 
 static int *integers(size_t count) { return calloc(count + 1, sizeof(int)); }
 
+/* Sort `count` numbers of which the first `sorted` rise; `spare` has room for the others. */
+static void sort_rest(int *numbers, int sorted, int count, int *spare) {
+    int rest = count - sorted;
+    memcpy(spare, numbers + sorted, rest * sizeof(int));
+    qsort(spare, rest, sizeof(int), rising);
+    while (rest) numbers[--count] = sorted && numbers[sorted - 1] > spare[rest - 1] ? numbers[--sorted] : spare[--rest];
+}
+
 /* Rows of L, column by column: those of A's column and of the columns whose first row below the
-   diagonal it is. */
+   diagonal it is, the last of which mostly has all. */
 static int fill_in(factors *f, const int *row) {
     int n = f->size, room = 4 * f->entries + n;
-    int *mark = integers(n), *child = integers(n), *next = integers(n);
+    int *mark = integers(n), *child = integers(n), *next = integers(n), *spare = integers(n);
     f->rows = malloc(room * sizeof(int));
     memset(child, -1, n * sizeof(int)), memset(mark, -1, n * sizeof(int));
     for (int j = 0; j < n && f->rows; j++) {
-        int count = f->start[j];
+        int count = f->start[j], sorted = 0;
         if (count + n > room) f->rows = realloc(f->rows, (room = 2 * room + n) * sizeof(int));
         if (!f->rows) break;
-        for (int k = f->begin[j], r; k < f->begin[j + 1]; k++)
-            if (mark[r = row[f->entry[k]]] != j) mark[f->rows[count++] = r] = j;
-        for (int c = child[j]; c >= 0; c = next[c])
+        for (int c = child[j]; c >= 0; c = next[c]) {
             for (int k = f->start[c] + 1; k < f->start[c + 1]; k++)
                 if (mark[f->rows[k]] != j) mark[f->rows[count++] = f->rows[k]] = j;
-        qsort(f->rows + f->start[j], count - f->start[j], sizeof(int), rising);
+            if (c == child[j]) sorted = count - f->start[j];
+        }
+        for (int k = f->begin[j], r; k < f->begin[j + 1]; k++)
+            if (mark[r = row[f->entry[k]]] != j) mark[f->rows[count++] = r] = j;
+        sort_rest(f->rows + f->start[j], sorted, count - f->start[j], spare);
         f->start[j + 1] = count;
         if (count - f->start[j] > 1) {
             int parent = f->rows[f->start[j] + 1];
             next[j] = child[parent], child[parent] = j;
         }
     }
-    free(mark), free(child), free(next);
+    free(mark), free(child), free(next), free(spare);
     return f->rows != NULL;
 }
 
@@ -59,11 +69,12 @@ static void sort_entries(factors *f, const int *column) {
 }
 
 static void find_places(factors *f, const int *row) {
+    int *place = integers(f->size);
     for (int j = 0; j < f->size; j++) {
-        int *from = f->rows + f->start[j], *to = f->rows + f->start[j + 1];
-        for (int k = f->begin[j]; k < f->begin[j + 1]; k++)
-            f->place[k] = (int *)bsearch(row + f->entry[k], from, to - from, sizeof(int), rising) - f->rows;
+        for (int k = f->start[j]; k < f->start[j + 1]; k++) place[f->rows[k]] = k;
+        for (int k = f->begin[j]; k < f->begin[j + 1]; k++) f->place[k] = place[row[f->entry[k]]];
     }
+    free(place);
 }
 
 static void find_groups(factors *f) {

@@ -51,8 +51,10 @@ class LevelFactors:
         self._loops.prepare.restype = ctypes.c_void_p
         self._order = np.asarray(pattern.fill_reducing if order is None else order, np.int32)
         self._signs = np.where(self._order < pattern.size - pressures, 1.0, -1.0)
-        ends = np.argsort(self._order)[np.stack(pattern.rows_columns)]
-        low, high = np.sort(ends, axis=0).astype(np.int32)
+        place = np.empty_like(self._order)
+        place[self._order] = np.arange(pattern.size)
+        row, column = (place[ends] for ends in pattern.rows_columns)
+        low, high = np.minimum(row, column), np.maximum(row, column)
         made = self._loops.prepare(pattern.size, len(low), high.ctypes, low.ctypes)
         self._factors = ctypes.c_void_p(made)
         weakref.finalize(self, self._loops.discard, self._factors)

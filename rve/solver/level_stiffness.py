@@ -90,10 +90,15 @@ class LevelPattern:
 
     @cached_property
     def fill_reducing(self) -> Integers:
-        """Which row comes where, so that few entries of factors are not zero."""
-        row, column = (one.astype(int) for one in self.rows_columns)
-        template = spmatrix(1.0, row, column, (self.size, self.size))
-        return np.array(amd.order(template, uplo="L"), np.int64).ravel()
+        """Which row comes where, so that few entries of factors are not zero.
+
+        Unknowns 2 k and 2 k + 1, a node's displacements, stay side by side.
+        """
+        nodes = LevelPattern(self.unknowns[:, ::2] // 2)
+        row, column = (one.astype(int) for one in nodes.rows_columns)
+        template = spmatrix(1.0, row, column, (nodes.size, nodes.size))
+        order = np.array(amd.order(template, uplo="L"), np.int64)
+        return np.asarray(2 * order + np.arange(2)).ravel()
 
     def values(self, elements: Array, scales: Array | None = None) -> Array:
         """Stored entries from the element matrices, shape (m, k, k), times scales, shape (m,)."""

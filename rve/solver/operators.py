@@ -49,12 +49,14 @@ class SideBySide:
         source = self.source.getDenseArray()
         shape = len(source), len(self.inner), self.columns
         values, result = vectors.reshape(shape), products.reshape(shape)
+        if self.rest is not None:
+            self.rest.fetch(vectors)
         for k, matrix in enumerate(self.inner):
             source[:] = values[:, k]
             matrix.matMult(self.source, result=self.target)
             result[:, k] = self.target.getDenseArray(readonly=True)
         if self.rest is not None:
-            self.rest.add(values, result)
+            self.rest.add(result)
 
 
 class _Rest:
@@ -71,12 +73,15 @@ class _Rest:
         wanted = PETSc.IS().createBlock(wide * block, others, comm=PETSc.COMM_SELF)
         self.scatter = PETSc.Scatter().create(self.near, wanted, self.fetched, None)
 
-    def add(self, values: Array, result: Array) -> None:
-        """Add to products, shape (rows, matrices, columns), of this rank's vectors `values`."""
-        self.near.array[:] = values.ravel()
+    def fetch(self, vectors: Array) -> None:
+        """Ask other ranks for their parts of vectors, and give them this one's."""
+        self.near.array[:] = vectors.ravel()
         self.scatter.begin(self.near, self.fetched)
+
+    def add(self, result: Array) -> None:
+        """Add to products, shape (rows, matrices, columns), of the vectors that were asked for."""
         self.scatter.end(self.near, self.fetched)
-        far = self.fetched.array_r.reshape(-1, *values.shape[1:])
+        far = self.fetched.array_r.reshape(-1, *result.shape[1:])
         for k, part in enumerate(self.parts):
             result[self.rows, k] += part @ far[:, k]
 

@@ -103,14 +103,17 @@ def spread_matrices(count):
     return pattern, values, dense
 
 
+@pytest.mark.parametrize("seed", [None, 1, 2])
 @pytest.mark.parametrize(("count", "columns"), [(1, 1), (3, 2), (8, 3), (13, 4), (17, 7), (2, 0)])
-def test_factors_are_those_of_numpy(count, columns):
+def test_factors_are_those_of_numpy(count, columns, seed):
     pattern, values, dense = spread_matrices(count)
-    factors = LevelFactors(pattern, iter(values))
+    mixed = None if seed is None else np.random.default_rng(seed).permutation(pattern.size)
+    factors = LevelFactors(pattern, iter(values), mixed)
     vectors = np.random.default_rng(8).standard_normal((count, pattern.size, columns))
     forward, backward = factors.forward(vectors), factors.backward(vectors)
     order = factors._order
     assert sorted(order) == list(range(pattern.size))
+    assert seed is not None or (order[1::2] == order[::2] + 1).all()  # a node's displacements
     for k, matrix in enumerate(dense):
         lower = np.linalg.cholesky(matrix[np.ix_(order, order)])
         first = scipy.linalg.solve_triangular(lower, vectors[k][order], lower=True)

@@ -258,6 +258,20 @@ def test_ranges_out_of_order(changes):
         )
 
 
+@pytest.mark.parametrize(("accuracy", "radii"), [(1e-6, [7, 2]), (1e-8, [7, 4])])
+def test_the_decay_of_coefficients_tells_how_many_radii_are_missing(accuracy, radii):
+    asked = []
+
+    class Counted(SeriesSource):
+        def moduli(self, radii, modulus):
+            asked.append(len(radii))
+            return super().moduli(radii, modulus)
+
+    span = TableRange(MATRIX, 0.3, (0.3, 0.6), (80e9, 80e9))
+    build_table(span, accuracy=accuracy, make=Counted)
+    assert asked == radii
+
+
 def test_refuses_when_interpolation_does_not_settle():
     with pytest.raises(TableError, match="cover less, or allow a larger error"):
         build_table(
