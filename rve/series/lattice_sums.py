@@ -50,7 +50,8 @@ def lattice_sums(highest: int) -> LatticeSums:
     """Both families up to exponent `highest` ≥ 60, to round-off."""
     plain, conjugate = np.zeros(highest + 1), np.zeros(highest + 1)
     for n in range(4, highest + 1, 4):
-        plain[n] = _eisenstein(n) if n < 40 else _near_points(n, conjugate=False)
+        # Σ p^-n by Riemann's ζ and Lipschitz' formula
+        plain[n] = 2 * (zeta(n) + _lipschitz(n, 1)) if n < 40 else _near_points(n, conjugate=False)
     for n in range(7, highest + 1, 4):
         # Σ conj(p) p^-n with conj(p) = p − 2 i j, where Σ p^(1−n) vanishes
         conjugate[n] = 4 * _lipschitz(n, 2) if n < 40 else _near_points(n, conjugate=True)
@@ -71,11 +72,6 @@ def _lipschitz(n: int, power: int) -> float:
     q = np.arange(1.0, 40.0)
     logarithm = n * np.log(2 * np.pi) - gammaln(n) + (n - 1) * np.log(q) - 2 * np.pi * q
     return float(np.sum(np.exp(logarithm) / (1 - np.exp(-2 * np.pi * q)) ** power))
-
-
-def _eisenstein(n: int) -> float:
-    """Σ p^-n over p = m + i j, n a multiple of 4, by Riemann's ζ and Lipschitz' formula."""
-    return 2 * float(zeta(n)) + 2 * _lipschitz(n, 1)
 
 
 def _near_points(n: int, *, conjugate: bool) -> float:

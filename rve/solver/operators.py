@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse as sp
 
+from alphacut.rve.mesh.triangulation import Integers
 from alphacut.rve.petsc import PETSc, beside_diagonal
 from alphacut.rve.solver.constraints import Overlap
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -154,19 +155,27 @@ class Saddle:
         return found
 
     def assembled(self) -> PETSc.Mat:
-        """The whole matrix, for direct solvers.
+        """The whole matrix, for direct solvers."""
+        starts, columns, values = self.stiffness.convert("aij", PETSc.Mat()).getValuesCSR()
+        rows = np.repeat(np.array(self._displacements.own), np.diff(starts))
+        flux, rest, (u, p) = self._flux.tocoo(), self._compliance.tocoo(), self._places()
+        beside, below = u[self._displacements.start + flux.col], p[self._pressures.start + flux.row]
+        own = p[self._pressures.start + rest.row], p[self._pressures.start + rest.col]
+        places = [u[rows], below, beside, own[0]], [u[columns], beside, below, own[1]]
+        parts = np.concatenate([values, flux.data, flux.data, -rest.data])
+        size = len(u) + len(p)
+        given = sp.csr_matrix((parts, tuple(map(np.concatenate, places))), shape=(size, size))
+        kept = np.flatnonzero(np.diff(given.indptr)).astype(PETSc.IntType)
+        starts = np.append(given.indptr[kept], given.nnz).astype(PETSc.IntType)
+        whole = PETSc.Mat().createAIJ([(self.local_size, size)] * 2, comm=self.stiffness.comm)
+        numbers = given.indices.astype(PETSc.IntType)
+        whole.setValuesIJV(starts, numbers, given.data, PETSc.InsertMode.ADD_VALUES, kept)
+        whole.assemble()
+        return whole
 
-        Raises:
-            RuntimeError: On several ranks.
-        """
-        if self.stiffness.comm.size > 1:
-            raise RuntimeError(
-                "nearly incompressible phases have a direct solver on one rank only; take the"
-                " default solver, or one rank"
-            )
-        rows, columns, values = self.stiffness.convert("aij").getValuesCSR()
-        stiffness = sp.csr_matrix((values, columns, rows), shape=self.stiffness.getSize())
-        whole = sp.bmat([[stiffness, self._flux.T], [self._flux, -self._compliance]], format="csr")
-        whole.sort_indices()
-        csr = whole.indptr.astype(PETSc.IntType), whole.indices.astype(PETSc.IntType), whole.data
-        return PETSc.Mat().createAIJ(whole.shape, csr=csr, comm=self.stiffness.comm)
+    def _places(self) -> tuple[Integers, Integers]:
+        """Rows of all displacements and of all pressures."""
+        owned = zip(self._displacements.owned, self._pressures.owned, strict=True)
+        counts = [len(rows) for both in owned for rows in both]
+        pressed = np.repeat(np.arange(len(counts)) % 2, counts)
+        return np.flatnonzero(pressed == 0), np.flatnonzero(pressed)

@@ -53,7 +53,10 @@ def declared_errors(result: HomogenisedSpheres) -> Document | None:
     if not result.errors:
         return None
     modulus, nu = result.error_of(hill_average)
-    s11, s12 = result.error_of(_stresses) / GPA
+    # mean σ11 and σ12 under eq. 15, ε33 = 0, from K, (C11 − C12)/2 and C44
+    s11, s12 = (
+        result.error_of(lambda k: STRAIN * np.array([2 * k[0] + 2 / 3 * k[1], 2 * k[2]])) / GPA
+    )
     along = result.error_of(young_along) / GPA
     bulk, deviator, shear = result.error_of(lambda values: values) / GPA
     return {
@@ -67,11 +70,6 @@ def declared_errors(result: HomogenisedSpheres) -> Document | None:
         "shear_ratio": shear_ratio(result)[1],
         "curve": None,
     }
-
-
-def _stresses(values: Array) -> Array:
-    """Mean σ11 and σ12 under eq. 15, ε33 = 0, from K, (C11 − C12)/2 and C44."""
-    return STRAIN * np.array([2 * values[0] + 2 / 3 * values[1], 2 * values[2]])
 
 
 def shear_ratio(result: HomogenisedSpheres) -> tuple[float, float]:
