@@ -54,8 +54,9 @@ def write_tables(results: Path, folder: Path) -> list[Path]:
         if "curve" in dataset:
             tables[f"{path.stem}-curve"] = _curves(dataset)
             dataset = dataset.drop_vars([x for x in ("curve", "limits") if x in dataset])
+        widest = next((v.dims for v in dataset.data_vars.values() if v.dims), ())
         for axes, part in _by_axes(dataset):
-            own = [] if axes == _widest(dataset) else ["by", *axes]
+            own = [] if axes == widest else ["by", *axes]  # the first bears the name alone
             name, rows = "-".join([path.stem, *own]), math.prod(part.sizes.values())
             if rows > MOST:
                 say(f"{name}.csv is left out: it had {rows:,} rows; {path} holds them as NetCDF")
@@ -158,11 +159,6 @@ def _by_axes(dataset: xarray.Dataset) -> Iterator[tuple[tuple[str, ...], xarray.
             groups.setdefault(tuple(map(str, variable.dims)), []).append(str(name))
     for axes, names in groups.items():
         yield axes, dataset[names]
-
-
-def _widest(dataset: xarray.Dataset) -> tuple[str, ...]:
-    """Axes of the first variable that has any, whose file bears the dataset's name alone."""
-    return next((tuple(map(str, v.dims)) for v in dataset.data_vars.values() if v.dims), ())
 
 
 def _csv(part: xarray.Dataset) -> str:

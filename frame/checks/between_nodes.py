@@ -14,10 +14,14 @@ from alphacut.frame.dynamics.flow import Flow, LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Envelope
-from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.linear import Accelerogram, frequencies
 
-PARTS = 4
+PARTS, MOST = 4, 64
 """Parts of a step that are looked at in a linear structure; a general one is looked at halfway."""
+AT_ONCE = 16
+"""Trajectories that are held at once."""
+PHASE = 0.8
+"""Most phase in rad that the fastest mode takes in a part, up to the most parts."""
 SAFETY = 1.5
 """Factor on the largest stray of the trajectories looked at."""
 FLOOR = 0.1
@@ -28,7 +32,8 @@ def with_stray(found: Envelope, flow: UnitFlow) -> Envelope:
     """The envelope with an estimate of what lies between its nodes; a proof is left as it is."""
     if found.between is not None:
         return found
-    between = stray(flow.flow, probes(flow.boxes))
+    corners = probes(flow.boxes)
+    between = stray(flow.flow, np.vstack([corners, (corners + flow.boxes.modal) / 2]))
     facts = {**found.facts, "between_nodes": float((between / flow.scale).max())}
     return replace(found, between=between, facts=facts)
 
@@ -42,20 +47,22 @@ def stray(flow: Flow, points: Array) -> Array:
         flow: The trajectories.
         points: Parameters of those that are looked at, shape (S, d), in SI units.
     """
+    pieces = np.array_split(points, -(-len(points) // AT_ONCE))
+    off = np.max([_off(flow, some) for some in pieces], axis=0)
+    # where the trajectories looked at are straight, others are not
+    near = [np.roll(off, k, 0) for k in (-1, 0, 1)]
+    near.append(np.broadcast_to(FLOOR * off.max(0), off.shape))
+    return np.concatenate([np.zeros((1, off.shape[1])), SAFETY * np.max(near, 0)])
+
+
+def _off(flow: Flow, points: Array) -> Array:
+    """Largest distance of trajectories from straight lines in each step, shape (T − 1, m)."""
     fine, parts = _finer(flow, points)
     ends = fine[:, ::parts]
     share = (np.arange(1, parts) / parts)[:, None]
     inner = fine[:, :-1].reshape(len(fine), -1, parts, fine.shape[-1])[:, :, 1:]
     straight = ends[:, :-1, None] * (1 - share) + ends[:, 1:, None] * share
-    off = np.abs(inner - straight).max((0, 2))
-    # where the trajectories looked at are straight, others are not
-    spread = [
-        off,
-        np.roll(off, 1, 0),
-        np.roll(off, -1, 0),
-        np.broadcast_to(FLOOR * off.max(0), off.shape),
-    ]
-    return np.concatenate([np.zeros((1, off.shape[1])), SAFETY * np.max(spread, 0)])
+    return np.asarray(np.abs(inner - straight).max((0, 2)))
 
 
 def ground_stray(ground: Accelerogram, time: Array) -> Array:
@@ -83,8 +90,10 @@ def _finer(flow: Flow, points: Array) -> tuple[Array, int]:
 
 @_finer.register
 def _(flow: LinearFlow, points: Array) -> tuple[Array, int]:
-    finer = replace(flow, step=flow.step / PARTS, integrator=Exact())
-    return finer.values(points), PARTS
+    turn = float(frequencies(flow.system)[-1]) * flow.step
+    parts = int(np.clip(np.ceil(turn / PHASE), PARTS, MOST))
+    finer = replace(flow, step=flow.step / parts, integrator=Exact())
+    return finer.values(points), parts
 
 
 @_finer.register

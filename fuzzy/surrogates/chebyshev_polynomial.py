@@ -120,10 +120,10 @@ class _Search:
 
         bounds = [(0.0, 1.0 if b > a else 0.0) for a, b in zip(self.lower, self.upper, strict=True)]
         unit = np.clip((start - self.lower) / self._span(), 0, 1)
-        room = {"type": "ineq", "fun": self._room}
-        options: dict[str, Any] = (
-            {"method": "SLSQP", "constraints": [room]} if self.slack else {"method": "L-BFGS-B"}
-        )
+        options: dict[str, Any] = {"method": "L-BFGS-B"}
+        if slack := self.slack:
+            room = {"type": "ineq", "fun": lambda unit: float(slack(self._point(unit))[0])}
+            options = {"method": "SLSQP", "constraints": [room]}
         found = minimize(self._objective, unit, jac=True, bounds=bounds, **options)
         place = self._point(found.x)[0]
         if self.slack:
@@ -139,9 +139,6 @@ class _Search:
     def _value(self, point: Array) -> float:
         terms = self.polynomial.basis(point)[0]
         return float(terms @ self.polynomial.coefficients[:, self.output])
-
-    def _room(self, unit: Array) -> float:
-        return float(self.slack(self._point(unit))[0]) if self.slack else 0.0
 
     def _point(self, unit: Array) -> Array:
         return np.clip(self.lower + unit * self._span(), self.lower, self.upper)[None]

@@ -294,8 +294,9 @@ class SectionImage:
         else:
             light = 0.0
         mask = smooth > threshold
-        if self.particles == "dark" or (self.particles == "auto" and not self._are_bright(mask)):
-            mask = ~mask
+        # the particles' pieces fill more of their convex hulls
+        bright = self.particles != "auto" or self._convexity(mask) > self._convexity(~mask)
+        mask = ~mask if self.particles == "dark" or not bright else mask
         within, without = (float(np.median(smooth[self._core(one)])) for one in (mask, ~mask))
         share = (smooth - without) / (within - without)  # noise beyond 0 and 1 cancels in sums
         labels = _rounder(self._pieces(mask), self.roundness, np.pi * self.smallest**2)
@@ -313,10 +314,6 @@ class SectionImage:
         seeds[tuple(peaks.T)] = np.arange(1, len(peaks) + 1)
         labels: Labels = segmentation.watershed(-depth, seeds, mask=mask)  # type: ignore[no-untyped-call]
         return _convex_whole(labels, parts)
-
-    def _are_bright(self, mask: NDArray[np.bool_]) -> bool:
-        """The bright phase is the particles: its pieces fill more of their convex hulls."""
-        return self._convexity(mask) > self._convexity(~mask)
 
     def _convexity(self, mask: NDArray[np.bool_]) -> float:
         """Area of all pieces over that of their convex hulls."""

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from alphacut.frame import Exact, LinearFlow, StoreyFrame
+from alphacut.frame import Exact, LinearFlow, StoreyFrame, envelope
 from alphacut.frame.checks import between_nodes
 from alphacut.frame.checks.between_nodes import stray
+from alphacut.frame.structures.linear import frequencies
+from alphacut.fuzzy import Interval
 
 
 def test_a_whole_swing_within_a_step_is_seen() -> None:
@@ -17,6 +19,37 @@ def test_a_whole_swing_within_a_step_is_seen() -> None:
     ratio = found[1:, 0] / (0.1 / turn)  # amplitude over the straight line, which is zero
     assert (ratio >= 1).all()
     assert (ratio <= 1.8).all()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_modes_that_turn_several_times_within_a_step_are_seen(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    stiffness, start = 10 ** random.uniform(5, 6.5, 3), 0.01 * random.normal(size=3)
+    frame = StoreyFrame((1e4,) * 3, stiffness=tuple(stiffness), q0=tuple(start), damping_ratio=0.01)
+    step, point = random.uniform(15, 35) / frequencies(frame)[-1], np.empty((1, 0))
+    found = stray(LinearFlow(frame, (), 12 * step, step, Exact()), point)
+    fine = LinearFlow(frame, (), 12 * step, step / 100, Exact()).values(point)[0]
+    share = np.linspace(0, 1, 101)[:, None]
+    for j in range(12):
+        inner = fine[100 * j : 100 * (j + 1) + 1]
+        off = abs(inner - inner[0] * (1 - share) - inner[-1] * share).max(0)
+        assert (off <= found[j + 1]).all()
+    assert found.max() < 4 * abs(fine).max()
+
+
+def test_trajectories_halfway_to_the_corners_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    looked: list[float] = []
+
+    def kept(flow: LinearFlow, points: np.ndarray) -> np.ndarray:
+        looked.extend(points[:, 0])
+        return np.zeros((len(flow.time), len(flow.outputs)))
+
+    monkeypatch.setattr(between_nodes, "stray", kept)
+    frame = StoreyFrame((1e4,), stiffness=(1e6,), q0=(0.1,))
+    envelope(
+        frame, {"k1": Interval(0.8e6, 1.2e6)}, duration=0.4, step=0.01, method="graph-follower"
+    )
+    assert sorted({round(k / 1e5) for k in looked}) == [8, 9, 10, 11, 12]
 
 
 def test_a_step_counts_its_neighbours_and_a_share_of_the_largest(
