@@ -134,13 +134,10 @@ def _body(name: str, arguments: Sequence[Any], expressions: Sequence[Any]) -> st
     write = _printer().doprint
     named = [(f"const V {symbol}", e) for symbol, e in shared]
     named += [(f"out[{k}]", e) for k, e in enumerate(reduced)]
-    lines = [f"{left} = {_right(sympy.sympify(e).xreplace(place), write)};" for left, e in named]
-    text = "\n    ".join(lines)
+    right = [(left, sympy.sympify(e).xreplace(place)) for left, e in named]
+    spread = [(left, "BROAD({})" if e.is_number else "{}", write(e)) for left, e in right]
+    text = "\n    ".join(f"{left} = {form.format(value)};" for left, form, value in spread)
     return f"static void {name}(const V *x, V *out)\n{{\n    {text}\n}}\n"
-
-
-def _right(expression: Any, write: Any) -> str:
-    return f"BROAD({write(expression)})" if expression.is_number else str(write(expression))
 
 
 def _printer() -> Any:

@@ -95,7 +95,9 @@ def scan(read: Callable[[int, int], bytes], start: int, end: int) -> Iterator[Re
         end: Size of the file.
     """
     while start < end:
-        size = max(_BLOCK, _needed(read(start, HEAD)))
+        head = read(start, HEAD)
+        needed = _LENGTH.unpack(head[len(MARK) :][: _LENGTH.size]) if len(head) == HEAD else (0,)
+        size = max(_BLOCK, HEAD + needed[0])
         data = read(start, min(size, end - start))
         last, position = start + len(data) >= end, 0
         while position < len(data):
@@ -112,11 +114,6 @@ def scan(read: Callable[[int, int], bytes], start: int, end: int) -> Iterator[Re
                 yield Damage(start + position, data[position:][: HEAD + _SHOWN], size, torn)
             position += size
         start += position
-
-
-def _needed(head: bytes) -> int:
-    """Bytes that a record says it needs."""
-    return HEAD + _LENGTH.unpack(head[len(MARK) :][: _LENGTH.size])[0] if len(head) == HEAD else 0
 
 
 def _broken(data: bytes, position: int, size: int, last: bool) -> tuple[int, bool]:

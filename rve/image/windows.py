@@ -14,9 +14,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from alphacut.rve.image.bounds import EQUAL, StiffnessBounds, inverse_below
-from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.energy import UNIT
-from alphacut.rve.image.fields.side import DISPLACEMENT, STRESS, solve_side
 from alphacut.stochastic.theta.truncated_normal import Array
 
 CONFIDENCE = 0.95
@@ -79,25 +77,6 @@ def tiles_of(image: Array, along: int) -> Array:
         )
     blocks = image.reshape(along, rows // along, along, columns // along)
     return np.ascontiguousarray(blocks.swapaxes(1, 2).reshape(-1, rows // along, columns // along))
-
-
-def solve_tiles(
-    bulk: Array, shear: Array, *, aspect: float = 1.0, solver: ConjugateGradient | None = None
-) -> Tiling:
-    """Bounds of tiles under uniform displacement and under uniform traction.
-
-    Args:
-        bulk: Plane-strain bulk modulus K + G/3 of each pixel, shape (tiles, rows, columns), in Pa.
-        shear: Shear modulus, same shape, in Pa.
-        aspect: Height of a pixel over its width.
-        solver: Stopping rule.
-    """
-    rule = solver or ConjugateGradient()
-    stiffness, compliance = (
-        solve_side(side, bulk, shear, solver=rule, aspect=aspect, clamped=True).energy.upper
-        for side in (DISPLACEMENT, STRESS)
-    )
-    return Tiling(stiffness, compliance)
 
 
 def _mean(matrices: Array) -> Array:

@@ -85,24 +85,23 @@ class LevelFactors:
 
 
 def saddle_factors(
-    unknowns: Integers, triangles: Integers, elements: Iterable[Array]
+    level: LevelPattern, triangles: Integers, elements: Iterable[Array]
 ) -> LevelFactors:
     """Factors of saddle-point matrices, of displacements and then pressures.
 
     Args:
-        unknowns: Displacements of each triangle, −1 where fixed, shape (m, 12).
+        level: Of the displacements.
         triangles: Those with a pressure, numbered after the displacements in this order.
         elements: Of each matrix: element matrices, shape (m, 13, 13), the pressure last.
 
     Raises:
         ConvergenceError: A pivot has the wrong sign.
     """
-    displacements = int(unknowns.max()) + 1
-    pressures = np.full((len(unknowns), 1), -1)
-    pressures[triangles, 0] = displacements + np.arange(len(triangles))
-    pattern = LevelPattern(np.concatenate([unknowns, pressures], axis=1))
-    place = np.argsort(LevelPattern(unknowns).fill_reducing)
-    beside = unknowns[triangles]
+    pressures = np.full((len(level.unknowns), 1), -1)
+    pressures[triangles, 0] = level.size + np.arange(len(triangles))
+    pattern = LevelPattern(np.concatenate([level.unknowns, pressures], axis=1))
+    place = np.argsort(level.fill_reducing)
+    beside = level.unknowns[triangles]
     last = np.where(beside >= 0, place[beside], -1).max(axis=1)  # of a triangle's displacements
     order = np.argsort(np.concatenate([place, last + 0.5]), kind="stable")
     return LevelFactors(pattern, map(pattern.values, elements), order, len(triangles))

@@ -95,7 +95,8 @@ def _patterns(periodicity: Periodicity, plane: Triangulation) -> tuple[LevelPatt
     """Of a level's matrices on quadratic and on linear triangles."""
     nodes = plane.triangles, plane.triangles[:, :3]
     quadratic, linear = (with_components(periodicity.unknown[own]) for own in nodes)
-    return LevelPattern(quadratic), LevelPattern(linear)
+    middles = plane.points[plane.triangles[:, :3]].mean(axis=1)
+    return LevelPattern(quadratic, middles), LevelPattern(linear, middles)
 
 
 @dataclass(frozen=True)
@@ -173,7 +174,7 @@ class ThetaPreconditioner:
         else:
             whole = list(on)
             self.quadratic = saddle_factors(
-                quadratic.unknowns, pressures.triangles, pressures.saddles(whole)
+                quadratic, pressures.triangles, pressures.saddles(whole)
             )
             coarse = [reduced(one) for one in whole]
         self.linear = LevelFactors(linear, [*coarse, *map(reduced, between)])

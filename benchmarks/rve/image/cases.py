@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
+from alphacut.rve.image.fields.side import DISPLACEMENT, STRESS, solve_side
 from alphacut.rve.image.moduli import PlaneModuli
+from alphacut.rve.image.windows import Tiling
 
 Array = NDArray[np.float64]
 
@@ -53,3 +56,12 @@ def moduli_of(mask: Array | NDArray[np.bool_], phases: list[PlaneModuli]) -> tup
         np.where(mask, particle.bulk, matrix.bulk),
         np.where(mask, particle.shear, matrix.shear),
     )
+
+
+def solve_tiles(bulk: Array, shear: Array) -> Tiling:
+    """Bounds of tiles of moduli, shape (tiles, rows, columns), under either uniform condition."""
+    stiffness, compliance = (
+        solve_side(side, bulk, shear, solver=ConjugateGradient(), clamped=True).energy.upper
+        for side in (DISPLACEMENT, STRESS)
+    )
+    return Tiling(stiffness, compliance)

@@ -12,8 +12,8 @@ from scipy.stats import binom
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.moduli import PlaneModuli
 from alphacut.rve.image.solve import solve_image
-from alphacut.rve.image.windows import CONFIDENCE, solve_tiles, tiles_of
-from benchmarks.rve.image.cases import moduli_of, noise, phases_of
+from alphacut.rve.image.windows import CONFIDENCE, tiles_of
+from benchmarks.rve.image.cases import moduli_of, noise, phases_of, solve_tiles
 
 LEVEL = 0.5  # of the noise above which a pixel is particle: 31 % of the area
 

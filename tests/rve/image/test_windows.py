@@ -11,7 +11,8 @@ from alphacut.rve.image.fields.operator import Operator
 from alphacut.rve.image.fields.side import DISPLACEMENT, STRESS, solve_side
 from alphacut.rve.image.moduli import PlaneModuli
 from alphacut.rve.image.solve import solve_image
-from alphacut.rve.image.windows import Tiling, solve_tiles, tiles_of
+from alphacut.rve.image.windows import Tiling, tiles_of
+from benchmarks.rve.image.cases import solve_tiles
 
 
 def random_image(rng, size):
