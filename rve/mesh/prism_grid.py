@@ -7,7 +7,7 @@ half-way between levels, the planar vertices (a serendipity wedge has no midpoin
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,28 +25,28 @@ def moved(mesh: Triangulation, radius: float) -> Array:
     particle and the side bend with it; only an edge across a diagonal of the square, where sliding
     has a kink, stays straight.
     """
-    points = _slide(mesh.points, mesh.radius, radius)
-    straight = np.flatnonzero(_across_diagonal(mesh)) + mesh.vertices
+    (distance, side, straight), old = _rays(mesh), mesh.radius
+    with np.errstate(divide="ignore", invalid="ignore"):
+        outer = (radius + (distance - old) * (side - radius) / (side - old)) / distance
+    points = mesh.points * np.where(distance <= old * (1 + 1e-9), radius / old, outer)[:, None]
     points[straight] = points[mesh.ends[straight - mesh.vertices]].mean(axis=1)
     # z = 0 of eq. 14
     points[mesh.arc] *= radius / np.linalg.norm(points[mesh.arc], axis=1, keepdims=True)
     return np.asarray(points)
 
 
-def _across_diagonal(mesh: Triangulation) -> NDArray[np.bool_]:
-    """Mask of edges outside the particle that cross a diagonal, shape (edges,)."""
-    x, y = mesh.points[mesh.ends].transpose(2, 1, 0)
-    return np.asarray(((x - y).prod(axis=0) < -1e-12) | ((x + y).prod(axis=0) < -1e-12))
+@lru_cache(maxsize=4)
+def _rays(mesh: Triangulation) -> tuple[Array, Array, Integers]:
+    """Distances of the nodes and of the square's side along their rays, shape (n,).
 
-
-def _slide(points: Array, old: float, new: float) -> Array:
-    """Move along rays, shape (n, 2), from the circle of radius `old` to `new`; sides stay."""
-    reach = abs(points).max(axis=1)  # 1 on the square's sides
-    distance = np.linalg.norm(points, axis=1)
+    With the midpoints of edges outside the particle that cross a diagonal.
+    """
+    distance = np.linalg.norm(mesh.points, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        side = distance / reach  # distance of the square's side along the ray
-        outer = (new + (distance - old) * (side - new) / (side - old)) / distance
-    return np.asarray(points * np.where(distance <= old * (1 + 1e-9), new / old, outer)[:, None])
+        side = distance / abs(mesh.points).max(axis=1)
+    x, y = mesh.points[mesh.ends].transpose(2, 1, 0)
+    across = ((x - y).prod(axis=0) < -1e-12) | ((x + y).prod(axis=0) < -1e-12)
+    return distance, side, np.flatnonzero(across) + mesh.vertices
 
 
 @dataclass(frozen=True)
