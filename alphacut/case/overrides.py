@@ -14,6 +14,8 @@ from alphacut.io.problem import BadInput, Problem
 from alphacut.io.quantity import NUMBER
 
 Raw = dict[str, Any]
+ARRAY = r"\[(?:[^\[\]]|\[[^\[\]]*\])*\]"  # whose first bracket its last one closes
+COMMA = r",(?![^\[]*\])"  # between quantities, not within one such as [1, 2, 3] t
 ARRAYS = ("fuzzy list", "numbers", "choices")  # kinds of keys that hold arrays
 
 
@@ -122,16 +124,11 @@ def toml_or_text(value: str, key: Key) -> object:
     except tomllib.TOMLDecodeError:
         # .3 and 3. are no TOML
         found = float(value) if re.fullmatch(r"[+-]?(\d+\.|\.\d+)([eE][+-]?\d+)?", value) else value
-    if (
-        key.alone
-        and not isinstance(found, list)
-        and (not isinstance(found, str) or "," not in re.sub(r"\[.*?\]", "", found))
-    ):
-        return found  # one for all
-    if key.kind in ARRAYS and not isinstance(found, list):
-        inner = found if isinstance(found, str) else value.strip()
-        inner = inner[1:-1] if inner.startswith("[") and inner.endswith("]") else inner
-        items = [item.strip() for item in inner.split(",") if item.strip()]
+    inner = found if isinstance(found, str) else value.strip()
+    inner = inner[1:-1] if re.fullmatch(ARRAY, inner) else inner
+    items = [item.strip() for item in re.split(COMMA, inner) if item.strip()]
+    one_for_all = key.alone and len(items) < 2
+    if key.kind in ARRAYS and not isinstance(found, list) and not one_for_all:
         plain = key.kind == "numbers" and not key.unit
         return [float(item) if plain and re.fullmatch(NUMBER, item) else item for item in items]
     return str(found) if key.kind == "text" else found

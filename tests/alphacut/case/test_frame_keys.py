@@ -10,6 +10,7 @@ import pytest
 import xarray
 
 from alphacut.case.load import load
+from alphacut.case.overrides import apply_change
 from alphacut.entry import main
 from alphacut.frame.structures.linear import frequencies
 from alphacut.stages.vibration.structure import structure
@@ -190,3 +191,20 @@ def test_a_run_with_weights_and_a_record_in_g_is_proved(
     assert main(["envelope", str(path), "--json", "-"]) == 0
     found = json.loads(capfd.readouterr().out)
     assert "guaranteed" in json.dumps(found)
+
+
+@pytest.mark.parametrize(
+    ("value", "masses"),
+    [
+        ("10 t,[19, 20, 21] t,[4,5,6] t", ["10 t", "[19, 20, 21] t", "[4,5,6] t"]),
+        ("[[19,20,21] t, 10 t, 5 t]", ["[19,20,21] t", "10 t", "5 t"]),
+        ("[1,2] t, 3 t, [4,5] t", ["[1,2] t", "3 t", "[4,5] t"]),
+        ("[1,2,3], [4,5,6]", ["[1,2,3]", "[4,5,6]"]),
+        ('["20 t", "10 t"]', ["20 t", "10 t"]),
+        ("[20 t, 10 t]", ["20 t", "10 t"]),
+    ],
+)
+def test_commas_within_a_fuzzy_number_part_no_masses(value, masses):
+    raw = {"frame": {"masses": []}}
+    apply_change(raw, f"frame.masses={value}")
+    assert raw["frame"]["masses"] == masses
