@@ -108,12 +108,14 @@ class PlanarSource:
                     f" {self.accuracy:.1e} is wanted: allow a larger error, or take the series"
                 )
             wanted = 0.8 * self.accuracy / found.error
-            finer = [
-                max(_FINEST, self.mesh_size * min(0.9, wanted ** (1 / rate))) for rate in _RATES
-            ]
-            sizes = list(dict.fromkeys(finer))
-            tried = self.ranks.each(partial(self._judge, radius), sizes)
-            kept = [one.error <= self.accuracy for one in tried]
+            finer = [self.mesh_size * min(0.9, wanted ** (1 / rate)) for rate in _RATES]
+            sizes = list(dict.fromkeys(max(_FINEST, size) for size in finer))
+            tried: list[SolvedCell] = []
+            kept = [False]
+            while len(tried) < len(sizes) and True not in kept:
+                more = sizes[len(tried) :][: self.ranks.size]  # as many as there are ranks for
+                tried += self.ranks.each(partial(self._judge, radius), more)
+                kept = [one.error <= self.accuracy for one in tried]
             best = kept.index(True) if True in kept else -1
             self.mesh_size, found = sizes[best], tried[best]
         return found
