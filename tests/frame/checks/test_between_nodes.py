@@ -21,12 +21,12 @@ def test_a_whole_swing_within_a_step_is_seen() -> None:
     assert (ratio <= 1.8).all()
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(16))
 def test_modes_that_turn_several_times_within_a_step_are_seen(seed: int) -> None:
     random = np.random.default_rng(seed)
     stiffness, start = 10 ** random.uniform(5, 6.5, 3), 0.01 * random.normal(size=3)
     frame = StoreyFrame((1e4,) * 3, stiffness=tuple(stiffness), q0=tuple(start), damping_ratio=0.01)
-    step, point = random.uniform(15, 35) / frequencies(frame)[-1], np.empty((1, 0))
+    step, point = random.uniform(15, 50) / frequencies(frame)[-1], np.empty((1, 0))
     found = stray(LinearFlow(frame, (), 12 * step, step, Exact()), point)
     fine = LinearFlow(frame, (), 12 * step, step / 100, Exact()).values(point)[0]
     share = np.linspace(0, 1, 101)[:, None]
@@ -35,6 +35,15 @@ def test_modes_that_turn_several_times_within_a_step_are_seen(seed: int) -> None
         off = abs(inner - inner[0] * (1 - share) - inner[-1] * share).max(0)
         assert (off <= found[j + 1]).all()
     assert found.max() < 4 * abs(fine).max()
+
+
+def test_the_last_of_many_trajectories_counts() -> None:
+    frame = StoreyFrame((1e4,), stiffness=(1e6,), q0=(0.1,))
+    flow = LinearFlow(frame, ("q1_0",), 1.0, 0.1, Exact())
+    points = np.zeros((40, 1))
+    points[-1] = 0.1
+    assert stray(flow, points) == pytest.approx(stray(flow, points[-1:]))
+    assert stray(flow, points).max() > 0
 
 
 def test_trajectories_halfway_to_the_corners_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,7 +17,7 @@ from alphacut.entry import main
 from alphacut.rve import Phase
 from alphacut.rve.mesh import triangulation, wedge
 from alphacut.rve.mesh.periodicity import identify
-from alphacut.rve.mesh.prism_grid import PrismGrid
+from alphacut.rve.mesh.prism_grid import PrismGrid, moved
 from alphacut.rve.mesh.triangulation import triangulate
 from alphacut.rve.prism.slice_stress import SliceStress
 from alphacut.rve.prism.system import PrismSystem
@@ -292,3 +292,19 @@ def test_strains_are_those_of_numpy(loads):
     assert determinant == pytest.approx(wanted, rel=1e-13)
     assert found == pytest.approx(strains_by_numpy(slopes) @ values, rel=1e-12, abs=1e-12)
     assert slices.determinants() == pytest.approx(wanted, rel=1e-13)
+
+
+@pytest.mark.parametrize("radius", [0.3, 0.5, 0.8])
+def test_only_edges_across_a_diagonal_outside_the_particle_stay_straight(radius):
+    plane = triangulate(size=0.2, radius=0.5)
+    points = moved(plane, radius)
+    ends = plane.points[plane.ends]
+    sides = [np.sign(np.round(ends[..., 0] + k * ends[..., 1], 9)) for k in (1, -1)]
+    crossing = np.any([side.prod(axis=1) < 0 for side in sides], axis=0)
+    outside = (np.linalg.norm(ends, axis=2) >= 0.5 - 1e-9).all(axis=1)
+    bend = np.linalg.norm(points[plane.vertices :] - points[plane.ends].mean(axis=1), axis=1)
+    arc = plane.arc[plane.vertices :]
+    assert (crossing & outside).any()
+    assert bend[crossing & ~arc].max() < 1e-14
+    if radius != 0.5:
+        assert bend[outside & ~crossing & ~arc].max() > 1e-4

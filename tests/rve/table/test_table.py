@@ -10,7 +10,7 @@ from alphacut.rve.cell import with_ratio
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.rve.slices.model import solve_slice
-from alphacut.rve.table.build import TableError, build_table
+from alphacut.rve.table.build import PlanarSource, SolvedCell, TableError, build_table
 from alphacut.rve.table.cache import table_key
 from alphacut.rve.table.interpolant import TableRange, coefficients, leja, tail
 from alphacut.rve.table.model import TableModel
@@ -256,6 +256,23 @@ def test_ranges_out_of_order(changes):
                 **changes,
             }
         )
+
+
+@pytest.mark.parametrize(("rate", "tried"), [(8.0, 1), (6.5, 2)])
+def test_one_rank_tries_a_mesh_as_fine_as_likely_only_where_the_rougher_one_fails(rate, tried):
+    source, sizes = PlanarSource(SPAN, 1e-5), []
+    source.mesh_size = 0.5
+
+    def judge(radius, size):
+        sizes.append(size)
+        return SolvedCell(np.ones((1, 3)), np.full(4, 1e-3 * (size / 0.5) ** rate), 1)
+
+    source._judge = judge
+    found = source._fine_enough(0.5, judge(0.5, 0.5))
+    foretold = [0.5 * 0.008 ** (1 / power) for power in (7.5, 6.0)]  # 0.8 · 1e-5 / 1e-3
+    assert sizes[1:] == pytest.approx(foretold[:tried])
+    assert source.mesh_size == sizes[-1]
+    assert found.error <= 1e-5
 
 
 @pytest.mark.parametrize(("accuracy", "radii"), [(1e-6, [7, 2]), (1e-8, [7, 4])])
