@@ -37,10 +37,7 @@ def moved(mesh: Triangulation, radius: float) -> Array:
 
 @lru_cache(maxsize=4)
 def _rays(mesh: Triangulation) -> tuple[Array, Array, Integers]:
-    """Distances of the nodes and of the square's side along their rays, shape (n,).
-
-    With the midpoints of edges outside the particle that cross a diagonal.
-    """
+    """Distances of nodes and of the square's side along rays, (n,), and midpoints kept straight."""
     distance = np.linalg.norm(mesh.points, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         side = distance / abs(mesh.points).max(axis=1)

@@ -117,9 +117,8 @@ class LevelPattern:
         for half, touched in zip((lower[:, axis], ~lower[:, axis]), pairs[axis], strict=True):
             own, number = np.flatnonzero(touched & ~between), np.full(self.size + 1, -1)
             number[own] = np.arange(len(own))
-            order.append(
-                own[LevelPattern(number[self.unknowns[half]], self.middles[half]).dissected()]
-            )
+            part = LevelPattern(number[self.unknowns[half]], self.middles[half])
+            order.append(own[part.dissected()])
         return np.concatenate([*order, np.flatnonzero(between)])
 
     def _touched(self, elements: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -229,8 +229,8 @@ def build_table(
         fresh = [float(radius) for radius in radii if radius not in known]
         for radius, solved in zip(fresh, supply.moduli(fresh, moduli), strict=True):
             known[radius] = _logarithms(span, radius, moduli, solved)
-        values = np.array([known[radius] for radius in radii])
-        found, noise = coefficients(values), supply.space[1:].max(axis=1)
+        found = coefficients(np.array([known[radius] for radius in radii]))
+        noise = supply.space[1:].max(axis=1)
         tails = tail(found, 0, noise=noise), tail(found, 1, noise=noise)
         both = float((tails[0] + tails[1])[:3].max())
         if both <= allowed:
@@ -250,13 +250,18 @@ def build_table(
                 " less, or allow a larger error"
             )
         if tails[0][:3].max() >= tails[1][:3].max():
-            if before == np.inf:  # what two radii less would have left, by the coefficients
-                sizes = abs(found).max(axis=(1, 2))
-                before = both * float(sizes[-6:-3].max() / sizes[-3:].max()) ** (2 / 3)
-            more = np.log(allowed / both) / np.log(both / before) if both < before else 1
-            counts, before = (counts[0] + 2 * int(np.clip(round(more), 1, 3)), counts[1]), both
+            counts, before = (counts[0] + _missing(found, both, before, allowed), counts[1]), both
         else:
             counts, known = (counts[0], counts[1] + 2), {}
+
+
+def _missing(found: Array, left: float, before: float, allowed: float) -> int:
+    """About how many radii are missing, 2 to 6, by the error left `before`, inf at first."""
+    if before == np.inf:  # what two radii less would have left, by the coefficients
+        sizes = abs(found).max(axis=(1, 2))
+        before = left * float(sizes[-6:-3].max() / sizes[-3:].max()) ** (2 / 3)
+    more = np.log(allowed / left) / np.log(left / before) if left < before else 1
+    return 2 * int(np.clip(round(more), 1, 3))
 
 
 def _logarithms(span: TableRange, radius: float, modulus: Array, solved: Array) -> Array:
