@@ -18,12 +18,12 @@ import numpy as np
 from scipy.stats import t as students_t
 
 from alphacut.rve.cell import Phase
-from alphacut.rve.spheres.many.stiffness import stiffness_of
-from alphacut.rve.spheres.many.voxels import voxels_of
 from alphacut.stochastic.errors import RefusedError
 from alphacut.stochastic.spheres.packing import SpherePacking
 from alphacut.stochastic.spheres.spheres import Spheres
 from alphacut.stochastic.theta.truncated_normal import Array
+from benchmarks.rve.voxels.stiffness import stiffness_of
+from benchmarks.rve.voxels.voxels import voxels_of
 
 Quantity = Callable[[Array], Array]  # of moduli (…, 3), K, (C11 − C12)/2 and C44: shape (…)
 REFINEMENTS = (1.0, 1.75, 2.6, 3.75)  # the last three make the limit

@@ -27,8 +27,6 @@ from alphacut.case.load import load
 from alphacut.rve.cell import Phase
 from alphacut.rve.spheres.bounds import hashin_shtrikman
 from alphacut.rve.spheres.cubic import hill_average
-from alphacut.rve.spheres.many.stiffness import stiffness_of
-from alphacut.rve.spheres.many.voxels import voxels_of
 from alphacut.rve.spheres.series.stiffness import cubic_stiffness
 from alphacut.stages.material import modulus
 from alphacut.stages.material.campaign import campaign
@@ -39,6 +37,8 @@ from alphacut.stochastic.spheres.spheres import Spheres
 from alphacut.stochastic.theta.truncated_normal import Array
 from benchmarks.rve.many_material import Declared, RandomMaterial, random_material
 from benchmarks.rve.many_random_cells import SOLVER, RandomCells, limit_of_grids
+from benchmarks.rve.voxels.stiffness import stiffness_of
+from benchmarks.rve.voxels.voxels import voxels_of
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "benchmarks" / "results"

@@ -32,13 +32,13 @@ from alphacut.rve.spheres.bounds import (
     hashin_shtrikman,
     shear_against_trace_bounds,
 )
-from alphacut.rve.spheres.many.stiffness import stiffness_of
-from alphacut.rve.spheres.many.voxels import voxels_of
 from alphacut.rve.spheres.result import volume_fraction
 from alphacut.rve.spheres.series.stiffness import cubic_stiffness
 from alphacut.stochastic.spheres.spheres import Spheres
 from alphacut.stochastic.theta.truncated_normal import Array
 from benchmarks.rve.many_random_cells import limit_of_grids
+from benchmarks.rve.voxels.stiffness import stiffness_of
+from benchmarks.rve.voxels.voxels import voxels_of
 
 RESULTS = Path(__file__).parents[1] / "results"
 MATRIX = Phase(20e9)

@@ -3,13 +3,13 @@ import pytest
 
 from alphacut.rve import Phase
 from alphacut.rve.spheres.bounds import bulk_and_shear
-from alphacut.rve.spheres.many import stiffness
-from alphacut.rve.spheres.many.laminate import voxel_stiffness
-from alphacut.rve.spheres.many.stiffness import stiffness_of
-from alphacut.rve.spheres.many.voxels import Voxels, voxels_of
 from alphacut.rve.spheres.series.stiffness import cubic_stiffness
 from alphacut.stochastic.spheres.spheres import Spheres
 from benchmarks.rve.many_random_cells import limit_of_grids
+from benchmarks.rve.voxels import stiffness
+from benchmarks.rve.voxels.laminate import voxel_stiffness
+from benchmarks.rve.voxels.stiffness import stiffness_of
+from benchmarks.rve.voxels.voxels import Voxels, voxels_of
 
 MATRIX, STIFF = Phase(20e9), Phase(80e9)
 

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from alphacut.rve.spheres.many.voxels import voxels_of
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 from alphacut.stochastic.spheres.packing import SpherePacking
 from alphacut.stochastic.spheres.spheres import Spheres
+from benchmarks.rve.voxels.voxels import voxels_of
 
 
 def test_volume_is_exact_whatever_the_grid():

@@ -17,8 +17,8 @@ import numpy as np
 
 from alphacut.rve.cell import Phase
 from alphacut.rve.spheres.bounds import bulk_and_shear
-from alphacut.rve.spheres.many.voxels import Voxels
 from alphacut.stochastic.theta.truncated_normal import Array
+from benchmarks.rve.voxels.voxels import Voxels
 
 PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 

@@ -13,10 +13,10 @@ import numpy as np
 
 from alphacut.rve.cell import Phase
 from alphacut.rve.spheres.bounds import bulk_and_shear
-from alphacut.rve.spheres.many.fourier import FourierGrid
-from alphacut.rve.spheres.many.laminate import VoxelStiffness, voxel_stiffness
-from alphacut.rve.spheres.many.voxels import Voxels
 from alphacut.stochastic.theta.truncated_normal import Array
+from benchmarks.rve.voxels.fourier import FourierGrid
+from benchmarks.rve.voxels.laminate import VoxelStiffness, voxel_stiffness
+from benchmarks.rve.voxels.voxels import Voxels
 
 LIMIT = 1000  # iterations of one load
 # strains 11, 22, 33, 23, 13, 12, and what divides their energy ε : C : ε into a modulus

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import fft
 
-from alphacut.rve.spheres.many.laminate import PAIRS
 from alphacut.stochastic.theta.truncated_normal import Array
+from benchmarks.rve.voxels.laminate import PAIRS
 
 Waves = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]  # half of a real field's spectrum
 
