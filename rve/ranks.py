@@ -60,19 +60,50 @@ class Ranks:
         Ranks of one machine take the dearest that is left; others are dealt theirs beforehand.
         `progress` is called with the share of the items taken; `costs` are about those of items.
         """
-        own: dict[int, T] = {}
         order = sorted(range(len(items)), key=lambda k: -costs[k] if costs else k)
+        own: dict[int, T] = {}
         with self.together():
             for k in self._drawn(len(items)):
                 own[order[k]] = function(items[order[k]])
                 if progress:
                     progress((k + 1) / len(items))
-        found = {k: one for part in self.all(own) for k, one in part.items()}
+        found = self._joined(own)
         return [found[k] for k in range(len(items))]
+
+    def until(
+        self,
+        enough: Callable[[int, T], bool],
+        function: Callable[[S], T],
+        items: Sequence[S],
+        progress: Callable[[float], None] | None = None,
+    ) -> dict[int, T]:
+        """The function of items in their order until that of some number is enough; known to all.
+
+        Ranks of several machines, which cannot tell each other in time, compute one each.
+        """
+        own: dict[int, T] = {}
+        counter = self._counter(len(items))
+        with self.together():
+            for k in self._drawn(len(items)):
+                own[k] = function(items[k])
+                if progress:
+                    progress((k + 1) / len(items))
+                if enough(k, own[k]) or (self.size > 1 and counter is None):
+                    if counter is not None:
+                        _count(counter, len(items))
+                    break
+        return self._joined(own)
+
+    def _joined(self, own: dict[int, T]) -> dict[int, T]:
+        return {k: one for part in self.all(own) for k, one in part.items()}
+
+    def _counter(self, count: int) -> MPI.Win | None:
+        """What numbers below `count` are drawn from, where that is worth while."""
+        return _counter(self.comm.handle) if self.comm and count > self.size > 1 else None
 
     def _drawn(self, count: int) -> Iterator[int]:
         """Numbers below `count`, in rising order, each for the rank that asks first."""
-        counter = _counter(self.comm.handle) if self.comm and count > self.size > 1 else None
+        counter = self._counter(count)
         if self.comm is None or counter is None:
             yield from range(self.rank, count, self.size)
             return
@@ -80,14 +111,8 @@ class Ranks:
             counter.tomemory()[:] = self.size.to_bytes(8, byteorder)
         self.comm.Barrier()
         yield self.rank  # so the first ones go to the same ranks in every run
-        one, number = np.ones(1, np.int64), np.zeros(1, np.int64)
-        while True:
-            counter.Lock(0)
-            counter.Fetch_and_op(one, number, 0)
-            counter.Unlock(0)
-            if number[0] >= count:
-                return
-            yield int(number[0])
+        while (number := _count(counter, 1)) < count:
+            yield number
 
     def all(self, own: T) -> list[T]:
         """What every rank has, known to all."""
@@ -110,6 +135,15 @@ class Ranks:
     def size(self) -> int:
         """Number of ranks."""
         return self.comm.size if self.comm else 1
+
+
+def _count(counter: MPI.Win, step: int) -> int:
+    """The number, which is a step further from now on."""
+    number = np.zeros(1, np.int64)
+    counter.Lock(0)
+    counter.Fetch_and_op(np.full(1, step), number, 0)
+    counter.Unlock(0)
+    return int(number[0])
 
 
 @cache

@@ -60,6 +60,20 @@ class SolvedCell(NamedTuple):
         return float(self.errors[:3].max())
 
 
+@dataclass(frozen=True)
+class Asked:
+    """Cells on one mesh: those that judge it, then those of given moduli."""
+
+    places: Sequence[float]
+    radii: Sequence[float] = ()
+    modulus: Array = field(default_factory=lambda: _NONE)
+
+    @property
+    def costs(self) -> list[float]:
+        """About what they cost."""
+        return [_JUDGES * cost for cost in _costs(self.places)] + _costs(self.radii)
+
+
 @dataclass
 class PlanarSource:
     """Moduli by planar cells of order 4 on meshes as fine as `accuracy` needs.
@@ -78,7 +92,8 @@ class PlanarSource:
 
     def moduli(self, radii: Sequence[float], modulus: Array) -> list[Array]:
         """At the chosen mesh size, which the first call chooses."""
-        found = self._cells((), radii, modulus) if self.mesh_size else self._first(radii, modulus)
+        asked = Asked((), radii, modulus)
+        found = self._cells(asked) if self.mesh_size else self._first(radii, modulus)
         return [one.moduli for one in found]
 
     def _first(self, radii: Sequence[float], modulus: Array) -> list[SolvedCell]:
@@ -86,53 +101,77 @@ class PlanarSource:
         places = judging_radii(self.span)
         others = [r for r in radii if modulus.size > 1 or r not in places]
         self.mesh_size, solved = _ROUGH, {}
-        found = dict(zip(places, self._cells(places), strict=True))
+        found = dict(zip(places, self._cells(Asked(places)), strict=True))
         while (most := max((cell.error, r) for r, cell in found.items()))[0] > self.accuracy:
             worst = most[1]
-            best = self._fine_enough(worst, found[worst])
             rest = [r for r in places if r != worst]  # a finer mesh gains more at one than another
-            cells = self._cells(rest, others, modulus)
+            best, *cells = self._refined(worst, found[worst], Asked(rest, others, modulus))
             found = dict(zip(rest, cells, strict=False)) | {worst: best}
             solved = dict(zip(others, cells[len(rest) :], strict=True))
         self.space = np.vstack([places, np.transpose([found[r].errors for r in places])])
-        known = found | (solved or dict(zip(others, self._cells((), others, modulus), strict=True)))
-        return [known[radius] for radius in radii]
+        if not solved:
+            solved = dict(zip(others, self._cells(Asked((), others, modulus)), strict=True))
+        return [(found | solved)[radius] for radius in radii]
 
-    def _fine_enough(self, radius: float, found: SolvedCell) -> SolvedCell:
-        """One cell on a mesh that keeps the accuracy and is taken, from a rougher one."""
-        while found.error > self.accuracy:
-            if self.mesh_size <= _FINEST:
-                raise TableError(
-                    f"planar cells at r = {radius:.4g} leave a relative error of"
-                    f" {found.error:.1e} on the finest mesh ({_FINEST:g}) and"
-                    f" {self.accuracy:.1e} is wanted: allow a larger error, or take the series"
-                )
-            wanted = 0.8 * self.accuracy / found.error
-            finer = [self.mesh_size * min(0.9, wanted ** (1 / rate)) for rate in _RATES]
-            sizes = list(dict.fromkeys(max(_FINEST, size) for size in finer))
-            tried: list[SolvedCell] = []
-            kept = [False]
-            while len(tried) < len(sizes) and True not in kept:
-                more = sizes[len(tried) :][: self.ranks.size]  # as many as there are ranks for
-                tried += self.ranks.each(partial(self._judge, radius), more)
-                kept = [one.error <= self.accuracy for one in tried]
-            best = kept.index(True) if True in kept else -1
-            self.mesh_size, found = sizes[best], tried[best]
-        return found
+    def _refined(self, worst: float, found: SolvedCell, asked: Asked) -> list[SolvedCell]:
+        """A cell on a mesh that keeps the accuracy, from a rougher one, and all asked for on it."""
+        sizes: list[float] = []
+        while True:
+            sizes = sizes or self._finer(worst, found)
+            tried, sizes = sizes[: self.ranks.size], sizes[self.ranks.size :]
+            cells = self._tried(worst, tried, asked)
+            kept = [k for k in range(len(tried)) if cells[k].error <= self.accuracy]
+            best = kept[0] if kept else len(tried) - 1
+            self.mesh_size, found = tried[best], cells[best]
+            if kept and best == len(tried) - 1 and len(cells) == len(tried) + len(asked.costs):
+                return [cells[k] for k in range(best, len(cells))]
+            if kept:
+                return [found, *self._cells(asked)]
 
-    def _cells(
-        self, places: Sequence[float], radii: Sequence[float] = (), modulus: Array = _NONE
-    ) -> list[SolvedCell]:
-        """Cells that judge the mesh, then cells of given moduli, dealt out together."""
+    def _finer(self, radius: float, found: SolvedCell) -> list[float]:
+        """Mesh sizes that are likely to keep the accuracy, from a cell of a rougher mesh."""
+        if self.mesh_size <= _FINEST:
+            raise TableError(
+                f"planar cells at r = {radius:.4g} leave a relative error of"
+                f" {found.error:.1e} on the finest mesh ({_FINEST:g}) and"
+                f" {self.accuracy:.1e} is wanted: allow a larger error, or take the series"
+            )
+        wanted = 0.8 * self.accuracy / found.error
+        finer = [self.mesh_size * min(0.9, wanted ** (1 / rate)) for rate in _RATES]
+        return list(dict.fromkeys(max(_FINEST, size) for size in finer))
 
-        def solve(number: int) -> SolvedCell:
-            if number < len(places):
-                return self._judge(places[number], self.mesh_size)
-            radius = radii[number - len(places)]
-            return self._solve(radius, modulus, _ORDER, self.mesh_size)
+    def _tried(self, worst: float, sizes: Sequence[float], asked: Asked) -> dict[int, SolvedCell]:
+        """One cell on each mesh, 0, 1, …; the next are those asked for, on the finest.
 
-        costs = [_JUDGES * cost for cost in _costs(places)] + _costs(radii)
+        These are begun by ranks that have none of the former left, until the mesh is not the one.
+        """
+        meshes, costs = len(sizes), asked.costs
+        numbers = [
+            *range(meshes),
+            *sorted(range(meshes, meshes + len(costs)), key=lambda k: -costs[k - meshes]),
+        ]
+
+        def cell(number: int) -> SolvedCell:
+            if number < meshes:
+                return self._judge(worst, sizes[number])
+            return self._cell(asked, sizes[-1], number - meshes)
+
+        def enough(k: int, found: SolvedCell) -> bool:
+            return k < meshes and (found.error <= self.accuracy) == (k + 1 < meshes)
+
+        found = self.ranks.until(enough, cell, numbers, self.progress)
+        return {numbers[k]: one for k, one in found.items()}
+
+    def _cells(self, asked: Asked) -> list[SolvedCell]:
+        """The cells on the chosen mesh, dealt out."""
+        costs, solve = asked.costs, partial(self._cell, asked, self.mesh_size)
         return self.ranks.each(solve, range(len(costs)), self.progress, costs)
+
+    def _cell(self, asked: Asked, size: float, number: int) -> SolvedCell:
+        if number < len(asked.places):
+            return self._judge(asked.places[number], size)
+        radius = asked.radii[number - len(asked.places)]
+        return self._solve(radius, asked.modulus, _ORDER, size)
 
     def _judge(self, radius: float, size: float) -> SolvedCell:
         """The cell of both extreme inclusions."""

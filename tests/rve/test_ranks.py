@@ -11,6 +11,7 @@ from alphacut.rve.ranks import ALONE
 
 with_mpirun = pytest.mark.skipif(shutil.which("mpirun") is None, reason="no mpirun")
 SCRIPT = """
+from time import sleep
 from mpi4py import MPI
 from alphacut.rve.ranks import Ranks
 
@@ -24,6 +25,10 @@ assert ranks.each(square, range(5)) == [0, 1, 4, 9, 16]
 assert own == sorted(own), own
 assert sum(ranks.all(len(own))) == 5
 assert ranks.each(abs, range(-4, 0), costs=[1, 2, 3, 4]) == [4, 3, 2, 1]
+taken = ranks.until(lambda k, found: found == 16, lambda k: sleep(0.01) or k * k, range(40))
+assert {0, 1, 2, 3, 4} <= set(taken) and len(taken) < 12, taken
+assert all(found == k * k for k, found in taken.items()) and len({*map(str, ranks.all(taken))}) == 1
+assert sorted(ranks.until(lambda k, found: False, abs, range(7))) == list(range(7))
 assert ranks.first(lambda: MPI.COMM_WORLD.rank) == 0
 failures = 0
 lacking = lambda: ranks.first(lambda: bytearray(2**62))
@@ -67,5 +72,7 @@ def test_a_process_by_itself_does_everything():
     shares = []
     assert ALONE.each(abs, [-1, 2, -3], shares.append) == [1, 2, 3]
     assert shares == [1 / 3, 2 / 3, 1]
+    assert ALONE.until(lambda k, found: k == 1, abs, [-1, 2, -3], shares.append) == {0: 1, 1: 2}
+    assert shares[3:] == [1 / 3, 2 / 3]
     with pytest.raises(ValueError, match="of its own"):
         ALONE.first(lambda: int("of its own"))

@@ -7,10 +7,11 @@ from numpy.polynomial import chebyshev
 
 from alphacut.rve import Phase
 from alphacut.rve.cell import with_ratio
+from alphacut.rve.ranks import ALONE, Ranks
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.rve.slices.model import solve_slice
-from alphacut.rve.table.build import PlanarSource, SolvedCell, TableError, build_table
+from alphacut.rve.table.build import Asked, PlanarSource, SolvedCell, TableError, build_table
 from alphacut.rve.table.cache import table_key
 from alphacut.rve.table.interpolant import TableRange, coefficients, leja, tail
 from alphacut.rve.table.model import TableModel
@@ -258,21 +259,40 @@ def test_ranges_out_of_order(changes):
         )
 
 
-@pytest.mark.parametrize(("rate", "tried"), [(8.0, 1), (6.5, 2)])
-def test_one_rank_tries_a_mesh_as_fine_as_likely_only_where_the_rougher_one_fails(rate, tried):
-    source, sizes = PlanarSource(SPAN, 1e-5), []
+class Two(Ranks):
+    """Two ranks, of which the second has done all when the first could stop it."""
+
+    size = 2
+
+    def each(self, function, items, progress=None, costs=None):
+        return [function(item) for item in items]
+
+    def until(self, enough, function, items, progress=None):
+        return {k: function(item) for k, item in enumerate(items)}
+
+
+@pytest.mark.parametrize("ranks", [ALONE, Two()])
+@pytest.mark.parametrize(("rate", "tried"), [(8.0, 1), (6.5, 2), (4.5, 3)])
+def test_a_mesh_as_fine_as_likely_is_tried_where_the_rougher_one_fails_or_at_once(
+    rate, tried, ranks
+):
+    source, sizes = PlanarSource(SPAN, 1e-5, ranks), []
     source.mesh_size = 0.5
 
     def judge(radius, size):
-        sizes.append(size)
-        return SolvedCell(np.ones((1, 3)), np.full(4, 1e-3 * (size / 0.5) ** rate), 1)
+        sizes.append((radius, size))
+        error = 1e-3 * (size / 0.5) ** rate
+        return SolvedCell(np.full((1, 3), size), np.full(4, error), 1)
 
     source._judge = judge
-    found = source._fine_enough(0.5, judge(0.5, 0.5))
+    cells = source._refined(0.5, judge(0.5, 0.5), Asked([0.3, 0.7]))
     foretold = [0.5 * 0.008 ** (1 / power) for power in (7.5, 6.0)]  # 0.8 · 1e-5 / 1e-3
-    assert sizes[1:] == pytest.approx(foretold[:tried])
-    assert source.mesh_size == sizes[-1]
-    assert found.error <= 1e-5
+    own = [size for radius, size in sizes[1:] if radius == 0.5]
+    assert own[:2] == pytest.approx(foretold[: tried if ranks is ALONE else 2])
+    assert len(own) >= tried
+    assert [cell.moduli[0, 0] for cell in cells] == 3 * [source.mesh_size]
+    assert max(cell.error for cell in cells) <= 1e-5
+    assert sizes.count((0.3, source.mesh_size)) == 1
 
 
 @pytest.mark.parametrize(("accuracy", "radii"), [(1e-6, [7, 2]), (1e-8, [7, 4])])
