@@ -1,8 +1,8 @@
 """PETSc, started without the option files of the caller's home and folder, and its options.
 
 PETSc reads ``~/.petscrc`` when it is first imported, DOLFINx imports it too: import this file
-before either. Open MPI's transport for one-sided messages over fabrics, which nothing here sends,
-takes a second to look for a fabric when MPI starts; it is left out unless the caller names
+before either. Open MPI's transports for one-sided messages over fabrics, which nothing here sends,
+take up to a second to look for a fabric when MPI starts; they are left out unless the caller names
 transports. UCX rewrites the process's functions of memory to watch them, which takes 0.05 s and
 serves fabrics alone; it does not unless the caller asks for it. Options stand under the project's
 prefix; what PETSc does not use is an error.
@@ -14,17 +14,16 @@ import ctypes
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from alphacut.rve.interruption import uninterrupted
 from alphacut.rve.ranks import Ranks
 from alphacut.rve.solver.options import PREFIX, OptionError
 
-os.environ.setdefault("OMPI_MCA_btl", "^ofi")
+os.environ.setdefault("OMPI_MCA_btl", "^ofi,uct")
 os.environ.setdefault("UCX_MEM_EVENTS", "n")
 
 with uninterrupted():
@@ -105,28 +104,37 @@ def _beside_diagonal(matrix: PETSc.Mat) -> tuple[ctypes.c_void_p, ctypes.c_void_
     return part, numbers
 
 
-def beside_diagonal(
-    matrix: PETSc.Mat,
-) -> tuple[NDArray[np.int64], sp.bsr_matrix, NDArray[np.int32 | np.int64]]:
+class BesideDiagonal(NamedTuple):
     """What this rank's rows of a matrix in blocks multiply of other ranks.
 
-    Rows of blocks that have some, these rows times the other ranks' blocks that they need, and the
-    numbers of those blocks.
+    Args:
+        rows: Numbers of the rows of blocks that have some, n.
+        starts: Where the blocks of each begin, shape (n + 1,).
+        columns: Which of `others` each block stands for.
+        blocks: The first number of the first block; they run column by column, and are PETSc's own.
+        others: Numbers of the other ranks' blocks that the rows need.
     """
+
+    rows: NDArray[np.int32]
+    starts: NDArray[np.int32]
+    columns: NDArray[np.int32]
+    blocks: ctypes.c_void_p
+    others: NDArray[np.int32 | np.int64]
+
+
+def beside_diagonal(matrix: PETSc.Mat) -> BesideDiagonal:
+    """What this rank's rows of a matrix in blocks multiply of other ranks; the matrix must live."""
     part, numbers = _beside_diagonal(matrix)
     rows, done = np.zeros(1, PETSc.IntType), ctypes.c_int()
     starts, columns = ctypes.c_void_p(), ctypes.c_void_p()
     found = rows.ctypes, ctypes.byref(starts), ctypes.byref(columns), ctypes.byref(done)
     _LIBRARY.MatGetRowIJ(part, 0, 0, 1, *found)
     pointers = _numbers(starts, int(rows[0]) + 1, PETSc.IntType)
-    place, block = _numbers(columns, int(pointers[-1]), PETSc.IntType), matrix.getBlockSize()
-    values = _numbers(_first_block(part), len(place) * block**2, PETSc.ScalarType)
-    by_row = values.reshape(-1, block, block).transpose(0, 2, 1)  # PETSc's run column by column
+    place = _numbers(columns, int(pointers[-1]), PETSc.IntType)
     some = np.flatnonzero(np.diff(pointers))
-    kept = np.append(pointers[some], pointers[-1])
+    small = [one.astype(np.int32) for one in (some, np.append(pointers[some], pointers[-1]), place)]
     others = _numbers(numbers, int(place.max(initial=-1)) + 1, PETSc.IntType)
-    shape = block * len(some), block * len(others)
-    return some, sp.bsr_matrix((by_row.copy(), place.copy(), kept), shape=shape), others.copy()
+    return BesideDiagonal(small[0], small[1], small[2], _first_block(part), others.copy())
 
 
 def _numbers(first: ctypes.c_void_p, count: int, kind: type) -> Any:

@@ -150,6 +150,15 @@ class PrismGrid:
             return np.broadcast_to(self.plane.points, (len(theta), *self.plane.points.shape))
         return np.array([moved(self.plane, float(r)) for r in radius(theta)])
 
+    def part(self, positions: Array, of: PrismGrid) -> Array:
+        """Positions of the nodes from those of a grid of more layers."""
+        first = self.span.start - of.span.start
+        sizes = len(self.plane.points), self.plane.vertices
+        counts = len(self.span) + 1, len(self.span)
+        both = np.split(positions, [(len(of.span) + 1) * sizes[0]])
+        parts = zip(both, sizes, counts, strict=True)
+        return np.concatenate([one[first * size :][: count * size] for one, size, count in parts])
+
     def positions(self, radius: RadiusMap) -> Array:
         """(x1, x2, θ) of all nodes, shape (nodes, 3)."""
         full, half = self.planes(radius)

@@ -104,6 +104,7 @@ class PrismSystem:
         self.pattern, places = near.matrix(self.ranks)
         self.form = PrismForm(near.grid, near.pairs, self.overlap.own, places)
         self.mixed: MixedSystem | None = None
+        self._used = False  # the matrix
         self._jit = self.form.jit_seconds
 
     def take_jit_seconds(self) -> float:
@@ -119,7 +120,7 @@ class PrismSystem:
         """
         self.map = radius_map
         near, places = self.form.grid, self.form.place(radius_map)
-        self.positions = places if near is self.grid else self.grid.positions(radius_map)
+        self.positions = places if near is self.grid else self.grid.part(places, near)
         self.share = self._share(self.grid, self.positions)
         if not self.grid.conforming:
             self.form.mark(self.share if near is self.grid else self._share(near, places))
@@ -172,7 +173,9 @@ class PrismSystem:
 
     def stiffness_of(self, phases: tuple[Phase, Phase]) -> PETSc.Mat:
         """Reduced stiffness of ordinary phases, in the one matrix that this system always has."""
-        self.pattern.zeroEntries()
+        if self._used:
+            self.pattern.zeroEntries()
+        self._used = True
         for k, phase in enumerate(phases):
             self.form.add_stiffness(k, self.pattern, phase.modulus)
         self.pattern.assemble()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,6 +10,7 @@ import scipy.sparse as sp
 
 from alphacut.rve.mesh.triangulation import Integers
 from alphacut.rve.petsc import PETSc, beside_diagonal
+from alphacut.rve.solver.c_loops import WEDGES, c_loops
 from alphacut.rve.solver.constraints import Overlap
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -64,11 +66,9 @@ class _Rest:
     """Products with unknowns of other ranks, which few rows have."""
 
     def __init__(self, matrices: Sequence[PETSc.Mat], columns: int) -> None:
-        beside = [beside_diagonal(matrix) for matrix in matrices]
-        (some, _, others), first, wide = beside[0], matrices[0], len(matrices) * columns
+        self.parts = [beside_diagonal(matrix) for matrix in matrices]
+        first, wide, others = matrices[0], len(matrices) * columns, self.parts[0].others
         rows, block = first.getSizes()[0][0], first.getBlockSize()
-        self.rows = (block * some[:, None] + np.arange(block)).ravel()
-        self.parts = [part for _, part, _ in beside]
         self.near = PETSc.Vec().createMPI((wide * rows, None), comm=first.comm)
         self.fetched = PETSc.Vec().createSeq(wide * block * len(others))
         wanted = PETSc.IS().createBlock(wide * block, others, comm=PETSc.COMM_SELF)
@@ -82,9 +82,18 @@ class _Rest:
     def add(self, result: Array) -> None:
         """Add to products, shape (rows, matrices, columns), of the vectors that were asked for."""
         self.scatter.end(self.near, self.fetched)
-        far = self.fetched.array_r.reshape(-1, *result.shape[1:])
+        far, (_, matrices, columns) = self.fetched.array_r, result.shape
         for k, part in enumerate(self.parts):
-            result[self.rows, k] += part @ far[:, k]
+            c_loops(WEDGES).add_products(
+                len(part.rows), part.rows.ctypes, part.starts.ctypes, part.columns.ctypes,
+                part.blocks, columns, matrices * columns, _from(far, k * columns),
+                _from(result, k * columns),
+            )  # fmt: skip
+
+
+def _from(values: Array, number: int) -> ctypes.c_void_p:
+    """Where one of the numbers stands."""
+    return ctypes.c_void_p(values.ctypes.data + number * values.itemsize)
 
 
 class Saddle:

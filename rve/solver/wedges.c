@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NODES = 15, DOFS = 30, SLICES = 3, CORNERS = 6, PLANAR = 12, LOADS = 3 };
+enum { NODES = 15, SLICES = 3, CORNERS = 6, PLANAR = 12, LOADS = 3 };
 
 typedef void (*integral)(double *, const double *, const double *, const double *, const int *,
                          const uint8_t *, void *);
@@ -52,74 +52,136 @@ int couple(int wedges, const int *pairs, int low, int high, int size, int *inner
     return status;
 }
 
-/* Displacements of a wedge's nodes, the first at rest, under unit strains e11, e22 and 2 e12. */
-static void move(const double *nodes, double (*affine)[LOADS]) {
-    for (int j = 0; j < NODES; j++) {
-        double x = nodes[3 * j] - nodes[0], y = nodes[3 * j + 1] - nodes[1];
-        double u[LOADS] = {x, 0, y / 2}, v[LOADS] = {0, y, x / 2};
-        memcpy(affine[2 * j], u, sizeof u), memcpy(affine[2 * j + 1], v, sizeof v);
+/* Nodes of a wedge below and above each corner of a triangle of six nodes, and half-way at its vertices: in
+   that order they are its HATS and BUBBLES. The corners after the vertices lie between two of those. */
+enum { HATS = 2 * PLANAR, BUBBLES = CORNERS, DOFS = HATS + BUBBLES };
+static const int ORDER[NODES] = {0, 1, 2, 9, 7, 6, 3, 4, 5, 14, 13, 12, 8, 10, 11}, ENDS[3][2] = {{1, 2}, {0, 2}, {0, 1}};
+
+/* Places of the nodes in ORDER, from those in the wedge's own, and displacements under unit strains. */
+static void arrange(const double *nodes, double (*places)[2], double (*affine)[DOFS]) {
+    for (int k = 0; k < NODES; k++) {
+        double x = nodes[3 * ORDER[k]], y = nodes[3 * ORDER[k] + 1], u = x - nodes[0], v = y - nodes[1];
+        places[k][0] = x, places[k][1] = y;
+        affine[0][2 * k] = u, affine[0][2 * k + 1] = affine[1][2 * k] = 0, affine[1][2 * k + 1] = v;
+        affine[2][2 * k] = v / 2, affine[2][2 * k + 1] = u / 2;
     }
 }
 
-/* Add to the matrix of a wedge those of its slices of constant theta: triangles of six nodes whose
-   displacements follow from the wedge's by `traces`. The third coordinate of nodes is theta. */
-static void slice(integral integrate, const double *weights, const double *nodes, const double *constants,
-                  const double (*traces)[CORNERS][NODES], const double *heights, double (*matrix)[DOFS]) {
-    double height = nodes[3 * 3 + 2] - nodes[2];
+/* Corners of a slice of constant theta; `along` has the hats from below and above and the bubble there. */
+static void cut(const double *along, const double (*places)[2], double (*corners)[3]) {
+    for (int d = 0; d < 2; d++) {
+        double bubble[3];
+        for (int v = 0; v < 3; v++)
+            bubble[v] = places[2 * CORNERS + v][d] - (places[v][d] + places[CORNERS + v][d]) / 2;
+        for (int c = 0; c < CORNERS; c++) {
+            double rise = c < 3 ? bubble[c] : (bubble[ENDS[c - 3][0]] + bubble[ENDS[c - 3][1]]) / 2;
+            corners[c][d] = along[0] * places[c][d] + along[1] * places[CORNERS + c][d] + along[2] * rise;
+        }
+    }
+}
+
+/* A column for each displacement of the vertices, from those of the corners: what their bubbles carry. */
+static void carried(int rows, const double (*corners)[PLANAR], double (*found)[BUBBLES]) {
+    for (int r = 0; r < rows; r++) {
+        for (int c = 0; c < BUBBLES; c++) found[r][c] = corners[r][c];
+        for (int e = 0; e < 3; e++)
+            for (int k = 0; k < 2; k++)
+                for (int d = 0; d < 2; d++) found[r][2 * ENDS[e][k] + d] += corners[r][2 * (e + 3) + d] / 2;
+    }
+}
+
+/* Matrix of a wedge, its nodes in ORDER: the sum of its slices of constant theta, triangles of six nodes
+   whose displacements are hats times those below and above, and bubbles on the vertices. */
+static void wedge(integral integrate, const double *weights, const double (*places)[2], const double *constants,
+                  const double (*along)[3], const double *heights, double (*matrix)[DOFS]) {
+    double sums[6][PLANAR][PLANAR] = {{{0}}}, beside[2][PLANAR][BUBBLES], half[PLANAR][BUBBLES];
+    double turned[BUBBLES][PLANAR], own[BUBBLES][BUBBLES];
     for (int s = 0; s < SLICES; s++, weights += CORNERS) {
-        double corners[CORNERS][3] = {{0}}, planar[PLANAR][PLANAR] = {{0}}, half[PLANAR][DOFS] = {{0}};
-        for (int a = 0; a < CORNERS; a++)
-            for (int j = 0; j < NODES; j++)
-                for (int d = 0; d < 2; d++) corners[a][d] += traces[s][a][j] * nodes[3 * j + d];
+        double corners[CORNERS][3] = {{0}}, planar[PLANAR][PLANAR] = {{0}};
+        cut(along[s], places, corners);
         integrate(planar[0], weights, constants, corners[0], NULL, NULL, NULL);
-        for (int r = 0; r < PLANAR; r++)
-            for (int b = 0; b < CORNERS; b++)
-                for (int j = 0; j < NODES; j++) {
-                    half[r][2 * j] += planar[r][2 * b] * traces[s][b][j];
-                    half[r][2 * j + 1] += planar[r][2 * b + 1] * traces[s][b][j];
-                }
-        for (int a = 0; a < CORNERS; a++)
-            for (int i = 0; i < NODES; i++) {
-                double factor = heights[s] * height * traces[s][a][i];
-                for (int j = 0; j < DOFS && factor != 0; j++) {
-                    matrix[2 * i][j] += factor * half[2 * a][j];
-                    matrix[2 * i + 1][j] += factor * half[2 * a + 1][j];
-                }
+        for (int i = 0, k = 0; i < 3; i++)
+            for (int j = 0; j <= i; j++, k++) {
+                double factor = heights[s] * along[s][i] * along[s][j];
+                for (int e = 0; e < PLANAR * PLANAR; e++) sums[k][0][e] += factor * planar[0][e];
             }
     }
+    carried(PLANAR, sums[3], beside[0]), carried(PLANAR, sums[4], beside[1]), carried(PLANAR, sums[5], half);
+    for (int r = 0; r < PLANAR; r++)
+        for (int c = 0; c < BUBBLES; c++) turned[c][r] = half[r][c];
+    carried(BUBBLES, turned, own);
+    for (int i = 0; i < 2; i++)
+        for (int r = 0; r < PLANAR; r++) {
+            for (int j = 0; j < 2; j++)
+                memcpy(matrix[i * PLANAR + r] + j * PLANAR, sums[i + j][r], sizeof sums[0][r]);
+            for (int c = 0; c < BUBBLES; c++)
+                matrix[i * PLANAR + r][HATS + c] = matrix[HATS + c][i * PLANAR + r] = beside[i][r][c];
+        }
+    for (int r = 0; r < BUBBLES; r++) memcpy(matrix[HATS + r] + HATS, own[r], sizeof own[r]);
+    /* a bubble is what is half-way less the mean of what is below and above */
+    for (int r = 0; r < DOFS; r++)
+        for (int c = 0; c < BUBBLES; c++)
+            for (int i = 0; i < 2; i++) matrix[r][i * PLANAR + c] -= matrix[r][HATS + c] / 2;
+    for (int r = 0; r < BUBBLES; r++)
+        for (int i = 0; i < 2; i++)
+            for (int c = 0; c < DOFS; c++) matrix[i * PLANAR + r][c] -= matrix[HATS + r][c] / 2;
 }
 
 /* Add the matrices of some wedges, and take from `forces` (pairs x 2 x 3) what they do to unit strains.
 
    integrate: over a triangle at one theta; weights: at its 6 points in 3 slices, for each of the wedges.
    some: numbers of the wedges; nodes, pairs, place: of all wedges, 15 x 3, 15 and 15 x 15; pairs count
-   from the first of the rows, -1 where they are none of them.
-   traces, heights: of the slices, 3 x 6 x 15 and 3.
+   from the first of the rows, -1 where they are none of them. The third coordinate of nodes is theta.
+   along, heights: hats from below and above and bubble of each slice, 3 x 3, and its weight for unit height, 3.
    values, others: blocks of 2 x 2, column by column, where `place` is not negative, and below -1. */
-void add_wedges(integral integrate, const double (*traces)[CORNERS][NODES], const double *heights, int count,
-                const int *some, const double *weights, const double *nodes, const double *constants,
-                const int *pairs, const int *place, double *values, double *others, double *forces) {
-    double matrix[DOFS][DOFS], affine[DOFS][LOADS];
+void add_wedges(integral integrate, const double (*along)[3], const double *heights, int count, const int *some,
+                const double *weights, const double *nodes, const double *constants, const int *pairs,
+                const int *place, double *values, double *others, double *forces) {
+    double matrix[DOFS][DOFS], affine[LOADS][DOFS], places[NODES][2], high[SLICES];
     for (int k = 0; k < count; k++) {
         const double *corners = nodes + (size_t)some[k] * NODES * 3;
         const int *own = pairs + (size_t)some[k] * NODES, *at = place + (size_t)some[k] * NODES * NODES;
-        memset(matrix, 0, sizeof matrix);
-        slice(integrate, weights + (size_t)k * SLICES * CORNERS, corners, constants, traces, heights, matrix);
+        for (int s = 0; s < SLICES; s++) high[s] = heights[s] * (corners[3 * 3 + 2] - corners[2]);
+        for (int e = 0; e < NODES * NODES; e++) /* which are fetched while the matrix is made */
+            if (at[e] >= 0) __builtin_prefetch(values + 4 * (size_t)at[e], 1);
+        arrange(corners, places, affine);
+        wedge(integrate, weights + (size_t)k * SLICES * CORNERS, places, constants, along, high, matrix);
         for (int i = 0; i < NODES; i++)
-            for (int j = 0; j < NODES; j++, at++) {
-                if (*at == -1) continue;
-                double *block = *at >= 0 ? values + 4 * (size_t)*at : others + 4 * (size_t)(-2 - *at);
+            for (int j = 0; j < NODES; j++) {
+                int to = at[ORDER[i] * NODES + ORDER[j]];
+                if (to == -1) continue;
+                double *block = to >= 0 ? values + 4 * (size_t)to : others + 4 * (size_t)(-2 - to);
                 block[0] += matrix[2 * i][2 * j], block[1] += matrix[2 * i + 1][2 * j];
                 block[2] += matrix[2 * i][2 * j + 1], block[3] += matrix[2 * i + 1][2 * j + 1];
             }
-        move(corners, affine);
+        double sum[LOADS][DOFS] = {{0}};
+        for (int j = 0; j < DOFS; j++)
+            for (int l = 0; l < LOADS; l++)
+                for (int i = 0; i < DOFS; i++) sum[l][i] += affine[l][j] * matrix[j][i];
         for (int i = 0; i < DOFS; i++) {
-            if (own[i / 2] < 0) continue;
-            double sum[LOADS] = {0};
-            for (int j = 0; j < DOFS; j++)
-                for (int l = 0; l < LOADS; l++) sum[l] += matrix[i][j] * affine[j][l];
-            for (int l = 0; l < LOADS; l++) forces[(2 * own[i / 2] + i % 2) * LOADS + l] -= sum[l];
+            int row = own[ORDER[i / 2]];
+            for (int l = 0; l < LOADS && row >= 0; l++) forces[(2 * row + i % 2) * LOADS + l] -= sum[l][i];
         }
+    }
+}
+
+/* Add products of some rows of blocks, 2 x 2 and column by column, with vectors side by side.
+
+   some, starts, columns: numbers of the `count` rows, where each one's blocks begin, and their columns.
+   from, to: two rows for each number, `step` numbers from one row to the next, `loads` vectors in each. */
+void add_products(int count, const int *some, const int *starts, const int *columns, const double *blocks,
+                  int loads, int step, const double *from, double *to) {
+    for (int r = 0; r < count; r++) {
+        double sum[2][loads + 1], *row = to + 2 * (size_t)step * some[r];
+        memset(sum, 0, sizeof sum);
+        for (int e = starts[r]; e < starts[r + 1]; e++) {
+            const double *block = blocks + 4 * (size_t)e, *x = from + 2 * (size_t)step * columns[e];
+            for (int l = 0; l < loads; l++) {
+                sum[0][l] += block[0] * x[l] + block[2] * x[step + l];
+                sum[1][l] += block[1] * x[l] + block[3] * x[step + l];
+            }
+        }
+        for (int l = 0; l < loads; l++) row[l] += sum[0][l], row[step + l] += sum[1][l];
     }
 }
 
