@@ -164,7 +164,7 @@ def plain_warnings() -> Iterator[None]:
 
 def interrupted(options: argparse.Namespace) -> str:
     """What is left of the work of a command that was interrupted."""
-    keeping = {"envelope": ("out",), "modulus": ("store", "resume")}
+    keeping = {"envelope": ("out",), "image": ("out",), "modulus": ("store", "resume")}
     names = keeping.get(options.command, ())
     if options.command != "run" and not any(getattr(options, name, None) for name in names):
         how = " or ".join(f"--{name}" for name in names)
@@ -183,6 +183,9 @@ def unfinished(options: argparse.Namespace) -> Path | None:
         return folder if finished(folder) else None
     store = options.store if options.command == "modulus" else None
     path = Path(store or f"results/{Path(options.case).stem}/samples.db")
+    if options.command == "image":
+        folder = Path(options.out).with_suffix(".partial")
+        return folder if any(folder.glob("*.npz")) else None
     if options.command == "envelope":
         path = Path(options.out).with_suffix(".partial.npz")
     return path if path.is_file() and path.stat().st_size else None

@@ -34,12 +34,13 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     study = study_of(case, petsc=petsc)
     for remark in contradicted(case, study):
         say(f"warning: {remark}")
+    kept = Path(options.out).with_suffix(".partial") if options.out else None
     with progress("Image", quiet=options.quiet) as tick:
-        found = compute(study, progress=tick)
-    if options.out:
+        found = compute(study, progress=tick, kept=kept)
+    if kept:
         inputs = {"case": case.sections, "petsc": dict(petsc)}
         key = fingerprint(inputs, ("stochastic", "rve", "fuzzy"))
-        write(found, Path(options.out), attributes(case.text_of_file, key))
+        write(found, Path(options.out), attributes(case.text_of_file, key), kept)
     numbers = document(found)
     if answer(options, numbers, out, summary(numbers)) and not options.out:
         say("to hand this on: the same command with --out image.nc, then modulus.file")

@@ -94,7 +94,8 @@ def damaged(path: Path, why: str) -> BadInput:
 
 def finished(folder: Path) -> list[Path]:
     """Files of a run, whole or begun, that the same run goes on from."""
-    found = (file for ending in ("nc", "npz", "db") for file in sorted(folder.glob(f"*.{ending}")))
+    kinds = "*.nc", "*.npz", "*.db", "*.partial/*.npz"
+    found = (file for kind in kinds for file in sorted(folder.glob(kind)))
     return [file for file in found if file.stat().st_size]
 
 

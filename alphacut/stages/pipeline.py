@@ -7,6 +7,7 @@ from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from shutil import rmtree
 from typing import TYPE_CHECKING
 
 from alphacut.case.case import Case
@@ -160,10 +161,13 @@ class Chain:
         key = fingerprint({**inputs, "files": files}, ("stochastic", "rve", "fuzzy"))
 
         def compute(path: Path) -> None:
+            kept = self.file("image.partial")
+            if self.fresh:
+                rmtree(kept, ignore_errors=True)
             with progress("Image", quiet=self.quiet) as tick:
                 study = study_of(self.case, petsc=self.petsc)
-                found = bounds.compute(study, progress=tick)
-            document.write(found, path, attributes(self.case.text_of_file, key))
+                found = bounds.compute(study, progress=tick, kept=kept)
+            document.write(found, path, attributes(self.case.text_of_file, key), kept)
 
         return self.stored("image.nc", key, compute)
 

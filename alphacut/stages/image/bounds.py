@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from time import perf_counter
 
 import numpy as np
@@ -167,15 +168,23 @@ class Told:
         self.tick(max(self.share, min(self.seconds / self.first / self.count, 0.99)))
 
 
-def compute(study: ImageStudy, *, progress: Tick | None = None) -> FuzzyImage:
-    """Bounds at every level, and what widens them."""
+def compute(
+    study: ImageStudy, *, progress: Tick | None = None, kept: Path | None = None
+) -> FuzzyImage:
+    """Bounds at every level, and what widens them.
+
+    Args:
+        study: What is solved.
+        progress: Told the share done.
+        kept: Folder of fields that are found, for the same study begun again; None keeps none.
+    """
     modal, count = study.images(None, None), solutions(study)
     told = Told(progress or (lambda share: None), count)
     pixels = f"image of {modal.bulk[0].size} pixels: {count} pairs of solutions"
     several = progress is not None and count > 1 and study.random is None
     if several and modal.bulk[0].size * count > MANY:
         say(f"{pixels}, or more where pixels are divided: this may take minutes")
-    watched = replace(study.model.solver, watch=told.still)
+    watched = replace(study.model.solver, watch=told.still, kept=kept)
     start = replace(study.model, solver=watched)
     if study.random is not None:  # many images: pixels are divided only where that is asked for
         start = replace(start, division=start.parts)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from shutil import rmtree
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -172,6 +173,7 @@ def random_variables(found: RandomResponse) -> Document:
     }
 
 
-def write(found: FuzzyImage, path: Path, attributes: dict[str, str | int]) -> None:
-    """Write ``image.nc``, whole or not at all."""
+def write(found: FuzzyImage, path: Path, attributes: dict[str, str | int], kept: Path) -> None:
+    """Write ``image.nc``, whole or not at all, and remove the folder of what was kept for it."""
     write_dataset(dataset(found), path, attributes | {"document": as_json(document(found))})
+    rmtree(kept, ignore_errors=True)

@@ -141,8 +141,9 @@ def _fields(
         part = slice(first, first + together)
         guess = None if start is None else start[:, part]
         load = operator.load(modes[:, part])
-        system = System(operator, preconditioner, load, scale[:, part], least, guess)
-        solution = solver.solve(system)
+        origin = trace, deviator, modes[:, part]
+        system = System(operator, preconditioner, load, scale[:, part], least, guess, origin)
+        solution = solver.found(system)
         fields[:, part] = solution.fields
         iterations = max(iterations, solution.iterations)
     return fields, iterations

@@ -29,6 +29,7 @@ class System:
         least: Energy of any field over the one that it has in the constant material, at least;
             shape (tiles,), positive.
         start: First guess, of the load's shape; None: zero.
+        origin: What the operator is made of.
     """
 
     operator: Linear
@@ -37,6 +38,7 @@ class System:
     scale: Array
     least: Array
     start: Array | None = None
+    origin: tuple[Array, ...] = ()
 
     def begin(self) -> tuple[Array, Array]:
         """First fields and their residuals, arrays to work in; the residuals replace the load."""

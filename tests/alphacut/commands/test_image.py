@@ -5,11 +5,13 @@ import re
 
 import numpy as np
 import pytest
+import xarray
 from markupsafe import Markup
 
 from alphacut.entry import main
 from alphacut.io.problem import BadInput
 from alphacut.report import material
+from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.stages.image import bounds
 from alphacut.stages.image.bounds import Told
 
@@ -490,3 +492,37 @@ def test_progress_within_a_solution_is_by_the_time_of_the_first(monkeypatch):
     told.still()
     told.still()
     assert seen == [0.0, 0.25, 0.25, 0.375, 0.99]
+
+
+@pytest.mark.parametrize("command", ["image", "run"])
+def test_a_stopped_image_goes_on_from_the_fields_that_were_found(
+    folder, capfd, monkeypatch, command
+):
+    case, solve, asked = written(folder), ConjugateGradient.solve, []
+
+    def counted(solver, system):
+        asked.append(system)
+        if len(asked) == stop:
+            raise KeyboardInterrupt
+        return solve(solver, system)
+
+    def finished(name):
+        asked.clear()
+        out = str(folder / name) + (".nc" if command == "image" else "")
+        status = main([command, case, "--quiet", "--out", out])
+        return status, len(asked), folder / name / "image" if command == "run" else folder / name
+
+    monkeypatch.setattr(ConjugateGradient, "solve", counted)
+    monkeypatch.setattr(ConjugateGradient, "threads", 1)
+    stop = None
+    _, every, whole = finished("whole")
+    stop = 5
+    status, _, begun = finished("begun")
+    assert status == 130
+    assert "what was finished is kept in" in capfd.readouterr().err
+    assert len(list(begun.with_suffix(".partial").glob("*.npz"))) == 4
+    stop = None
+    assert finished("begun")[:2] == (0, every - 4)
+    assert not begun.with_suffix(".partial").exists()
+    first, second = (xarray.load_dataset(file.with_suffix(".nc")) for file in (whole, begun))
+    assert first.equals(second)

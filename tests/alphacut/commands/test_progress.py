@@ -83,18 +83,22 @@ def test_an_interrupted_command_says_what_is_kept_and_where(tmp_path):
     from alphacut.entry import interrupted
 
     assert "nothing is kept" in interrupted(Namespace(command="envelope", out=None))
-    assert interrupted(Namespace(command="image", out="image.nc")) == "nothing is kept"
+    assert interrupted(Namespace(command="mesh", out="mesh.xdmf")) == "nothing is kept"
     bare = Namespace(command="modulus", store=None, resume=False)
     assert interrupted(bare) == "without --store or --resume nothing is kept"
     run = Namespace(command="run", out=str(tmp_path), case="own.toml", quick=False)
     envelope = Namespace(command="envelope", out=str(tmp_path / "x.nc"), case="own.toml")
     modulus = Namespace(command="modulus", store=str(tmp_path / "s.db"), case="own.toml")
+    image = Namespace(command="image", out=str(tmp_path / "i.nc"), case="own.toml")
     (tmp_path / "s.db").touch()
-    for kept in (run, envelope, modulus):
+    (tmp_path / "i.partial").mkdir()
+    for kept in (run, envelope, modulus, image):
         assert interrupted(kept) == "nothing was finished yet, so nothing is kept"
-    for kept, name in ((run, "modulus.nc"), (envelope, "x.partial.npz"), (modulus, "s.db")):
+    files = ("modulus.nc", "x.partial.npz", "s.db", "i.partial/a.npz", "image.partial/a.npz")
+    (tmp_path / "image.partial").mkdir()
+    for kept, name in zip((run, envelope, modulus, image, run), files, strict=True):
         (tmp_path / name).write_text("some", encoding="utf-8")
-        place = tmp_path if kept is run else tmp_path / name
+        place = tmp_path if kept is run else tmp_path / name.removesuffix("/a.npz")
         what = f"what was finished is kept in {place}, and the same command goes on from there"
         assert interrupted(kept) == what
         (tmp_path / name).unlink()
