@@ -76,10 +76,10 @@ def square_root(operator: Jet, mass: Array) -> Jet:
 
 
 def _check(squared: Array, ratios: Array) -> None:
-    if not (squared > 1e-12 * np.abs(squared).max(-1, keepdims=True)).all():
+    if not (share := (squared / abs(squared).max(-1, keepdims=True)).min()) > 1e-12:
         raise ValueError(
-            "damping ratio: the stiffness is not positive definite; a mode without frequency has no"
-            " ratio, give dampers"
+            f"damping ratio: a mode's squared frequency is {share:.1e} of the greatest, not above"
+            " rounding (1e-12): it has no ratio; give dampers, or join storeys that are too stiff"
         )
     close = (np.diff(squared) < APART * squared[:, 1:]) & (np.diff(ratios) != 0)
     if close.any():

@@ -207,5 +207,5 @@ def test_group_and_messages():
         ratios=(0.1,),
         q0=np.ones(2),
     )
-    with pytest.raises(ValueError, match="stiffness is not positive definite"):
+    with pytest.raises(ValueError, match="of the greatest, not above rounding"):
         LinearFlow(floating, ("m",), 1, 0.1).values(np.array([[1.0]]))
