@@ -197,8 +197,12 @@ def extreme_radii(radius_map: RadiusMap) -> Array:
     """
     require_map(radius_map)
     law = radius_map.distribution
-    radii = radius_map(np.linspace(law.lower, law.upper, _SAMPLES))
+    theta = np.linspace(law.lower, law.upper, _SAMPLES)
+    radii = radius_map(theta)
     ends = np.sort(radii[[0, -1]])
+    for k in (int(radii.argmin()), int(radii.argmax())):  # the extreme may lie between samples
+        first, last = theta[max(k - 1, 0)], theta[min(k + 1, _SAMPLES - 1)]
+        radii = np.append(radii, radius_map(np.linspace(first, last, _SAMPLES)))
     slack = 1e-3 * (radii.max() - radii.min())
     low = ends[0] if radii.min() >= ends[0] else max(radii.min() - slack, 0.9 * radii.min())
     high = ends[1] if radii.max() <= ends[1] else radii.max() + min(slack, 0.1 * (1 - radii.max()))

@@ -7,7 +7,7 @@ from alphacut.rve.model import CrossCheckError, cross_check, named
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.rve.slices.model import SlicesModel, solve_slice
-from alphacut.rve.slices.theta_rule import theta_error, theta_rule
+from alphacut.rve.slices.theta_rule import extreme_radii, theta_error, theta_rule
 from alphacut.stochastic import HermiteMap
 
 planar = pytest.importorskip("alphacut.rve.planar.problem")
@@ -289,6 +289,16 @@ def test_estimate_of_the_rule_falls_with_its_error():
     estimate, true = estimated_and_true(lambda _: 16, seed=8, decades=4)
     assert (estimate > true - 1e-11).all()
     assert np.quantile(estimate, 0.9) < 1e-6
+
+
+@pytest.mark.parametrize("at", [-3.0, 3.0])
+@pytest.mark.parametrize("slope", [0.0, 4e-4, 1.1e-3, 3e-3])
+def test_radii_beyond_an_end_by_less_than_a_sample_are_within_the_extremes(at, slope):
+    curve = HermiteMap(0.16, -slope, 0.7, 0.66) if at < 0 else HermiteMap(0.7, 0.66, 0.16, slope)
+    low, high = extreme_radii(curve)
+    near = curve(at * (1 - np.geomspace(1e-7, 1, 100_001)))
+    assert low <= near.min() * (1 + 1e-10)
+    assert high >= near.max() * (1 - 1e-10)
 
 
 def test_models_by_name():
