@@ -173,10 +173,7 @@ def compute(
 ) -> FuzzyImage:
     """Bounds at every level, and what widens them.
 
-    Args:
-        study: What is solved.
-        progress: Told the share done.
-        kept: Folder of fields that are found, for the same study begun again; None keeps none.
+    Fields that are found stay in the folder `kept`, if any, for the same study begun again.
     """
     modal, count = study.images(None, None), solutions(study)
     told = Told(progress or (lambda share: None), count)
