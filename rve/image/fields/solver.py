@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
@@ -82,7 +83,8 @@ class Solver(ABC):
                 np.savez(stream, fields=solution.fields, iterations=np.array(solution.iterations))
             partial.replace(file)
         except OSError:  # a full disk does not end what goes on without it
-            partial.unlink(missing_ok=True)
+            with suppress(OSError):
+                partial.unlink()
         return solution
 
     def _name(self, system: System) -> str:

@@ -526,3 +526,25 @@ def test_a_stopped_image_goes_on_from_the_fields_that_were_found(
     assert not begun.with_suffix(".partial").exists()
     first, second = (xarray.load_dataset(file.with_suffix(".nc")) for file in (whole, begun))
     assert first.equals(second)
+
+
+def test_a_fresh_run_takes_no_fields_of_a_stopped_one(folder, monkeypatch):
+    case, solve, asked = written(folder), ConjugateGradient.solve, []
+
+    def counted(solver, system):
+        asked.append(system)
+        if len(asked) == 5:
+            raise KeyboardInterrupt
+        return solve(solver, system)
+
+    monkeypatch.setattr(ConjugateGradient, "solve", counted)
+    monkeypatch.setattr(ConjugateGradient, "threads", 1)
+    command = ["run", case, "--quiet", "--out", str(folder / "out")]
+    assert main(command) == 130
+    kept = folder / "out" / "image.partial"
+    before = {file: file.stat().st_mtime_ns for file in kept.glob("*.npz")}
+    asked.clear()
+    assert main([*command, "--fresh"]) == 130
+    after = {file: file.stat().st_mtime_ns for file in kept.glob("*.npz")}
+    assert len(before) == len(after) == 4
+    assert all(after[file] > before[file] for file in before)

@@ -262,13 +262,16 @@ def test_ranges_out_of_order(changes):
 class Two(Ranks):
     """Two ranks, of which the second has done all when the first could stop it."""
 
-    size = 2
+    size, told, orders = 2, [], []
 
     def each(self, function, items, progress=None, costs=None):
         return [function(item) for item in items]
 
     def until(self, enough, function, items, progress=None):
-        return {k: function(item) for k, item in enumerate(items)}
+        found = {k: function(item) for k, item in enumerate(items)}
+        self.told.append([enough(k, one) for k, one in found.items()])
+        self.orders.append(list(items))
+        return found
 
 
 @pytest.mark.parametrize("ranks", [ALONE, Two()])
@@ -277,6 +280,8 @@ def test_a_mesh_as_fine_as_likely_is_tried_where_the_rougher_one_fails_or_at_onc
     rate, tried, ranks
 ):
     source, sizes = PlanarSource(SPAN, 1e-5, ranks), []
+    Two.told.clear()
+    Two.orders.clear()
     source.mesh_size = 0.5
 
     def judge(radius, size):
@@ -293,6 +298,9 @@ def test_a_mesh_as_fine_as_likely_is_tried_where_the_rougher_one_fails_or_at_onc
     assert [cell.moduli[0, 0] for cell in cells] == 3 * [source.mesh_size]
     assert max(cell.error for cell in cells) <= 1e-5
     assert sizes.count((0.3, source.mesh_size)) == 1
+    if ranks is not ALONE:  # the others are in vain where the rougher mesh or none will do
+        assert ranks.told[0] == [tried == 1, tried == 3, False, False]
+        assert ranks.orders[0] == [0, 1, 2, 3]  # small particles take longest
 
 
 @pytest.mark.parametrize(("accuracy", "radii"), [(1e-6, [7, 2]), (1e-8, [7, 4])])
