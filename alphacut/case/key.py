@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields, replace
+from functools import partial
 from types import MappingProxyType, NoneType
 from typing import TYPE_CHECKING, ClassVar, Literal, get_args, get_origin, get_type_hints
 
@@ -91,6 +92,10 @@ class Key:
     choices: tuple[str, ...] = ()
     required: bool = False
     default: object = None
+
+
+positive = partial(Key, allowed=POSITIVE)
+"""A key of numbers greater than 0."""
 
 
 class UnknownValueError(AttributeError):

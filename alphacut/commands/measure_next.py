@@ -11,8 +11,6 @@ from alphacut.case.idle import require_read
 from alphacut.case.load import load
 from alphacut.commands import options as common
 from alphacut.io.files import as_json, write_text
-from alphacut.io.output_paths import unwritable
-from alphacut.io.problem import refuse
 from alphacut.io.progress import progress
 from alphacut.io.units import engineering
 from alphacut.stages.material.modulus import stand_in
@@ -48,8 +46,6 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     case = load(options.case, common.changes(options, KEYS))
     require_read(case, READ, "measure-next")
     folder = Path(options.out) if options.out else None
-    if folder is not None:
-        refuse(unwritable("--out", folder, folder=True))
     handed = common.given_modulus(options.modulus) or stand_in(case)
     with progress("Measure next", quiet=options.quiet) as tick:
         name, every, found, fixed = measure_next(case, handed, options.output, tick)

@@ -11,8 +11,6 @@ from alphacut.case.idle import require_read
 from alphacut.case.load import load
 from alphacut.commands.options import add_common, add_modulus, answer, changes, given_modulus
 from alphacut.io.files import as_json, write_text
-from alphacut.io.output_paths import unwritable
-from alphacut.io.problem import refuse
 from alphacut.io.progress import progress
 from alphacut.stages.material.modulus import stand_in
 from alphacut.stages.vibration.structure import structure
@@ -43,8 +41,6 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     if case.sections.update is None:
         raise case.without("update")
     folder = Path(options.out) if options.out else None
-    if folder is not None:
-        refuse(unwritable("--out", folder, folder=True))
     wanted = structure(case, given_modulus(options.modulus) or stand_in(case))
     found = learned(case, wanted)
     document: dict[str, Any] = found.document()

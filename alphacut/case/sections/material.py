@@ -11,12 +11,12 @@ from alphacut.case.key import (
     DEVIATIONS,
     MEMBERSHIP,
     POISSON,
-    POSITIVE,
     UNIT,
     Key,
     Range,
     Section,
     keys_of,
+    positive,
 )
 from alphacut.case.sections.picture import Picture
 from alphacut.fuzzy import FuzzyNumber
@@ -113,13 +113,9 @@ class Cell(Section):
             " a simple cubic array"
         ),
     ] = "cylinders"
-    matrix_modulus: Annotated[
-        FuzzyNumber, Key("Young's modulus of the matrix", "Pa", allowed=POSITIVE)
-    ]
+    matrix_modulus: Annotated[FuzzyNumber, positive("Young's modulus of the matrix", "Pa")]
     matrix_poisson: Annotated[FuzzyNumber, Key("Poisson's ratio of the matrix", allowed=POISSON)]
-    inclusion_modulus: Annotated[
-        FuzzyNumber, Key("Young's modulus of the particle", "Pa", allowed=POSITIVE)
-    ]
+    inclusion_modulus: Annotated[FuzzyNumber, positive("Young's modulus of the particle", "Pa")]
     inclusion_poisson: Annotated[
         FuzzyNumber, Key("Poisson's ratio of the particle", allowed=POISSON)
     ]
@@ -176,7 +172,7 @@ class Modulus(Section):
         ),
     ] = "axes"
     value: Annotated[
-        FuzzyNumber | None, Key("a known modulus instead of a computed one", "Pa", allowed=POSITIVE)
+        FuzzyNumber | None, positive("a known modulus instead of a computed one", "Pa")
     ] = None
     file: Annotated[
         str | None, Key("α-cuts from a NetCDF file instead of computed ones", file=True)
@@ -193,11 +189,7 @@ class Modulus(Section):
     ] = "next value"
     bounds: Annotated[
         FuzzyNumber | None,
-        Key(
-            "physically possible moduli, two numbers; needed with measured ones",
-            "Pa",
-            allowed=POSITIVE,
-        ),
+        positive("physically possible moduli, two numbers; needed with measured ones", "Pa"),
     ] = None
     law: Annotated[
         Literal["normal", "log-normal"] | None, Key("law of measured moduli, where it is known")
@@ -220,5 +212,5 @@ class Response(Section):
     ] = (0.05, 0.5, 0.95)
     limit: Annotated[
         float | None,
-        Key("stress whose probability of being exceeded is wanted", "Pa", allowed=POSITIVE),
+        positive("stress whose probability of being exceeded is wanted", "Pa"),
     ] = None

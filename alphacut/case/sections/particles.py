@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from alphacut.case.key import MEMBERSHIP, NATURAL, NOT_NEGATIVE, POSITIVE, UNIT, Key, Range, Section
+from alphacut.case.key import MEMBERSHIP, NATURAL, NOT_NEGATIVE, UNIT, Key, Range, Section, positive
 
 PACKINGS = Key("independent packings", allowed=Range("from 5 to 10,000", 5.0, 1e4, closed=True))
 
@@ -68,11 +68,11 @@ class Packing(Section):
     ]
     smallest_radius: Annotated[
         float | None,
-        Key("smallest radius of the log-normal law; needed without a file", "m", allowed=POSITIVE),
+        positive("smallest radius of the log-normal law; needed without a file", "m"),
     ] = None
     largest_radius: Annotated[
         float | None,
-        Key("largest radius of the log-normal law; needed without a file", "m", allowed=POSITIVE),
+        positive("largest radius of the log-normal law; needed without a file", "m"),
     ] = None
     file: Annotated[
         str | None,
@@ -93,9 +93,7 @@ class Circles(Section):
     file: Annotated[
         str, Key("CSV file, its units in the header: x [mm], y [mm], r [mm]", file=True)
     ]
-    size: Annotated[
-        tuple[float, ...], Key("width and height of the section", "m", allowed=POSITIVE)
-    ]
+    size: Annotated[tuple[float, ...], positive("width and height of the section", "m")]
     origin: Annotated[
         tuple[float, ...], Key("lower left corner of the section in the file's coordinates", "m")
     ] = (0.0, 0.0)
@@ -123,7 +121,7 @@ class Photograph(Section):
     """Circles segmented from the image of a section."""
 
     file: Annotated[str, Key("image file", file=True)]
-    pixel: Annotated[float, Key("side of a pixel", "m", allowed=POSITIVE)]
+    pixel: Annotated[float, positive("side of a pixel", "m")]
     particles: Annotated[
         Literal["auto", "bright", "dark"], Key("bright or dark against the matrix")
     ] = "auto"
@@ -159,20 +157,18 @@ class PackedSpheres(Section):
     ]
     smallest_radius: Annotated[
         float | None,
-        Key(
+        positive(
             "smallest radius of the log-normal law, or of the spheres that circles are of;"
             " needed without measured radii",
             "m",
-            allowed=POSITIVE,
         ),
     ] = None
     largest_radius: Annotated[
         float | None,
-        Key(
+        positive(
             "largest radius of the log-normal law, or the one that no sphere exceeds; needed"
             " without measured radii",
             "m",
-            allowed=POSITIVE,
         ),
     ] = None
     file: Annotated[
@@ -193,10 +189,8 @@ class PackedSpheres(Section):
     ] = None
     visible: Annotated[
         float | None,
-        Key(
-            "radius from which on every circle is seen; the smallest circle's if left out",
-            "m",
-            allowed=POSITIVE,
+        positive(
+            "radius from which on every circle is seen; the smallest circle's if left out", "m"
         ),
     ] = None
     level: Annotated[

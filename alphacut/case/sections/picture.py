@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from alphacut.case.key import NOT_NEGATIVE, POISSON, POSITIVE, UNIT, Key, Range, Section
+from alphacut.case.key import NOT_NEGATIVE, POISSON, UNIT, Key, Range, Section, positive
 from alphacut.fuzzy import FuzzyNumber
 
 DIVISIONS = Range("from 1 to 16", 1.0, 16.0, closed=True)
@@ -39,19 +39,13 @@ class Picture(Section):
     ] = None
     pixel: Annotated[
         tuple[float, ...] | None,
-        Key(
-            "side of a pixel of the image, or its width and height",
-            "m",
-            allowed=POSITIVE,
-            alone=True,
-        ),
+        positive("side of a pixel of the image, or its width and height", "m", alone=True),
     ] = None
     size: Annotated[
         tuple[float, ...] | None,
-        Key(
+        positive(
             "width and height of the cell: needed by an outline, checked against an image's pixels",
             "m",
-            allowed=POSITIVE,
         ),
     ] = None
     pixels: Annotated[
@@ -82,11 +76,7 @@ class Picture(Section):
     ] = None
     modulus: Annotated[
         tuple[FuzzyNumber, ...] | None,
-        Key(
-            "Young's modulus of each phase, from dark to bright or as labelled",
-            "Pa",
-            allowed=POSITIVE,
-        ),
+        positive("Young's modulus of each phase, from dark to bright or as labelled", "Pa"),
     ] = None
     poisson: Annotated[
         tuple[FuzzyNumber, ...] | None,
@@ -94,15 +84,13 @@ class Picture(Section):
     ] = None
     bulk: Annotated[
         tuple[FuzzyNumber, ...] | None,
-        Key(
-            "bulk modulus K of each phase, that of three dimensions, instead of modulus",
-            "Pa",
-            allowed=POSITIVE,
+        positive(
+            "bulk modulus K of each phase, that of three dimensions, instead of modulus", "Pa"
         ),
     ] = None
     shear: Annotated[
         tuple[FuzzyNumber, ...] | None,
-        Key("shear modulus of each phase, beside bulk", "Pa", allowed=POSITIVE),
+        positive("shear modulus of each phase, beside bulk", "Pa"),
     ] = None
     boundary: Annotated[
         Literal["periodic", "window"],

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from alphacut.case.key import MEMBERSHIP, NOT_NEGATIVE, POSITIVE, UNIT, Key, Range, Section
+from alphacut.case.key import MEMBERSHIP, NOT_NEGATIVE, UNIT, Key, Range, Section, positive
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -51,9 +51,7 @@ class Field(Section):
             " masses of the floors"
         ),
     ]
-    length: Annotated[
-        float, Key("height over which the correlation falls to 1/e", "m", allowed=POSITIVE)
-    ]
+    length: Annotated[float, positive("height over which the correlation falls to 1/e", "m")]
     share: Annotated[
         float,
         Key(
@@ -94,7 +92,7 @@ class Update(Section):
     ]
     held_out: Annotated[
         tuple[float, ...],
-        Key("modes that are not learned from, but predicted and compared", allowed=POSITIVE),
+        positive("modes that are not learned from, but predicted and compared"),
     ] = ()
     frequency_deviation: Annotated[
         float | None,

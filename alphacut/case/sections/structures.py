@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from alphacut.case.key import COUNT, NOT_NEGATIVE, POSITIVE, RATIO, Key, Section
+from alphacut.case.key import COUNT, NOT_NEGATIVE, RATIO, Key, Section, positive
 from alphacut.fuzzy import Crisp, FuzzyNumber
 
 ZERO, TWO = Crisp(0.0), Crisp(2.0)
@@ -15,43 +15,39 @@ ZERO, TWO = Crisp(0.0), Crisp(2.0)
 class Frame(Section):
     """Storey frame: rigid floors on elastic columns, numbered from the ground."""
 
-    masses: Annotated[tuple[FuzzyNumber, ...], Key("mass of each floor", "kg", allowed=POSITIVE)]
+    masses: Annotated[tuple[FuzzyNumber, ...], positive("mass of each floor", "kg")]
     lengths: Annotated[
         tuple[FuzzyNumber, ...] | None,
-        Key(
+        positive(
             "length of the columns below each floor; beside stiffness the height of each storey,"
             " for p_delta and for limits in % of it",
             "m",
-            allowed=POSITIVE,
             alone=True,
         ),
     ] = None
     modulus: Annotated[
-        FuzzyNumber | None, Key("Young's modulus where none is handed on", "Pa", allowed=POSITIVE)
+        FuzzyNumber | None, positive("Young's modulus where none is handed on", "Pa")
     ] = None
     second_moment: Annotated[
         tuple[FuzzyNumber, ...] | None,
-        Key(
+        positive(
             "second moment of area of one column, one for all storeys or one for each",
             "m^4",
-            allowed=POSITIVE,
             alone=True,
         ),
     ] = None
     columns: Annotated[
         tuple[FuzzyNumber, ...],
-        Key(
+        positive(
             "columns in each storey, clamped at both ends; fuzzy where a storey's stiffness is",
-            allowed=POSITIVE,
             alone=True,
         ),
     ] = (TWO,)
     stiffness: Annotated[
         tuple[FuzzyNumber, ...] | None,
-        Key(
+        positive(
             "stiffness of each storey, in place of lengths, modulus, second_moment and columns",
             "N/m",
-            allowed=POSITIVE,
             alone=True,
         ),
     ] = None
@@ -136,24 +132,20 @@ class Tower(Section):
 
     storeys: Annotated[int, Key("number of storeys", allowed=COUNT)]
     bays: Annotated[int, Key("number of bays", allowed=COUNT)]
-    height: Annotated[float, Key("height of a storey", "m", allowed=POSITIVE)]
-    width: Annotated[float, Key("width of a bay", "m", allowed=POSITIVE)]
-    column_area: Annotated[float, Key("area of a column", "m^2", allowed=POSITIVE)]
-    column_moment: Annotated[
-        float, Key("second moment of area of a column", "m^4", allowed=POSITIVE)
-    ]
-    beam_area: Annotated[float, Key("area of a beam", "m^2", allowed=POSITIVE)]
-    beam_moment: Annotated[float, Key("second moment of area of a beam", "m^4", allowed=POSITIVE)]
-    E_columns: Annotated[
-        FuzzyNumber, Key("Young's modulus of the lower half's columns", "Pa", allowed=POSITIVE)
-    ]
+    height: Annotated[float, positive("height of a storey", "m")]
+    width: Annotated[float, positive("width of a bay", "m")]
+    column_area: Annotated[float, positive("area of a column", "m^2")]
+    column_moment: Annotated[float, positive("second moment of area of a column", "m^4")]
+    beam_area: Annotated[float, positive("area of a beam", "m^2")]
+    beam_moment: Annotated[float, positive("second moment of area of a beam", "m^4")]
+    E_columns: Annotated[FuzzyNumber, positive("Young's modulus of the lower half's columns", "Pa")]
     E_columns_top: Annotated[
-        FuzzyNumber, Key("Young's modulus of the upper half's columns", "Pa", allowed=POSITIVE)
+        FuzzyNumber, positive("Young's modulus of the upper half's columns", "Pa")
     ]
-    E_beams: Annotated[FuzzyNumber, Key("Young's modulus of the beams", "Pa", allowed=POSITIVE)]
+    E_beams: Annotated[FuzzyNumber, positive("Young's modulus of the beams", "Pa")]
     mass: Annotated[
         FuzzyNumber,
-        Key("mass of the floors over the length of the beams", "kg/m", allowed=POSITIVE),
+        positive("mass of the floors over the length of the beams", "kg/m"),
     ]
     density: Annotated[float, Key("density of the columns", "kg/m^3", allowed=NOT_NEGATIVE)]
     damping_ratio: Annotated[
@@ -185,19 +177,15 @@ class Tower(Section):
 class Pendulum(Section):
     """Damped pendulum: a mass on a bar under gravity; the output is the force in the bar."""
 
-    mass: Annotated[FuzzyNumber, Key("mass", "kg", allowed=POSITIVE)]
-    length: Annotated[FuzzyNumber, Key("length of the bar", "m", allowed=POSITIVE)]
+    mass: Annotated[FuzzyNumber, positive("mass", "kg")]
+    length: Annotated[FuzzyNumber, positive("length of the bar", "m")]
     damping: Annotated[
         FuzzyNumber, Key("moment over angular velocity", "N*m*s", allowed=NOT_NEGATIVE)
     ]
-    gravity: Annotated[FuzzyNumber, Key("acceleration of gravity", "m/s^2", allowed=POSITIVE)]
+    gravity: Annotated[FuzzyNumber, positive("acceleration of gravity", "m/s^2")]
     angle: Annotated[FuzzyNumber, Key("angle at the start, 0 hanging down", "rad")]
     angular_velocity: Annotated[FuzzyNumber, Key("angular velocity at the start", "rad/s")]
     tolerance: Annotated[
         float,
-        Key(
-            "wanted error of the force; a declared error above it is a failure",
-            "N",
-            allowed=POSITIVE,
-        ),
+        positive("wanted error of the force; a declared error above it is a failure", "N"),
     ] = 0.001

@@ -10,12 +10,12 @@ from alphacut.case.key import (
     COUNT,
     MEMBERSHIP,
     NATURAL,
-    POSITIVE,
     SHARE,
     UNIT,
     Key,
     Range,
     Section,
+    positive,
 )
 
 EnvelopeMethod = Literal[
@@ -49,7 +49,7 @@ class Study(Section):
         tuple[str, ...],
         Key("inputs that are fuzzy; all others take their modal value", of_inputs=True),
     ]
-    duration: Annotated[float, Key("length of the simulation", "s", allowed=POSITIVE)]
+    duration: Annotated[float, positive("length of the simulation", "s")]
     figures: Annotated[tuple[str, ...], Key("figure of the paper for each output, or for one")] = ()
     output: Annotated[str, Key("the one output that is drawn; all if left out")] = ""
 
@@ -77,13 +77,12 @@ class Envelope(Section):
     ] = 2
     tolerance: Annotated[
         float,
-        Key(
+        positive(
             "wanted error: of every output where all are displacements; where units are mixed, of"
             " the first displacement, and of every other output, displacements too, the same share"
             " of its peak (`check` prints each); a declared error above one that is asked for is"
             " a failure",
             "m",
-            allowed=POSITIVE,
         ),
     ] = 0.0001
     relative_tolerance: Annotated[
@@ -99,21 +98,20 @@ class Envelope(Section):
     ] = 0.25
     certify: Annotated[
         float | None,
-        Key(
+        positive(
             "gap within which the bounds of a linear structure, up to six inputs fuzzy, are"
             " enclosed, and proved unless the result says verified by sampling: of every output"
             " where all are displacements; where units are mixed, of the first displacement, and of"
             " the others the same share of their peaks, so 3 mm of q1 may be 14 mm of q6 (`check`"
             " prints each); if left out, method auto proves its tolerance",
             "m",
-            allowed=POSITIVE,
         ),
     ] = None
     shares: Annotated[
         bool, Key("whether run tells what drives the width: an envelope more for each fuzzy input")
     ] = True
-    duration: Annotated[float, Key("length of the simulation", "s", allowed=POSITIVE)]
-    step: Annotated[float, Key("time step", "s", allowed=POSITIVE)]
+    duration: Annotated[float, positive("length of the simulation", "s")]
+    step: Annotated[float, positive("time step", "s")]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
