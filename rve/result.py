@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from html import escape
 from itertools import product
 from typing import TYPE_CHECKING, ClassVar
 
@@ -101,6 +100,8 @@ class Homogenised:
 
     def _repr_html_(self) -> str:
         """The same as a table, for notebooks."""
+        from html import escape
+
         rows = {
             f"E of {self.convention}": f"{self.modulus:.7g} Pa",
             f"ν of {self.convention}": f"{self.poisson:.5g}",

@@ -11,9 +11,7 @@ import argparse
 import csv
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 
 from alphacut.rve.cell import Phase
@@ -73,6 +71,9 @@ def measure_capped(
     solver: str, first: Timing, *, cap: float, mesh_size: float, repeat: int
 ) -> Timing:
     """Time one solver in a process of its own, stopped after `cap` seconds."""
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
     with ProcessPoolExecutor(1, mp_context=get_context("forkserver")) as executor:
         executor.submit(
             measure, solver, mesh_size=SMALL

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from alphacut.rve.mesh.triangulation import Integers, Triangulation
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -30,21 +30,10 @@ class Periodicity:
     vertices: int
     count: int
 
-    def linear_injection(self, plane: Triangulation) -> sp.csr_matrix:
-        """Matrix that carries values on vertices to all nodes, shape (count, vertices)."""
-        rows = [np.arange(self.vertices)]
-        columns = [np.arange(self.vertices)]
-        values = [np.ones(self.vertices)]
-        midpoint, first = np.unique(self.unknown[plane.vertices :], return_index=True)
-        for end in self.unknown[plane.ends[first]].T:
-            kept = end >= 0
-            rows, columns, values = (
-                [*rows, midpoint[kept]],
-                [*columns, end[kept]],
-                [*values, np.full(kept.sum(), 0.5)],
-            )
-        triplet = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
-        return sp.csr_matrix(triplet, shape=(self.count, self.vertices))
+    def ends(self, plane: Triangulation) -> NDArray[np.int32]:
+        """Unknowns of the vertices beside each midpoint's, −1 where fixed, shape (midpoints, 2)."""
+        first = np.unique(self.unknown[plane.vertices :], return_index=True)[1]
+        return np.ascontiguousarray(self.unknown[plane.ends[first]], np.int32)
 
 
 @lru_cache(maxsize=4)

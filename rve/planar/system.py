@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from cvxopt import cholmod, matrix, spmatrix
 
+from alphacut.rve.solver.c_loops import WEDGES, c_loops
 from alphacut.rve.solver.level_stiffness import LevelPattern
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -28,23 +28,19 @@ class Cholesky:
     """
 
     def __init__(self, pattern: LevelPattern) -> None:
-        self._rows, columns = (part.astype(np.int64) for part in pattern.rows_columns)
-        self._size, self._starts = (
-            pattern.size,
-            np.searchsorted(columns, np.arange(pattern.size + 1)),
-        )
-        self._matrix = spmatrix(1.0, self._rows, columns, (self._size, self._size))
+        self._size, (self._rows, self._columns) = pattern.size, pattern.rows_columns
+        rows, columns = (part.astype(np.int64) for part in pattern.rows_columns)
+        self._matrix = spmatrix(1.0, rows, columns, (self._size, self._size))
         self._factor = cholmod.symbolic(self._matrix)
 
     def product(self, values: Array, vectors: Array) -> Array:
         """The symmetric matrix with these `values` times vectors, shape (size, k)."""
-        above = values.copy()
-        above[self._starts[:-1]] = 0.0  # the diagonal, first in its column
-        lower, rest = (
-            sp.csc_matrix((part, self._rows, self._starts), shape=(self._size,) * 2)
-            for part in (values, above)
-        )
-        return np.asarray(lower @ vectors + rest.T @ vectors)
+        given, found = np.ascontiguousarray(vectors), np.zeros(vectors.shape)
+        c_loops(WEDGES).add_symmetric(
+            len(values), self._rows.ctypes, self._columns.ctypes, values.ctypes, given.shape[1],
+            given.ctypes, found.ctypes,
+        )  # fmt: skip
+        return found
 
     def solve(self, values: Array, loads: Array) -> Array:
         """Solutions of the columns of `loads` for the matrix with these `values`.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from mpi4py import MPI
@@ -14,7 +15,6 @@ from alphacut.rve.mesh.periodicity import identify
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.petsc import PETSc
 from alphacut.rve.prism.form import PrismForm
-from alphacut.rve.prism.mixed import UNIT_STRAINS, MixedPhase, MixedSystem
 from alphacut.rve.prism.mixed_element import NEARLY_INCOMPRESSIBLE
 from alphacut.rve.prism.slice_stress import CELL_AREA, SliceStress
 from alphacut.rve.ranks import Ranks
@@ -23,6 +23,9 @@ from alphacut.rve.solver.level_stiffness import element_stiffness
 from alphacut.rve.solver.theta_preconditioner import LevelPressures, ThetaPreconditioner
 from alphacut.stochastic import RadiusMap, ThetaRule, layered_rule
 from alphacut.stochastic.theta.truncated_normal import Array
+
+if TYPE_CHECKING:
+    from alphacut.rve.prism.mixed import MixedSystem
 
 _DEVIATOR = np.array([[0.5, -0.5, 0], [-0.5, 0.5, 0], [0, 0, 1]])  # of (σ11, σ22, σ12)
 
@@ -142,25 +145,19 @@ class PrismSystem:
     def set_poisson(self, phases: tuple[Phase, Phase]) -> None:
         """Take the phases' Poisson's ratios; nearly incompressible ones get mixed elements."""
         self.form.set_poisson(phases)
-        near = self._nearly_incompressible(phases)
-        self.mixed = None
-        if near:
-            affine = self.affine(UNIT_STRAINS)
-            self.mixed = MixedSystem(self.numbering, near, affine, self.pattern, self.overlap)
+        ratios = {k: phase.poisson for k, phase in enumerate(phases)}
+        near = {k: ratio for k, ratio in ratios.items() if ratio > NEARLY_INCOMPRESSIBLE}
+        self.mixed = self._mixed(near) if near and self.grid.conforming else None
 
-    def _nearly_incompressible(self, phases: tuple[Phase, Phase]) -> dict[int, MixedPhase]:
-        inside = self.grid.plane.inside
-        return {
-            k: MixedPhase(
-                self.grid,
-                self.positions,
-                self.map.distribution,
-                np.flatnonzero(inside == bool(k)),
-                Phase(1.0, phase.poisson),
-            )
-            for k, phase in enumerate(phases)
-            if self.grid.conforming and phase.poisson > NEARLY_INCOMPRESSIBLE
-        }
+    def _mixed(self, near: dict[int, float]) -> MixedSystem:
+        from alphacut.rve.prism.mixed import UNIT_STRAINS, MixedPhase, MixedSystem
+
+        grid, parts = self.grid, dict[int, MixedPhase]()
+        for k, ratio in near.items():
+            own, one = np.flatnonzero(grid.plane.inside == bool(k)), Phase(1.0, ratio)
+            parts[k] = MixedPhase(grid, self.positions, self.map.distribution, own, one)
+        affine = self.affine(UNIT_STRAINS)
+        return MixedSystem(self.numbering, parts, affine, self.pattern, self.overlap)
 
     def stiffness(self, phase: int) -> PETSc.Mat:
         """Reduced K_m (phase 0) or K_i (phase 1) for a unit modulus, less mean pressures."""

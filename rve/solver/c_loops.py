@@ -6,10 +6,8 @@ import ctypes
 import hashlib
 import os
 import platform
-import subprocess
 from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 WEDGES = Path(__file__).with_name("wedges.c")
 _FLAGS = ("-O3", "-fno-math-errno", "-shared", "-fPIC")
@@ -33,12 +31,16 @@ def c_loops(source: Path) -> ctypes.CDLL:
     key = "\n".join((*_FLAGS, source.read_text(encoding="utf-8"), _processor()))
     made = kernels() / f"{source.stem}-{hashlib.sha256(key.encode()).hexdigest()[:16]}.so"
     if not made.exists():
+        from tempfile import TemporaryDirectory
+
         with TemporaryDirectory(dir=made.parent) as work:  # renamed when whole, for others
             _compile(source, Path(work) / made.name).replace(made)
     return ctypes.CDLL(str(made))
 
 
 def _compile(source: Path, made: Path) -> Path:
+    import subprocess
+
     command = [os.environ.get("CC", "cc"), *_FLAGS, str(source), "-o", str(made), "-lm"]
     for more in (["-march=native"], []):  # which not every compiler knows
         try:

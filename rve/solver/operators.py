@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.sparse as sp
 
 from alphacut.rve.mesh.triangulation import Integers
 from alphacut.rve.petsc import PETSc, beside_diagonal
 from alphacut.rve.solver.c_loops import WEDGES, c_loops
 from alphacut.rve.solver.constraints import Overlap
 from alphacut.stochastic.theta.truncated_normal import Array
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
 
 
 class SideBySide:
@@ -165,6 +168,8 @@ class Saddle:
 
     def assembled(self) -> PETSc.Mat:
         """The whole matrix, for direct solvers."""
+        import scipy.sparse as sp
+
         starts, columns, values = self.stiffness.convert("aij", PETSc.Mat()).getValuesCSR()
         rows = np.repeat(np.array(self._displacements.own), np.diff(starts))
         flux, rest, (u, p) = self._flux.tocoo(), self._compliance.tocoo(), self._places()

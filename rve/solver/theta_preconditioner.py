@@ -37,12 +37,12 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-import scipy.sparse as sp
 
 from alphacut.rve.mesh.periodicity import Periodicity
 from alphacut.rve.mesh.triangulation import Integers, Triangulation
 from alphacut.rve.petsc import PETSc
 from alphacut.rve.ranks import Ranks
+from alphacut.rve.solver.c_loops import WEDGES, c_loops
 from alphacut.rve.solver.constraints import LevelNumbering, Overlap
 from alphacut.rve.solver.level_factors import LevelFactors, saddle_factors
 from alphacut.rve.solver.level_stiffness import LevelPattern, with_components
@@ -156,7 +156,7 @@ class ThetaPreconditioner:
         self.overlap = Overlap(
             ranks, numbering.owned(ranks.size), [numbering.beside(s.levels) for s in shares], shares
         )
-        self.injection = sp.kron(periodicity.linear_injection(grid.plane), np.eye(2), format="csr")
+        self.ends = periodicity.ends(grid.plane)
         quadratic, linear = _patterns(periodicity, grid.plane)
         self.pressures = 0 if pressures is None else len(pressures.triangles)
         self.pressed = numbering.on_levels(self.pressures, ranks)
@@ -201,8 +201,11 @@ class ThetaPreconditioner:
         rows = [list(share.levels) for share in self.overlap.shares]
         lifted = self.quadratic.forward(both)
         solved = self.quadratic.backward(self._along_theta(self.mass.linear, lifted, rows, loads))
-        correction, bubbles = self._excess(_in_plane(self.injection.T, level), middle, rows, loads)
-        hats = solved[:, :planar] + _in_plane(self.injection, correction)
+        corners = np.zeros((len(level), vertices, level.shape[2]))
+        self._inject(level, corners, 1)
+        correction, bubbles = self._excess(corners, middle, rows, loads)
+        hats = np.ascontiguousarray(solved[:, :planar])
+        self._inject(hats, correction, 0)
         ends = hats[: len(middle), :vertices].copy()
         ends[: len(level) - 1] += hats[1 : len(middle) + 1, :vertices]
         joined = self._join(hats[: len(before), :vertices] / 2, hats, bubbles + ends / 2)
@@ -211,6 +214,14 @@ class ThetaPreconditioner:
             return result
         rest = solved[:, planar:].reshape(len(level) * self.pressures, level.shape[2])
         return np.concatenate([result, self.pressed.give(rest, loads)])
+
+    def _inject(self, nodes: Array, corners: Array, back: int) -> None:
+        """Add J times vectors on vertices to those on all nodes, or `back` by its transpose."""
+        count, vertices = len(nodes), len(corners[0]) // 2
+        c_loops(WEDGES).inject(
+            count, vertices, len(self.ends), 2 * nodes.shape[2], self.ends.ctypes,
+            nodes.ctypes, corners.ctypes, back,
+        )  # fmt: skip
 
     def _excess(
         self, level: Array, middle: Array, rows: list[list[int]], loads: int
@@ -260,10 +271,3 @@ class ThetaPreconditioner:
         paired = np.concatenate([level[: len(middle)], middle], axis=1)
         parts = before, paired, level[len(middle) :]
         return np.concatenate([part.reshape(len(part) * part.shape[1], columns) for part in parts])
-
-
-def _in_plane(matrix: sp.csr_matrix, vectors: Array) -> Array:
-    """Sparse matrix (m, size) times each of vectors (k, size, columns)."""
-    k, size, columns = vectors.shape
-    flat = vectors.transpose(1, 0, 2).reshape(size, k * columns)
-    return np.asarray((matrix @ flat).reshape(matrix.shape[0], k, columns).transpose(1, 0, 2))

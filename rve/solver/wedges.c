@@ -324,3 +324,34 @@ void integrate_triangles(integral integrate, int triangles, int k, const double 
     for (int m = 0; m < triangles; m++, places += 3 * k, found += 4 * k * k)
         integrate(found, NULL, constants[inside[m]], places, NULL, NULL, NULL);
 }
+
+/* Add a symmetric matrix, given by its lower triangle, times `width` vectors side by side to `found`. */
+void add_symmetric(int count, const int *rows, const int *columns, const double *values, int width,
+                   const double *vectors, double *found) {
+    for (int n = 0; n < count; n++) {
+        long row = (long)rows[n] * width, column = (long)columns[n] * width;
+        for (int i = 0; i < width; i++) found[row + i] += values[n] * vectors[column + i];
+        if (row == column) continue;
+        for (int i = 0; i < width; i++) found[column + i] += values[n] * vectors[row + i];
+    }
+}
+
+/* Add to `count` vectors on all nodes of a plane, `width` numbers a node, linear functions that have values on
+   its corners: a node that follows the corners lies half-way between its two `ends`, of which -1 is fixed.
+   Where `back`, add the transposed of that to the corners instead. */
+void inject(int count, int corners, int middles, int width, const int (*ends)[2], double *nodes, double *values,
+            int back) {
+    long all = (long)(corners + middles) * width, some = (long)corners * width;
+    for (int k = 0; k < count; k++, nodes += all, values += some) {
+        for (long i = 0; i < some; i++)
+            if (back) values[i] += nodes[i];
+            else nodes[i] += values[i];
+        for (int m = 0; m < 2 * middles; m++) {
+            int end = ends[m / 2][m % 2];
+            double *middle = nodes + some + (long)(m / 2) * width, *value = values + (long)end * width;
+            for (int i = 0; i < width && end >= 0; i++)
+                if (back) value[i] += middle[i] / 2;
+                else middle[i] += value[i] / 2;
+        }
+    }
+}

@@ -7,7 +7,6 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import betainc, betaincinv, betaln
 
 Array = NDArray[Any]  # of floats; shapes and units are said in words
 
@@ -153,6 +152,8 @@ class Beta:
 
     def pdf(self, theta: ArrayLike) -> Array:
         """Density f_Θ at `theta` (any shape); zero outside the support."""
+        from scipy.special import betaln
+
         theta = np.asarray(theta, float)
         inside = (theta >= self.lower) & (theta <= self.upper)
         xi = self.xi(theta)
@@ -161,10 +162,14 @@ class Beta:
 
     def cdf(self, theta: ArrayLike) -> Array:
         """P(Θ ≤ theta), any shape."""
+        from scipy.special import betainc
+
         return np.asarray(betainc(self.p, self.q, self.xi(theta)))
 
     def quantile(self, probability: ArrayLike) -> Array:
         """The θ below which a share `probability` in [0, 1] lies, any shape."""
+        from scipy.special import betaincinv
+
         share = np.asarray(probability, float)
         require_shares(share)
         xi = betaincinv(self.p, self.q, share)

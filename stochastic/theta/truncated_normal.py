@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import erfc, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import ndtr, ndtri
 
 from alphacut.stochastic.theta.law import Array, require_shares, require_support
 
@@ -45,8 +45,8 @@ class TruncatedNormal:
     def _below(self, theta: ArrayLike) -> Array:
         """Uncut probability of [lower, theta], a difference of the smaller tails."""
         if self.lower > 0:
-            return np.asarray(ndtr(-self.lower) - ndtr(-np.asarray(theta, float)))
-        return np.asarray(ndtr(np.asarray(theta, float)) - ndtr(self.lower))
+            return _normal(-self.lower) - _normal(-np.asarray(theta))
+        return _normal(theta) - _normal(self.lower)
 
     def pdf(self, theta: ArrayLike) -> Array:
         """Density f_Θ at `theta` (any shape); zero outside the support."""
@@ -60,15 +60,24 @@ class TruncatedNormal:
 
     def quantile(self, probability: ArrayLike) -> Array:
         """The θ below which a share `probability` in [0, 1] lies, any shape."""
+        from scipy.special import ndtri
+
         share = np.asarray(probability, float)
         require_shares(share)
         theta = (
-            -ndtri(ndtr(-self.lower) - share * self.mass)
+            -ndtri(_normal(-self.lower) - share * self.mass)
             if self.lower > 0
-            else ndtri(ndtr(self.lower) + share * self.mass)
+            else ndtri(_normal(self.lower) + share * self.mass)
         )
         return np.asarray(np.clip(theta, self.lower, self.upper))
 
     def sample(self, number: int, generator: np.random.Generator) -> Array:
         """`number` independent values of θ, shape (number,)."""
         return self.quantile(generator.random(number))
+
+
+def _normal(theta: ArrayLike) -> Array:
+    """Distribution function of the standard normal law, any shape; SciPy would start later."""
+    values = np.asarray(theta, float)
+    found = [erfc(-one / sqrt(2)) / 2 for one in values.ravel()]
+    return np.array(found).reshape(values.shape)
