@@ -39,12 +39,14 @@ class Ranks:
             if raised is not None:
                 raise raised
 
-    def first(self, function: Callable[[], T]) -> T:
-        """What rank 0 finds, on every rank."""
+    def first(self, function: Callable[[], T], meanwhile: Callable[[], object] = int) -> T:
+        """What rank 0 finds, on every rank; the others do something else `meanwhile`."""
         if self.comm is None:
             return function()
         with self.together():
             own = [function()] if self.comm.rank == 0 else []
+            if not own:
+                meanwhile()
         found: list[T] = self.comm.bcast(own)
         return found[0]
 

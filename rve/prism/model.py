@@ -161,7 +161,10 @@ class PrismModel:
         coarse, thick = means
         layers = error_of_layers(coarse, thick)
         change = np.nan_to_num(abs(coarse / mean_moduli(result.curve) - 1)).max()
-        gain = np.clip(0.75 / self.mesh_size, 4, 15) if self.interface == "conforming" else 1.0
+        halvings = np.log2(self._rough / self.mesh_size)
+        gain = np.clip(0.75 / self.mesh_size, 4, 15) ** halvings
+        if self.interface != "conforming":
+            gain = 2**halvings - 1
         expected = float(max(change / gain, layers.max(), 0.02 * self.mesh_size**3))
         told = partial(judged, cache=self.cache, ranks=self._ranks)
         return told(result, radius_map, phases, layers=layers, expected=expected)
@@ -169,21 +172,20 @@ class PrismModel:
     def coarser(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
     ) -> list[Array]:
-        """Mean moduli and ratio of a mesh twice as coarse, and with half the layers, shape (2, 4).
+        """Mean moduli and ratio of a coarser mesh, and of half the layers on it, shape (2, 4).
 
         Of two ranks each solves one, and the cells that the reference begins with; nan where they
         cannot be solved.
         """
         alone = Ranks(self._ranks.comm if self._ranks.size == 2 else None)
-        coarse = replace(self, estimate=False, mesh_size=min(1.0, 2 * self.mesh_size))
+        coarse = replace(self, estimate=False, mesh_size=self._rough)
         coarse = replace(coarse, parallel=self.parallel and alone.size == 1)
         thick = replace(coarse, layers=max(1, self.layers // 2))
 
         def means(model: PrismModel) -> list[Array]:  # not the results: some maps cannot be sent
             found = [mean_moduli(one.curve) for one in model.solve(radius_map, matrix, inclusions)]
-            if self._ranks.rank:  # which the next step loads Gmsh on, while the first may solve
+            if self._ranks.rank:  # where the cells that follow stand beside what is left
                 give_back()
-                import_module("alphacut.rve.mesh.planar")
             return found
 
         spans = [reference_range(radius_map, (matrix, one)) for one in inclusions]
@@ -197,17 +199,25 @@ class PrismModel:
         keep(dict(zip(first, rest, strict=True)))
         return list(map(np.stack, zip(one, two, strict=True)))
 
+    @property
+    def _rough(self) -> float:
+        """Mesh size of companions that foretell errors: four times as coarse, or up to 0.4."""
+        h = self.mesh_size
+        return min(1.0, max(2 * h, min(4 * h, 0.4)))
+
     def _moved(self, radius_map: RadiusMap, watch: Stopwatch) -> PrismSystem:
         with watch("mesh"):
-            plane = self._plane(radius_map, self._ranks)
+            plane = self._plane(radius_map, self._ranks, self.estimate)
             system = _system(plane, self.layers, self.parallel)
             system.move(radius_map)
         watch.shift("mesh", "jit", system.take_jit_seconds())
         return system
 
-    def _plane(self, radius_map: RadiusMap, ranks: Ranks) -> Triangulation:
+    def _plane(self, radius_map: RadiusMap, ranks: Ranks, more: bool = False) -> Triangulation:
+        """Planar mesh; the first of several ranks makes it, others load Gmsh for `more` meshes."""
         radius = reference_radius(radius_map) if self.interface == "conforming" else 0.0
-        return _plane(self.mesh_size, radius, self.cache, ranks)
+        load = partial(import_module, "alphacut.rve.mesh.planar") if more else int
+        return _plane(self.mesh_size, radius, self.cache, ranks, load)
 
     @property
     def _loads(self) -> Array:
@@ -335,11 +345,14 @@ _PLANES: dict[tuple[float, float, Path | None], Triangulation] = {}
 _MOST_PLANES = 4  # that are kept
 
 
-def _plane(size: float, radius: float, cache: Path | None, ranks: Ranks) -> Triangulation:
-    """Planar mesh, kept; of several ranks the first alone makes it, and loads Gmsh."""
+def _plane(
+    size: float, radius: float, cache: Path | None, ranks: Ranks, meanwhile: Callable[[], object]
+) -> Triangulation:
+    """Planar mesh, kept; of several ranks the first alone makes it."""
     key = size, radius, cache
     if not all(ranks.all(key in _PLANES)):
-        made = ranks.first(partial(triangulate, size=size, radius=radius, cache=cache))
+        make = partial(triangulate, size=size, radius=radius, cache=cache)
+        made = ranks.first(make, meanwhile)
         while len(_PLANES) >= _MOST_PLANES:
             del _PLANES[next(iter(_PLANES))]
         _PLANES[key] = made

@@ -34,6 +34,9 @@ alphacut.rve.ranks._counter = lambda handle: None  # as on several machines
 assert ranks.until(lambda k, found: False, abs, range(7)) == {0: 0, 1: 1, 2: 2}
 assert ranks.each(abs, range(-7, 0)) == [7, 6, 5, 4, 3, 2, 1]
 assert ranks.first(lambda: MPI.COMM_WORLD.rank) == 0
+own.clear()
+assert ranks.first(lambda: 7, lambda: own.append(1)) == 7
+assert len(own) == (ranks.rank > 0)
 failures = 0
 lacking = lambda: ranks.first(lambda: bytearray(2**62))
 for work in (lacking, lambda: ranks.first(lambda: 1 / 0), lambda: ranks.each(lambda k: 1 / (k - 1), range(3))):

@@ -251,7 +251,14 @@ def references(monkeypatch):
 
 @pytest.mark.parametrize(
     ("size", "layers", "modulus"),
-    [(0.4, 6, 80e9), (0.25, 12, 80e9), (0.25, 2, 80e9), (0.12, 9, 80e9), (0.25, 6, 1e6)],
+    [
+        (0.4, 6, 80e9),
+        (0.25, 12, 80e9),
+        (0.25, 2, 80e9),
+        (0.12, 9, 80e9),
+        (0.1, 16, 80e9),
+        (0.25, 6, 1e6),
+    ],
 )
 def test_one_reference_does_where_coarser_means_foretell_its_accuracy(
     references, size, layers, modulus
