@@ -39,13 +39,13 @@ class Ranks:
             if raised is not None:
                 raise raised
 
-    def first(self, function: Callable[[], T], meanwhile: Callable[[], object] = int) -> T:
+    def first(self, function: Callable[[], T], meanwhile: Callable[[], object] | None = None) -> T:
         """What rank 0 finds, on every rank; the others do something else `meanwhile`."""
         if self.comm is None:
             return function()
         with self.together():
             own = [function()] if self.comm.rank == 0 else []
-            if not own:
+            if not own and meanwhile:
                 meanwhile()
         found: list[T] = self.comm.bcast(own)
         return found[0]

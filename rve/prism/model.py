@@ -216,7 +216,7 @@ class PrismModel:
     def _plane(self, radius_map: RadiusMap, ranks: Ranks, more: bool = False) -> Triangulation:
         """Planar mesh; the first of several ranks makes it, others load Gmsh for `more` meshes."""
         radius = reference_radius(radius_map) if self.interface == "conforming" else 0.0
-        load = partial(import_module, "alphacut.rve.mesh.planar") if more else int
+        load = partial(import_module, "alphacut.rve.mesh.planar") if more else None
         return _plane(self.mesh_size, radius, self.cache, ranks, load)
 
     @property
@@ -346,13 +346,13 @@ _MOST_PLANES = 4  # that are kept
 
 
 def _plane(
-    size: float, radius: float, cache: Path | None, ranks: Ranks, meanwhile: Callable[[], object]
+    size: float, radius: float, cache: Path | None, ranks: Ranks, aside: Callable[[], object] | None
 ) -> Triangulation:
-    """Planar mesh, kept; of several ranks the first alone makes it."""
+    """Planar mesh, kept; of several ranks the first alone makes it, others do something else."""
     key = size, radius, cache
     if not all(ranks.all(key in _PLANES)):
         make = partial(triangulate, size=size, radius=radius, cache=cache)
-        made = ranks.first(make, meanwhile)
+        made = ranks.first(make, aside)
         while len(_PLANES) >= _MOST_PLANES:
             del _PLANES[next(iter(_PLANES))]
         _PLANES[key] = made
