@@ -58,7 +58,7 @@ def version_of(package: str) -> str:
 
 @cache
 def _metadata() -> list[str]:
-    folders = [path for path in map(Path, sys.path) if path.is_dir()]
+    folders = [path for path in map(Path, sys.path) if path.is_dir() and os.access(path, os.R_OK)]
     found = [path.name for one in folders for path in one.iterdir()]
     return [name for name in found if name.endswith((".dist-info", ".egg-info"))]
 
