@@ -161,10 +161,10 @@ class PrismModel:
         coarse, thick = means
         layers = error_of_layers(coarse, thick)
         change = np.nan_to_num(abs(coarse / mean_moduli(result.curve) - 1)).max()
-        halvings = np.log2(self._rough / self.mesh_size)
-        gain = np.clip(0.75 / self.mesh_size, 4, 15) ** halvings
+        ratio = self._rough / self.mesh_size
+        gain = np.clip(0.75 / self.mesh_size, 4, 15) ** np.log2(ratio)
         if self.interface != "conforming":
-            gain = 2**halvings - 1
+            gain = max(ratio - 1, 1.0)  # 0 on the roughest mesh
         expected = float(max(change / gain, layers.max(), 0.02 * self.mesh_size**3))
         told = partial(judged, cache=self.cache, ranks=self._ranks)
         return told(result, radius_map, phases, layers=layers, expected=expected)

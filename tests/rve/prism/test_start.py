@@ -4,6 +4,7 @@ import subprocess
 import sys
 from importlib.metadata import version
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,18 +14,21 @@ from alphacut.rve.cell import Phase
 from alphacut.rve.mesh.periodicity import identify
 from alphacut.rve.mesh.triangulation import triangulate
 from alphacut.rve.planar.system import Cholesky
+from alphacut.rve.prism import model as prism_model
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.prism.task import Stopwatch
 from alphacut.rve.solver.integrals import MADE_BY, version_of
 from alphacut.rve.solver.level_stiffness import LevelPattern
 from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
 from alphacut.stochastic import HermiteMap
+from tests.rve.test_ranks import on_ranks, with_mpirun
 
 CELL = """
 import sys
 from alphacut.rve.cell import Phase
 from alphacut.rve.prism.model import PrismModel
 from alphacut.stochastic import HermiteMap
+from tests.rve.test_ranks import on_ranks, with_mpirun
 
 paper = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
 (found,) = PrismModel(0.4, 4, estimate=True).solve(paper, Phase(20e9), [Phase(80e9)])
@@ -95,3 +99,45 @@ def test_only_meshes_that_follow_the_interface_have_mixed_elements(interface, mi
     system = model._moved(radii, Stopwatch())
     system.set_poisson((Phase(20e9, 0.4999), Phase(80e9, 0.3)))
     assert list(system.mixed.phases if system.mixed else ()) == mixed
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("size", "expected"), [(0.06, 0.018), (0.1, 0.03), (0.2, 0.06), (1.0, 0.02 * 1.3)]
+)
+def test_errors_of_first_order_are_foretold_as_they_are(monkeypatch, size, expected):
+    """Made-up moduli 1 + 0.3 h, as of a mesh that ignores the interface."""
+    model, told = PrismModel(size, interface="sign"), []
+    monkeypatch.setattr(prism_model, "mean_moduli", lambda curve: np.full(4, 1 + 0.3 * size))
+    monkeypatch.setattr(prism_model, "judged", lambda *_, expected, **__: told.append(expected))
+    coarse = np.full(4, 1 + 0.3 * model._rough)
+    model._with_errors(SimpleNamespace(curve=None), None, (), np.stack([coarse, coarse]))
+    assert told == [pytest.approx(expected / (1 + 0.3 * size), rel=1e-12)]
+
+
+RANKS = """
+import sys
+from mpi4py import MPI
+from alphacut.rve.cell import Phase
+from alphacut.rve.prism import model
+from alphacut.stochastic import HermiteMap
+from tests.rve.test_ranks import on_ranks, with_mpirun
+
+paper, given, rank = HermiteMap(0.1337, 0.1, 0.8663, 0.1692), [], MPI.COMM_WORLD.rank
+model.give_back = lambda: given.append(1)
+phases = paper, Phase(20e9), [Phase(80e9)]
+model.PrismModel(0.5, 2, parallel=True).solve(*phases)
+assert ("gmsh" in sys.modules) == (rank == 0), "one mesh is one rank's work"
+asked = model.PrismModel(0.6, 2, parallel=True, estimate=True)
+asked._moved(paper, model.Stopwatch())
+assert "gmsh" in sys.modules, "of two ranks the second waits idly"
+asked.solve(*phases)
+assert len(given) == (rank > 0), given
+print("done", flush=True)
+"""
+
+
+@with_mpirun
+def test_of_two_ranks_the_second_loads_gmsh_early_and_gives_memory_back():
+    done = on_ranks(2, RANKS)
+    assert done.stdout.split() == 2 * ["done"], done.stderr
