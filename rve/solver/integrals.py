@@ -17,8 +17,7 @@ from typing import Any
 from alphacut.rve.interruption import uninterrupted
 from alphacut.rve.solver.c_loops import kernels
 
-# twice as fast as the default -O2, equal to round-off
-JIT = {"cffi_extra_compile_args": ["-O3", "-ffast-math"], "timeout": 120}  # for other processes
+_FAST = ["-O3", "-ffast-math"]  # twice as fast as the default -O2, equal to round-off
 # FFCx's own: a file of the caller's folder could ask for single precision, and stay in the cache
 _TABLES = {"epsilon": 1e-14, "table_rtol": 1e-6, "table_atol": 1e-9}
 _FFCX = {"scalar_type": "float64", "sum_factorization": False, **_TABLES}
@@ -40,13 +39,23 @@ def triangle_integral(order: int, *, weighted: bool = False) -> Callable[..., No
     try:
         return _function(note.read_text(encoding="utf-8"))
     except (OSError, ValueError, AttributeError):
-        made = Path(str(_compiled(order, weighted).__file__))
-    code = made.with_name(made.name.partition(".")[0] + ".c").read_text(encoding="utf-8")
-    name = code.partition("void tabulate_tensor_")[2].partition("(")[0]
-    place, partial = f"{made}\ntabulate_tensor_{name}", note.with_suffix(f".{os.getpid()}")
+        place, partial = _made(order, weighted), note.with_suffix(f".{os.getpid()}")
     partial.write_text(place, encoding="utf-8")
     partial.replace(note)
     return _function(place)
+
+
+def _made(order: int, weighted: bool) -> str:
+    """Path of a library that is new, and the name of its function."""
+    from tempfile import TemporaryDirectory
+
+    # no other process's folder: what a killed one leaves in FEniCS's cache would be waited for
+    with TemporaryDirectory(dir=kernels()) as work:
+        library = Path(str(_compiled(order, weighted, work).__file__))
+        code = library.with_name(library.name.partition(".")[0] + ".c").read_text(encoding="utf-8")
+        made = library.replace(kernels() / library.name)
+    name = code.partition("void tabulate_tensor_")[2].partition("(")[0]
+    return f"{made}\ntabulate_tensor_{name}"
 
 
 def version_of(package: str) -> str:
@@ -70,8 +79,8 @@ def _function(place: str) -> Callable[..., None]:
     return found
 
 
-def _compiled(order: int, weighted: bool) -> ModuleType:
-    """The form of eq. 7 without its weight, compiled by FFCx or taken from its cache."""
+def _compiled(order: int, weighted: bool, work: str) -> ModuleType:
+    """The form of eq. 7 without its weight, compiled by FFCx in a folder."""
     with uninterrupted(), warnings.catch_warnings():
         import basix.ufl
         import ufl
@@ -97,7 +106,8 @@ def _compiled(order: int, weighted: bool) -> ModuleType:
                 "quadrature_weights": weights,
             }
         form = density * ufl.dx(mesh, metadata=rule)
-        module: ModuleType = jit.ffcx_jit(MPI.COMM_SELF, form, _FFCX, JIT)[1]
+        how = {"cffi_extra_compile_args": _FAST, "cache_dir": work}
+        module: ModuleType = jit.ffcx_jit(MPI.COMM_SELF, form, _FFCX, how)[1]
         return module
 
 

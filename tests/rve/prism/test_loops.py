@@ -219,13 +219,20 @@ def test_the_integral_is_found_again_without_ufl_and_made_where_it_is_gone(tmp_p
     find(2, weighted=True)
     find(2, weighted=True)
     assert len(made) == 1
-    (note,) = tmp_path.iterdir()
+    note = next(path for path in tmp_path.iterdir() if not path.suffix)
     told, asked = note.read_text(encoding="utf-8"), {"scalar_type": "float32", "table_rtol": 0.1}
     monkeypatch.setattr("ffcx.options._load_options", lambda: ({}, asked))  # of folder or home
     note.write_text(str(tmp_path / "nowhere.so") + "\ntabulate", encoding="utf-8")
     find(2, weighted=True)
     assert len(made) == 2
     assert note.read_text(encoding="utf-8") == told
+
+
+def test_what_a_killed_compilation_leaves_is_not_waited_for(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    integrals.triangle_integral.__wrapped__(1)
+    assert [path.name for path in tmp_path.iterdir()] == ["alphacut"]  # no "fenics" to wait in
+    assert {path.suffix for path in integrals.kernels().iterdir()} == {"", ".so"}
 
 
 def test_loops_are_compiled_once_and_need_a_compiler(tmp_path, monkeypatch):
