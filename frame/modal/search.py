@@ -27,8 +27,8 @@ BEHIND = 0.1
 """The same for fresh starts, which begin farther from their optima."""
 FRESH = 8
 """Fresh points of an independent pass at every node, over the samples of the search."""
-VALUES = 16e6
-"""Most numbers of their trajectories that are kept at a time: 128 MB."""
+VALUES, MOST = 16e6, 1e8
+"""Most numbers of trajectories kept at a time: of fresh points 128 MB, of the first 800 MB."""
 CALM = 20.0
 """Change of phase (rad) over the box up to which the least effort finds the basins."""
 SMALL = 1e-3
@@ -90,7 +90,7 @@ class ModalSearch:
         gained: Array = np.zeros(m)
         tick = share(progress, 0.0, 1.0)
         if (upper > lower).any():
-            pool = self._samples(lower, upper)
+            pool = self._samples(lower, upper, int(MOST / (total * m)))
             values = trajectories(model, pool)
             tick(0.02)
             coarse, rivals = self._search(model, lower, upper, (pool, values), self.stride(model))
@@ -202,10 +202,12 @@ class ModalSearch:
         contest(model, found, lower, upper, self.small)
         return found
 
-    def _samples(self, lower: Array, upper: Array) -> Array:
+    def _samples(self, lower: Array, upper: Array, most: int) -> Array:
+        """Points of the box; more than `most`, of as many nodes and outputs, fill the memory."""
         d = len(lower)
         # narrow boxes hold fewer basins
         count = 2 ** round(np.log2(max(64, self.samples * ((upper - lower) / 2).max())))
+        count = max(64, min(count, most // 2))
         unit = chebyshev_points(d, count, skip=1 + 7919 * self.seed)
         points = np.vstack([unit, tensor_points(d, count)])
         scaled: Array = (lower + upper) / 2 + (upper - lower) / 2 * points

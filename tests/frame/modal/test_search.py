@@ -77,3 +77,17 @@ def test_independent_passes_find_the_basins_that_a_search_has_missed() -> None:
     once = search.ModalSearch(8, 1, passes=1).run(model, lower, upper)
     assert once[3].max() > 1e-3  # a pass that still gains says so
     assert once[3].max() == pytest.approx((once[0] - alone[0]).max())
+
+
+def test_trajectories_of_a_search_stay_within_what_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    model, asked = ridges(0.0)[0], []
+    monkeypatch.setattr(search, "MOST", 200 * 3 * len(model.time))
+
+    def watched(model: ModalModel, points: np.ndarray, *nodes: np.ndarray) -> np.ndarray:
+        asked.append(len(points))
+        return trajectories(model, points, *nodes)
+
+    monkeypatch.setattr(search, "trajectories", watched)
+    search.ModalSearch(passes=0).run(model, -np.ones(4), np.ones(4))
+    assert len(asked) == 1
+    assert 100 <= asked[0] <= 200  # where 512 and a grid were asked
