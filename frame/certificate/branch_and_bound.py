@@ -132,21 +132,9 @@ class Tree:
         m, d = len(model.outputs), len(lower)
         numbers = (optima.node * m + optima.output) * 2 + (optima.side > 0)
         remainder, total = Remainder.of(model, lower, upper), 2 * m * len(model.time)
-        tree = cls(
-            model,
-            lower,
-            upper,
-            optima,
-            numbers,
-            Problems(
-                model.time,
-                remainder,
-                np.zeros(total),
-                np.zeros((total, d)),
-                np.zeros((total, 1 + d + d * (d + 1) // 2)),
-                gap,
-            ),
-        )
+        points, jets = np.zeros((total, d)), np.zeros((total, 1 + d + d * (d + 1) // 2))
+        problems = Problems(model.time, remainder, np.zeros(total), points, jets, gap)
+        tree = cls(model, lower, upper, optima, numbers, problems)
         tree._renew(np.arange(len(numbers)))
         return tree
 
@@ -209,19 +197,14 @@ class Tree:
         row_box, row_node = box[begin], node[begin]
         started, together = self._parts
         jets = together.jets(centre)
-        return Piece(
-            centre,
-            radius,
-            edges,
+        rows, begin = (
             np.searchsorted(row_box, np.arange(len(centre) + 1)),
             np.append(begin, len(box)),
-            row_node,
-            column,
-            jets,
-            self.model.count,
-            started,
-            self._forced(jets[:, 0, : self.model.count], row_box, row_node),
         )
+        count = self.model.count
+        forced = self._forced(jets[:, 0, :count], row_box, row_node)
+        place = centre, radius, edges, rows, begin
+        return Piece(*place, row_node, column, jets, count, started, forced)
 
     @cached_property
     def _parts(self) -> tuple[bool, Polynomial]:

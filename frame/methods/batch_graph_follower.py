@@ -105,6 +105,8 @@ class BatchFollower:
         """Pursues all levels of `flow.boxes`, from the narrowest box to the widest."""
         levels = len(flow.boxes.alpha)
         out = Pursuit.empty(flow, beside=self.contests > 0)
+        d, places = len(flow.boxes.names), len(flow.time) * len(flow.outputs)
+        at_once = int(np.clip(MOST / (places * (1 + d + d * d)), 1, self.batch))
         for done, level in enumerate(reversed(range(levels))):
             lower, upper = flow.boxes.unit(level)
             out.enter(lower, upper, self)
@@ -112,7 +114,7 @@ class BatchFollower:
             points = self._start(flow, lower, upper, out)[: max(1, limit - len(out.points))]
             contests = self.contests
             while len(points):
-                for chunk in np.array_split(points, -(-len(points) // self.batch)):
+                for chunk in np.array_split(points, -(-len(points) // at_once)):
                     out.take(chunk)
                 if progress:
                     progress(min(1.0, len(out.points) / self.budget))
@@ -274,6 +276,8 @@ JUMP = 0.05
 """Share of the box's width from which on optima of neighbouring nodes lie in different basins."""
 SAFETY = 2.0
 """Factor on what the last models promise: the next ones promise again."""
+MOST = 64e6
+"""Most numbers of Taylor models computed at a time: 512 MB."""
 TRIES = 40
 """Proposals looked at per window of time."""
 SPACING = 0.02

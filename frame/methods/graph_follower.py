@@ -102,10 +102,7 @@ class GraphFollower:
 
     def envelope(self, flow: UnitFlow, followed: Followed, seconds: float) -> Envelope:
         """Envelope of what was followed."""
-        facts: dict[str, float | str] = {
-            "order": self.order,
-            "gain": self.tolerance,
-        }
+        facts: dict[str, float | str] = {"order": self.order, "gain": self.tolerance}
         if followed.exhausted:
             facts["reason"] = f"stopped at the budget of {self.budget} trajectories"
         return signed_envelope(

@@ -196,16 +196,22 @@ def require(samples: int, columns: int) -> None:
     Raises:
         TooLargeError: It does not fit.
     """
-    need = needed(samples, columns)
-    if need < _SMALL:
-        return
-    free = available()
-    if need > _SHARE * free:
-        size = (
-            f"{samples:,} samples of {columns} inputs and outputs need {need / 1e9:.3g} GB of"
-            f" memory and {free / 1e9:.3g} GB are free"
-        )
-        raise TooLargeError(
-            f"{size}; take fewer levels, a plan with fewer samples (reduced, signed), or fewer"
-            " outputs"
-        )
+    what = f"{samples:,} samples of {columns} inputs and outputs"
+    cure = "take fewer levels, a plan with fewer samples (reduced, signed), or fewer outputs"
+    require_bytes(needed(samples, columns), what, cure)
+
+
+def require_bytes(need: int, what: str, cure: str) -> None:
+    """Refuse what does not fit, before it starts.
+
+    Args:
+        need: Bytes.
+        what: They are for.
+        cure: What to do else.
+
+    Raises:
+        TooLargeError: It does not fit.
+    """
+    if need > _SMALL and need > _SHARE * (free := available()):
+        size = f"{need / 1e9:.3g} GB of memory and {free / 1e9:.3g} GB are free"
+        raise TooLargeError(f"{what} need {size}; {cure}")

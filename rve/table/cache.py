@@ -20,19 +20,8 @@ from alphacut.rve.table.build import PlanarSource, Source, build_table
 from alphacut.rve.table.interpolant import Table, TableRange
 
 # The code a table comes from.
-_PROGRAMS = (
-    "bounds.py",
-    "cell.py",
-    "square.py",
-    "mesh/*.py",
-    "planar/*.py",
-    "series/*.py",
-    "slices/*.py",
-    "solver/*.c",
-    "solver/*.py",
-    "spheres/**/*.py",
-    "table/*.py",
-)
+_PROGRAMS = ["bounds.py", "cell.py", "square.py", "solver/*.c", "spheres/**/*.py"]
+_PROGRAMS += [f"{room}/*.py" for room in ("mesh", "planar", "series", "slices", "solver", "table")]
 _PACKAGES = "numpy", "scipy", "cvxopt", "petsc4py", "gmsh", *MADE_BY
 
 

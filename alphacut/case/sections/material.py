@@ -211,6 +211,5 @@ class Response(Section):
         tuple[float, ...], Key("probabilities whose quantiles are wanted", allowed=UNIT)
     ] = (0.05, 0.5, 0.95)
     limit: Annotated[
-        float | None,
-        positive("stress whose probability of being exceeded is wanted", "Pa"),
+        float | None, positive("stress whose probability of being exceeded is wanted", "Pa")
     ] = None

@@ -67,12 +67,10 @@ class Packing(Section):
         Key("share of the area that discs cover", allowed=Range("inside (0, 0.85)", 0.0, 0.85)),
     ]
     smallest_radius: Annotated[
-        float | None,
-        positive("smallest radius of the log-normal law; needed without a file", "m"),
+        float | None, positive("smallest radius of the log-normal law; needed without a file", "m")
     ] = None
     largest_radius: Annotated[
-        float | None,
-        positive("largest radius of the log-normal law; needed without a file", "m"),
+        float | None, positive("largest radius of the log-normal law; needed without a file", "m")
     ] = None
     file: Annotated[
         str | None,

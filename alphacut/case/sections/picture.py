@@ -89,8 +89,7 @@ class Picture(Section):
         ),
     ] = None
     shear: Annotated[
-        tuple[FuzzyNumber, ...] | None,
-        positive("shear modulus of each phase, beside bulk", "Pa"),
+        tuple[FuzzyNumber, ...] | None, positive("shear modulus of each phase, beside bulk", "Pa")
     ] = None
     boundary: Annotated[
         Literal["periodic", "window"],

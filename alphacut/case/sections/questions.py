@@ -91,8 +91,7 @@ class Update(Section):
         ),
     ]
     held_out: Annotated[
-        tuple[float, ...],
-        positive("modes that are not learned from, but predicted and compared"),
+        tuple[float, ...], positive("modes that are not learned from, but predicted and compared")
     ] = ()
     frequency_deviation: Annotated[
         float | None,

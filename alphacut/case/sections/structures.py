@@ -144,8 +144,7 @@ class Tower(Section):
     ]
     E_beams: Annotated[FuzzyNumber, positive("Young's modulus of the beams", "Pa")]
     mass: Annotated[
-        FuzzyNumber,
-        positive("mass of the floors over the length of the beams", "kg/m"),
+        FuzzyNumber, positive("mass of the floors over the length of the beams", "kg/m")
     ]
     density: Annotated[float, Key("density of the columns", "kg/m^3", allowed=NOT_NEGATIVE)]
     damping_ratio: Annotated[
@@ -186,6 +185,5 @@ class Pendulum(Section):
     angle: Annotated[FuzzyNumber, Key("angle at the start, 0 hanging down", "rad")]
     angular_velocity: Annotated[FuzzyNumber, Key("angular velocity at the start", "rad/s")]
     tolerance: Annotated[
-        float,
-        positive("wanted error of the force; a declared error above it is a failure", "N"),
+        float, positive("wanted error of the force; a declared error above it is a failure", "N")
     ] = 0.001

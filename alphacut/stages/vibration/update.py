@@ -85,12 +85,7 @@ class Learned:
             "narrowed": found.narrowed,
             **self._identified,
             "held_out": [
-                {
-                    "mode": x.mode,
-                    "measured": x.measured,
-                    "predicted": x.predicted,
-                    "inside": x.inside,
-                }
+                {name: getattr(x, name) for name in ("mode", "measured", "predicted", "inside")}
                 for x in self.held_out
             ],
             "claim": str(found.claim),

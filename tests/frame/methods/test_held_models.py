@@ -8,6 +8,7 @@ from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.methods.held_models import HeldModels
 from alphacut.fuzzy import Triangular
+from alphacut.fuzzy.campaign.workers import TooLargeError
 
 
 def test_models_are_those_of_the_last_holder_at_its_nodes_and_beside() -> None:
@@ -29,6 +30,11 @@ def test_models_are_those_of_the_last_holder_at_its_nodes_and_beside() -> None:
             assert np.array_equal(np.moveaxis(second, 0, -1), jet.second[:, :, s, near, o])
     kept = ~changed.ravel()
     assert np.array_equal(held.models(1, everywhere)[2][kept], before[0][kept])
+
+
+def test_models_that_do_not_fit_are_refused_before_they_are_computed() -> None:
+    with pytest.raises(TooLargeError, match=r"models of 1,000,001 nodes, 8 outputs and 90 inputs"):
+        HeldModels.empty((0, -1, 1), (1_000_001, 8, 2), 90)
 
 
 def test_contests_and_wider_boxes_ask_kept_models_and_no_trajectory_twice(

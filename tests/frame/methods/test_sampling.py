@@ -1,10 +1,13 @@
-"""Sampled envelopes: a few trajectories at a time, with progress."""
+"""Sampled and followed envelopes: a few trajectories at a time, with progress."""
+
+from functools import partial
 
 import numpy as np
 import pytest
 
 from alphacut.frame import StoreyFrame, envelope
-from alphacut.frame.methods import sampling
+from alphacut.frame.boxes import UnitFlow
+from alphacut.frame.methods import batch_graph_follower, sampling
 from alphacut.fuzzy import Triangular
 
 FRAME = StoreyFrame((2e3, 1e3), (2.5, 2.7), 24.7561e9, 1e-6, q0=(0.01, 0.03), v0=(0, -0.5))
@@ -24,3 +27,16 @@ def test_few_trajectories_at_a_time_give_the_same_bounds(method, monkeypatch):
     assert done == sorted(done)
     assert done[0] == 0
     assert len(set(done)) > len(whole.alpha)
+
+
+def test_few_taylor_models_at_a_time_give_the_same_bounds(monkeypatch):
+    asked, plain = [], UnitFlow.taylor
+    monkeypatch.setattr(UnitFlow, "taylor", lambda *of: asked.append(len(of[1])) or plain(*of))
+    find = partial(envelope, FRAME, INPUTS, duration=1, step=0.1, progress=False)
+    whole = find(method="improved-graph-follower")
+    assert max(asked) > 5
+    monkeypatch.setattr(batch_graph_follower, "MOST", 5 * 11 * 2 * 7)
+    asked.clear()
+    few = find(method="improved-graph-follower")
+    assert max(asked) == 5
+    assert np.abs(few.upper - whole.upper).max() < 1e-12
