@@ -134,14 +134,17 @@ def _phi(x: complex) -> tuple[complex, complex]:
 
 def _largest(q: Array, v: Array, h: float) -> float:
     """Largest magnitude of the cubics through values and slopes of the nodes."""
-    turns = np.flatnonzero(v[:-1] * v[1:] < 0)
-    a, b, rise = h * v[turns], h * v[turns + 1], q[turns + 1] - q[turns]
-    # q(s) = q0 + a s + (3 rise − 2 a − b) s² + (a + b − 2 rise) s³, stationary where its slope is 0
+    a, b, rise = h * v[:-1], h * v[1:], np.diff(q)
+    # q(s) = q0 + a s + (3 rise − 2 a − b) s² + (a + b − 2 rise) s³, stationary where its slope is 0,
+    # twice in a step in which the ground turns a motion that had nearly come to rest
     square, cube = 3 * rise - 2 * a - b, a + b - 2 * rise
     root = np.sqrt(np.maximum(square**2 - 3 * cube * a, 0.0))
-    s = np.clip(-a / (square + np.copysign(root, square)), 0.0, 1.0)
-    inner = q[turns] + s * (a + s * (square + s * cube))
-    return float(max(np.abs(q).max(), np.abs(inner).max(initial=0.0)))
+    both = -(square + np.copysign(root, square))
+    top = float(np.abs(q).max())
+    for over, under in ((a, both), (both, 3 * cube)):
+        s = np.clip(np.divide(over, under, out=np.zeros_like(a), where=under != 0), 0.0, 1.0)
+        top = max(top, float(np.abs(q[:-1] + s * (a + s * (square + s * cube))).max()))
+    return top
 
 
 def _left_out(

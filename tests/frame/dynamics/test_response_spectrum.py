@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 from alphacut.frame import Accelerogram
 from alphacut.frame.dynamics.response_spectrum import response_spectrum
@@ -72,6 +73,25 @@ def test_records_of_any_kind_agree_with_dense_integration_within_the_error() -> 
     assert found.error[0] < 1e-5 * np.abs(a).max() / omega**2  # of what it would hold at rest
     missed = 0.5 * (0.0031 * 2 * np.pi) ** 2  # of a peak between two of the reference's points
     assert abs(found.displacement[0] - peak) <= found.error[0] + (1e-9 + missed) * peak
+
+
+def test_a_peak_between_nodes_whose_velocities_have_one_sign_is_found() -> None:
+    step, zeta, omega = 0.013, 0.05, 2 * np.pi / 1.063659179388998
+    a = np.random.default_rng(1).normal(0, 0.2, 77) * 9.80665
+    rates = np.zeros((4, 4))  # of q, its velocity, the ground's acceleration and its slope
+    rates[0, 1], rates[1, :3], rates[2, 3] = 1, (-(omega**2), -2 * zeta * omega, -1), 1
+    few, state, q = expm(rates * step / 64), np.zeros(2), []
+    for first, last in pairwise(a):
+        moved = np.array([*state, first, (last - first) / step])
+        for _ in range(64):
+            moved = few @ moved
+            q.append(moved[0])
+        state = moved[:2]
+    found = response_spectrum(Accelerogram(step, a), [2 * np.pi / omega], zeta)
+    most = np.abs(q).max()
+    assert most > 1.0008 * np.abs(q[63::64]).max()
+    assert most - 1e-9 <= found.displacement[0] + found.error[0]
+    assert found.displacement[0] - found.error[0] <= most * (1 + (0.1 / 64) ** 2)
 
 
 def test_stiff_oscillators_follow_the_ground_and_soft_ones_stay_behind() -> None:
