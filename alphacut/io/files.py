@@ -48,10 +48,26 @@ def leave(status: int) -> NoReturn:
     os._exit(status)
 
 
+def is_special(path: Path) -> bool:
+    """Whether this is a device, a pipe or a socket, that nothing may replace."""
+    return path.exists() and not (path.is_file() or path.is_dir())
+
+
 @contextmanager
 def whole_file(path: Path | str) -> Iterator[Path]:
-    """Temporary name beside `path`, renamed to it once the block is through."""
+    """Temporary name beside `path`, renamed to it once the block is through.
+
+    A link stays and its target is replaced; a device or a pipe is written to.
+    """
     path = Path(path)
+    if is_special(path):
+        from tempfile import TemporaryDirectory
+
+        with TemporaryDirectory() as folder:
+            yield (partial := Path(folder) / path.name)
+            path.write_bytes(partial.read_bytes())
+        return
+    path = Path(os.path.realpath(path))
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
     try:

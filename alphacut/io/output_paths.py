@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from alphacut.io.files import is_special
 from alphacut.io.problem import Problem, refuse
 
 INSIDE = (
@@ -71,7 +72,7 @@ def unwritable(option: str, path: Path, *, folder: bool) -> Iterator[Problem]:
     while not there.exists() and there != there.parent:
         there = there.parent
     try:
-        if str(there) != "/dev":
+        if not is_special(path):
             tempfile.TemporaryFile(dir=there).close()
     except OSError as error:
         reason = (error.strerror or str(error)).lower()

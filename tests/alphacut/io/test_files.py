@@ -1,0 +1,45 @@
+"""Whole files: what stands there is replaced only where it is a file."""
+
+import os
+import threading
+
+import pytest
+
+from alphacut.io.files import whole_file, write_text
+
+
+def test_a_link_stays_and_its_target_is_replaced(tmp_path):
+    real, link = tmp_path / "real.json", tmp_path / "link.json"
+    real.write_text("old", encoding="utf-8")
+    link.symlink_to(real)
+    write_text(link, "new")
+    assert link.is_symlink()
+    assert real.read_text(encoding="utf-8") == "new"
+
+
+def test_a_pipe_is_written_to_and_stays(tmp_path):
+    pipe, read = tmp_path / "pipe.json", []
+    os.mkfifo(pipe)
+    reader = threading.Thread(target=lambda: read.append(pipe.read_text(encoding="utf-8")))
+    reader.start()
+    write_text(pipe, "told")
+    reader.join(10)
+    assert read == ["told"]
+    assert pipe.is_fifo()
+
+
+def test_a_file_that_fails_leaves_the_old_one(tmp_path):
+    path = tmp_path / "a.txt"
+    write_text(path, "old")
+    with pytest.raises(ZeroDivisionError), whole_file(path) as partial:
+        partial.write_text("new", encoding="utf-8")
+        raise ZeroDivisionError
+    assert [x.name for x in tmp_path.iterdir()] == ["a.txt"]
+    assert path.read_text(encoding="utf-8") == "old"
+
+
+def test_devices_may_be_named_for_output(tmp_path):
+    from alphacut.io.output_paths import unwritable
+
+    assert not list(unwritable("--json", tmp_path / "a.json", folder=False))
+    assert not list(unwritable("--json", type(tmp_path)("/dev/null"), folder=False))
