@@ -15,7 +15,7 @@ from types import ModuleType
 from alphacut.commands.parser import Parser, refuse_petsc, split_petsc
 from alphacut.fuzzy import CampaignError
 from alphacut.io.files import leave as leave
-from alphacut.io.files import rank, ranks, say, standard_output
+from alphacut.io.files import open_streams, rank, ranks, say, standard_output
 from alphacut.io.netcdf import finished
 from alphacut.io.output_paths import check_destinations
 from alphacut.io.problem import BadInput, missing
@@ -116,6 +116,7 @@ def main(
         Exit status, see `STATUSES`.
     """
     options = argparse.Namespace(command="")
+    open_streams()
     try:
         ours, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
         commands = (COMMANDS if names is None else Commands(names)).meant(ours)

@@ -9,7 +9,7 @@ import os
 import sys
 import threading
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stdout, suppress
 from pathlib import Path
 from typing import Any, NoReturn, TextIO
 
@@ -32,6 +32,15 @@ def ranks() -> int:
     return next((int(os.environ[name]) for name in SIZES if name in os.environ), 1)
 
 
+def open_streams() -> None:
+    """Give standard streams that are closed the null device, for other files would take them."""
+    while (handle := os.open(os.devnull, os.O_RDWR)) < 3:
+        os.set_inheritable(handle, True)
+    os.close(handle)
+    sys.stdout = sys.stdout or os.fdopen(1, "w", encoding="utf-8")
+    sys.stderr = sys.stderr or os.fdopen(2, "w", encoding="utf-8")
+
+
 def leave(status: int) -> NoReturn:
     """End the program; its memory is not taken apart first, up to 0.2 s once PETSc is loaded."""
     mpi = sys.modules.get("mpi4py.MPI")
@@ -40,9 +49,11 @@ def leave(status: int) -> NoReturn:
     try:
         atexit._run_exitfuncs()  # as multiprocessing does
         sys.stdout.flush()
-        sys.stderr.flush()
-    except OSError:
-        sys.exit(status)
+    except OSError as error:  # BrokenPipeError where its reader wanted no more
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        if not isinstance(error, BrokenPipeError):
+            say(f"standard output cannot be written: {error.strerror}")
+            status = status or 1
     if mpi and not mpi.Is_finalized() and any(name in os.environ for name in (*RANKS, *SIZES)):
         mpi.Finalize()  # for mpirun or its like
     os._exit(status)
@@ -136,4 +147,5 @@ def standard_output(json_to_stdout: bool) -> Iterator[TextIO]:
 def say(message: str) -> None:
     """One line to people, on standard error; the first rank alone speaks."""
     if rank() == 0:
-        print(f"alphacut: {message}", file=sys.stderr, flush=True)
+        with suppress(OSError):
+            print(f"alphacut: {message}", file=sys.stderr, flush=True)

@@ -135,8 +135,8 @@ def _phi(x: complex) -> tuple[complex, complex]:
 def _largest(q: Array, v: Array, h: float) -> float:
     """Largest magnitude of the cubics through values and slopes of the nodes."""
     a, b, rise = h * v[:-1], h * v[1:], np.diff(q)
-    # q(s) = q0 + a s + (3 rise − 2 a − b) s² + (a + b − 2 rise) s³, stationary where its slope is 0,
-    # twice in a step in which the ground turns a motion that had nearly come to rest
+    # q(s) = q0 + a s + (3 rise − 2 a − b) s² + (a + b − 2 rise) s³ turns where its slope is 0:
+    # twice in a step in which the ground stops the motion and drives it on
     square, cube = 3 * rise - 2 * a - b, a + b - 2 * rise
     root = np.sqrt(np.maximum(square**2 - 3 * cube * a, 0.0))
     both = -(square + np.copysign(root, square))

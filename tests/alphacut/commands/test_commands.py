@@ -422,6 +422,25 @@ def test_the_program_ends_with_its_status_its_output_and_what_was_left_for_the_e
     assert (run.returncode, run.stdout, run.stderr) == (3, "first\nlast\n", "")
 
 
+@pytest.mark.parametrize(
+    ("streams", "status", "said"),
+    [
+        (">&-", 0, ""),
+        (">&- 2>&-", 0, ""),
+        ("| true", 0, ""),
+        (
+            "> /dev/full",
+            1,
+            "alphacut: standard output cannot be written: No space left on device\n",
+        ),
+    ],
+)
+def test_streams_that_are_closed_or_full_leave_no_traceback(streams, status, said, tmp_path):
+    command = f"{sys.executable} -m alphacut check {PAPER} {streams}; exit ${{PIPESTATUS[0]}}"
+    run = subprocess.run(["bash", "-c", command], capture_output=True, text=True)
+    assert (run.returncode, run.stderr) == (status, said)
+
+
 def test_warnings_of_the_libraries_are_plain_lines_each_once(monkeypatch, capfd):
     def run(*_):
         for _ in range(2):
