@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Iterator, Mapping
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TextIO
@@ -18,8 +19,8 @@ from alphacut.figures.captions import core, in_words
 from alphacut.figures.showing import Showing
 from alphacut.frame.outputs import output_unit
 from alphacut.fuzzy.campaign.workers import pool
-from alphacut.io.files import Document, as_json, say, write_text
-from alphacut.io.output_paths import unwritable
+from alphacut.io.files import Document, as_json, rank, say, write_text
+from alphacut.io.output_paths import alone, unwritable
 from alphacut.io.problem import BadInput, refuse
 from alphacut.io.provenance import door
 from alphacut.io.units import engineering, largest_by_unit
@@ -65,6 +66,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Compute, draw, compare."""
     chain = prepared(options, petsc)
+    with alone("--out", chain.folder) if rank() == 0 else nullcontext():
+        return computed(options, chain, out)
+
+
+def computed(options: argparse.Namespace, chain: Chain, out: TextIO) -> int:
+    """The numbers and figures of a chain, and its answer."""
     start = time.perf_counter()
     with pool(chain.workers) as executor:
         showing = Showing(chain, not options.no_figures, executor)

@@ -6,10 +6,11 @@ import argparse
 import os
 import tempfile
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from alphacut.io.files import is_special
-from alphacut.io.problem import Problem, refuse
+from alphacut.io.problem import BadInput, Problem, refuse
 
 INSIDE = (
     "inside ./enter only the project, the current folder, home and the temporary folder are visible"
@@ -82,6 +83,33 @@ def unwritable(option: str, path: Path, *, folder: bool) -> Iterator[Problem]:
             str(path),
             hint(path) or "a folder that you may write to",
         )
+
+
+@contextmanager
+def alone(option: str, folder: Path) -> Iterator[None]:
+    """Keep other runs out of a folder; where the file system cannot, nothing is kept out.
+
+    Raises:
+        BadInput: Another run is writing into it.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                what = "another run is writing into this folder"
+                cure = "another folder, or this one once that run has ended"
+                raise BadInput.of(option, what, str(folder), cure) from None
+        yield
+    finally:
+        os.close(handle)
 
 
 def hint(path: Path) -> str:
