@@ -34,7 +34,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     common.add_keys(parser, KEYS)
     common.add_modulus(parser)
     parser.add_argument(
-        "--most", type=float, default=2.0, metavar="X", help="largest scaling asked for (default 2)"
+        "--most",
+        type=float,
+        default=2.0,
+        metavar="X",
+        help="largest scaling asked for (default 2, or what leaves each input a meaning)",
     )
     common.add_workers(parser, "the proof")
 
@@ -71,6 +75,10 @@ def text(found: Tolerances) -> str:
         for name, ends in found.intervals.items()
     ]
     lines += fixed_line(found.fixed)
+    lines += [f"scaled by {found.most:.4g} at most: {found.ended}"] if found.ended else []
+    if found.undecided:
+        what = f"undecided between {scale.safe:.4g} and {found.most:.4g}"
+        return "\n".join([*lines, f"{what}: neither proved nor refuted; narrow some inputs", ""])
     if scale.witness is None:
         return "\n".join([*lines, f"nothing unsafe found up to {scale.safe:.4g}", ""])
     point = ", ".join(

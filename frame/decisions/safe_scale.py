@@ -30,6 +30,8 @@ EASY = (1.0, 0.3)
 """The same as shares of that, tried first: they serve where the largest box is far from limits."""
 SHRINK = (0.004, 0.008, 0.015, 0.03, 0.06, 0.12, 0.25, 0.5, 0.75)
 """By how much the box to be proved is smaller than the refuted one, until all is proved."""
+HALVED = 0.5 ** np.arange(6)
+"""Shares of the largest box that are tried while neither a proof nor a broken limit is found."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,14 +119,20 @@ def safe_scale(
         box, shares = (centre, centre), (nominal_share, nominal_share)
         worth = ("guaranteed", "")
         return SafeScale(names, centre, None, *box, 0.0, centre, *shares, *worth, 0, seconds)
-    safe, unsafe, witness = most, np.inf, None
+    boxes = 0
     with told(progress) as tell:
-        done, boxes = _easily(search, 1 - nominal_share, most, budget, workers)
-        if not done:
+        for size in most * HALVED:
+            unsafe, witness = np.inf, None
+            done, looked = _easily(search, 1 - nominal_share, size, budget, workers)
+            boxes, safe = boxes + looked, size if done else 0.0
+            if done:
+                break
             search.gap = min(GAP, FINE * (1 - nominal_share))
-            refuted = _refuted(search, most, precision)
-            safe, unsafe, witness, more = _proved(search, refuted, most, budget, workers, tell)
-            boxes += more
+            refuted = _refuted(search, size, precision)
+            safe, unsafe, witness, looked = _proved(search, refuted, size, budget, workers, tell)
+            boxes += looked
+            if safe or witness is not None:
+                break
     share = 0.0 if witness is None else search.share(witness)
     worth = ("verified by sampling" if search.reason else "guaranteed", search.reason)
     seconds = time.perf_counter() - begun

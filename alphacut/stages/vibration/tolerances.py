@@ -15,6 +15,8 @@ import numpy as np
 from alphacut.case.case import Case
 from alphacut.case.limits import exceeded_limits
 from alphacut.frame import StoreyFrame
+from alphacut.frame.checks.admissible import RATIO
+from alphacut.frame.checks.admissible import wanted as admissible
 from alphacut.frame.decisions.safe_scale import SafeScale, safe_scale
 from alphacut.frame.outputs import output_unit
 from alphacut.fuzzy import FuzzyNumber, Interval, Signed, Triangular, propagate
@@ -30,8 +32,8 @@ from alphacut.stochastic.theta.truncated_normal import Array
 Range = Callable[[float], tuple[float, float]]
 SCALES = 13
 """Scales at which the range of the cell's modulus is computed; between them it is interpolated."""
-
-
+MEANINGFUL = 0.9
+"""Share of the scale at which a support reaches what its input must not be."""
 UNITS = {
     **{"E": "Pa", "matrix_modulus": "Pa", "inclusion_modulus": "Pa", "I": "m^4", "k": "N/m"},
     **{"m": "kg", "l": "m", "q": "m", "v": "m/s", "d": "N*s/m"},
@@ -64,6 +66,8 @@ class Tolerances:
         frame: The frame's parameters by name, in SI; without E where the cell gives it.
         cell: The cell's inputs, likewise; empty where the modulus is given.
         fixed: Fuzzy inputs that are held fixed.
+        most: Largest scale that was asked for.
+        ended: Why this is less than the caller asked for; empty where it is not.
     """
 
     found: SafeScale
@@ -71,6 +75,13 @@ class Tolerances:
     frame: Mapping[str, FuzzyNumber]
     cell: Mapping[str, FuzzyNumber]
     fixed: Sequence[str] = ()
+    most: float = 2.0
+    ended: str = ""
+
+    @property
+    def undecided(self) -> bool:
+        """Whether neither a proof nor a motion above the limit was found beyond the safe scale."""
+        return self.found.witness is None and (self.found.safe or 0.0) < self.most
 
     @property
     def intervals(self) -> dict[str, tuple[float, float]]:
@@ -91,6 +102,9 @@ class Tolerances:
         return {
             **(limits[0] if len(limits) == 1 else {"limits": limits}),
             "safe_scale": found.safe,
+            "most": self.most,
+            **({"most_reason": self.ended} if self.ended else {}),
+            "undecided": self.undecided,
             "unsafe_scale": None if np.isinf(found.unsafe) else found.unsafe,
             "gap": None if np.isinf(found.gap) else found.gap,
             "safe": {name: list(ends) for name, ends in self.intervals.items()},
@@ -137,6 +151,7 @@ def tolerances(
         raise BadInput.of("frame", "missing: safe tolerances are those of a storey frame")
     inputs = wanted.inputs(over.fuzzy)
     own = {name: x for name, x in inputs.items() if modulus_range is None or name != "E"}
+    most, ended = _with_meaning(wanted.frame, own, most)
 
     def reach(scale: float) -> tuple[Array, Array]:
         ends = _all_scaled(own, scale)
@@ -159,7 +174,22 @@ def tolerances(
     if cell is not None and found.safe and "E" in inputs:
         found = _within_cell(found, cell, list(inputs).index("E"))
     fixed = left_out(wanted, [task_of(case)])
-    return Tolerances(found, limits, own, cell.inputs if cell else {}, fixed)
+    return Tolerances(found, limits, own, cell.inputs if cell else {}, fixed, most, ended)
+
+
+def _with_meaning(
+    frame: StoreyFrame, own: Mapping[str, FuzzyNumber], most: float
+) -> tuple[float, str]:
+    """The largest scale, lowered to where every input has a meaning, and which one has none."""
+    ended = ""
+    for name, number in own.items():
+        (low, high), modal, rule = number.support, number.modal, admissible(frame, name)
+        ends = [modal / (modal - low)] if rule and low < modal else []
+        ends += [(1 - modal) / (high - modal)] if rule == RATIO and high > modal else []
+        if ends and MEANINGFUL * min(ends) < most:
+            most = MEANINGFUL * min(ends)
+            ended = f"{name}, which must be {rule}, has no meaning from {min(ends):.4g} on"
+    return most, ended
 
 
 def _limited(wanted: Structure, outputs: tuple[str, ...], case: Case) -> StoreyFrame:

@@ -96,3 +96,29 @@ def test_fuzzy_inputs_that_are_held_fixed_are_told(tmp_path, capfd):
     assert fixed in capfd.readouterr().out
     assert main(["tolerances", str(path), "--json", "-"]) == 0
     assert json.loads(capfd.readouterr().out)["fixed"] == ["m1"]
+
+
+def test_supports_are_not_scaled_to_where_an_input_has_no_meaning(tmp_path, capfd):
+    damped = CASE.replace('["50 N s/m"]\ndamper_placement = "storey"', '["50 N s/m"]').replace(
+        'dampers = ["50 N s/m"]', 'damping_ratio = "[1, 3, 6] %"'
+    )
+    wide = damped.replace('["E", "m1"]', '["m1", "zeta"]')
+    assert told(tmp_path, "1 m", "--json", "-", text=wide) == 0
+    found = json.loads(capfd.readouterr().out)
+    assert found["safe_scale"] == pytest.approx(found["most"])
+    assert found["most"] == pytest.approx(0.9 * 1.5)  # zeta is 0 at 1.5
+    assert found["safe"]["zeta"][0] > 0
+    assert found["most_reason"].startswith("zeta, which must be 0 or greater")
+    assert not found["undecided"]
+
+
+def test_what_is_neither_proved_nor_refuted_is_told_and_smaller_boxes_are_tried(tmp_path, capfd):
+    wide = CASE.replace("[900, 1000, 1100] kg", "[500, 1000, 1500] kg")
+    wide = wide.replace('"1000 kg"]', '"[400, 1000, 1600] kg"]').replace('"m1"]', '"m"]')
+    wide = wide.replace('"4 s"', '"1.5 s"').replace('"0.01 s"', '"0.02 s"')
+    assert told(tmp_path, "90 mm", "--json", "-", text=wide) == 0
+    found = json.loads(capfd.readouterr().out)
+    assert found["safe_scale"] > 0
+    assert found["undecided"] == (found["unsafe_scale"] is None)
+    assert main(["tolerances", str(tmp_path / "two.toml")]) == 0
+    assert ("undecided between" in capfd.readouterr().out) == found["undecided"]
