@@ -49,7 +49,7 @@ KEYS = {
     ),
 }
 READ = ("frame", "field", "pendulum", "tower", "envelope", "exceedance")
-GIVEN = ("modulus.value", "modulus.file", "modulus.measured")
+GIVEN = tuple(f"modulus.{x}" for x in ("value", "file", "measured", "claim", "bounds", "law"))
 UNEXPLAINED = {"--out": "", "--workers": "1", "--best-effort": "", "--strict": ""}
 OF_AUTO = ("modal", "improved-graph-follower")
 

@@ -1,8 +1,9 @@
-"""Checks that given values are numbers."""
+"""Checks that given values are numbers, and limits in words."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
+from math import floor, log10
 
 import numpy as np
 
@@ -46,3 +47,9 @@ def require_count(name: str, value: object, least: int | None) -> None:
         raise ValueError(
             f"{name}: {value!r} is not allowed; it must be a whole number, {least} or greater"
         )
+
+
+def below(value: float) -> str:
+    """A positive limit in two digits, rounded down, so that it keeps itself."""
+    unit = 10.0 ** (floor(log10(value)) - 1)
+    return f"{floor(value / unit * (1 + 1e-12)) * unit:.2g}"

@@ -10,6 +10,7 @@ import numpy as np
 
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.numbers import below
 from alphacut.frame.checks.corners import signs
 from alphacut.frame.checks.tolerance import LIMIT
 from alphacut.frame.dynamics.flow import Flow, LinearFlow, StepError
@@ -164,6 +165,6 @@ def require_stable(flow: Flow, cuts: Boxes) -> None:
         raise ValueError(
             f"step: {flow.step:g} s gives omega_max h = {fastest * flow.step:.3g}, where the scheme"
             f" {flow.integrator.name} is unstable; take at most some"
-            f" {flow.integrator.stability_limit / fastest:.2g} s, or the integrator exact, midpoint"
-            " or gauss4"
+            f" {below(flow.integrator.stability_limit / fastest)} s, or the integrator exact,"
+            " midpoint or gauss4"
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import atan, pi
 
+from alphacut.frame.calculus.numbers import below
 from alphacut.frame.dynamics.flow import nodes
 from alphacut.frame.structures.linear import LinearSystem, frequencies
 
@@ -57,10 +58,8 @@ class StepGuard:
                 f"{found}not above {LIMIT:g}, so that the step is short enough: by the midpoint"
                 f" rule the fastest mode {lag}"
             )
-        cure = (
-            f"take a step of at most {LIMIT / self.frequency:.2g} s, or check the units of masses"
-            " and stiffness"
-        )
+        most = below(LIMIT / self.frequency)
+        cure = f"take a step of at most {most} s, or check the units of masses and stiffness"
         return f"{found}above {LIMIT:g} the fastest mode {lag}; {cure}"
 
     def __repr__(self) -> str:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import floor, log10
 
 import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
+from alphacut.frame.calculus.numbers import below
 from alphacut.frame.outputs import output_unit
 
 LIMIT = 0.01
@@ -50,7 +50,7 @@ class ToleranceGuard:
         return (
             f"tolerance: {self.tolerance:.3g} {unit} is {100 * self.share:.3g} % of the peak of"
             f" {self.output}, {self.peak:.3g} {unit}; above {100 * LIMIT:g} % an envelope is rough;"
-            f" take at most {_below(self.cure)} {unit}, or a relative tolerance such as 0.001"
+            f" take at most {below(self.cure)} {unit}, or a relative tolerance such as 0.001"
         )
 
 
@@ -60,9 +60,3 @@ def tolerance_guard(flow: UnitFlow, tolerance: float) -> ToleranceGuard:
     wanted = tolerance * flow.scale
     worst = int(np.argmax(np.divide(wanted, peak, out=np.zeros_like(peak), where=peak > 0)))
     return ToleranceGuard(float(wanted[worst]), flow.outputs[worst], float(peak[worst]))
-
-
-def _below(value: float) -> str:
-    """Two digits, rounded down."""
-    unit = 10.0 ** (floor(log10(value)) - 1)
-    return f"{floor(value / unit * (1 + 1e-12)) * unit:.2g}"

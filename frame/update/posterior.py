@@ -199,10 +199,13 @@ def _require_of(
     frame: StoreyFrame, measured: Measurement, prior: Mapping[str, FuzzyNumber]
 ) -> None:
     for mode in measured.modes:
-        if max(mode.mode, mode.reference, *mode.shape, 1) > frame.floors:
+        if mode.mode > frame.floors:
             raise ValueError(
                 f"mode {mode.mode}: the frame has {frame.floors} floors, and as many modes"
             )
+        if (floor := max(mode.reference, *mode.shape, 1)) > frame.floors:
+            what = f"mode {mode.mode} has an amplitude q{floor}"
+            raise ValueError(f"{what}; the frame has {frame.floors} floors")
     for name, number in prior.items():
         if not widest(number).lower > 0:
             raise ValueError(

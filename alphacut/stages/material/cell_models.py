@@ -14,7 +14,7 @@ from alphacut.rve.auto.model import TABLED, AutoModel, RefinedModel
 from alphacut.rve.cell import Phase
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres.series.model import SphereSeriesModel
-from alphacut.rve.spheres.table.model import SphereTableModel
+from alphacut.rve.spheres.table.model import LEAST_ACCURACY, SphereTableModel
 from alphacut.rve.table.model import TableModel
 from alphacut.stages.material.cell import CellChoice, CellModel
 from alphacut.stochastic import RadiusMap
@@ -101,6 +101,9 @@ def made(choice: CellChoice) -> CellModel:
     if choice.particles == "spheres" and choice.method != "auto":
         if choice.method == "table":
             accuracy = SphereTableModel.accuracy if tolerance is None else TABLED * tolerance
+            if accuracy < LEAST_ACCURACY:
+                what = f"the accuracy of the table of spheres cannot keep {tolerance:g}"
+                raise ValueError(f"{what}; take 1.2e-05 or more, or method series")
             return SphereTableModel(accuracy, table_folder(), choice.moduli, choice.parallel)
         own = SphereSeriesModel.accuracy if tolerance is None else max(SHARE * tolerance, 1e-11)
         return SphereSeriesModel(accuracy=own)

@@ -16,7 +16,8 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 KEY = "update.measured"
 ALLOWED = "mode,frequency [Hz],q1,q2 … with the floors that were measured"
-
+MOST = 1e9
+"""Largest frequency in Hz, and amplitude."""
 RECORDED = "time [s],q1 [mm],a2 [m/s^2] … with the outputs that were recorded"
 
 
@@ -121,10 +122,13 @@ def _numbers(file: CsvFile, line: int, row: list[str], count: int) -> list[float
     if (
         len(values) != count
         or not (values[0] >= 1 and values[0] % 1 == 0)
-        or not 0 < values[1] < float("inf")
-        or np.isinf(values).any()
+        or not 1 / MOST < values[1] < MOST
+        or (np.abs(values[2:]) > MOST).any()
     ):
-        allowed = "a mode from 1, a positive frequency and amplitudes, points in the numbers"
+        allowed = (
+            f"a mode from 1, a frequency in Hz above 0 and amplitudes, none above {MOST:g}, with"
+            " points in the numbers"
+        )
         raise file.refuse(line, "this row is no measured mode", ",".join(row), allowed)
     return values
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from alphacut.frame import guard
 from alphacut.frame.boxes import UnitFlow, boxes
+from alphacut.frame.calculus.numbers import below
 from alphacut.frame.certificate.remainder import MOST_PARAMETERS
 from alphacut.frame.checks.between_nodes import stray
 from alphacut.frame.checks.tolerance import tolerance_guard
@@ -111,7 +112,7 @@ def coarse_nodes(wanted: Structure, task: EnvelopeTask) -> Iterator[Problem]:
         what = (
             f"{task.step:g} s between nodes and a first natural period of {2 * pi / slowest:.3g} s:"
             f" up to {100 * missed:.0f} % of a peak may lie between two nodes; take at most"
-            f" {2 * acos(1 - MISSED) / slowest:.2g} s"
+            f" {below(2 * acos(1 - MISSED) / slowest)} s"
         )
         yield Problem("envelope.step", what)
 
