@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 
 from alphacut.case.case import Case
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import Problem, refuse
 
 STEERED = ("auto", "modal", "graph-follower", "improved-graph-follower")
 FOLLOWERS = ("graph-follower", "improved-graph-follower")
@@ -67,19 +67,9 @@ def require_read(case: Case, sections: Collection[str], command: str) -> None:
         for key in sorted(case.changed)
         if key not in sections and not any(key.startswith(f"{name}.") for name in sections)
     ]
-    if unread:
-        raise BadInput(
-            [
-                Problem(
-                    key,
-                    f"command {command} does not read this key",
-                    str(case.written[key]),
-                    f"keys of {', '.join(sections)}",
-                    file="command line",
-                )
-                for key in unread
-            ]
-        )
+    what, allowed = f"command {command} does not read this key", f"keys of {', '.join(sections)}"
+    where = "command line"
+    refuse([Problem(x, what, str(case.written[x]), allowed, file=where) for x in unread])
 
 
 def changed_moduli(case: Case) -> list[str]:

@@ -13,6 +13,7 @@ from alphacut.io.units import engineering
 from alphacut.report.envelopes import between
 from alphacut.report.figures import listed, picture
 from alphacut.report.tables import paragraphs, section, sentence, table
+from alphacut.stages.measure_next import GAINS
 from alphacut.stages.vibration import decision, joint, update
 
 
@@ -97,6 +98,3 @@ def next_measured(folder: Path) -> Markup:
     drawn = picture(folder / "figures" / f"{stem}.svg", caption(stem, paper=False))
     note = [sentence(found["note"])] if found["note"] else []
     return section("What to measure next", paragraphs(*words, *note), table(head, rows), drawn)
-
-
-GAINS = ("half", "half_least", "exact", "exact_least")

@@ -30,6 +30,7 @@ from alphacut.stages.width_shares import cell_range, thinned
 
 TOLERANCE = 1e-3
 """Error of the envelopes, as a share of each output's peak."""
+GAINS = ("half", "half_least", "exact", "exact_least")
 
 
 def measure_next(
@@ -149,15 +150,7 @@ def advice_document(found: Advice, answer: str, fixed: Sequence[str] = ()) -> Do
         "width": found.width,
         "error": found.error,
         "alpha": found.alpha,
-        "gains": {
-            x.name: {
-                "half": unit * x.half,
-                "half_least": unit * x.half_least,
-                "exact": unit * x.exact,
-                "exact_least": unit * x.exact_least,
-            }
-            for x in found.gains
-        },
+        "gains": {x.name: {key: unit * getattr(x, key) for key in GAINS} for x in found.gains},
         "fixed": list(fixed),
         "note": found.note,
     }

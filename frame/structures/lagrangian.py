@@ -184,14 +184,7 @@ def pendulum(
 
     return LagrangianSystem(
         coordinates=1,
-        parameters={
-            "m": mass,
-            "l": length,
-            "d": damping,
-            "g": gravity,
-            "phi_0": phi0,
-            "omega_0": omega0,
-        },
+        parameters=dict(m=mass, l=length, d=damping, g=gravity, phi_0=phi0, omega_0=omega0),
         lagrangian=lagrangian,
         initial=lambda p: ([p["phi_0"]], [p["omega_0"]]),
         observed={

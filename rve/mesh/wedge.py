@@ -51,20 +51,8 @@ def wedge() -> basix.finite_element.FiniteElement:
     evaluations = [
         [np.eye(len(p)).reshape(len(p), 1, len(p), 1) for p in entity] for entity in points
     ]
-    return basix.create_custom_element(
-        PRISM,
-        [],
-        _coefficients(),
-        points,
-        evaluations,
-        0,
-        basix.MapType.identity,
-        basix.SobolevSpace.H1,
-        False,
-        1,
-        2,
-        basix.PolysetType.standard,
-    )
+    kind = 0, basix.MapType.identity, basix.SobolevSpace.H1, False, 1, 2, basix.PolysetType.standard
+    return basix.create_custom_element(PRISM, [], _coefficients(), points, evaluations, *kind)
 
 
 def slab_rule(*, planar_degree: int = 4, layer_points: int = 3) -> tuple[Array, Array]:
