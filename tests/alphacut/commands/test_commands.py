@@ -4,6 +4,7 @@ whatever the workers.
 
 import json
 import os
+import re
 import subprocess
 import sys
 import warnings
@@ -17,6 +18,7 @@ from alphacut.case.sections.vibration import ENVELOPE_METHODS
 from alphacut.commands.parser import split_petsc
 from alphacut.entry import COMMANDS, main, parsers
 from alphacut.io.files import as_json, rank, standard_output, whole_file
+from alphacut.io.output_paths import alone
 from alphacut.io.problem import BadInput
 from alphacut.stages.vibration.envelope import method_options
 from alphacut.stages.vibration.envelope_task import task_of
@@ -383,6 +385,31 @@ DRAWN_ELSEWHERE = ("concrete", "paper-literal", "building")
 VARIANTS = ("concrete", "paper-literal")  # of the paper's case, run in the slow tests
 
 
+MEASURED = """
+schema = 1
+title = "Measured moduli"
+about = "One floor, for tests."
+stages = ["modulus", "envelope"]
+[modulus]
+measured = "m.csv"
+claim = "mean"
+bounds = ["10 GPa", "60 GPa"]
+[frame]
+masses = ["10 t"]
+lengths = "3 m"
+second_moment = "1e-5 m^4"
+dampers = "50 N s/m"
+damper_placement = "ground"
+displacements = "10 mm"
+velocities = "0.1 m/s"
+[envelope]
+fuzzy = ["E"]
+duration = "1 s"
+step = "0.05 s"
+alpha = [0.5, 1]
+"""
+
+
 def quick_run(path, folder, capfd, *more):
     """Summary of the quick form."""
     assert main(["run", str(path), "--quick", "--out", str(folder), "--quiet", *more]) == 0, (
@@ -420,6 +447,39 @@ def test_the_program_ends_with_its_status_its_output_and_what_was_left_for_the_e
     )
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert (run.returncode, run.stdout, run.stderr) == (3, "first\nlast\n", "")
+
+
+def test_a_run_refuses_a_folder_that_another_run_writes_into(tmp_path, capfd):
+    command = ["run", PAPER, "--quick", "--out", str(tmp_path), "--quiet"]
+    with alone("--out", tmp_path):
+        assert main(command) == 2
+    assert "another run is writing into this folder" in capfd.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_claim_of_measured_moduli_is_a_key_of_envelopes_too(tmp_path, capfd):
+    (tmp_path / "m.csv").write_text("E [GPa]\n30\n31\n29.5\n32\n30.4\n", encoding="utf-8")
+    path, tops = tmp_path / "c.toml", []
+    path.write_text(MEASURED, encoding="utf-8")
+    for claim in ("mean", "next value"):
+        words = ["envelope", str(path), "--json", "-", "--quiet", "--set"]
+        assert main([*words, f'modulus.claim="{claim}"']) == 0, capfd.readouterr().err
+        tops.append(json.loads(capfd.readouterr().out)["max"][0][0])
+    assert abs(tops[0] - tops[1]) > 1e-4
+
+
+@pytest.mark.parametrize("integrator", ["midpoint", "rk4"])
+def test_a_step_that_is_too_long_is_told_one_that_is_not(integrator, tmp_path, capfd):
+    path, (head, _, rest) = tmp_path / "c.toml", MEASURED.partition("[modulus]")
+    path.write_text(head.replace('"modulus", ', "") + rest[rest.index("[frame]") :], "utf-8")
+    words = ["envelope", str(path), "--set", 'frame.modulus="[20, 25, 30] GPa"', "--quiet"]
+    words += ["--method", "vertex", "--set", f"envelope.integrator={integrator}", "--strict"]
+    assert main([*words, "--step", "0.5", "--duration", "2"]) == 2
+    most = re.search(r"take (?:a step of )?at most (?:some )?([\d.]+) s", capfd.readouterr().err)
+    main([*words, "--step", most[1], "--duration", f"{20 * float(most[1]):g}"])
+    told = capfd.readouterr().err
+    assert "omega_max h" not in told
+    assert "duration" not in told
 
 
 @pytest.mark.parametrize(

@@ -122,3 +122,15 @@ def test_what_is_neither_proved_nor_refuted_is_told_and_smaller_boxes_are_tried(
     assert found["undecided"] == (found["unsafe_scale"] is None)
     assert main(["tolerances", str(tmp_path / "two.toml")]) == 0
     assert ("undecided between" in capfd.readouterr().out) == found["undecided"]
+
+
+def test_ratios_of_damping_stay_below_the_critical(tmp_path, capfd):
+    wide = CASE.replace(
+        'dampers = ["50 N s/m"]\ndamper_placement = "storey"', "damping_ratio = 0.5"
+    )
+    wide = wide.replace("damping_ratio = 0.5", 'damping_ratio = "[0.4, 0.5, 0.8]"')
+    wide = wide.replace('["E", "m1"]', '["zeta"]')
+    assert told(tmp_path, "1 m", "--json", "-", "--most", "4", text=wide) == 0
+    found = json.loads(capfd.readouterr().out)
+    assert found["most"] == pytest.approx(0.9 * 0.5 / 0.3)
+    assert found["safe"]["zeta"][1] < 1

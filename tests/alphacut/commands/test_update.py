@@ -84,7 +84,10 @@ def test_figures_and_envelopes_before_and_after(
         ("mode,frequency,q1,q2\n1,2,1\n", "no measured mode"),
         ("mode,frequency,q1,q2\n1,2,1,1\n1,2,,1\n", "in some rows only"),
         ("mode,frequency,q1,q2\n", "needs a header and a row"),
-        ("mode,frequency,q1,q9\n1,2,1,1\n", "4 floors"),
+        ("mode,frequency,q1,q9\n1,2,1,1\n", "mode 1 has an amplitude q9; the frame has 4 floors"),
+        ("mode,frequency,q1,q2\n1,1e300,1,1\n", "none above 1e+09"),
+        ("mode,frequency,q1,q2\n1,1e-300,1,1\n", "no measured mode"),
+        ("mode,frequency,q1,q2\n1,2,1e160,1\n", "none above 1e+09"),
         ("mode,frequency,q1,q2\n7,2,1,1\n", "4 floors"),
     ],
 )
