@@ -37,8 +37,8 @@ def open_streams() -> None:
     while (handle := os.open(os.devnull, os.O_RDWR)) < 3:
         os.set_inheritable(handle, True)
     os.close(handle)
-    sys.stdout = sys.stdout or os.fdopen(1, "w", encoding="utf-8")
-    sys.stderr = sys.stderr or os.fdopen(2, "w", encoding="utf-8")
+    sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - to the end
+    sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
 
 
 def leave(status: int) -> NoReturn:
@@ -121,7 +121,8 @@ def standard_output(json_to_stdout: bool) -> Iterator[TextIO]:
     With ``--json -`` everything that libraries print, C ones too, goes to standard error, so that
     the one JSON object stands alone; on every MPI rank but the first, nothing is printed at all.
     """
-    if rank() == 0 and not json_to_stdout:
+    closed = getattr(sys.stdout, "name", "") == os.devnull  # another file may stand in its place
+    if rank() == 0 and (closed or not json_to_stdout):
         yield sys.stdout
         return
     sys.stdout.flush()

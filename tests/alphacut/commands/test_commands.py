@@ -488,6 +488,7 @@ def test_a_step_that_is_too_long_is_told_one_that_is_not(integrator, tmp_path, c
         (">&-", 0, ""),
         (">&- 2>&-", 0, ""),
         ("| true", 0, ""),
+        ("--json - >&-", 0, ""),
         (
             "> /dev/full",
             1,
@@ -496,7 +497,12 @@ def test_a_step_that_is_too_long_is_told_one_that_is_not(integrator, tmp_path, c
     ],
 )
 def test_streams_that_are_closed_or_full_leave_no_traceback(streams, status, said, tmp_path):
-    command = f"{sys.executable} -m alphacut check {PAPER} {streams}; exit ${{PIPESTATUS[0]}}"
+    words = (
+        ("spectrum", str(CASES / "building.record.csv"), "--quiet")
+        if "json" in streams
+        else ("check", PAPER)
+    )
+    command = f"{sys.executable} -m alphacut {' '.join(words)} {streams}; exit ${{PIPESTATUS[0]}}"
     run = subprocess.run(["bash", "-c", command], capture_output=True, text=True)
     assert (run.returncode, run.stderr) == (status, said)
 
