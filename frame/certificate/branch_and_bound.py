@@ -197,13 +197,9 @@ class Tree:
         row_box, row_node = box[begin], node[begin]
         started, together = self._parts
         jets = together.jets(centre)
-        rows, begin = (
-            np.searchsorted(row_box, np.arange(len(centre) + 1)),
-            np.append(begin, len(box)),
-        )
-        count = self.model.count
+        rows, count = np.searchsorted(row_box, np.arange(len(centre) + 1)), self.model.count
         forced = self._forced(jets[:, 0, :count], row_box, row_node)
-        place = centre, radius, edges, rows, begin
+        place = centre, radius, edges, rows, np.append(begin, len(box))
         return Piece(*place, row_node, column, jets, count, started, forced)
 
     @cached_property

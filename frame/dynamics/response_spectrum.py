@@ -142,7 +142,8 @@ def _largest(q: Array, v: Array, h: float) -> float:
     both = -(square + np.copysign(root, square))
     top = float(np.abs(q).max())
     for over, under in ((a, both), (both, 3 * cube)):
-        s = np.clip(np.divide(over, under, out=np.zeros_like(a), where=under != 0), 0.0, 1.0)
+        with np.errstate(over="ignore"):  # a root far outside the step
+            s = np.divide(over, under, out=np.zeros_like(a), where=under != 0).clip(0.0, 1.0)
         top = max(top, float(np.abs(q[:-1] + s * (a + s * (square + s * cube))).max()))
     return top
 

@@ -19,7 +19,7 @@ from alphacut.frame.checks.admissible import RATIO
 from alphacut.frame.checks.admissible import wanted as admissible
 from alphacut.frame.decisions.safe_scale import SafeScale, safe_scale
 from alphacut.frame.outputs import output_unit
-from alphacut.fuzzy import FuzzyNumber, Interval, Signed, Triangular, propagate
+from alphacut.fuzzy import CampaignError, FuzzyNumber, Interval, Signed, Triangular, propagate
 from alphacut.io.files import Document
 from alphacut.io.problem import BadInput
 from alphacut.io.progress import Tick
@@ -144,14 +144,14 @@ def tolerances(
     limits, over = exceeded_limits(case), case.envelope
     given = handed is not None or case.frame.modulus is not None or case.frame.stiffness is not None
     cell = None if given else campaign(case)
-    modulus_range = None if cell is None else _cell_range(cell, most)
+    modulus_range, most, ended = (None, most, "") if cell is None else _cell_range(cell, most)
     modulus = handed if cell is None or modulus_range is None else _triangle(modulus_range)
     wanted = structure(case, modulus)
     if wanted.frame is None:
         raise BadInput.of("frame", "missing: safe tolerances are those of a storey frame")
     inputs = wanted.inputs(over.fuzzy)
     own = {name: x for name, x in inputs.items() if modulus_range is None or name != "E"}
-    most, ended = _with_meaning(wanted.frame, own, most)
+    most, ended = _with_meaning(wanted.frame, own, most, ended)
 
     def reach(scale: float) -> tuple[Array, Array]:
         ends = _all_scaled(own, scale)
@@ -178,16 +178,15 @@ def tolerances(
 
 
 def _with_meaning(
-    frame: StoreyFrame, own: Mapping[str, FuzzyNumber], most: float
+    frame: StoreyFrame, own: Mapping[str, FuzzyNumber], most: float, ended: str
 ) -> tuple[float, str]:
-    """The largest scale, lowered to where every input has a meaning, and which one has none."""
-    ended = ""
+    """The largest scale, lowered to 1 or where every input has a meaning, and which has none."""
     for name, number in own.items():
         (low, high), modal, rule = number.support, number.modal, admissible(frame, name)
         ends = [modal / (modal - low)] if rule and low < modal else []
         ends += [(1 - modal) / (high - modal)] if rule == RATIO and high > modal else []
-        if ends and MEANINGFUL * min(ends) < most:
-            most = MEANINGFUL * min(ends)
+        if ends and min(ends) <= most > 1:
+            most = max(MEANINGFUL * min(ends), 1.0)
             ended = f"{name}, which must be {rule}, has no meaning from {min(ends):.4g} on"
     return most, ended
 
@@ -207,31 +206,34 @@ def _limited(wanted: Structure, outputs: tuple[str, ...], case: Case) -> StoreyF
 
 def _moduli(cell: Campaign, scale: float) -> tuple[float, float]:
     """Range of E over the cell's supports at a scale, by the corners that the proved signs give."""
-    inputs = {}
-    for name, number in cell.inputs.items():
-        low, high = _scaled(number, scale)
-        inputs[name] = Interval(low, high)
+    inputs = {name: Interval(*ends) for name, ends in _all_scaled(cell.inputs, scale).items()}
+    plan, shared, known = Signed(outputs=("E",)), cell.shared, cell.known
     found = propagate(
-        cell.task,
-        inputs,
-        Signed(outputs=("E",)),
-        alpha=[1.0],
-        shared=cell.shared,
-        known=cell.known,
-        progress=False,
+        cell.task, inputs, plan, alpha=[1.0], shared=shared, known=known, progress=False
     )
     lower, upper = found.bounds("E")
     return float(lower[0]), float(upper[0])
 
 
-def _cell_range(cell: Campaign, most: float) -> Range:
-    """Range of E by scale, monotone between computed ones."""
+def _cell_range(cell: Campaign, most: float) -> tuple[Range, float, str]:
+    """Range of E by scale, monotone between computed ones; the last of them, and why it is."""
     from scipy.interpolate import PchipInterpolator
 
-    scales = np.linspace(0, most, SCALES)
-    ends = np.array([_moduli(cell, float(scale)) for scale in scales])
-    low, high = (PchipInterpolator(scales, ends[:, side]) for side in (0, 1))
-    return lambda scale: (float(low(scale)), float(high(scale)))
+    scales = np.union1d(np.linspace(0, most, SCALES), min(most, 1.0))
+    ends, ended = list[tuple[float, float]](), ""
+    for scale in map(float, scales):
+        try:
+            ends.append(_moduli(cell, scale))
+        except CampaignError as error:
+            if scale <= 1:  # the case's own supports
+                raise
+            ended = (
+                f"at {scale:.4g} the cell has no modulus: {error.failures[0][1].partition(': ')[2]}"
+            )
+            break
+    scales, both = scales[: len(ends)], np.array(ends)
+    low, high = (PchipInterpolator(scales, both[:, side]) for side in (0, 1))
+    return lambda scale: (float(low(scale)), float(high(scale))), float(scales[-1]), ended
 
 
 def _triangle(modulus: Range) -> FuzzyNumber:

@@ -6,6 +6,8 @@ import re
 import pytest
 
 from alphacut.entry import main
+from alphacut.fuzzy import CampaignError
+from alphacut.stages.vibration import tolerances
 
 CASE = """
 schema = 1
@@ -122,6 +124,37 @@ def test_what_is_neither_proved_nor_refuted_is_told_and_smaller_boxes_are_tried(
     assert found["undecided"] == (found["unsafe_scale"] is None)
     assert main(["tolerances", str(tmp_path / "two.toml")]) == 0
     assert ("undecided between" in capfd.readouterr().out) == found["undecided"]
+
+
+@pytest.mark.parametrize("light", ["10 kg", "300 kg"])
+def test_the_supports_of_the_case_are_within_reach_however_near_the_end_they_are(
+    light, tmp_path, capfd
+):
+    wide = CASE.replace("[900, 1000, 1100] kg", f"[{light[:-3]}, 1000, 1100] kg")
+    wide = wide.replace('["E", "m1"]', '["m1"]')
+    assert told(tmp_path, "1 m", "--json", "-", text=wide) == 0
+    found = json.loads(capfd.readouterr().out)
+    limit = 1000 / (1000 - float(light[:-3]))
+    assert found["most"] == pytest.approx(max(1, 0.9 * limit))
+    assert told(tmp_path, "1 m", "--json", "-", "--most", f"{0.95 * limit:.3f}", text=wide) == 0
+    assert "most_reason" not in json.loads(capfd.readouterr().out)
+
+
+def test_a_cell_without_a_modulus_ends_the_scales_and_not_the_command(monkeypatch):
+    def moduli(cell, scale):
+        if scale > cell:
+            raise CampaignError([({}, "ValueError: Young's modulus is -1 Pa")], 2)
+        return 10 - scale, 10 + scale
+
+    monkeypatch.setattr(tolerances, "_moduli", moduli)
+    reach, most, ended = tolerances._cell_range(1.5, 2.0)
+    assert most == 1.5
+    assert reach(1.5) == pytest.approx((8.5, 11.5))
+    assert ended == "at 1.667 the cell has no modulus: Young's modulus is -1 Pa"
+    assert tolerances._cell_range(3, 1.7)[1:] == (1.7, "")
+    assert tolerances._cell_range(1.01, 1.7)[1] == 1
+    with pytest.raises(CampaignError):
+        tolerances._cell_range(0.9, 1.7)
 
 
 def test_ratios_of_damping_stay_below_the_critical(tmp_path, capfd):
