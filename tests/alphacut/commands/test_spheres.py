@@ -79,7 +79,10 @@ def test_text_says_what_e_is(capfd):
     [
         (["--method", "prism"], "this model is one of cylinders"),
         (["--method", "slices"], "this model is one of cylinders"),
-        (["--method", "table", "--tolerance", "1e-7"], "accuracy of the table of spheres"),
+        (
+            ["--method", "table", "--tolerance", "1e-7"],
+            "cannot keep 1e-07; take 1.2e-05 or more, or method series",
+        ),
         (["--method", "series", "--radius", "1.2"], "--radius = 1.2: out of range"),
         (["--method", "series", "--radius", "nan"], "--radius = nan: out of range"),
         (["--method", "series", "--radius", "0.5", "--a2", "0.2"], "no effect beside --radius"),
