@@ -15,6 +15,10 @@ LEAST = 250
 """Problems below which a piece costs more than it saves."""
 USUAL = 6
 """Newton steps after which quadratic models are maximised over all faces: the rest is on ridges."""
+BEGUN = 1.0
+"""Trust region's first radius; half as much costs a third more evaluations."""
+WIDTH = 2.0
+"""Of the unit box."""
 ITERATIONS = 300
 """Newton steps after which a problem that has not converged is left as it is."""
 
@@ -35,7 +39,7 @@ def _newton(
 
     What the models last promised is kept in `optima.left`.
     """
-    radius: Array = np.full(len(which), 0.5)
+    radius: Array = np.full(len(which), BEGUN)
     f, g, H = _signed(model, optima, optima.point[which], which)
     bend = np.zeros_like(H)  # what gradients have shown H to lack
     for count in range(ITERATIONS):
@@ -49,7 +53,8 @@ def _newton(
         promised = gain(g, H, step)
         optima.left[which] = promised
         held = np.abs(step).max(1, initial=0.0) >= 0.999 * radius
-        open_ = (promised > small) | (held & (promised > 1e-3 * small))
+        # held back, it may promise as much more in the whole box as a parabola does
+        open_ = promised * np.where(held, np.minimum((WIDTH / radius) ** 2, 1e3), 1.0) > small
         if not open_.all():
             which, radius, step, promised, g, H, bend = (
                 x[open_] for x in (which, radius, step, promised, g, H, bend)
@@ -60,9 +65,10 @@ def _newton(
         step = trial - optima.point[which]
         f, g2, H2 = _signed(model, optima, trial, which)
         if model.secant:
-            lack = _symmetric_rank_one(H2 + bend, step, g2 - g)
-            bend += lack
-            H, H2 = H + lack, H2 + bend
+            H2 += bend
+            lack = _symmetric_rank_one(H2, step, g2 - g)
+            for x in (bend, H, H2):
+                x += lack
         got = f - optima.value[which]
         better = got > 0
         optima.point[which[better]], optima.value[which[better]] = trial[better], f[better]
@@ -70,7 +76,7 @@ def _newton(
         ratio = got / promised
         radius = np.where(
             ratio > 0.75,
-            np.minimum(2 * radius, 2.0),
+            np.minimum(2 * radius, WIDTH),
             np.where(ratio < 0.25, 0.3 * np.abs(step).max(1), radius),
         )
 
@@ -91,4 +97,5 @@ def _signed(
     """Side × output with gradient and Hessian, of problems `which` at points (W, d)."""
     side = optima.side[which]
     f, g, H = model.at(points, optima.node[which], optima.output[which])
-    return side * f, side[:, None] * g, side[:, None, None] * H
+    H *= side[:, None, None]
+    return side * f, side[:, None] * g, H
