@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,6 +21,7 @@ from alphacut.io.netcdf import finished
 from alphacut.io.output_paths import check_destinations
 from alphacut.io.problem import BadInput, missing
 from alphacut.io.provenance import door, own_version
+from alphacut.rve.interruption import stoppable
 from alphacut.rve.solver.options import OptionError
 
 NAMES = (
@@ -60,7 +62,7 @@ exit status:
   1    a computation failed: one line says which and what to do
   2    bad input: one line for each problem; nothing was computed or written
   3    a campaign ended with failed samples: the others are kept
-  130  interrupted; one line says whether what was finished is kept
+  130  interrupted, 143 by SIGTERM, 129 by SIGHUP; one line says what is kept
 """
 
 
@@ -117,35 +119,34 @@ def main(
     """
     options = argparse.Namespace(command="")
     open_streams()
-    try:
-        ours, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
-        commands = (COMMANDS if names is None else Commands(names)).meant(ours)
-        top, made = parsers(program, commands)
-        options, left = top.parse_known_args(ours)
-        if left:
-            made[options.command].refuse([word for word in left if word.startswith("-")] or left)
-        refuse_petsc(commands[options.command].__name__.rpartition(".")[2], petsc)
-        check_destinations(made[options.command], options)
-        with standard_output(getattr(options, "json", None) == "-") as out, plain_warnings():
-            return int(commands[options.command].run(options, petsc, out))
-    except BadInput as error:
-        for problem in error.problems:
-            say(str(problem))
-        return 2
-    except OptionError as error:
-        say(str(error))
-        return 2
-    except KeyboardInterrupt:
-        say(f"interrupted; {interrupted(options)}")
-        return 130
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        return 0
-    except CampaignError as error:
-        say(pasted(str(error)))
-        return 3
-    except (RuntimeError, ValueError, ArithmeticError, OSError, MemoryError, ImportError) as error:
-        return failed(error)
+    with stoppable() as came:
+        try:
+            ours, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
+            commands = (COMMANDS if names is None else Commands(names)).meant(ours)
+            top, made = parsers(program, commands)
+            options, left = top.parse_known_args(ours)
+            if left:
+                made[options.command].refuse([one for one in left if one.startswith("-")] or left)
+            refuse_petsc(commands[options.command].__name__.rpartition(".")[2], petsc)
+            check_destinations(made[options.command], options)
+            with standard_output(getattr(options, "json", None) == "-") as out, plain_warnings():
+                return int(commands[options.command].run(options, petsc, out))
+        except (BadInput, OptionError) as error:
+            for problem in getattr(error, "problems", [error]):
+                say(str(problem))
+            return 2
+        except KeyboardInterrupt:
+            how = f"ended by {signal.Signals(came[0]).name}" if came else "interrupted"
+            say(f"{how}; {interrupted(options)}")
+            return 128 + (came or [signal.SIGINT])[0]
+        except BrokenPipeError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+            return 0
+        except CampaignError as error:
+            say(pasted(str(error)))
+            return 3
+        except (RuntimeError, ValueError, ArithmeticError, OSError, MemoryError, ImportError) as e:
+            return failed(e)
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Ctrl-C that waits for the end of what it would garble."""
+"""Ctrl-C, SIGTERM and SIGHUP end a program in order, and wait for the end of what they garble."""
 
 from __future__ import annotations
 
@@ -6,22 +6,58 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import FrameType
+
+_STOPS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+
+
+@contextmanager
+def stoppable() -> Iterator[list[int]]:
+    """Let SIGTERM and SIGHUP interrupt the block as Ctrl-C does; gives the number that came.
+
+    The first alone, for `timeout` and batch systems send one to a process and one to its group.
+    What was ignored before, as under nohup, stays ignored.
+    """
+    main, came = threading.current_thread() is threading.main_thread(), list[int]()
+    kept = {one: signal.getsignal(one) for one in _STOPS if main}
+    kept = {one: how for one, how in kept.items() if how not in (None, signal.SIG_IGN)}
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        came.append(number)
+        pressed = signal.getsignal(signal.SIGINT)
+        if len(came) == 1:
+            (pressed if callable(pressed) else signal.default_int_handler)(number, frame)
+
+    for one in kept:
+        signal.signal(one, stop)
+    try:
+        yield came
+    finally:
+        for one, how in kept.items():
+            signal.signal(one, how)
 
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Hold Ctrl-C back to the end of the block.
+    """Hold Ctrl-C, and what stops as it does, back to the end of the block.
 
-    PETSc loses what Python raises below it; basix and DOLFINx, while they are imported, abort.
+    PETSc loses what Python raises below it; basix and DOLFINx, while they are imported, abort, and
+    MPI takes signals for itself.
     """
     before, held = signal.getsignal(signal.SIGINT), list[int]()
-    if threading.current_thread() is not threading.main_thread() or not callable(before):
+    main, kept = (
+        threading.current_thread() is threading.main_thread(),
+        map(signal.getsignal, _STOPS),
+    )
+    taken = [(one, how) for one, how in zip(_STOPS, kept, strict=True) if how is not None]
+    if not main or before in (None, signal.SIG_DFL):
         yield
         return
     signal.signal(signal.SIGINT, lambda number, _: held.append(number))
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
-        if held:
-            before(held[0], None)
+        for one, how in [(signal.SIGINT, before), *taken]:
+            signal.signal(one, how)
+        if held and (callable(before) or held[-1] != signal.SIGINT):  # else ignored
+            (before if callable(before) else signal.default_int_handler)(held[-1], None)

@@ -4,8 +4,8 @@ PETSc reads ``~/.petscrc`` when it is first imported, DOLFINx imports it too: im
 before either. Open MPI's transports for one-sided messages over fabrics, which nothing here sends,
 take up to a second to look for a fabric when MPI starts; they are left out unless the caller names
 transports. UCX rewrites the process's functions of memory to watch them, which takes 0.05 s and
-serves fabrics alone; it does not unless the caller asks for it. Options stand under the project's
-prefix; what PETSc does not use is an error.
+serves fabrics alone; it does not unless the caller asks for it. Signals stay the program's. Options
+stand under the project's prefix; what PETSc does not use is an error.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ os.environ.setdefault("UCX_MEM_EVENTS", "n")
 with uninterrupted():
     import petsc4py
 
-    petsc4py.init(["alphacut", "-skip_petscrc"])
+    petsc4py.init(["alphacut", "-skip_petscrc", "-no_signal_handler"])
     from petsc4py import PETSc as PETSc
 
 if TYPE_CHECKING:

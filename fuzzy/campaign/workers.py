@@ -16,6 +16,7 @@ from typing import ParamSpec, TypeVar
 P = ParamSpec("P")
 T = TypeVar("T")
 _WATCH = 0.2  # seconds between looks at the parent
+_GROUP = [signal.SIGHUP] if hasattr(signal, "SIGHUP") else []  # not on Windows
 
 
 class ProcessPool(Executor):
@@ -63,9 +64,15 @@ class ProcessPool(Executor):
 def _processes(workers: int) -> Executor:
     from joblib.externals.loky import ProcessPoolExecutor
 
-    made: Executor = ProcessPoolExecutor(
-        workers, initializer=_end_with_parent, initargs=(os.getpid(),)
-    )
+    # loky's tracker of semaphores begins here and inherits what is blocked: it must outlive this
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, _GROUP) if _GROUP else None
+    try:
+        made: Executor = ProcessPoolExecutor(
+            workers, initializer=_end_with_parent, initargs=(os.getpid(),)
+        )
+    finally:
+        if mask is not None:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     return made
 
 
@@ -140,8 +147,9 @@ def _end_with_parent(parent: int) -> None:
     """Leave when the process that started this one is gone: a killed campaign leaves no orphans."""
     from threading import Thread
 
-    # Ctrl-C reaches the whole group; the parent decides
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # These reach the whole group; the parent decides
+    for number in (signal.SIGINT, *_GROUP):
+        signal.signal(number, signal.SIG_IGN)
 
     def watch() -> None:
         while os.getppid() == parent:

@@ -1,4 +1,4 @@
-"""Ctrl-C while basix and DOLFINx are imported waits for their end, and is one line then."""
+"""Ctrl-C and SIGTERM while basix and DOLFINx are imported wait for their end; then, one line."""
 
 import ast
 import subprocess
@@ -16,7 +16,7 @@ class Pressed:
     def find_spec(self, name, path, target=None):
         if name == "{at}" and self in sys.meta_path:
             sys.meta_path.remove(self)
-            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), signal.{signal})
 
 sys.meta_path.insert(0, Pressed())
 status = main(["cell", "cases/paper.toml", "--method", "{method}"])
@@ -24,6 +24,10 @@ print(status, "{last}" in sys.modules)
 """
 
 
+@pytest.mark.parametrize(
+    ("signal", "status", "how"),
+    [("SIGINT", 130, "interrupted"), ("SIGTERM", 143, "ended by SIGTERM")],
+)
 @pytest.mark.parametrize(
     ("at", "method", "last"),
     [
@@ -34,16 +38,35 @@ print(status, "{last}" in sys.modules)
     ],
 )
 def test_it_ends_with_the_usual_status_once_the_import_is_done(
-    at, method, last, tmp_path, monkeypatch
+    at, method, last, signal, status, how, tmp_path, monkeypatch
 ):
     if at == "dolfinx.cpp":  # which is imported where FFCx's integral was not made before
         monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    program = PROGRAM.format(at=at, method=method, last=last)
+    program = PROGRAM.format(at=at, method=method, last=last, signal=signal)
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT, check=False
     )
-    assert (done.returncode, done.stdout) == (0, "130 True\n")
-    assert done.stderr == "alphacut: interrupted; nothing is kept\n"
+    assert (done.returncode, done.stdout) == (0, f"{status} True\n")
+    assert done.stderr == f"alphacut: {how}; nothing is kept\n"
+
+
+@pytest.mark.parametrize(("number", "ends"), [("SIGINT", "True"), ("SIGTERM", "False")])
+def test_where_ctrl_c_is_ignored_the_others_still_wait_for_the_end(number, ends):
+    program = f"""
+import os, signal
+from alphacut.rve.interruption import stoppable, uninterrupted
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+try:
+    with stoppable(), uninterrupted():
+        os.kill(os.getpid(), signal.{number})
+        print("through", end=" ")
+except KeyboardInterrupt:
+    print(False)
+else:
+    print(True)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT)
+    assert done.stdout == f"through {ends}\n", done.stderr
 
 
 def imported_at_once(tree):

@@ -1,0 +1,83 @@
+"""SIGTERM and SIGHUP end a command as Ctrl-C does: one line, what was finished kept, no orphans."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from alphacut.entry import COMMANDS, main
+
+ROOT = Path(__file__).parents[3]
+PAPER = str(ROOT / "cases" / "paper.toml")
+ENDED = {"SIGTERM": 143, "SIGHUP": 129}
+
+
+def members(group):
+    """Processes of a group that still run, but for those that only wait to be counted."""
+    listed = subprocess.run(["ps", "-eo", "pgid=,stat="], capture_output=True, text=True)
+    rows = [line.split() for line in listed.stdout.splitlines()]
+    return sum(row[0] == str(group) and not row[1].startswith("Z") for row in rows)
+
+
+@pytest.mark.parametrize(
+    ("name", "whole"), [("SIGTERM", False), ("SIGTERM", True), ("SIGHUP", True)]
+)
+def test_a_campaign_keeps_its_samples_and_ends_its_workers(name, whole, tmp_path):
+    store = tmp_path / "s.db"
+    words = ["modulus", PAPER, "--method", "prism", "--workers", "2", "--store", str(store)]
+    command = [sys.executable, "-m", "alphacut", *words, "--set", "mesh.size=0.05", "--quiet"]
+    with subprocess.Popen(command, stderr=-1, cwd=ROOT, start_new_session=True) as campaign:
+        before = time.monotonic()
+        while not (store.exists() and store.stat().st_size > 4000):
+            assert campaign.poll() is None
+            assert time.monotonic() < before + 100
+            time.sleep(0.05)
+        for _ in range(2):  # as timeout sends it
+            (os.killpg if whole else os.kill)(campaign.pid, getattr(signal, name))
+        told = campaign.communicate(timeout=60)[1].decode()
+    kept = f"what was finished is kept in {store}, and the same command goes on from there"
+    assert (campaign.returncode, told) == (ENDED[name], f"alphacut: ended by {name}; {kept}\n")
+    while members(campaign.pid):
+        assert time.monotonic() < before + 120
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_each_has_its_status_and_is_handled_no_longer_afterwards(name, monkeypatch, capfd):
+    number = getattr(signal, name)
+
+    def ended(*_, **__):
+        os.kill(os.getpid(), number)
+        os.kill(os.getpid(), number)
+
+    monkeypatch.setattr(COMMANDS["check"], "load", ended)
+    before = signal.getsignal(number)
+    assert main(["check", PAPER]) == ENDED[name]
+    assert signal.getsignal(number) == before
+    assert capfd.readouterr().err == f"alphacut: ended by {name}; nothing is kept\n"
+
+
+def test_what_nohup_ignores_stays_ignored(monkeypatch, capfd):
+    load = COMMANDS["check"].load
+
+    def hung_up(*words, **others):
+        os.kill(os.getpid(), signal.SIGHUP)
+        return load(*words, **others)
+
+    monkeypatch.setattr(COMMANDS["check"], "load", hung_up)
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        assert main(["check", PAPER]) == 0, capfd.readouterr().err
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_a_reader_that_wants_no_more_is_no_error_of_petsc():
+    words = f"cell {PAPER} --method prism --mesh-size 0.3 --layers 2"
+    piped = f"({sys.executable} -m alphacut {words}; echo status $? >&2) | true"
+    done = subprocess.run(["bash", "-c", piped], capture_output=True, text=True, cwd=ROOT)
+    assert done.stderr == "status 0\n"
