@@ -47,21 +47,21 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--cross-check",
         metavar="A,B",
-        default="",
         help="run two models; fail if E differs by more than --tolerance (1e-4)",
     )
 
 
-def named_models(option: str, text: str) -> tuple[str, ...]:
-    """Names of models, separated by commas."""
-    names = tuple(name.strip() for name in text.split(",") if name.strip())
+def named_models(option: str, text: str | None) -> tuple[str, ...]:
+    """Names of models, separated by commas; none if the option is not given."""
+    names = tuple(name.strip() for name in (text or "").split(",") if name.strip())
     for name in names:
         if name not in CELL_METHODS:
-            raise BadInput.of(option, f"there is no model {name}", text, ", ".join(CELL_METHODS))
+            what = f"there is no model {name}"
+            raise BadInput.of(option, what, text or "", ", ".join(CELL_METHODS))
     return names
 
 
-def named_pair(text: str) -> tuple[str, ...]:
+def named_pair(text: str | None) -> tuple[str, ...]:
     """The two models of ``--cross-check``; none if it is not asked for."""
     names = named_models("--cross-check", text)
     if text and (len(names) != 2 or len(set(names)) != 2):

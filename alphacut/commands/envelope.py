@@ -74,7 +74,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     case = load(options.case, common.changes(options, KEYS), without=replaced(options))
     require_read(case, (*READ, *GIVEN), "envelope")
     handed = common.given_modulus(options.modulus) or stand_in(case)
-    task = replace(task_of(case), exclude=excluded(options.exclude))
+    task = replace(task_of(case), exclude=excluded(options.exclude or ""))
     contradictions(options, case, task)
     for line in envelope.wide_gap(case):
         say(f"warning: {line}")

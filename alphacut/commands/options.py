@@ -90,7 +90,7 @@ def add_keys(parser: argparse.ArgumentParser, keys: Mapping[str, KeyOption]) -> 
 def add_exclude(parser: argparse.ArgumentParser, known: str) -> None:
     """``--exclude`` and ``--best-effort``."""
     parser.add_argument(
-        "--exclude", metavar="NAMES", default="", help=f"not to be taken by method auto: {known}"
+        "--exclude", metavar="NAMES", help=f"not to be taken by method auto: {known}"
     )
     add_best_effort(parser)
 

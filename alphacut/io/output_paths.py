@@ -20,24 +20,20 @@ OUTPUTS = ("out", "json", "export", "store", "csv")
 
 
 def check_destinations(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
-    """Refuse what a command could not write.
+    """Refuse empty text, and what a command could not write.
 
     Raises:
-        BadInput: One problem for each option that names such a place.
+        BadInput: One problem for each option or argument of that kind.
     """
     problems: list[Problem] = []
     for action in parser._actions:
-        given = getattr(options, action.dest, None)
-        if action.dest in OUTPUTS and given == "":
-            problems.append(
-                Problem(
-                    action.option_strings[-1],
-                    "the name is empty",
-                    allowed=f"a {str(action.metavar).lower()}",
-                )
-            )
-        elif action.dest in OUTPUTS and isinstance(given, str) and given != "-":
-            option, kind = action.option_strings[-1], str(action.metavar)
+        given, writes = getattr(options, action.dest, None), action.dest in OUTPUTS
+        kind = str(action.metavar)
+        option = [kind, *action.option_strings][-1]
+        if isinstance(given, str) and not given.strip(" ,"):
+            what, allowed = ("the name", f"a {kind.lower()}") if writes else ("this", action.help)
+            problems.append(Problem(option, f"{what} is empty", given, allowed or kind))
+        elif writes and isinstance(given, str) and given != "-":
             place = list(unwritable(option, Path(given), folder=kind == "FOLDER"))
             problems += place or unknown_ending(option, kind, given)
     refuse(problems)

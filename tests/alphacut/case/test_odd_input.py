@@ -74,6 +74,14 @@ def test_odd_files(name, words, tmp_path, capfd, monkeypatch):
         ("check pendulum --set envelope.integrator=exact", "this is for linear structures"),
         ("check paper --set envelope.integrator=composition4", "this is for a pendulum"),
         ("run paper --out ", "--out: the name is empty"),
+        ("cell paper --cross-check ", "--cross-check: this is empty; allowed: run two models"),
+        ("cell paper --exclude ", "--exclude: this is empty; allowed: not to be taken by method"),
+        ("cell paper --exclude ,", "--exclude = ,: this is empty"),
+        ("modulus paper --exclude ", "--exclude: this is empty"),
+        ("envelope paper --exclude ", "--exclude: this is empty"),
+        ("modulus paper --alpha ", "--alpha: this is empty; allowed: levels, as 0,0.5,1"),
+        ("envelope paper --fuzzy ", "--fuzzy: this is empty"),
+        ("measure-next paper --output ", "--output: this is empty"),
         ("envelope pendulum --modulus 20_GPa", "this structure takes no modulus"),
         ("envelope paper --exclude vertex", "'vertex' is unknown to auto"),
         ("envelope paper --exclude modal", "the method is graph-follower"),
@@ -98,6 +106,10 @@ def test_odd_options(arguments, words, tmp_path, capfd, monkeypatch):
         capfd,
     )
     assert not list(tmp_path.iterdir())
+
+
+def test_an_empty_folder_is_not_the_current_one(capfd):
+    refused(["report", ""], "FOLDER: this is empty; allowed: results of a run", capfd)
 
 
 def refused(arguments, words, capfd):
