@@ -191,6 +191,11 @@ class Case:
 
     def without(self, section: str) -> BadInput:
         """The error of a command that cannot do without a section."""
+        if section in ("cell", "radius") and (given := next(iter(self.stand_ins), "")):
+            what = "this gives the modulus, and the command computes one from [radius] and [cell]"
+            taken = f", or {door('envelope', self.path)}, which takes it"
+            allowed = "both sections beside it" + taken * ("envelope" in self.stages)
+            return self.refuse(given, what, allowed)
         what = f"missing; this command needs section [{section}]"
         if section == "picture":
             section, what = "cell", "missing; this command needs section [cell] with a picture"

@@ -194,3 +194,13 @@ def test_the_report_tells_the_measured_modulus_by_its_cuts(tmp_path, capfd):
     plain = re.sub("</?a[^>]*>", "", page)
     assert "result of the next value of E lies in its α-cut with P &gt;= 1 - α" in plain
     assert '<td>1</td><td class="number">30.1000</td><td class="number">30.1000</td>' in page
+
+
+@pytest.mark.parametrize("command", ["modulus", "cell"])
+def test_a_command_that_computes_a_modulus_says_that_the_case_gives_one(command, tmp_path, capfd):
+    (tmp_path / "m.csv").write_text("E [GPa]\n24\n25\n26\n", encoding="utf-8")
+    path = with_modulus(tmp_path, 'measured = "m.csv"\nbounds = "[10, 60] GPa"')
+    assert main([command, str(path)]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert "modulus.measured = m.csv: this gives the modulus" in line
+    assert f"alphacut envelope {path}, which takes it" in line
