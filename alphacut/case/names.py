@@ -133,26 +133,27 @@ def known_input(case: Case, key: str, name: str, count: int) -> Iterator[Problem
     members += [f"{group}{floor + 1}_0" for group in ("q", "v") for floor in range(count)]
     members += [f"zeta{mode + 1}" for mode in range(count)]
     if name not in GROUPS and name not in members:
-        groups = ", ".join(group for group in GROUPS if not no_such_part(case, group))
+        groups = [group for group in GROUPS if not no_such_part(case, group)]
         members = [member for member in members if not no_such_part(case, member)]
         firsts = [member for member in members if re.fullmatch(r"\D+1(_0)?", member)]
         ends = ((first, first.replace("1", str(count))) for first in firsts)
         each = ", ".join(" to ".join(dict.fromkeys(pair)) for pair in ends)
-        allowed = f"{groups}, or one floor: {each}"
-        yield Problem(
-            key,
-            f"the frame has no input {name}",
-            name,
-            allowed,
-            nearest(name, members) if re.match("[mlckdqvz]", name) else "",
-        )
+        allowed = f"{', '.join(groups)}, or one floor: {each}"
+        initial = re.sub(r"^([qv])_?0?_?(\d+)$", r"\1\2_0", name)  # as of the paper's q02
+        alike = [known for known in (*groups, *members) if known[0] == name[:1]]
+        close = initial if initial in members else nearest(name, alike)
+        yield Problem(key, f"the frame has no input {name}", name, allowed, close)
     elif without := no_such_part(case, name):
         yield Problem(key, f"the frame has no input {name}: {without}", name)
 
 
 def no_such_part(case: Case, name: str) -> str:
     """Why a frame lacks an input that others have; empty where it has it."""
-    given = case.frame
+    given, ratios = case.frame, len(case.frame.damping_ratio or ())
+    if name.startswith("zeta") and not ratios:
+        return "no damping_ratio is given"
+    if name[4:] and name.startswith("zeta") and ratios == 1:
+        return "one damping_ratio stands for all modes, zeta"
     if given.stiffness is None:
         if name[0] == "k":
             return "no stiffness is given"

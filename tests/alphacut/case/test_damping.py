@@ -139,7 +139,7 @@ def test_ratios_of_a_tower_and_of_each_mode_are_fuzzy_inputs(tmp_path):
         (
             re.sub(r'fuzzy = \["E", "m"\] .*', 'fuzzy = ["zeta"]', PAPER),
             "envelope.fuzzy",
-            "'zeta' is unknown",
+            "the frame has no input zeta: no damping_ratio is given",
         ),
     ],
 )

@@ -148,6 +148,32 @@ def test_a_command_in_a_message_has_the_door_the_path_and_its_quotes(tmp_path, c
     assert pasted("run `python -m alphacut repair s.db`") == f"run `{door()} repair s.db`"
 
 
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [("q02", "q2_0"), ("q0_2", "q2_0"), ("q2", "q2_0"), ("v_03", "v3_0"), ("q09", "q0"),
+     ("mm1", "m1"), ("zetta1", ""), ("b1", "")],
+)  # fmt: skip
+def test_a_misspelt_input_of_a_frame_is_offered_its_like_alone(name, meant, capfd):
+    assert main(["check", str(CASES / "paper.toml"), "--set", f'envelope.fuzzy=["{name}"]']) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert "zeta" not in line.replace(name, "")  # the frame has no damping ratio
+    assert line.partition("did you mean ")[2].rstrip("?") == meant
+
+
+@pytest.mark.parametrize(
+    ("given", "name", "words"),
+    [
+        ("5 %", "zeta2", "zeta2: one damping_ratio stands for all modes, zeta"),
+        ("[4, 5, 6] %", "zetta", "did you mean zeta?"),
+        ("4 %,5 %,6 %", "zetta2", "did you mean zeta2?"),
+    ],
+)
+def test_damping_ratios_of_modes_are_offered_where_they_are_given(given, name, words, capfd):
+    sets = ["--set", f"frame.damping_ratio={given}", "--set", f"envelope.fuzzy={name}"]
+    assert main(["check", str(CASES / "paper.toml"), *sets]) == 2
+    assert words in capfd.readouterr().err
+
+
 def test_one_argument_too_many_is_called_so(capfd):
     assert main(["check", str(CASES / "paper.toml"), "other.toml"]) == 2
     assert "check = other.toml: there is one argument too many" in capfd.readouterr().err
