@@ -18,7 +18,7 @@ from alphacut.frame.structures.field_frame import FieldFrame
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.lagrangian import pendulum as make
 from alphacut.frame.structures.linear import LinearSystem
-from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.field import FuzzyField
 from alphacut.io.problem import BadInput
 from alphacut.io.provenance import door
@@ -76,11 +76,11 @@ class Structure:
                 ", ".join(self.numbers),
             ) from None
         if not found:
+            spread = any(not isinstance(self.numbers[member], Crisp) for member in members)
+            why = "its values are all equal" if spread else "it is one number"
+            cure = "an interval or a triangle whose values differ, or a list without this input"
             raise BadInput.of(
-                "envelope.fuzzy",
-                "this input is crisp in the case",
-                name,
-                "an input with a triangle or an interval",
+                "envelope.fuzzy", f"this input is crisp in the case: {why}", name, cure
             )
         return found
 

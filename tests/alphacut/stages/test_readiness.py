@@ -39,7 +39,12 @@ BROKEN = {
     "crisp input": (
         "paper",
         [('fuzzy = ["E"]', 'fuzzy = ["l"]')],
-        r"own.toml:\d+: study\[0\].fuzzy = l: this input is crisp",
+        r"own.toml:\d+: study\[0\].fuzzy = l: this input is crisp in the case: it is one number",
+    ),
+    "equal values": (
+        "building",
+        [('"[28, 30, 34] t"', '"[10, 10, 10] t"')],
+        "fuzzy = m8: this input is crisp in the case: its values are all equal; allowed: .*differ",
     ),
     "crisp random": (
         "building",
