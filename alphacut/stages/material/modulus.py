@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -390,5 +391,7 @@ def positive(file: CsvFile, line: int, text: str) -> float:
     except ValueError:
         value = math.nan
     if not (math.isfinite(value) and value > 0):
-        raise file.refuse(line, "this row is no positive number", text)
+        cure = text.replace(",", ".") if re.fullmatch(r"\s*\d+,\d+\s*", text) else ""
+        allowed = f"a decimal point, {cure.strip()}" if cure else "a number such as 30.5"
+        raise file.refuse(line, "this row is no positive number", text, allowed)
     return value

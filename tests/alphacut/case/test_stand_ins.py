@@ -117,6 +117,7 @@ def test_an_earlier_run_stands_in(tmp_path, capfd):
         ("E\n24\n", "the column .E. is not a modulus with its unit"),
         ("E [m]\n24\n", 'unit "m" is wrong'),
         ("E [GPa]\n24\n-3\n", "m.csv:3: .*no positive number"),
+        ("E [GPa]\n24\n30,0\n", "m.csv:3: .*no positive number; allowed: a decimal point, 30.0$"),
         ("E [GPa]\nx\n", "m.csv:2: .*no positive number"),
         ("E [GPa]\n", "a header and a row"),
     ],
