@@ -12,6 +12,7 @@ Progress = Callable[[float], None]
 _WAIT = 1.0  # seconds before a bar appears
 _EVERY = 0.2  # seconds between its moves
 _WIDTH = 30
+_TAKEN = 0.9  # share of what is left that a stage takes
 
 
 def share(progress: Progress | None, first: float, last: float) -> Progress:
@@ -25,6 +26,27 @@ def stage(progress: Progress | None, what: str) -> None:
     """Tell a progress that shows it what is being done from now on."""
     if (tell := getattr(progress, "stage", None)) is not None:
         tell(what)
+
+
+class Stages:
+    """Progress of stages that follow each other until one succeeds: it never falls.
+
+    Where stages are shown by name each begins anew; elsewhere each leaves a share to the next.
+    """
+
+    def __init__(self, progress: Progress) -> None:
+        self.progress, self.named = progress, hasattr(progress, "stage")
+        self.first = self.reached = 0.0
+
+    def stage(self, what: str) -> None:
+        """Another one begins."""
+        self.first = self.reached
+        stage(self.progress, what)
+
+    def __call__(self, done: float) -> None:
+        """Tell the share done of this one."""
+        self.reached = max(self.reached, self.first + _TAKEN * (1 - self.first) * done)
+        self.progress(done if self.named else self.reached)
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from alphacut.frame.decisions.limit_search import LEAST, LimitSearch, Reach, Unp
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.structures.storey import StoreyFrame
-from alphacut.fuzzy.progress_bar import Progress, told
+from alphacut.fuzzy.progress_bar import Progress, Stages, stage, told
 from alphacut.fuzzy.sets.given import finite_by_name, positive
 
 GAP = 1e-3
@@ -120,8 +120,10 @@ def safe_scale(
         worth = ("guaranteed", "")
         return SafeScale(names, centre, None, *box, 0.0, centre, *shares, *worth, 0, seconds)
     boxes = 0
-    with told(progress) as tell:
+    with told(progress) as whole:
+        tell = whole and Stages(whole)
         for size in most * HALVED:
+            stage(tell, f"scales up to {size:.3g}")
             unsafe, witness = np.inf, None
             done, looked = _easily(search, 1 - nominal_share, size, budget, workers)
             boxes, safe = boxes + looked, size if done else 0.0

@@ -17,7 +17,7 @@ from alphacut.frame.methods.plan import Candidate, candidates
 from alphacut.frame.outputs import output_unit
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
-from alphacut.fuzzy.progress_bar import Progress, stage
+from alphacut.fuzzy.progress_bar import Progress, Stages, stage
 
 TOLERANCE = 1e-4
 """Wanted error unless one is given, in m."""
@@ -85,6 +85,7 @@ class Auto:
             ToleranceError: No method left reaches the tolerance.
         """
         flow, tolerance = self.wanted(flow)
+        progress = progress and Stages(progress)
         steps, begun = step_error(flow), time.perf_counter()
         reached = float((steps / flow.scale).max())
         left, refused = tolerance - reached, [f"{name} excluded" for name in self.exclude]
@@ -103,7 +104,6 @@ class Auto:
         ]
         if "modal" in tried:
             try:
-                stage(progress, "proof")
                 proof, unproved = _proved(flow, left, progress, self.workers)
                 if proof is not None:
                     why = "modal: polynomials of the modes, whose bounds are proved"
@@ -147,6 +147,7 @@ def _proved(
     """A guaranteed envelope within the wanted error, or None and the reason why there is none."""
     reason = ""
     for share in GAPS:
+        stage(progress, f"proof up to {flow.told(share * wanted)}")
         try:
             found = guaranteed(flow, share * wanted, progress, workers)
         except GapError as error:
@@ -169,10 +170,12 @@ def _followed(
     spread, strict, used = 256, tolerance / 4, 0
     for attempt in range(4):
         method = BatchFollower(strict, budget, spread, contests=3, seed=seed + 2 * attempt)
+        stage(progress, f"Graph Follower, pass {2 * attempt + 1}")
         first = method.run(flow, progress)
         used += first.trajectories
         if "reason" in first.facts:
             return None
+        stage(progress, f"Graph Follower, pass {2 * attempt + 2}")
         second = replace(method, seed=method.seed + 1).run(flow, progress)
         used += second.trajectories
         apart = distance(first, second, flow)

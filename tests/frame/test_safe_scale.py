@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from alphacut.frame import StoreyFrame
+from alphacut.frame.decisions import safe_scale as module
 from alphacut.frame.decisions.limit_search import LimitSearch
 from alphacut.frame.decisions.safe_scale import _easily, limit_search, safe_scale, scaled
 from alphacut.frame.dynamics.flow import LinearFlow
@@ -116,3 +117,22 @@ def test_a_rough_model_whose_error_is_sampled_proves_nothing(monkeypatch):
 
     monkeypatch.setattr(LimitSearch, "fit", sampled)
     assert not _easily(search, 1 - search.share(search.nominal), 0.5, 100, 1)[0]
+
+
+def test_progress_never_falls_where_smaller_scales_follow(monkeypatch):
+    def hopeless(search, refuted, most, budget, workers, progress):
+        search.reason = ""
+        for share in (0.1, 0.5, 1.0):
+            progress(share)
+        return 0.0, np.inf, None, 1
+
+    monkeypatch.setattr(module, "_easily", lambda *_: (False, 0))
+    monkeypatch.setattr(module, "_refuted", lambda *_: (np.inf, None))
+    monkeypatch.setattr(module, "_proved", hopeless)
+    frame, shares = StoreyFrame([1e3], [3.0], 2.5e10, 1e-6, v0=[0.5]), []
+    reach = scaled(np.array([2.5e10]), np.array([1e9]), np.array([1e9]))
+    common = {"duration": 0.2, "step": 0.01, "progress": shares.append}
+    safe_scale(frame, {"E": 2.5e10}, reach, {"q1": 0.2}, **common)
+    assert len(shares) == 3 * len(module.HALVED)
+    assert shares == sorted(shares)
+    assert shares[-1] <= 1

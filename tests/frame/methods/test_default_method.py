@@ -12,7 +12,7 @@ import pytest
 
 from alphacut.frame import Envelope, Exact, LinearFlow, MatrixStructure, StoreyFrame, envelope
 from alphacut.frame.methods import auto
-from alphacut.frame.methods.modal import Modal
+from alphacut.frame.methods.modal import GapError, Modal
 from alphacut.frame.modal.exact_response import ExactResponse
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
@@ -108,3 +108,57 @@ def test_a_seed_is_that_of_the_search_where_nothing_is_proved(
     inputs = {"E": Triangular(24e9, 25e9, 26e9)}
     envelope(FRAME, inputs, duration=0.2, step=0.1, alpha=(0,), seed=7)
     assert seeds == [7]
+
+
+def unproved(error: type[RuntimeError], shares: list[float]) -> Any:
+    """A proof that goes on to the end, which it does not reach."""
+
+    def proof(flow: Any, gap: float, progress: Any, workers: Any) -> Any:
+        for share in (0.2, 0.7, 1.0):
+            progress(share)
+        shares.append(np.nan)
+        raise error("the boxes did not suffice")
+
+    return proof
+
+
+@pytest.mark.parametrize("error", [UnprovedError, GapError])
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-9])
+def test_progress_never_falls_where_a_search_follows_a_proof(
+    error: type[RuntimeError], tolerance: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shares: list[float] = []
+    monkeypatch.setattr(auto, "guaranteed", unproved(error, shares))
+    given = {"m1": Interval(1e4, 2e4)}
+    common: dict[str, Any] = {"duration": 1.0, "step": 0.02, "tolerance": tolerance}
+    envelope(FRAME, given, alpha=(0,), progress=shares.append, **common)
+    proofs = np.flatnonzero(np.isnan(shares))
+    assert len(proofs) == (2 if error is GapError else 1)
+    told = np.delete(shares, proofs)
+    assert len(told) > 3 * len(proofs) + 2
+    assert (np.diff(told) >= 0).all()
+    assert told[2] < told[-1] <= 1
+
+
+def test_stages_that_are_shown_by_name_begin_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[object] = []
+
+    class Named:
+        def stage(self, what: str) -> None:
+            told.append(what)
+
+        def __call__(self, done: float) -> None:
+            told.append(done)
+
+    monkeypatch.setattr(auto, "guaranteed", unproved(GapError, []))
+    envelope(FRAME, LIGHT, alpha=(0,), progress=Named(), duration=1.0, step=0.02)
+    names = [one for one in told if isinstance(one, str)]
+    assert [name.partition(",")[0] for name in names[:3]] == [
+        "proof up to 1e-05 m",
+        "proof up to 0.0001 m",
+        "search",
+    ]
+    for name in names:
+        after = told[told.index(name) + 1 :]
+        own = after[: next((k for k, one in enumerate(after) if isinstance(one, str)), len(after))]
+        assert own == sorted(own), name  # type: ignore[type-var]
