@@ -40,7 +40,11 @@ def test_a_campaign_keeps_its_samples_and_ends_its_workers(name, whole, tmp_path
             (os.killpg if whole else os.kill)(campaign.pid, getattr(signal, name))
         told = campaign.communicate(timeout=60)[1].decode()
     kept = f"what was finished is kept in {store}, and the same command goes on from there"
-    assert (campaign.returncode, told) == (ENDED[name], f"alphacut: ended by {name}; {kept}\n")
+    assert campaign.returncode == ENDED[name]
+    assert told.startswith(f"alphacut: ended by {name}; {kept}\n")
+    # a worker that has just begun may be ended by the signal itself: loky's tracker warns of that
+    rest = told.splitlines()[1:]
+    assert all("resource_tracker" in line or "warnings.warn" in line for line in rest), told
     while members(campaign.pid):
         assert time.monotonic() < before + 120
         time.sleep(0.05)
