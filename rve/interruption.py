@@ -45,11 +45,8 @@ def uninterrupted() -> Iterator[None]:
     MPI takes signals for itself.
     """
     before, held = signal.getsignal(signal.SIGINT), list[int]()
-    main, kept = (
-        threading.current_thread() is threading.main_thread(),
-        map(signal.getsignal, _STOPS),
-    )
-    taken = [(one, how) for one, how in zip(_STOPS, kept, strict=True) if how is not None]
+    others = {one: signal.getsignal(one) for one in _STOPS}
+    main = threading.current_thread() is threading.main_thread()
     if not main or before in (None, signal.SIG_DFL):
         yield
         return
@@ -57,7 +54,8 @@ def uninterrupted() -> Iterator[None]:
     try:
         yield
     finally:
-        for one, how in [(signal.SIGINT, before), *taken]:
-            signal.signal(one, how)
+        for one, how in {signal.SIGINT: before, **others}.items():
+            if how is not None:
+                signal.signal(one, how)
         if held and (callable(before) or held[-1] != signal.SIGINT):  # else ignored
             (before if callable(before) else signal.default_int_handler)(held[-1], None)
