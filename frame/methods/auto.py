@@ -14,6 +14,7 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.batch_graph_follower import BatchFollower
 from alphacut.frame.methods.modal import FINE, GapError, Modal, guaranteed
 from alphacut.frame.methods.plan import Candidate, candidates
+from alphacut.frame.modal.fitting import MANY
 from alphacut.frame.outputs import output_unit
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
@@ -85,47 +86,49 @@ class Auto:
             ToleranceError: No method left reaches the tolerance.
         """
         flow, tolerance = self.wanted(flow)
-        progress = progress and Stages(progress)
-        steps, begun = step_error(flow), time.perf_counter()
-        reached = float((steps / flow.scale).max())
-        left, refused = tolerance - reached, [f"{name} excluded" for name in self.exclude]
-        if left <= 0:
-            raise ToleranceError(
-                f"auto: the error of time stepping, {flow.told(reached)}, is above the"
-                f" tolerance {flow.told(tolerance)}; take the integrator exact, a smaller step or"
-                " a larger tolerance"
-            )
-        plan = self.plan(flow)
-        tried = [candidate.name for candidate in plan if candidate.seconds <= self.seconds]
-        refused += [
-            f"{candidate.name} not started: {candidate}"
-            for candidate in plan
-            if candidate.seconds > self.seconds
-        ]
+        progress, begun = progress and Stages(progress), time.perf_counter()
+        left, cure = _left(flow, tolerance), "allow more methods, a larger budget or tolerance"
+        tried, refused = self._tried(flow)
         if "modal" in tried:
-            try:
-                proof, unproved = _proved(flow, left, progress, self.workers)
-                if proof is not None:
-                    why = "modal: polynomials of the modes, whose bounds are proved"
-                    return _reported(proof, flow, begun, why)
-                stage(progress, f"search, since unproved: {unproved}")
-                found = Modal(tolerance=left / FINE, seed=self.seed).run(flow, progress)
-                found = replace(found, facts={**found.facts, "unproved": unproved})
-                if _estimate(found, flow) <= left:
-                    return _reported(found, flow, begun, _why(found))
-                refused.append(f"modal estimates {flow.told(_estimate(found, flow))}")
-            except ModalError as error:
-                refused.append(str(error))
+            found, why = self._by_modes(flow, left, progress)
+            if found is not None and _estimate(found, flow) <= left:
+                return _reported(found, flow, begun, why)
+            refused.append(why)
+            if found is not None and len(flow.boxes.names) > MANY and "bounds" in found.facts:
+                tried = []  # the Graph Follower begins from fewer points, at a higher price
+                cure = "take fewer or narrower inputs, a larger tolerance, or the method modal,"
+                cure += " which gives these bounds with their error"
         if "improved-graph-follower" in tried:
             followed = _followed(flow, left, self.budget, progress, self.seed)
             if followed is not None:
                 why = "; ".join(refused) or "the system is not linear"
                 return _reported(followed, flow, begun, f"improved-graph-follower, since {why}")
             refused.append(f"improved-graph-follower needs more than {self.budget} trajectories")
-        raise ToleranceError(
-            f"auto: no method reaches {flow.told(tolerance)} ({'; '.join(refused)}); allow more"
-            " methods, a larger budget or tolerance"
-        )
+        why = f"no method reaches {flow.told(tolerance)} ({'; '.join(refused)})"
+        raise ToleranceError(f"auto: {why}; {cure}")
+
+    def _tried(self, flow: UnitFlow) -> tuple[list[str], list[str]]:
+        """Methods that are affordable, and why the others are not begun."""
+        plan, refused = self.plan(flow), [f"{name} excluded" for name in self.exclude]
+        dear = [candidate for candidate in plan if candidate.seconds > self.seconds]
+        refused += [f"{candidate.name} not started: {candidate}" for candidate in dear]
+        return [candidate.name for candidate in plan if candidate not in dear], refused
+
+    def _by_modes(
+        self, flow: UnitFlow, left: float, progress: Progress | None
+    ) -> tuple[Envelope | None, str]:
+        """Proved bounds or a search, and why it is taken or does not suffice."""
+        try:
+            proof, unproved = _proved(flow, left, progress, self.workers)
+            if proof is not None:
+                return proof, "modal: polynomials of the modes, whose bounds are proved"
+            stage(progress, f"search, since unproved: {unproved}")
+            found = Modal(tolerance=left / FINE, seed=self.seed).run(flow, progress)
+        except ModalError as error:
+            return None, str(error)
+        found = replace(found, facts={**found.facts, "unproved": unproved})
+        missed = _estimate(found, flow) > left
+        return found, f"modal estimates {flow.told(_estimate(found, flow))}" * missed or _why(found)
 
     def plan(self, flow: UnitFlow) -> tuple[Candidate, ...]:
         """What would be tried, one after the other, with the seconds expected."""
@@ -139,6 +142,18 @@ class Auto:
         if flow.relative or any(output_unit(name) == "m" for name in flow.outputs):
             return flow, TOLERANCE
         return replace(flow, relative=True), SHARE
+
+
+def _left(flow: UnitFlow, tolerance: float) -> float:
+    """What time stepping leaves of the tolerance; raises ToleranceError if that is nothing."""
+    reached = float((step_error(flow) / flow.scale).max())
+    if reached >= tolerance:
+        raise ToleranceError(
+            f"auto: the error of time stepping, {flow.told(reached)}, is above the"
+            f" tolerance {flow.told(tolerance)}; take the integrator exact, a smaller step or"
+            " a larger tolerance"
+        )
+    return tolerance - reached
 
 
 def _proved(

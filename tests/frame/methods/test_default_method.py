@@ -5,6 +5,7 @@ tolerance.
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -162,3 +163,27 @@ def test_stages_that_are_shown_by_name_begin_anew(monkeypatch: pytest.MonkeyPatc
         after = told[told.index(name) + 1 :]
         own = after[: next((k for k, one in enumerate(after) if isinstance(one, str)), len(after))]
         assert own == sorted(own), name  # type: ignore[type-var]
+
+
+MANY = {name: Triangular(0.97 * x, x, 1.03 * x) for name, x in FRAME.parameters.items() if x}
+
+
+def missing(self: Modal, flow: Any, progress: Any = None) -> Envelope:
+    """A search among many inputs that goes on finding more."""
+    found = Modal(self.tolerance).run(flow, progress)
+    assert found.error is not None
+    return replace(found, error=0.01 + found.error, facts={**found.facts, "bounds": "exact"})
+
+
+def test_many_inputs_that_miss_the_tolerance_do_not_begin_the_graph_follower(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class Missed(Modal):
+        run = missing
+
+    monkeypatch.setattr(auto, "Modal", Missed)
+    monkeypatch.delattr(auto.BatchFollower, "run")
+    assert len(MANY) > 6
+    common: dict[str, Any] = {"duration": 0.4, "step": 0.02, "alpha": (0,)}
+    with pytest.raises(auto.ToleranceError, match=r"modal estimates 0.01 m\); take fewer or"):
+        envelope(FRAME, MANY, **common)
