@@ -15,8 +15,8 @@ LEAST = 250
 """Problems below which a piece costs more than it saves."""
 USUAL = 6
 """Newton steps after which quadratic models are maximised over all faces: the rest is on ridges."""
-BEGUN = 1.0
-"""Trust region's first radius; half as much costs a third more evaluations."""
+BEGUN, SURE = 0.4, 0.1
+"""Trust region's first radius; by how much a gain may miss what was promised of a sound model."""
 WIDTH = 2.0
 """Of the unit box."""
 ITERATIONS = 300
@@ -76,7 +76,7 @@ def _newton(
         ratio = got / promised
         radius = np.where(
             ratio > 0.75,
-            np.minimum(2 * radius, WIDTH),
+            np.minimum(np.where(np.abs(ratio - 1) < SURE, 5, 2) * radius, WIDTH),
             np.where(ratio < 0.25, 0.3 * np.abs(step).max(1), radius),
         )
 
