@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
+from scipy.stats import chi2
 from scipy.stats import f as law
 
 from alphacut.frame.calculus.jet import Array
@@ -22,6 +23,8 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.sets.claimed import Claim, Claimed, Joint
 from alphacut.fuzzy.sets.stepwise import outer_steps
 
+ALIKE = 1e-6
+"""Probability below which deviations of outputs so far apart are not those of errors alike."""
 RAYS = 100
 """Random directions along which the border of a set is searched, besides two for each parameter."""
 
@@ -137,7 +140,8 @@ def learn_from_motion(
         seed: Of the directions searched.
 
     Raises:
-        ValueError: The priors are not those of the flow, or levels do not rise within (0, 1].
+        ValueError: The priors are not those of the flow, levels do not rise within (0, 1], or the
+            outputs' errors are not alike.
     """
     levels = np.asarray(alpha, float)
     if tuple(prior) != record.flow.names:
@@ -148,6 +152,7 @@ def learn_from_motion(
         raise ValueError(f"alpha: {list(alpha)} must rise within (0, 1]")
     ends = np.array([number.support for number in prior.values()])
     best, reach = _fit(record, ends)
+    _require_alike(record, best)
     rng = np.random.default_rng(seed)
     rays = np.vstack([rng.normal(size=(RAYS, len(best))) @ reach.T, reach.T, -reach.T])
     widest = reach @ reach.T
@@ -198,6 +203,25 @@ def _fit(record: RecordedMotion, ends: Array) -> tuple[Array, Array]:
     values, vectors = np.linalg.eigh(spread)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     return middle + half * fit.x, half[:, None] * root
+
+
+def _require_alike(record: RecordedMotion, best: Array) -> None:
+    """Bartlett's test of one deviation for all outputs (Proc. R. Soc. A 160, 268, 1937)."""
+    miss = record.misfit(best[None])[0].reshape(record.values.shape)
+    count, outputs = len(miss) - 1, miss.shape[1]
+    if outputs < 2 or count < 10 * len(best):
+        return
+    least = 1e-9 * np.abs(record.values).max()  # of a record without errors nothing is told
+    variance = np.maximum(miss.var(0, ddof=1), least**2)
+    apart = count * (outputs * np.log(variance.mean()) - np.log(variance).sum())
+    apart /= 1 + (outputs + 1) / (3 * outputs * count)
+    if chi2.sf(apart, outputs - 1) < ALIKE:
+        each = zip(record.flow.outputs, np.sqrt(variance), strict=True)
+        told = ", ".join(f"{deviation:.2g} of {name}" for name, deviation in each)
+        raise ValueError(
+            f"the recorded outputs' errors are not alike: deviations {told} (SI) of the best fit;"
+            " the sets rest on one deviation for all: learn from outputs that are measured alike"
+        )
 
 
 def _border(record: RecordedMotion, ends: Array, best: Array, rays: Array, level: float) -> Array:

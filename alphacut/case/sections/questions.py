@@ -77,8 +77,8 @@ class Update(Section):
     recorded: Annotated[
         str | None,
         Key(
-            "CSV file time [s],q1 [mm],a2 [m/s^2] … in place of measured modes: outputs of the"
-            " frame recorded from t = 0 on at even steps, with errors alike and independent",
+            "CSV file time [s],q1 [mm],q2 [mm] … in place of measured modes: outputs of the frame,"
+            " of one unit, recorded from t = 0 on at even steps, with errors alike and independent",
             file=True,
         ),
     ] = None

@@ -18,7 +18,7 @@ KEY = "update.measured"
 ALLOWED = "mode,frequency [Hz],q1,q2 … with the floors that were measured"
 MOST = 1e9
 """Largest frequency in Hz, and amplitude."""
-RECORDED = "time [s],q1 [mm],a2 [m/s^2] … with the outputs that were recorded"
+RECORDED = "time [s],q1 [mm],q2 [mm] … with the outputs that were recorded, all of one unit"
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +53,9 @@ def motion_rows(path: Path, known: Sequence[str]) -> MotionRows:
     if names[0] != "time" or wrong or len(set(names)) < max(len(names), 2):
         raise file.refuse(line, "the header is wrong", ",".join(head), RECORDED)
     units = ["s", *map(output_unit, names[1:])]
+    if len(set(units[1:])) > 1:
+        what = "the outputs have different units, and their errors are to be alike"
+        raise file.refuse(line, what, ",".join(head), "outputs of one unit: the others left out")
     cells = zip(head, names, units, strict=True)
     scales = [file.scale(line, cell, name, unit) for cell, name, unit in cells]
     table = []

@@ -115,7 +115,9 @@ def sentences(found: Document) -> list[str]:
     """Inputs, predictions and what was not learned, from `Learned.document`, in SI."""
     if "refuted" in found:
         return [str(found["refuted"])]
-    lines = [f"inputs at α = {found['alpha'][0]:g}, proved to hold all that agree:"]
+    proved = "agreement" in found  # of modes; the sets of a motion are searched
+    worth = "proved to hold all that agree" if proved else "searched, not proved"
+    lines = [f"inputs at α = {found['alpha'][0]:g}, {worth}:"]
     for name, ends in found["inputs"].items():
         low, high, share = ends["lower"][0], ends["upper"][0], found["narrowed"][name]
         lines.append(f"  {name}: {low:.6g} … {high:.6g}, {100 * share:.3g} % of its prior's width")

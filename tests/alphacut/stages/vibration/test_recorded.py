@@ -92,6 +92,7 @@ GOOD = "time [s],q1 [mm]\n0,10\n0.02,9\n0.04,8\n0.06,7\n"
     [
         ("time [s],q1\n0,1\n0.1,2\n", "", "", "the column 'q1' is not q1 with its unit"),
         ("time [s],q9 [mm]\n0,1\n0.1,2\n", "", "", "the header is wrong"),
+        (GOOD.replace("q1 [mm]", "q1 [mm],a2 [m/s^2]"), "", "", "outputs have different units"),
         ("time [s],q1 [kN]\n0,1\n0.1,2\n", "", "", "update.recorded"),
         ("time [s],q1 [mm]\n0,1\n0.1,2;5\n", "", "", "this row is no instant"),
         ("time [s],q1 [mm]\n0,1\n0.1,2\n0.3,2\n", "", "", "not evenly spaced"),
@@ -115,3 +116,19 @@ def test_recorded_motions_that_make_no_sense(
     assert pattern in told
     assert len(told.splitlines()) == 1
     assert not out.exists()
+
+
+def test_recorded_outputs_whose_errors_differ_are_refused_and_sets_are_no_proof(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = recorded(np.random.default_rng(7), 0.05)
+    alike = written(tmp_path, rows)
+    assert main(["update", str(alike)]) == 0
+    assert "inputs at α = 0.05, searched, not proved:" in capsys.readouterr().out
+    head, *lines = rows.splitlines()
+    finer = [line.rpartition(",") for line in recorded(np.random.default_rng(8), 1e-4).splitlines()]
+    mixed = [
+        f"{line.rpartition(',')[0]},{fine[2]}" for line, fine in zip(lines, finer[1:], strict=True)
+    ]
+    assert main(["update", str(written(tmp_path, "\n".join([head, *mixed, ""])))]) == 2
+    assert "the recorded outputs' errors are not alike: deviations" in capsys.readouterr().err
