@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from alphacut.frame.calculus.jet import Array
 from alphacut.frame.decisions.limit_search import Unproved
 from alphacut.frame.decisions.safe_scale import SafeScale, limit_search, safe_scale
 from alphacut.frame.decisions.sure_exceeding import sure_exceeding
+from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arguments import fuzzy_inputs
@@ -95,31 +97,32 @@ def exceeding(
         cuts = np.array([x.cut(max(1 - size, lowest)) for x in numbers.values()])
         return cuts[:, 0], cuts[:, 1]
 
-    found = safe_scale(
-        frame,
-        nominal,
-        reach,
-        limits,
-        duration=duration,
-        step=step,
-        most=most,
-        workers=workers,
-        progress=progress,
-        failed=failed,
-    )
+    proof = partial(safe_scale, frame, nominal, reach, limits, duration=duration, step=step)
+    necessity, sampled = (0.0, 0.0), ""
+    try:
+        found = proof(most=most, workers=workers, progress=progress, failed=failed)
+        if found.safe is None:
+            search = limit_search(frame, nominal, reach, limits, duration, step, failed)
+            sure = sure_exceeding(search, most)
+            necessity, sampled = (sure.size or 0.0, min(sure.kept, 1.0)), search.reason
+    except ModalError as error:
+        return _unknown(nominal, str(error), str(JointClaim.of(numbers)), lowest)
     safe = 0.0 if found.safe is None else found.safe
     upper = lowest if safe >= most else 1 - safe
     lower = 1 - found.unsafe if np.isfinite(found.unsafe) else 0.0
-    necessity, sampled = (0.0, 0.0), ""
-    if found.safe is None:
-        search = limit_search(frame, nominal, reach, limits, duration, step, failed)
-        sure = sure_exceeding(search, most)
-        necessity = (sure.size or 0.0, min(sure.kept, 1.0))
-        sampled = search.reason
     if sampled:
         found = replace(found, nature="verified by sampling", reason=sampled)
     claim = str(JointClaim.of(numbers).resting_on(found.nature))
     return Exceeding((max(lower, 0.0), upper), necessity, found, claim, lowest)
+
+
+def _unknown(nominal: Mapping[str, float], why: str, claim: str, lowest: float) -> Exceeding:
+    """Of a motion that has no model to rest a proof on."""
+    centre, reason = np.array([*nominal.values()], float), why.partition(";")[0]
+    shares = np.nan, np.nan
+    box = centre, 0.0, centre, centre, np.inf, None
+    scale = SafeScale(tuple(nominal), *box, *shares, "guaranteed", reason, 0, 0.0)
+    return Exceeding((0.0, 1.0), (0.0, 1.0), scale, claim, lowest)
 
 
 def any_exceeding(each: Mapping[str, Exceeding], together: Exceeding | None = None) -> Exceeding:

@@ -22,6 +22,9 @@ from alphacut.frame.modal.starting_points import spread_points, trajectories
 REFINED = 64
 """Motions of a search that are driven to their local extreme."""
 
+TIE = 1e-12
+"""Share of a limit by which rounding may lift a motion beyond one that it only reaches."""
+
 LEAST = 1e-9
 """Share of the largest size below which a witness lies in the core that all boxes hold."""
 
@@ -86,6 +89,10 @@ class LimitSearch:
         """Largest |output| / limit of the true motion at parameters (d,)."""
         return float((np.abs(self.flow.values(point[None])[0]) / self.limits).max())
 
+    def exceeded(self, point: Array) -> bool:
+        """Whether the true motion at parameters (d,) breaks a limit: to reach it is no break."""
+        return self.share(point) > 1 + TIE
+
     def size_of(self, point: Array) -> float:
         """Least size up to the model's whose box holds a point."""
         low, high = 0.0, self.size
@@ -101,7 +108,7 @@ class LimitSearch:
         found = _worst(self.model, *self.unit(size))
         for row in np.argsort(-found.value)[:4]:
             point = self.model.boxes.to_physical(found.point[row])
-            if self.share(point) > 1:
+            if self.exceeded(point):
                 return self.pulled(point, beyond=True)
         return None
 
@@ -115,7 +122,7 @@ class LimitSearch:
         other, same = 0.0, 1.0
         for _ in range(12):
             middle = (other + same) / 2
-            held = (self.share(self.nominal + middle * (point - self.nominal)) > 1) == beyond
+            held = self.exceeded(self.nominal + middle * (point - self.nominal)) == beyond
             other, same = (other, middle) if held else (middle, same)
         pulled: Array = self.nominal + same * (point - self.nominal)
         return pulled
@@ -152,7 +159,7 @@ def unproved(
     lower, upper = search.unit(size)
     allowed = (1 - np.repeat(search.error.ravel(), 2))[pending]
     left, at, boxes = enclosed(search, lower, upper, pending, allowed, budget, workers)
-    return left, at if search.share(at) > 1 else None, boxes
+    return left, at if search.exceeded(at) else None, boxes
 
 
 def enclosed(

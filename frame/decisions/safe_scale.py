@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.decisions.limit_search import LEAST, LimitSearch, Reach, Unproved, unproved
+from alphacut.frame.decisions.limit_search import LEAST, TIE, LimitSearch, Reach, Unproved, unproved
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.structures.storey import StoreyFrame
@@ -41,7 +41,8 @@ class SafeScale:
     Args:
         names: Parameters, d of them.
         nominal: Their nominal values, shape (d,), in SI units.
-        safe: Largest scale proved safe; None where the nominal motion reaches a limit.
+        safe: Largest scale proved safe, 0 where the nominal motion reaches a limit; None where it
+            exceeds one.
         lower: Lower ends of the safe box, shape (d,).
         upper: Upper ends.
         unsafe: Scale of the least box that holds the witness; infinite without one.
@@ -114,7 +115,8 @@ def safe_scale(
     begun, names = time.perf_counter(), tuple(nominal)
     search = limit_search(frame, nominal, reach, limits, duration, step, failed)
     centre = search.nominal
-    if (nominal_share := search.share(centre)) >= 1:
+    nominal_share = search.share(centre)
+    if search.exceeded(centre):
         seconds = time.perf_counter() - begun
         box, shares = (centre, centre), (nominal_share, nominal_share)
         worth = ("guaranteed", "")
@@ -125,6 +127,10 @@ def safe_scale(
         for size in most * HALVED:
             stage(tell, f"scales up to {size:.3g}")
             unsafe, witness = np.inf, None
+            if nominal_share > 1 - TIE:  # nothing is left for a proof
+                search.gap, safe = GAP, 0.0
+                unsafe, witness = _refuted(search, size, precision)
+                break
             done, looked = _easily(search, 1 - nominal_share, size, budget, workers)
             boxes, safe = boxes + looked, size if done else 0.0
             if done:

@@ -103,7 +103,7 @@ def surely(search: LimitSearch, size: float) -> tuple[bool, Array | None]:
     parts, looked = [search.unit(size)], 0
     if not (parts[0][1] > parts[0][0]).any():
         point = search.model.boxes.to_physical(parts[0][0])
-        return (True, None) if search.share(point) > 1 else (False, point)
+        return (True, None) if search.exceeded(point) else (False, point)
     while parts and looked < PARTS:
         lower, upper = parts.pop()
         looked += 1

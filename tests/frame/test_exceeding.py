@@ -211,3 +211,19 @@ def test_six_stiffnesses_under_one_ratio_are_proved_far_from_the_limit() -> None
     for limit, verdict in ((2.0, "safe"), (0.4, "unsafe")):
         found = exceeding(frame, inputs, {"drift1": limit * peak}, duration=1.0, step=0.05)
         assert (found.verdict, found.scale.nature) == (verdict, "guaranteed")
+
+
+@pytest.mark.parametrize("limit", [0.009, 0.011])
+def test_of_a_mode_that_does_not_oscillate_nothing_is_known(limit: float) -> None:
+    slow = replace(ONE, q0=[0.01], v0=[0.0], dampers=[1e6])
+    found = exceeding(slow, {"E": Triangular(2.4e10, 2.5e10, 2.6e10)}, {"q1": limit}, **TIME)
+    assert (found.possibility, found.necessity, found.verdict) == ((0, 1), (0, 1), "undecided")
+    assert found.scale.reason.startswith("a mode does not oscillate")
+    assert "use graph-follower" not in found.scale.reason
+
+
+def test_a_release_from_the_limit_is_not_said_to_exceed_it() -> None:
+    release = replace(ONE, q0=[0.01], v0=[0.0], dampers=[50.0])
+    found = exceeding(release, {"E": Triangular(2.4e10, 2.5e10, 2.6e10)}, {"q1": 0.01}, **TIME)
+    assert found.possibility[0] == 0
+    assert found.necessity == (0, 0)

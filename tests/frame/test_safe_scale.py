@@ -64,6 +64,20 @@ def test_the_safe_box_is_safe_and_the_witness_is_not(seed):
     assert found.nature == "guaranteed"
 
 
+def test_a_limit_that_is_only_reached_is_not_exceeded():
+    # pulled by the limit and let go: no motion goes beyond it, for any modulus
+    frame = one_floor({"q0": [0.01], "dampers": [50.0]})
+    reach = scaled(np.array([2.5e10]), np.array([1e9]), np.array([1e9]))
+    tie = safe_scale(frame, {"E": 2.5e10}, reach, {"q1": 0.01}, **TIME)
+    assert (tie.safe, tie.witness, tie.nominal_share) == (0.0, None, pytest.approx(1.0, abs=1e-12))
+    over = safe_scale(frame, {"E": 2.5e10}, reach, {"q1": 0.01 * (1 - 1e-9)}, **TIME)
+    assert over.safe is None
+    # where stiffness decides, a motion beyond is found all the same
+    swing = one_floor({"q0": [0.01], "v0": [0.05]})
+    peak = np.abs(LinearFlow(swing, ("E",), 5, 0.01, Exact()).values(np.array([[2.5e10]]))).max()
+    assert safe_scale(swing, {"E": 2.5e10}, reach, {"q1": peak}, **TIME).witness is not None
+
+
 def test_a_limit_that_is_never_reached_or_always_broken_is_said_to_be():
     frame = one_floor({"q0": [0.01]})
     reach = scaled(np.array([2.5e10]), np.array([1e9]), np.array([1e9]))

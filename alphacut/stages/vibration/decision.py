@@ -309,6 +309,8 @@ def why(one: Document) -> str:
         return cure if "not proved" in one["verdict"] else ""
     if one["witness"] is None:
         return ", since neither a proof nor a motion beyond it was found; narrower inputs decide"
+    if one["necessity"][1] >= 1:
+        return ", since a motion beyond it was found, and neither one within nor a proof of none"
     return ", since some of the motions exceed it and some do not; narrower inputs decide"
 
 

@@ -21,7 +21,7 @@ OPERATIONS: dict[type[ast.operator], Callable[[Interval, Interval], Interval]] =
     ast.Div: Interval.__truediv__,
 }
 FUNCTIONS: dict[str, Callable[[Interval], Interval]] = {
-    "sqrt": lambda v: Interval(np.maximum(v.low, 0), np.maximum(v.high, 0)).rising(np.sqrt),
+    "sqrt": Interval.root,
     "exp": lambda v: v.rising(np.exp),
     "abs": Interval.__abs__,
     "cos": Interval.cosine,
@@ -45,7 +45,7 @@ class Equation:
     inequality: str
 
     def __post_init__(self) -> None:
-        self._excess(Interval.exact(0.5), Interval.exact(0.5))
+        self._excess(Interval.exact(0.0), Interval.exact(0.0))
 
     def classify(self, grid: Grid) -> Array:
         """OUTSIDE, CUT or INSIDE for each pixel, shape (rows, columns)."""
@@ -58,7 +58,11 @@ class Equation:
         return np.array(np.broadcast_to(classes, (grid.rows, grid.columns)))
 
     def _excess(self, x: Interval, y: Interval) -> Interval:
-        """Expression that must not be positive."""
+        """Expression that must not be positive.
+
+        Raises:
+            ValueError: The text is no inequality, or it has the root of a negative value.
+        """
         try:
             tree = ast.parse(self.inequality.strip(), mode="eval").body
         except SyntaxError as error:

@@ -318,14 +318,16 @@ def test_what_is_not_proved_is_judged_by_the_envelope_with_a_reason() -> None:
     assert next(_verdicts(found, margin, "guaranteed")) == sure
     calm = {"a": one(None), "b": one(None, "safe"), ANY: one(None)}
     assert list(_verdicts(calm, margin, "estimated")) == [kept, "safe", kept]
-    for verdict, witness, words in (
+    for verdict, witness, words, *most in (
         (kept, None, "; fewer or narrower fuzzy inputs would give a proof"),
         ("undecided", None, ", since neither a proof nor a motion beyond it was found"),
-        ("undecided", {"m1": 1.0}, ", since some of the motions exceed it"),
+        ("undecided", {"m1": 1.0}, ", since some of the motions exceed it", 0.9),
+        ("undecided", {"m1": 1.0}, ", since a motion beyond it was found, and neither"),
         ("safe", None, ""),
         (sure, None, ""),
     ):
-        told = why({"verdict": verdict, "witness": witness})
+        necessity = (0.0, *(most or [1.0]))
+        told = why({"verdict": verdict, "witness": witness, "necessity": necessity})
         assert told.startswith(words)
         assert bool(told) is bool(words)
 
