@@ -99,9 +99,6 @@ def random_threshold(case: Case) -> Iterator[Problem]:
         return
     if len(given.threshold or ()) != 1:
         yield Problem(key, "a random threshold parts two phases", allowed="one cell.threshold")
-    if not given.threshold_deviation.support.lower > 0:
-        what = "the deviation of a random threshold is positive"
-        yield case.problem(key, what, "no deviation for a crisp threshold")
     if given.boundary == "window":
         what = "a random threshold is for a periodic image"
         yield Problem(key, what, allowed='boundary = "periodic"')

@@ -141,13 +141,19 @@ def numbers(result: Homogenised) -> str:
     return as_json({**document, "declared_error": errors}, indent=2)
 
 
+def above(error: float, value: float) -> str:
+    """An error rounded up, with that of a value that is printed with ten digits."""
+    return f"{1.05 * (error + 5e-10 * abs(value)):.1e}"
+
+
 def comments(result: Homogenised, mark: str) -> str:
     """Lines of comment: the isotropic constants' worth, and the stiffness where it is known."""
     words = shape(result)
     lines = [words.convention]
     if result.errors:
         modulus, nu = errors_of_constants(result)
-        lines.append(f"declared absolute errors: E {modulus:.1e} Pa, nu {nu:.1e}")
+        told = f"E {above(modulus, result.modulus)} Pa, nu {above(nu, 1.0)}"
+        lines.append(f"declared absolute errors: {told}")
     if result.stiffness is not None:
         error, ratio = errors_of_stiffness(result)
         of_array = shear_ratio(result.stiffness)
@@ -158,7 +164,8 @@ def comments(result: Homogenised, mark: str) -> str:
             " strain, and the absolute errors of its entries:"
         )
         lines += [", ".join(f"{entry:.9e}" for entry in row) for row in result.stiffness]
-        lines += [", ".join(f"{entry:.1e}" for entry in row) for row in error]
+        pairs = (zip(*rows, strict=True) for rows in zip(error, result.stiffness, strict=True))
+        lines += [", ".join(above(*pair) for pair in row) for row in pairs]
     return "".join(f"{mark} {line}\n" for line in lines)
 
 
@@ -189,7 +196,7 @@ def errors_of_stiffness(result: Homogenised) -> tuple[Array, float]:
 def about(result: Homogenised, fibres: FibreConstants) -> str:
     """Line of comment on orthotropic constants."""
     return shape(result).about + ", ".join(
-        f"{name} {error:.1e}" for name, error in fibres.errors.items()
+        f"{name} {above(error, fibres.values[name])}" for name, error in fibres.errors.items()
     )
 
 

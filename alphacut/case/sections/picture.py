@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from alphacut.case.key import NOT_NEGATIVE, POISSON, UNIT, Key, Range, Section, positive
+from alphacut.case.key import POISSON, UNIT, Key, Range, Section, positive
 from alphacut.fuzzy import FuzzyNumber
 
 DIVISIONS = Range("from 1 to 16", 1.0, 16.0, closed=True)
@@ -60,9 +60,7 @@ class Picture(Section):
     ] = None
     threshold_deviation: Annotated[
         FuzzyNumber | None,
-        Key(
-            "standard deviation of a random threshold, normal about threshold", allowed=NOT_NEGATIVE
-        ),
+        positive("standard deviation of a random threshold, normal about threshold"),
     ] = None
     quantiles: Annotated[
         tuple[float, ...],

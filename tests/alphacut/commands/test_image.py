@@ -299,7 +299,7 @@ def test_a_run_hands_the_modulus_on_to_the_frame_and_keeps_it(folder, capfd):
         ({"threshold": None, "labels": "[60, 200]"}, "which is none of cell.labels"),
         ({"threshold": None, "labels": "[60]"}, "there is one phase"),
         ({"threshold": None, "labels": "[60, 60]"}, "a label stands twice"),
-        ({"threshold_deviation": "0"}, "the deviation of a random threshold is positive"),
+        ({"threshold_deviation": "0"}, "cell.threshold_deviation = 0: 0 is out of range"),
         ({"quantiles": "[0.5]"}, "quantiles are of a random threshold"),
         (
             {"threshold": None, "labels": "[60, 200]", "threshold_deviation": "3"},
