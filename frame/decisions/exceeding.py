@@ -16,7 +16,7 @@ from functools import partial
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.decisions.limit_search import Unproved
+from alphacut.frame.decisions.limit_search import LimitSearch, Unproved
 from alphacut.frame.decisions.safe_scale import SafeScale, limit_search, safe_scale
 from alphacut.frame.decisions.sure_exceeding import sure_exceeding
 from alphacut.frame.structures.modes import ModalError
@@ -99,14 +99,14 @@ def exceeding(
 
     proof = partial(safe_scale, frame, nominal, reach, limits, duration=duration, step=step)
     necessity, sampled = (0.0, 0.0), ""
+    search = limit_search(frame, nominal, reach, limits, duration, step, failed)
     try:
         found = proof(most=most, workers=workers, progress=progress, failed=failed)
         if found.safe is None:
-            search = limit_search(frame, nominal, reach, limits, duration, step, failed)
             sure = sure_exceeding(search, most)
             necessity, sampled = (sure.size or 0.0, min(sure.kept, 1.0)), search.reason
     except ModalError as error:
-        return _unknown(nominal, str(error), str(JointClaim.of(numbers)), lowest)
+        return _unknown(search, str(error), str(JointClaim.of(numbers)), lowest)
     safe = 0.0 if found.safe is None else found.safe
     upper = lowest if safe >= most else 1 - safe
     lower = 1 - found.unsafe if np.isfinite(found.unsafe) else 0.0
@@ -116,13 +116,14 @@ def exceeding(
     return Exceeding((max(lower, 0.0), upper), necessity, found, claim, lowest)
 
 
-def _unknown(nominal: Mapping[str, float], why: str, claim: str, lowest: float) -> Exceeding:
-    """Of a motion that has no model to rest a proof on."""
-    centre, reason = np.array([*nominal.values()], float), why.partition(";")[0]
-    shares = np.nan, np.nan
-    box = centre, 0.0, centre, centre, np.inf, None
-    scale = SafeScale(tuple(nominal), *box, *shares, "guaranteed", reason, 0, 0.0)
-    return Exceeding((0.0, 1.0), (0.0, 1.0), scale, claim, lowest)
+def _unknown(search: LimitSearch, why: str, claim: str, lowest: float) -> Exceeding:
+    """What the nominal motion tells, where there is no model to rest a proof on."""
+    centre, share = search.nominal, search.share(search.nominal)
+    passed, told = search.exceeded(centre), ("guaranteed", why.partition(";")[0], 0, 0.0)
+    safe, unsafe, witness = (None, 0.0, centre) if passed else (0.0, np.inf, None)
+    box = safe, centre, centre, unsafe, witness, share * passed, share
+    scale = SafeScale(search.flow.names, centre, *box, *told)
+    return Exceeding((float(passed), 1.0), (0.0, 1.0 if passed else 0.0), scale, claim, lowest)
 
 
 def any_exceeding(each: Mapping[str, Exceeding], together: Exceeding | None = None) -> Exceeding:

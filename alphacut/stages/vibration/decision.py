@@ -310,7 +310,7 @@ def why(one: Document) -> str:
     if one["witness"] is None:
         return ", since neither a proof nor a motion beyond it was found; narrower inputs decide"
     if one["necessity"][1] >= 1:
-        return ", since a motion beyond it was found, and neither one within nor a proof of none"
+        return ", since a motion beyond it was found, and neither one that keeps it nor a proof"
     return ", since some of the motions exceed it and some do not; narrower inputs decide"
 
 
