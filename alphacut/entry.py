@@ -138,6 +138,8 @@ def main(
         except KeyboardInterrupt:
             how = f"ended by {signal.Signals(came[0]).name}" if came else "interrupted"
             say(f"{how}; {interrupted(options)}")
+            if came and ranks() > 1 and "mpi4py.MPI" in sys.modules:  # others may wait for this one
+                sys.modules["mpi4py.MPI"].COMM_WORLD.Abort(128 + came[0])
             return 128 + (came or [signal.SIGINT])[0]
         except BrokenPipeError:
             os.dup2(os.open(os.devnull, os.O_WRONLY), 1)

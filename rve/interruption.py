@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+ONCE = 1.0
+"""Seconds within which signals count as one."""
 _STOPS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
@@ -15,17 +18,19 @@ _STOPS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(sig
 def stoppable() -> Iterator[list[int]]:
     """Let SIGTERM and SIGHUP interrupt the block as Ctrl-C does; gives the number that came.
 
-    The first alone, for `timeout` and batch systems send one to a process and one to its group.
+    Not again within `ONCE`: `timeout` and batch systems send one to a process and one to its group.
     What was ignored before, as under nohup, stays ignored.
     """
     main, came = threading.current_thread() is threading.main_thread(), list[int]()
+    heard = [-ONCE]
     kept = {one: signal.getsignal(one) for one in _STOPS if main}
     kept = {one: how for one, how in kept.items() if how not in (None, signal.SIG_IGN)}
 
     def stop(number: int, frame: FrameType | None) -> None:
         came.append(number)
-        pressed = signal.getsignal(signal.SIGINT)
-        if len(came) == 1:
+        pressed, now = signal.getsignal(signal.SIGINT), time.monotonic()
+        if now - heard[0] >= ONCE:
+            heard[0] = now
             (pressed if callable(pressed) else signal.default_int_handler)(number, frame)
 
     for one in kept:

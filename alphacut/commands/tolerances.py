@@ -36,7 +36,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--most",
         type=float,
-        default=2.0,
         metavar="X",
         help="largest scaling asked for (default 2, or what leaves each input a meaning)",
     )
@@ -46,7 +45,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Compute and report."""
     common.check_workers(options.workers)
-    if not options.most > 0:
+    if options.most is not None and not options.most > 0:
         raise BadInput.of("--most", "out of range", f"{options.most:g}", "greater than 0")
     case = load(options.case, common.changes(options, KEYS))
     require_read(case, READ, "tolerances")

@@ -158,7 +158,7 @@ def comments(result: Homogenised, mark: str) -> str:
         error, ratio = errors_of_stiffness(result)
         of_array = shear_ratio(result.stiffness)
         lines.append(shear_ratio_in_words(of_array, words.meaning))
-        lines.append(f"absolute error of this ratio: {ratio:.1e}")
+        lines.append(f"absolute error of this ratio: {above(ratio + 5e-4, 0.0)}")  # three decimals
         lines.append(
             f"{words.kind} in Pa, Voigt order {', '.join(words.order)} with engineering shear"
             " strain, and the absolute errors of its entries:"

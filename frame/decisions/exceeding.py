@@ -19,7 +19,7 @@ from alphacut.frame.calculus.jet import Array
 from alphacut.frame.decisions.limit_search import LimitSearch, Unproved
 from alphacut.frame.decisions.safe_scale import SafeScale, limit_search, safe_scale
 from alphacut.frame.decisions.sure_exceeding import sure_exceeding
-from alphacut.frame.structures.modes import ModalError
+from alphacut.frame.structures.modes import ModalError, UnsuitedOutputError
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arguments import fuzzy_inputs
@@ -105,6 +105,8 @@ def exceeding(
         if found.safe is None:
             sure = sure_exceeding(search, most)
             necessity, sampled = (sure.size or 0.0, min(sure.kept, 1.0)), search.reason
+    except UnsuitedOutputError:
+        raise
     except ModalError as error:
         return _unknown(search, str(error), str(JointClaim.of(numbers)), lowest)
     safe = 0.0 if found.safe is None else found.safe

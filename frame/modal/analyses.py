@@ -8,7 +8,14 @@ from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.structures.linear import Matrices, evaluate, relative_to_ground
-from alphacut.frame.structures.modes import ModalError, Modes, eigenvectors, modes, state_matrix
+from alphacut.frame.structures.modes import (
+    ModalError,
+    Modes,
+    UnsuitedOutputError,
+    eigenvectors,
+    modes,
+    state_matrix,
+)
 
 
 def analyse(
@@ -32,7 +39,7 @@ def analyse(
         ModalError: The structure has no such modes, or the integrator mixes them.
     """
     if relative_to_ground(flow.system):
-        raise ModalError(
+        raise UnsuitedOutputError(
             "modal: accelerations relative to the ground, ar1 …, are followed by `envelope` alone;"
             " take the absolute ones, a1 …"
         )

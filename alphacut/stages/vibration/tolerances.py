@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from alphacut.frame.checks.admissible import RATIO
 from alphacut.frame.checks.admissible import wanted as admissible
 from alphacut.frame.decisions.safe_scale import SafeScale, safe_scale
 from alphacut.frame.outputs import output_unit
+from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy import CampaignError, FuzzyNumber, Interval, Signed, Triangular, propagate
 from alphacut.io.files import Document
 from alphacut.io.problem import BadInput
@@ -30,6 +32,8 @@ from alphacut.stages.vibration.studies import left_out
 from alphacut.stochastic.theta.truncated_normal import Array
 
 Range = Callable[[float], tuple[float, float]]
+MOST = 2.0
+"""Largest scale that is asked for by default."""
 SCALES = 13
 """Scales at which the range of the cell's modulus is computed; between them it is interpolated."""
 MEANINGFUL = 0.9
@@ -125,7 +129,7 @@ def tolerances(
     case: Case,
     handed: FuzzyNumber | None,
     *,
-    most: float = 2.0,
+    most: float | None = None,
     workers: int = 1,
     progress: Tick | None = None,
 ) -> Tolerances:
@@ -134,14 +138,17 @@ def tolerances(
     Args:
         case: With the sections exceedance and envelope and a storey frame.
         handed: Modulus in Pa that stands in for the cell, if any.
-        most: Largest scale that is asked for.
+        most: Largest scale that is asked for; None for `MOST`, or less where an input's meaning
+            ends near it.
         workers: Processes of the proof.
         progress: Told the share done.
 
     Raises:
+        ModalError: A mode does not oscillate within the largest scale.
         BadInput: The structure is no storey frame, or has no such output.
     """
     limits, over = exceeded_limits(case), case.envelope
+    near, most = (MEANINGFUL, MOST) if most is None else (1.0, most)
     given = handed is not None or case.frame.modulus is not None or case.frame.stiffness is not None
     cell = None if given else campaign(case)
     modulus_range, most, ended = (None, most, "") if cell is None else _cell_range(cell, most)
@@ -151,7 +158,7 @@ def tolerances(
         raise BadInput.of("frame", "missing: safe tolerances are those of a storey frame")
     inputs = wanted.inputs(over.fuzzy)
     own = {name: x for name, x in inputs.items() if modulus_range is None or name != "E"}
-    most, ended = _with_meaning(wanted.frame, own, most, ended)
+    most, ended = _with_meaning(wanted.frame, own, most, ended, near)
 
     def reach(scale: float) -> tuple[Array, Array]:
         ends = _all_scaled(own, scale)
@@ -160,17 +167,14 @@ def tolerances(
         both = np.array([ends[name] for name in inputs], float)
         return both[:, 0], both[:, 1]
 
-    found = safe_scale(
-        _limited(wanted, tuple(limits), case),
-        {name: number.modal for name, number in inputs.items()},
-        reach,
-        limits,
-        duration=over.duration,
-        step=over.step,
-        most=most,
-        workers=workers,
-        progress=progress or False,
-    )
+    nominal = {name: number.modal for name, number in inputs.items()}
+    proof = partial(safe_scale, _limited(wanted, tuple(limits), case), nominal, reach, limits)
+    proof = partial(proof, duration=over.duration, step=over.step, most=most)
+    try:
+        found = proof(workers=workers, progress=progress or False)
+    except ModalError as error:
+        what = str(error).partition(";")[0]
+        raise ModalError(f"{what}; less damping, narrower supports or a smaller --most") from None
     if cell is not None and found.safe and "E" in inputs:
         found = _within_cell(found, cell, list(inputs).index("E"))
     fixed = left_out(wanted, [task_of(case)])
@@ -178,14 +182,17 @@ def tolerances(
 
 
 def _with_meaning(
-    frame: StoreyFrame, own: Mapping[str, FuzzyNumber], most: float, ended: str
+    frame: StoreyFrame, own: Mapping[str, FuzzyNumber], most: float, ended: str, near: float
 ) -> tuple[float, str]:
-    """The largest scale, lowered to 1 or where every input has a meaning, and which has none."""
+    """The largest scale, lowered to 1 or where every input has a meaning, and which has none.
+
+    A meaning that ends at a scale lowers what is above `near` times that.
+    """
     for name, number in own.items():
         (low, high), modal, rule = number.support, number.modal, admissible(frame, name)
         ends = [modal / (modal - low)] if rule and low < modal else []
         ends += [(1 - modal) / (high - modal)] if rule == RATIO and high > modal else []
-        if ends and min(ends) <= most > 1:
+        if ends and near * min(ends) <= most > 1:
             most = max(MEANINGFUL * min(ends), 1.0)
             ended = f"{name}, which must be {rule}, has no meaning from {min(ends):.4g} on"
     return most, ended
@@ -225,11 +232,10 @@ def _cell_range(cell: Campaign, most: float) -> tuple[Range, float, str]:
         try:
             ends.append(_moduli(cell, scale))
         except CampaignError as error:
-            if scale <= 1:  # the case's own supports
+            kind, _, why = error.failures[0][1].partition(": ")
+            if scale <= 1 or kind != "ValueError":  # the case's own supports, or another fault
                 raise
-            ended = (
-                f"at {scale:.4g} the cell has no modulus: {error.failures[0][1].partition(': ')[2]}"
-            )
+            ended = f"at {scale:.4g} the cell has no modulus: {why}"
             break
     scales, both = scales[: len(ends)], np.array(ends)
     low, high = (PchipInterpolator(scales, both[:, side]) for side in (0, 1))

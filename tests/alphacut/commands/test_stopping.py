@@ -1,6 +1,7 @@
 """SIGTERM and SIGHUP end a command as Ctrl-C does: one line, what was finished kept, no orphans."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -10,6 +11,8 @@ from pathlib import Path
 import pytest
 
 from alphacut.entry import COMMANDS, main
+from alphacut.rve import interruption
+from alphacut.rve.interruption import stoppable
 
 ROOT = Path(__file__).parents[3]
 PAPER = str(ROOT / "cases" / "paper.toml")
@@ -85,3 +88,42 @@ def test_a_reader_that_wants_no_more_is_no_error_of_petsc():
     piped = f"({sys.executable} -m alphacut {words}; echo status $? >&2) | true"
     done = subprocess.run(["bash", "-c", piped], capture_output=True, text=True, cwd=ROOT)
     assert done.stderr == "status 0\n"
+
+
+def test_a_signal_that_python_drops_is_heard_when_it_comes_again(monkeypatch):
+    monkeypatch.setattr(interruption, "ONCE", 0.2)
+
+    class Dropped:
+        def __del__(self):
+            os.kill(os.getpid(), signal.SIGTERM)
+            signal.getsignal(signal.SIGINT)  # the handler runs here, where nobody catches it
+
+    with stoppable() as came:
+        Dropped()
+        os.kill(os.getpid(), signal.SIGTERM)
+        assert len(came) == 2  # as one
+        time.sleep(0.3)
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGTERM)
+
+
+@pytest.mark.skipif(shutil.which("mpirun") is None, reason="no mpirun")
+def test_a_signal_to_one_rank_ends_all():
+    words = ["cell", PAPER, "--method", "prism", "--mesh-size", "0.04", "--layers", "12", "--quiet"]
+    command = ["mpirun", "-n", "2", sys.executable, "-m", "alphacut", *words]
+    with subprocess.Popen(command, stdout=-1, stderr=-1, cwd=ROOT, start_new_session=True) as job:
+        ranks, before = [], time.monotonic()
+        while len(ranks) < 2 and time.monotonic() < before + 60:
+            listed = subprocess.run(
+                ["ps", "-eo", "pid=,pgid=,ppid="], capture_output=True, text=True
+            )
+            rows = [line.split() for line in listed.stdout.splitlines()]
+            ranks = [int(pid) for pid, _, parent in rows if parent == str(job.pid)]
+            time.sleep(0.05)
+        time.sleep(2.5)  # into the solution
+        os.kill(ranks[-1], signal.SIGTERM)
+        try:
+            job.communicate(timeout=60)
+        finally:
+            job.terminate()
+        assert job.returncode != 0

@@ -167,3 +167,26 @@ def test_ratios_of_damping_stay_below_the_critical(tmp_path, capfd):
     found = json.loads(capfd.readouterr().out)
     assert found["most"] == pytest.approx(0.9 * 0.5 / 0.3)
     assert found["safe"]["zeta"][1] < 1
+
+
+def test_a_default_stays_away_from_scales_at_which_a_mode_no_longer_oscillates(tmp_path, capfd):
+    soft = CASE.replace("[22, 25, 27] GPa", "[12.51, 25, 26] GPa")
+    soft = soft.replace('["50 N s/m"]', '["1.5 kN s/m"]').replace('["E", "m1"]', '["E"]')
+    assert told(tmp_path, "1 m", "--json", "-", text=soft) == 0
+    assert json.loads(capfd.readouterr().out)["most"] == pytest.approx(0.9 * 25 / 12.49)
+    assert told(tmp_path, "1 m", "--most", "2", text=soft) == 1
+    error = capfd.readouterr().err
+    assert "oscillate" in error
+    assert error.endswith("less damping, narrower supports or a smaller --most\n")
+    assert "graph-follower" not in error
+
+
+def test_other_faults_of_a_cell_are_no_end_of_the_scales(monkeypatch):
+    def moduli(cell, scale):
+        if scale > 1.2:
+            raise CampaignError([({}, "MemoryError: ")], 2)
+        return 10 - scale, 10 + scale
+
+    monkeypatch.setattr(tolerances, "_moduli", moduli)
+    with pytest.raises(CampaignError):
+        tolerances._cell_range(None, 2.0)

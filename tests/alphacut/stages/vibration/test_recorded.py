@@ -132,3 +132,10 @@ def test_recorded_outputs_whose_errors_differ_are_refused_and_sets_are_no_proof(
     ]
     assert main(["update", str(written(tmp_path, "\n".join([head, *mixed, ""])))]) == 2
     assert "the recorded outputs' errors are not alike: deviations" in capsys.readouterr().err
+
+
+def test_rounding_alone_is_no_error_of_the_outputs(tmp_path: Path) -> None:
+    head, *lines = recorded(np.random.default_rng(7), 0.0).splitlines()
+    rows = [line.split(",") for line in lines]
+    digits = [f"{t},{float(one):.3g},{float(two):.3g}" for t, one, two in rows]
+    assert main(["update", str(written(tmp_path, "\n".join([head, *digits, ""])))]) == 0
