@@ -99,16 +99,17 @@ def exceeding(
 
     proof = partial(safe_scale, frame, nominal, reach, limits, duration=duration, step=step)
     necessity, sampled = (0.0, 0.0), ""
-    search = limit_search(frame, nominal, reach, limits, duration, step, failed)
+    seek = partial(limit_search, frame, nominal, reach, limits, duration, step, failed)
     try:
         found = proof(most=most, workers=workers, progress=progress, failed=failed)
         if found.safe is None:
+            search = seek()
             sure = sure_exceeding(search, most)
             necessity, sampled = (sure.size or 0.0, min(sure.kept, 1.0)), search.reason
     except UnsuitedOutputError:
         raise
     except ModalError as error:
-        return _unknown(search, str(error), str(JointClaim.of(numbers)), lowest)
+        return _unknown(seek(), str(error), str(JointClaim.of(numbers)), lowest)
     safe = 0.0 if found.safe is None else found.safe
     upper = lowest if safe >= most else 1 - safe
     lower = 1 - found.unsafe if np.isfinite(found.unsafe) else 0.0
