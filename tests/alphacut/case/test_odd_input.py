@@ -137,3 +137,12 @@ def test_one_value_for_all_floors_may_be_changed_from_the_command_line():
     given = (frame.damping_ratio, frame.lengths, frame.displacements, frame.velocities)
     assert [len(values) for values in given] == [1, 1, 3, 1]
     assert frame.damping_ratio[0].modal == 0.04
+
+
+def test_every_key_that_a_command_does_not_read_is_told(capfd):
+    keys = ["--set", "mesh.size=0.1", "--set", "mesh.layers=6"]
+    assert main(["envelope", str(CASES / "paper.toml"), *keys]) == 2
+    told = capfd.readouterr().err
+    assert told.count("command envelope does not read this key") == 2
+    assert "mesh.size" in told
+    assert "mesh.layers" in told
