@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
@@ -35,6 +35,9 @@ from alphacut.stages.vibration.envelope_task import EnvelopeTask, task_of
 from alphacut.stages.vibration.structure import Structure, structure
 from alphacut.stages.vibration.studies import cut_line, fixed_line, left_out
 from alphacut.stochastic.theta.truncated_normal import Array
+
+if TYPE_CHECKING:
+    import xarray
 
 ABOUT = "envelopes of the structure's vibration on every α-cut"
 KEYS = {
@@ -90,18 +93,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         return 0
     content = {"case": case.sections, "task": task, "modulus": handed}
     content["files"] = case.digests(*case.sections.files)
-    key = fingerprint(content, ("fuzzy", "frame"))
-    beside = options.out and Path(options.out).with_suffix(".partial.npz")
-    kept = KeptArrays(beside, key) if beside else None
-    with progress("Envelopes", quiet=options.quiet) as tick:
-        found = envelope.compute(
-            wanted, task, strict=options.strict, workers=options.workers, progress=tick, kept=kept
-        )
-    dataset = outcomes.with_peaks(found, wanted, task)
-    envelope.keep_tolerance(case, dataset, best_effort=options.best_effort)
-    if kept:
-        envelope.write(dataset, options.out, case_text=case.text_of_file, key=key)
-        kept.done()
+    found, dataset = computed(options, case, wanted, task, fingerprint(content, ("fuzzy", "frame")))
     limit = exceeded(options, case, wanted)
     tried = dataset["peak_tried"].values
     contract = {"asked": task.tolerance, "reached": dataset.attrs.get("reached")}
@@ -121,6 +113,24 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     text += outcomes.sentences(limit) if limit else ""
     common.answer(options, document, out, text)
     return 0
+
+
+def computed(
+    options: argparse.Namespace, case: Case, wanted: Structure, task: EnvelopeTask, key: str
+) -> tuple[Envelope, xarray.Dataset]:
+    """The envelopes, judged by the case's tolerance, then written where ``--out`` says."""
+    beside = options.out and Path(options.out).with_suffix(".partial.npz")
+    kept = KeptArrays(beside, key) if beside else None
+    with progress("Envelopes", quiet=options.quiet) as tick:
+        found = envelope.compute(
+            wanted, task, strict=options.strict, workers=options.workers, progress=tick, kept=kept
+        )
+    dataset = outcomes.with_peaks(found, wanted, task)
+    envelope.keep_tolerance(case, dataset, best_effort=options.best_effort)
+    if kept:
+        envelope.write(dataset, options.out, case_text=case.text_of_file, key=key)
+        kept.done()
+    return found, dataset
 
 
 def exceeded(options: argparse.Namespace, case: Case, wanted: Structure) -> Document | None:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import chi2
+from scipy.stats import bartlett
 from scipy.stats import f as law
 
 from alphacut.frame.calculus.jet import Array
@@ -208,15 +208,15 @@ def _fit(record: RecordedMotion, ends: Array) -> tuple[Array, Array]:
 def _require_alike(record: RecordedMotion, best: Array) -> None:
     """Bartlett's test of one deviation for all outputs (Proc. R. Soc. A 160, 268, 1937)."""
     miss = record.misfit(best[None])[0].reshape(record.values.shape)
-    count, outputs = len(miss) - 1, miss.shape[1]
-    if outputs < 2 or count < 10 * len(best):
+    deviations = miss.std(0, ddof=1)
+    if miss.shape[1] < 2 or len(miss) <= 10 * len(best):
         return
-    least = 1e-9 * np.abs(record.values).max()  # of a record without errors nothing is told
-    variance = np.maximum(miss.var(0, ddof=1), least**2)
-    apart = count * (outputs * np.log(variance.mean()) - np.log(variance).sum())
-    apart /= 1 + (outputs + 1) / (3 * outputs * count)
-    if chi2.sf(apart, outputs - 1) < ALIKE and variance.max() > 4 * variance.min():
-        each = zip(record.flow.outputs, np.sqrt(variance), strict=True)
+    if deviations.max() <= 1e-9 * np.abs(record.values).max():  # a record without errors
+        return
+    with np.errstate(divide="ignore"):
+        chance = bartlett(*miss.T).pvalue
+    if chance < ALIKE and deviations.max() > 2 * deviations.min():
+        each = zip(record.flow.outputs, deviations, strict=True)
         told = ", ".join(f"{deviation:.2g} of {name}" for name, deviation in each)
         raise ValueError(
             f"the recorded outputs' errors are not alike: deviations {told} (SI) of the best fit;"

@@ -12,6 +12,7 @@ import pytest
 from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.export.fields import require_conforming
+from alphacut.export.material_card import above
 from alphacut.io.problem import BadInput
 
 ROOT = Path(__file__).parents[3]
@@ -261,3 +262,11 @@ def test_fields_come_back_with_their_units_in_their_names(ending, tmp_path):
     }
     assert names <= set(found)
     assert found["stress_1_11_Pa"].max() > 1e8
+
+
+def test_errors_on_cards_hold_their_own_digits_and_those_of_the_values():
+    rng = np.random.default_rng()
+    for error, value in 10 ** rng.uniform(-12, 12, (300, 2)):
+        printed = float(f"{value:.9e}")
+        assert float(above(error, value)) >= error + abs(printed - value)
+        assert float(above(error, value)) <= 1.2 * (error + 5e-10 * value)

@@ -12,6 +12,9 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Envelope, Exact, LinearFlow, MatrixStructure, StoreyFrame, envelope
+from alphacut.frame.boxes import UnitFlow, boxes
+from alphacut.frame.checks.step_error import step_error
+from alphacut.frame.dynamics.integrators import Midpoint
 from alphacut.frame.methods import auto
 from alphacut.frame.methods.modal import GapError, Modal
 from alphacut.frame.modal.exact_response import ExactResponse
@@ -187,3 +190,13 @@ def test_many_inputs_that_miss_the_tolerance_do_not_begin_the_graph_follower(
     common: dict[str, Any] = {"duration": 0.4, "step": 0.02, "alpha": (0,)}
     with pytest.raises(auto.ToleranceError, match=r"modal estimates 0.01 m\); take fewer or"):
         envelope(FRAME, MANY, **common)
+
+
+def test_time_stepping_takes_its_error_from_the_tolerance() -> None:
+    flow = LinearFlow(FRAME, ("m1",), 1.0, 0.02, Midpoint())
+    way = UnitFlow(flow, boxes(LIGHT, (0.0,)))
+    reached = float((step_error(way) / way.scale).max())
+    assert reached > 0
+    assert auto._left(way, 3 * reached) == pytest.approx(2 * reached)
+    with pytest.raises(auto.ToleranceError, match="the error of time stepping"):
+        auto._left(way, reached)

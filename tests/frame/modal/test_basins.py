@@ -9,6 +9,7 @@ from alphacut.frame.calculus.jet import Array
 from alphacut.frame.modal.contest import contest
 from alphacut.frame.modal.exact_response import ExactResponse
 from alphacut.frame.modal.model import ModalModel
+from alphacut.frame.modal.newton import refine
 from alphacut.frame.modal.optima import Optima, best_of_few, problems
 from alphacut.frame.modal.polish import Polish
 from alphacut.frame.modal.probes import probe
@@ -154,3 +155,39 @@ def test_what_the_last_pass_gained_is_told(passes: int) -> None:
         assert gained[0] > 0.04
     else:
         assert gained[0] <= 1e-9
+
+
+class Plane(Hills):
+    """A slope so slight that the first trust region promises less than is asked for."""
+
+    def at(self, unit: Array, node: Array, output: Array) -> tuple[Array, Array, Array]:
+        value = 1e-3 * unit.sum(1)
+        return value, np.full(unit.shape, 1e-3), np.zeros((*unit.shape, 2))
+
+
+def test_what_a_trust_region_holds_back_is_judged_by_the_whole_box() -> None:
+    found = top(1, -ENDS, -2e-3)
+    found.value[:] = found.side * -2e-3
+    refine(on(Plane(1)), found, np.flatnonzero(found.side > 0), -ENDS, ENDS, 1e-3)
+    assert found.value[found.side > 0] == pytest.approx(2e-3)
+
+
+class Bowl(Hills):
+    """A concave quadratic whose second derivatives only the change of its gradients tells."""
+
+    secant: ClassVar[bool] = True
+    bend = np.array([[-2.0, 0.7], [0.7, -1.0]])
+    evaluated = 0
+
+    def at(self, unit: Array, node: Array, output: Array) -> tuple[Array, Array, Array]:
+        self.evaluated += 1
+        away = unit - 0.3
+        g = away @ self.bend
+        return 1 + (g * away).sum(1) / 2, g, np.zeros((*unit.shape, 2))
+
+
+def test_second_derivatives_are_learned_from_gradients() -> None:
+    bowl, found = Bowl(1), top(1, np.array([-0.5, 0.9]), -np.inf)
+    refine(on(bowl), found, np.flatnonzero(found.side > 0), -ENDS, ENDS, 1e-9)
+    assert found.value[found.side > 0] == pytest.approx(1.0, abs=1e-8)
+    assert bowl.evaluated <= 5  # eight where a correction comes a step late

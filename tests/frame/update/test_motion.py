@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from alphacut.frame import Exact, LinearFlow, StoreyFrame, envelope
-from alphacut.frame.update.motion import RecordedMotion, learn_from_motion
+from alphacut.frame.update.motion import RecordedMotion, _require_alike, learn_from_motion
 from alphacut.fuzzy import FuzzyNumber, Interval
 
 FRAME = StoreyFrame(
@@ -91,3 +95,19 @@ def test_records_that_do_not_fit_are_refused() -> None:
         learn_from_motion(record, {"c2": Interval(1, 2)})
     with pytest.raises(ValueError, match=r"must rise within"):
         learn_from_motion(record, PRIOR, alpha=(0.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("rows", "ratio", "told"),
+    [(600, 1.5, False), (600, 3.0, True), (100, 3.0, True), (15, 50, False)],
+)
+def test_outputs_are_refused_whose_errors_differ_by_much_and_surely(
+    rows: int, ratio: float, told: bool
+) -> None:
+    noise = np.random.default_rng().normal(size=(rows, 2)) * [1e-3, 1e-3 * ratio]
+    flow = SimpleNamespace(outputs=("q1", "q2"))
+    record: Any = SimpleNamespace(values=noise, flow=flow, misfit=lambda _: (noise[None], None))
+    with pytest.raises(ValueError, match="errors are not alike") if told else nullcontext():
+        _require_alike(record, np.zeros(2))
+    silent: Any = SimpleNamespace(values=1e12 * noise, flow=flow, misfit=record.misfit)
+    _require_alike(silent, np.zeros(2))
