@@ -14,6 +14,8 @@ import numpy as np
 if TYPE_CHECKING:
     from mpi4py import MPI
 
+    from alphacut.stochastic.theta.truncated_normal import Array
+
 S = TypeVar("S")
 T = TypeVar("T")
 
@@ -120,13 +122,18 @@ class Ranks:
         """What every rank has, known to all."""
         return self.comm.allgather(own) if self.comm else [own]
 
-    def swap(self, pieces: list[T]) -> list[T]:
-        """A piece for each rank turned into one from each."""
+    def swap(self, pieces: list[Array]) -> list[Array]:
+        """Numbers for each rank turned into those from each; they go as they lie in memory."""
         if self.comm is None or self.size == 1:
             return pieces
-        own = self.comm.rank
-        sent = [None if k == own else piece for k, piece in enumerate(pieces)]
-        return [pieces[k] if k == own else got for k, got in enumerate(self.comm.alltoall(sent))]
+        shapes, own = self.comm.alltoall([piece.shape for piece in pieces]), self.rank
+        found = [pieces[own] if k == own else np.empty(shape) for k, shape in enumerate(shapes)]
+        coming = [self.comm.Irecv(array, k) for k, array in enumerate(found) if k != own]
+        for k in set(range(self.size)) - {own}:
+            self.comm.Send(np.ascontiguousarray(pieces[k]), k)
+        for one in coming:
+            one.Wait()
+        return found
 
     @property
     def rank(self) -> int:

@@ -63,31 +63,6 @@ class Cut:
     solution: CrispBounds
 
 
-def solve_cuts(
-    grey: Array,
-    boxes: Sequence[ImageBox],
-    *,
-    aspect: float = 1.0,
-    solver: Solver | None = None,
-    division: int = 1,
-) -> list[Cut]:
-    """One guaranteed cut for each box: one solve with stresses and one with displacements.
-
-    The order of the phases is needed at the two corners only. Where a pixel that the threshold
-    leaves open may be of phases without order, it takes the least of their K + G/3 and the least of
-    their G: still a proof, but of an enclosure.
-
-    Args:
-        grey: Grey values, shape (rows, columns).
-        boxes: Cuts of the input, each inside the one before or the other way round; neighbours give
-            the first guess.
-        aspect: Height of a pixel over its width.
-        solver: Stopping rule.
-        division: Parts along each side of a pixel.
-    """
-    return list(each_cut(grey, boxes, aspect=aspect, solver=solver, division=division))
-
-
 def each_cut(
     grey: Array,
     boxes: Iterable[ImageBox],
@@ -96,7 +71,20 @@ def each_cut(
     solver: Solver | None = None,
     division: int = 1,
 ) -> Iterator[Cut]:
-    """The cuts of `solve_cuts` one after another; equal neighbours are solved once."""
+    """A guaranteed cut for each box: one solve with stresses and one with displacements.
+
+    The order of the phases is needed at the two corners only. Where a pixel that the threshold
+    leaves open may be of phases without order, it takes the least of their K + G/3 and the least of
+    their G: still a proof, but of an enclosure.
+
+    Args:
+        grey: Grey values, shape (rows, columns).
+        boxes: Cuts of the input, each inside the one before or the other way round; neighbours give
+            the first guess, and equal ones are solved once.
+        aspect: Height of a pixel over its width.
+        solver: Stopping rule.
+        division: Parts along each side of a pixel.
+    """
     last: Cut | None = None
     before: ModuliImages | None = None
     for box in boxes:

@@ -12,6 +12,7 @@ from alphacut.rve.ranks import ALONE
 with_mpirun = pytest.mark.skipif(shutil.which("mpirun") is None, reason="no mpirun")
 SCRIPT = """
 from time import sleep
+import numpy as np
 from mpi4py import MPI
 import alphacut.rve.ranks
 from alphacut.rve.ranks import Ranks
@@ -37,6 +38,12 @@ assert ranks.first(lambda: MPI.COMM_WORLD.rank) == 0
 own.clear()
 assert ranks.first(lambda: 7, lambda: own.append(1)) == 7
 assert len(own) == (ranks.rank > 0)
+table = np.arange(12.0).reshape(3, 4)  # parts of it do not lie side by side in memory
+got = ranks.swap([table[:, :k] + 100 * ranks.rank for k in range(ranks.size)])
+for k, one in enumerate(got):
+    assert np.array_equal(one, table[:, : ranks.rank] + 100 * k), (k, one)
+got = ranks.swap([table.T[k:] for k in range(ranks.size)])
+assert all(np.array_equal(one, table.T[ranks.rank :]) for one in got)
 failures = 0
 lacking = lambda: ranks.first(lambda: bytearray(2**62))
 for work in (lacking, lambda: ranks.first(lambda: 1 / 0), lambda: ranks.each(lambda k: 1 / (k - 1), range(3))):

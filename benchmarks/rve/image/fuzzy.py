@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from alphacut.rve.image.cuts import ImageBox, solve_cuts
+from alphacut.rve.image.cuts import ImageBox, each_cut
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
 from alphacut.rve.image.solve import solve_image
@@ -44,13 +44,13 @@ def time_of_cuts(size: int, seed: int) -> bool:
     solve_image(*moduli_of(grey >= THRESHOLD, [matrix, particle]))
     crisp = time.perf_counter() - began
     began = time.perf_counter()
-    cuts = solve_cuts(grey, [box(alpha) for alpha in LEVELS])
+    cuts = [*each_cut(grey, [box(alpha) for alpha in LEVELS])]
     seconds = time.perf_counter() - began
     print(
         f"{size}²: one crisp image {crisp:.1f} s, five levels {seconds:.1f} s, "
         f"{seconds / crisp:.1f} times"
     )
-    exact = solve_cuts(grey, [box(alpha) for alpha in LEVELS], solver=ConjugateGradient(1e-9))
+    exact = [*each_cut(grey, [box(alpha) for alpha in LEVELS], solver=ConjugateGradient(1e-9))]
     gaps = [
         abs(a / b - 1)
         for near, full in zip(cuts, exact, strict=True)
@@ -66,7 +66,7 @@ def time_of_cuts(size: int, seed: int) -> bool:
 def samples_outside(size: int, number: int, seed: int) -> int:
     """How many random samples of the box at α = 0 may lie outside its cut."""
     grey, cut = noise(size, seed=seed), box(0.0)
-    bounds = solve_cuts(grey, [cut])[0].bounds
+    bounds = next(each_cut(grey, [cut])).bounds
     outside = 0
     for k in range(number):
         found = solve_image(*_sample(cut, grey, np.random.default_rng([seed, k]))).bounds

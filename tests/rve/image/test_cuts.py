@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from alphacut.rve.image.cuts import ENCLOSED, TWO_CORNERS, ImageBox, nested, solve_cuts
+from alphacut.rve.image.cuts import ENCLOSED, TWO_CORNERS, ImageBox, each_cut, nested
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
 from alphacut.rve.image.solve import solve_image
@@ -53,7 +53,7 @@ def sample(cut, rng, grey):
 @pytest.mark.parametrize("ordered", [True, False])
 def test_samples_never_leave_the_cut(ordered):
     grey, rng = noise(24, 1), np.random.default_rng(2)
-    cuts = solve_cuts(grey, [box(a, ordered) for a in (1.0, 0.5, 0.0)])
+    cuts = [*each_cut(grey, [box(a, ordered) for a in (1.0, 0.5, 0.0)])]
     assert [cut.nature for cut in cuts] == [
         TWO_CORNERS,
         *[TWO_CORNERS if ordered else ENCLOSED] * 2,
@@ -68,7 +68,7 @@ def test_samples_never_leave_the_cut(ordered):
 
 def test_the_ends_are_those_of_the_two_corners_solved_in_full():
     grey, cut = noise(32, 3), box(0.0)
-    found = solve_cuts(grey, [box(1.0), cut])[1].bounds
+    found = [*each_cut(grey, [box(1.0), cut])][1].bounds
     for end, threshold in ((0, cut.thresholds[0][1]), (1, cut.thresholds[0][0])):
         sides = [(p.lower, p.upper)[end] for p in cut.phases]
         mask = grey >= threshold
@@ -86,7 +86,7 @@ def test_three_phases_and_two_thresholds():
     phases = [
         ModuliInterval.crisp(PlaneModuli(k, g)) for k, g in ((1.0, 0.5), (3.0, 2.0), (9.0, 6.0))
     ]
-    cut = solve_cuts(grey, [ImageBox([(0.3, 0.4), (0.6, 0.6)], phases)])[0]
+    cut = next(each_cut(grey, [ImageBox([(0.3, 0.4), (0.6, 0.6)], phases)]))
     labels = np.digitize(grey, [0.35, 0.6])
     moduli = np.array([(1.0, 0.5), (3.0, 2.0), (9.0, 6.0)])[labels]
     inside = solve_image(moduli[..., 0], moduli[..., 1]).bounds
