@@ -1,11 +1,14 @@
 """Ctrl-C and SIGTERM while basix and DOLFINx are imported wait for their end; then, one line."""
 
 import ast
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from alphacut.rve.interruption import uninterrupted
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = """
@@ -67,6 +70,18 @@ else:
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT)
     assert done.stdout == f"through {ends}\n", done.stderr
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_handlers_that_the_block_takes_for_itself_are_given_back(name):
+    number, own = getattr(signal, name), lambda *_: None
+    before = signal.signal(number, own)
+    try:
+        with uninterrupted():
+            signal.signal(number, signal.SIG_DFL)  # as MPI does
+        assert signal.getsignal(number) is own
+    finally:
+        signal.signal(number, before)
 
 
 def imported_at_once(tree):

@@ -1,5 +1,7 @@
 """Functions that workers run: of a file, of a script without a guard, typed in, of a notebook."""
 
+import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -8,6 +10,7 @@ from threading import Lock
 import pytest
 
 from alphacut.fuzzy import Triangular
+from alphacut.fuzzy.campaign.workers import pool
 from tests.fuzzy.general import propagate
 
 ROOT = Path(__file__).parents[3]
@@ -68,3 +71,10 @@ def test_workers_are_a_whole_number(workers):
         ValueError, match=r"number of workers is .*; it must be a whole number, 1 or more"
     ):
         propagate(max, {"x": Triangular(0, 1, 2)}, workers=workers)
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGHUP"])
+def test_workers_leave_signals_of_the_whole_group_to_their_parent(name):
+    number = getattr(signal, name)
+    with pool(2) as workers:
+        assert workers.submit(lambda: os.kill(os.getpid(), number) or 7).result(60) == 7
