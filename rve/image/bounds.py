@@ -43,19 +43,13 @@ class StiffnessBounds:
     def modulus(self) -> tuple[float, float]:
         """Bounds of Young's modulus of eq. 16, E = 3 A/2 − A²/(2 B), in Pa.
 
-        Raises:
-            ValueError: E is not certain to rise with A: 3/2 ≤ A/B somewhere in the bounds.
+        E rises with B, and with A as far as A = 3/2 B.
         """
-        steepest = self.shear[1] / self.bulk[0]
-        if not steepest < 1.5:
-            raise ValueError(
-                f"E of eq. 16 has no bounds here: A/B reaches {steepest:.3g}, and E rises with A"
-                " only below 1.5"
-            )
-        low, high = (
-            (1.5 * a - a * a / (2 * b)) for a, b in zip(self.shear, self.bulk, strict=True)
-        )
-        return low * (1 - 16 * UNIT), high * (1 + 16 * UNIT)
+        (softest, stiffest), (least, most) = self.shear, self.bulk
+        low = min(_young(softest, least), _young(stiffest, least))
+        high = _young(float(np.clip(1.5 * most, softest, stiffest)), most)
+        slack = 16 * UNIT * stiffest * (1.5 + stiffest / (2 * least))
+        return low - slack, high + slack
 
     @property
     def relative_error(self) -> Array:
@@ -75,6 +69,10 @@ class StiffnessBounds:
 
 
 EQUAL = np.array([1.0, 1.0, 0.0])
+
+
+def _young(a: float, b: float) -> float:
+    return 1.5 * a - a * a / (2 * b)
 
 
 def _form(stiffness: Array, strain: Array) -> float:

@@ -46,12 +46,17 @@ class Tiling:
         first order.
 
         Raises:
-            ValueError: There is one tile only, or E has no bounds.
+            ValueError: There is one tile only, or E may fall where A rises.
         """
         count = len(self.stiffness)
         if count < 2:
             raise ValueError("one tile has no scatter; divide the window into 2 × 2 tiles or more")
         bracket = self.bracket
+        if not (steepest := bracket.shear[1] / bracket.bulk[0]) < 1.5:
+            raise ValueError(
+                f"A/B of eq. 16 reaches {steepest:.3g}, and tiles tell the scatter of E below 1.5"
+                " only; take the boundary periodic"
+            )
         low, high = bracket.modulus
         softer = -bracket.lower @ (self.compliance - self.compliance.mean(axis=0)) @ bracket.lower
         stiffer = self.stiffness - self.stiffness.mean(axis=0)

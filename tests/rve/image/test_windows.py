@@ -76,6 +76,12 @@ def test_the_interval_is_that_of_student_for_tiles_of_known_scatter():
     assert np.allclose(tiling.material_modulus(), (low, high), rtol=1e-9)
 
 
+def test_tiles_whose_modulus_may_fall_with_a_give_no_interval():
+    slack = np.stack(2 * [PlaneModuli(0.4, 1.0).stiffness])  # A/B = 2.5
+    with pytest.raises(ValueError, match=r"A/B of eq. 16 reaches 2\.5, .* take the boundary peri"):
+        Tiling(slack, np.linalg.inv(slack)).material_modulus()
+
+
 def test_one_tile_gives_no_interval():
     ones = np.ones((1, 4, 4))
     with pytest.raises(ValueError, match="one tile has no scatter"):
