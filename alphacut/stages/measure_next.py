@@ -15,6 +15,7 @@ import numpy as np
 from alphacut import frame
 from alphacut.case.case import Case
 from alphacut.frame.outputs import output_unit
+from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval
 from alphacut.fuzzy.decisions.measure_next import Advice, Answer, advice
 from alphacut.fuzzy.knowledge.joint import joined_once
@@ -109,17 +110,21 @@ def _width(
     assert wanted.linear is not None
     if all(isinstance(number, Crisp) for number in inputs.values()):
         return 0.0, 0.0
-    found = frame.envelope(
-        wanted.linear,
-        inputs,
-        alpha=(0.0,),
-        duration=task.duration,
-        step=every,
-        method="modal",
-        tolerance=TOLERANCE,
-        relative=True,
-        progress=False,
-    )
+    try:
+        found = frame.envelope(
+            wanted.linear,
+            inputs,
+            alpha=(0.0,),
+            duration=task.duration,
+            step=every,
+            method="modal",
+            tolerance=TOLERANCE,
+            relative=True,
+            progress=False,
+        )
+    except ModalError as unsuited:
+        why = str(unsuited).partition(";")[0]
+        raise BadInput.of("frame", why, allowed="modes that oscillate, to compare widths") from None
     width = (found.upper - found.lower)[0, :, column].mean()
     error = np.inf if found.error is None else 2 * found.error[0, :, column].mean()
     return float(width), float(error)

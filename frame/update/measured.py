@@ -6,11 +6,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.special import chdtri
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.fuzzy import Crisp, FuzzyNumber, from_data
 from alphacut.fuzzy.knowledge.named_law import from_scatter
 from alphacut.fuzzy.sets.claimed import Claimed
+
+CHANCE = 1e-6
+"""Probability below which measured values contradict the deviation that is given of them."""
 
 
 @dataclass(frozen=True)
@@ -74,34 +78,45 @@ def measured_mode(
             that of the reference floor: the one whose mean amplitude is largest.
         frequency_deviation: Standard deviation of one value as a share of it, where it is known
             from elsewhere; from the values' own scatter if not given, which takes two at least.
-        shape_deviation: The same of an amplitude, as a share of that of the reference floor.
+        shape_deviation: The same of any amplitude, as a share of that of the reference floor.
 
     Raises:
-        ValueError: There are too few values, counts differ, or a reference amplitude is 0.
+        ValueError: Values are too few or contradict their deviation, counts differ, or a reference
+            amplitude is 0.
     """
     values = np.asarray(frequencies, float)
     rows = {floor: np.asarray(row, float) for floor, row in (shapes or {}).items()}
     if any(row.shape != values.shape for row in rows.values()) or values.ndim != 1:
         raise ValueError(f"mode {mode}: each floor needs {values.size} amplitudes, as frequencies")
     spread = None if frequency_deviation is None else frequency_deviation * float(values.mean())
-    number = _mean(values, spread)
+    number = _mean(values, spread, f"mode {mode}: frequencies", "frequency_deviation")
     if not rows:
         return MeasuredMode(mode, number)
     reference = max(rows, key=lambda floor: abs(float(rows[floor].mean())))
     if not rows[reference].all():
         raise ValueError(f"mode {mode}: an amplitude of floor {reference}, the reference, is 0")
-    shape = {
-        floor: _mean(row / rows[reference], shape_deviation)
-        for floor, row in rows.items()
-        if floor != reference
-    }
+    shape = {}
+    for floor in [floor for floor in rows if floor != reference]:
+        ratios, what = rows[floor] / rows[reference], f"mode {mode}: amplitudes of floor {floor}"
+        # to first order; the reference scatters, too
+        both = shape_deviation and shape_deviation * float(np.hypot(1, ratios.mean()))
+        shape[floor] = _mean(ratios, both, what, "shape_deviation")
     return MeasuredMode(mode, number, shape, reference)
 
 
-def _mean(values: Array, deviation: float | None) -> Claimed:
+def _mean(values: Array, deviation: float | None, what: str, key: str) -> Claimed:
+    count = len(values)
+    if deviation is None and count < 2:
+        raise ValueError(f"{what}: one value tells no scatter; measure more, or give {key}")
     if deviation is None:
         return from_data(values, "mean", law="normal")
-    return from_scatter(float(values.mean()), deviation, len(values), known=True)
+    scatter = float(values.std(ddof=1)) if count > 1 else 0.0
+    if (count - 1) * (scatter / deviation) ** 2 > chdtri(max(count - 1, 1), CHANCE):
+        raise ValueError(
+            f"{what} scatter by {scatter:.3g}, and {key} makes that {deviation:.3g}, which chance"
+            f" does in one of {1 / CHANCE:.0e} cases; give a larger one, or none"
+        )
+    return from_scatter(float(values.mean()), deviation, count, known=True)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ from time import perf_counter
 
 import numpy as np
 
-from alphacut.rve.cell import STRAIN, square_moduli
 from alphacut.rve.image.bounds import StiffnessBounds
 from alphacut.rve.image.cuts import ENCLOSED, TWO_CORNERS, nested
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
@@ -17,7 +16,6 @@ from alphacut.rve.image.phase_images import ModuliImages
 from alphacut.rve.image.read import require_memory
 from alphacut.rve.image.solve import CrispBounds, both_sides, solve_between
 from alphacut.rve.image.windows import Tiling, tiles_of
-from alphacut.rve.result import Homogenised, StressCurve
 from alphacut.stochastic.theta.truncated_normal import Array
 
 BOUNDARIES = ("periodic", "window")
@@ -46,27 +44,6 @@ class ImageCut:
     solution: CrispBounds | None
     iterations: int
     seconds: float
-
-    @property
-    def homogenised(self) -> Homogenised:
-        """Middle of the bounds as a model of the cell gives it, with its error."""
-        middle = (self.bounds.lower + self.bounds.upper) / 2
-        bulk, _, shear = square_moduli(middle)
-        curve = StressCurve(
-            np.zeros(1),
-            np.ones(1),
-            np.array([STRAIN * bulk]),  # eq. 15: ε11 = ε22 = 0.01
-            np.array([2 * STRAIN * shear]),  # and ε12 = 0.01
-            middle[None],
-        )
-        return Homogenised(
-            curve,
-            "image",
-            iterations=(self.iterations,),
-            seconds={"total": self.seconds},
-            errors={"space": self.bounds.relative_error},
-            reason=self.nature,
-        )
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,12 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import Document
 from alphacut.io.problem import BadInput
 from alphacut.io.progress import Tick
+from alphacut.io.units import engineering
 from alphacut.stages.vibration import envelope
 from alphacut.stages.vibration.envelope_task import task_of
 from alphacut.stages.vibration.modes_csv import ModeRows, MotionRows, mode_rows, motion_rows
 from alphacut.stages.vibration.structure import Structure
+from alphacut.stages.vibration.tolerances import input_unit
 
 if TYPE_CHECKING:
     import xarray
@@ -119,8 +121,9 @@ def sentences(found: Document) -> list[str]:
     worth = "proved to hold all that agree" if proved else "searched, not proved"
     lines = [f"inputs at α = {found['alpha'][0]:g}, {worth}:"]
     for name, ends in found["inputs"].items():
-        low, high, share = ends["lower"][0], ends["upper"][0], found["narrowed"][name]
-        lines.append(f"  {name}: {low:.6g} … {high:.6g}, {100 * share:.3g} % of its prior's width")
+        both, share = (ends["lower"][0], ends["upper"][0]), found["narrowed"][name]
+        told = " … ".join(engineering(end, input_unit(name), digits=6) for end in both)
+        lines.append(f"  {name}: {told}, {100 * share:.3g} % of its prior's width")
     for held in found["held_out"]:
         low, high = held["predicted"]
         where = "inside" if held["inside"] else "OUTSIDE"

@@ -83,6 +83,7 @@ def test_inputs_of_the_cell_stand_in_for_its_modulus(tmp_path: Path) -> None:
         (["--fuzzy", "m"], "crisp"),
         (["--set", "exceedance.limit=3 m"], "exceedance"),
         (["--set", "envelope.method=none"], "envelope.method"),
+        (["--set", "frame.rayleigh_mass=9e6 1/s"], "; allowed: modes that oscillate"),
     ],
 )
 def test_questions_that_make_no_sense(

@@ -236,13 +236,22 @@ def test_known_deviations_take_one_value(rng: np.random.Generator) -> None:
     low, high = one.frequency.cut(0.05)
     assert (low, high) == pytest.approx((2 - 1.959964 * 0.02, 2 + 1.959964 * 0.02), abs=1e-6)
     low, high = one.shape[1].cut(0.05)
-    assert high - low == pytest.approx(2 * 1.959964 * 0.02, abs=1e-6)
+    scatter = 0.02 * np.hypot(1, 0.5)  # of the ratio: both amplitudes scatter
+    assert high - low == pytest.approx(2 * 1.959964 * scatter, abs=1e-6)
 
 
 @pytest.mark.parametrize(
     ("make", "pattern"),
     [
-        (lambda: measured_mode(1, [2.0]), r"needs 2 or more"),
+        (lambda: measured_mode(1, [2.0]), r"frequencies: one value tells .* frequency_deviation$"),
+        (
+            lambda: measured_mode(2, [2.0, 2.1], frequency_deviation=0.001),
+            r"frequencies scatter by 0.07.*, and frequency_deviation makes that 0.002",
+        ),
+        (
+            lambda: measured_mode(1, [2, 2.1], {1: [0.2, 0.4], 2: [1, 1]}, shape_deviation=0.01),
+            r"floor 1 scatter by 0.141, and shape_deviation makes that 0.0104, .* give a larger one",
+        ),
         (lambda: measured_mode(1, [2.0, 2.1], {1: [1.0]}), r"each floor needs 2 amplitudes"),
         (lambda: MeasuredMode(0, Interval(1, 2)), r"numbered from 1"),
         (lambda: MeasuredMode(1, Interval(-2, -1)), r"must be positive"),
@@ -255,6 +264,30 @@ def test_known_deviations_take_one_value(rng: np.random.Generator) -> None:
 def test_what_makes_no_sense_is_refused(make: object, pattern: str) -> None:
     with pytest.raises(ValueError, match=pattern):
         make()  # type: ignore[operator]
+
+
+@pytest.mark.parametrize(("count", "share"), [(1, 0.9), (3, -0.6), (2, 0.1)])
+def test_shapes_of_known_deviation_hold_the_truth_as_often_as_claimed(
+    count: int, share: float
+) -> None:
+    rng, held = np.random.default_rng(count), 0
+    for _ in range(2000):  # all floors scatter alike, that of the largest amplitude, too
+        rows = np.array([[share], [1.0]]) + 0.02 * rng.standard_normal((2, count))
+        mode = measured_mode(
+            1, 2 + 0.01 * rng.standard_normal(count), {1: rows[0], 2: rows[1]}, shape_deviation=0.02,
+            frequency_deviation=0.01,
+        )  # fmt: skip
+        low, high = mode.shape[1].cut(0.1)
+        held += low <= share <= high
+    assert 0.88 <= held / 2000 <= 0.925
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_scatter_that_chance_explains_is_not_refused(count: int) -> None:
+    rng = np.random.default_rng(count)
+    for _ in range(300):
+        values = 2.0 * (1 + 0.01 * rng.standard_normal(count))
+        measured_mode(1, values, frequency_deviation=0.01)
 
 
 def test_modes_and_priors_beyond_the_frame_are_refused() -> None:

@@ -152,22 +152,6 @@ def test_the_gap_needs_the_energies_of_the_pixels():
         constitutive_gap(found, np.ones(3))
 
 
-def test_the_model_gives_the_result_type_of_the_other_models():
-    grey, exact = np.ones((4, 4)), PlaneModuli.of_young(20.0, 0.3)
-    images = ModuliImages((exact.bulk * grey,) * 2, (exact.shear * grey,) * 2, attained=True)
-    _, cut = ImageModel().refined(images)
-    found = cut.homogenised
-    assert np.isclose(found.modulus, 20.0, rtol=1e-12)
-    assert np.isclose(found.poisson, 0.3, rtol=1e-12)
-    assert found.method == "image"
-    mixed = np.where(ramp() > 0.5, 3.0, 1.0)
-    _, cut = ImageModel().refined(ModuliImages((mixed, mixed), (mixed, mixed), attained=True))
-    low, high = cut.modulus
-    assert low < cut.homogenised.modulus < high
-    form = cut.bounds.shear
-    assert np.isclose(cut.homogenised.errors["space"][2], sum(form) / 2 / form[0] - 1)
-
-
 @pytest.mark.parametrize(("contrast", "rows", "parts"), [(9, 4, 2), (11, 4, 1), (9, 1 << 19, 1)])
 def test_pixels_are_divided_where_that_is_cheap(contrast, rows, parts):
     image = np.ones((rows, 4))
