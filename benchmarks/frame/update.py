@@ -88,7 +88,6 @@ def measure(truth: Array, records: int, masses: bool, rng: np.random.Generator) 
         largest = int(np.abs(shape).argmax())
         shape = shape / shape[largest]
         noise = NOISE * rng.standard_normal((records, FLOORS))
-        noise[:, largest] = 0.0
         frequency = np.sqrt(values[0, k]) / (2 * np.pi)
         frequencies = frequency * (1 + NOISE * rng.standard_normal(records))
         floors = {z + 1: shape[z] + noise[:, z] for z in range(FLOORS)}
@@ -107,16 +106,19 @@ def _deviations(truth: Array, step: float = 1e-5) -> Array:
     """Least standard deviation of each stiffness, from one record with noise of 1 %."""
     shifted = [truth * (1 + sign * step * np.eye(FLOORS)) for sign in (1, -1)]
     ahead, behind = (np.array([_noise_free(row) for row in rows]) for rows in shifted)
-    slopes = (ahead - behind).T / (2 * step * truth)
-    return np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes / NOISE**2)))
+    # a shape's scale is unknown: of its length only the ratio to the noise counts
+    share = 1 / np.abs(_noise_free(truth)[MODES:].reshape(FLOORS, MODES)).max(axis=0)
+    sharpness = np.concatenate([np.ones(MODES), np.tile(share, FLOORS)]) / NOISE
+    slopes = (ahead - behind).T / (2 * step * truth) * sharpness[:, None]
+    return np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
 
 
 def _noise_free(truth: Array) -> Array:
-    """Logarithms of the frequencies, and the shapes, each in units that carry a noise of 1 %."""
+    """Logarithms of the frequencies, and the shapes, of length 1."""
     values, vectors = Chain.of(FRAME, names_of(False)).modes(truth[None])
     shapes = vectors[0, :, :MODES]
     largest = np.abs(shapes).argmax(axis=0)
-    scaled = shapes / shapes[largest, np.arange(MODES)]
+    scaled = shapes / np.linalg.norm(shapes, axis=0) * np.sign(shapes[largest, np.arange(MODES)])
     return np.concatenate([np.log(values[0, :MODES]) / 2, scaled.ravel()])
 
 

@@ -20,14 +20,14 @@ from alphacut.frame.structures.modes import ModalError
 
 PROBED = 800
 """Problems on which a step of Newton's method is timed."""
-STEPS = 30
+STEPS = 140
 """Steps a problem takes on polynomials, all passes together."""
-RISE = 3.0
-"""Cost of the final polynomials beside those of degree 2, which are timed."""
 LIGHT = 290
 """The same with the least effort."""
+RISE = 3.0
+"""Cost of the final polynomials beside those of degree 2, which are timed, less 1 an input."""
 GUIDING, POLISHING = 680, 100
-"""The same of more than six inputs: on polynomials that guide, with all that is not a step counted
+"""The steps of more than six inputs: on polynomials that guide, with all that is not a step counted
 as so many, and on exact trajectories."""
 GRAPHS = 1500
 """Trajectories that the Graph Follower takes on all levels, where its budget does not end it."""
@@ -104,7 +104,7 @@ def _modal(flow: UnitFlow, *, light: bool = False) -> Candidate:
         for level in range(len(flow.boxes.alpha))
     )
     problems = 2 * len(flow.time) * len(flow.outputs) * wide
-    steps = LIGHT if light else GUIDING if d > MANY else STEPS * RISE
+    steps = LIGHT if light else GUIDING if d > MANY else STEPS * (RISE + d)
     seconds = fitting * (1 if d > MANY else 10) + problems * steps * _step(model, d)
     words = f"{problems} bounds by polynomials of the modes"
     if d > MANY and not light:

@@ -13,6 +13,8 @@ from alphacut.fuzzy import Crisp, FuzzyNumber, from_data
 from alphacut.fuzzy.knowledge.named_law import from_scatter
 from alphacut.fuzzy.sets.claimed import Claimed
 
+NEAR = 0.8
+"""Share of the largest amplitude of a mode from which on a floor may be the reference."""
 CHANCE = 1e-6
 """Probability below which measured values contradict the deviation that is given of them."""
 
@@ -75,10 +77,11 @@ def measured_mode(
         mode: Its number by rising frequency, from 1.
         frequencies: Measured values, in Hz.
         shapes: Measured amplitudes by floor, as many of each as frequencies. Each set is divided by
-            that of the reference floor: the one whose mean amplitude is largest.
+            that of the reference floor: the highest of those near the largest mean amplitude, so
+            that among equal ones no chance decides.
         frequency_deviation: Standard deviation of one value as a share of it, where it is known
             from elsewhere; from the values' own scatter if not given, which takes two at least.
-        shape_deviation: The same of any amplitude, as a share of that of the reference floor.
+        shape_deviation: The same of any amplitude, as a share of the largest of the mode.
 
     Raises:
         ValueError: Values are too few or contradict their deviation, counts differ, or a reference
@@ -92,14 +95,17 @@ def measured_mode(
     number = _mean(values, spread, f"mode {mode}: frequencies", "frequency_deviation")
     if not rows:
         return MeasuredMode(mode, number)
-    reference = max(rows, key=lambda floor: abs(float(rows[floor].mean())))
+    means = {floor: abs(float(row.mean())) for floor, row in rows.items()}
+    largest = max(means.values())
+    reference = max(floor for floor, mean in means.items() if mean >= NEAR * largest)
     if not rows[reference].all():
         raise ValueError(f"mode {mode}: an amplitude of floor {reference}, the reference, is 0")
     shape = {}
     for floor in [floor for floor in rows if floor != reference]:
         ratios, what = rows[floor] / rows[reference], f"mode {mode}: amplitudes of floor {floor}"
         # to first order; the reference scatters, too
-        both = shape_deviation and shape_deviation * float(np.hypot(1, ratios.mean()))
+        share = float(np.hypot(1, ratios.mean())) * largest / means[reference]
+        both = shape_deviation and shape_deviation * share
         shape[floor] = _mean(ratios, both, what, "shape_deviation")
     return MeasuredMode(mode, number, shape, reference)
 

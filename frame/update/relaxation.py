@@ -88,9 +88,9 @@ class Rows:
 
     def program(self) -> LinearProgram:
         """The linear program of all rows."""
-        row, column, value = (np.array(part) for part in zip(*self.entries, strict=True))
-        shape = (len(self.right), len(self.lower))
-        rows = csr_array((value.astype(float), (row, column)), shape=shape)
+        row, column, value = np.array(self.entries, float).reshape(-1, 3).T
+        shape, places = (len(self.right), len(self.lower)), (row.astype(int), column.astype(int))
+        rows = csr_array((value, places), shape=shape)
         return LinearProgram(rows, np.array(self.right), np.array(self.lower), np.array(self.upper))
 
 

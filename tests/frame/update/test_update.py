@@ -282,6 +282,30 @@ def test_shapes_of_known_deviation_hold_the_truth_as_often_as_claimed(
     assert 0.88 <= held / 2000 <= 0.925
 
 
+def test_among_equal_amplitudes_the_highest_floor_is_the_reference() -> None:
+    rng, held, shape = np.random.default_rng(5), 0, {1: 0.9, 2: -1.0, 3: 1.0, 4: 0.93}
+    for _ in range(1000):
+        rows = {floor: [x + 0.02 * rng.standard_normal()] for floor, x in shape.items()}
+        mode = measured_mode(2, [2.0], rows, frequency_deviation=0.01, shape_deviation=0.02)
+        assert mode.reference == 4
+        low, high = mode.shape[2].cut(0.1)
+        held += low <= -1 / 0.93 <= high
+    assert 0.875 <= held / 1000 <= 0.93
+
+
+def test_at_level_1_a_prior_that_agrees_is_a_point() -> None:
+    frame = StoreyFrame([1000.0, 1000.0], stiffness=[103510.0, 103510.0])
+    values, _ = Chain.of(frame, ("k1", "k2")).modes(np.full((1, 2), 103510.0))
+    modes = [
+        measured_mode(k + 1, np.sqrt(x) / (2 * np.pi) * np.array([0.998, 1.0, 1.002]))
+        for k, x in enumerate(values[0])
+    ]
+    prior = dict.fromkeys(("k1", "k2"), Triangular(95e3, 103510.0, 112e3))
+    found = update(frame, prior, Measurement(tuple(modes)), alpha=(0.05, 1.0))
+    assert found.upper[1] == pytest.approx(found.lower[1], rel=1e-12)
+    assert found.height[1] == 1.0
+
+
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_scatter_that_chance_explains_is_not_refused(count: int) -> None:
     rng = np.random.default_rng(count)
