@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.calculus.low_discrepancy import chebyshev_points
+from alphacut.frame.calculus.low_discrepancy import chebyshev_points, corners
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.envelope import Envelope
@@ -19,8 +20,10 @@ from alphacut.frame.modal.polynomial_error import judged_at_optima, polynomial_e
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 
-SAMPLES = 64
-"""Independent trajectories on each level, where the modes cannot judge."""
+SAMPLES = 128
+"""Trajectories inside each level's box, as many on its faces and edges, and at its corners at most,
+where the modes cannot judge."""
+CHUNK = 32  # trajectories at once
 SAFETY = 2.0
 """Factor on what they find beyond the bounds."""
 GAP = 0.25
@@ -56,7 +59,8 @@ def judged(found: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
     missed = np.array([_missed(found, flow, level) for level in range(len(found.alpha))])
     error = np.broadcast_to(own, found.lower.shape) + SAFETY * missed[:, None]
     error = error + (steps if found.error is None else 0.0)
-    return _told(found, error, flow, f"{SAMPLES} independent trajectories on each level")
+    count = len(_sample(len(flow.boxes.names), 0))
+    return _told(found, error, flow, f"{count} independent trajectories on each level")
 
 
 def _sharper(proved: Envelope, found: Envelope, flow: UnitFlow) -> Envelope:
@@ -146,10 +150,18 @@ def _by_modes(found: Envelope, flow: UnitFlow) -> Array | None:
 def _missed(found: Envelope, flow: UnitFlow, level: int) -> Array:
     """By how much an independent sample of a level leaves the envelope, shape (m,)."""
     lower, upper = flow.boxes.unit(level)
-    points = chebyshev_points(len(lower), SAMPLES, skip=100_003 * (level + 1))
+    points = (lower + upper) / 2 + (upper - lower) / 2 * _sample(len(lower), level)
     worst = np.zeros(len(flow.outputs))
-    for chunk in np.array_split((lower + upper) / 2 + (upper - lower) / 2 * points, 2):
+    for chunk in np.array_split(points, len(points) // CHUNK):
         values = flow.values(chunk)
         beyond = np.maximum(values.max(0) - found.upper[level], found.lower[level] - values.min(0))
         worst = np.maximum(worst, beyond.max(0))
     return worst
+
+
+def _sample(d: int, level: int) -> Array:
+    """Points of [−1, 1]^d where extremes may lie: inside, on faces and edges, at corners."""
+    drawn = partial(chebyshev_points, d, SAMPLES, skip=100_003 * (level + 1))
+    few = 2**d <= SAMPLES
+    ends = corners(-np.ones(d), np.ones(d)) if few else np.sign(drawn(skip=50_003))
+    return np.concatenate([drawn(), np.clip(2 * drawn(skip=70_001), -1, 1), ends])
