@@ -1,4 +1,4 @@
-"""Seconds of proofs and searches, by those that they take on some of the nodes."""
+"""Seconds of proofs, by those that they take on some of the nodes."""
 
 from __future__ import annotations
 
@@ -13,18 +13,17 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.methods import modal
 from alphacut.frame.methods.auto import GAPS, Auto
 from alphacut.frame.methods.plan import Candidate, planned
-from alphacut.frame.modal.fitting import MANY, fit_modes
-from alphacut.frame.modal.levels import search_levels
+from alphacut.frame.modal.fitting import MANY
 from alphacut.frame.structures.modes import ModalError
 
 NODES = 40
-"""Nodes on which a proof and a search are timed."""
+"""Nodes on which a proof is timed."""
 DENSE = 0.6
 """Cost of a node among all beside that among so few, which share less."""
 
 
 def foreseen(name: str, method: object, flow: UnitFlow) -> tuple[Candidate, ...]:
-    """What a method would do as `planned`, its proof and then its search timed on some nodes."""
+    """What a method would do as `planned`, its proof timed on some nodes."""
     found = planned(name, method, flow)
     if not isinstance(flow.flow, LinearFlow) or found[0].name != "modal":
         return found
@@ -53,14 +52,13 @@ def _by_auto(first: Candidate, flow: UnitFlow, wanted: float) -> Candidate:
             return replace(first, seconds=spent, words=f"{first.words}; {worth}")
         if not worth.startswith(modal.TOO_WIDE):
             break
-    search = _search(flow, wanted / modal.FINE)
-    parts = [float(f"{x:.1g}") for x in (spent, search)]
+    parts = [float(f"{x:.1g}") for x in (spent, first.seconds)]
     words = (
         f"{first.words}: some {parts[0]:g} s for a proof that is expected to fail and {parts[1]:g}"
         " s for a search then; certify with a gap wider than the tolerance, as 2 mm, may be proved"
         " sooner"
     )
-    return replace(first, seconds=spent + search, words=words)
+    return replace(first, seconds=spent + first.seconds, words=words)
 
 
 PROVED = "a proof is expected"
@@ -83,17 +81,6 @@ def _proof(flow: UnitFlow, way: modal.Modal, gap: float, *, patient: bool) -> tu
     ended = f"the boxes allowed are expected to leave a gap of {flow.told(proof.gap)}"
     most = gap if patient else gap / GAPS[0]
     return seconds, unproved or (PROVED if proof.gap <= most else ended)
-
-
-def _search(flow: UnitFlow, tolerance: float) -> float:
-    """Seconds of the search of polynomials."""
-    thin, factor = _thinned(flow)
-    assert isinstance(thin.flow, LinearFlow)
-    begun = time.perf_counter()
-    model = fit_modes(thin.flow, thin.boxes, tolerance=tolerance, scale=thin.scale)
-    fixed, begun = time.perf_counter() - begun, time.perf_counter()
-    search_levels(thin, model, 0, tolerance, None)
-    return fixed + factor * (time.perf_counter() - begun)
 
 
 def _thinned(flow: UnitFlow) -> tuple[UnitFlow, float]:

@@ -21,9 +21,7 @@ from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 
 SAMPLES = 128
-"""Trajectories inside each level's box, as many on its faces and edges, and at its corners at most,
-where the modes cannot judge."""
-CHUNK = 32  # trajectories at once
+"""Trajectories inside each level's box, as many on its faces, and at corners at most."""
 SAFETY = 2.0
 """Factor on what they find beyond the bounds."""
 GAP = 0.25
@@ -59,8 +57,8 @@ def judged(found: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
     missed = np.array([_missed(found, flow, level) for level in range(len(found.alpha))])
     error = np.broadcast_to(own, found.lower.shape) + SAFETY * missed[:, None]
     error = error + (steps if found.error is None else 0.0)
-    count = len(_sample(len(flow.boxes.names), 0))
-    return _told(found, error, flow, f"{count} independent trajectories on each level")
+    judge = f"{len(_sample(len(flow.boxes.names), 0))} independent trajectories on each level"
+    return _told(found, error, flow, judge)
 
 
 def _sharper(proved: Envelope, found: Envelope, flow: UnitFlow) -> Envelope:
@@ -152,7 +150,7 @@ def _missed(found: Envelope, flow: UnitFlow, level: int) -> Array:
     lower, upper = flow.boxes.unit(level)
     points = (lower + upper) / 2 + (upper - lower) / 2 * _sample(len(lower), level)
     worst = np.zeros(len(flow.outputs))
-    for chunk in np.array_split(points, len(points) // CHUNK):
+    for chunk in np.array_split(points, len(points) // 32):
         values = flow.values(chunk)
         beyond = np.maximum(values.max(0) - found.upper[level], found.lower[level] - values.min(0))
         worst = np.maximum(worst, beyond.max(0))
@@ -162,6 +160,5 @@ def _missed(found: Envelope, flow: UnitFlow, level: int) -> Array:
 def _sample(d: int, level: int) -> Array:
     """Points of [−1, 1]^d where extremes may lie: inside, on faces and edges, at corners."""
     drawn = partial(chebyshev_points, d, SAMPLES, skip=100_003 * (level + 1))
-    few = 2**d <= SAMPLES
-    ends = corners(-np.ones(d), np.ones(d)) if few else np.sign(drawn(skip=50_003))
+    ends = np.sign(drawn(skip=50_003)) if 2**d > SAMPLES else corners(-np.ones(d), np.ones(d))
     return np.concatenate([drawn(), np.clip(2 * drawn(skip=70_001), -1, 1), ends])

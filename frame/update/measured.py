@@ -77,8 +77,7 @@ def measured_mode(
         mode: Its number by rising frequency, from 1.
         frequencies: Measured values, in Hz.
         shapes: Measured amplitudes by floor, as many of each as frequencies. Each set is divided by
-            that of the reference floor: the highest of those near the largest mean amplitude, so
-            that among equal ones no chance decides.
+            that of the reference floor, the highest near the largest: no chance decides.
         frequency_deviation: Standard deviation of one value as a share of it, where it is known
             from elsewhere; from the values' own scatter if not given, which takes two at least.
         shape_deviation: The same of any amplitude, as a share of the largest of the mode.
