@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -159,6 +158,7 @@ def _missed(found: Envelope, flow: UnitFlow, level: int) -> Array:
 
 def _sample(d: int, level: int) -> Array:
     """Points of [−1, 1]^d where extremes may lie: inside, on faces and edges, at corners."""
-    drawn = partial(chebyshev_points, d, SAMPLES, skip=100_003 * (level + 1))
-    ends = np.sign(drawn(skip=50_003)) if 2**d > SAMPLES else corners(-np.ones(d), np.ones(d))
-    return np.concatenate([drawn(), np.clip(2 * drawn(skip=70_001), -1, 1), ends])
+    first = [100_003 * (level + 1) + k * SAMPLES for k in range(3)]
+    inside, wide, ends = (chebyshev_points(d, SAMPLES, skip=skip) for skip in first)
+    ends = np.sign(ends) if 2**d > SAMPLES else corners(-np.ones(d), np.ones(d))
+    return np.concatenate([inside, np.clip(2 * wide, -1, 1), ends])

@@ -7,6 +7,7 @@ import pytest
 
 from alphacut.frame import StoreyFrame, envelope, plan
 from alphacut.frame.methods import modal
+from alphacut.frame.methods import plan as planning
 from alphacut.fuzzy import Triangular
 
 FRAME = StoreyFrame(
@@ -41,3 +42,13 @@ def test_a_proof_that_its_boxes_do_not_end_is_told_with_the_search_after_it(monk
     light = plan(FRAME, INPUTS | MORE, duration=4.0, step=0.01, alpha=(0.0,), method="modal")[0]
     assert "proof" not in light.words
     assert np.isfinite(told.seconds)
+
+
+@pytest.mark.parametrize("longer", [4, 9])
+def test_a_search_takes_a_root_more_for_a_node_where_neighbours_are_few(longer, monkeypatch):
+    monkeypatch.setattr(planning, "_step", lambda *_: 1.0)  # beside which fits take no time
+    seconds = [
+        plan(FRAME, INPUTS, duration=t, step=0.01, alpha=(0.0,), method="modal")[0].seconds
+        for t in (1.0, 1.0 * longer)
+    ]
+    assert seconds[1] / seconds[0] == pytest.approx(np.sqrt(longer), rel=0.01)

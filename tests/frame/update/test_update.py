@@ -293,6 +293,16 @@ def test_among_equal_amplitudes_the_highest_floor_is_the_reference() -> None:
     assert 0.875 <= held / 1000 <= 0.93
 
 
+def test_a_reference_is_near_the_largest_and_its_size_counts() -> None:
+    known = {"frequency_deviation": 0.01, "shape_deviation": 0.02}
+    assert measured_mode(1, [2.0], {1: [1.0], 2: [0.5]}, **known).reference == 1
+    mode = measured_mode(1, [2.0], {1: [-1.0], 2: [0.85]}, **known)
+    assert mode.reference == 2
+    ratio = 1 / 0.85  # 2 % of the largest amplitude, over the reference's
+    scatter = 0.02 * ratio * np.hypot(1, ratio)
+    assert mode.shape[1].cut(0.05).width == pytest.approx(2 * 1.959964 * scatter, abs=1e-6)
+
+
 def test_at_level_1_a_prior_that_agrees_is_a_point() -> None:
     frame = StoreyFrame([1000.0, 1000.0], stiffness=[103510.0, 103510.0])
     values, _ = Chain.of(frame, ("k1", "k2")).modes(np.full((1, 2), 103510.0))
