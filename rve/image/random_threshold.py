@@ -64,7 +64,8 @@ def threshold_nodes(grey: Array, law: NormalThreshold) -> Array:
     """Thresholds at which the response over a law is wanted, rising.
 
     All images that a threshold within `REACH` deviations makes, where these are few: then each pair
-    of nodes holds one image, and the mean is as close as that image's bounds. Else even steps.
+    of nodes holds one image, and the mean is as close as that image's bounds. Else even steps. The
+    next grey value on either side is a node too, since the image is the same up to there.
 
     Args:
         grey: Grey values, shape (rows, columns).
@@ -72,12 +73,13 @@ def threshold_nodes(grey: Array, law: NormalThreshold) -> Array:
     """
     reach = REACH * law.deviation[1]
     low, high = law.mean[0] - reach, law.mean[1] + reach
-    values = np.unique(grey)
-    values = values[(values >= low) & (values <= high)].astype(float)
+    values = np.unique(grey).astype(float)
+    before, after = values[values < low][-1:], values[values > high][:1]
+    values = values[(values >= low) & (values <= high)]
     if len(values) > NODES:
-        return np.linspace(low, high, NODES)
-    nodes = np.sort(np.concatenate([values, np.nextafter(values, np.inf)]))
-    return nodes if len(nodes) else np.array([sum(law.mean) / 2])
+        return np.concatenate([before, np.linspace(low, high, NODES), after])
+    values = np.concatenate([before, values, after])
+    return np.sort(np.concatenate([values, np.nextafter(values, np.inf)]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ CURES = {
     "discretisation": "divide the pixels: cell.division or cell.width",
     "outline": "take more pixels across: cell.pixels",
     "finite window": "take a larger window, or another number of tiles",
-    "threshold steps": f"up to {NODES} grey values within four deviations: each is solved",
+    "threshold steps": f"up to {NODES} grey values within four deviations: all are solved",
     "threshold": "state cell.threshold more closely",
     "phases": "state the moduli of the phases more closely",
 }

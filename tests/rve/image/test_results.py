@@ -78,6 +78,64 @@ def test_a_random_threshold_needs_ordered_phases():
         threshold_response(ramp(8), [0.4, 0.6], crossed)
 
 
+def exact(grey, law, phases=PHASES):
+    """Probabilities of an image's steps, rising thresholds, and bounds of E and stiffness there."""
+    values = np.unique(grey)
+    below = ndtr((values - law.mean[0]) / law.deviation[0])
+    found = []
+    for value in [*values, np.inf]:  # thresholds up to a grey value, above the one before: an image
+        moduli = [
+            np.where(grey >= value, b, a)
+            for a, b in zip(*((p.lower.bulk, p.lower.shear) for p in phases), strict=True)
+        ]
+        found.append(solve_image(*moduli).bounds)
+    return np.diff(below, prepend=0.0, append=1.0), found
+
+
+STEPPED = np.round(8 * ramp(12))
+GREYS = {
+    "integers": (STEPPED, 4.5),
+    "threshold at a grey value": (STEPPED, 4.0),
+    "fractions": (0.37 * STEPPED - 1.1, 0.37 * 4.4 - 1.1),
+    "two values": (np.where(ramp(12) > 0.5, 1, 0), 0.5),
+    "one value": (np.full((2, 2), 3.0), 2.0),
+    "threshold beyond all greys": (STEPPED, 12.0),
+}
+
+
+@pytest.mark.parametrize("deviation", [1e-9, 1e-6, 1e-3, 0.1, 0.3, 1.0, 10.0])
+@pytest.mark.parametrize("kind", GREYS)
+def test_a_random_threshold_of_any_deviation_is_as_close_as_its_images(kind, deviation):
+    grey, mean = GREYS[kind]
+    law = NormalThreshold((mean, mean), (deviation, deviation))
+    found = threshold_response(grey, threshold_nodes(grey, law), PHASES)
+    shares, images = exact(grey, law)
+    lower, upper = (
+        np.tensordot(shares, [getattr(image, end) for image in images], axes=1)
+        for end in ("lower", "upper")
+    )
+    whole, (low, high) = found.stiffness(law), StiffnessBounds(lower, upper).modulus
+    assert np.linalg.eigvalsh(upper - whole.lower)[0] > 0
+    assert np.linalg.eigvalsh(whole.upper - lower)[0] > 0
+    assert whole.modulus[1] - whole.modulus[0] < 1.2 * (high - low) + 0.01
+    ends = np.array([found.quantile(law, share) for share in (0.05, 0.3, 0.5, 0.7, 0.95)])
+    assert (np.diff(ends, axis=0) >= 0).all()
+    over = np.cumsum(shares)  # E falls with the threshold: its quantile is that of 1 - share
+    for share, (low, high) in zip((0.05, 0.3, 0.7, 0.95), ends[[0, 1, 3, 4]], strict=True):
+        least, most = images[int(np.searchsorted(over, 1 - share))].modulus
+        assert low <= most
+        assert least <= high
+        assert high - low < 1.2 * (most - least) + 0.01
+
+
+def test_a_node_beyond_the_reach_of_many_grey_values_leaves_no_probability_to_the_phases():
+    grey, law = 1000 * ramp(12), NormalThreshold((500.0, 500.0), (60.0, 60.0))
+    nodes = threshold_nodes(grey, law)
+    assert len(np.unique(grey[abs(grey - 500) < 240])) > 65
+    assert nodes[0] <= grey[grey <= 260].max()
+    assert nodes[-1] >= grey[grey >= 740].min()
+
+
 @pytest.mark.parametrize("order", [1, -1])
 def test_few_grey_values_give_the_mean_as_close_as_their_images(order):
     grey = np.round(8 * ramp(12)).astype(int)
@@ -85,19 +143,11 @@ def test_few_grey_values_give_the_mean_as_close_as_their_images(order):
     nodes = threshold_nodes(grey, law)
     found = threshold_response(grey, nodes, phases)
     low, high = found.mean(law)
-    exact, ends = np.zeros(2), np.array([*np.unique(grey), np.inf])
-    below = 0.0
-    for value in ends:  # thresholds up to a grey value, above the one before, make one image
-        share = ndtr((value - 4.2) / 0.9) - below
-        below += share
-        moduli = [
-            np.where(grey >= value, b, a)
-            for a, b in zip(*((p.lower.bulk, p.lower.shear) for p in phases), strict=True)
-        ]
-        exact += share * np.array(solve_image(*moduli).bounds.modulus)
-    assert low <= exact[1]
-    assert exact[0] <= high
-    assert high - low < 1.5 * (exact[1] - exact[0]) + 0.002 * exact[0]
+    shares, images = exact(grey, law, phases)
+    least, most = shares @ [image.modulus for image in images]
+    assert low <= most
+    assert least <= high
+    assert high - low < 1.5 * (most - least) + 0.002 * least
     whole = found.stiffness(law)
     assert whole.width < 0.05
     assert whole.modulus[0] < high
