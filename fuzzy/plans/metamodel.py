@@ -21,8 +21,9 @@ from alphacut.fuzzy.sets.given import require_fields
 from alphacut.fuzzy.sets.numbers import Array, Interval, Rows
 
 CORNERS = (
-    "on one box the teacher {} has the corners alone; where the function turns inside take"
-    " Metamodel(teacher=Optimisation()) or BranchAndBound(function), or another plan"
+    "on one box the teacher {} has the corners alone, widened by the samples of other boxes within;"
+    " where the function turns inside take Metamodel(teacher=Optimisation()) or"
+    " BranchAndBound(function), or another plan"
 )
 _SAFETY = 2  # the error elsewhere may be larger than on the boxes that were held out
 
@@ -35,9 +36,11 @@ class Metamodel:
         boxes: Boxes to learn from.
         held_out: Boxes more that it is tested on.
         teacher: Plan whose bounds on each box are learnt, at its cost for each of `boxes` and
-            `held_out`. A box has one level, of which `Reduced`, `General` and `Extended` take the
-            2^n corners alone, enough where the model is monotone; where it turns inside, take
-            `Optimisation()` or `BranchAndBound(function)`.
+            `held_out`, widened to hold the samples of all boxes that lie within. A box has one
+            level, of which `Reduced`, `General` and `Extended` take the 2^n corners alone, enough
+            where the model is monotone; where it turns inside, take `Optimisation()` or
+            `BranchAndBound(function)`. The bounds are "estimated" where the teacher's are
+            guaranteed, else "searched": the error holds what is seen of the teacher's misses.
         seed: Where the boxes are drawn from.
 
     Raises:
@@ -85,11 +88,15 @@ class Metamodel:
                 " which runs the model once"
             )
         unit = self._boxes(len(moving))
+        boxes = [_real(box, lower, upper, moving) for box in unit]
         lessons = []
-        for row in range(len(unit)):
-            lessons.append(self._taught(memo, domain, _real(unit[row], lower, upper, moving)))
+        for row, box in enumerate(boxes):
+            lessons.append(self._taught(memo, domain, box))
             model.report(0.9 * (row + 1) / len(unit))
-        taught = np.array(lessons)
+        at, values = memo.points, memo.values
+        pairs = zip(lessons, boxes, strict=True)
+        taught = np.array([_widened(lesson, box, at, values.array) for lesson, box in pairs])
+        proved = all(result.nature is Nature.GUARANTEED for result in lessons)
         features, targets = unit.reshape(len(unit), -1), taught.reshape(len(unit), -1)
         learn, test = slice(0, self.boxes + 2), slice(self.boxes + 2, None)
         predict = RBFInterpolator(features[learn], targets[learn], kernel="cubic", degree=1)
@@ -99,7 +106,8 @@ class Metamodel:
         if isinstance(self.teacher, Reduced | General | Extended):
             notes.append(CORNERS.format(type(self.teacher).__name__))
         support, most = (lower, upper), missed.max(axis=(0, 1))
-        return TrainedBounds(memo.values.columns, support, predict, most, len(memo), (*notes,))
+        base = Nature.ESTIMATED if proved else Nature.SEARCHED
+        return TrainedBounds(values.columns, support, predict, most, len(memo), base, (*notes,))
 
     def _boxes(self, inputs: int) -> Array:
         """Boxes of the unit cube, shape (n, 2, inputs): the cube, its middle, spread ones."""
@@ -112,11 +120,17 @@ class Metamodel:
         first = np.array([[[0.0] * inputs, [1.0] * inputs], [[0.5] * inputs, [0.5] * inputs]])
         return np.concatenate([first, ends])
 
-    def _taught(self, memo: Memo, domain: Domain, box: Array) -> Array:
-        """The teacher's bounds on a box, shape (2, outputs)."""
+    def _taught(self, memo: Memo, domain: Domain, box: Array) -> FuzzyResult:
+        """The teacher's bounds on a box."""
         inputs = {name: Interval(*box[:, i]) for i, name in enumerate(domain.names)}
-        result = self.teacher.run(memo, Domain(inputs, (0.0,)))
-        return np.array([result.lower[0], result.upper[0]])
+        return self.teacher.run(memo, Domain(inputs, (0.0,)))
+
+
+def _widened(taught: FuzzyResult, box: Array, points: Array, values: Array) -> Array:
+    """Bounds on a box that hold every sample within, whatever it was for, shape (2, outputs)."""
+    within = ((points >= box[0]) & (points <= box[1])).all(axis=1)
+    seen = np.concatenate([taught.lower, taught.upper, values[within]])
+    return np.array([seen.min(axis=0), seen.max(axis=0)])
 
 
 def _real(box: Array, lower: Array, upper: Array, moving: Rows) -> Array:
@@ -136,6 +150,7 @@ class TrainedBounds:
         predict: From boxes of the unit cube (n, 2 · moving inputs) to bounds (n, 2 · outputs).
         missed: Largest error on the boxes that were held out, shape (outputs,).
         runs: Samples of the model that the training took.
+        base: What its bounds are worth.
         notes: What is to be said of the teacher, one sentence each.
     """
 
@@ -144,6 +159,7 @@ class TrainedBounds:
     predict: Callable[[Array], Array]
     missed: Array
     runs: int
+    base: Nature
     notes: tuple[str, ...] = ()
 
     def bounds(self, domain: Domain) -> FuzzyResult:
@@ -178,7 +194,7 @@ class TrainedBounds:
             upper=nested[1],
             lower_at=places,
             upper_at=places,
-            base=Nature.ESTIMATED,
+            base=self.base,
             plan="metamodel",
             runs=self.runs,
             error=np.broadcast_to(_SAFETY * self.missed, least.shape).copy(),

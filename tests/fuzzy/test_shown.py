@@ -211,7 +211,7 @@ def test_a_metamodel_names_outputs_errors_and_what_its_teacher_sees():
     found = propagate(two, X, Metamodel(boxes=9, held_out=4, teacher=General()))
     half = found.error[0] / 2
     assert f"by up to {half[0]:.3g} of w, {half[1]:.3g} of s; the error is 2 times" in str(found)
-    assert "the teacher General has the corners alone; where the function turns" in str(found)
+    assert "the teacher General has the corners alone, widened by the samples" in str(found)
     assert " runs a box" in str(found)
     assert str(found).splitlines()[1].endswith(f", error {found.error[0, 0]:.2g}")
     assert f"<td>{found.error[0, 0]:.2g}</td></tr>" in found._repr_html_()
