@@ -22,8 +22,7 @@ from alphacut.fuzzy.sets.numbers import Array, Interval, Rows
 
 CORNERS = (
     "on one box the teacher {} has the corners alone, widened by the samples of other boxes within;"
-    " where the function turns inside take Metamodel(teacher=Optimisation()) or"
-    " BranchAndBound(function), or another plan"
+    " where the function turns inside take Optimisation() or BranchAndBound(function) as teacher"
 )
 _SAFETY = 2  # the error elsewhere may be larger than on the boxes that were held out
 
