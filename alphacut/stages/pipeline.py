@@ -82,7 +82,7 @@ class Chain:
             handed = modulus.read_number(self.file("modulus.nc"), warn=False)
         picture = self.image() if "image" in self.case.stages else None
         if picture is not None:
-            handed = modulus.read_number(self.file("image.nc"))
+            handed = modulus.read_number(self.file("image.nc"), "cell")
         found = Results(self.case, self.folder, cell, {}, handed, image=picture)
         if cell is not None and self.case.sections.response:
             found = replace(found, response=self.response(cell))

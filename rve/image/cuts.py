@@ -77,13 +77,8 @@ def each_cut(
     leaves open may be of phases without order, it takes the least of their K + G/3 and the least of
     their G: still a proof, but of an enclosure.
 
-    Args:
-        grey: Grey values, shape (rows, columns).
-        boxes: Cuts of the input, each inside the one before or the other way round; neighbours give
-            the first guess, and equal ones are solved once.
-        aspect: Height of a pixel over its width.
-        solver: Stopping rule.
-        division: Parts along each side of a pixel.
+    Each box lies inside the one before or the other way round; neighbours give the first guess, and
+    equal ones are solved once. The rest is as in `solve_between`.
     """
     last: Cut | None = None
     before: ModuliImages | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from time import perf_counter
+from math import log2
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from alphacut.rve.image.cuts import ENCLOSED, TWO_CORNERS, nested
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.solver import Solver
 from alphacut.rve.image.phase_images import ModuliImages
-from alphacut.rve.image.read import require_memory
+from alphacut.rve.image.read import memory
 from alphacut.rve.image.solve import CrispBounds, both_sides, solve_between
 from alphacut.rve.image.windows import Tiling, tiles_of
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -21,6 +21,7 @@ from alphacut.stochastic.theta.truncated_normal import Array
 BOUNDARIES = ("periodic", "window")
 MILD = 10.0
 LARGE = 1 << 19
+FLATTEST = 1e-3  # least side of a pixel over the other; beyond, rounding spoils the fields
 CONFIDENT = "95 % confidence interval of the material, no proof"
 
 
@@ -35,7 +36,6 @@ class ImageCut:
         nature: What the interval is worth.
         solution: Fields of a periodic image.
         iterations: Of the slowest system.
-        seconds: Wall time.
     """
 
     bounds: StiffnessBounds
@@ -43,7 +43,6 @@ class ImageCut:
     nature: str
     solution: CrispBounds | None
     iterations: int
-    seconds: float
 
 
 @dataclass(frozen=True)
@@ -73,18 +72,22 @@ class ImageModel:
     def __post_init__(self) -> None:
         if self.boundary not in BOUNDARIES:
             raise ValueError(f"the boundary is {self.boundary!r}; take periodic or window")
+        if not FLATTEST <= self.aspect <= 1 / FLATTEST:
+            what = f"a pixel is {self.aspect:.3g} times as high as wide"
+            raise ValueError(f"{what}; allowed: {FLATTEST:g} to {1 / FLATTEST:g} times")
         if self.boundary == "window" and self.tiles < 2:
             raise ValueError("one tile has no scatter; divide the window into 2 × 2 tiles or more")
 
-    def refined(self, images: ModuliImages) -> tuple[ImageModel, ImageCut]:
+    def refined(self, images: ModuliImages, before: float = 0.0) -> tuple[ImageModel, ImageCut]:
         """The model with the parts that its width needs, and periodic bounds of the image by it.
 
         Args:
             images: Least and greatest moduli for crisp inputs, equal but where an outline cuts.
+            before: Width with half as many parts; 0: not known.
 
         Raises:
-            ValueError: An outline alone causes a larger width, or it needs more memory than there
-                is.
+            ValueError: An outline alone causes a larger width, or the widths fall too slowly for
+                the memory there is.
         """
         model = replace(self, division=self.division or usual_division(images))
         crisp = model.periodic(images, pixels=True)
@@ -96,8 +99,16 @@ class ImageModel:
                 f" themselves, {self.width:.2e} is asked for; take more pixels"
             )
         rows, columns = images.bulk[0].shape
-        require_memory(rows, columns, 2 * model.parts)
-        return replace(model, division=2 * model.parts).refined(images)
+        needed, have = memory(rows, columns, model.parts)
+        power = log2(before / crisp.bounds.width) if before else 2.0
+        least = crisp.bounds.width * (needed / have) ** (power / 2)
+        if needed > have / 4 or least > self.width:
+            raise ValueError(
+                f"the width {self.width:.2e} takes more parts of a pixel than fit into memory: "
+                f"{model.parts} give {crisp.bounds.width:.1e}, those that fit {least:.1e} at best; "
+                "take a larger width, or an image of fewer pixels"
+            )
+        return replace(model, division=2 * model.parts).refined(images, crisp.bounds.width)
 
     def cuts(
         self, images: Sequence[ModuliImages], crisp: tuple[ModuliImages, ImageCut]
@@ -124,16 +135,14 @@ class ImageModel:
         """Bounds between two images, of the boundary that the model has."""
         if self.boundary == "periodic":
             return self.periodic(images, start)
-        began = perf_counter()
         tiling, iterations = self.tiling(images, self.tiles)
         bounds, modulus = tiling.bracket, tiling.material_modulus()
-        return ImageCut(bounds, modulus, CONFIDENT, None, iterations, perf_counter() - began)
+        return ImageCut(bounds, modulus, CONFIDENT, None, iterations)
 
     def periodic(
         self, images: ModuliImages, start: CrispBounds | None = None, *, pixels: bool = False
     ) -> ImageCut:
         """Bounds between two images that repeat themselves."""
-        began = perf_counter()
         solution = solve_between(
             images,
             aspect=self.aspect,
@@ -145,8 +154,7 @@ class ImageModel:
         nature = TWO_CORNERS if images.attained else ENCLOSED
         iterations = max(solution.upper.iterations, solution.lower.iterations)
         bounds = solution.bounds
-        seconds = perf_counter() - began
-        return ImageCut(bounds, bounds.modulus, nature, solution, iterations, seconds)
+        return ImageCut(bounds, bounds.modulus, nature, solution, iterations)
 
     def tiling(self, images: ModuliImages, along: int) -> tuple[Tiling, int]:
         """Tiles of a window under uniform displacement and uniform traction, and the iterations."""

@@ -110,7 +110,8 @@ class ThresholdResponse:
     @property
     def modulus(self) -> tuple[Array, Array]:
         """Bounds of E of eq. 16 at the nodes, each of shape (n,), in Pa, falling."""
-        ends = np.array([_modulus(a, b) for a, b in zip(self.lower, self.upper, strict=True)])
+        pairs = zip(self.lower, self.upper, strict=True)
+        ends = np.array([StiffnessBounds(*pair).modulus for pair in pairs])
         lower = np.maximum.accumulate(ends[::-1, 0])[::-1]  # E exceeds before what it falls to
         return lower, np.minimum.accumulate(ends[:, 1])
 
@@ -160,7 +161,7 @@ class ThresholdResponse:
     def _pure(self) -> tuple[float, float]:
         """E of the softer and of the stiffer phase alone, in Pa."""
         low, high = self.pure
-        return _modulus(low, low)[0], _modulus(high, high)[1]
+        return StiffnessBounds(low, low).modulus[0], StiffnessBounds(high, high).modulus[1]
 
 
 def threshold_response(
@@ -174,13 +175,8 @@ def threshold_response(
 ) -> ThresholdResponse:
     """Stiffness over the threshold of two phases.
 
-    Args:
-        grey: Grey values, shape (rows, columns).
-        thresholds: Nodes, rising.
-        phases: Moduli of the darker and of the brighter phase, one stiffer in K + G/3 and in G.
-        aspect: Height of a pixel over its width.
-        solver: Stopping rule.
-        division: Parts along each side of a pixel.
+    The nodes rise; the phases are the darker and the brighter one, one stiffer in K + G/3 and in G.
+    The rest is as in `each_cut`.
 
     Raises:
         ValueError: The phases have no such order, so nothing need fall with the threshold.
@@ -207,8 +203,3 @@ def ordered(phases: Sequence[ModuliInterval]) -> tuple[ModuliInterval, ModuliInt
         "a random threshold needs one phase that is stiffer in K + G/3 and in G; "
         "a fuzzy threshold, whose cuts need no order, does not"
     )
-
-
-def _modulus(lower: Array, upper: Array) -> tuple[float, float]:
-    """Bounds of E of eq. 16 from those of the stiffness, in Pa."""
-    return StiffnessBounds(lower, upper).modulus

@@ -93,14 +93,19 @@ def require_memory(rows: int, columns: int, division: int) -> None:
     Raises:
         ValueError: It says how much is needed, and how large a window would fit.
     """
-    have = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    needed = BYTES_PER_PIXEL * rows * columns * division**2
+    needed, have = memory(rows, columns, division)
     if needed > have:
         side = int((have / BYTES_PER_PIXEL / division**2) ** 0.5)
         raise ValueError(
             f"{rows} × {columns} pixels divided by {division} need about {needed / 1e9:.0f} GB of "
             f"memory, this machine has {have / 1e9:.0f}; crop a window of {side} × {side} pixels"
         )
+
+
+def memory(rows: int, columns: int, division: int) -> tuple[int, int]:
+    """Bytes that the solution of an image needs, and those that this machine has."""
+    have = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    return BYTES_PER_PIXEL * rows * columns * division**2, have
 
 
 def require_phases(grey: Array, thresholds: tuple[tuple[float, float], ...]) -> None:

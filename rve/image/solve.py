@@ -39,16 +39,10 @@ def solve_image(
     division: int = 1,
     pixels: bool = False,
 ) -> CrispBounds:
-    """Proved bounds of the effective stiffness of the periodic image.
+    """Proved bounds of the effective stiffness of the periodic image, as by `solve_between`.
 
-    Args:
-        bulk: Plane-strain bulk modulus K + G/3 of each pixel, shape (rows, columns), in Pa; row 0
-            is at the bottom, y rises with rows.
-        shear: Shear modulus of each pixel, same shape, in Pa.
-        aspect: Height of a pixel over its width.
-        solver: Stopping rule.
-        division: Parts along each side of a pixel.
-        pixels: Keep the energy of each pixel.
+    The plane-strain bulk modulus K + G/3 and the shear modulus of each pixel have the shape (rows,
+    columns) and are in Pa; row 0 is at the bottom, y rises with rows.
     """
     images = ModuliImages((bulk, bulk), (shear, shear), attained=True)
     return solve_between(images, aspect=aspect, solver=solver, division=division, pixels=pixels)
@@ -65,14 +59,8 @@ def solve_between(
 ) -> CrispBounds:
     """Proved bounds of the stiffness of every image between two.
 
-    Args:
-        images: Least and greatest moduli.
-        aspect: Height of a pixel over its width.
-        solver: Stopping rule.
-        division: Parts along each side of a pixel.
-        start: Result of a similar image of as many pixels and parts; its fields are the first
-            guess.
-        pixels: Keep the energy of each pixel.
+    The aspect is the height of a pixel over its width, the division the number of parts along each
+    side of a pixel. `start` is a result of as many parts, whose fields are the first guess.
     """
     fields = None if start is None else (start.upper.fields, start.lower.fields)
     upper, lower = both_sides(
@@ -97,17 +85,9 @@ def both_sides(
     clamped: bool = False,
     pixels: bool = False,
 ) -> tuple[SideSolution, SideSolution]:
-    """Displacements and stresses, on as many threads as the solver allows.
+    """Displacements and stresses by `solve_side`, on as many threads as the solver allows.
 
-    Args:
-        moduli: K + G/3 and G of the tiles for the displacements, then those for the stresses, as
-            `solve_side` takes them, like all that follows.
-        solver: Stopping rule.
-        aspect: Height of a pixel over its width.
-        division: Parts along each side of a pixel.
-        start: Fields to start from, of each side.
-        clamped: Fluctuations vanish on the edge of each tile.
-        pixels: Keep the energy of each pixel.
+    The moduli are those of the tiles for the displacements, then for the stresses, as is the start.
     """
     stopped = Event()
 

@@ -54,8 +54,8 @@ class Tiling:
         bracket = self.bracket
         if not (steepest := bracket.shear[1] / bracket.bulk[0]) < 1.5:
             raise ValueError(
-                f"A/B of eq. 16 reaches {steepest:.3g}, and tiles tell the scatter of E below 1.5"
-                " only; take the boundary periodic"
+                f"A/B of eq. 16 may reach {steepest:.3g}, and tiles tell the scatter of E below 1.5"
+                " only; take boundary periodic, larger tiles or phases of less contrast"
             )
         low, high = bracket.modulus
         softer = -bracket.lower @ (self.compliance - self.compliance.mean(axis=0)) @ bracket.lower

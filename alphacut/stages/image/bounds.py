@@ -11,6 +11,7 @@ from time import perf_counter
 import numpy as np
 
 from alphacut.io.files import say
+from alphacut.io.problem import BadInput
 from alphacut.io.progress import Tick
 from alphacut.rve.image.gap import constitutive_gap
 from alphacut.rve.image.model import ImageCut, ImageModel, reduced_to_pixels
@@ -18,6 +19,7 @@ from alphacut.rve.image.moduli import grain_modulus
 from alphacut.rve.image.random_threshold import NODES
 from alphacut.stages.image.random_response import RandomResponse, responses
 from alphacut.stages.image.study import ImageStudy, Level
+from alphacut.stages.material.cell import GPA, POSITIVE
 from alphacut.stochastic.theta.truncated_normal import Array
 
 CURES = {
@@ -42,11 +44,6 @@ class Contribution:
 
     source: str
     width: float
-
-    @property
-    def cure(self) -> str:
-        """Change of the case that narrows it."""
-        return CURES[self.source]
 
 
 def contributions(
@@ -174,7 +171,17 @@ def compute(
     """Bounds at every level, and what widens them.
 
     Fields that are found stay in the folder `kept`, if any, for the same study begun again.
+
+    Raises:
+        BadInput: The image cannot give what the case asks for.
     """
+    try:
+        return _computed(study, progress, kept)
+    except ValueError as error:
+        raise BadInput.of("cell", str(error)) from None
+
+
+def _computed(study: ImageStudy, progress: Tick | None, kept: Path | None) -> FuzzyImage:
     modal, count = study.images(None, None), solutions(study)
     told = Told(progress or (lambda share: None), count)
     pixels = f"image of {modal.bulk[0].size} pixels: {count} pairs of solutions"
@@ -206,5 +213,8 @@ def compute(
         width = alone
     rows = contributions(study, crisp.modulus[1] - crisp.modulus[0], width)
     own = apparent(study, model) if model.boundary == "window" else ()
+    if not (low := cuts[0].modulus[0] / GPA) > 0:
+        what = f"E has no bound above {low:.3g} GPa, and no structure takes that"
+        say(f"warning: cell: {what}: {POSITIVE}")
     told.done(1.0)
     return FuzzyImage(study, model, crisp, cuts, rows, own, random, told.seconds)

@@ -14,7 +14,7 @@ from alphacut.io.netcdf import write_dataset
 from alphacut.io.provenance import versions
 from alphacut.rve.image.directions import directions
 from alphacut.rve.image.model import ImageCut
-from alphacut.stages.image.bounds import FuzzyImage
+from alphacut.stages.image.bounds import CURES, FuzzyImage
 from alphacut.stages.image.phases import BEYOND, IF, phase_lines
 from alphacut.stages.image.random_response import RandomResponse
 from alphacut.stages.material.cell import GPA
@@ -89,7 +89,7 @@ def error_table(found: FuzzyImage) -> list[Document]:
             "source": row.source,
             "width_GPa": row.width / GPA,
             "share": row.width / total,
-            "cure": row.cure,
+            "cure": CURES[row.source],
         }
         for row in found.contributions
     ]

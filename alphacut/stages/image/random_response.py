@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from time import perf_counter
 
 import numpy as np
 
@@ -26,13 +25,11 @@ class RandomResponse:
         random: The threshold.
         alpha: Levels, rising.
         by_level: Response for the phases at each level, and at their modal values (None).
-        seconds: Wall time.
     """
 
     random: RandomThreshold
     alpha: tuple[float, ...]
     by_level: dict[Level, ThresholdResponse]
-    seconds: float
 
     @property
     def modal(self) -> ThresholdResponse:
@@ -45,7 +42,7 @@ class RandomResponse:
         bounds = [self.by_level[a].stiffness(self.random.law(a)) for a in self.alpha]
         intervals = nested([b.modulus for b in bounds[::-1]])[::-1]
         return tuple(
-            ImageCut(b, modulus, RANDOM, None, 0, self.seconds / len(bounds))
+            ImageCut(b, modulus, RANDOM, None, 0)
             for b, modulus in zip(bounds, intervals, strict=True)
         )
 
@@ -79,7 +76,6 @@ def responses(study: ImageStudy, model: ImageModel, random: RandomThreshold) -> 
     Raises:
         ValueError: The phases have no order.
     """
-    began = perf_counter()
     nodes = threshold_nodes(random.grey, random.law(study.alpha[0]))
 
     def solved(level: Level) -> ThresholdResponse:
@@ -96,4 +92,4 @@ def responses(study: ImageStudy, model: ImageModel, random: RandomThreshold) -> 
     for level in study.alpha:
         same = study.phases(level) == study.phases(None)
         by_level[level] = by_level[None] if same else solved(level)
-    return RandomResponse(random, study.alpha, by_level, perf_counter() - began)
+    return RandomResponse(random, study.alpha, by_level)

@@ -35,6 +35,7 @@ def study_of(case: Case, *, petsc: Mapping[str, str] | None = None) -> ImageStud
     first, second = given.pairs
     try:
         parted = _outline(case) if given.image is None else _image(case, given.image)
+        source = "cell.size" if given.pixel is None else "cell.pixel"
         study = ImageStudy(
             parted.ranges,
             tuple(zip(first, second, strict=True)),

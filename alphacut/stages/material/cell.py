@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from alphacut.rve.result import Homogenised
 
 GPA = 1e9
+POSITIVE = "divide the pixels (cell.division) or take phases of less contrast"  # E of an image
 DIRECTIONS = np.arange(0, 91, 15)  # in degrees
 INPUTS = (
     "a1",

@@ -23,7 +23,7 @@ from alphacut.io.problem import BadInput
 from alphacut.io.progress import Tick
 from alphacut.io.provenance import attributes, versions
 from alphacut.stages.material.campaign import Campaign, theta_shown
-from alphacut.stages.material.cell import GPA, CellChoice, anisotropy, parts
+from alphacut.stages.material.cell import GPA, POSITIVE, CellChoice, anisotropy, parts
 from alphacut.stages.material.cell_models import cell_model
 from alphacut.stochastic import ThetaLaw, TruncatedNormal
 
@@ -313,7 +313,7 @@ def read_number(path: Path | str, option: str = "--modulus", *, warn: bool = Tru
     """The fuzzy modulus in Pa from a file that `write` made, and its warning unless not to `warn`.
 
     Raises:
-        BadInput: The file is missing, holds no modulus, or was written by a newer program.
+        BadInput: The file is missing, holds no positive modulus, or was written by a newer program.
     """
     dataset = read_dataset(Path(path), key=option)
     try:
@@ -325,6 +325,9 @@ def read_number(path: Path | str, option: str = "--modulus", *, warn: bool = Tru
             str(path),
             "a modulus.nc of this program",
         ) from None
+    if not (low := float(ends.min())) > 0:
+        what = f"{Path(path).name} holds an E down to {low / GPA:.3g} GPa"
+        raise BadInput.of(option, what, allowed=f"an E that is positive throughout: {POSITIVE}")
     if warn and (warned := dataset.attrs.get("outside")):
         say(f"warning: {option}: {warned}")
     if len(alpha) == 1:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from time import perf_counter
 
 import numpy as np
 
@@ -60,7 +59,6 @@ class SideSolution:
         fields: Fluctuations for the unit loads, shape (tiles, 3, types, rows, columns).
         energy: Mean energies with their rounding.
         iterations: Of the slowest load.
-        seconds: Wall time.
     """
 
     side: Side
@@ -68,7 +66,6 @@ class SideSolution:
     fields: Array
     energy: Energy
     iterations: int
-    seconds: float
 
 
 def solve_side(
@@ -98,7 +95,6 @@ def solve_side(
         clamped: Fluctuations vanish on the edge of each tile; else they are periodic.
         pixels: Keep the energy of each pixel.
     """
-    began = perf_counter()
     element = side.element(aspect)
     modes = element.mean_modes(SOLVED_LOADS)
     start = None if start is None else _of_solved_loads(start)
@@ -112,7 +108,7 @@ def solve_side(
     fields = _of_unit_loads(fields)
     modes = element.mean_modes(UNIT_LOADS)
     result = energy(element, trace, deviator, fields, modes, pixels=pixels)
-    return SideSolution(side, aspect, fields, result, iterations, perf_counter() - began)
+    return SideSolution(side, aspect, fields, result, iterations)
 
 
 def _fields(

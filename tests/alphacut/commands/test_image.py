@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -242,8 +243,47 @@ def test_a_width_asked_for_divides_the_pixels(folder, capfd):
     assert narrow["width"] <= whole["width"] / 3
     open_pixels = {"inequality": '"x <= 0.513"', "size": '["1 m", "1 m"]', "pixels": "16"}
     outline = {"image": None, "pixel": None, "threshold": None, **open_pixels}
-    assert main(["image", written(folder, **outline, width="1e-3")]) == 1
+    assert main(["image", written(folder, **outline, width="1e-3")]) == 2
     assert "pixels that the outline cuts cause a width" in capfd.readouterr().err
+
+
+def test_a_width_that_memory_does_not_reach_is_refused_soon(folder, capfd):
+    np.save(folder / "l.npy", np.random.default_rng(5).integers(0, 2, (8, 8)))
+    case = written(folder, image='"l.npy"', threshold="[0.5]", width="1e-6")
+    assert main(["image", case, "--quiet"]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert "cell: the width 1.00e-06 takes more parts of a pixel than fit into memory" in line
+    assert "at best; take a larger width, or an image of fewer pixels" in line
+
+
+LOOSE = {"image": '"l.npy"', "threshold": "[0.5]", "modulus": '["20 GPa", "0.002 GPa"]'}
+
+
+def test_an_e_without_a_positive_bound_is_told_and_handed_to_no_structure(folder, capfd):
+    np.save(folder / "l.npy", np.random.default_rng(5).integers(0, 2, (8, 8)))
+    assert main(["image", written(folder, **LOOSE), "--quiet"]) == 0
+    told = capfd.readouterr().err
+    assert "warning: cell: E has no bound above -" in told
+    assert "divide the pixels (cell.division) or take phases of less contrast" in told
+    head = HEAD.replace('["image"]', '["image", "envelope"]')
+    case, out = written(folder, head, FRAME, **LOOSE), folder / "out"
+    paper = str(Path(__file__).parents[3] / "cases" / "paper.toml")
+    for call, key in (
+        (["run", case, "--out", str(out)], "cell"),
+        (["envelope", paper, "--modulus", str(out / "image.nc")], "--modulus"),
+    ):
+        assert main([*call, "--quiet"]) == 2
+        line = capfd.readouterr().err.splitlines()[-1]
+        assert f"alphacut: {key}: image.nc holds an E down to -" in line
+        assert "allowed: an E that is positive throughout: divide the pixels" in line
+    whole = ["run", case, "--out", str(out), "--no-figures", "--quiet"]
+    assert main([*whole, "--set", 'cell.modulus=["20 GPa", "0.2 GPa"]']) == 0
+
+
+def test_tiles_that_may_have_no_scatter_of_e_are_bad_input(folder, capfd):
+    np.save(folder / "l.npy", np.random.default_rng(5).integers(0, 2, (8, 8)))
+    assert main(["image", written(folder, **LOOSE, boundary='"window"'), "--quiet"]) == 2
+    assert "take boundary periodic, larger tiles or phases of less" in capfd.readouterr().err
 
 
 def test_the_words_name_the_plane_strain_bulk_modulus(folder, capfd):
@@ -282,6 +322,10 @@ def test_a_run_hands_the_modulus_on_to_the_frame_and_keeps_it(folder, capfd):
         ({"image": '"b.png"'}, "there is no such file"),
         ({"inequality": '"x <= 1"'}, "got 2 pictures"),
         ({"pixel": None}, "missing: the side of a pixel"),
+        (
+            {"pixel": '["1 mm", "1e6 mm"]'},
+            "cell.pixel: a pixel is 1e+06 times as high as wide; allowed: 0.001 to 1000 times",
+        ),
         ({"threshold": None}, "nothing tells the phases apart"),
         ({"labels": "[0, 1]"}, "two things tell the phases apart"),
         (
