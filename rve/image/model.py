@@ -86,8 +86,7 @@ class ImageModel:
             before: Width with half as many parts; 0: not known.
 
         Raises:
-            ValueError: An outline alone causes a larger width, or the widths fall too slowly for
-                the memory there is.
+            ValueError: The width is out of reach, of an outline's pixels or of the memory.
         """
         model = replace(self, division=self.division or usual_division(images))
         crisp = model.periodic(images, pixels=True)
@@ -136,8 +135,7 @@ class ImageModel:
         if self.boundary == "periodic":
             return self.periodic(images, start)
         tiling, iterations = self.tiling(images, self.tiles)
-        bounds, modulus = tiling.bracket, tiling.material_modulus()
-        return ImageCut(bounds, modulus, CONFIDENT, None, iterations)
+        return ImageCut(tiling.bracket, tiling.material_modulus(), CONFIDENT, None, iterations)
 
     def periodic(
         self, images: ModuliImages, start: CrispBounds | None = None, *, pixels: bool = False

@@ -85,10 +85,7 @@ def both_sides(
     clamped: bool = False,
     pixels: bool = False,
 ) -> tuple[SideSolution, SideSolution]:
-    """Displacements and stresses by `solve_side`, on as many threads as the solver allows.
-
-    The moduli are those of the tiles for the displacements, then for the stresses, as is the start.
-    """
+    """Displacements, then stresses, by `solve_side` on as many threads as the solver allows."""
     stopped = Event()
 
     def watch() -> None:
