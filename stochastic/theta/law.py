@@ -12,6 +12,7 @@ Array = NDArray[Any]  # of floats; shapes and units are said in words
 
 MASS_GAP = 1e-8
 """Most by which the integral of a density may miss the difference of its distribution function."""
+NARROWEST = 1e-4  # width of a support over its greater end, beside which rounding is small
 _PANEL_GAP = 1e-13
 _HALVINGS, _MOST_PANELS = 48, 400
 
@@ -40,15 +41,18 @@ class ThetaLaw(Protocol):
         """The θ below which a share `probability` in [0, 1] lies, any shape."""
 
 
-def require_support(lower: float, upper: float) -> None:
-    """Refuse a support that is not two finite ends in order.
+def require_support(lower: float, upper: float, unit: float = 0.0) -> None:
+    """Refuse a support that is not two finite ends in order, `NARROWEST` or more apart.
 
     Raises:
         ValueError: It is not.
     """
-    if not (np.isfinite(lower) and np.isfinite(upper) and lower < upper):
+    least = NARROWEST * max(abs(lower), abs(upper), unit)
+    ordered = np.isfinite(lower) and np.isfinite(upper) and lower < upper
+    if not (ordered and upper - lower >= 0.999 * least):  # 9.999 … 10 is wide enough
         raise ValueError(
             f"the support of θ is [{lower}, {upper}]; it needs two finite ends, lower < upper"
+            + (f", {least:.2g} or more apart" if ordered else "")
         )
 
 
@@ -152,13 +156,13 @@ class Beta:
 
     def pdf(self, theta: ArrayLike) -> Array:
         """Density f_Θ at `theta` (any shape); zero outside the support."""
-        from scipy.special import betaln
+        from scipy.special import betaln, xlog1py, xlogy
 
         theta = np.asarray(theta, float)
         inside = (theta >= self.lower) & (theta <= self.upper)
         xi = self.xi(theta)
-        scale = np.exp(-betaln(self.p, self.q)) / (self.upper - self.lower)
-        return np.where(inside, scale * xi ** (self.p - 1) * (1 - xi) ** (self.q - 1), 0.0)
+        log = xlogy(self.p - 1, xi) + xlog1py(self.q - 1, -xi) - betaln(self.p, self.q)
+        return np.where(inside, np.exp(log) / (self.upper - self.lower), 0.0)
 
     def cdf(self, theta: ArrayLike) -> Array:
         """P(Θ ≤ theta), any shape."""

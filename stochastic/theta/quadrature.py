@@ -28,6 +28,7 @@ class ThetaRule:
 
 
 _MOST_PANELS = 64  # to begin with
+_NEGLIGIBLE = 1e-200  # weight of nodes so far off that polynomials overflow there
 
 
 def layered_rule(distribution: ThetaLaw, *, layers: int, points: int) -> ThetaRule:
@@ -74,12 +75,13 @@ def gauss_rule(
     if points < 1:
         raise ValueError(f"got a rule of {points} points; at least one is needed")
     fine = _fine_rule(distribution, 16 + 2 * points, between)
-    weights = fine.weights
+    held = fine.weights > _NEGLIGIBLE
+    at, weights = fine.nodes[held], fine.weights[held]
     diagonal, off = np.zeros(points), np.zeros(points)
-    previous, current = np.zeros_like(fine.nodes), np.ones_like(fine.nodes)
+    previous, current = np.zeros_like(at), np.ones_like(at)
     for k in range(points):
-        diagonal[k] = weights @ (fine.nodes * current**2)
-        following = (fine.nodes - diagonal[k]) * current - off[k - 1] * previous * (k > 0)
+        diagonal[k] = weights @ (at * current**2)
+        following = (at - diagonal[k]) * current - off[k - 1] * previous * (k > 0)
         off[k] = np.sqrt(weights @ following**2)
         previous, current = current, following / off[k]
     jacobi = np.diag(diagonal) + np.diag(off[:-1], 1) + np.diag(off[:-1], -1)

@@ -30,7 +30,7 @@ class TruncatedNormal:
     upper: float = 3.0
 
     def __post_init__(self) -> None:
-        require_support(self.lower, self.upper)
+        require_support(self.lower, self.upper, unit=1.0)
         if not self.mass > 0:
             raise ValueError(
                 f"the standard normal gives the support [{self.lower}, {self.upper}] of θ no"

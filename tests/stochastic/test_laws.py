@@ -40,7 +40,10 @@ class Own:
         return getattr(stats, self.kind).ppf(probability, *self.shape)
 
 
-@pytest.mark.parametrize("exponents", [(1, 1), (2, 5), (1.3, 1.7), (60, 40)])
+EXPONENTS = [(1, 1), (2, 5), (1.3, 1.7), (60, 40), (600, 600), (1000, 1000), (1000, 1), (2, 1000)]
+
+
+@pytest.mark.parametrize("exponents", EXPONENTS)
 def test_beta_is_scipys(exponents):
     law, reference = Beta(*exponents, -2.0, 1.0), stats.beta(*exponents, loc=-2, scale=3)
     theta = np.linspace(-2.5, 1.5, 41)
@@ -50,12 +53,31 @@ def test_beta_is_scipys(exponents):
     assert law.quantile(share) == pytest.approx(reference.ppf(share), abs=1e-12)
 
 
-@pytest.mark.parametrize("exponents", [(1, 1), (2, 5), (1.3, 1.7), (60, 40)])
-def test_gauss_rule_has_the_moments_of_the_law(exponents):
-    rule, (p, q), exact = gauss_rule(Beta(*exponents), points=5), exponents, 1.0
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("points", [5, 120])
+@pytest.mark.parametrize("exponents", EXPONENTS)
+def test_gauss_rule_has_the_moments_of_the_law(exponents, points):
+    rule, (p, q), exact = gauss_rule(Beta(*exponents), points=points), exponents, 1.0
     for power in range(10):
         assert rule.weights @ ((rule.nodes + 3) / 6) ** power == pytest.approx(exact, rel=1e-11)
         exact *= (p + power) / (p + q + power)
+
+
+@pytest.mark.parametrize("law", [TruncatedNormal, lambda *ends: Beta(600, 600, *ends)])
+def test_a_support_is_no_narrower_than_its_rounding_allows(law):
+    """Beside 10 a width of 1e-6 keeps nine digits: too few for the integral of the density."""
+    ends = 9.999, 10.0
+    rule = gauss_rule(law(*ends), points=5)
+    assert rule.weights.sum() == pytest.approx(1, abs=1e-12)
+    assert ends[0] < rule.mean(rule.nodes) < ends[1]
+    with pytest.raises(ValueError, match=r"lower < upper, 0\.001 or more apart"):
+        law(9.999999, 10.0)
+
+
+def test_a_normal_law_s_support_is_measured_in_standard_deviations():
+    with pytest.raises(ValueError, match=r"0\.0001 or more apart"):
+        TruncatedNormal(0.0, 1e-6)
+    assert gauss_rule(Beta(2, 2, 0.0, 1e-6), points=3).weights.sum() == pytest.approx(1)
 
 
 @pytest.mark.parametrize("law", [Own(), Own("rv_histogram"), Own("beta", (3.5, 1.2))], ids=str)

@@ -123,6 +123,24 @@ def test_a_law_without_probability_on_its_support_is_refused(case):
         load(case, ["radius.theta=[3, -3]"])
 
 
+@pytest.mark.parametrize(("exponents", "modulus"), [(600, 23.99634), (1000, 23.99515)])
+def test_steep_beta_laws_give_a_cell_without_a_warning(tmp_path, capfd, exponents, modulus):
+    text = CASE.replace('map = "exponential"', "a2 = 0.3\na4 = 0.4").replace("[2, 5]", "[2, 2]")
+    text = text.replace("[0.2, 0.25, 0.3]", "0.2").partition("[response]")[0]
+    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
+    change = f"radius.exponents=[{exponents}, {exponents}]"
+    assert main(["cell", str(tmp_path / "case.toml"), "--set", change]) == 0
+    told = capfd.readouterr()
+    assert "warning" not in told.err
+    assert float(told.out.split()[2]) == pytest.approx(modulus, abs=1e-5)
+
+
+def test_too_narrow_a_support_is_refused_by_its_key(capfd):
+    assert main(["cell", str(PAPER), "--set", "radius.theta=[9.999999,10]"]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert "radius.theta = [9.999999, 10.0]: the support" in line
+
+
 def test_one_radius_stands_for_any_map(case, capfd):
     assert main(["cell", str(case), "--radius", "0.5", "--json", "-"]) == 0
     assert '"E_GPa": 24.2182' in capfd.readouterr().out
