@@ -16,7 +16,7 @@ from time import perf_counter
 
 import numpy as np
 
-from alphacut.stochastic.errors import RefusedError
+from alphacut.stochastic.errors import RefusedError, UnfitDataError
 from alphacut.stochastic.fit.area_weighted import DISCS, SPHERES, AreaWeighted, Shape
 from alphacut.stochastic.fit.hermite_fit import HermiteFit, SlopeBand, slope_band
 from alphacut.stochastic.fit.pbox import PBox, least_pbox
@@ -37,6 +37,7 @@ between particles that touch, count as cells of this one where no limits are giv
 
 MOST_CAPPED = 0.15  # share of the area that may lie in cells tighter than that
 ORDERED = 0.1  # |⟨e^{6iφ}⟩| above which particles are said to lie in rows
+SAME = 1e-6  # differences of r_n up to which it is one value, but for round-off
 WIDEST = 0.95  # band, in probability, to which one is widened for several samples
 
 
@@ -113,13 +114,13 @@ class Study:
         """The sample with cells of discs no tighter than `TIGHTEST`, unless limits are given.
 
         Raises:
-            RefusedError: More than `MOST_CAPPED` of the area lies in cells tighter than that.
+            UnfitDataError: More than `MOST_CAPPED` of the area lies in cells tighter than that.
         """
         if self.limits or self.shape is SPHERES:
             return sample
         share = 1 - float(sample.cdf(TIGHTEST))
         if share > MOST_CAPPED:
-            raise RefusedError(
+            raise UnfitDataError(
                 f"{share:.1%} of the area lies in cells tighter than r_n = {TIGHTEST:g}, and a disc"
                 f" fills its square cell at 1; at area fraction {sample.area_fraction:.4f} no"
                 " square cell stands for these particles: take an image of them as the cell"
@@ -263,12 +264,18 @@ def fitted_map(case: Study, sample: AreaWeighted, others: Sequence[AreaWeighted]
             halves until one holds them, and told in `allowed`.
 
     Raises:
-        RefusedError: No p-box contains the samples.
+        UnfitDataError: All cells have one r_n, or no p-box contains the samples.
     """
     streams = np.random.SeedSequence(case.seed, spawn_key=(1,)).spawn(2)
     used = case.used(sample)
     every = [case.limits_of(one) for one in (used, *others)]
     lower, upper = min(low for low, _ in every), max(high for _, high in every)
+    if case.limits is None and upper - lower < SAME:
+        raise UnfitDataError(
+            f"all cells kept have one r_n, {upper:.10g}, and a fit needs unequal ones: take"
+            f" [radius] with a1 = {upper:.10g}, a2 = 0, a3 = {upper:.10g}, a4 = 0 in place of"
+            " [microstructure] and of its stage"
+        )
     kept, fit = used.truncated(lower, upper), HermiteFit(lower, upper, case.distribution)
     band = kept.band(case.confidence, case.bootstrap, np.random.default_rng(streams[0]))
     slopes = slope_band(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.stochastic.errors import RefusedError
+from alphacut.stochastic.errors import UnfitDataError
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.particles.circles_csv import CircleFile, MeasuredCircles
 from alphacut.stochastic.particles.discs import Discs
@@ -102,7 +102,7 @@ def reduced_radii(sections: list[Section]) -> AreaWeighted:
     """Area-weighted r_n of all whole cells, grouped by section or patch.
 
     Raises:
-        RefusedError: A cell is smaller than its disc, so that discs overlap.
+        UnfitDataError: A cell is smaller than its disc, so that discs overlap.
     """
     values, weights, groups = [], [], []
     for number, section in enumerate(sections):
@@ -117,7 +117,7 @@ def reduced_radii(sections: list[Section]) -> AreaWeighted:
         np.concatenate(values), np.concatenate(weights), np.concatenate(groups)
     )
     if sample.values[-1] > np.sqrt(4 / np.pi):
-        raise RefusedError(
+        raise UnfitDataError(
             f"a cell has r_n = {sample.values[-1]:.4g}, more area of disc than of cell: discs"
             " overlap; mend the data"
         )

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from alphacut.stochastic.errors import RefusedError
+from alphacut.stochastic.errors import UnfitDataError
 from alphacut.stochastic.theta.truncated_normal import Array
 
 
@@ -140,7 +140,7 @@ class AreaWeighted:
 
         Raises:
             ValueError: The limits are not in order within (0, 1).
-            RefusedError: Fewer than ten values lie within them.
+            UnfitDataError: Fewer than ten values lie within them.
         """
         if not 0 < lower < upper < 1:
             raise ValueError(
@@ -148,9 +148,9 @@ class AreaWeighted:
             )
         inside = (self.values >= lower) & (self.values <= upper)
         if inside.sum() < 10:
-            raise RefusedError(
+            raise UnfitDataError(
                 f"only {int(inside.sum())} of {len(self.values)} reduced radii lie between"
-                f" {lower:g} and {upper:g}; 10 needed"
+                f" {lower:g} and {upper:g}; 10 needed: take wider limits, or more particles"
             )
         return AreaWeighted.of(self.values[inside], self.weights[inside], self.groups[inside])
 
@@ -170,11 +170,11 @@ class AreaWeighted:
         """Half width c of the bootstrap band: sup |F* − F| ≤ c in a share `level` of the resamples.
 
         Raises:
-            RefusedError: There are fewer than five groups to draw from.
+            UnfitDataError: There are fewer than five groups to draw from.
         """
         groups = int(self.groups.max()) + 1
         if groups < 5:
-            raise RefusedError(
+            raise UnfitDataError(
                 "a bootstrap needs five packings, or cells in five patches of a section; these lie"
                 f" in {groups} of the 25 patches: is the size of the section that of its particles,"
                 " in their unit? If so, take more particles"

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import polynomial
 
-from alphacut.stochastic.errors import RefusedError
+from alphacut.stochastic.errors import RefusedError, UnfitDataError
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.fit.hermite_fit import SHAPES, SLOPES, HermiteFit, SlopeBand
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -86,7 +86,7 @@ def least_pbox(
         others: Further samples within the ends, each to be contained as well.
 
     Raises:
-        RefusedError: No p-box of monotone cubics with these ends contains the sample.
+        UnfitDataError: No p-box of monotone cubics with these ends contains the sample.
     """
     modal = fit.slopes(sample)
     core = _core(modal, None if hold is None else hold.monotone(fit))
@@ -179,7 +179,7 @@ def _solve(
     least = _least_breach(
         matrix, right, np.concatenate(monotone), np.tile(fit.rising + 1e-9, 4), core
     )
-    raise RefusedError(
+    raise UnfitDataError(
         f"no p-box of monotone cubics from {fit.a1:g} to {fit.a3:g} contains the distribution: the"
         f" best leaves r_n = {wish.values[chosen[least[0]]]:.4g} outside by {least[1]:.2g}; widen"
         " the limits, or the band (where none is given, by more confidence)"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -67,15 +68,13 @@ class CircleFile:
         rows, table = found.rows, found.values - (*self.origin, 0.0)
         reasons = self._nonsense(rows, table, found.told)
         good = np.array([row not in reasons for row in rows], bool)
-        overlaps = self._overlaps(rows[good], table[good], found.told)
+        overlaps, needed = self._overlaps(rows[good], table[good], found.told)
         reasons |= overlaps
         if reasons and not self.drop:
             told = "; ".join(f"row {row} {reason}" for row, reason in sorted(reasons.items())[:10])
-            cure = "mend them, or drop them: [microstructure.circles] drop = true" + (
-                ", or allow a small overlap: [microstructure.circles] overlap = 0.02"
-                if overlaps
-                else ""
-            )
+            cure = "mend them, or drop them: [microstructure.circles] drop = true"
+            if overlaps and len(overlaps) == len(reasons) and needed < 1:
+                cure += f", or take overlaps for errors of measurement: overlap = {needed:g}"
             raise ValueError(f"{self.path}: {_counted(len(reasons))} no sense: {told}; {cure}")
         good = np.array([row not in reasons for row in rows], bool)
         if not good.any():
@@ -102,16 +101,16 @@ class CircleFile:
                 reasons[row] = f"has the radius {told(r)} and overlaps its own periodic image"
         return reasons
 
-    def _overlaps(self, rows: Array, table: Array, told: Told) -> dict[int, str]:
-        """The later row of every pair that overlaps."""
+    def _overlaps(self, rows: Array, table: Array, told: Told) -> tuple[dict[int, str], float]:
+        """The later row of every pair that overlaps, and the `overlap` that allows them all."""
         if len(table) < 2:
-            return {}
+            return {}, 0.0
         discs = Discs(table[:, :2], table[:, 2], np.array(self.size), self.periodic)
         first, second = np.sort(np.stack(close_pairs(discs, 0.0)), axis=0)
         depth = -surface_distance(discs, first, second)
-        wrong = depth > np.maximum(self.overlap, 1e-9) * np.minimum(
-            discs.radii[first], discs.radii[second]
-        )
+        share = depth / np.minimum(discs.radii[first], discs.radii[second])
+        wrong = share > max(self.overlap, 1e-9)
+        needed = math.ceil(100 * share.max(initial=0.0) + 1e-9) / 100
         first, second, depth = first[wrong], second[wrong], depth[wrong]
         across = (
             np.hypot(*(table[first, :2] - table[second, :2]).T)
@@ -124,7 +123,7 @@ class CircleFile:
         return {
             late: f"overlaps the circle of row {early} by {told(by, 3)}{where}"
             for early, late, by, where in sorted(pairs, reverse=True)
-        }
+        }, needed
 
 
 def _counted(number: int) -> str:

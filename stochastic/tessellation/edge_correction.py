@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.stochastic.errors import RefusedError
+from alphacut.stochastic.errors import UnfitDataError
 from alphacut.stochastic.tessellation.apollonius import Apollonius
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -41,7 +41,7 @@ def whole_cells(diagram: Apollonius) -> WholeCells:
     """Cells clear of the window's edge, with weights that make up for the others.
 
     Raises:
-        RefusedError: No cell is whole.
+        UnfitDataError: No cell is whole.
     """
     discs = diagram.discs
     if not discs.periodic:
@@ -50,7 +50,7 @@ def whole_cells(diagram: Apollonius) -> WholeCells:
         room = np.stack([x, inner[0] - x, y, inner[1] - y], axis=1)
         disc = np.flatnonzero((reach <= room).all(axis=1) & ~diagram.hidden & ~diagram.cut)
         if not len(disc):
-            raise RefusedError(
+            raise UnfitDataError(
                 f"none of the {len(discs)} cells is whole within the window: take a larger window"
             )
         fits = (

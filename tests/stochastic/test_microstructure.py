@@ -199,13 +199,28 @@ def test_rows_are_dropped_on_demand_and_listed(tmp_path):
 
 
 def test_periodic_overlaps_are_seen_across_the_edge(tmp_path):
-    text = "x [mm],y [mm],r [mm]\n1,20,3\n39,20,3\n"
+    text = "x [mm],y [mm],r [mm]\n1,20,3\n37,20,3\n"
     assert len(circle_file(tmp_path, text).read().discs) == 2
     with pytest.raises(
         ValueError,
-        match=r"overlaps the circle of row 2 by 4 mm across the periodic edge.*periodic.*overlap =",
+        match=r"overlaps the circle of row 2 by 2 mm across the periodic edge.*periodic.*overlap =",
     ):
         circle_file(tmp_path, text, periodic=True).read()
+
+
+@pytest.mark.parametrize(("x", "needed"), [(15.99, 0.01), (15.9, 0.04), (15.0, 0.34), (13.5, 0.84)])
+def test_the_overlap_that_a_refusal_names_is_taken(tmp_path, x, needed):
+    text = f"x [mm],y [mm],r [mm]\n10,20,3\n{x},20,3\n30,20,3\n35.99,20,3\n"
+    with pytest.raises(ValueError, match=rf"errors of measurement: overlap = {needed}$"):
+        circle_file(tmp_path, text).read()
+    assert len(circle_file(tmp_path, text, overlap=needed).read().discs) == 4
+    with pytest.raises(ValueError, match=r"drop = true$"):  # the row besides stays wrong
+        circle_file(tmp_path, text + "35,35,-1\n").read()
+
+
+def test_no_overlap_allows_a_disc_that_lies_in_another(tmp_path):
+    with pytest.raises(ValueError, match=r"drop = true$"):
+        circle_file(tmp_path, "x [mm],y [mm],r [mm]\n10,20,3\n11,20,1\n").read()
 
 
 def test_a_unit_for_all_columns_is_a_length_even_where_each_has_its_own(tmp_path):

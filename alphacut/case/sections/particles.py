@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from alphacut.case.key import MEMBERSHIP, NATURAL, NOT_NEGATIVE, UNIT, Key, Range, Section, positive
+from alphacut.case.key import NATURAL, NOT_NEGATIVE, RATIO, UNIT, Key, Range, Section, positive
 
 PACKINGS = Key("independent packings", allowed=Range("from 5 to 10,000", 5.0, 1e4, closed=True))
 
@@ -64,7 +64,7 @@ class Packing(Section):
     ]
     area_fraction: Annotated[
         float,
-        Key("share of the area that discs cover", allowed=Range("inside (0, 0.85)", 0.0, 0.85)),
+        Key("share of the area that discs cover", allowed=Range("inside (0, 0.84)", 0.0, 0.84)),
     ]
     smallest_radius: Annotated[
         float | None, positive("smallest radius of the log-normal law; needed without a file", "m")
@@ -106,7 +106,7 @@ class Circles(Section):
         float,
         Key(
             "overlap that counts as error of measurement, over the smaller radius",
-            allowed=MEMBERSHIP,
+            allowed=RATIO,
         ),
     ] = 0.0
 

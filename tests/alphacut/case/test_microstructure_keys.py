@@ -107,6 +107,14 @@ def test_a_run_warns_of_what_was_left_out_as_well(section, tmp_path, capfd):
             ["microstructure.band=0", "microstructure.limits=[0.05, 0.99]"],
             r"widen the limits, or the band \(where none is given",
         ),
+        (
+            ["microstructure.limits=[0.5, 0.5001]"],
+            r"between 0\.5 and 0\.5001; 10 needed: take wider limits, or more particles",
+        ),
+        (
+            ["microstructure.circles.overlap=1"],
+            r"overlap = 1: 1 is out of range; allowed: .* 0 or greater and below 1",
+        ),
         (["microstructure.circles.unit=GPa"], "unit for all columns.*'GPa', which is not a length"),
     ],
 )
@@ -114,8 +122,44 @@ def test_a_refusal_names_a_cure_that_the_case_has(changes, told, section, capfd)
     words = [
         word for change in ["microstructure.bootstrap=100", *changes] for word in ("--set", change)
     ]
-    assert main(["microstructure", str(section), *words]) in (1, 2)
+    assert main(["microstructure", str(section), *words]) == 2
     assert re.search(told, capfd.readouterr().err)
+
+
+def test_every_packed_fraction_that_the_key_allows_is_one_of_the_packing():
+    for fraction, allowed in ((0.8399, True), (0.84, False)):
+        change = f"microstructure.packing.area_fraction={fraction}"
+        if allowed:
+            assert study_of(load(CONCRETE, [change])).source.packing.area_fraction == fraction
+            continue
+        with pytest.raises(BadInput, match=r"area_fraction = 0\.84.*inside \(0, 0\.84\)"):
+            load(CONCRETE, [change])
+
+
+@pytest.mark.parametrize("side", [1, 2, 4, 8])
+@pytest.mark.parametrize("radius", [0.24, 0.3])
+def test_one_reduced_radius_is_refused_with_a_cure_whatever_the_rounding(
+    section, tmp_path, side, radius, capfd
+):
+    """A lattice of equal discs: r_n is 2 radii over the pitch, but for round-off."""
+    at = (np.arange(side) + 0.5) / side * 0.7
+    rows = [f"{x!r},{y!r},{radius * 0.7 / side!r}" for x in map(float, at) for y in map(float, at)]
+    (tmp_path / "section.csv").write_text("\n".join(["x [m],y [m],r [m]", *rows]))
+    text = section.read_text(encoding="utf-8")
+    (tmp_path / "own.toml").write_text(
+        re.sub(r"(?m)^size = \[.*", 'size = ["0.7 m", "0.7 m"]', text)
+    )
+    assert main(["microstructure", str(tmp_path / "own.toml"), "--set", "bootstrap=100"]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert f"all cells kept have one r_n, {2 * radius:g}, and a fit needs unequal ones" in line
+    cure = re.findall(r"(a\d) = ([\d.]+)", line)
+    assert [name for name, _ in cure] == ["a1", "a2", "a3", "a4"]
+    radius = "\n".join(["[radius]", *(f"{name} = {value}" for name, value in cure), ""])
+    text = re.sub(r"\[microstructure\].*?(?=\n\[cell\])", radius, text, flags=re.DOTALL)
+    text = text.replace('["microstructure", ', "[")
+    (tmp_path / "own.toml").write_text(text, encoding="utf-8")
+    words = ["--set", "modulus.method=series", "--quiet"]
+    assert main(["cell", str(tmp_path / "own.toml"), *words]) == 0, capfd.readouterr().err
 
 
 def test_check_tells_the_size_of_an_image(section, capfd):
