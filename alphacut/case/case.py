@@ -17,7 +17,7 @@ from alphacut.case.sections.questions import Decision, Field, Joint, Update
 from alphacut.case.sections.structures import Frame, Pendulum, Tower
 from alphacut.case.sections.vibration import Envelope, Exceedance, Study
 from alphacut.io.problem import BadInput, Problem
-from alphacut.io.provenance import door
+from alphacut.io.provenance import digest, door
 
 S = TypeVar("S", bound=Section)
 
@@ -149,6 +149,13 @@ class Case:
             if section is not None
             for _, name in files_of(section)
         ]
+
+    def traces(self, *names: str) -> dict[str, str]:
+        """Digest of each section, by default of all, and of the files it names; "" of none."""
+        every = {field.name: getattr(self.sections, field.name) for field in fields(Sections)}
+        names = names or tuple(name for name in every if name not in ("top", "study"))
+        given = {name: every[name] for name in names}
+        return {k: digest([x, self.digests(x)]) if x else "" for k, x in given.items()}
 
     def asked(self, key: str) -> bool:
         """Whether the file or the command line gives the key, so that no default stands in."""

@@ -12,6 +12,7 @@ from alphacut.case.load import load
 from alphacut.commands import options as common
 from alphacut.io.files import as_json, write_text
 from alphacut.io.progress import progress
+from alphacut.io.provenance import digest
 from alphacut.io.units import engineering
 from alphacut.stages.material.modulus import stand_in
 from alphacut.stages.measure_next import advice_document, measure_next
@@ -22,8 +23,7 @@ KEYS = {
     "--fuzzy": common.KeyOption("envelope.fuzzy", "inputs that may be measured, as E,m", "NAMES"),
     "--duration": common.KeyOption("envelope.duration", "length of the simulation", bare="s"),
 }
-OF_CELL = ("radius", "cell", "mesh", "modulus")
-READ = ("stages", "frame", "field", "tower", "envelope", "update", *OF_CELL)
+READ = ("frame", "field", "tower", "envelope", "update", "radius", "cell", "mesh", "modulus")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,12 +44,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Compute again for every input, and report."""
     case = load(options.case, common.changes(options, KEYS))
-    require_read(case, READ, "measure-next")
+    require_read(case, ("stages", *READ), "measure-next")
     folder = Path(options.out) if options.out else None
-    handed = common.given_modulus(options.modulus) or stand_in(case)
+    given = common.given_modulus(options.modulus)
     with progress("Measure next", quiet=options.quiet) as tick:
-        name, every, found, fixed = measure_next(case, handed, options.output, tick)
-    document = {**advice_document(found, name, fixed), "nodes_every": every}
+        name, every, found, fixed = measure_next(
+            case, given or stand_in(case), options.output, tick
+        )
+    sections = case.traces(*READ) | ({"--modulus": digest(given)} if given else {})
+    document = {**advice_document(found, name, fixed), "nodes_every": every, "sections": sections}
     if folder is not None:
         from alphacut.figures.questions import gains
         from alphacut.figures.style import save, style

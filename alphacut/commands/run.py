@@ -73,6 +73,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
 def computed(options: argparse.Namespace, chain: Chain, out: TextIO) -> int:
     """The numbers and figures of a chain, and its answer."""
     start = time.perf_counter()
+    asked_of = load(options.case, options.set) if options.quick else chain.case
     with pool(chain.workers) as executor:
         showing = Showing(chain, not options.no_figures, executor)
         results = replace(chain, executor=executor, meanwhile=showing.begin).run()
@@ -83,6 +84,7 @@ def computed(options: argparse.Namespace, chain: Chain, out: TextIO) -> int:
         "shares": shares.mean_shares(driving),
         **({"shares_notes": notes.split("\n")} if (notes := driving.attrs.get("notes")) else {}),
         **({"changes": options.set} if options.set else {}),
+        "sections": asked_of.traces(),
         "figures": drawn,
         "seconds": time.perf_counter() - start,
     }

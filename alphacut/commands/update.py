@@ -43,7 +43,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     folder = Path(options.out) if options.out else None
     wanted = structure(case, given_modulus(options.modulus) or stand_in(case))
     found = learned(case, wanted)
-    document: dict[str, Any] = found.document()
+    document: dict[str, Any] = {**found.document(), "sections": case.traces(*READ)}
     bands = None
     if folder is not None and found.posterior is not None and case.sections.envelope is not None:
         with progress("Envelopes", quiet=options.quiet) as tick:

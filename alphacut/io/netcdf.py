@@ -83,13 +83,11 @@ def upgraded(found: xarray.Dataset) -> xarray.Dataset:
     return turned.rename({"outer_lower": "lower", "outer_upper": "upper"})
 
 
-def damaged(path: Path, why: str) -> BadInput:
-    """The error for a summary that cannot be used."""
-    return BadInput.of(
-        str(path),
-        f"this file is damaged: {why}",
-        allowed=f"make it anew: {door('run')} CASE.toml keeps what is computed",
-    )
+def damaged(path: Path, why: Exception | str, cure: str = "") -> BadInput:
+    """The error for a summary, or another JSON file beside it, that cannot be used."""
+    told = why if isinstance(why, str | ValueError) else f"{type(why).__name__} at {why}"
+    cure = cure or f"make it anew: {door('run')} CASE.toml keeps what is computed"
+    return BadInput.of(str(path), f"this file is damaged: {told}", allowed=cure)
 
 
 def finished(folder: Path) -> list[Path]:
@@ -117,7 +115,7 @@ def read_summary(folder: Path) -> Document:
     try:
         found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:
-        raise damaged(path, str(error)) from None
+        raise damaged(path, error) from None
     if not isinstance(found, dict):
         raise damaged(path, "it holds no object")
     told = found.get("versions")

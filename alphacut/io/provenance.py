@@ -86,9 +86,13 @@ def fingerprint(inputs: Mapping[str, object], packages: Sequence[str]) -> str:
         "versions": versions(),
         "format": FORMAT,
     }
-    return hashlib.sha256(
-        json.dumps(content, sort_keys=True, default=_canonical).encode()
-    ).hexdigest()
+    return digest(content)
+
+
+def digest(content: object) -> str:
+    """Digest of sections, numbers and texts."""
+    text = json.dumps(content, sort_keys=True, default=_canonical)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _canonical(value: object) -> object:

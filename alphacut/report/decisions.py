@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 
 from markupsafe import Markup
 
 from alphacut.figures.captions import caption, in_words
 from alphacut.io.files import Document
+from alphacut.io.netcdf import damaged
+from alphacut.io.provenance import door
 from alphacut.io.units import engineering
 from alphacut.report.envelopes import between
 from alphacut.report.figures import listed, picture
@@ -82,19 +85,45 @@ def together(summary: Document, folder: Path) -> Markup:
     return section("What goes together", paragraphs(*words), table(head, rows), drawn)
 
 
-def next_measured(folder: Path) -> Markup:
-    """Which input to measure next, where `alphacut measure-next` left its answer in the folder."""
-    found = json.loads((folder / "measure-next.json").read_text(encoding="utf-8"))
+OWN = {"envelope", "--modulus"}
+"""What `alphacut measure-next` may be asked with by itself: inputs, duration, a modulus."""
+
+
+def next_measured(summary: Document, folder: Path) -> Markup:
+    """Which input to measure next, where `alphacut measure-next` left its answer in the folder.
+
+    Raises:
+        BadInput: That file is damaged.
+    """
+    path, title = folder / "measure-next.json", "What to measure next"
+    again = door("measure-next", "CASE.toml", "--out", folder)
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        made, run = found.get("sections", {}), summary.get("sections", {})
+        other = [name for name in made if made[name] != run.get(name, "")]
+        names = " and ".join(other)
+        told = f"The gains in {path.name} rest on another {names} than this run" if other else ""
+        if run and not OWN.issuperset(other):
+            cure = f"{told} and are left out: {again}, with every --set of the run, makes it anew."
+            return section(title, paragraphs(cure))
+        if not (made and run):
+            told = f"Older programs do not say whether {path.name} is of this run's case"
+        return section(title, *gains(found, folder, sentence(told)))
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise damaged(path, error, f"delete it, or make it anew: {again}") from None
+
+
+def gains(found: Document, folder: Path, remark: str) -> Iterator[Markup]:
+    """What is lost of the width, by input."""
     rows = [
         (in_words(name), *(f"{gain[kind]:.1%}" for kind in GAINS))
         for name, gain in found["gains"].items()
     ]
-    words = [
+    words = (
         f"Width of {found['answer']} at α = {found['alpha']:g} lost if one input is known better:"
         " about its modal value, and at least, wherever in its cut the better value may lie."
-    ]
-    head = ("input", "twice as well", "at least", "exactly", "at least")
+    )
+    yield paragraphs(*filter(None, (words, sentence(found["note"]), remark)))
+    yield table(("input", "twice as well", "at least", "exactly", "at least"), rows)
     stem = "measure-next"
-    drawn = picture(folder / "figures" / f"{stem}.svg", caption(stem, paper=False))
-    note = [sentence(found["note"])] if found["note"] else []
-    return section("What to measure next", paragraphs(*words, *note), table(head, rows), drawn)
+    yield picture(folder / "figures" / f"{stem}.svg", caption(stem, paper=False))

@@ -36,7 +36,7 @@ def report(folder: Path) -> str:
     try:
         return page(summary, folder)
     except (KeyError, TypeError, AttributeError, IndexError) as error:
-        raise damaged(folder / "summary.json", f"{type(error).__name__} at {error}") from error
+        raise damaged(folder / "summary.json", error) from error
 
 
 def page(summary: Document, folder: Path) -> str:

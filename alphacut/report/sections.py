@@ -59,7 +59,7 @@ def sections(summary: Document, folder: Path) -> Iterator[Markup]:
     if "joint" in summary:
         yield together(summary, folder)
     if (folder / "measure-next.json").is_file():
-        yield next_measured(folder)
+        yield next_measured(summary, folder)
     if summary.get("shares"):
         yield shares(summary["shares"], summary.get("shares_notes", ()))
     if summary.get("paper"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import re
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from alphacut.entry import main
+from alphacut.io.provenance import door
 from tests.alphacut.one_floor import OMEGA, one_floor
 
 # over a whole period the mean width is in proportion to the sum of the widths of q0 and of v0 / ω
@@ -62,6 +64,75 @@ def test_the_report_of_the_folder_shows_it(case: Path, tmp_path: Path) -> None:
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "<h2>What to measure next</h2>" in page
     assert page.count("Width lost if an input is known twice as well, and exactly") == 1
+
+
+def page_after(out: Path, *asked: str) -> str:
+    """What the report says of measure-next, asked so; all of the page where it says nothing."""
+    if asked:
+        assert main(["measure-next", *asked, "--out", str(out), "--quiet"]) == 0
+    assert main(["report", str(out), "--quiet"]) == 0
+    page = html.unescape((out / "report.html").read_text(encoding="utf-8"))
+    page = re.sub(r"</?a\b[^>]*>", "", page)  # links to terms
+    return page.partition("<h2>What to measure next</h2>")[2].partition("</section>")[0] or page
+
+
+def test_the_report_leaves_out_what_was_computed_of_another_frame(
+    case: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out, changed = tmp_path / "out", ["--set", "frame.masses=2 t"]
+    assert main(["run", str(case), *changed, "--out", str(out), "--quiet", "--no-figures"]) == 0
+    page = page_after(out, str(case))
+    assert "The gains in measure-next.json rest on another frame than this run and are left" in page
+    assert f"{door('measure-next', 'CASE.toml', '--out', out)}, with every --set of the run" in page
+    assert "<table" not in page
+    page = page_after(out, str(case), *changed)
+    assert "<table" in page
+    assert "rest on" not in page
+    page = page_after(out, str(case), *changed, "--fuzzy", "q0")  # asked on purpose
+    assert "<table" in page
+    assert "The gains in measure-next.json rest on another envelope than this run." in page
+    capfd.readouterr()
+
+
+def test_gains_belong_to_the_quick_run_of_their_case(case: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert main(["run", str(case), "--quick", "--out", str(out), "--quiet", "--no-figures"]) == 0
+    page = page_after(out, str(case))
+    assert "<table" in page
+    assert "rest on" not in page
+
+
+@pytest.mark.parametrize("old", ["measure-next.json", "summary.json"])
+def test_files_of_older_programs_are_shown_with_what_is_not_known(
+    case: Path, tmp_path: Path, old: str
+) -> None:
+    out = tmp_path / "out"
+    assert main(["run", str(case), "--out", str(out), "--quiet", "--no-figures"]) == 0
+    assert main(["measure-next", str(case), "--out", str(out), "--quiet"]) == 0
+    told = json.loads((out / old).read_text(encoding="utf-8"))
+    del told["sections"]
+    (out / old).write_text(json.dumps(told), encoding="utf-8")
+    page = page_after(out)
+    assert "<table" in page
+    assert "Older programs do not say whether measure-next.json is of this run's case." in page
+
+
+@pytest.mark.parametrize("content", ["garbage", '{"a":1}', "[1]", '{"sections": 1}', "\xff"])
+def test_a_damaged_file_of_gains_is_named_with_a_cure_that_works(
+    case: Path, tmp_path: Path, content: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert main(["run", str(case), "--out", str(out), "--quiet", "--no-figures"]) == 0
+    (out / "measure-next.json").write_text(content, encoding="latin-1")
+    capfd.readouterr()
+    assert main(["report", str(out), "--quiet"]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line.startswith(f"alphacut: {out / 'measure-next.json'}: this file is damaged: ")
+    cure = door("measure-next", "CASE.toml", "--out", out)
+    assert line.endswith(f"allowed: delete it, or make it anew: {cure}")
+    assert "<table" in page_after(out, str(case))
+    (out / "measure-next.json").unlink()
+    assert main(["report", str(out), "--quiet"]) == 0
 
 
 def test_inputs_of_the_cell_stand_in_for_its_modulus(tmp_path: Path) -> None:

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from alphacut.case.load import load
+from alphacut.commands.update import READ
 from alphacut.entry import main
 
 CASES = Path(__file__).parents[3] / "cases"
@@ -72,6 +74,13 @@ def test_figures_and_envelopes_before_and_after(
     assert main(["update", str(path), "--out", str(folder), "--quiet", *more]) == 0
     told = json.loads((folder / "update.json").read_text(encoding="utf-8"))
     assert told["envelope_width"]["q4"] < 0.5
+    changed = ["frame.outputs=['q4']", "update.alpha=[0.05]"]
+    assert told["sections"] == load(path, changed).traces(*READ)
+    others = load(path, changed[:1]).traces(*READ)
+    assert [name for name in READ if others[name] != told["sections"][name]] == ["update"]
+    with next(path.parent.glob("*.modes.csv")).open("a", encoding="utf-8") as stream:
+        stream.write("# another content\n")
+    assert load(path, changed).traces("update") != {"update": told["sections"]["update"]}
     assert {"update-q4.png", "update-inputs.svg"} <= {path.name for path in folder.iterdir()}
 
 
