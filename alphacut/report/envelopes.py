@@ -160,7 +160,8 @@ def spectrum(folder: Path) -> Markup:
     try:
         with path.open(encoding="utf-8", newline="") as stream:
             rows = [[float(row[name]) for name in COLUMNS] for row in csv.DictReader(stream)]
-        values = np.array(rows).reshape(-1, len(np.unique(np.array(rows)[:, 1])), len(COLUMNS))
+        found = np.asarray_chkfinite(rows)
+        values = found.reshape(-1, len(np.unique(found[:, 1])), len(COLUMNS))
     except (OSError, ValueError, KeyError, TypeError, IndexError):
         cure = f"the file of `{door('spectrum', 'RECORD.csv', '--out', folder)}`, or none"
         raise BadInput.of("FOLDER", "this is no response spectrum", str(path), cure) from None

@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from alphacut.figures.captions import caption
 from alphacut.io.files import Document
-from alphacut.report.tables import fragment, section
+from alphacut.report.tables import fragment, paragraphs, section
 
 # figures that stand in the section they belong to
 ELSEWHERE = re.compile(
@@ -49,6 +49,21 @@ def gallery(summary: Document, folder: Path) -> Markup:
     ]
     shown = Markup('<div class="gallery">{}</div>').format(Markup("\n").join(figures))
     return section("Figures", shown) if figures else Markup("")
+
+
+STORED = (
+    "microstructure", "modulus", "image", "response", "update", "exceedance", "decision", "joint",
+    "shares",
+)  # fmt: skip
+
+
+def missing(summary: Document, folder: Path) -> Markup:
+    """What the run wrote and the folder lacks; empty where it lacks nothing."""
+    named = [f"{name}.nc" for name in STORED if summary.get(name)] + summary.get("figures", [])
+    gone = [name for name in named if not (folder / name).is_file()]
+    some = ", ".join(gone[:4]) + (f" and {len(gone) - 4} more" if len(gone) > 4 else "")
+    told = f"The run wrote files that are no longer here: {some}. The same run makes them anew."
+    return section("Missing files", paragraphs(told)) if gone else Markup("")
 
 
 def picture(svg: Path, caption: str, *, wide: bool = False) -> Markup:

@@ -17,7 +17,7 @@ from alphacut.io.units import engineering
 from alphacut.report import glossary, tables
 from alphacut.report.decisions import decided, learned, next_measured, together
 from alphacut.report.envelopes import envelopes, natural, spectrum
-from alphacut.report.figures import gallery, listed
+from alphacut.report.figures import gallery, listed, missing
 from alphacut.report.key_results import key_results
 from alphacut.report.material import given, image, microstructure, modulus, stress
 from alphacut.report.tables import (
@@ -35,6 +35,7 @@ from alphacut.report.tables import (
 def sections(summary: Document, folder: Path) -> Iterator[Markup]:
     """All sections that the results allow, in reading order."""
     yield key_results(summary)
+    yield missing(summary, folder)
     if "microstructure" in summary:
         seen = listed(summary, folder, "image_circles")
         yield microstructure(summary["microstructure"], seen)

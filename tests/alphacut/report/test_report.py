@@ -205,6 +205,22 @@ def test_only_what_the_run_drew_is_shown_and_what_the_command_line_changed_is_to
     assert "<code>exceedance.limit=1 %</code>" in page
 
 
+def test_what_the_run_wrote_and_the_folder_lacks_is_named(tmp_path, capfd):
+    case, out = small_building(tmp_path / "case"), tmp_path / "out"
+    quick = ["run", case, "--quick", "--quiet", "--out", str(out)]
+    assert main(quick) == 0, capfd.readouterr().err
+    gone = json.loads((out / "summary.json").read_text(encoding="utf-8"))["figures"]
+    shutil.rmtree(out / "figures")
+    (out / "exceedance.nc").unlink()
+    for missing in (True, False):
+        assert main(["report", str(out), "--quiet"]) == 0
+        page = (out / "report.html").read_text(encoding="utf-8")
+        assert ("<h2>Missing files</h2>" in page) is missing
+        more = f"exceedance.nc, {', '.join(gone[:3])} and {len(gone) - 3} more. The same run makes"
+        assert (more in page) is missing
+        assert main(quick) == 0
+
+
 def test_the_array_s_shear_ratio_is_told_where_it_is_known():
     from alphacut.report.material import isotropy
 
