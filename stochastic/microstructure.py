@@ -59,9 +59,6 @@ class Study:
             so that fewer data make a fuzzier map; of that band the part whose maps are monotone.
             None: of measured particles, not of simulated ones, whose number is a matter of choice.
         distribution: Law of θ.
-
-    Raises:
-        ValueError: A value lies outside its range.
     """
 
     source: Simulated | Measured | SpherePackings
@@ -73,25 +70,6 @@ class Study:
     band: float | None = None
     sampling: bool | None = None
     distribution: TruncatedNormal = field(default_factory=TruncatedNormal)
-
-    def __post_init__(self) -> None:
-        if self.limits is not None and not 0 < self.limits[0] < self.limits[1] < 1:
-            raise ValueError(
-                f"the limits of r_n are {self.limits[0]:g} and {self.limits[1]:g}; they need 0 <"
-                " lower < upper < 1"
-            )
-        if not 0 < self.share < 1:
-            raise ValueError(f"the share of area to keep is {self.share:g}; it must lie in (0, 1)")
-        if not 0 < self.confidence < 1:
-            raise ValueError(f"the confidence is {self.confidence:g}; it must lie in (0, 1)")
-        if self.bootstrap < 100:
-            raise ValueError(
-                f"{self.bootstrap} resamples were asked for; the band needs 100 or more"
-            )
-        if self.band is not None and not 0 <= self.band < 1:
-            raise ValueError(f"the band is {self.band:g}; it must lie in [0, 1)")
-        if self.seed < 0:
-            raise ValueError(f"the seed is {self.seed}; it must be a whole number, 0 or greater")
 
     @property
     def holds_slopes(self) -> bool:
@@ -270,7 +248,7 @@ def fitted_map(case: Study, sample: AreaWeighted, others: Sequence[AreaWeighted]
     used = case.used(sample)
     every = [case.limits_of(one) for one in (used, *others)]
     lower, upper = min(low for low, _ in every), max(high for _, high in every)
-    if case.limits is None and upper - lower < SAME:
+    if case.limits is None and abs(upper - lower) < SAME:
         raise UnfitDataError(
             f"all cells kept have one r_n, {upper:.10g}, and a fit needs unequal ones: take"
             f" [radius] with a1 = {upper:.10g}, a2 = 0, a3 = {upper:.10g}, a4 = 0 in place of"

@@ -131,21 +131,14 @@ class AreaWeighted:
 
     def limits(self, share: float) -> tuple[float, float]:
         """Limits that keep `share` in (0, 1) of the area, equal shares cut off at both ends."""
-        if not 0 < share < 1:
-            raise ValueError(f"the share of area to keep is {share:g}; it must lie in (0, 1)")
         return float(self.quantile((1 - share) / 2)), float(self.quantile((1 + share) / 2))
 
     def truncated(self, lower: float, upper: float) -> AreaWeighted:
         """Part of the sample within the limits, its weights scaled to the sum 1.
 
         Raises:
-            ValueError: The limits are not in order within (0, 1).
             UnfitDataError: Fewer than ten values lie within them.
         """
-        if not 0 < lower < upper < 1:
-            raise ValueError(
-                f"the limits of r_n are {lower:g} and {upper:g}; they need 0 < lower < upper < 1"
-            )
         inside = (self.values >= lower) & (self.values <= upper)
         if inside.sum() < 10:
             raise UnfitDataError(

@@ -31,10 +31,7 @@ class CircleFile:
         unit: Unit of columns whose header names none; empty if each does.
         drop: Leave out rows that make no sense and list them, instead of refusing the file.
         overlap: Overlap of two circles that is taken for an error of measurement, as a share of the
-            smaller radius.
-
-    Raises:
-        ValueError: The rectangle has no area, or the allowed overlap lies outside [0, 1).
+            smaller radius, below 1.
     """
 
     path: Path
@@ -44,18 +41,6 @@ class CircleFile:
     unit: str = ""
     drop: bool = False
     overlap: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not all(np.isfinite(side) and side > 0 for side in self.size):
-            raise ValueError(
-                f"the section is {self.size[0]:g} × {self.size[1]:g} m; both sides must be positive"
-                " and finite"
-            )
-        if not 0 <= self.overlap < 1:
-            raise ValueError(
-                f"the allowed overlap is {self.overlap:g} of the smaller radius; it must lie in"
-                " [0, 1)"
-            )
 
     def read(self) -> MeasuredCircles:
         """The circles.

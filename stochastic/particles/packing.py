@@ -135,7 +135,6 @@ def _overlap(apart: Array, reach: Array, side: float) -> Array:
     return np.asarray((apart**2).sum(axis=1) < reach**2)
 
 
-METHODS = ("auto", "sequential", "relaxed")
 # area fraction, half the gap counted to each radius, up to which sequential addition is quick
 SEQUENTIAL_LIMIT = 0.45
 LEVEL = 1e-4  # a packing of the right law is refused with this probability
@@ -147,14 +146,12 @@ class Packing:
 
     Args:
         discs: Number of discs, at least 1.
-        area_fraction: Share of the square that they cover, in (0, 0.84).
+        area_fraction: Share of the square that they cover, in (0, 0.84): below random close
+            packing.
         radii: Law of the radii.
         gap: Least distance between surfaces, in m, not negative.
         method: "sequential" (random sequential addition), "relaxed" (for dense packings), or "auto"
             (the first where it can).
-
-    Raises:
-        ValueError: A value lies outside its range.
     """
 
     discs: int
@@ -162,24 +159,6 @@ class Packing:
     radii: RadiusLaw
     gap: float = 0.0
     method: str = "auto"
-
-    def __post_init__(self) -> None:
-        if not (isinstance(self.discs, int | np.integer) and self.discs >= 1):
-            raise ValueError(
-                f"a packing of {self.discs} discs was asked for; it needs a whole number, at"
-                " least 1"
-            )
-        if not 0 < self.area_fraction < 0.84:
-            raise ValueError(
-                f"the area fraction is {self.area_fraction:g}; it must lie in (0, 0.84), below"
-                " random close packing"
-            )
-        if not 0 <= self.gap < np.inf:
-            raise ValueError(f"the gap is {self.gap:g} m; it must be finite and not negative")
-        if self.method not in METHODS:
-            raise ValueError(
-                f"the packing method is {self.method!r}; take one of {', '.join(METHODS)}"
-            )
 
     def make(self, generator: np.random.Generator) -> Discs:
         """One packing. The square is as large as the discs and the area fraction make it.

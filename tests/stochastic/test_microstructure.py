@@ -185,11 +185,9 @@ def test_nonsense_in_a_file_is_refused_by_row_and_reason(tmp_path, text, message
         circle_file(tmp_path, text).read()
 
 
-def test_missing_file_and_bad_section_are_refused(tmp_path):
+def test_a_missing_file_is_refused(tmp_path):
     with pytest.raises(ValueError, match="cannot be read"):
         CircleFile(tmp_path / "none.csv", (1, 1)).read()
-    with pytest.raises(ValueError, match="both sides"):
-        CircleFile(tmp_path / "none.csv", (1, 0))
 
 
 def test_rows_are_dropped_on_demand_and_listed(tmp_path):
@@ -429,22 +427,6 @@ def test_figures_are_drawn(found, tmp_path):
     } <= set(files)
     assert all(path.stat().st_size > 2000 for paths in files.values() for path in paths)
     assert not list(tmp_path.glob("*partial*"))
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (dict(limits=(0.9, 0.1)), "0 < lower < upper < 1"),
-        (dict(share=1.2), "share of area"),
-        (dict(confidence=1.0), "confidence"),
-        (dict(bootstrap=10), "100 or more"),
-        (dict(seed=-1), "0 or greater"),
-        (dict(band=2.0), "band is 2"),
-    ],
-)
-def test_bad_studies_are_refused(change, message):
-    with pytest.raises(ValueError, match=message):
-        Study(SMALL, **change)
 
 
 def test_too_few_packings_are_refused():

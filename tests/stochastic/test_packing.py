@@ -117,22 +117,6 @@ def test_impossible_wishes_are_refused_with_the_numbers():
         Packing(1, 0.8, EQUAL, gap=1e-3).make(np.random.default_rng(0))
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (dict(discs=0), "at least 1"),
-        (dict(discs=2.5), "whole number"),
-        (dict(area_fraction=0.0), r"\(0, 0\.84\)"),
-        (dict(area_fraction=0.9), "close packing"),
-        (dict(gap=-1.0), "not negative"),
-        (dict(method="magic"), "auto, sequential, relaxed"),
-    ],
-)
-def test_bad_wishes_are_refused(change, message):
-    with pytest.raises(ValueError, match=message):
-        Packing(**(dict(discs=10, area_fraction=0.2, radii=EQUAL) | change))
-
-
 def test_sequential_centres_are_uniform_and_without_direction():
     packing = Packing(2000, 0.2, TENFOLD, method="sequential").make(np.random.default_rng(4))
     assert stats.kstest((packing.centres / packing.size).ravel(), "uniform").pvalue > 1e-4

@@ -126,14 +126,42 @@ def test_a_refusal_names_a_cure_that_the_case_has(changes, told, section, capfd)
     assert re.search(told, capfd.readouterr().err)
 
 
-def test_every_packed_fraction_that_the_key_allows_is_one_of_the_packing():
-    for fraction, allowed in ((0.8399, True), (0.84, False)):
-        change = f"microstructure.packing.area_fraction={fraction}"
-        if allowed:
-            assert study_of(load(CONCRETE, [change])).source.packing.area_fraction == fraction
-            continue
-        with pytest.raises(BadInput, match=r"area_fraction = 0\.84.*inside \(0, 0\.84\)"):
-            load(CONCRETE, [change])
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ("limits=[0.9, 0.1]", "rising order"),
+        ("limits=[0.1, 1]", r"inside \(0, 1\)"),
+        ("share=1.2", r"inside \(0, 1\)"),
+        ("confidence=1", r"inside \(0, 1\)"),
+        ("bootstrap=10", "from 100 to 1e5"),
+        ("seed=-1", "from 0 to 1e18"),
+        ("band=2", "0 or greater and below 1"),
+        ("packing.discs=0", "from 10 to 1e6"),
+        ("packing.discs=20.5", "20.5"),
+        ("packing.packings=4", "from 5 to 10,000"),
+        ("packing.area_fraction=0", r"inside \(0, 0\.84\)"),
+        ("packing.area_fraction=0.84", r"inside \(0, 0\.84\)"),
+        ("packing.gap=-1 mm", "0 or greater"),
+        ("packing.gap=inf mm", "0 or greater"),
+        ("packing.method=magic", "auto, sequential, relaxed"),
+    ],
+)
+def test_settings_of_a_study_and_of_packings_are_checked_by_their_keys(change, told):
+    """And nowhere else, so that no second range can differ from the documented one."""
+    with pytest.raises(BadInput, match=rf"microstructure\.{change.partition('=')[0]}.*{told}"):
+        load(CONCRETE, [f"microstructure.{change}"])
+
+
+@pytest.mark.parametrize("size", ['["0 m", "1 m"]', '["inf m", "1 m"]', '["1 m"]', '"1 m"'])
+def test_a_section_has_two_sides(section, size):
+    with pytest.raises(BadInput, match=r"microstructure\.circles\.size"):
+        study_of(load(section, [f"microstructure.circles.size={size}"]))
+
+
+@pytest.mark.parametrize("fraction", [0.01, 0.8399])
+def test_every_fraction_that_the_key_allows_reaches_the_packing(fraction):
+    found = study_of(load(CONCRETE, [f"microstructure.packing.area_fraction={fraction}"]))
+    assert found.source.packing.area_fraction == fraction
 
 
 @pytest.mark.parametrize("side", [1, 2, 4, 8])

@@ -68,10 +68,6 @@ def test_ten_thousand_spheres_in_a_minute():
 
 
 def test_what_cannot_be_packed_is_refused():
-    with pytest.raises(ValueError, match=r"volume fraction is 0\.6; it must lie in \(0, 0\.5\]"):
-        SpherePacking(10, 0.6, LAW)
-    with pytest.raises(ValueError, match="a packing of 0 spheres"):
-        SpherePacking(0, 0.2, LAW)
     with pytest.raises(RefusedError, match="too large for its periodic cube"):
         SpherePacking(2, 0.2, LAW).make(np.random.default_rng(0))
 
