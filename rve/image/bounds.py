@@ -51,6 +51,11 @@ class StiffnessBounds:
         slack = 16 * UNIT * stiffest * (1.5 + stiffest / (2 * least))
         return low - slack, high + slack
 
+    def require_rising(self, cure: str) -> None:
+        """Raise ValueError where E may fall with A, for what rests on E rising with both."""
+        if not (steepest := self.shear[1] / self.bulk[0]) < 1.5:
+            raise ValueError(f"E may fall with A: A/B of eq. 16 is up to {steepest:.3g}; {cure}")
+
     @property
     def relative_error(self) -> Array:
         """Errors of C11 + C12, C11 − C12 and C33 of the middle of the bounds, shape (3,).

@@ -99,7 +99,7 @@ class ImageModel:
             )
         rows, columns = images.bulk[0].shape
         needed, have = memory(rows, columns, model.parts)
-        power = log2(before / crisp.bounds.width) if before else 2.0
+        power = max(log2(before / crisp.bounds.width), 1.0) if before else 2.0
         least = crisp.bounds.width * (needed / have) ** (power / 2)
         if needed > have / 4 or least > self.width:
             raise ValueError(

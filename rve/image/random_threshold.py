@@ -110,8 +110,10 @@ class ThresholdResponse:
     @property
     def modulus(self) -> tuple[Array, Array]:
         """Bounds of E of eq. 16 at the nodes, each of shape (n,), in Pa, falling."""
-        pairs = zip(self.lower, self.upper, strict=True)
-        ends = np.array([StiffnessBounds(*pair).modulus for pair in pairs])
+        pairs = [StiffnessBounds(*pair) for pair in zip(self.lower, self.upper, strict=True)]
+        for one in (*pairs, *(StiffnessBounds(pure, pure) for pure in self.pure)):
+            one.require_rising("give the threshold as a fuzzy number, or phases of less contrast")
+        ends = np.array([pair.modulus for pair in pairs])
         lower = np.maximum.accumulate(ends[::-1, 0])[::-1]  # E exceeds before what it falls to
         return lower, np.minimum.accumulate(ends[:, 1])
 

@@ -52,11 +52,7 @@ class Tiling:
         if count < 2:
             raise ValueError("one tile has no scatter; divide the window into 2 × 2 tiles or more")
         bracket = self.bracket
-        if not (steepest := bracket.shear[1] / bracket.bulk[0]) < 1.5:
-            raise ValueError(
-                f"A/B of eq. 16 may reach {steepest:.3g}, and tiles tell the scatter of E below 1.5"
-                " only; take boundary periodic, larger tiles or phases of less contrast"
-            )
+        bracket.require_rising("take boundary periodic, larger tiles or phases of less contrast")
         low, high = bracket.modulus
         softer = -bracket.lower @ (self.compliance - self.compliance.mean(axis=0)) @ bracket.lower
         stiffer = self.stiffness - self.stiffness.mean(axis=0)

@@ -78,6 +78,18 @@ def test_a_random_threshold_needs_ordered_phases():
         threshold_response(ramp(8), [0.4, 0.6], crossed)
 
 
+def test_the_law_of_e_needs_an_e_that_rises_with_the_stiffness():
+    auxetic = [ModuliInterval.crisp(PlaneModuli.of_young(e, -0.5)) for e in (20.0, 80.0)]
+    found = threshold_response(ramp(8), [0.4, 0.6], auxetic)
+    law = NormalThreshold((0.5, 0.5), (0.1, 0.1))
+    assert found.stiffness(law).modulus[0] > 0  # of the mean stiffness nothing need rise
+    for law_of_e in (lambda: found.mean(law), lambda: found.quantile(law, 0.5)):
+        with pytest.raises(
+            ValueError, match=r"A/B of eq. 16 is up to 1.61; give the threshold"
+        ):
+            law_of_e()
+
+
 def exact(grey, law, phases=PHASES):
     """Probabilities of an image's steps, rising thresholds, and bounds of E and stiffness there."""
     values = np.unique(grey)
