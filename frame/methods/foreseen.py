@@ -16,10 +16,8 @@ from alphacut.frame.methods.plan import Candidate, planned
 from alphacut.frame.modal.fitting import MANY
 from alphacut.frame.structures.modes import ModalError
 
-NODES = 40
-"""Nodes on which a proof is timed."""
-DENSE = 0.6
-"""Cost of a node among all beside that among so few, which share less."""
+NODES = 40  # on which a proof is timed
+DENSE = 0.6  # cost of a node among all beside that among so few, which share less
 
 
 def foreseen(name: str, method: object, flow: UnitFlow) -> tuple[Candidate, ...]:

@@ -19,8 +19,7 @@ from alphacut.frame.modal.polynomial_error import judged_at_optima, polynomial_e
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 
-SAMPLES = 128
-"""Trajectories inside each level's box, as many on its faces, and at corners at most."""
+SAMPLES = 128  # inside each level's box, as many on its faces, and at corners at most
 SAFETY = 2.0
 """Factor on what they find beyond the bounds."""
 GAP = 0.25

@@ -23,10 +23,8 @@ PROBED = 800
 STEPS = 140
 """Steps a problem takes on polynomials among `NODES` in time; neighbours share what they find."""
 NODES = 250
-LIGHT = 290
-"""The same with the least effort."""
-RISE = 3.0
-"""Cost of the final polynomials beside those of degree 2, which are timed, less 1 an input."""
+LIGHT = 290  # the same with the least effort
+RISE = 3.0  # cost of the final polynomials beside those of degree 2, less 1 an input
 GUIDING, POLISHING = 680, 100
 """The steps of more than six inputs: on polynomials that guide, with all that is not a step counted
 as so many, and on exact trajectories."""

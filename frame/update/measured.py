@@ -13,10 +13,8 @@ from alphacut.fuzzy import Crisp, FuzzyNumber, from_data
 from alphacut.fuzzy.knowledge.named_law import from_scatter
 from alphacut.fuzzy.sets.claimed import Claimed
 
-NEAR = 0.8
-"""Share of the largest amplitude of a mode from which on a floor may be the reference."""
-CHANCE = 1e-6
-"""Probability below which measured values contradict the deviation that is given of them."""
+NEAR = 0.8  # share of a mode's largest amplitude from which on a floor may be the reference
+CHANCE = 1e-6  # probability below which values contradict the deviation that is given of them
 
 
 @dataclass(frozen=True)

@@ -34,11 +34,20 @@ class SpherePacking:
         spheres: Number of spheres, at least 1.
         volume_fraction: Share of the cube that they fill, in (0, 0.5].
         radii: Law of the radii, by number.
+
+    Raises:
+        ValueError: A value lies outside its range.
     """
 
     spheres: int
     volume_fraction: float
     radii: RadiusLaw
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.spheres, int | np.integer) and self.spheres >= 1):
+            raise ValueError(f"a packing of {self.spheres} spheres: take a whole number from 1 on")
+        if not 0 < (share := self.volume_fraction) <= MOST_VOLUME:
+            raise ValueError(f"the volume fraction is {share:g}; it must lie in (0, 0.5]")
 
     def make(self, generator: np.random.Generator) -> Spheres:
         """One packing; the cube is as large as the spheres and the fraction make it.
