@@ -52,3 +52,12 @@ def test_a_search_takes_a_root_more_for_a_node_where_neighbours_are_few(longer, 
         for t in (1.0, 1.0 * longer)
     ]
     assert seconds[1] / seconds[0] == pytest.approx(np.sqrt(longer), rel=0.01)
+
+
+def test_more_inputs_take_more_for_a_step(monkeypatch):
+    monkeypatch.setattr(planning, "_step", lambda *_: 1.0)
+    seconds = [
+        plan(FRAME, inputs, duration=1.0, step=0.01, alpha=(0.0,), method="modal")[0].seconds
+        for inputs in (INPUTS, INPUTS | MORE)
+    ]
+    assert seconds[1] / seconds[0] == pytest.approx((3 + 4) / (3 + 2), rel=0.01)
