@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import csv
+import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
@@ -19,6 +21,11 @@ from alphacut.stochastic.theta.truncated_normal import Array
 if TYPE_CHECKING:
     from alphacut.frame.dynamics.response_spectrum import ResponseSpectrum
 
+HEAD = ("damping", "period [s]", "displacement [m]", "pseudo-velocity [m/s]") + (
+    "pseudo-acceleration [m/s^2]",
+    "error of the displacement [m]",
+    "record",
+)
 ABOUT = "response spectrum of a record of the ground's motion"
 MOST = 2000
 """Periods, at most."""
@@ -63,7 +70,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     except ValueError as error:
         raise BadInput.of("--shortest, --longest", str(error)) from None
     if options.out:
-        write(found, Path(options.out))
+        write(found, Path(options.record).name, Path(options.out))
     answer(options, document(found), out, table(found))
     return 0
 
@@ -140,22 +147,18 @@ def table(found: Sequence[ResponseSpectrum]) -> str:
     return "\n".join([*lines, ""])
 
 
-def write(found: Sequence[ResponseSpectrum], folder: Path) -> None:
+def write(found: Sequence[ResponseSpectrum], record: str, folder: Path) -> None:
     """The table of all periods, and the figure."""
     from alphacut.figures.envelope import spectrum
     from alphacut.figures.style import save, style
 
-    head = (
-        "damping,period [s],displacement [m],pseudo-velocity [m/s],pseudo-acceleration [m/s^2],"
-        "error of the displacement [m]"
-    )
-    lines = [head]
+    text = io.StringIO()
+    lines = csv.writer(text, lineterminator="\n")
+    lines.writerow(HEAD)
     for x in found:
         columns = (x.periods, x.displacement, x.pseudo_velocity, x.pseudo_acceleration, x.error)
-        lines += [
-            ",".join([repr(x.damping), *(repr(float(value)) for value in row)])
-            for row in zip(*columns, strict=True)
-        ]
-    write_text(folder / "spectrum.csv", "\n".join([*lines, ""]))
+        rows = zip(*columns, strict=True)
+        lines.writerows([repr(x.damping), *map(float, row), record] for row in rows)
+    write_text(folder / "spectrum.csv", text.getvalue())
     with style():
         save(spectrum(found), folder / "spectrum")

@@ -9,6 +9,8 @@ from typing import TextIO
 from alphacut.case.idle import require_read
 from alphacut.case.load import load
 from alphacut.commands import options as common
+from alphacut.frame.decisions.limit_search import TIE
+from alphacut.frame.decisions.safe_scale import SafeScale
 from alphacut.frame.outputs import output_unit
 from alphacut.io.problem import BadInput
 from alphacut.io.progress import progress
@@ -77,7 +79,7 @@ def text(found: Tolerances) -> str:
     lines += [f"scaled by {found.most:.4g} at most: {found.ended}"] if found.ended else []
     if found.undecided:
         what = f"undecided between {scale.safe:.4g} and {found.most:.4g}"
-        return "\n".join([*lines, f"{what}: neither proved nor refuted; narrow some inputs", ""])
+        return "\n".join([*lines, f"{what}: {_why_undecided(scale)}", ""])
     if scale.witness is None:
         return "\n".join([*lines, f"nothing unsafe found up to {scale.safe:.4g}", ""])
     point = ", ".join(
@@ -87,3 +89,10 @@ def text(found: Tolerances) -> str:
     lines.append(f"unsafe at {scale.unsafe:.4g} ({100 * scale.gap:.2g} % more): {point}")
     what = f"|{next(iter(found.limits))}|" if len(kept) == 1 else "the worst of them"
     return "\n".join([*lines, f"  there {what} is {scale.share:.6g} of the limit", ""])
+
+
+def _why_undecided(scale: SafeScale) -> str:
+    """What keeps a scale from being proved or refuted, with its cure."""
+    if scale.nominal_share > 1 - TIE:
+        return "the nominal motion reaches the limit itself; take a limit a little greater"
+    return "neither proved nor refuted; narrow some inputs"

@@ -159,7 +159,8 @@ def spectrum(folder: Path) -> Markup:
     path = folder / "spectrum.csv"
     try:
         with path.open(encoding="utf-8", newline="") as stream:
-            rows = [[float(row[name]) for name in COLUMNS] for row in csv.DictReader(stream)]
+            table_rows = list(csv.DictReader(stream))
+        rows = [[float(row[name]) for name in COLUMNS] for row in table_rows]
         found = np.asarray_chkfinite(rows)
         values = found.reshape(-1, len(np.unique(found[:, 1])), len(COLUMNS))
     except (OSError, ValueError, KeyError, TypeError, IndexError):
@@ -185,4 +186,6 @@ def spectrum(folder: Path) -> Markup:
         for ratio, one in zip(ratios, values, strict=True)
     ]
     drawn = picture(folder / "spectrum.svg", caption("spectrum", paper=False))
-    return section("Response spectrum", paragraphs(*words), drawn, table(tuple(head), cells))
+    record = table_rows[0].get("record")
+    title = f"Response spectrum of {record}" if record else "Response spectrum"
+    return section(title, paragraphs(*words), drawn, table(tuple(head), cells))

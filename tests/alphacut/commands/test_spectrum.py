@@ -44,7 +44,7 @@ def test_a_push_doubles_what_it_does_slowly(
     assert plain["pseudo_acceleration_m_per_s2"] == pytest.approx([2 * 0.980665] * 5, rel=1e-6)
     assert max(damped["displacement_m"]) < max(plain["displacement_m"])
     table = np.genfromtxt(out / "spectrum.csv", delimiter=",", skip_header=1)
-    assert table.shape == (10, 6)
+    assert table.shape == (10, 7)
     np.testing.assert_array_equal(table[:5, 2], plain["displacement_m"])
     assert {path.name for path in out.iterdir()} == {f"spectrum.{x}" for x in ("csv", "png", "svg")}
 
@@ -93,7 +93,7 @@ def test_the_report_of_a_folder_shows_the_spectrum_in_it(
     assert main([*asked, "--out", str(out)]) == 0
     assert main(["report", str(out), "--quiet"]) == 0
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert "<h2>Response spectrum</h2>" in page
+    assert "<h2>Response spectrum of r.csv</h2>" in page
     assert "displacement, 2 %" in page
     rows = (out / "spectrum.csv").read_text(encoding="utf-8").splitlines()[1:]
     five = [row.split(",") for row in rows if row.startswith("0.05,")]

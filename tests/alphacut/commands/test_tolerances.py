@@ -190,3 +190,14 @@ def test_other_faults_of_a_cell_are_no_end_of_the_scales(monkeypatch):
     monkeypatch.setattr(tolerances, "_moduli", moduli)
     with pytest.raises(CampaignError):
         tolerances._cell_range(None, 2.0)
+
+
+def test_a_limit_that_the_nominal_motion_only_reaches_is_told_with_a_cure(tmp_path, capfd):
+    text = CASE.replace('["0 mm"]', '["44 mm"]').replace('["0.1 m/s", "0.2 m/s"]', '["0 m/s"]')
+    text = text.replace('"50 N s/m"', '"500 N s/m"').replace("drift1", "q1")
+    path = tmp_path / "two.toml"
+    path.write_text(text, encoding="utf-8")
+    cure = "reaches the limit itself; take a limit a little greater"
+    for limit, undecided in (("44 mm", True), ("45 mm", False)):
+        assert main(["tolerances", str(path), "--set", f"exceedance.limit={limit}"]) == 0
+        assert (cure in capfd.readouterr().out) == undecided
