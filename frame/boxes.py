@@ -12,7 +12,7 @@ import numpy as np
 from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.calculus.numbers import require_numbers
 from alphacut.frame.dynamics.flow import Flow
-from alphacut.frame.outputs import output_unit
+from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arguments import fuzzy_inputs
 
@@ -171,12 +171,12 @@ class UnitFlow:
     def reference(self) -> int:
         """Index of the output that a tolerance is meant for: the first displacement, else 0."""
         return next(
-            (index for index, name in enumerate(self.outputs) if output_unit(name) == "m"), 0
+            (index for index, name in enumerate(self.outputs) if Output(name).unit == "m"), 0
         )
 
     def told(self, value: float) -> str:
         """An error or gap in words, with the unit of a tolerance."""
-        unit = "of each peak" if self.relative else output_unit(self.outputs[self.reference])
+        unit = "of each peak" if self.relative else Output(self.outputs[self.reference]).unit
         return f"{value:.3g} {unit}"
 
     @cached_property
@@ -186,7 +186,7 @@ class UnitFlow:
         Relative: the modal peaks. Else 1 when all outputs share a unit, or their modal peaks by
             that of `reference`.
         """
-        if not self.relative and len({output_unit(name) for name in self.outputs}) == 1:
+        if not self.relative and len({Output(name).unit for name in self.outputs}) == 1:
             return np.ones(len(self.outputs))
         peak = np.abs(self.flow.values(self.boxes.modal[None])[0]).max(0)
         shares: Array = np.where(peak > 0, peak, peak.max() or 1.0) / (

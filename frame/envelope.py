@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.outputs import output_unit
+from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.drawing import draw_bands, new_axes
 from alphacut.fuzzy.tables import html_table, write_csv
 
@@ -225,7 +225,7 @@ class Envelope:
         bands = [self.lower, self.upper, *([] if self.error is None else [self.error])]
         numbers = np.concatenate([np.stack(bands, axis=3), self.lower_at, self.upper_at], axis=3)
         rows = (
-            (name, output_unit(name), float(alpha), float(time), *numbers[a, t, k].tolist())
+            (name, Output(name).unit, float(alpha), float(time), *numbers[a, t, k].tolist())
             for k, name in enumerate(self.outputs)
             for a, alpha in enumerate(self.alpha)
             for t, time in enumerate(self.time)
@@ -255,7 +255,7 @@ class Envelope:
             data, axes, {"method": self.method, "nature": self.nature, **counts, **self.facts}
         )
         dataset["time"].attrs["units"] = "s"
-        units = sorted({output_unit(name) for name in self.outputs})
+        units = sorted({Output(name).unit for name in self.outputs})
         for name in set(data) - {"lower_at", "upper_at"}:
             dataset[name].attrs["units"] = units[0] if len(units) == 1 else "SI, by output"
         for name in ("lower_at", "upper_at"):
@@ -288,5 +288,5 @@ def signed_envelope(
 
 def _unit(name: str) -> str:
     """The unit after a number; nothing where it is not known."""
-    unit = output_unit(name)
+    unit = Output(name).unit
     return "" if unit == "SI" else f" {unit}"

@@ -18,9 +18,9 @@ from alphacut.frame.dynamics.flow import Flow, LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Envelope
-from alphacut.frame.outputs import output_unit
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
+from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.counted import counted
 from alphacut.fuzzy.progress_bar import Progress, told
@@ -70,7 +70,7 @@ class FuzzyPeaks:
         lines = [f"fuzzy peaks on {counted(len(self.alpha), 'level')}"]
         for k, (low, high) in enumerate(zip(self.lower[0], self.upper[0], strict=True)):
             name = self.outputs[k] if self.outputs else f"output {k}"
-            unit = f" {output_unit(name)}" if self.outputs else ""
+            unit = f" {Output(name).unit}" if self.outputs else ""
             error = "not estimated" if self.error is None else f"{self.error[0, k]:.2g}{unit}"
             cut = f"{low:.6g} … {high:.6g}{unit} at α = {self.alpha[0]:g}"
             lines.append(f"  {name}: {cut}, error {error}")

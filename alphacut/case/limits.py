@@ -101,9 +101,9 @@ def limit_in(case: Case, key: str, name: str, text: str) -> float:
     Raises:
         BadInput: It is no positive quantity of that unit.
     """
-    from alphacut.frame.outputs import output_unit
+    from alphacut.frame.structures.quantities import Output
 
-    unit, height = output_unit(name), storey_height(case, name)
+    unit, height = Output(name).unit, storey_height(case, name)
     try:
         share = height is not None and text.rstrip().endswith("%")
         limit = (

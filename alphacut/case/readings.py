@@ -45,7 +45,7 @@ class Reading:
 
 def readings(case: Case) -> Iterator[Reading]:
     """Every quantity that stands in the file, defaults of a frame's stiffness, every limit."""
-    from alphacut.frame.outputs import output_unit
+    from alphacut.frame.structures.quantities import Output
 
     for entry in fields(case.sections):
         section = getattr(case.sections, entry.name)
@@ -54,7 +54,7 @@ def readings(case: Case) -> Iterator[Reading]:
     for key, output, limit in limits(case):
         height = storey_height(case, output)
         beside = f", {100 * limit / height:.3g} % of the storey's height" if height else ""
-        yield Reading(f"{key} limit of {output}", "limit", (limit,), output_unit(output), beside)
+        yield Reading(f"{key} limit of {output}", "limit", (limit,), Output(output).unit, beside)
 
 
 def limits(case: Case) -> Iterator[tuple[str, str, float]]:

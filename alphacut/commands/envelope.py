@@ -19,7 +19,7 @@ from alphacut.case.values import nearest
 from alphacut.commands import options as common
 from alphacut.frame import Envelope
 from alphacut.frame.exceedance import peaks
-from alphacut.frame.outputs import output_unit
+from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document, say
 from alphacut.io.kept_arrays import KeptArrays
 from alphacut.io.problem import BadInput, Problem, refuse
@@ -196,7 +196,7 @@ def excluded(text: str) -> tuple[str, ...]:
 def summary(found: Envelope, tried: Array | None = None, *, own_gap: bool = False) -> str:
     """Extremes and fuzzy peaks at the lowest level as a small table."""
     of = peaks(found)
-    units = [output_unit(name) for name in found.outputs]
+    units = [Output(name).unit for name in found.outputs]
     least = of.lower[0] if tried is None else tried
     columns = [
         list(map(float, row))
@@ -240,7 +240,7 @@ def beyond(error: float | None, output: str) -> str:
     """Words on how far a peak may lie outside its bounds."""
     if error is None:
         return ""
-    return f", between nodes up to {engineering(error, output_unit(output), digits=2)} more"
+    return f", between nodes up to {engineering(error, Output(output).unit, digits=2)} more"
 
 
 def error_in_words(found: Envelope) -> str:
@@ -250,7 +250,7 @@ def error_in_words(found: Envelope) -> str:
     largest = zip(found.outputs, found.error.max((0, 1)), strict=True)
     words = ", attained to within " if "gap" in found.facts else ", error up to "
     return words + ", ".join(
-        f"{engineering(float(value), output_unit(name), digits=2)} of {name}"
+        f"{engineering(float(value), Output(name).unit, digits=2)} of {name}"
         for name, value in largest
     )
 
@@ -262,13 +262,13 @@ def proved(found: Envelope, *, own_gap: bool) -> str:
             found.outputs, found.proved_lower[0].min(0), found.proved_upper[0].max(0), strict=True
         )
         words = (
-            f"{name} {' … '.join(engineering(float(x), output_unit(name)) for x in pair)}"
+            f"{name} {' … '.join(engineering(float(x), Output(name).unit) for x in pair)}"
             for name, *pair in ends
         )
         return f"guaranteed bounds of the exact motion: {', '.join(words)}\n"
     if "gap" not in found.facts:
         return ""
     of = str(found.facts["gap_output"])
-    gap = engineering(float(found.facts["gap"]), output_unit(of))
+    gap = engineering(float(found.facts["gap"]), Output(of).unit)
     asked = " (asked of the proof by the program itself)" if own_gap else ""
     return f"every node's bounds enclosed to within {gap} of {of}{asked}; {found.facts['proof']}\n"

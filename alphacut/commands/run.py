@@ -17,7 +17,7 @@ from alphacut.case.quick import banner, quick, settings
 from alphacut.commands import options as common
 from alphacut.figures.captions import core, in_words
 from alphacut.figures.showing import Showing
-from alphacut.frame.outputs import output_unit
+from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.io.files import Document, as_json, rank, say, write_text
 from alphacut.io.output_paths import alone, unwritable
@@ -244,7 +244,7 @@ def image_lines(found: Document) -> Iterator[str]:
 def envelope_lines(name: str, study: Document) -> Iterator[str]:
     """Extremes of each output of a study; outputs of one unit have one prefix."""
     ends = [
-        (output, output_unit(output), float(low), float(study["max"][output]))
+        (output, Output(output).unit, float(low), float(study["max"][output]))
         for output, low in study["min"].items()
     ]
     largest = largest_by_unit((value, unit) for _, unit, *values in ends for value in values)

@@ -21,10 +21,10 @@ from alphacut.stochastic.theta.truncated_normal import Array
 if TYPE_CHECKING:
     from alphacut.frame.dynamics.response_spectrum import ResponseSpectrum
 
-HEAD = ("damping", "period [s]", "displacement [m]", "pseudo-velocity [m/s]") + (
-    "pseudo-acceleration [m/s^2]",
-    "error of the displacement [m]",
-    "record",
+HEAD = (
+    "damping",
+    *("period [s]", "displacement [m]", "pseudo-velocity [m/s]", "pseudo-acceleration [m/s^2]"),
+    *("error of the displacement [m]", "record"),
 )
 ABOUT = "response spectrum of a record of the ground's motion"
 MOST = 2000

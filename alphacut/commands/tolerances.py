@@ -11,7 +11,7 @@ from alphacut.case.load import load
 from alphacut.commands import options as common
 from alphacut.frame.decisions.limit_search import TIE
 from alphacut.frame.decisions.safe_scale import SafeScale
-from alphacut.frame.outputs import output_unit
+from alphacut.frame.structures.quantities import Output
 from alphacut.io.problem import BadInput
 from alphacut.io.progress import progress
 from alphacut.io.units import engineering
@@ -62,7 +62,7 @@ def text(found: Tolerances) -> str:
     """The safe scale, the safe intervals and the witness, with their units, a line each."""
     scale = found.found
     kept = [
-        f"|{name}| <= {engineering(limit, output_unit(name))}"
+        f"|{name}| <= {engineering(limit, Output(name).unit)}"
         for name, limit in found.limits.items()
     ]
     if scale.safe is None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from alphacut.frame.envelope import error_name
-from alphacut.frame.outputs import output_unit
+from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import say, write_text
 from alphacut.io.netcdf import read_dataset
 from alphacut.stages.material.modulus import listed
@@ -105,7 +105,7 @@ def with_worth(dataset: xarray.Dataset) -> xarray.Dataset:
 def _by_output(dataset: xarray.Dataset) -> Iterator[tuple[str, str]]:
     """For each output a wide table: a row for each node, the bounds of each level side by side."""
     for name in map(str, dataset["output"].values):
-        one, unit = dataset.sel(output=name), output_unit(name)
+        one, unit = dataset.sel(output=name), Output(name).unit
         columns = {"time [s]": one["time"].values}
         for level in one["alpha"].values:
             for band in (band for band in BANDS if band in one):
@@ -133,7 +133,7 @@ def _peaks(study: str, dataset: xarray.Dataset) -> Iterator[str]:
             numbers = (float(level), low, more[0], high, more[1])
             cells = ["" if x is None else repr(x) for x in numbers]
             nature = str(dataset.attrs.get("nature", ""))
-            yield ",".join([study, name, output_unit(name), *cells, nature])
+            yield ",".join([study, name, Output(name).unit, *cells, nature])
 
 
 def _curves(dataset: xarray.Dataset) -> str:
@@ -170,7 +170,7 @@ def _csv(part: xarray.Dataset) -> str:
     mixed = [name for name in part.data_vars if part[name].attrs.get("units") == BY_OUTPUT]
     outputs = table.get("observed", table.get("output"))
     if mixed and outputs is not None:
-        table["unit"] = [output_unit(str(name)) for name in outputs]
+        table["unit"] = [Output(str(name)).unit for name in outputs]
         names.append("unit")
     names += [str(name) for name in part.coords if name not in names]
     units = {name: part[name].attrs.get("units", "") if name in part else "" for name in names}

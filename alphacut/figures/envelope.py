@@ -12,8 +12,8 @@ import numpy as np
 from alphacut.figures import style as look
 from alphacut.figures.captions import INPUTS
 from alphacut.frame.dynamics.response_spectrum import ResponseSpectrum
-from alphacut.frame.outputs import output_unit, output_words
 from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.quantities import Output
 from alphacut.io.units import MINUS, axis_prefix, engineering
 from alphacut.stages.vibration.exceedance import event_unit, event_words
 from alphacut.stages.vibration.studies import Study
@@ -43,12 +43,12 @@ def envelope(dataset: xarray.Dataset, output: str, study: Study) -> Figure:
         axes.plot(time, shown.isel(alpha=-1)[side], color=look.INK, lw=0.8)
         axes.plot(time, shown.isel(alpha=0)[side], color=look.INK, lw=0.3)
     axes.set_xlabel("time t, s")
-    look.prefix_axis(axes, output, output_unit(output))
+    look.prefix_axis(axes, output, Output(output).unit)
     axes.set_xlim(time[0], time[-1])
     # letters mean something else in a pendulum
     known = INPUTS if output.startswith(("q", "v", "a", "drift", "shear", "base", "roof")) else {}
     words = ", ".join(known.get(name, name) for name in study.task.fuzzy)
-    title = f"{output_words(output)}; fuzzy: {words}"
+    title = f"{Output(output).words}; fuzzy: {words}"
     axes.set_title(fill(title, 84), loc="left", fontsize=10)
     look.alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return drawn

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from alphacut.figures.style import BLUE, GREY, INK, ORANGE, prefix_axis
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.methods.follower_record import FollowerRecord, record_flow
-from alphacut.frame.outputs import output_unit
+from alphacut.frame.structures.quantities import Output
 from alphacut.stages.pipeline import Results
 from alphacut.stages.vibration.studies import Study
 
@@ -60,7 +60,7 @@ def follower(results: Results, study: Study) -> Figure:
         )
     panels[4].set_xlabel("time t, s")
     for panel in panels[::2]:
-        prefix_axis(panel, output, output_unit(output))
+        prefix_axis(panel, output, Output(output).unit)
     return drawn
 
 

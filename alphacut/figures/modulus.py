@@ -8,7 +8,7 @@ import numpy as np
 
 from alphacut.case.case import Case
 from alphacut.figures import style as look
-from alphacut.frame.outputs import output_unit
+from alphacut.frame.structures.quantities import Output
 from alphacut.stages.material.cell import GPA
 from alphacut.stages.material.modulus import AVERAGE
 from alphacut.stages.pipeline import Results
@@ -168,7 +168,7 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
             label="envelope" if side == "lower" else None,
         )
     axes.set_xlabel("time t, s")
-    look.prefix_axis(axes, output, output_unit(output))
+    look.prefix_axis(axes, output, Output(output).unit)
     axes.set_title(
         f"Fuzzy mapping of {output} at α = {float(dataset['alpha']):g}", loc="left", fontsize=10
     )

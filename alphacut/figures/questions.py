@@ -18,7 +18,7 @@ from alphacut.figures.style import (
     figure,
     prefix_axis,
 )
-from alphacut.frame.outputs import output_unit
+from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
 from alphacut.io.units import MINUS, axis_prefix
 from alphacut.stages.vibration.decision import degree
@@ -127,7 +127,7 @@ def bands(dataset: xarray.Dataset, output: str) -> Figure:
         )
     axes.set_xlim(time[0], time[-1])
     axes.set_xlabel("time t, s")
-    prefix_axis(axes, output, output_unit(output))
+    prefix_axis(axes, output, Output(output).unit)
     level = float(dataset["alpha"].values[0])
     axes.set_title(f"{output} at α = {level:g}", loc="left", fontsize=10)
     axes.legend(fontsize=8, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0))

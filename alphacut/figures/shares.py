@@ -8,7 +8,7 @@ import numpy as np
 
 from alphacut.figures.captions import INPUTS, in_words
 from alphacut.figures.style import BLUE, GREY, ORANGE, PURPLE, prefix_axis
-from alphacut.frame.outputs import output_unit
+from alphacut.frame.structures.quantities import Output
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def panel(axes: Axes, found: xarray.Dataset, output: str) -> None:
     behind.fill_between(time, 0, width, color="#d9d9d9", lw=0)
     behind.set_ylim(bottom=0)
     behind.grid(False)
-    prefix_axis(behind, f"width of {output}", output_unit(output))
+    prefix_axis(behind, f"width of {output}", Output(output).unit)
     axes.set_zorder(behind.get_zorder() + 1)
     axes.patch.set_visible(False)
     for index, name in enumerate(found["input"].values):

@@ -11,7 +11,7 @@ import numpy as np
 from markupsafe import Markup
 
 from alphacut.figures.captions import caption
-from alphacut.frame.outputs import output_unit
+from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
 from alphacut.io.problem import BadInput
 from alphacut.io.provenance import door
@@ -38,7 +38,7 @@ def envelopes(summary: Document, exceedance: Markup) -> Markup:
 def extremes(studies: Document) -> list[tuple[str, ...]]:
     """Least and greatest value of each output, and the error where one was estimated."""
     each = [
-        (name, study, output, output_unit(output))
+        (name, study, output, Output(output).unit)
         for name, study in studies.items()
         for output in study["min"]
     ]
@@ -79,7 +79,7 @@ def natural(summary: Document) -> Markup:
 def peaks(summary: Document) -> Markup:
     """Fuzzy peaks of every study, and the fuzzy probability of exceeding the case's limit."""
     each = [
-        (name, output, output_unit(output), of)
+        (name, output, Output(output).unit, of)
         for name, study in summary["envelopes"].items()
         for output, of in study.get("peak", {}).items()
     ]

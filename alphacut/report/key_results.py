@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from markupsafe import Markup
 
 from alphacut.figures.captions import core
-from alphacut.frame.outputs import output_unit
+from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
 from alphacut.io.units import engineering, largest_by_unit
 from alphacut.report import envelopes
@@ -97,9 +97,9 @@ def peaks(summary: Document) -> Iterator[Line]:
         return
     study = max(studies.values(), key=lambda one: len(one["fuzzy"]))
     found = study.get("peak", {})
-    largest = largest_by_unit((of["upper"][0], output_unit(name)) for name, of in found.items())
+    largest = largest_by_unit((of["upper"][0], Output(name).unit) for name, of in found.items())
     for name, of in found.items():
-        unit = output_unit(name)
+        unit = Output(name).unit
         likely, whole = (
             envelopes.between(of["lower"][k], of["upper"][k], unit, largest[unit]) for k in (-1, 0)
         )

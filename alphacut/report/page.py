@@ -12,7 +12,7 @@ import numpy as np
 from markupsafe import Markup, escape
 
 from alphacut.case.quick import banner
-from alphacut.frame.outputs import output_unit
+from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
 from alphacut.io.netcdf import damaged, read_dataset, read_summary
 from alphacut.report.glossary import explained
@@ -77,7 +77,7 @@ def plot(name: str, study: Document, dataset: xarray.Dataset) -> Document:
         "fuzzy": len(dataset["parameter"]),
         "alpha": dataset["alpha"].values.tolist(),
         "outputs": [str(output) for output in dataset["output"].values],
-        "units": [output_unit(str(output)) for output in dataset["output"].values],
+        "units": [Output(str(output)).unit for output in dataset["output"].values],
         "step": float(time[1] - time[0]),
         **{
             side: [[packed(row) for row in level] for level in values]

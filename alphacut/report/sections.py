@@ -214,14 +214,14 @@ def explained(rows: Sequence[tuple[object, ...]]) -> Iterator[str]:
 
 def proofs(summary: Document) -> Iterator[str]:
     """Gap of each certified envelope, and what it rests on."""
-    from alphacut.frame.outputs import output_unit
+    from alphacut.frame.structures.quantities import Output
 
     for name, study in summary.get("envelopes", {}).items():
         if "proved" in study:
             ends = study["proved"]
             words = ", ".join(
-                f"{output} {engineering(ends['min'][output], output_unit(output))} …"
-                f" {engineering(ends['max'][output], output_unit(output))}"
+                f"{output} {engineering(ends['min'][output], Output(output).unit)} …"
+                f" {engineering(ends['max'][output], Output(output).unit)}"
                 for output in ends["min"]
             )
             yield (
@@ -230,7 +230,7 @@ def proofs(summary: Document) -> Iterator[str]:
             )
         if "gap" in study:
             of = str(study.get("gap_output", next(iter(study.get("min", {"q": 0})))))
-            gap = engineering(float(study["gap"]), output_unit(of), digits=2)
+            gap = engineering(float(study["gap"]), Output(of).unit, digits=2)
             worth = "proved" if "guaranteed" in str(study["nature"]) else "verified by sampling"
             yield (
                 f"The bounds of envelope {name} are {worth} at every node, and no wider than {gap}"

@@ -14,8 +14,8 @@ import numpy as np
 
 from alphacut import frame
 from alphacut.case.case import Case
-from alphacut.frame.outputs import output_unit
 from alphacut.frame.structures.modes import ModalError
+from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval
 from alphacut.fuzzy.decisions.measure_next import Advice, Answer, advice
 from alphacut.fuzzy.knowledge.joint import joined_once
@@ -151,7 +151,7 @@ def advice_document(found: Advice, answer: str, fixed: Sequence[str] = ()) -> Do
     unit = 1 / found.width if found.width > 0 else 0.0
     return {
         "answer": answer,
-        "unit": "Pa" if answer == "E" else output_unit(answer),
+        "unit": "Pa" if answer == "E" else Output(answer).unit,
         "width": found.width,
         "error": found.error,
         "alpha": found.alpha,

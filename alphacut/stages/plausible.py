@@ -84,7 +84,7 @@ def overdamped(case: Case, wanted: Structure) -> Iterator[str]:
 
 def odd(case: Case) -> Iterator[str]:
     """Remarks on moduli of a structure and on limits that most likely have the wrong unit."""
-    from alphacut.frame.outputs import output_unit
+    from alphacut.frame.structures.quantities import Output
 
     for one in readings(case):
         if one.unit == "Pa" and one.key.startswith(("frame.", "tower.")):
@@ -99,7 +99,7 @@ def odd(case: Case) -> Iterator[str]:
             if one.values[-1] > 0:  # 0 leaves a structure undamped
                 yield from unlike(one.key, end, "", DAMPED, "a damping ratio")
     for section, output, value in limits(case):
-        height, unit = storey_height(case, output), output_unit(output)
+        height, unit = storey_height(case, output), Output(output).unit
         usual = (DRIFTS[0] * height, DRIFTS[1] * height) if height else LIMITS.get(unit, ANY)
         if unit == "N" and case.sections.frame:
             weight = 9.81 * sum(number.modal for number in case.frame.masses)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import warnings
 from functools import singledispatch
 
@@ -14,6 +13,7 @@ from alphacut.frame.checks.step_error import probes
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem, evaluate, round_off
 from alphacut.frame.structures.matrix import MatrixStructure
+from alphacut.frame.structures.quantities import RATIO, Parameter, of_storey_frame
 from alphacut.frame.structures.storey import StoreyFrame
 
 OTHER_UNITS = 500  # from so many times the structure's own value on, or that part of it
@@ -21,31 +21,23 @@ SLOW = 10  # periods longer than so many durations are warned of
 ROUNDING = 1e-6
 """Share of a peak that round-off may leave without a word."""
 NODES = 3  # or all of fewer steps than these
-POSITIVE = "positive"
-NOT_NEGATIVE = "0 or greater"
-RATIO = "0 or greater and below 1, the critical damping"
-OF_FRAME = {
-    r"E|I\d*|[mlck]\d+": POSITIVE,
-    r"d\d+|rayleigh_(mass|stiffness)": NOT_NEGATIVE,
-    r"zeta\d*": RATIO,
-}
-"""Names of a storey frame's parameters, and what they must be; the others may be any number."""
 
 
 @singledispatch
-def wanted(system: LinearSystem | LagrangianSystem, name: str) -> str | None:
-    """Admissible range of a parameter of `system`; None where nothing is known."""
-    return None
+def parameter(system: LinearSystem | LagrangianSystem, name: str) -> Parameter:
+    """A parameter of `system`, with the unit and the range that are known of it."""
+    return Parameter(name)
 
 
-@wanted.register
-def _(system: StoreyFrame, name: str) -> str | None:
-    return next((rule for pattern, rule in OF_FRAME.items() if re.fullmatch(pattern, name)), None)
+@parameter.register
+def _(system: StoreyFrame, name: str) -> Parameter:
+    return of_storey_frame(name)
 
 
-@wanted.register
-def _(system: MatrixStructure, name: str) -> str | None:
-    return RATIO if name in [ratio for ratio in system.ratios if isinstance(ratio, str)] else None
+@parameter.register
+def _(system: MatrixStructure, name: str) -> Parameter:
+    ratio = name in [ratio for ratio in system.ratios if isinstance(ratio, str)]
+    return Parameter(name, range=RATIO if ratio else "")
 
 
 def require_admissible(
@@ -70,16 +62,11 @@ def require_admissible(
             long beside the duration, or short beside the step.
     """
     for name, low, high in zip(cuts.names, cuts.lower.min(0), cuts.upper.max(0), strict=True):
-        rule = wanted(system, name)
-        bad = (
-            (rule == POSITIVE and not low > 0)
-            or (rule in (NOT_NEGATIVE, RATIO) and not low >= 0)
-            or (rule == RATIO and not high < 1)
-        )
-        if bad or not np.isfinite([low, high]).all():
+        own = parameter(system, name)
+        if not own.admits(low, high):
             raise ValueError(
                 f"uncertain parameter {name}: its support [{low:g}, {high:g}] must be"
-                f" {rule or 'finite'}; narrow it"
+                f" {own.range or 'finite'}; narrow it"
             )
         require_size(name, system.parameters[name], np.array([low, high]))
     if isinstance(system, StoreyFrame):

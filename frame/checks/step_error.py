@@ -17,9 +17,9 @@ from alphacut.frame.dynamics.flow import Flow, LinearFlow, StepError
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.dynamics.nonlinear import SCHEMES, LagrangianFlow
 from alphacut.frame.envelope import Envelope
-from alphacut.frame.outputs import output_unit
 from alphacut.frame.structures.linear import evaluate
 from alphacut.frame.structures.modes import state_matrix
+from alphacut.frame.structures.quantities import Output
 
 CORNERS = 16
 """Corners of the widest box that are looked at, at most."""
@@ -91,7 +91,7 @@ def with_step_error(found: Envelope, flow: UnitFlow, scheme: str, steps: Array) 
         steps: From `step_error`, shape (T, m).
     """
     alike = [
-        output_unit(name) == output_unit(flow.outputs[flow.reference]) for name in flow.outputs
+        Output(name).unit == Output(flow.outputs[flow.reference]).unit for name in flow.outputs
     ]
     facts: dict[str, float | str] = {
         "integrator": scheme,
@@ -116,7 +116,7 @@ def _dominance(found: Envelope, flow: UnitFlow, steps: Array) -> dict[str, str]:
     worst = int(ratio.argmax())
     if ratio[worst] <= 1:
         return {}
-    name, unit = flow.outputs[worst], output_unit(flow.outputs[worst]).replace("SI", "")
+    name, unit = flow.outputs[worst], Output(flow.outputs[worst]).unit.replace("SI", "")
     cure = (
         "integrator exact has none"
         if isinstance(flow.flow, LinearFlow)

@@ -8,7 +8,7 @@ import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.numbers import below
-from alphacut.frame.outputs import output_unit
+from alphacut.frame.structures.quantities import Output
 
 LIMIT = 0.01
 """Largest share of an output's peak that passes without a warning."""
@@ -46,7 +46,7 @@ class ToleranceGuard:
     @property
     def message(self) -> str:
         """One sentence for a warning or an error."""
-        unit = output_unit(self.output)
+        unit = Output(self.output).unit
         return (
             f"tolerance: {self.tolerance:.3g} {unit} is {100 * self.share:.3g} % of the peak of"
             f" {self.output}, {self.peak:.3g} {unit}; above {100 * LIMIT:g} % an envelope is rough;"

@@ -15,9 +15,9 @@ from alphacut.frame.methods.batch_graph_follower import BatchFollower
 from alphacut.frame.methods.modal import FINE, GapError, Modal, guaranteed
 from alphacut.frame.methods.plan import Candidate, candidates
 from alphacut.frame.modal.fitting import MANY
-from alphacut.frame.outputs import output_unit
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
+from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.progress_bar import Progress, Stages, stage
 
 TOLERANCE = 1e-4
@@ -139,7 +139,7 @@ class Auto:
         """The flow with the scale of the tolerance, and the tolerance."""
         if self.tolerance is not None:
             return flow, self.tolerance
-        if flow.relative or any(output_unit(name) == "m" for name in flow.outputs):
+        if flow.relative or any(Output(name).unit == "m" for name in flow.outputs):
             return flow, TOLERANCE
         return replace(flow, relative=True), SHARE
 

@@ -22,6 +22,7 @@ from alphacut.frame.dynamics.spectral import responses
 from alphacut.frame.reduced.response_basis import energy_basis
 from alphacut.frame.structures.damping import modal_damping
 from alphacut.frame.structures.linear import Accelerogram, Matrices
+from alphacut.frame.structures.quantities import Output
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
@@ -209,9 +210,9 @@ class ReducedStructure:
         return self.full.parameters
 
     @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names of the observed quantities."""
-        return tuple(self.full.observed)
+    def outputs(self) -> tuple[Output, ...]:
+        """Names of the observed quantities, with their units."""
+        return tuple(map(Output, self.full.observed))
 
     @property
     def ground(self) -> Accelerogram | None:

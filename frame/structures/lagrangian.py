@@ -14,6 +14,7 @@ from alphacut.frame.structures.lagrangian_check import (
     listed,
     require_dimensions,
 )
+from alphacut.frame.structures.quantities import Output
 
 if TYPE_CHECKING:
     from sympy import Expr, Matrix
@@ -36,7 +37,7 @@ class LagrangianSystem:
         parameters: All parameters with their modal values, in SI units.
         lagrangian: L(q, v, p), with q and v sequences of n and p a mapping from names.
         initial: The initial state (q0, v0) from p, n numbers each.
-        observed: Outputs by name, each a function of (q, v, p).
+        observed: Outputs by name, each a function of (q, v, p); `Output` names give a unit.
         force: Generalised forces F(q, v, p), n of them; None for none.
 
     Raises:
@@ -101,9 +102,9 @@ class LagrangianSystem:
         )
 
     @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names of the observed quantities."""
-        return tuple(self.observed)
+    def outputs(self) -> tuple[Output, ...]:
+        """Names of the observed quantities, with their units."""
+        return tuple(map(Output, self.observed))
 
     @cached_property
     def symbols(self) -> Equations:

@@ -13,6 +13,7 @@ from alphacut.frame.calculus.jet import Array, Jet, variables
 from alphacut.frame.calculus.numbers import require_number, require_numbers
 from alphacut.frame.structures.damping import modal_damping
 from alphacut.frame.structures.linear import Accelerogram, Matrices
+from alphacut.frame.structures.quantities import Output
 
 
 def require_factors(kind: str, terms: object, parameters: Mapping[str, float]) -> None:
@@ -215,9 +216,9 @@ class MatrixStructure:
                 )
 
     @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names of the observed quantities."""
-        return tuple(self.observed)
+    def outputs(self) -> tuple[Output, ...]:
+        """Names of the observed quantities, with their units."""
+        return tuple(map(Output, self.observed))
 
     def matrices(self, p: Mapping[str, Jet]) -> Matrices:
         """M, D, K and the initial state at S parameter sets."""

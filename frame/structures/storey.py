@@ -12,6 +12,7 @@ import numpy as np
 from alphacut.frame.calculus.jet import Jet, stack
 from alphacut.frame.structures.damping import modal_damping
 from alphacut.frame.structures.linear import Matrices
+from alphacut.frame.structures.quantities import Output
 from alphacut.frame.structures.storey_checks import (
     StoreyValues,
     check_numbers,
@@ -87,7 +88,7 @@ class StoreyFrame(StoreyValues):
         if not self.stiffness:
             object.__setattr__(self, "columns", tuple(self.columns) or (2.0,) * n)
         object.__setattr__(
-            self, "outputs", tuple(self.outputs) or tuple(f"q{z + 1}" for z in range(n))
+            self, "outputs", tuple(map(Output, self.outputs or (f"q{z + 1}" for z in range(n))))
         )
         check_values(self)
         for output in self.outputs:

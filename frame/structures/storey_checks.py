@@ -10,22 +10,23 @@ import numpy as np
 
 from alphacut.frame.calculus.numbers import require_number, require_numbers
 from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.quantities import (
+    NOT_NEGATIVE,
+    OF_STOREY_FRAME,
+    Parameter,
+    of_storey_frame,
+)
 
-UNITS = {
-    "masses": "kg",
-    "lengths": "m",
-    "modulus": "Pa",
-    "second_moment": "m⁴",
-    "dampers": "N s/m",
-    "q0": "m",
-    "v0": "m/s",
+SYMBOLS = {
+    **{"masses": "m", "lengths": "l", "modulus": "E", "second_moment": "I", "dampers": "d"},
+    **{"q0": "q", "v0": "v", "columns": "c", "stiffness": "k", "damping_ratio": "zeta"},
 }
-UNITS |= {
+"""What each argument's values are called as parameters."""
+UNITS = {name: OF_STOREY_FRAME[symbol][0] for name, symbol in SYMBOLS.items()} | {
     "rayleigh": "1/s and s",
     "damping_ratio": "shares of the critical damping",
     "columns": "columns of each storey",
-    "stiffness": "N/m",
-    "gravity": "m/s²",
+    "gravity": "m/s^2",
 }
 
 
@@ -126,36 +127,17 @@ def _check_lengths(frame: StoreyValues) -> None:
 
 
 def _check_signs(frame: StoreyValues) -> None:
-    positive: dict[str, Sequence[float]] = {
-        "masses": frame.masses,
-        "lengths": frame.lengths,
-        "modulus": [] if frame.modulus is None else [frame.modulus],
-        "second_moment": frame.moments,
-        "columns": frame.columns,
-        "stiffness": frame.stiffness,
-    }
-    for name, values in positive.items():
-        for value in values:
-            if not (value > 0 and np.isfinite(value)):
-                raise ValueError(
-                    f"{name}: {value:g} is not allowed; it must be positive and finite"
-                )
-    not_negative = {"dampers": frame.dampers, "rayleigh": frame.rayleigh}
-    for name, values in {**not_negative, "gravity": [frame.gravity]}.items():
-        for value in values:
-            if not (value >= 0 and np.isfinite(value)):
-                what = name if name == "gravity" else "damping"
-                raise ValueError(f"{name}: {value:g} is not allowed; {what} must not be negative")
+    ranges = {name: of_storey_frame(symbol).range for name, symbol in SYMBOLS.items()}
+    for name, rule in {**ranges, "rayleigh": NOT_NEGATIVE, "gravity": NOT_NEGATIVE}.items():
+        given = getattr(frame, name)
+        for value in () if given is None else np.atleast_1d(given):
+            if not Parameter(name, range=rule).admits(value, value):
+                must = rule if np.isfinite(value) else "finite"
+                raise ValueError(f"{name}: {value:g} is not allowed; it must be {must}")
 
 
 def _check_damping(frame: StoreyValues) -> None:
     n = len(frame.masses)
-    for value in frame.ratios.values():
-        if not 0 <= value < 1:
-            raise ValueError(
-                f"damping_ratio: {value:g} is not allowed; it must be 0 or greater and below 1,"
-                " the critical damping"
-            )
     if len(frame.ratios) not in (0, 1, n):
         raise ValueError(
             f"damping_ratio: {len(frame.ratios)} values for {n} modes; give one for all modes,"

@@ -13,8 +13,8 @@ from alphacut import frame
 from alphacut.case.case import Case
 from alphacut.case.limits import Limit, limits_of
 from alphacut.frame.decisions.exceeding import Exceeding, any_exceeding, exceeding
-from alphacut.frame.outputs import output_unit
 from alphacut.frame.structures.modes import ModalError
+from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
 from alphacut.io.problem import BadInput
 from alphacut.io.progress import Tick
@@ -109,7 +109,7 @@ def _decisions(
     of = partial(of, duration=task.duration, step=task.step, lowest=task.alpha[0], progress=False)
     each, least = {}, {one.output: one.value for one in sorted(limits, key=lambda x: -x.value)}
     for one in limits:
-        alike = failed.setdefault(output_unit(one.output), [])
+        alike = failed.setdefault(Output(one.output).unit, [])
         each[one.name] = of({one.output: one.value}, failed=alike)
         if progress:
             progress(len(each) / count)
@@ -236,7 +236,7 @@ def decision_document(found: xarray.Dataset) -> Document:
         margins[name] = {
             "output": observed,
             "limit": float(found["allowed"].sel(output=name)),
-            "unit": output_unit(observed),
+            "unit": Output(observed).unit,
             **{side: found["margin"].sel(output=name, bound=side).values for side in SIDES},
         }
     facts = {key: found.attrs[key] for key in ("reason", "claim", "step", "peaks")}

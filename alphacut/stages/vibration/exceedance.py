@@ -14,7 +14,7 @@ from alphacut.frame import Envelope
 from alphacut.frame import exceedance as probabilities
 from alphacut.frame.boxes import boxes
 from alphacut.frame.exceedance import ANY, FuzzyProbability, peaks, tried_peaks
-from alphacut.frame.outputs import output_unit
+from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import Document
 from alphacut.io.problem import BadInput
@@ -272,7 +272,7 @@ def events(found: xarray.Dataset) -> Iterator[xarray.Dataset]:
 
 def event_unit(output: str) -> str:
     """SI unit of an output's limit; shares of their limits where any of several is meant."""
-    return "" if output == ANY else output_unit(output)
+    return "" if output == ANY else Output(output).unit
 
 
 def event_words(output: str, of: str = "") -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from alphacut.case.case import Case
 from alphacut.frame.dynamics.flow import Flow
-from alphacut.frame.outputs import output_unit
+from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.joint_outputs import area, joint_outputs
 from alphacut.io.files import Document
 from alphacut.io.problem import BadInput
@@ -88,7 +88,7 @@ def joint(case: Case, wanted: Structure) -> xarray.Dataset:
     words = [
         f"{given.outputs[k % len(columns)]} at {given.times[k % len(nodes)]:g} s" for k in (0, 1)
     ]
-    units = [output_unit(given.outputs[k % len(columns)]) for k in (0, 1)]
+    units = [Output(given.outputs[k % len(columns)]).unit for k in (0, 1)]
     polygons = (("alpha", "corner", "value"), _padded([*found.outer, *found.inner]))
     outer, inner = np.split(polygons[1] * np.array(pair.unit), 2)
     return xarray.Dataset(

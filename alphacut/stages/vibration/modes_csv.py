@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.frame.outputs import output_unit
+from alphacut.frame.structures.quantities import Output
 from alphacut.io.csv_rows import CsvFile
 from alphacut.stages.vibration.accelerogram import even_step
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -52,7 +52,7 @@ def motion_rows(path: Path, known: Sequence[str]) -> MotionRows:
     wrong = [name for name in names[1:] if name not in known]
     if names[0] != "time" or wrong or len(set(names)) < max(len(names), 2):
         raise file.refuse(line, "the header is wrong", ",".join(head), RECORDED)
-    units = ["s", *map(output_unit, names[1:])]
+    units = ["s", *(Output(name).unit for name in names[1:])]
     if len(set(units[1:])) > 1:
         what = "the outputs have different units, and their errors are to be alike"
         raise file.refuse(line, what, ",".join(head), "outputs of one unit: the others left out")

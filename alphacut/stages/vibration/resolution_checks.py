@@ -16,10 +16,10 @@ from alphacut.frame.certificate.remainder import MOST_PARAMETERS
 from alphacut.frame.checks.between_nodes import stray
 from alphacut.frame.checks.tolerance import tolerance_guard
 from alphacut.frame.exceedance import within_steps
-from alphacut.frame.outputs import output_unit
 from alphacut.frame.propagation import absolute
 from alphacut.frame.structures.linear import frequencies
 from alphacut.frame.structures.polynomial_dependence import UnprovedError, degrees
+from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import say
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.units import engineering
@@ -60,7 +60,7 @@ def wanted_errors(wanted: Structure, task: EnvelopeTask) -> Iterator[str]:
         return
     asked = task.tolerance if task.certify is None else task.certify
     each = ", ".join(
-        f"{name} {engineering(float(share * asked), output_unit(name), digits=2)}"
+        f"{name} {engineering(float(share * asked), Output(name).unit, digits=2)}"
         for name, share in zip(wanted.outputs, shares_of_tolerance(wanted, task), strict=True)
     )
     yield f"envelope: wanted {'error' if task.certify is None else 'gap'} up to {each}"

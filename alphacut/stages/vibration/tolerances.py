@@ -6,7 +6,6 @@ are scaled with the others, and the frame gets the range of E over them.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -16,11 +15,9 @@ import numpy as np
 from alphacut.case.case import Case
 from alphacut.case.limits import exceeded_limits
 from alphacut.frame import StoreyFrame
-from alphacut.frame.checks.admissible import RATIO
-from alphacut.frame.checks.admissible import wanted as admissible
 from alphacut.frame.decisions.safe_scale import SafeScale, safe_scale
-from alphacut.frame.outputs import output_unit
 from alphacut.frame.structures.modes import ModalError
+from alphacut.frame.structures.quantities import RATIO, Output, of_storey_frame
 from alphacut.fuzzy import CampaignError, FuzzyNumber, Interval, Signed, Triangular, propagate
 from alphacut.io.files import Document
 from alphacut.io.problem import BadInput
@@ -38,16 +35,12 @@ SCALES = 13
 """Scales at which the range of the cell's modulus is computed; between them it is interpolated."""
 MEANINGFUL = 0.9
 """Share of the scale at which a support reaches what its input must not be."""
-UNITS = {
-    **{"E": "Pa", "matrix_modulus": "Pa", "inclusion_modulus": "Pa", "I": "m^4", "k": "N/m"},
-    **{"m": "kg", "l": "m", "q": "m", "v": "m/s", "d": "N*s/m"},
-    **{"rayleigh_mass": "1/s", "rayleigh_stiffness": "s"},
-}
 
 
 def input_unit(name: str) -> str:
     """SI unit of an input of the cell or of a storey frame; none of directions of a field."""
-    return UNITS.get(re.sub(r"\d+(_0)?$", "", name), "")
+    of_cell = {"matrix_modulus": "Pa", "inclusion_modulus": "Pa"}
+    return of_cell.get(name) or of_storey_frame(name).unit
 
 
 def _all_scaled(numbers: Mapping[str, FuzzyNumber], scale: float) -> dict[str, tuple[float, float]]:
@@ -100,7 +93,7 @@ class Tolerances:
             None if found.witness is None else dict(zip(found.names, found.witness, strict=True))
         )
         limits: list[Document] = [
-            {"output": name, "limit": limit, "unit": output_unit(name)}
+            {"output": name, "limit": limit, "unit": Output(name).unit}
             for name, limit in self.limits.items()
         ]
         return {
@@ -189,7 +182,7 @@ def _with_meaning(
     A meaning that ends at a scale lowers what is above `near` times that.
     """
     for name, number in own.items():
-        (low, high), modal, rule = number.support, number.modal, admissible(frame, name)
+        (low, high), modal, rule = number.support, number.modal, of_storey_frame(name).range
         ends = [modal / (modal - low)] if rule and low < modal else []
         ends += [(1 - modal) / (high - modal)] if rule == RATIO and high > modal else []
         if ends and near * min(ends) <= most > 1:

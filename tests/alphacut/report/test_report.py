@@ -188,10 +188,18 @@ def small_building(folder):
     return str(folder / "building.toml")
 
 
-def test_only_what_the_run_drew_is_shown_and_what_the_command_line_changed_is_told(tmp_path, capfd):
-    case, out = small_building(tmp_path / "case"), tmp_path / "out"
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory):
+    """The case and the folder of a run with its figures."""
+    folder = tmp_path_factory.mktemp("drawn")
+    case = small_building(folder / "case")
+    assert main(["run", case, "--quick", "--quiet", "--out", str(folder / "out")]) == 0
+    return case, folder / "out"
+
+
+def test_only_what_the_run_drew_is_shown_and_what_the_command_line_changed_is_told(drawn, tmp_path):
+    case, out = drawn[0], shutil.copytree(drawn[1], tmp_path / "out")
     quick = ["run", case, "--quick", "--quiet", "--out", str(out)]
-    assert main(quick) == 0, capfd.readouterr().err
     assert (out / "figures" / "record.svg").is_file()
     assert main(["report", str(out), "--quiet"]) == 0
     page = (out / "report.html").read_text(encoding="utf-8")
@@ -205,10 +213,8 @@ def test_only_what_the_run_drew_is_shown_and_what_the_command_line_changed_is_to
     assert "<code>exceedance.limit=1 %</code>" in page
 
 
-def test_what_the_run_wrote_and_the_folder_lacks_is_named(tmp_path, capfd):
-    case, out = small_building(tmp_path / "case"), tmp_path / "out"
-    quick = ["run", case, "--quick", "--quiet", "--out", str(out)]
-    assert main(quick) == 0, capfd.readouterr().err
+def test_what_the_run_wrote_and_the_folder_lacks_is_named(drawn, tmp_path):
+    case, out = drawn[0], shutil.copytree(drawn[1], tmp_path / "out")
     gone = json.loads((out / "summary.json").read_text(encoding="utf-8"))["figures"]
     shutil.rmtree(out / "figures")
     (out / "exceedance.nc").unlink()
@@ -218,7 +224,8 @@ def test_what_the_run_wrote_and_the_folder_lacks_is_named(tmp_path, capfd):
         assert ("<h2>Missing files</h2>" in page) is missing
         more = f"exceedance.nc, {', '.join(gone[:3])} and {len(gone) - 3} more. The same run makes"
         assert (more in page) is missing
-        assert main(quick) == 0
+        if missing:
+            assert main(["run", case, "--quick", "--quiet", "--out", str(out)]) == 0
 
 
 def test_the_array_s_shear_ratio_is_told_where_it_is_known():

@@ -1,0 +1,101 @@
+"""Observed quantities and parameters of structures: their names, SI units and ranges."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+UNITS = {
+    **{"q": "m", "drift": "m", "roof": "m", "v": "m/s", "a": "m/s^2", "ar": "m/s^2"},
+    **{"shear": "N", "base_shear": "N", "force": "N", "phi": "rad"},
+}
+WORDS = {
+    "q": "displacement of floor",
+    "v": "velocity of floor",
+    "a": "acceleration of floor",
+    "ar": "acceleration relative to the ground of floor",
+    "drift": "drift of storey",
+    "shear": "shear force of storey",
+}
+POSITIVE = "positive"
+NOT_NEGATIVE = "0 or greater"
+RATIO = "0 or greater and below 1, the critical damping"
+
+
+class Output(str):
+    """Name of an observed quantity that knows its unit; among other texts it is its name.
+
+    Args:
+        name: As ``q3``, or any word.
+        unit: SI unit, as ``m/s``. Where none is given, that of the storey frame's output of this
+            kind; "SI" of names that are none.
+    """
+
+    unit: str
+
+    def __new__(cls, name: str, unit: str = "") -> Output:
+        """The name with the unit, or with its own."""
+        made = super().__new__(cls, name)
+        own = name.unit if isinstance(name, Output) else UNITS.get(made._parts[0], "SI")
+        made.unit = unit or own
+        return made
+
+    def __reduce__(self) -> tuple[type[Output], tuple[str, str]]:
+        """How a copy is made, in another process, too."""
+        return Output, (str(self), self.unit)
+
+    @property
+    def _parts(self) -> tuple[str, str]:
+        kind = self.rstrip("0123456789")
+        return kind, self[len(kind) :]
+
+    @property
+    def words(self) -> str:
+        """In words, with its name: "displacement of floor 3 (q3)"; else the name."""
+        kind, place = self._parts
+        known = WORDS.get(kind)
+        return f"{known} {place} ({self})" if known and place else self.replace("_", " ")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a structure.
+
+    Args:
+        name: As ``m2``.
+        unit: SI unit; empty where it has none, or none is known.
+        range: `POSITIVE`, `NOT_NEGATIVE`, `RATIO`, or empty for any number.
+    """
+
+    name: str
+    unit: str = ""
+    range: str = ""
+
+    def admits(self, low: float, high: float) -> bool:
+        """Whether all values from `low` to `high` are finite and within the range."""
+        above = {POSITIVE: low > 0, NOT_NEGATIVE: low >= 0, RATIO: low >= 0 and high < 1}
+        return bool(np.isfinite([low, high]).all() and above.get(self.range, True))
+
+
+OF_STOREY_FRAME = {
+    "E": ("Pa", POSITIVE),
+    "I": ("m^4", POSITIVE),
+    "m": ("kg", POSITIVE),
+    "l": ("m", POSITIVE),
+    "k": ("N/m", POSITIVE),
+    "c": ("", POSITIVE),
+    "d": ("N*s/m", NOT_NEGATIVE),
+    "rayleigh_mass": ("1/s", NOT_NEGATIVE),
+    "rayleigh_stiffness": ("s", NOT_NEGATIVE),
+    "zeta": ("", RATIO),
+    "q": ("m", ""),
+    "v": ("m/s", ""),
+}
+"""Units and ranges of a storey frame's parameters, by their names without the floor."""
+
+
+def of_storey_frame(name: str) -> Parameter:
+    """A parameter of a storey frame by its name; without unit and range where it is no such."""
+    return Parameter(name, *OF_STOREY_FRAME.get(re.sub(r"\d+(_0)?$", "", name), ()))
