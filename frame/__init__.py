@@ -7,7 +7,6 @@ from alphacut.frame.dynamics.integrators import (
     Exact,
     Gauss4,
     Midpoint,
-    Newmark,
     RungeKutta4,
 )
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
@@ -19,11 +18,12 @@ from alphacut.frame.propagation import envelope, plan
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 from alphacut.frame.structures.linear import Accelerogram
 from alphacut.frame.structures.matrix import MatrixStructure
+from alphacut.frame.structures.quantities import Output
 from alphacut.frame.structures.storey import StoreyFrame
 
 __all__ = [
     "INTEGRATORS", "METHODS", "Accelerogram", "Envelope", "Exact", "FollowerRecord", "Gauss4",
     "GraphFollower", "LagrangianFlow", "LagrangianSystem", "LinearFlow", "MatrixStructure",
-    "Midpoint", "Newmark", "RungeKutta4", "StepGuard", "StoreyFrame", "envelope", "guard",
+    "Midpoint", "Output", "RungeKutta4", "StepGuard", "StoreyFrame", "envelope", "guard",
     "pendulum", "plan", "record",
 ]  # fmt: skip

@@ -58,7 +58,7 @@ def envelope(
             error of 1e-4 m, or of a thousandth of each peak where no output is a displacement, and
             improved-graph-follower for others.
         integrator: Time stepping. Of linear structures an integrator or its name: exact (of auto
-            and modal unless given), midpoint (of all others), newmark, rk4, gauss4. Of general
+            and modal unless given), midpoint (of all others), rk4, gauss4. Of general
             Lagrangian systems midpoint (unless given), composition4 or rk4.
         relative: Whether the method's tolerance is a share of each output's peak at the modal
             parameters, instead of a length in SI units.

@@ -82,12 +82,11 @@ def stability_limits(highest: float = 6.0) -> dict[str, float]:
 
 COLOURS = {
     "midpoint": "#0072b2",
-    "newmark": "#56b4e9",
     "rk4": "#d55e00",
     "gauss4": "#009e73",
     "exact": "black",
 }
-STYLES = {"newmark": "--", "exact": ":"}
+STYLES = {"exact": ":"}
 
 
 def draw(rows: list[dict[str, Any]], drifts: dict[str, Array], steps: int, path: Path) -> None:

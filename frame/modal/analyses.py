@@ -59,7 +59,7 @@ def analyse(
 def _discrete(rate: Jet, flow: LinearFlow) -> Jet:
     """Log R(hλ)/h: the rate at which the integrator's modes advance."""
     rational = flow.integrator.amplification
-    if rational is None or (flow.system.ground is not None and rational[0]):
+    if flow.system.ground is not None and rational[0]:
         raise ModalError(
             f"modal: the integrator '{flow.integrator.name}' keeps no modes here; take exact, or"
             " the method graph-follower"

@@ -66,6 +66,7 @@ class Accelerogram:
                 f"accelerogram: step {self.step:g} s must be positive and all"
                 f" {np.size(self.acceleration)} samples finite, two or more"
             )
+        object.__setattr__(self, "acceleration", np.asarray(self.acceleration, float))
 
     @property
     def extremes(self) -> tuple[float, float, float]:

@@ -112,8 +112,8 @@ class MatrixStructure:
         mass: Pairs (factor, symmetric array (n, n)), in kg; an array may be sparse, as those that
             `scipy.io.mmread` reads.
         stiffness: The same, in N/m.
-        observed: Rows by output name, each (n,) acting on displacements or (2n,) acting on
-            displacements and velocities.
+        observed: Rows by output name (an `Output` gives its unit), each (n,) acting on
+            displacements or (2n,) acting on displacements and velocities.
         damping: The same, in N s/m.
         q0: Initial displacements, shape (n,), in m; zero when None.
         v0: Initial velocities, shape (n,), in m/s; zero when None.

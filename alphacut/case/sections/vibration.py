@@ -27,7 +27,7 @@ EnvelopeMethod = Literal[
     "monte-carlo",
     "quasi-monte-carlo",
 ]
-IntegratorName = Literal["midpoint", "newmark", "rk4", "gauss4", "exact", "composition4"]
+IntegratorName = Literal["midpoint", "rk4", "gauss4", "exact", "composition4"]
 ENVELOPE_METHODS: tuple[str, ...] = get_args(EnvelopeMethod)
 INTEGRATORS: tuple[str, ...] = get_args(IntegratorName)
 NONLINEAR = ("midpoint", "composition4", "rk4")  # those that integrate a pendulum
@@ -70,7 +70,10 @@ class Envelope(Section):
     method: Annotated[EnvelopeMethod, Key("how the envelope is found")] = "auto"
     integrator: Annotated[
         IntegratorName | None,
-        Key("time stepping; by the method if left out: exact for modal, else midpoint"),
+        Key(
+            "time stepping; by the method if left out: exact for modal, else midpoint (of linear"
+            " structures Newmark's method of average acceleration)"
+        ),
     ] = None
     order: Annotated[
         int, Key("order κ of the Taylor models", allowed=Range("1 or 2", 1, 2, closed=True))

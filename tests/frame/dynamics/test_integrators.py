@@ -14,7 +14,6 @@ from alphacut.frame import (
     Exact,
     LinearFlow,
     Midpoint,
-    Newmark,
     StoreyFrame,
     guard,
 )
@@ -29,7 +28,7 @@ SHAKEN = replace(
     damper_placement="storey",
 )
 NAMES = ("E", "m1", "l2", "d3", "q2_0", "v3_0")
-ALL = [*INTEGRATORS.values(), Newmark(1 / 6, 0.5), Newmark(0.36, 0.7)]
+ALL = list(INTEGRATORS.values())
 
 
 def modal(names: tuple[str, ...], system: StoreyFrame = FRAME) -> np.ndarray:
@@ -120,10 +119,6 @@ def test_midpoint_is_the_two_step_recurrence() -> None:
             )
         )
     assert np.abs(LinearFlow(FRAME, ("E",), 10, h).values(modal(("E",)))[0] - q).max() < 1e-11
-    assert (
-        np.abs(LinearFlow(FRAME, ("E",), 10, h, Newmark()).values(modal(("E",)))[0] - q).max()
-        < 1e-11
-    )
 
 
 def test_undamped_energy_does_not_drift() -> None:
@@ -171,5 +166,3 @@ def test_unknown_parameters_and_odd_durations_are_refused() -> None:
         LinearFlow(FRAME, ("m4",), 1, 0.1)
     with pytest.raises(ValueError, match="not a positive multiple"):
         LinearFlow(FRAME, ("E",), 1, 0.3)
-    with pytest.raises(ValueError, match="beta"):
-        Newmark(-1.0)

@@ -1,0 +1,79 @@
+"""Outputs keep their unit wherever they go; parameters admit what their range says."""
+
+import pickle
+from copy import deepcopy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from alphacut.frame import MatrixStructure, Output, StoreyFrame, envelope, pendulum
+from alphacut.frame.structures.quantities import OF_STOREY_FRAME, of_storey_frame
+from alphacut.fuzzy import Triangular
+
+FRAME = StoreyFrame((1.0, 2.0), (1.0, 1.0), 1.0, 1.0, q0=(1.0, 0.0))
+
+
+@pytest.mark.parametrize("name", ["q1", "v12", "a3", "ar2", "drift1", "shear2", "base_shear"])
+def test_outputs_of_a_storey_frame_know_their_units(name: str) -> None:
+    kind = name.rstrip("0123456789")
+    units = {"q": "m", "drift": "m", "v": "m/s", "shear": "N", "base_shear": "N"}
+    assert Output(name).unit == units.get(kind, "m/s^2")
+    assert Output(name) == name
+    assert {name: 1}[Output(name)] == 1
+
+
+def test_a_given_unit_goes_along_with_the_name() -> None:
+    tip = Output("q1", "mm")
+    for copy in (Output(tip), pickle.loads(pickle.dumps(tip)), deepcopy(tip)):
+        assert (copy, copy.unit, type(copy)) == ("q1", "mm", Output)
+    assert Output("q1").unit == "m"
+    assert Output(tip, "cm").unit == "cm"
+    assert Output("word").unit == "SI"
+    assert (Output("q12").words, Output("base_shear").words) == (
+        "displacement of floor 12 (q12)",
+        "base shear",
+    )
+
+
+def test_every_structure_gives_units_of_its_outputs() -> None:
+    eye = np.eye(2)
+    rows = {Output("turn", "rad"): np.array([1.0, 0.0]), "q2": np.array([0.0, 1.0])}
+    matrix = MatrixStructure(
+        parameters={"k": 1.0}, mass=[(1.0, eye)], stiffness=[("k", eye)], observed=rows, q0=[1, 0]
+    )
+    assert [name.unit for name in matrix.outputs] == ["rad", "m"]
+    assert [name.unit for name in pendulum().outputs] == ["N", "rad"]
+    assert [name.unit for name in replace(FRAME, outputs=("a1", "q2")).outputs] == ["m/s^2", "m"]
+    inputs = {"k": Triangular(0.9, 1.0, 1.1)}
+    found = envelope(matrix, inputs, duration=1.0, step=0.1, alpha=(0,), method="vertex")
+    assert "rad" in repr(found)
+    assert found.to_dataset()["lower"].attrs["units"] == "SI, by output"
+
+
+@pytest.mark.parametrize("kind", OF_STOREY_FRAME)
+def test_ranges_are_those_that_a_frame_accepts(kind: str) -> None:
+    one = of_storey_frame(kind)
+    assert not one.admits(0.5, np.inf)
+    assert not one.admits(np.nan, 0.5)
+    assert one.admits(1e-9, 0.999)
+    arguments = {"E": "modulus", "I": "second_moment", "rayleigh_mass": "rayleigh"}
+    arguments |= {"m": "masses", "l": "lengths", "d": "dampers", "zeta": "damping_ratio"}
+    arguments |= {"c": "columns", "q": "q0", "v": "v0"}
+    if kind not in arguments:
+        return
+    for value in (-1.0, 0.0, 0.999, 1.0, 2.0):
+        given: object = value if kind in ("E", "I", "zeta") else (value, value)
+        try:
+            replace(FRAME, **{arguments[kind]: given})  # type: ignore[arg-type]
+            accepted = True
+        except ValueError as error:
+            accepted = False
+            assert one.range in str(error)
+        assert accepted == one.admits(value, value), (kind, value)
+
+
+def test_names_with_floors_are_parameters_and_directions_of_a_field_are_none() -> None:
+    assert of_storey_frame("q2_0").unit == "m"
+    assert of_storey_frame("zeta10").range == of_storey_frame("zeta").range
+    assert (of_storey_frame("m_1").unit, of_storey_frame("m_1").range) == ("", "")
