@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -14,6 +15,7 @@ from alphacut.frame.calculus.low_discrepancy import chebyshev_points, corners
 from alphacut.frame.calculus.numbers import require_count
 from alphacut.frame.checks.admissible import require_motion, require_size
 from alphacut.frame.checks.between_nodes import stray
+from alphacut.frame.checks.step_error import MARGIN, deviations, exact
 from alphacut.frame.dynamics.flow import Flow, LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
@@ -246,10 +248,12 @@ def exceedances(
     spread: int = 64,
     rng: np.random.Generator | None = None,
     progress: Progress | bool | None = None,
+    integrator: str = "midpoint",
 ) -> dict[str, FuzzyProbability]:
     """Fuzzy probabilities of exceeding several limits, from the same trajectories, as `exceedance`.
 
-    Its arguments are the same, with the limits in their units by output in place of one.
+    Its arguments are the same, with the limits in their units by output in place of one, and the
+    integrator of a general system.
 
     Returns:
         One for each output, and beside several `ANY`: that any limit is exceeded, over shares of
@@ -271,7 +275,7 @@ def exceedances(
     names = *cuts.names, *random
     flow: Flow
     if isinstance(system, LagrangianSystem):
-        flow = LagrangianFlow(system, names, duration, step)
+        flow = LagrangianFlow(system, names, duration, step, integrator)
     else:
         flow = LinearFlow(system, names, duration, step, Exact())
         middle = np.tile(cuts.modal, (len(draws), 1))
@@ -279,27 +283,26 @@ def exceedances(
     for name, values in zip(random, drawn, strict=True):
         require_size(name, system.parameters[name], np.array([values.min(), values.max()]))
     tried = [_tried(cuts, level, spread) for level in range(len(cuts.alpha))]
+    least: list[Array] = []
     found: list[Array] = []
     higher: list[Array] = []
     spaced = tried[0][:: -(-len(tried[0]) // LOOKED_AT)]
     few = np.array([[*point, *draw] for point in spaced for draw in draws[:LOOKED_AT]])
-    between = stray(flow, few)
+    between, off = stray(flow, few), _off(flow, few)
     with told(progress) as tell:
         for point in np.concatenate(tried):
             size = np.abs(flow.values(np.hstack([np.tile(point, (len(draws), 1)), draws])))
-            found.append(size.max(1)[:, columns] / sizes)
-            higher.append(within_steps(size, between).max(1)[:, columns] / sizes)
+            least.append(np.maximum(size - off, 0.0).max(1)[:, columns] / sizes)
+            found.append((size + off).max(1)[:, columns] / sizes)
+            higher.append(within_steps(size + off, between).max(1)[:, columns] / sizes)
             if tell:
                 tell(len(found) / sum(map(len, tried)))
     of = np.repeat(np.arange(len(tried)), [len(points) for points in tried])
-    peak, more = np.array(found), np.array(higher)  # (points, draws, limits)
-    each = [
-        _probability(peak[..., k], more[..., k], of, size, random=bool(random), alpha=cuts.alpha)
-        for k, size in enumerate(sizes)
-    ]
+    three = [np.array(x) for x in (least, found, higher)]  # (points, draws, limits) each
+    chance = partial(_probability, of=of, random=bool(random), alpha=cuts.alpha)
+    each = [chance(*(x[..., k] for x in three), size=size) for k, size in enumerate(sizes)]
     if len(each) > 1:
-        parts = peak.max(-1), more.max(-1)
-        each.append(_probability(*parts, of, 1.0, random=bool(random), alpha=cuts.alpha))
+        each.append(chance(*(x.max(-1) for x in three), size=1.0))
     return dict(zip((*limits, ANY), each, strict=False))
 
 
@@ -337,21 +340,30 @@ def _limits_of(
     return np.array([*limits.values()], float), [system.outputs.index(name) for name in limits]
 
 
+def _off(flow: Flow, points: Array) -> Array:
+    """What trajectories are wrong by, with a margin, from those at some points, shape (T, m)."""
+    if exact(flow):
+        return np.zeros((len(flow.time), len(flow.outputs)))
+    return MARGIN * np.maximum.accumulate(deviations(flow, points)[1].max(0), axis=0)
+
+
 def _probability(
-    peak: Array, more: Array, of: Array, size: float, *, random: bool, alpha: Array
+    least: Array, peak: Array, more: Array, of: Array, size: float, *, random: bool, alpha: Array
 ) -> FuzzyProbability:
     """Probability that peaks pass 1, from those at each fuzzy point and draw, (S, D).
 
     Args:
-        peak: Peaks at nodes over their limit.
+        least: Peaks at nodes over their limit, less what trajectories are wrong by.
+        peak: The same with it added.
         more: Those within steps, likewise.
         of: Level of each point, shape (S,).
         size: The limit, which the curve's limits are in units of.
         random: Whether there are draws.
         alpha: Levels.
     """
-    limits = np.linspace(0.95 * peak.min(), 1.05 * peak.max(), LIMITS)
-    low, high = _bounds(np.sort(peak, axis=1), of, np.append(limits, 1.0))
+    limits = np.linspace(0.95 * least.min(), 1.05 * peak.max(), LIMITS)
+    low = _bounds(np.sort(least, axis=1), of, np.append(limits, 1.0))[0]
+    least_above, high = _bounds(np.sort(peak, axis=1), of, np.append(limits, 1.0))
     above = _bounds(np.sort(more, axis=1), of, np.array([1.0]))
     draws = peak.shape[1]
     shares = (*low[:, -1], *high[:, -1])
@@ -364,7 +376,7 @@ def _probability(
         limits * size,
         low[:, :-1],
         high[:, :-1],
-        np.maximum(above[0][:, 0] - low[:, -1], above[1][:, 0] - high[:, -1]),
+        np.maximum(above[0][:, 0] - least_above[:, -1], above[1][:, 0] - high[:, -1]),
     )
 
 

@@ -1,4 +1,4 @@
-"""Error of time stepping in an envelope, and steps too long for the scheme."""
+"""Error of time stepping and of a reduction in an envelope, and steps too long for the scheme."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from alphacut.frame.dynamics.flow import Flow, LinearFlow, StepError
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.dynamics.nonlinear import SCHEMES, LagrangianFlow
 from alphacut.frame.envelope import Envelope
+from alphacut.frame.reduced.reduction import ReducedStructure
 from alphacut.frame.structures.linear import evaluate
 from alphacut.frame.structures.modes import state_matrix
 from alphacut.frame.structures.quantities import Output
@@ -29,6 +30,8 @@ GROWTH = 1e-6
 """Growth of a motion within a step that counts as rounding."""
 DIVERGED = 10.0
 """Error of a scheme, as a multiple of the motion's peak, from which on it has left the motion."""
+FULL = 4
+"""Motions of a full structure that a reduced one is judged by, at most."""
 
 
 def probes(cuts: Boxes) -> Array:
@@ -42,13 +45,13 @@ def probes(cuts: Boxes) -> Array:
 def step_error(flow: UnitFlow) -> Array:
     """Estimate of the largest time-stepping error so far, from modal values and corners, (T, m).
 
-    Of a linear structure the distance from the exact propagator; else the distance from half the
-    step, extrapolated by the scheme's order.
+    Of a linear structure the distance from the exact propagator, of a reduced one from the motion
+    of the full structure; else the distance from half the step, extrapolated by the scheme's order.
 
     Raises:
         StepError: A scheme has left the motion.
     """
-    if isinstance(flow.flow, LinearFlow) and isinstance(flow.flow.integrator, Exact):
+    if exact(flow.flow):
         return np.zeros((len(flow.time), len(flow.outputs)))
     values, error = deviations(flow.flow, probes(flow.boxes))
     so_far: Array = np.maximum.accumulate(error.max(0), axis=0)
@@ -62,6 +65,13 @@ def step_error(flow: UnitFlow) -> Array:
     return MARGIN * so_far
 
 
+def exact(flow: Flow) -> bool:
+    """Whether trajectories have no error but rounding."""
+    if not isinstance(flow, LinearFlow) or isinstance(flow.system, ReducedStructure):
+        return False
+    return isinstance(flow.integrator, Exact)
+
+
 @singledispatch
 def deviations(flow: Flow, points: Array) -> tuple[Array, Array]:
     """More accurate trajectories at `points` (S, d), and the flow's errors, (S, T, m)."""
@@ -71,8 +81,13 @@ def deviations(flow: Flow, points: Array) -> tuple[Array, Array]:
 
 @deviations.register
 def _(flow: LinearFlow, points: Array) -> tuple[Array, Array]:
-    exact = replace(flow, integrator=Exact()).values(points)
-    return exact, np.abs(flow.values(points) - exact)
+    if isinstance(flow.system, ReducedStructure):
+        points = points[:: -(-len(points) // FULL)]
+        given = [dict(zip(flow.names, point.tolist(), strict=True)) for point in points]
+        full = np.array([flow.system.truth(point, flow.time) for point in given])
+        return full, np.abs(flow.values(points) - full)
+    truth = replace(flow, integrator=Exact()).values(points)
+    return truth, np.abs(flow.values(points) - truth)
 
 
 @deviations.register
@@ -82,7 +97,7 @@ def _(flow: LagrangianFlow, points: Array) -> tuple[Array, Array]:
 
 
 def with_step_error(found: Envelope, flow: UnitFlow, scheme: str, steps: Array) -> Envelope:
-    """The envelope with the time-stepping error in its facts and estimated error.
+    """The envelope with the time-stepping error in its facts and errors; certified bounds grow.
 
     Args:
         found: The envelope of the scheme's trajectories.
@@ -104,8 +119,26 @@ def with_step_error(found: Envelope, flow: UnitFlow, scheme: str, steps: Array) 
         error = error + steps
         if "estimated_error" in facts:
             facts["estimated_error"] = float((error / flow.scale).max())
-    _warn(found, steps.max(0))
+    _warn(found, flow, steps.max(0))
+    if found.inner_lower is not None and found.inner_upper is not None and steps.any():
+        found = replace(
+            found,
+            lower=found.lower - steps,
+            upper=found.upper + steps,
+            inner_lower=found.inner_lower + steps,
+            inner_upper=found.inner_upper - steps,
+        )
+        error = None if error is None else error + 2 * steps
     return replace(found, error=error, facts=facts)
+
+
+def source(flow: Flow) -> tuple[str, str]:
+    """What makes trajectories inexact, and what lessens that."""
+    if not isinstance(flow, LinearFlow):
+        return "time stepping", "take a smaller step, or a scheme of order 4"
+    if isinstance(flow.system, ReducedStructure):
+        return "the reduction to few shapes", "take narrower supports"
+    return "time stepping", "take a smaller step; integrator exact has none"
 
 
 def _dominance(found: Envelope, flow: UnitFlow, steps: Array) -> dict[str, str]:
@@ -117,31 +150,25 @@ def _dominance(found: Envelope, flow: UnitFlow, steps: Array) -> dict[str, str]:
     if ratio[worst] <= 1:
         return {}
     name, unit = flow.outputs[worst], Output(flow.outputs[worst]).unit.replace("SI", "")
-    cure = (
-        "integrator exact has none"
-        if isinstance(flow.flow, LinearFlow)
-        else "take a smaller step, or a scheme of order 4"
-    )
+    what, cure = source(flow.flow)
     return {
         "dominant_error": (
-            f"time stepping: {steps[worst]:.2g} {unit} of {name} against {own[worst]:.2g} {unit} of"
+            f"{what}: {steps[worst]:.2g} {unit} of {name} against {own[worst]:.2g} {unit} of"
             f" the envelope; {cure}"
         )
     }
 
 
-def _warn(found: Envelope, steps: Array) -> None:
-    """Warns where time stepping is wrong by more than a hundredth of a peak."""
+def _warn(found: Envelope, flow: UnitFlow, steps: Array) -> None:
+    """Warns where trajectories are wrong by more than a hundredth of a peak."""
     peak = np.maximum(np.abs(found.lower), np.abs(found.upper)).max((0, 1))
     share = np.divide(steps, peak, out=np.zeros_like(steps), where=peak > 0)
     worst = int(share.argmax())
     if share[worst] > LIMIT:
         of = f"{steps[worst]:.2g}, {100 * share[worst]:.2g} % of the peak of {found.outputs[worst]}"
-        warnings.warn(
-            f"step: {found.time[1]:g} s leaves an error of time stepping of {of}; take a smaller"
-            " step",
-            stacklevel=4,
-        )
+        what, cure = source(flow.flow)
+        where = f"step: {found.time[1]:g} s leaves an" if what == "time stepping" else "the"
+        warnings.warn(f"{where} error of {what} of {of}; {cure}", stacklevel=4)
 
 
 def require_stable(flow: Flow, cuts: Boxes) -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
-from alphacut.frame.checks.step_error import step_error
+from alphacut.frame.checks.step_error import source, step_error
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.batch_graph_follower import BatchFollower
 from alphacut.frame.methods.modal import FINE, GapError, Modal, guaranteed
@@ -148,10 +148,10 @@ def _left(flow: UnitFlow, tolerance: float) -> float:
     """What time stepping leaves of the tolerance; raises ToleranceError if that is nothing."""
     reached = float((step_error(flow) / flow.scale).max())
     if reached >= tolerance:
+        what, cure = source(flow.flow)
         raise ToleranceError(
-            f"auto: the error of time stepping, {flow.told(reached)}, is above the"
-            f" tolerance {flow.told(tolerance)}; take the integrator exact, a smaller step or"
-            " a larger tolerance"
+            f"auto: the error of {what}, {flow.told(reached)}, is above the tolerance"
+            f" {flow.told(tolerance)}; {cure}, or a larger tolerance"
         )
     return tolerance - reached
 

@@ -1,11 +1,11 @@
 """Reduction of large linear structures to few shapes that hold for the whole box.
 
 The full structure has thousands of unknowns and matrices that are sums of a few given matrices,
-each times a smooth factor of the
-parameters: K(p) = Σ_i f_i(p) K_i, likewise M and D. Projection on a common basis V makes it a small
-structure with n = V's columns, and everything in this package applies. The basis holds the energy
-of harmonic responses at a few parameter sets (`frame.response_basis`); the error is measured
-against trajectories of the full structure at other parameter sets.
+each times a smooth factor of the parameters: K(p) = Σ_i f_i(p) K_i, likewise M and D. Projection
+on a common basis V makes it a small structure with n = V's columns, and everything in this package
+applies. The basis holds the energy of harmonic responses and of the modes that resonate, at a few
+parameter sets (`frame.response_basis`); what it leaves out is measured against trajectories of the
+full structure (`frame.checks.step_error`) and counts as error of an envelope.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
+from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.dynamics.spectral import responses
 from alphacut.frame.reduced.response_basis import energy_basis
 from alphacut.frame.structures.damping import modal_damping
@@ -28,6 +30,14 @@ if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
 
 Factor = Callable[[Mapping[str, Any]], Any]
+BEYOND = 4
+"""Modes count up to so many times the end of the ground's band."""
+SHARPEST = 0.02
+"""Twice the damping ratio below which resonances are not taken for larger: none has the time."""
+RESONANT = (100, 300)
+"""Modes that may resonate, at most; the second number where the first is not enough."""
+MOST_NODES, PERIODS = 1000, 10
+"""Nodes, and periods of a structure without ground motion, by which the shapes are judged."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,23 +79,44 @@ class AffineStructure:
         self,
         bounds: Mapping[str, tuple[float, float]],
         *,
+        accuracy: float = 5e-4,
         keep: float = 1e-11,
         samples: int = 5,
         frequencies: int = 24,
     ) -> ReducedStructure:
         """Projection on the shapes that carry the energy of harmonic responses in a box.
 
+        Modes that resonate come in only where the motion without them is not accurate enough at
+        two of the points. What an envelope declares is measured anew, see `step_error`.
+
         Args:
             bounds: Lower and upper ends of the uncertain parameters.
+            accuracy: Error of the motion, as a share of each peak, that needs no further shapes.
             keep: Share of the strongest shape's strain energy below which a shape is left out.
             samples: Points of the box.
             frequencies: Frequencies of the load at each point.
         """
-        band = self._band()
-        shapes = [
-            self._response_shapes(point, np.geomspace(*band, frequencies))
-            for point in _points(self.parameters, bounds, samples)
-        ]
+        band, points = self._band(), _points(self.parameters, bounds, samples)
+        loads = np.geomspace(*band, frequencies)
+        shapes = [self._response_shapes(point, loads) for point in points]
+        made, time = self._projected(shapes, keep), self._watched(band[0])
+        truth = [self.trajectories(point, time) for point in points[:2]]
+        for lowest in RESONANT:
+            if made.deviation(points[:2], time, truth) <= accuracy:
+                break
+            beyond = [self._resonances(point, BEYOND * band[1], lowest) for point in points]
+            made = self._projected([*shapes, *beyond], keep)
+        return made
+
+    def _watched(self, slowest: float) -> Array:
+        """Nodes of the motion by which the shapes are judged, in s, from half the least ω."""
+        if self.ground is None:
+            return np.linspace(0.0, PERIODS * np.pi / slowest, 20 * PERIODS + 1)
+        count = min(len(self.ground.acceleration), MOST_NODES)
+        return np.arange(count) * self.ground.step
+
+    def _projected(self, shapes: Sequence[Array], keep: float) -> ReducedStructure:
+        """Projection on the strongest of shapes, each (N, k)."""
         M, K = self.assembled(self.parameters)
         # so that the rigid motion is projected without error
         always = [self.excitation] if self.ground is not None else []
@@ -137,6 +168,24 @@ class AffineStructure:
             )
         return np.column_stack(shapes)
 
+    def _resonances(self, p: Mapping[str, float], top: float, lowest: int) -> Array:
+        """Modes up to a frequency (rad/s) in the size that they swing to in resonance, (N, k)."""
+        from scipy.sparse.linalg import eigsh
+
+        M, K = self.assembled(p)
+        squared, shape = eigsh(K, min(lowest, K.shape[0] - 1), M, sigma=0.0)
+        omega, push = np.sqrt(squared), shape.T @ (M @ self.excitation)
+        start = [x for x in (self.q0, self.v0) if x is not None]
+        share = np.abs(push) / squared * (self.ground is not None)
+        share += sum(np.abs(shape.T @ (M @ x)) for x in start)
+        damped = self._half_damping(p, squared) / omega
+        return np.asarray((shape * share / np.maximum(2 * damped, SHARPEST))[:, omega <= top])
+
+    def _half_damping(self, p: Mapping[str, float], squared: Array) -> Array:
+        """ζ ω of modes with squared frequencies ω², by Rayleigh and by the ratio, in 1/s."""
+        half = (float(p[self.rayleigh[0]]) + float(p[self.rayleigh[1]]) * squared) / 2
+        return np.asarray(half + (float(p[self.ratio]) * np.sqrt(squared) if self.ratio else 0.0))
+
     def _band(self) -> tuple[float, float]:
         """Angular frequencies from half the fundamental one to the end of the spectrum."""
         from scipy.sparse.linalg import splu
@@ -157,8 +206,7 @@ class AffineStructure:
 
         M, K = self.assembled(p)
         squared, shape = eigh(K.toarray(), M.toarray())
-        half = (float(p[self.rayleigh[0]]) + float(p[self.rayleigh[1]]) * squared) / 2
-        half += float(p[self.ratio]) * np.sqrt(squared) if self.ratio else 0.0
+        half = self._half_damping(p, squared)
         root = np.sqrt(half**2 - squared + 0j)
         slow, fast = -half + root, -half - root
         rows = np.array(list(self.observed.values())) @ shape
@@ -244,13 +292,19 @@ class ReducedStructure:
         rows = np.hstack([self.rows, np.zeros_like(self.rows)])
         return Jet.constant(np.tile(rows, (like.value.size, 1, 1)), like.directions)
 
-    def error(self, points: Sequence[Mapping[str, float]], time: Array, values: Array) -> float:
-        """Largest deviation of `values` (S, T, m) from the full structure, relative to peaks."""
-        worst = 0.0
-        for point, mine in zip(points, values, strict=True):
-            truth = self.full.trajectories({**self.parameters, **point}, time)
-            worst = max(worst, float((np.abs(mine - truth).max(0) / np.abs(truth).max(0)).max()))
-        return worst
+    def deviation(
+        self, points: Sequence[Mapping[str, float]], time: Array, truth: Sequence[Array]
+    ) -> float:
+        """Largest error of the motion at parameter sets, as a share of each peak in `truth`."""
+        names = tuple(self.parameters)
+        flow = LinearFlow(self, names, float(time[-1]), float(time[1]), Exact())
+        found = flow.values(np.array([[point[name] for name in names] for point in points]))
+        pairs = zip(found, truth, strict=True)
+        return max(float((np.abs(x - y).max(0) / np.abs(y).max(0)).max()) for x, y in pairs)
+
+    def truth(self, point: Mapping[str, float], time: Array) -> Array:
+        """Outputs of the full structure, shape (T, m); parameters not given are modal."""
+        return self.full.trajectories({**self.parameters, **point}, time)
 
 
 def _points(

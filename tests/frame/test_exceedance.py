@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from alphacut.frame import Accelerogram, LinearFlow, StoreyFrame, envelope
+from alphacut.frame import Accelerogram, LagrangianFlow, LinearFlow, StoreyFrame, envelope, pendulum
 from alphacut.frame.boxes import boxes
 from alphacut.frame.dynamics.integrators import Exact
-from alphacut.frame.exceedance import exceedance, peaks, tried_peaks
+from alphacut.frame.exceedance import exceedance, exceedances, peaks, tried_peaks
 from alphacut.fuzzy import Interval, Triangular
 
 FRAME = StoreyFrame(
@@ -229,3 +229,29 @@ def test_a_random_mass_in_tonnes_is_refused() -> None:
     random = {"m1": scipy.stats.norm(9, 0.5)}
     with pytest.raises(ValueError, match=r"m1: its support .* of another size than .* own value"):
         exceedance(FRAME, {"E": INPUTS["E"]}, random, limit=0.1, duration=1, step=0.1)
+
+
+@pytest.mark.parametrize("scheme", ["midpoint", "composition4"])
+def test_the_probability_of_a_pendulum_holds_the_error_of_time_stepping(scheme: str) -> None:
+    """Twenty steps a period: the peaks of the scheme alone are passed too often or too seldom."""
+    system = pendulum(length=0.7228, damping=0.014, phi0=2.15, omega0=0.0)
+    step, random = 0.0853, {"phi_0": scipy.stats.norm(2.15, 0.02)}
+    draws = scipy.stats.norm(2.15, 0.02).rvs(400, random_state=3)
+    fine = LagrangianFlow(system, ("phi_0",), 49 * step, step / 16, "composition4")
+    force = np.abs(fine.values(draws[:, None])[:, ::16, 0]).max(1)
+    limit = float(np.median(force))
+    found = exceedances(
+        system,
+        {"m": Interval(0.9999, 1.0001)},
+        random,
+        limits={"force": limit},
+        duration=49 * step,
+        step=step,
+        alpha=(1,),
+        samples=400,
+        spread=1,
+        integrator=scheme,
+    )["force"]
+    assert found.lower[0] - 3 * found.deviation <= 0.5 <= found.upper[0] + 3 * found.deviation
+    if scheme == "composition4":
+        assert found.upper[0] - found.lower[0] < 0.5

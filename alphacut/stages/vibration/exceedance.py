@@ -183,6 +183,7 @@ def exceedance(case: Case, wanted: Structure, progress: Tick | None = None) -> x
         samples=limited.samples,
         rng=np.random.default_rng(limited.seed),
         progress=progress or False,
+        integrator=over.integrator if wanted.linear is None and over.integrator else "midpoint",
     )
     facts = {
         "fuzzy": ", ".join(fuzzy),
