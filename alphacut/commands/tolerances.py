@@ -20,6 +20,8 @@ from alphacut.stages.vibration.studies import fixed_line
 from alphacut.stages.vibration.tolerances import Tolerances, input_unit, tolerances
 
 ABOUT = "largest supports for which the limit provably holds"
+OPEN = 0.1
+"""Gap beyond the safe scale, as a share of it, from which on it is called undecided."""
 KEYS = {
     "--fuzzy": common.KeyOption(
         "envelope.fuzzy", "inputs whose supports are scaled, as E,m", "NAMES"
@@ -88,7 +90,9 @@ def text(found: Tolerances) -> str:
     )
     lines.append(f"unsafe at {scale.unsafe:.4g} ({100 * scale.gap:.2g} % more): {point}")
     what = f"|{next(iter(found.limits))}|" if len(kept) == 1 else "the worst of them"
-    return "\n".join([*lines, f"  there {what} is {scale.share:.6g} of the limit", ""])
+    lines.append(f"  there {what} is {scale.share:.6g} of the limit")
+    lines += ["between the two it is undecided; narrow some inputs"] * (scale.gap > OPEN)
+    return "\n".join([*lines, ""])
 
 
 def _why_undecided(scale: SafeScale) -> str:

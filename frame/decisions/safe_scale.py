@@ -9,7 +9,7 @@ smaller scale alone, since a box holds the smaller ones.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,6 +30,10 @@ EASY = (1.0, 0.3)
 """The same as shares of that, tried first: they serve where the largest box is far from limits."""
 SHRINK = (0.004, 0.008, 0.015, 0.03, 0.06, 0.12, 0.25, 0.5, 0.75)
 """By how much the box to be proved is smaller than the refuted one, until all is proved."""
+CLOSE = (0.3, 0.03)
+"""The same between a scale that is proved and one that is not."""
+LOOSE, HALVINGS = 0.9, 6
+"""Share of the unproved scale below which a greater one is looked for, and in how many steps."""
 HALVED = 0.5 ** np.arange(6)
 """Shares of the largest box that are tried while neither a proof nor a broken limit is found."""
 
@@ -141,8 +145,14 @@ def safe_scale(
             boxes += looked
             if safe or witness is not None:
                 break
+        reason = search.reason if nominal_share <= 1 - TIE else ""
+        low, high = 0.0 if reason else safe, min(unsafe, 2 * size, most)
+        if nominal_share <= 1 - TIE and low < LOOSE * high:
+            low, looked = _closer(search, 1 - nominal_share, low, high, budget, workers)
+            boxes += looked
+            safe, reason = (low, "") if low else (safe, reason)
     share = 0.0 if witness is None else search.share(witness)
-    worth = ("verified by sampling" if search.reason else "guaranteed", search.reason)
+    worth = ("verified by sampling" if reason else "guaranteed", reason)
     seconds = time.perf_counter() - begun
     box, shares = reach(safe), (share, nominal_share)
     return SafeScale(names, centre, safe, *box, unsafe, witness, *shares, *worth, boxes, seconds)
@@ -154,13 +164,31 @@ def _require(limits: Mapping[str, float], most: float) -> None:
     positive("most, the largest scale,", most)
 
 
+def _closer(
+    search: LimitSearch, left: float, low: float, high: float, budget: float, workers: int
+) -> tuple[float, int]:
+    """A greater scale proved between two scales, by halving what is between, and boxes."""
+    boxes = 0
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        done, looked = _easily(search, left, middle, budget, workers, CLOSE)
+        boxes += looked
+        low, high = (middle, high) if done else (low, middle)
+    return low, boxes
+
+
 def _easily(
-    search: LimitSearch, left: float, most: float, budget: float, workers: int
+    search: LimitSearch,
+    left: float,
+    most: float,
+    budget: float,
+    workers: int,
+    gaps: Sequence[float] = EASY,
 ) -> tuple[bool, int]:
     """Whether a rough model, cheaper to bound, proves the largest box, and boxes looked at."""
     pending: Array = np.arange(2 * len(search.flow.time) * len(search.flow.outputs))
     boxes = 0
-    for search.gap in (share * left for share in EASY):
+    for search.gap in (share * left for share in gaps):
         if search.hopeless(most):
             break
         search.fit(most)

@@ -201,3 +201,40 @@ def test_a_limit_that_the_nominal_motion_only_reaches_is_told_with_a_cure(tmp_pa
     for limit, undecided in (("44 mm", True), ("45 mm", False)):
         assert main(["tolerances", str(path), "--set", f"exceedance.limit={limit}"]) == 0
         assert (cure in capfd.readouterr().out) == undecided
+
+
+WIDE = """
+schema = 1
+title = "Three floors"
+about = "Supports so wide that no proof of the modes covers the unsafe scale."
+stages = ["envelope"]
+
+[frame]
+masses = ["12 t", "12 t", "9 t"]
+stiffness = ["[7, 8, 11] MN/m", "[6, 8, 10] MN/m", "[4.5, 6, 8] MN/m"]
+lengths = "3 m"
+damping_ratio = "3 %"
+displacements = ["5 mm", "9 mm", "12 mm"]
+velocities = "0 m/s"
+
+[envelope]
+fuzzy = ["k"]
+duration = "2 s"
+step = "0.02 s"
+
+[exceedance]
+output = "drift1"
+limit = "LIMIT"
+"""
+
+
+def test_a_greater_limit_never_gives_a_smaller_proved_scale(tmp_path, capfd):
+    scales = []
+    for limit in ("5.2 mm", "6 mm"):
+        assert told(tmp_path, limit, "--json", "-", text=WIDE) == 0
+        found = json.loads(capfd.readouterr().out)
+        assert found["nature"] == "guaranteed"
+        scales.append(found["safe_scale"])
+    assert scales[0] <= scales[1] < found["unsafe_scale"] / 1.1
+    assert main(["tolerances", str(tmp_path / "two.toml")]) == 0
+    assert "between the two it is undecided" in capfd.readouterr().out
