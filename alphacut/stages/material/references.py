@@ -221,7 +221,7 @@ def beside(
     return {
         "beside": found,
         "outside": outside(case, found, modulus / GPA, (support[0] / GPA, support[1] / GPA)),
-        "publish": publish(case, found),
+        "publish": publish(case, found) + _beyond_bounds(case, found, modulus / GPA),
     }
 
 
@@ -322,6 +322,25 @@ def publish(case: Case, found: Document) -> str:
     return (
         f"To publish for long fibres:{first} for plane strain the isotropic average{told}"
         ' (modulus.average = "isotropic"); E of the square array (eq. 16) is of its axes alone.'
+    )
+
+
+def _beyond_bounds(case: Case, found: Document, modulus: float) -> str:
+    """That the E to publish passes what isotropic materials reach, and why; else empty."""
+    spheres = case.cell.particles == "spheres"
+    value = modulus if spheres else found["isotropic_average_E_GPa"] or modulus
+    if not spheres and value == modulus and case.modulus.average != "isotropic":
+        return ""
+    low, high = found["spheres" if spheres else "fibres"]["hashin_shtrikman_E_GPa"]
+    off = max(value / high - 1, 1 - value / low)
+    if off <= SLACK:
+        return ""
+    side, bound = ("above", high) if value > high else ("below", low)
+    return (
+        f" But {value:.4g} GPa lies {100 * off:.2g} % {side} {bound:.4g} GPa, the Hashin–Shtrikman"
+        " bound of every isotropic material of these phases and this fraction: cells of all radii"
+        " share one strain, which overrates E where radii scatter and particles are soft. It is"
+        " that of the array alone; of a random material publish the bounds."
     )
 
 
