@@ -15,6 +15,7 @@ from alphacut.commands import options as common
 from alphacut.export.material_card import check_format, export
 from alphacut.io.files import ranks, say
 from alphacut.io.problem import BadInput, Problem, refuse
+from alphacut.io.units import fixed
 from alphacut.rve.anisotropy import ISOTROPIC_ENOUGH, shear_ratio_in_words
 from alphacut.rve.auto.model import ORDER
 from alphacut.rve.cell import STRAIN
@@ -207,9 +208,10 @@ def summary(result: Homogenised) -> str:
         off = [f" ± {value / unit:.1e}" for value, unit in absolute]
     iterations = ", ".join(map(str, result.iterations)) or "none"
     return (
-        f"E = {result.modulus / cell.GPA:.6f}{off[0]} GPa, nu = {result.poisson:.6f}{off[1]}"
-        f" ({result.convention})\n{error}mean s11 = {s11:.9f}{off[2]} GPa under"
-        f" ε11 = ε22 = {STRAIN:g}, mean s12 = {s12:.9f}{off[3]} GPa under ε12 = {STRAIN:g}\n"
+        f"E = {fixed(result.modulus / cell.GPA, 6)}{off[0]} GPa,"
+        f" nu = {result.poisson:.6f}{off[1]} ({result.convention})\n{error}"
+        f"mean s11 = {fixed(s11, 9)}{off[2]} GPa under ε11 = ε22 = {STRAIN:g},"
+        f" mean s12 = {fixed(s12, 9)}{off[3]} GPa under ε12 = {STRAIN:g}\n"
         f"{result.method}, {result.unknowns} unknowns, {result.solver}, iterations {iterations}\n"
         f"seconds: {seconds}\n"
     )

@@ -13,6 +13,7 @@ from alphacut.commands.options import add_common, answer
 from alphacut.io.files import Document, say
 from alphacut.io.progress import progress
 from alphacut.io.provenance import attributes, fingerprint
+from alphacut.io.units import fixed
 from alphacut.stages.image.bounds import compute
 from alphacut.stages.image.document import document, interval, own_of_window, write
 from alphacut.stages.image.phases import contradicted
@@ -79,8 +80,8 @@ def anisotropy(found: Document) -> str:
         f"  plane-strain Young's modulus of the softest direction: {interval(turned['least'])}, "
         f"of the stiffest: {interval(turned['greatest'])}\n"
         f"  middle of these bounds, nearest isotropic tensor: plane-strain bulk"
-        f" {nearest['plane_strain_bulk_GPa']:.4f} GPa, shear {nearest['shear_GPa']:.4f} GPa,"
-        f" {nearest['distance']:.1%} away\n"
+        f" {fixed(nearest['plane_strain_bulk_GPa'], 4)} GPa, shear"
+        f" {fixed(nearest['shear_GPa'], 4)} GPa, {nearest['distance']:.1%} away\n"
     )
 
 

@@ -18,6 +18,7 @@ from alphacut.io.files import Document, say
 from alphacut.io.problem import BadInput, refuse
 from alphacut.io.progress import progress
 from alphacut.io.provenance import door, fingerprint
+from alphacut.io.units import fixed
 from alphacut.rve.auto.model import ORDER
 from alphacut.stages.contract import contract, keep_modulus, require_choice
 from alphacut.stages.material import modulus, response
@@ -146,9 +147,11 @@ def store_of(options: argparse.Namespace, case: Case) -> Path | None:
 def summary(found: modulus.FuzzyModulus) -> str:
     """The α-cuts as a small table."""
     lower, upper = (ends / GPA for ends in found.result.bounds("E"))
-    cuts = zip(found.result.alpha, lower, upper, *found.result.bounds("nu"), strict=True)
+    cuts = zip(
+        found.result.alpha, lower.tolist(), upper.tolist(), *found.result.bounds("nu"), strict=True
+    )
     rows = "".join(
-        f"{a:5.2f}  {low:10.5f}  {high:10.5f}  {least:8.5f}  {most:8.5f}\n"
+        f"{a:5.2f}  {fixed(low, 5):>10}  {fixed(high, 5):>10}  {least:8.5f}  {most:8.5f}\n"
         for a, low, high, least, most in cuts
     )
     cost = (

@@ -23,7 +23,7 @@ from alphacut.io.files import Document, as_json, rank, say, write_text
 from alphacut.io.output_paths import alone, unwritable
 from alphacut.io.problem import BadInput, refuse
 from alphacut.io.provenance import door
-from alphacut.io.units import engineering, largest_by_unit
+from alphacut.io.units import engineering, fixed, largest_by_unit
 from alphacut.stages import summary
 from alphacut.stages import width_shares as shares
 from alphacut.stages.contract import require_choice
@@ -206,10 +206,8 @@ def modulus_lines(found: Document) -> Iterator[str]:
         if inner[0] != inner[1]:
             nu = f"[{', '.join(inner)}] at α = {cell['alpha'][-1]:g}"
         nu += f", support [{', '.join(ends)}]" if ends[0] != ends[1] else ""
-        yield (
-            f"E = {core(cell)}, support [{cell['lower_GPa']:.4f}, {cell['upper_GPa']:.4f}] GPa,"
-            f" bounds {cell['nature']}; nu = {nu}"
-        )
+        support = ", ".join(fixed(cell[f"{end}_GPa"], 4) for end in ("lower", "upper"))
+        yield (f"E = {core(cell)}, support [{support}] GPa, bounds {cell['nature']}; nu = {nu}")
         yield from filter(None, [cell.get("crisp")])
         ranked = sorted(found.get("shares", {}).get("E", {}).items(), key=lambda one: -one[1])
         first = [f"{in_words(name)} {share:.0%}" for name, share in ranked[:3] if share > 0]

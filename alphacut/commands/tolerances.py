@@ -12,6 +12,7 @@ from alphacut.commands import options as common
 from alphacut.frame.decisions.limit_search import TIE
 from alphacut.frame.decisions.safe_scale import SafeScale
 from alphacut.frame.structures.quantities import Output
+from alphacut.io.files import say
 from alphacut.io.problem import BadInput
 from alphacut.io.progress import progress
 from alphacut.io.units import engineering
@@ -56,6 +57,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     handed = common.given_modulus(options.modulus) or stand_in(case)
     with progress("Tolerances", quiet=options.quiet) as tick:
         found = tolerances(case, handed, most=options.most, workers=options.workers, progress=tick)
+    if case.sections.update:
+        say("the supports scaled are those of the case: what [update] learns is not taken in")
     common.answer(options, found.document(), out, text(found))
     return 0
 

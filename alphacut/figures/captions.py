@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 
 from alphacut.io.files import Document
+from alphacut.io.units import fixed
 
 _TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 FIGURES: dict[str, str] = _TABLES["figures"]
@@ -50,5 +51,5 @@ def core(modulus: Document) -> str:
     """Modal value or core interval of a summary's fuzzy modulus, in GPa."""
     low, high = (float(modulus["E_GPa"][side][-1]) for side in ("lower", "upper"))
     if high - low <= 1e-9 * abs(high):
-        return f"{modulus['modal_GPa']:.4f} GPa"
-    return f"[{low:.4f}, {high:.4f}] GPa at α = {modulus['alpha'][-1]:g}"
+        return f"{fixed(modulus['modal_GPa'], 4)} GPa"
+    return f"[{fixed(low, 4)}, {fixed(high, 4)}] GPa at α = {modulus['alpha'][-1]:g}"

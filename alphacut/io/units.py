@@ -199,6 +199,11 @@ def engineering(value: float, si: str, *, digits: int = 4, beside: float = 0.0) 
     return f"{number} {PREFIXES[exponent]}{si}".replace("-", MINUS)
 
 
+def fixed(value: float, places: int) -> str:
+    """A number with so many decimals, or with six digits where these would leave two or fewer."""
+    return f"{value:.{places}f}" if not 0 < abs(value) < 10.0 ** (2 - places) else f"{value:.6g}"
+
+
 def largest_by_unit(values: Iterable[tuple[float, str]]) -> dict[str, float]:
     """Largest magnitude among values of the same unit, for `engineering`."""
     found: dict[str, float] = {}

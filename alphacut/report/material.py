@@ -6,6 +6,7 @@ from markupsafe import Markup
 
 from alphacut.figures.captions import core, in_words
 from alphacut.io.files import Document
+from alphacut.io.units import fixed
 from alphacut.report.tables import code, paragraphs, section, sentence, table
 from alphacut.rve.anisotropy import shear_ratio_in_words
 from alphacut.stages.image.document import interval, own_of_window
@@ -82,7 +83,7 @@ def modulus(found: Document, drawn: Markup) -> Markup:
     columns = [found["E_GPa"], *([poisson] if len(poisson["lower"]) else [])]
     ends = [one[side] for one in columns for side in ("lower", "upper")]
     rows = [
-        (f"{alpha:g}", *(f"{end[level]:.4f}" for end in ends))
+        (f"{alpha:g}", *(fixed(end[level], 4) for end in ends))
         for level, alpha in enumerate(found["alpha"])
     ]
     head = ("α", "lower E, GPa", "upper E, GPa", "lower ν", "upper ν")[: 1 + len(ends)]
@@ -90,12 +91,13 @@ def modulus(found: Document, drawn: Markup) -> Markup:
     told = [f"{one}." for one in lines(beside, found["particles"])] if beside else []
     told += [found[name] for name in ("outside", "crisp", "publish") if found.get(name)]
     words = Markup(
-        "<p>{} <strong>{}</strong>, support [{:.4f}, {:.4f}] GPa; Poisson's ratio {:.4f}. {} {}"
+        "<p>{} <strong>{}</strong>, support [{}, {}] GPa; Poisson's ratio {:.4f}. {} {}"
         " samples, {} linear systems, {:.1f} s. {} {} {}</p>"
     ).format(
         "Core" if "[" in core(found) else "Modal value",
         core(found),
-        *(found[name] for name in ("lower_GPa", "upper_GPa", "nu")),
+        *(fixed(found[name], 4) for name in ("lower_GPa", "upper_GPa")),
+        found["nu"],
         MEANING[meaning(found)],
         *(found[name] for name in ("samples", "solves", "seconds")),
         sentence(found.get("reason", "")),
@@ -118,7 +120,7 @@ def modulus(found: Document, drawn: Markup) -> Markup:
 def given(found: Document) -> Markup:
     """The modulus that the case gives instead of having it computed."""
     cuts = zip(found["alpha"], found["E_GPa"]["lower"], found["E_GPa"]["upper"], strict=True)
-    rows = [(f"{alpha:g}", f"{low:.4f}", f"{high:.4f}") for alpha, low, high in cuts]
+    rows = [(f"{alpha:g}", fixed(low, 4), fixed(high, 4)) for alpha, low, high in cuts]
     words = paragraphs(Markup("Given by the case: {}.").format(code(found["of"])))
     return section("Fuzzy modulus", words, table(("α", "lower E, GPa", "upper E, GPa"), rows))
 
@@ -129,7 +131,7 @@ def image(found: Document, drawn: Markup) -> Markup:
     ends = zip(
         cuts["alpha"], cuts["E_GPa"]["lower"], cuts["E_GPa"]["upper"], cuts["nature"], strict=True
     )
-    rows = [(f"{a:g}", f"{low:.4f}", f"{high:.4f}", nature) for a, low, high, nature in ends]
+    rows = [(f"{a:g}", fixed(low, 4), fixed(high, 4), nature) for a, low, high, nature in ends]
     turned = (found["directions_E_GPa"][end] for end in ("least", "greatest"))
     grains, least, greatest = map(interval, (found["grains_E_GPa"], *turned))
     own, level = own_of_window(found), f"over the inputs at α = {cuts['alpha'][-1]:g}"

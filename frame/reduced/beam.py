@@ -37,7 +37,8 @@ class BeamFrame:
         damping_ratio: ζ of all modes, beside Rayleigh's damping; None for none.
 
     Raises:
-        ValueError: A count or quantity is not positive, or the ratio is outside [0, 1).
+        ValueError: A count or quantity is not positive, the density negative, or the ratio outside
+            [0, 1).
     """
 
     storeys: int
@@ -54,7 +55,9 @@ class BeamFrame:
     damping_ratio: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("storeys", "bays", "height", "width", "modulus", "floor", "density"):
+        if not self.density >= 0:
+            raise ValueError(f"density: {self.density:g} is not allowed; it must be 0 or greater")
+        for name in ("storeys", "bays", "height", "width", "modulus", "floor"):
             if not getattr(self, name) > 0:
                 raise ValueError(
                     f"{name}: {getattr(self, name):g} is not allowed; it must be positive"

@@ -55,6 +55,8 @@ class Output(str):
     def words(self) -> str:
         """In words, with its name: "displacement of floor 3 (q3)"; else the name."""
         kind, place = self._parts
+        if self == "drift":  # of a tower
+            return "drift of the lowest storey (drift)"
         known = WORDS.get(kind)
         return f"{known} {place} ({self})" if known and place else self.replace("_", " ")
 

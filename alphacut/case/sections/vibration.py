@@ -126,7 +126,10 @@ class Exceedance(Section):
 
     output: Annotated[
         str,
-        Key("the output: q3, drift1, base_shear …; of a tower roof or drift, of a pendulum force"),
+        Key(
+            "the output: q3, drift1, base_shear …; of a tower roof or drift (of its lowest storey),"
+            " of a pendulum force"
+        ),
     ] = ""
     limit: Annotated[
         str,

@@ -12,6 +12,7 @@ import numpy as np
 from alphacut.io.files import Document, as_json
 from alphacut.io.netcdf import write_dataset
 from alphacut.io.provenance import versions
+from alphacut.io.units import fixed
 from alphacut.rve.image.directions import directions
 from alphacut.rve.image.model import ImageCut
 from alphacut.stages.image.bounds import CURES, FuzzyImage
@@ -78,7 +79,7 @@ def own_of_window(found: Document) -> str:
 
 def interval(ends: Mapping[str, float]) -> str:
     """An interval of moduli in GPa, for people."""
-    return f"[{ends['lower']:.4f}, {ends['upper']:.4f}] GPa"
+    return f"[{fixed(ends['lower'], 4)}, {fixed(ends['upper'], 4)}] GPa"
 
 
 def error_table(found: FuzzyImage) -> list[Document]:

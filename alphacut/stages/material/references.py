@@ -12,6 +12,7 @@ from alphacut.case.case import Case
 from alphacut.case.checks_material import taking_spheres
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import Document, say
+from alphacut.io.units import fixed
 from alphacut.rve import bounds as plane
 from alphacut.rve.anisotropy import plane_average
 from alphacut.rve.cell import STRAIN, Cell, Phase
@@ -251,10 +252,10 @@ def _fibres_in_words(found: Document, particles: str) -> Iterator[str]:
     place = MIDDLE if found.get("cuts") else ""
     if own := found.get("across"):
         told = (
-            f"that is E_T = {own['E_T_GPa']:.3f} GPa{place}: 1/E_T = 1/(4 G23) + 1/(4 K23)"
-            f" + ν_LT²/E_L, G23 {own['G23_GPa']:.3f} GPa averaged over all directions, K23"
-            f" {own['K23_GPa']:.3f} GPa of plane strain, E_L {own['E_L_GPa']:.3f} GPa, ν_LT"
-            f" {own['nu_LT']:.4f}"
+            f"that is E_T = {fixed(own['E_T_GPa'], 3)} GPa{place}: 1/E_T = 1/(4 G23) + 1/(4 K23)"
+            f" + ν_LT²/E_L, G23 {fixed(own['G23_GPa'], 3)} GPa averaged over all directions, K23"
+            f" {fixed(own['K23_GPa'], 3)} GPa of plane strain, E_L {fixed(own['E_L_GPa'], 3)} GPa,"
+            f" ν_LT {own['nu_LT']:.4f}"
         )
     else:
         told = "that one follows from the series, which refuses this cell"
@@ -267,14 +268,14 @@ def _fibres_in_words(found: Document, particles: str) -> Iterator[str]:
 def _bounds_in_words(found: Document, particles: str) -> str:
     """The references as one line."""
     kinds = [
-        f"{words} {' … '.join(f'{x:.3f}' for x in one['hashin_shtrikman_E_GPa'])}"
-        f" (Mori–Tanaka {one['mori_tanaka_E_GPa']:.3f})"
+        f"{words} {' … '.join(f'{fixed(x, 3)}' for x in one['hashin_shtrikman_E_GPa'])}"
+        f" (Mori–Tanaka {fixed(one['mori_tanaka_E_GPa'], 3)})"
         for words, one in (("long fibres", found["fibres"]), ("spheres", found["spheres"]))
     ]
     kind = "volume" if particles == "spheres" else "area"  # of a section across the fibres
     average = found["isotropic_average_E_GPa"]
     place = MIDDLE if found.get("cuts") else ""
-    own = f"; this array averaged over all directions {average:.3f}{place}" if average else ""
+    own = f"; this array averaged over all directions {fixed(average, 3)}{place}" if average else ""
     shape = (
         "discs of the plane are long fibres, their E in the same sense as the E above"
         if particles == "cylinders"
@@ -292,7 +293,7 @@ def over_support(found: Document) -> str:
     if cuts is None:
         return ""
     ends = [
-        f"{words} {cuts[kind]['lower'][0]:.3f} … {cuts[kind]['upper'][0]:.3f}"
+        f"{words} {fixed(cuts[kind]['lower'][0], 3)} … {fixed(cuts[kind]['upper'][0], 3)}"
         for words, kind in (("long fibres", "fibres"), ("spheres", "spheres"))
     ]
     return f". Over the inputs' ranges at α = {cuts['alpha'][0]:g}: {'; '.join(ends)}"
@@ -317,8 +318,8 @@ def publish(case: Case, found: Document) -> str:
             " modulus across long fibres."
         )
     average, across = found["isotropic_average_E_GPa"], found["across"]
-    told = f", {average:.3f} GPa{MIDDLE if found.get('cuts') else ''}" if average else ""
-    first = f" E_T = {across['E_T_GPa']:.3f} GPa as modulus across them;" if across else ""
+    told = f", {fixed(average, 3)} GPa{MIDDLE if found.get('cuts') else ''}" if average else ""
+    first = f" E_T = {fixed(across['E_T_GPa'], 3)} GPa as modulus across them;" if across else ""
     return (
         f"To publish for long fibres:{first} for plane strain the isotropic average{told}"
         ' (modulus.average = "isotropic"); E of the square array (eq. 16) is of its axes alone.'
@@ -356,10 +357,9 @@ def outside(
         return ""
     side, bound = ("below", low) if modulus < low else ("above", high)
     return (
-        f"E = {modulus:.3f} GPa lies {side} the Hashin–Shtrikman bound {bound:.3f} GPa of spheres"
-        f"{_whole(found, support)}, and {told}: its discs are long fibres, and its nu is theirs"
-        " too;"
-        f" cell.particles: {cure(case)}"
+        f"E = {fixed(modulus, 3)} GPa lies {side} the Hashin–Shtrikman bound {fixed(bound, 3)} GPa"
+        f" of spheres{_whole(found, support)}, and {told}: its discs are long fibres, and its nu is"
+        f" theirs too; cell.particles: {cure(case)}"
     )
 
 
@@ -369,7 +369,8 @@ def _whole(found: Document, support: tuple[float, float] | None) -> str:
     if cuts is None or support is None:
         return ""
     least, most = cuts["spheres"]["lower"][0], cuts["spheres"]["upper"][0]
-    ends = f"[{support[0]:.3f}, {support[1]:.3f}] GPa"
+    ends = f"[{fixed(support[0], 3)}, {fixed(support[1], 3)}] GPa"
+    within = f"{fixed(least, 3)} … {fixed(most, 3)}"
     if support[1] < least or support[0] > most:
-        return f" (so does all of its support {ends}: bounds there {least:.3f} … {most:.3f})"
-    return f" (its support is {ends}, the bounds over it {least:.3f} … {most:.3f})"
+        return f" (so does all of its support {ends}: bounds there {within})"
+    return f" (its support is {ends}, the bounds over it {within})"

@@ -10,6 +10,7 @@ import numpy as np
 from alphacut.case.case import Case
 from alphacut.case.checks_material import taking_spheres
 from alphacut.io.files import Document
+from alphacut.io.units import fixed
 from alphacut.rve.bounds import mori_tanaka as of_cylinders
 from alphacut.rve.cell import STRAIN, Phase
 from alphacut.rve.result import effective_modulus
@@ -88,11 +89,11 @@ def lines(result: HomogenisedSpheres) -> str:
     along, slack = found["E_along_GPa"], off["E_along_GPa"]
     first, second = found["G_GPa"]
     return (
-        f"E = {found['E_GPa']:.6f} ± {off['E_GPa']:.1e} GPa, nu = {result.poisson:.6f} ±"
+        f"E = {fixed(found['E_GPa'], 6)} ± {off['E_GPa']:.1e} GPa, nu = {result.poisson:.6f} ±"
         f" {off['nu']:.1e} (Hill's isotropic average)\n"
-        f"E along 100 = {along['100']:.6f} ± {slack['100']:.1e} GPa, along 111 ="
-        f" {along['111']:.6f} ± {slack['111']:.1e} GPa\n"
-        f"K = {found['K_GPa']:.6f} ± {off['K_GPa']:.1e} GPa, C44 = {first:.6f} ±"
+        f"E along 100 = {fixed(along['100'], 6)} ± {slack['100']:.1e} GPa, along 111 ="
+        f" {fixed(along['111'], 6)} ± {slack['111']:.1e} GPa\n"
+        f"K = {fixed(found['K_GPa'], 6)} ± {off['K_GPa']:.1e} GPa, C44 = {fixed(first, 6)} ±"
         f" {off['G_GPa'][0]:.1e} GPa, (C11 - C12)/2 = {second:.6f} ± {off['G_GPa'][1]:.1e} GPa\n"
         f"{result.method}: {result.reason}; {result.seconds['total']:.3f} s\n"
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -298,3 +299,35 @@ def test_e_of_spheres_says_what_is_not_in_its_error() -> None:
     case = SimpleNamespace(cell=SimpleNamespace(particles="spheres"))
     told = publish(case, {})  # type: ignore[arg-type]
     assert "What one cubic cell misses of many random spheres is not in its error: 0.44 %" in told
+
+
+@pytest.mark.parametrize("particles", ["spheres", "cylinders"])
+def test_an_e_to_publish_that_passes_the_bounds_beside_it_says_so(
+    tmp_path: Path, particles: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Pores of very different radii: one strain for all cells overrates E."""
+    path = polymer(tmp_path, "pores")
+    pores = ["cell.inclusion_modulus=1 MPa", "cell.matrix_modulus=3 GPa", "radius.a1=0.05"]
+    pores += ["radius.a3=0.95", "radius.a2=0.2", f"cell.particles={particles}"]
+    own = ["modulus.average=isotropic"] if particles == "cylinders" else []
+    pores += ["modulus.method=series", *own]
+    words = [word for change in pores for word in ("--set", change)]
+    assert main(["cell", str(path), *words]) == 0
+    (told,) = [x for x in capfd.readouterr().out.splitlines() if x.startswith("To publish")]
+    value, bound = re.search(r"But ([\d.]+) GPa lies [\d.]+ % above ([\d.]+) GPa", told).groups()
+    assert float(value) > float(bound)
+    fine = ["--set", "modulus.average=isotropic", "--set", "modulus.method=series"]
+    assert main(["cell", str(path), *fine]) == 0
+    assert "But" not in capfd.readouterr().out.partition("To publish")[2]
+
+
+def test_moduli_of_gels_keep_their_digits(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    gel = ["cell.matrix_modulus=2 kPa", "cell.inclusion_modulus=40 kPa", "modulus.method=series"]
+    words = [word for change in gel for word in ("--set", change)]
+    for command in ("cell", "modulus"):
+        assert main([command, str(polymer(tmp_path, "fibres")), *words]) == 0
+        out = capfd.readouterr().out
+        assert re.search(r"\d\.\d{3,}e-06", out)
+        assert "0.000 " not in out
