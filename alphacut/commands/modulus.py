@@ -146,12 +146,12 @@ def store_of(options: argparse.Namespace, case: Case) -> Path | None:
 
 def summary(found: modulus.FuzzyModulus) -> str:
     """The α-cuts as a small table."""
-    lower, upper = (ends / GPA for ends in found.result.bounds("E"))
-    cuts = zip(
-        found.result.alpha, lower.tolist(), upper.tolist(), *found.result.bounds("nu"), strict=True
+    lower, upper = (
+        [fixed(x, 5) for x in (ends / GPA).tolist()] for ends in found.result.bounds("E")
     )
+    cuts = zip(found.result.alpha, lower, upper, *found.result.bounds("nu"), strict=True)
     rows = "".join(
-        f"{a:5.2f}  {fixed(low, 5):>10}  {fixed(high, 5):>10}  {least:8.5f}  {most:8.5f}\n"
+        f"{a:5.2f}  {low:>10}  {high:>10}  {least:8.5f}  {most:8.5f}\n"
         for a, low, high, least, most in cuts
     )
     cost = (
