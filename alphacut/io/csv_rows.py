@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import csv
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from alphacut.io.output_paths import hint
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.units import factor
-from alphacut.stochastic.particles.csv_columns import not_text, with_points
+from alphacut.stochastic.particles.csv_columns import Rows, not_text, with_points
+from alphacut.stochastic.theta.truncated_normal import Array
 
 
 @dataclass(frozen=True)
@@ -29,7 +33,7 @@ class CsvFile:
     what: str
     allowed: str
 
-    def rows(self, least: int = 1) -> list[tuple[int, list[str]]]:
+    def rows(self, least: int = 1) -> Rows:
         """Line and entries of the header and of each row; empty lines and comments are left out.
 
         Commas separate them, or semicolons or tabs, beside which numbers may have decimal commas.
@@ -46,8 +50,7 @@ class CsvFile:
             if line.strip() and not line.startswith("#")
         ]
         if len(kept) <= least:
-            count = {1: "a row", 2: "two rows"}.get(least, f"{least} rows")
-            what = f"the {self.what} needs a header and {count} or more"
+            what = f"the {self.what} needs a header and {['a row', 'two rows'][least - 1]} or more"
             raise self.unreadable(what, self.allowed)
         header = kept[0][1]
         separator = ";" if ";" in header else "\t" if "\t" in header else ","
@@ -58,6 +61,16 @@ class CsvFile:
             return [rows[0], *with_points(rows[1:], self.path)]
         except ValueError as error:
             raise self.unreadable(str(error), "points, or commas throughout") from None
+
+    def finite(self, rows: Rows, count: int, what: str, allowed: str) -> Array:
+        """The rows as numbers, shape (rows, count); BadInput where one is not `count` of them."""
+        table = np.full((len(rows), count), np.nan)
+        for values, (line, row) in zip(table, rows, strict=True):
+            with suppress(ValueError):
+                values[:] = [float(text) for text in row] if len(row) == count else np.nan
+            if not np.isfinite(values).all():
+                raise self.refuse(line, f"this row is {what}", ",".join(row), allowed)
+        return table
 
     def lines(self) -> list[str]:
         """All lines of the file as text.

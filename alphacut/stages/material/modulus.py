@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -376,11 +377,7 @@ def measured_modulus(case: Case, file: str) -> FuzzyNumber:
 
 
 def measured_values(path: Path, key: str = "modulus.measured") -> list[float]:
-    """Measured moduli in Pa, shape (n,).
-
-    Raises:
-        BadInput: The file is missing, its header has no unit, or a row is no positive number.
-    """
+    """Measured moduli in Pa; BadInput without unit or where a row is no positive number."""
     file = CsvFile(path, key, "file", HEADER)
     (line, first), *rows = file.rows()
     scale = file.scale(line, ",".join(first), "a modulus", "Pa", pattern=NAMES)
@@ -389,12 +386,9 @@ def measured_values(path: Path, key: str = "modulus.measured") -> list[float]:
 
 def positive(file: CsvFile, line: int, text: str) -> float:
     """One value of the column."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not (math.isfinite(value) and value > 0):
-        cure = text.replace(",", ".") if re.fullmatch(r"\s*\d+,\d+\s*", text) else ""
-        allowed = f"a decimal point, {cure.strip()}" if cure else "a number such as 30.5"
-        raise file.refuse(line, "this row is no positive number", text, allowed)
-    return value
+    with suppress(ValueError):
+        if 0 < (value := float(text)) < math.inf:
+            return value
+    cure = text.replace(",", ".") if re.fullmatch(r"\s*\d+,\d+\s*", text) else ""
+    allowed = f"a decimal point, {cure.strip()}" if cure else "a number such as 30.5"
+    raise file.refuse(line, "this row is no positive number", text, allowed)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +12,10 @@ import numpy as np
 from alphacut.frame import Accelerogram
 from alphacut.io.csv_rows import CsvFile
 from alphacut.io.units import factor
+from alphacut.stochastic.particles.csv_columns import Rows
 from alphacut.stochastic.theta.truncated_normal import Array
 
-COLUMNS = {"time": "s", "acceleration": "m/s^2"}
-PATTERNS = {"time": "time|t", "acceleration": r"acceleration|acc\.?|a"}
+COLUMNS = [("time", "s", "time|t"), ("acceleration", "m/s^2", r"acceleration|acc\.?|a")]
 ALLOWED = "time [s],acceleration [m/s^2], [g] or [gal]"
 PAIR = "a time and an acceleration, such as 0.02,-0.35, with points and not commas in the numbers"
 NPTS = re.compile(r"NPTS\s*=\s*(\d+)\s*,\s*DT\s*=\s*(\d*\.?\d+)\s*SEC", re.IGNORECASE)
@@ -42,14 +43,13 @@ def accelerogram(path: Path, key: str = "frame.accelerogram") -> Accelerogram:
             what = "no comma found: commas, semicolons or tabs part columns, and blanks do not"
         raise file.refuse(line, what, allowed=ALLOWED)
     scales = [
-        file.scale(line, cell, name, si, pattern=PATTERNS[name])
-        for cell, (name, si) in zip(first, COLUMNS.items(), strict=True)
+        file.scale(line, cell, name, si, pattern=pattern)
+        for cell, (name, si, pattern) in zip(first, COLUMNS, strict=True)
     ]
-    values = np.array([pair(file, line, row) for line, row in rows]) * scales
+    values = file.finite(rows, 2, "not finite or no pair of numbers", PAIR) * scales
     if not values[:, 1].any():
-        what = "the acceleration is zero throughout"
-        raise file.unreadable(what, "a record that moves the ground")
-    return Accelerogram(even_step(file, values[:, 0], [line for line, _ in rows]), values[:, 1])
+        raise file.unreadable("the acceleration is zero throughout", "one that moves the ground")
+    return Accelerogram(even_step(file, rows, scales[0]), values[:, 1])
 
 
 def peer(file: CsvFile, lines: list[str], head: int, count: int, step: float) -> Array:
@@ -74,24 +74,26 @@ def cut_short(record: Accelerogram, duration: float) -> bool:
     return end - duration > max(record.step, 0.01 * end) and bool(np.any(rest))
 
 
-def pair(file: CsvFile, line: int, row: list[str]) -> tuple[float, float]:
-    """Time and acceleration of a row."""
-    try:
-        time, value = (float(text) for text in row)
-    except ValueError:
-        raise file.refuse(line, "this row is no pair of numbers", ",".join(row), PAIR) from None
-    if not (math.isfinite(time) and math.isfinite(value)):
-        raise file.refuse(line, "this row is not finite", ",".join(row), PAIR)
-    return time, value
+def even_step(file: CsvFile, rows: Rows, scale: float) -> float:
+    """The step of the times in column 0, which are even from 0 but for rounding in the file."""
+    written = [Decimal(row[0]) for _, row in rows]
+    times = scale * np.array(written, float)
+    if times[0] != 0:
+        what = f"the times begin at {times[0]:g} s"
+        raise file.refuse(rows[0][0], what, allowed="0 s; subtract the first time from all")
+    even, half = np.linspace(0, times[-1], len(times)), scale * half_digits(written)
+    # that of the last row is in the step too; from step/4 on, a missing row might pass for rounding
+    off = np.where(half < even[1] / 4, half + np.linspace(0, half[-1], len(half)), 0)
+    if times[-1] > 0 and (abs(times - even) <= off + EVEN * np.maximum(even, even[1])).all():
+        return float(even[1])
+    gaps = np.diff(times)
+    worst, usual = int(abs(gaps - np.median(gaps)).argmax()), np.median(gaps)
+    what = f"the times are not evenly spaced: {gaps[worst]:g} s to this row, mostly {usual:g} s"
+    raise file.refuse(rows[worst + 1][0], what, allowed="even steps above 0 s; resample to them")
 
 
-def even_step(file: CsvFile, times: Array, lines: list[int]) -> float:
-    """The step of evenly spaced times from 0."""
-    step = times[1] - times[0]
-    for index, time in enumerate(times):
-        if not step > 0 or abs(time - index * step) > EVEN * step * max(1, index):
-            what = f"the times are not evenly spaced from 0: this row is at {time:g} s"
-            allowed = f"{index * step:g} s here, by the first two rows"
-            raise file.refuse(lines[index], what, allowed=allowed)
-    # rounding of the first two rows would grow towards the end
-    return float(times[-1]) / (len(times) - 1)
+def half_digits(written: list[Decimal]) -> Array:
+    """Half a unit of the last digit to which each was rounded, zeros there written or not."""
+    last = min(int(number.as_tuple().exponent) for number in written)
+    most = max(len(number.as_tuple().digits) for number in written)
+    return 0.5 * 10.0 ** np.array([max(last, x.adjusted() + 1 - most) for x in written])

@@ -58,19 +58,9 @@ def motion_rows(path: Path, known: Sequence[str]) -> MotionRows:
         raise file.refuse(line, what, ",".join(head), "outputs of one unit: the others left out")
     cells = zip(head, names, units, strict=True)
     scales = [file.scale(line, cell, name, unit) for cell, name, unit in cells]
-    table = []
-    for number, row in rows:
-        try:
-            values = [float(text) for text in row]
-        except ValueError:
-            values = []
-        if len(values) != len(head) or not np.isfinite(values).all():
-            allowed = f"{len(head)} finite numbers, with points in them"
-            raise file.refuse(number, "this row is no instant", ",".join(row), allowed)
-        table.append(values)
-    found = np.array(table) * scales
-    step = even_step(file, found[:, 0], [number for number, _ in rows])
-    return MotionRows(step, tuple(names[1:]), found[:, 1:])
+    allowed = f"{len(head)} finite numbers, with points in them"
+    found = file.finite(rows, len(head), "no instant", allowed) * scales
+    return MotionRows(even_step(file, rows, scales[0]), tuple(names[1:]), found[:, 1:])
 
 
 @dataclass(frozen=True, eq=False)

@@ -81,7 +81,7 @@ def test_what_cannot_run_is_found_before(command, name, tmp_path, capfd):
         (
             "0.02,-0.00000",
             "0.025,-0.00000",
-            r"building.record.csv:5: .*this row is at 0.025 s; allowed: 0.02 s here",
+            r"building.record.csv:5: .*0.015 s to this row, mostly 0.01 s; allowed: even steps",
         ),
         ("[m/s^2]", "[m/s]", r"building.record.csv:2: .*unit"),
     ],

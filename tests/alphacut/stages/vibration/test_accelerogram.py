@@ -83,3 +83,54 @@ def test_a_record_of_peer_that_is_none_is_refused(
     file.write_text(AT2.replace(old, new), encoding="utf-8")
     with pytest.raises(BadInput, match=told):
         accelerogram(file)
+
+
+def written(tmp_path: Path, times: list[str]) -> Path:
+    file = tmp_path / "times.csv"
+    rows = "".join(f"{time},{k % 7 - 3}\n" for k, time in enumerate(times))
+    file.write_text(f"time [s],acceleration [m/s^2]\n{rows}")
+    return file
+
+
+@pytest.mark.parametrize("form", [".3f", ".5g", ".9f", "g", ".17g"])
+def test_even_times_may_be_rounded_to_their_last_digit(tmp_path: Path, form: str) -> None:
+    times = [format(k / 128, form) for k in range(3000)]
+    found = accelerogram(written(tmp_path, times))
+    assert found.step == pytest.approx(1 / 128, rel=3e-5)
+    assert found.step == float(times[-1]) / 2999
+
+
+def test_rounding_to_milliseconds_is_one_in_milliseconds_too(tmp_path: Path) -> None:
+    file = written(tmp_path, [f"{1000 * k / 128:.0f}" for k in range(500)])
+    file.write_text(file.read_text(encoding="utf-8").replace("[s]", "[ms]"), encoding="utf-8")
+    assert accelerogram(file).step == pytest.approx(1 / 128, rel=1e-3)
+
+
+@pytest.mark.parametrize("gap", [1, 2, 250, 498, 499])
+def test_a_missing_row_is_no_rounding(tmp_path: Path, gap: int) -> None:
+    times = [f"{0.0041 * k:.3f}" for k in range(501) if k != gap]
+    with pytest.raises(BadInput, match=r"not evenly spaced: .* resample to them"):
+        accelerogram(written(tmp_path, times))
+
+
+@pytest.mark.parametrize(
+    ("times", "told"),
+    [
+        (["0.00", "0.01", "0.01", "0.02", "0.03"], r"csv:4: .* 0 s to this row, mostly 0.01 s"),
+        (["0", "1", "2", "4", "5"], r"csv:5: .* 2 s to this row, mostly 1 s"),
+        (["0", "0", "0"], r"allowed: even steps above 0 s"),
+        (["0", "-1", "-2"], r"allowed: even steps above 0 s"),
+        (["10.00", "10.01", "10.02"], r"csv:2: .*begin at 10 s; .* subtract the first time"),
+    ],
+)
+def test_uneven_times_and_a_late_start_are_refused_with_a_cure(
+    tmp_path: Path, times: list[str], told: str
+) -> None:
+    with pytest.raises(BadInput, match=told):
+        accelerogram(written(tmp_path, times))
+
+
+def test_the_cures_of_refused_times_work(tmp_path: Path) -> None:
+    late = [10 + 0.0075 * k for k in range(100)]
+    times = [f"{time - late[0]:.4f}" for time in late]
+    assert accelerogram(written(tmp_path, times)).step == pytest.approx(0.0075)
