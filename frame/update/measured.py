@@ -99,7 +99,8 @@ def measured_mode(
         raise ValueError(f"mode {mode}: an amplitude of floor {reference}, the reference, is 0")
     shape = {}
     for floor in [floor for floor in rows if floor != reference]:
-        ratios, what = rows[floor] / rows[reference], f"mode {mode}: amplitudes of floor {floor}"
+        what = f"mode {mode}: amplitudes q{floor}/q{reference} of floor {floor}"
+        ratios = rows[floor] / rows[reference]
         # to first order; the reference scatters, too
         share = float(np.hypot(1, ratios.mean())) * largest / means[reference]
         both = shape_deviation and shape_deviation * share
@@ -109,8 +110,10 @@ def measured_mode(
 
 def _mean(values: Array, deviation: float | None, what: str, key: str) -> Claimed:
     count = len(values)
-    if deviation is None and count < 2:
-        raise ValueError(f"{what}: one value tells no scatter; measure more, or give {key}")
+    if deviation is None and np.allclose(values, values[0], 1e-12, 0.0):
+        told = "one value tells" if count < 2 else f"{count} values that are all {values[0]:g} tell"
+        cure = "measure more" if count < 2 else "write all digits"
+        raise ValueError(f"{what}: {told} no scatter; {cure}, or give {key}, such as 0.01")
     if deviation is None:
         return from_data(values, "mean", law="normal")
     scatter = float(values.std(ddof=1)) if count > 1 else 0.0

@@ -73,7 +73,7 @@ def _require_scatter(data: Observations, law: str) -> None:
     if data.lower[0] == data.lower[-1] and data.exact:
         raise ValueError(
             f"all {data.count} values are {data.lower[0]:g}, which a {law} law does not give:"
-            f" say how far each may be off, or to what resolution= they are rounded"
+            f" leave the law out, or, in Python, say to what resolution= they are rounded"
         )
 
 

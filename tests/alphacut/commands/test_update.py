@@ -135,3 +135,21 @@ def test_sections_that_make_no_sense(
     case = str(CASES / "laboratory-frame.toml")
     assert main(["update", case, "--set", change]) == 2
     assert re.search(pattern, capsys.readouterr().err)
+
+
+def test_equal_readings_name_the_keys_that_take_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = copied(tmp_path, without="held_out")
+    row = "1,0.883,-0.378,-0.719,-0.964,-1\n"
+    text = f"mode,frequency [Hz],q1,q2,q3,q4\n{row * 3}"
+    (tmp_path / "laboratory-frame.modes.csv").write_text(text, encoding="utf-8")
+    lines = path.read_text(encoding="utf-8").splitlines()
+    kept = [line for line in lines if "_deviation" not in line]
+    path.write_text("\n".join(kept), encoding="utf-8")
+    asked = ["update", str(path)]
+    for key in ("frequency_deviation", "shape_deviation"):
+        assert main(asked) == 2
+        assert f"give {key}, such as 0.01" in capsys.readouterr().err
+        asked += ["--set", f"update.{key}=0.01"]
+    assert main(asked) == 0

@@ -243,7 +243,18 @@ def test_known_deviations_take_one_value(rng: np.random.Generator) -> None:
 @pytest.mark.parametrize(
     ("make", "pattern"),
     [
-        (lambda: measured_mode(1, [2.0]), r"frequencies: one value tells .* frequency_deviation$"),
+        (
+            lambda: measured_mode(1, [2.0]),
+            r"frequencies: one value tells .* frequency_deviation, such",
+        ),
+        (
+            lambda: measured_mode(1, [2.0] * 3),
+            r"frequencies: 3 values that are all 2 tell .* give frequency_deviation, such as 0.01$",
+        ),
+        (
+            lambda: measured_mode(1, [2.0, 2.1], {1: [0.6, 0.3], 3: [2, 1]}),
+            r"q1/q3 of floor 1: 2 values that are all 0.3 tell .* give shape_deviation, such as 0.01$",
+        ),
         (
             lambda: measured_mode(2, [2.0, 2.1], frequency_deviation=0.001),
             r"frequencies scatter by 0.07.*, and frequency_deviation makes that 0.002",

@@ -234,7 +234,7 @@ def test_censored_values_are_intervals_without_an_end():
         (lambda: from_data([5], "mean", law="normal"), "a normal law needs 2 or more"),
         (
             lambda: from_data([5, 5, 5], "mean", law="normal"),
-            "all 3 values are 5, which a normal law does not give: say how far each may be off, or to what",
+            "all 3 values are 5, which a normal law does not give: leave the law out, or",
         ),
         (
             lambda: from_data([-1, 5], "mean", law="log-normal"),
