@@ -54,7 +54,8 @@ class StiffnessBounds:
     def require_rising(self, cure: str) -> None:
         """Raise ValueError where E may fall with A, for what rests on E rising with both."""
         if not (steepest := self.shear[1] / self.bulk[0]) < 1.5:
-            raise ValueError(f"E may fall with A: A/B of eq. 16 is up to {steepest:.3g}; {cure}")
+            what = f"A, twice the shear modulus, may be {steepest:.3g} times the bulk modulus B"
+            raise ValueError(f"{what}, and from 1.5 times on E of eq. 16 falls as A rises: {cure}")
 
     @property
     def relative_error(self) -> Array:

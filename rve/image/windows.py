@@ -43,16 +43,15 @@ class Tiling:
         """Confidence interval of E of eq. 16 of the material, from independent tiles.
 
         The bracket's ends, each moved out by t·s/√m, with s the scatter of E between m tiles to
-        first order.
-
-        Raises:
-            ValueError: There is one tile only, or E may fall where A rises.
+        first order; ValueError where there is one tile only, or E may fall as A rises.
         """
         count = len(self.stiffness)
         if count < 2:
             raise ValueError("one tile has no scatter; divide the window into 2 × 2 tiles or more")
         bracket = self.bracket
-        bracket.require_rising("take boundary periodic, larger tiles or phases of less contrast")
+        fewer = "fewer tiles (cell.tiles), so that each is larger, or " if count > 4 else ""
+        others = "(cell.boundary periodic would bound the picture repeated, no larger material)"
+        bracket.require_rising(f"take {fewer}a larger picture {others}")
         low, high = bracket.modulus
         softer = -bracket.lower @ (self.compliance - self.compliance.mean(axis=0)) @ bracket.lower
         stiffer = self.stiffness - self.stiffness.mean(axis=0)
@@ -65,11 +64,7 @@ class Tiling:
 
 
 def tiles_of(image: Array, along: int) -> Array:
-    """An image of shape (rows, columns) as tiles, (tiles, rows/along, columns/along).
-
-    Raises:
-        ValueError: The image cannot be divided so.
-    """
+    """An image as tiles, (tiles, rows/along, columns/along); ValueError where it has none such."""
     rows, columns = image.shape
     if along < 1 or rows % along or columns % along or min(rows, columns) < 2 * along:
         raise ValueError(

@@ -77,9 +77,18 @@ def test_the_interval_is_that_of_student_for_tiles_of_known_scatter():
 
 
 def test_tiles_whose_modulus_may_fall_with_a_give_no_interval():
-    slack = np.stack(2 * [PlaneModuli(0.4, 1.0).stiffness])  # A/B = 2.5
-    with pytest.raises(ValueError, match=r"A/B of eq. 16 is up to 2\.5; take boundary peri"):
-        Tiling(slack, np.linalg.inv(slack)).material_modulus()
+    for count, cure in ((4, "a larger picture"), (9, "fewer tiles .cell.tiles., so that each is")):
+        slack = np.stack(count * [PlaneModuli(0.4, 1.0).stiffness])  # A/B = 2.5
+        with pytest.raises(ValueError, match=rf"2\.5 times the bulk .* from 1\.5 .*: take {cure}"):
+            Tiling(slack, np.linalg.inv(slack)).material_modulus()
+
+
+def test_fewer_tiles_cure_what_many_leave_undecided():
+    bulk = np.where(np.random.default_rng(1).random((48, 48)) < 0.02, 1e-3, 1.0)
+    with pytest.raises(ValueError, match="take fewer tiles"):
+        solve_tiles(*[tiles_of(m, 12) for m in (bulk, bulk / 2)]).material_modulus()
+    low, high = solve_tiles(*[tiles_of(m, 2) for m in (bulk, bulk / 2)]).material_modulus()
+    assert low < high
 
 
 def test_one_tile_gives_no_interval():
