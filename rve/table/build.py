@@ -31,6 +31,11 @@ class TableError(RuntimeError):
     """A table does not reach its accuracy."""
 
 
+def larger_error(found: float) -> str:
+    """The cure where this error is the least, of which a table keeps half for interpolation."""
+    return f"take a --tolerance (modulus.tolerance) of {4 * found:.0e}, say, or --method series"
+
+
 class Source(Protocol):
     """Source of a table's moduli; its errors are known once it has been asked for some."""
 
@@ -134,7 +139,7 @@ class PlanarSource:
             raise TableError(
                 f"planar cells at r = {radius:.4g} leave a relative error of"
                 f" {found.error:.1e} on the finest mesh ({_FINEST:g}) and"
-                f" {self.accuracy:.1e} is wanted: allow a larger error, or take the series"
+                f" {self.accuracy:.1e} is wanted: {larger_error(found.error)}"
             )
         wanted = 0.8 * self.accuracy / found.error
         finer = [self.mesh_size * min(0.9, wanted ** (1 / rate)) for rate in _RATES]
@@ -286,7 +291,7 @@ def build_table(
             raise TableError(
                 f"the table's coefficients leave a relative error of {both:.1e} with {counts[0]}"
                 f" radii and {counts[1]} moduli and {allowed:.1e} is wanted: cover"
-                " less, or allow a larger error"
+                f" less, or {larger_error(both)}"
             )
         if tails[0][:3].max() >= tails[1][:3].max():
             counts, before = (counts[0] + _missing(found, both, before, allowed), counts[1]), both

@@ -17,7 +17,7 @@ from alphacut.rve.slices.theta_rule import extreme_radii, settle_rule
 from alphacut.rve.spheres.bounds import mori_tanaka
 from alphacut.rve.spheres.cubic import cubic_moduli, cubic_voigt
 from alphacut.rve.spheres.result import HomogenisedSpheres, certified_spheres, volume_fraction
-from alphacut.rve.table.build import TableError
+from alphacut.rve.table.build import TableError, larger_error
 from alphacut.rve.table.cache import stored_table
 from alphacut.rve.table.interpolant import Table, TableRange
 from alphacut.rve.table.model import each_poisson, rounded_moduli, rounded_radii, table_in_words
@@ -114,8 +114,7 @@ class OctantSource:
             if meshes.size <= _FINEST:
                 raise TableError(
                     f"elements about spheres leave a relative error of {error:.1e} on the finest"
-                    f" mesh ({_FINEST:g}) and {self.accuracy:.1e} is wanted: allow a larger error,"
-                    " or take the series"
+                    f" mesh ({_FINEST:g}) and {self.accuracy:.1e} is wanted: {larger_error(error)}"
                 )
             finer = (0.8 * allowed / error) ** (1 / ORDER)
             meshes.refine(max(_FINEST, meshes.size * min(0.75, max(0.25, finer))))

@@ -1,4 +1,5 @@
 import os
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -317,8 +318,18 @@ def test_the_decay_of_coefficients_tells_how_many_radii_are_missing(accuracy, ra
     assert asked == radii
 
 
+def test_the_larger_error_that_a_refusal_names_is_enough(monkeypatch):
+    monkeypatch.setattr("alphacut.rve.table.build._FINEST", 0.25)
+    span = TableRange(MATRIX, 0.3, (0.3, 0.3), (80e9, 80e9))
+    with pytest.raises(TableError, match=r"or --method series") as told:
+        build_table(span, accuracy=1e-9, make=PlanarSource)
+    larger = float(re.search(r"modulus.tolerance\) of ([\d.e-]+), say", str(told.value))[1])
+    assert 1e-9 < larger < 1e-2
+    assert build_table(span, accuracy=larger, make=PlanarSource).mesh_size >= 0.25
+
+
 def test_refuses_when_interpolation_does_not_settle():
-    with pytest.raises(TableError, match="cover less, or allow a larger error"):
+    with pytest.raises(TableError, match="cover less, or take a --tolerance"):
         build_table(
             TableRange(MATRIX, 0.3, (0.1, 0.9), (20.0, 20e18)), accuracy=1e-9, make=SeriesSource
         )
