@@ -78,7 +78,7 @@ class TwoSpaces:
         if self._krylov.getConvergedReason() <= 0:
             raise ConvergenceError(
                 f"conjugate gradients end after {steps} iterations with reason"
-                f" {self._krylov.getConvergedReason()}: take a finer mesh or a lower contrast"
+                f" {self._krylov.getConvergedReason()}: take --method series (modulus.method)"
             )
         return steps
 

@@ -350,3 +350,12 @@ def test_discs_make_no_radii_of_spheres(capfd):
     (line,) = capfd.readouterr().err.splitlines()
     assert "cell.particles = spheres: stage microstructure measures discs" in line
     assert "section [microstructure.spheres] in place of [microstructure.packing]" in line
+
+
+def test_a_contrast_that_elements_do_not_solve_is_left_to_the_series(capfd):
+    pytest.importorskip("dolfinx")
+    soft = ["--radius", "0.6", "--set", "cell.inclusion_modulus='1 MPa'", "--tolerance", "1e-3"]
+    asked = ["cell", PAPER, "--set", 'cell.particles="spheres"', *soft]
+    assert main([*asked, "--method", "table"]) == 1
+    assert "take --method series" in capfd.readouterr().err
+    assert main([*asked, "--method", "series"]) == 0
