@@ -132,6 +132,6 @@ def require_phases(grey: Array, thresholds: tuple[tuple[float, float], ...]) -> 
         raise ValueError(f"the threshold {top:g} is one of 8 bits, the image has 16: {told}")
     for (_, before), (after, _) in pairwise(thresholds):
         if not ((grey >= before) & (grey < after)).any():
-            raise ValueError(
-                f"no pixel lies between the thresholds {before:g} and {after:g}: {told}"
-            )
+            why = told if before < after else "they must rise, their supports apart"
+            pair = f"{before:g} and {after:g}"
+            raise ValueError(f"no pixel lies between the thresholds {pair}: {why}")

@@ -311,8 +311,10 @@ def test_an_image_too_large_for_memory_is_told_with_a_window_that_fits():
         (
             np.array([[0, 9]]),
             ((2.0, 3.0), (4.0, 5.0)),
-            "no pixel lies between the thresholds 3 and 4",
+            "no pixel lies between the thresholds 3 and 4: the grey values lie from 0 to 9",
         ),
+        (np.arange(9), ((6.0, 6.0), (3.0, 3.0)), "thresholds 6 and 3: they must rise"),
+        (np.arange(9), ((2.0, 5.0), (4.0, 4.0)), "thresholds 5 and 4: .* their supports apart"),
     ],
 )
 def test_thresholds_that_leave_a_phase_empty_are_refused(grey, thresholds, told):
