@@ -59,10 +59,9 @@ class Observations:
         lower, upper = rows[:, 0] - resolution / 2, rows[:, 1] + resolution / 2
         outside = np.flatnonzero((upper < low) | (lower > high))
         if len(outside):
-            raise ValueError(
-                f"the value {rows[outside[0]].tolist()} lies outside the bounds [{low:g},"
-                f" {high:g}]; widen them or correct the value"
-            )
+            value = " … ".join(f"{end:g}" for end in np.unique(rows[outside[0]]))
+            what = f"the value {value} lies outside the bounds [{low:g}, {high:g}]"
+            raise ValueError(f"{what}; widen them or correct the value")
         return cls(np.sort(np.maximum(lower, low)), np.sort(np.minimum(upper, high)), (low, high))
 
     @property

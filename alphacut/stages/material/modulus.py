@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -355,16 +355,7 @@ NAMES = r"E|E_?c?m?|E_?mod(ul(us)?)?|(young'?s?[\s_-]*)?modul(us|i)|elastic[\s_-
 
 
 def measured_modulus(case: Case, file: str) -> FuzzyNumber:
-    """The fuzzy modulus in Pa of measured values, with the claim that the case names.
-
-    Args:
-        case: With the section modulus.
-        file: CSV file, from the case's folder.
-
-    Raises:
-        BadInput: The file is missing, its header has no unit, a row is no positive number, or the
-            values do not decide what is claimed.
-    """
+    """The fuzzy modulus in Pa that a CSV file's values decide as claimed; BadInput if not."""
     key, wanted = "modulus.measured", case.modulus
     values = measured_values(case.beside(file), key)
     bounds = None if wanted.bounds is None else wanted.bounds.support
@@ -372,8 +363,15 @@ def measured_modulus(case: Case, file: str) -> FuzzyNumber:
         number = from_data(values, wanted.claim, bounds=bounds, law=wanted.law)
         number.cut(0.0)
     except ValueError as error:
-        raise case.refuse(key, str(error), 'bounds such as bounds = "[10, 60] GPa"') from None
-    return number
+        allowed = 'bounds such as bounds = "[10, 60] GPa"'
+        raise case.refuse(key, in_gpa(str(error)), allowed) from None
+    given = tuple(in_gpa(condition) for condition in number.claim.given)
+    return replace(number, claim=replace(number.claim, given=given))
+
+
+def in_gpa(told: str) -> str:
+    """A text of the library with its moduli, of 1e6 Pa and more, in GPa."""
+    return re.sub(r"\d[\d.]*e\+\d+", lambda found: f"{float(found[0]) / GPA:g} GPa", told)
 
 
 def measured_values(path: Path, key: str = "modulus.measured") -> list[float]:

@@ -80,7 +80,7 @@ def test_measured_values_stand_in(tmp_path):
         ("", "decide the cuts of the next value from α = 0.3333 on, not at α = 0: give bounds"),
         ('claim = "mode"', "the claim is 'mode'; it must be 'next value', 'mean'"),
         ('claim = "mean"', "no number of values decides a mean without a law or bounds"),
-        ('bounds = "[25, 60] GPa"', "lies outside the bounds"),
+        ('bounds = "[25, 60] GPa"', r"value 24.1 GPa lies outside the bounds \[25 GPa, 60 GPa\]"),
     ],
 )
 def test_what_measured_values_do_not_decide_is_refused(written, pattern, tmp_path):
@@ -88,6 +88,14 @@ def test_what_measured_values_do_not_decide_is_refused(written, pattern, tmp_pat
     case = load(with_modulus(tmp_path, f'measured = "cores.csv"\n{written}'))
     with pytest.raises(BadInput, match=pattern):
         stand_in(case)
+
+
+def test_a_law_that_equal_values_contradict_may_be_left_out(tmp_path):
+    (tmp_path / "cores.csv").write_text("E [GPa]\n30\n30\n30\n", encoding="utf-8")
+    written = 'measured = "cores.csv"\nbounds = "[10, 60] GPa"\nclaim = "mean"'
+    with pytest.raises(BadInput, match=r"all 3 values are 30 GPa.*: leave the law out"):
+        stand_in(load(with_modulus(tmp_path, written + '\nlaw = "normal"')))
+    assert stand_in(load(with_modulus(tmp_path, written))).support == pytest.approx((10e9, 60e9))
 
 
 def test_an_earlier_run_stands_in(tmp_path, capfd):
@@ -187,6 +195,7 @@ def test_the_report_tells_the_measured_modulus_by_its_cuts(tmp_path, capfd):
     assert '<td>0</td><td class="number">27.0000</td><td class="number">34.0000</td>' in page
     plain = re.sub("</?a[^>]*>", "", page)
     assert "result of the next value of E lies in its α-cut with P &gt;= 1 - α" in plain
+    assert "bounds [27 GPa, 34 GPa]" in plain
     assert '<td>1</td><td class="number">30.1000</td><td class="number">30.1000</td>' in page
 
 

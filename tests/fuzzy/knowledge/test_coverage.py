@@ -229,7 +229,7 @@ def test_censored_values_are_intervals_without_an_end():
         (lambda: from_data(SEVEN, "mean", bounds=(1, 2, 3)), r"they must be \(lower, upper\)"),
         (
             lambda: from_data(SEVEN, "mean", bounds=(2, 3)),
-            r"lies outside the bounds \[2, 3\]; widen them",
+            r"the value 1.96 lies outside the bounds \[2, 3\]; widen them",
         ),
         (lambda: from_data([5], "mean", law="normal"), "a normal law needs 2 or more"),
         (
