@@ -17,7 +17,9 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 COLUMNS = [("time", "s", "time|t"), ("acceleration", "m/s^2", r"acceleration|acc\.?|a")]
 ALLOWED = "time [s],acceleration [m/s^2], [g] or [gal]"
-PAIR = "a time and an acceleration, such as 0.02,-0.35, with points and not commas in the numbers"
+PAIR = (
+    "a finite time and acceleration, such as 0.02,-0.35, with points and not commas in the numbers"
+)
 NPTS = re.compile(r"NPTS\s*=\s*(\d+)\s*,\s*DT\s*=\s*(\d*\.?\d+)\s*SEC", re.IGNORECASE)
 IN_G = re.compile(r"ACCELERATION .*IN UNITS OF G\b", re.IGNORECASE)
 EVEN = 1e-6  # relative: steps that differ by more are not even
@@ -46,7 +48,7 @@ def accelerogram(path: Path, key: str = "frame.accelerogram") -> Accelerogram:
         file.scale(line, cell, name, si, pattern=pattern)
         for cell, (name, si, pattern) in zip(first, COLUMNS, strict=True)
     ]
-    values = file.finite(rows, 2, "not finite or no pair of numbers", PAIR) * scales
+    values = file.finite(rows, 2, "no pair of numbers", PAIR) * scales
     if not values[:, 1].any():
         raise file.unreadable("the acceleration is zero throughout", "one that moves the ground")
     return Accelerogram(even_step(file, rows, scales[0]), values[:, 1])

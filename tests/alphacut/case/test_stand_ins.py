@@ -142,7 +142,10 @@ def test_measured_nonsense_is_refused_with_row_and_reason(content, pattern, tmp_
         ("time,acceleration\n0,1\n1,2\n", "not time with its unit"),
         ("time [s],acceleration [m]\n0,1\n1,2\n", 'unit "m" is wrong'),
         ("time [s],acceleration [m/s^2]\n0,1\n1,x\n", "r.csv:3: .*no pair of numbers"),
-        ("time [s],acceleration [m/s^2]\n0,1\n1,nan\n", "not finite"),
+        (
+            "time [s],acceleration [m/s^2]\n0,1\n1,nan\n",
+            "no pair of numbers; allowed: a finite time",
+        ),
         ("time [s],acceleration [m/s^2]\n0,1\n1,2\n3,4\n", "not evenly spaced"),
         ("time [s]\n0\n1\n", "no comma found"),
         ("", "a header and two rows"),

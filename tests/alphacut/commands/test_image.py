@@ -283,7 +283,7 @@ def test_an_e_without_a_positive_bound_is_told_and_handed_to_no_structure(folder
 def test_tiles_that_may_have_no_scatter_of_e_are_bad_input(folder, capfd):
     np.save(folder / "l.npy", np.random.default_rng(5).integers(0, 2, (8, 8)))
     assert main(["image", written(folder, **LOOSE, boundary='"window"'), "--quiet"]) == 2
-    assert "take boundary periodic, larger tiles or phases of less" in capfd.readouterr().err
+    assert "take fewer tiles (cell.tiles), so that each is larger" in capfd.readouterr().err
 
 
 def test_the_words_name_the_plane_strain_bulk_modulus(folder, capfd):

@@ -75,7 +75,7 @@ def test_what_cannot_run_is_found_before(command, name, tmp_path, capfd):
             "0.02;-0.00000",
             (
                 r"building.record.csv:5: frame.accelerogram = 0.02;-0.00000: .*pair of numbers;"
-                r" allowed: a time"
+                r" allowed: a finite time"
             ),
         ),
         (

@@ -10,6 +10,7 @@ import pytest
 from scipy.linalg import expm
 
 from alphacut.entry import main
+from alphacut.stages.vibration.modes_csv import motion_rows
 
 CASE = """
 schema = 1
@@ -96,6 +97,7 @@ GOOD = "time [s],q1 [mm]\n0,10\n0.02,9\n0.04,8\n0.06,7\n"
         ("time [s],q1 [kN]\n0,1\n0.1,2\n", "", "", "update.recorded"),
         ("time [s],q1 [mm]\n0,1\n0.1,2;5\n", "", "", "this row is no instant"),
         ("time [s],q1 [mm]\n0,1\n0.1,2\n0.3,2\n", "", "", "not evenly spaced"),
+        ("time [s],q1 [mm]\n5,1\n5.1,2\n5.2,2\n", "", "", "0 s; subtract the first time from all"),
         ("time [s],q1 [mm]\n0,1\n0.1,2\n", "", "", "parameters need more"),
         (GOOD, 'recorded = "motion.csv"', 'recorded = "none.csv"', "there is no such file"),
         (GOOD, 'recorded = "motion.csv"\n', "", "learned from one file"),
@@ -139,3 +141,12 @@ def test_rounding_alone_is_no_error_of_the_outputs(tmp_path: Path) -> None:
     rows = [line.split(",") for line in lines]
     digits = [f"{t},{float(one):.3g},{float(two):.3g}" for t, one, two in rows]
     assert main(["update", str(written(tmp_path, "\n".join([head, *digits, ""])))]) == 0
+
+
+def test_a_recorded_motion_may_have_rounded_times(tmp_path: Path) -> None:
+    file = tmp_path / "motion.csv"
+    rows = "".join(f"{k / 128:.3f},{k % 5}\n" for k in range(300))
+    file.write_text(f"time [s],q1 [mm]\n{rows}", encoding="utf-8")
+    found = motion_rows(file, ("q1",))
+    assert found.step == pytest.approx(1 / 128, rel=1e-3)
+    assert found.values[:6, 0] == pytest.approx([0, 1e-3, 2e-3, 3e-3, 4e-3, 0])
