@@ -17,9 +17,7 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 COLUMNS = [("time", "s", "time|t"), ("acceleration", "m/s^2", r"acceleration|acc\.?|a")]
 ALLOWED = "time [s],acceleration [m/s^2], [g] or [gal]"
-PAIR = (
-    "a finite time and acceleration, such as 0.02,-0.35, with points and not commas in the numbers"
-)
+PAIR = "a finite time and acceleration, such as 0.02,-0.35, with points and no decimal commas"
 NPTS = re.compile(r"NPTS\s*=\s*(\d+)\s*,\s*DT\s*=\s*(\d*\.?\d+)\s*SEC", re.IGNORECASE)
 IN_G = re.compile(r"ACCELERATION .*IN UNITS OF G\b", re.IGNORECASE)
 EVEN = 1e-6  # relative: steps that differ by more are not even
