@@ -146,9 +146,7 @@ def store_of(options: argparse.Namespace, case: Case) -> Path | None:
 
 def summary(found: modulus.FuzzyModulus) -> str:
     """The α-cuts as a small table."""
-    lower, upper = (
-        [fixed(x, 5) for x in (ends / GPA).tolist()] for ends in found.result.bounds("E")
-    )
+    lower, upper = ([fixed(float(x), 5) for x in ends / GPA] for ends in found.result.bounds("E"))
     cuts = zip(found.result.alpha, lower, upper, *found.result.bounds("nu"), strict=True)
     rows = "".join(
         f"{a:5.2f}  {low:>10}  {high:>10}  {least:8.5f}  {most:8.5f}\n"
