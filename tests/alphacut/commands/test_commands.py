@@ -432,6 +432,11 @@ def test_every_shipped_case_runs_in_its_quick_form(path, tmp_path, capfd):
     assert all((tmp_path / name).stat().st_size > 1000 for name in summary["figures"])
 
 
+def test_the_shipped_pendulum_reaches_its_own_tolerance(capfd):
+    """Its quick form is coarser and asks for less."""
+    assert main(["envelope", str(CASES / "pendulum.toml"), "--quiet"]) == 0, capfd.readouterr().err
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", DRAWN_ELSEWHERE)
 def test_the_other_cases_draw_their_figures_too(name, tmp_path, capfd):
