@@ -30,8 +30,10 @@ GROWTH = 1e-6
 """Growth of a motion within a step that counts as rounding."""
 DIVERGED = 10.0
 """Error of a scheme, as a multiple of the motion's peak, from which on it has left the motion."""
-FULL = 4
-"""Motions of a full structure that a reduced one is judged by, at most."""
+FULL, FEWEST = 2 * 10**9, 5
+"""Unknowns cubed, over all motions of a full structure that judge a reduced one; least motions."""
+REDUCED = 2.0
+"""Factor on the error of a reduction besides: it is sharper between corners than that of steps."""
 
 
 def probes(cuts: Boxes) -> Array:
@@ -72,6 +74,12 @@ def exact(flow: Flow) -> bool:
     return isinstance(flow.integrator, Exact)
 
 
+def _affordable(points: Array, unknowns: int) -> Array:
+    """Some of the points in any order, so many as the modes of the full structure allow."""
+    count = int(np.clip(FULL // unknowns**3, FEWEST, CORNERS + 1))
+    return np.asarray(np.random.default_rng(0).permutation(points)[:count])
+
+
 @singledispatch
 def deviations(flow: Flow, points: Array) -> tuple[Array, Array]:
     """More accurate trajectories at `points` (S, d), and the flow's errors, (S, T, m)."""
@@ -82,10 +90,10 @@ def deviations(flow: Flow, points: Array) -> tuple[Array, Array]:
 @deviations.register
 def _(flow: LinearFlow, points: Array) -> tuple[Array, Array]:
     if isinstance(flow.system, ReducedStructure):
-        points = points[:: -(-len(points) // FULL)]
+        points = _affordable(points, len(flow.system.basis))
         given = [dict(zip(flow.names, point.tolist(), strict=True)) for point in points]
         full = np.array([flow.system.truth(point, flow.time) for point in given])
-        return full, np.abs(flow.values(points) - full)
+        return full, REDUCED * np.abs(flow.values(points) - full)
     truth = replace(flow, integrator=Exact()).values(points)
     return truth, np.abs(flow.values(points) - truth)
 
@@ -136,8 +144,8 @@ def source(flow: Flow) -> tuple[str, str]:
     """What makes trajectories inexact, and what lessens that."""
     if not isinstance(flow, LinearFlow):
         return "time stepping", "take a smaller step, or a scheme of order 4"
-    if isinstance(flow.system, ReducedStructure):
-        return "the reduction to few shapes", "take narrower supports"
+    if isinstance(flow.integrator, Exact):
+        return "the reduction to few shapes", "narrower supports may lessen it"
     return "time stepping", "take a smaller step; integrator exact has none"
 
 

@@ -56,6 +56,7 @@ class LimitSearch:
     nominal: Array
     gap: float
     failed: Unproved = field(default_factory=list)
+    size: float = field(default=0.0, init=False)
 
     def fit(self, size: float) -> None:
         """Model of the motion over the box of a size, in units of the limits."""

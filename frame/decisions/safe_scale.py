@@ -30,9 +30,9 @@ EASY = (1.0, 0.3)
 """The same as shares of that, tried first: they serve where the largest box is far from limits."""
 SHRINK = (0.004, 0.008, 0.015, 0.03, 0.06, 0.12, 0.25, 0.5, 0.75)
 """By how much the box to be proved is smaller than the refuted one, until all is proved."""
-CLOSE = (0.3, 0.03)
+CLOSE = (0.1,)
 """The same between a scale that is proved and one that is not."""
-LOOSE, HALVINGS = 0.9, 6
+LOOSE, HALVINGS = 0.9, 4
 """Share of the unproved scale below which a greater one is looked for, and in how many steps."""
 HALVED = 0.5 ** np.arange(6)
 """Shares of the largest box that are tried while neither a proof nor a broken limit is found."""
@@ -148,9 +148,11 @@ def safe_scale(
         reason = search.reason if nominal_share <= 1 - TIE else ""
         low, high = 0.0 if reason else safe, min(unsafe, 2 * size, most)
         if nominal_share <= 1 - TIE and low < LOOSE * high:
-            low, looked = _closer(search, 1 - nominal_share, low, high, budget, workers)
+            stage(tell, "scales between a proof and a broken limit")
+            low, broken, looked = _closer(search, 1 - nominal_share, low, high, budget, workers)
             boxes += looked
             safe, reason = (low, "") if low else (safe, reason)
+            unsafe, witness = broken or (unsafe, witness)
     share = 0.0 if witness is None else search.share(witness)
     worth = ("verified by sampling" if reason else "guaranteed", reason)
     seconds = time.perf_counter() - begun
@@ -166,15 +168,19 @@ def _require(limits: Mapping[str, float], most: float) -> None:
 
 def _closer(
     search: LimitSearch, left: float, low: float, high: float, budget: float, workers: int
-) -> tuple[float, int]:
-    """A greater scale proved between two scales, by halving what is between, and boxes."""
-    boxes = 0
+) -> tuple[float, tuple[float, Array] | None, int]:
+    """A greater scale proved between two, by halving; a broken one with its witness; boxes."""
+    boxes, broken = 0, None
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         done, looked = _easily(search, left, middle, budget, workers, CLOSE)
         boxes += looked
         low, high = (middle, high) if done else (low, middle)
-    return low, boxes
+        of_middle = search.size == middle and not (done or search.reason)
+        if of_middle and (found := search.witness(middle)) is not None:
+            high = search.size_of(found)
+            broken = high, found
+    return low, broken, boxes
 
 
 def _easily(

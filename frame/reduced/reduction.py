@@ -100,11 +100,12 @@ class AffineStructure:
         loads = np.geomspace(*band, frequencies)
         shapes = [self._response_shapes(point, loads) for point in points]
         made, time = self._projected(shapes, keep), self._watched(band[0])
+        top = BEYOND * band[1] if self.ground is not None else np.inf
         truth = [self.trajectories(point, time) for point in points[:2]]
         for lowest in RESONANT:
             if made.deviation(points[:2], time, truth) <= accuracy:
                 break
-            beyond = [self._resonances(point, BEYOND * band[1], lowest) for point in points]
+            beyond = [self._resonances(point, top, lowest) for point in points]
             made = self._projected([*shapes, *beyond], keep)
         return made
 

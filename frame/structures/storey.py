@@ -87,8 +87,9 @@ class StoreyFrame(StoreyValues):
             object.__setattr__(self, name, tuple(getattr(self, name)) or (0.0,) * n)
         if not self.stiffness:
             object.__setattr__(self, "columns", tuple(self.columns) or (2.0,) * n)
+        every = [f"q{z + 1}" for z in range(n)]
         object.__setattr__(
-            self, "outputs", tuple(map(Output, self.outputs or (f"q{z + 1}" for z in range(n))))
+            self, "outputs", tuple(Output(str(name)) for name in tuple(self.outputs) or every)
         )
         check_values(self)
         for output in self.outputs:

@@ -150,3 +150,23 @@ def test_progress_never_falls_where_smaller_scales_follow(monkeypatch):
     assert len(shares) == 3 * len(module.HALVED)
     assert shares == sorted(shares)
     assert shares[-1] <= 1
+
+
+def test_broken_limits_met_between_a_proof_and_a_limit_are_kept():
+    """A limit hardly above the nominal peak, and supports of very different widths."""
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        frame = one_floor({"v0": [0.4], "dampers": [rng.uniform(10, 100)]})
+        nominal = {"m1": 1e3, "l1": 3.0, "I": 1e-6}
+        centre = np.array([*nominal.values()])
+        reach = scaled(centre, np.array([0.4, 0.01, 0.05]) * centre, 0.05 * centre)
+        flow = LinearFlow(frame, tuple(nominal), 3, 0.02, Exact())
+        limit = 1.003 * np.abs(flow.values(centre[None])).max()
+        found = safe_scale(frame, nominal, reach, {"q1": limit}, duration=3, step=0.02)
+        lower, upper = reach(found.unsafe * (1 + 1e-9))
+        assert found.witness is not None
+        assert ((lower <= found.witness) & (found.witness <= upper)).all()
+        assert np.abs(flow.values(found.witness[None])).max() > limit
+        assert found.safe < found.unsafe < 1.5 * found.safe
+        ends = rng.uniform(*reach(found.safe), (2000, 3))
+        assert np.abs(flow.values(ends)).max() <= limit

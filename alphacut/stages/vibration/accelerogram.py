@@ -83,7 +83,8 @@ def even_step(file: CsvFile, rows: Rows, scale: float) -> float:
         raise file.refuse(rows[0][0], what, allowed="0 s; subtract the first time from all")
     even, half = np.linspace(0, times[-1], len(times)), scale * half_digits(written)
     # that of the last row is in the step too; from step/4 on, a missing row might pass for rounding
-    off = np.where(half < even[1] / 4, half + np.linspace(0, half[-1], len(half)), 0)
+    half = np.where(half < even[1] / 4, half, 0)
+    off = half + np.linspace(0, half[-1], len(half))
     if times[-1] > 0 and (abs(times - even) <= off + EVEN * np.maximum(even, even[1])).all():
         return float(even[1])
     gaps = np.diff(times)

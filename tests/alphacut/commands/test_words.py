@@ -69,7 +69,7 @@ def test_durations_are_in_the_banner_and_on_the_console(tmp_path, capfd):
         "--no-figures",
     ]
     assert main(arguments) == 0
-    assert "envelope.duration = 1.2 s; these numbers mean nothing" in capfd.readouterr().out
+    assert "envelope.duration = 0.6 s; these numbers mean nothing" in capfd.readouterr().out
 
 
 def test_a_case_of_ones_own_has_nothing_of_the_paper(porous):

@@ -331,3 +331,14 @@ def test_moduli_of_gels_keep_their_digits(
         out = capfd.readouterr().out
         assert re.search(r"\d\.\d{3,}e-06", out)
         assert "0.000 " not in out
+
+
+def test_wide_inputs_are_no_e_beyond_the_bounds(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The middle of E's core need not lie between bounds at the middle of the inputs."""
+    wide = ["cell.matrix_modulus=20 GPa", "cell.inclusion_modulus=[1, 100] GPa"]
+    wide += ["cell.particles=spheres", "modulus.method=series", "modulus.alpha=[0, 1]"]
+    words = [word for change in wide for word in ("--set", change)]
+    assert main(["modulus", str(polymer(tmp_path, "spheres")), *words]) == 0
+    assert "But" not in capfd.readouterr().out

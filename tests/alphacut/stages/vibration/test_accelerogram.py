@@ -134,3 +134,13 @@ def test_the_cures_of_refused_times_work(tmp_path: Path) -> None:
     late = [10 + 0.0075 * k for k in range(100)]
     times = [f"{time - late[0]:.4f}" for time in late]
     assert accelerogram(written(tmp_path, times)).step == pytest.approx(0.0075)
+
+
+@pytest.mark.parametrize(("step", "end", "gap"), [(0.05, 10, 100), (0.005, 10, 1500)])
+def test_a_missing_row_is_no_rounding_of_a_short_last_time(
+    tmp_path: Path, step: float, end: int, gap: int
+) -> None:
+    """The last time, "10" after "9.95", is written to seconds: its half unit is above the step."""
+    times = [f"{step * k:.10g}" for k in range(round(end / step) + 1) if k != gap]
+    with pytest.raises(BadInput, match=r"not evenly spaced: .* resample to them"):
+        accelerogram(written(tmp_path, times))
