@@ -30,8 +30,6 @@ GROWTH = 1e-6
 """Growth of a motion within a step that counts as rounding."""
 DIVERGED = 10.0
 """Error of a scheme, as a multiple of the motion's peak, from which on it has left the motion."""
-FULL, FEWEST = 2 * 10**9, 5
-"""Unknowns cubed, over all motions of a full structure that judge a reduced one; least motions."""
 REDUCED = 2.0
 """Factor on the error of a reduction besides: it is sharper between corners than that of steps."""
 
@@ -74,15 +72,12 @@ def exact(flow: Flow) -> bool:
     return isinstance(flow.integrator, Exact)
 
 
-def _affordable(points: Array, unknowns: int) -> Array:
-    """Some of the points in any order, so many as the modes of the full structure allow."""
-    count = int(np.clip(FULL // unknowns**3, FEWEST, CORNERS + 1))
-    return np.asarray(np.random.default_rng(0).permutation(points)[:count])
-
-
 @singledispatch
 def deviations(flow: Flow, points: Array) -> tuple[Array, Array]:
-    """More accurate trajectories at `points` (S, d), and the flow's errors, (S, T, m)."""
+    """More accurate trajectories at `points` (S, d), and the flow's errors, (S, T, m).
+
+    Those of a reduced structure are at its own `judges`, whose modes are kept.
+    """
     values = flow.values(points)
     return values, np.zeros_like(values)
 
@@ -90,10 +85,10 @@ def deviations(flow: Flow, points: Array) -> tuple[Array, Array]:
 @deviations.register
 def _(flow: LinearFlow, points: Array) -> tuple[Array, Array]:
     if isinstance(flow.system, ReducedStructure):
-        points = _affordable(points, len(flow.system.basis))
-        given = [dict(zip(flow.names, point.tolist(), strict=True)) for point in points]
-        full = np.array([flow.system.truth(point, flow.time) for point in given])
-        return full, REDUCED * np.abs(flow.values(points) - full)
+        whole, judges = replace(flow, names=tuple(flow.system.parameters)), flow.system.judges
+        full = np.array([flow.system.full.trajectories(point, flow.time) for point in judges])
+        found = whole.values(np.array([list(point.values()) for point in judges]))
+        return full, REDUCED * np.abs(found - full)
     truth = replace(flow, integrator=Exact()).values(points)
     return truth, np.abs(flow.values(points) - truth)
 

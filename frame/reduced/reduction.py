@@ -12,12 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet
-from alphacut.frame.calculus.low_discrepancy import chebyshev_points
+from alphacut.frame.calculus.low_discrepancy import chebyshev_points, corners
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.dynamics.spectral import responses
@@ -36,6 +37,8 @@ SHARPEST = 0.02
 """Twice the damping ratio below which resonances are not taken for larger: none has the time."""
 RESONANT = (100, 300)
 """Modes that may resonate, at most; the second number where the first is not enough."""
+FULL, CORNERS = 2 * 10**9, (5, 17)
+"""Unknowns cubed over all corners at which the error is measured; the least and most of them."""
 MOST_NODES, PERIODS = 1000, 10
 """Nodes, and periods of a structure without ground motion, by which the shapes are judged."""
 
@@ -97,16 +100,17 @@ class AffineStructure:
             frequencies: Frequencies of the load at each point.
         """
         band, points = self._band(), _points(self.parameters, bounds, samples)
+        judges = _corners(self.parameters, bounds, len(self.excitation))
         loads = np.geomspace(*band, frequencies)
         shapes = [self._response_shapes(point, loads) for point in points]
-        made, time = self._projected(shapes, keep), self._watched(band[0])
+        made, time = self._projected(shapes, keep, judges), self._watched(band[0])
         top = BEYOND * band[1] if self.ground is not None else np.inf
-        truth = [self.trajectories(point, time) for point in points[:2]]
+        truth = [self.trajectories(point, time) for point in judges[:2]]
         for lowest in RESONANT:
-            if made.deviation(points[:2], time, truth) <= accuracy:
+            if made.deviation(judges[:2], time, truth) <= accuracy:
                 break
             beyond = [self._resonances(point, top, lowest) for point in points]
-            made = self._projected([*shapes, *beyond], keep)
+            made = self._projected([*shapes, *beyond], keep, judges)
         return made
 
     def _watched(self, slowest: float) -> Array:
@@ -116,7 +120,9 @@ class AffineStructure:
         count = min(len(self.ground.acceleration), MOST_NODES)
         return np.arange(count) * self.ground.step
 
-    def _projected(self, shapes: Sequence[Array], keep: float) -> ReducedStructure:
+    def _projected(
+        self, shapes: Sequence[Array], keep: float, judges: Sequence[Mapping[str, float]]
+    ) -> ReducedStructure:
         """Projection on the strongest of shapes, each (N, k)."""
         M, K = self.assembled(self.parameters)
         # so that the rigid motion is projected without error
@@ -137,7 +143,9 @@ class AffineStructure:
             np.zeros(basis.shape[1]) if x is None else basis.T @ (M @ x) for x in (self.q0, self.v0)
         ]
         rows = np.array([row @ basis for row in self.observed.values()])
-        return ReducedStructure(self, basis, small[0], small[1], push, rows, state[0], state[1])
+        return ReducedStructure(
+            self, basis, small[0], small[1], push, rows, state[0], state[1], judges
+        )
 
     def _response_shapes(self, p: Mapping[str, float], frequencies: Array) -> Array:
         """Displacements under harmonic ground motion and of a free vibration, (N, k).
@@ -197,34 +205,39 @@ class AffineStructure:
         top = 0.0 if self.ground is None else self.ground.band()
         return fundamental / 2, max(top, 20 * fundamental)
 
+    @lru_cache(maxsize=64)  # noqa: B019
+    def _modes(self, p: tuple[tuple[str, float], ...]) -> tuple[Array, Array, Array]:
+        """ω², rows of the outputs (m, N), and shares of the ground, q0 and v0, (3, N)."""
+        from scipy.linalg import eigh
+
+        M, K = self.assembled(dict(p))
+        squared, shape = eigh(K.toarray(), M.toarray())
+        zero = np.zeros(len(squared))
+        moved = [self.excitation, *(zero if x is None else x for x in (self.q0, self.v0))]
+        rows = np.array(list(self.observed.values())) @ shape
+        return squared, rows, np.array([shape.T @ (M @ x) for x in moved])
+
     def trajectories(self, p: Mapping[str, float], time: Array) -> Array:
         """Outputs of the full structure by all its modes, shape (T, m), for checking.
 
         Rayleigh and modal damping keep the undamped modes, each of which answers with two
         exponentials.
         """
-        from scipy.linalg import eigh
-
-        M, K = self.assembled(p)
-        squared, shape = eigh(K.toarray(), M.toarray())
+        squared, rows, parts = self._modes(tuple(p.items()))
         half = self._half_damping(p, squared)
         root = np.sqrt(half**2 - squared + 0j)
         slow, fast = -half + root, -half - root
-        rows = np.array(list(self.observed.values())) @ shape
         h, out = time[1] - time[0], np.zeros((len(time), len(rows)), complex)
         if self.ground is not None:
-            share = -(shape.T @ (M @ self.excitation)) / (slow - fast)
+            share = -parts[0] / (slow - fast)
             two = responses(np.stack([slow, fast]), self.ground, h, len(time) - 1)[0]
             out += ((two[0] - two[1]) * share) @ rows.T
-        for x, parts in ((self.q0, (-fast, slow)), (self.v0, (1.0, -1.0))):
-            if x is not None and x.any():
-                share = shape.T @ (M @ x) / (slow - fast)
+        for x, (first, second) in zip(parts[1:], ((-fast, slow), (1.0, -1.0)), strict=True):
+            if x.any():
+                share = x / (slow - fast)
                 out += (
                     share
-                    * (
-                        parts[0] * np.exp(np.outer(time, slow))
-                        + parts[1] * np.exp(np.outer(time, fast))
-                    )
+                    * (first * np.exp(np.outer(time, slow)) + second * np.exp(np.outer(time, fast)))
                 ) @ rows.T
         return out.real
 
@@ -242,6 +255,7 @@ class ReducedStructure:
         rows: Observation rows, shape (m, n).
         q0: Initial coordinates, shape (n,).
         v0: Initial velocities of the coordinates, shape (n,).
+        judges: All parameters at some corners of the box, at which the error is measured.
     """
 
     full: AffineStructure
@@ -252,6 +266,7 @@ class ReducedStructure:
     rows: Array
     q0: Array
     v0: Array
+    judges: Sequence[Mapping[str, float]] = ()
 
     @property
     def parameters(self) -> Mapping[str, float]:
@@ -303,10 +318,6 @@ class ReducedStructure:
         pairs = zip(found, truth, strict=True)
         return max(float((np.abs(x - y).max(0) / np.abs(y).max(0)).max()) for x, y in pairs)
 
-    def truth(self, point: Mapping[str, float], time: Array) -> Array:
-        """Outputs of the full structure, shape (T, m); parameters not given are modal."""
-        return self.full.trajectories({**self.parameters, **point}, time)
-
 
 def _points(
     modal: Mapping[str, float], bounds: Mapping[str, tuple[float, float]], samples: int
@@ -318,6 +329,19 @@ def _points(
         {**modal, **dict(zip(bounds, (low + high) / 2 + (high - low) / 2 * u, strict=True))}
         for u in unit
     ]
+
+
+def _corners(
+    modal: Mapping[str, float], bounds: Mapping[str, tuple[float, float]], unknowns: int
+) -> list[dict[str, float]]:
+    """Some corners of the box in any order, so many as the modes of the structure allow."""
+    low, high = np.array(list(bounds.values())).reshape(-1, 2).T
+    count = int(np.clip(FULL // unknowns**3, *CORNERS))
+    rng, one = np.random.default_rng(0), np.ones(len(low))
+    ends = corners(-one, one) if len(low) <= 4 else rng.choice([-1.0, 1.0], (16, len(low)))
+    unit = rng.permutation(np.vstack([ends, 0 * one]))[:count]
+    middle, half = (low + high) / 2, (high - low) / 2
+    return [{**modal, **dict(zip(bounds, middle + half * u, strict=True))} for u in unit]
 
 
 def _lifted(factor: Any, size: int, d: int) -> Jet:
