@@ -238,3 +238,11 @@ def test_a_greater_limit_never_gives_a_smaller_proved_scale(tmp_path, capfd):
     assert scales[0] <= scales[1] < found["unsafe_scale"] / 1.1
     assert main(["tolerances", str(tmp_path / "two.toml")]) == 0
     assert "between the two it is undecided" in capfd.readouterr().out
+
+
+def test_what_a_measurement_teaches_is_said_to_be_left_out(tmp_path, capfd):
+    (tmp_path / "modes.csv").write_text("mode,frequency [Hz],q1\n1,0.4,1\n", encoding="utf-8")
+    measured = '[update]\nmeasured = "modes.csv"\nlearn = ["E"]\nfrequency_deviation = 0.01\n'
+    for text, words in ((CASE, False), (CASE + measured, True)):
+        assert told(tmp_path, "44 mm", "--json", "-", text=text) == 0
+        assert ("what [update] learns is not taken in" in capfd.readouterr().err) == words
