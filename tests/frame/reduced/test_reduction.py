@@ -206,3 +206,21 @@ def test_shapes_come_in_until_the_motion_is_accurate() -> None:
     assert few.deviation([structure.parameters], time, truth) > 0.02
     assert more.deviation([structure.parameters], time, truth) < 1e-3
     assert few.basis.shape[1] < more.basis.shape[1]
+
+
+def test_certified_bounds_of_a_poor_reduction_are_widened_on_both_sides() -> None:
+    """A box so narrow that the bounds proved of the reduced motion leave the true one out."""
+    sine = Accelerogram(0.01, np.sin(2 * np.pi * 3.1 * 0.01 * np.arange(150)))
+    structure = BeamFrame(12, 2, rayleigh=(0.01, 1e-4), ground=sine).structure()
+    time, inputs = np.arange(101) * 0.01, {"E_columns": Triangular(29.9999e9, 30e9, 30.0001e9)}
+    truth = structure.trajectories(structure.parameters, time)
+    reduced = structure.reduced({"E_columns": (29.9999e9, 30.0001e9)}, keep=1e-5, accuracy=1.0)
+    flow = LinearFlow(reduced, ("E_columns",), 1.0, 0.01, Exact())
+    off = flow.values(np.array([[30e9]]))[0] - truth
+    assert off.max() > 1e-6
+    assert off.min() < -1e-6
+    found = envelope(
+        reduced, inputs, duration=1.0, step=0.01, alpha=(0,), method="modal", certify=1e-7
+    )
+    assert (found.lower[0] <= truth).all()
+    assert (truth <= found.upper[0]).all()
