@@ -273,13 +273,10 @@ def exceedances(
     drawn = [_drawn(name, random[name], rng, samples) for name in random]
     draws = np.column_stack(drawn) if random else np.zeros((1, 0))
     names = *cuts.names, *random
-    flow: Flow
-    if isinstance(system, LagrangianSystem):
-        flow = LagrangianFlow(system, names, duration, step, integrator)
-    else:
-        flow = LinearFlow(system, names, duration, step, Exact())
+    flow = _trajectories(system, names, duration, step, integrator)
+    if isinstance(flow, LinearFlow):
         middle = np.tile(cuts.modal, (len(draws), 1))
-        require_motion(system, flow.names, np.hstack([middle, draws]), duration, step)
+        require_motion(flow.system, names, np.hstack([middle, draws]), duration, step)
     for name, values in zip(random, drawn, strict=True):
         require_size(name, system.parameters[name], np.array([values.min(), values.max()]))
     tried = [_tried(cuts, level, spread) for level in range(len(cuts.alpha))]
@@ -304,6 +301,18 @@ def exceedances(
     if len(each) > 1:
         each.append(chance(*(x.max(-1) for x in three), size=1.0))
     return dict(zip((*limits, ANY), each, strict=False))
+
+
+def _trajectories(
+    system: LinearSystem | LagrangianSystem,
+    names: tuple[str, ...],
+    duration: float,
+    step: float,
+    integrator: str,
+) -> Flow:
+    if isinstance(system, LagrangianSystem):
+        return LagrangianFlow(system, names, duration, step, integrator)
+    return LinearFlow(system, names, duration, step, Exact())
 
 
 def _drawn(name: str, given: Sampler, rng: np.random.Generator, samples: int) -> Array:

@@ -125,39 +125,55 @@ def safe_scale(
         box, shares = (centre, centre), (nominal_share, nominal_share)
         worth = ("guaranteed", "")
         return SafeScale(names, centre, None, *box, 0.0, centre, *shares, *worth, 0, seconds)
-    boxes = 0
     with told(progress) as whole:
         tell = whole and Stages(whole)
-        for size in most * HALVED:
-            stage(tell, f"scales up to {size:.3g}")
-            unsafe, witness = np.inf, None
-            if nominal_share > 1 - TIE:  # nothing is left for a proof
-                search.gap, safe = GAP, 0.0
-                unsafe, witness = _refuted(search, size, precision)
-                break
-            done, looked = _easily(search, 1 - nominal_share, size, budget, workers)
-            boxes, safe = boxes + looked, size if done else 0.0
-            if done:
-                break
-            search.gap = min(GAP, FINE * (1 - nominal_share))
-            refuted = _refuted(search, size, precision)
-            safe, unsafe, witness, looked = _proved(search, refuted, size, budget, workers, tell)
-            boxes += looked
-            if safe or witness is not None:
-                break
-        reason = search.reason if nominal_share <= 1 - TIE else ""
-        low, high = 0.0 if reason else safe, min(unsafe, 2 * size, most)
-        if nominal_share <= 1 - TIE and low < LOOSE * high:
-            stage(tell, "scales between a proof and a broken limit")
-            low, broken, looked = _closer(search, 1 - nominal_share, low, high, budget, workers)
-            boxes += looked
-            safe, reason = (low, "") if low else (safe, reason)
-            unsafe, witness = broken or (unsafe, witness)
+        if nominal_share > 1 - TIE:  # nothing is left for a proof
+            search.gap = GAP
+            safe, reason, boxes, (unsafe, witness) = 0.0, "", 0, _refuted(search, most, precision)
+        else:
+            left = 1 - nominal_share
+            told_of = _scales(search, left, most, precision, budget, workers, tell)
+            safe, reason, boxes, (unsafe, witness) = told_of
     share = 0.0 if witness is None else search.share(witness)
     worth = ("verified by sampling" if reason else "guaranteed", reason)
     seconds = time.perf_counter() - begun
     box, shares = reach(safe), (share, nominal_share)
     return SafeScale(names, centre, safe, *box, unsafe, witness, *shares, *worth, boxes, seconds)
+
+
+def _scales(
+    search: LimitSearch,
+    left: float,
+    most: float,
+    precision: float,
+    budget: float,
+    workers: int,
+    tell: Progress | None,
+) -> tuple[float, str, int, tuple[float, Array | None]]:
+    """The safe scale, why it is only sampled, boxes, and the refuted scale with its witness."""
+    boxes = 0
+    for size in most * HALVED:
+        stage(tell, f"scales up to {size:.3g}")
+        unsafe, witness = np.inf, None
+        done, looked = _easily(search, left, size, budget, workers)
+        boxes, safe = boxes + looked, size if done else 0.0
+        if done:
+            break
+        search.gap = min(GAP, FINE * left)
+        refuted = _refuted(search, size, precision)
+        safe, unsafe, witness, looked = _proved(search, refuted, size, budget, workers, tell)
+        boxes += looked
+        if safe or witness is not None:
+            break
+    reason = search.reason
+    low, high = 0.0 if reason else safe, min(unsafe, 2 * size, most)
+    if low < LOOSE * high:
+        stage(tell, "scales between a proof and a broken limit")
+        low, broken, looked = _closer(search, left, low, high, budget, workers)
+        boxes += looked
+        safe, reason = (low, "") if low else (safe, reason)
+        unsafe, witness = broken or (unsafe, witness)
+    return safe, reason, boxes, (unsafe, witness)
 
 
 def _require(limits: Mapping[str, float], most: float) -> None:
