@@ -37,8 +37,8 @@ SHARPEST = 0.02
 """Twice the damping ratio below which resonances are not taken for larger: none has the time."""
 RESONANT = (100, 300)
 """Modes that may resonate, at most; the second number where the first is not enough."""
-FULL, CORNERS = 2 * 10**9, (5, 17)
-"""Unknowns cubed over all corners at which the error is measured; the least and most of them."""
+FULL, CORNERS, INNER = 2 * 10**9, (5, 40), 24
+"""Unknowns cubed over all points at which the error is measured; least and most; those inside."""
 MOST_NODES, PERIODS = 1000, 10
 """Nodes, and periods of a structure without ground motion, by which the shapes are judged."""
 
@@ -334,12 +334,13 @@ def _points(
 def _corners(
     modal: Mapping[str, float], bounds: Mapping[str, tuple[float, float]], unknowns: int
 ) -> list[dict[str, float]]:
-    """Some corners of the box in any order, so many as the modes of the structure allow."""
+    """Corners of the box in any order, then points inside, as many as the modes allow."""
     low, high = np.array(list(bounds.values())).reshape(-1, 2).T
     count = int(np.clip(FULL // unknowns**3, *CORNERS))
     rng, one = np.random.default_rng(0), np.ones(len(low))
     ends = corners(-one, one) if len(low) <= 4 else rng.choice([-1.0, 1.0], (16, len(low)))
-    unit = rng.permutation(np.vstack([ends, 0 * one]))[:count]
+    inner = chebyshev_points(len(low), INNER)
+    unit = np.vstack([rng.permutation(np.vstack([ends, 0 * one])), inner])[:count]
     middle, half = (low + high) / 2, (high - low) / 2
     return [{**modal, **dict(zip(bounds, middle + half * u, strict=True))} for u in unit]
 
