@@ -9,6 +9,8 @@ import pytest
 from scipy.sparse.linalg import eigsh
 
 from alphacut.frame import Accelerogram, Exact, LinearFlow, StoreyFrame, envelope
+from alphacut.frame.boxes import UnitFlow, boxes
+from alphacut.frame.checks.step_error import step_error
 from alphacut.frame.reduced.beam import BeamFrame
 from alphacut.frame.structures.linear import evaluate, frequencies
 from alphacut.frame.structures.modes import classical_modes
@@ -224,3 +226,18 @@ def test_certified_bounds_of_a_poor_reduction_are_widened_on_both_sides() -> Non
     )
     assert (found.lower[0] <= truth).all()
     assert (truth <= found.upper[0]).all()
+
+
+def test_a_resonance_inside_the_box_is_within_the_declared_error() -> None:
+    """Undamped, so that the motion is worst between the corners."""
+    sine = Accelerogram(0.02, 3 * np.sin(2 * np.pi * 4.0 * 0.02 * np.arange(401)))
+    structure = BeamFrame(8, 3, rayleigh=(0.0, 0.0), ground=sine).structure()
+    reduced = structure.reduced({"E_columns": (18e9, 42e9)}, accuracy=1.0)
+    inputs = {"E_columns": Triangular(18e9, 30e9, 42e9)}
+    flow = LinearFlow(reduced, ("E_columns",), 8.0, 0.02, Exact())
+    declared = step_error(UnitFlow(flow, boxes(inputs, (0,))))
+    points = np.linspace(18e9, 42e9, 41)[:, None]
+    for point, found in zip(points, flow.values(points), strict=True):
+        p = {**structure.parameters, "E_columns": float(point[0])}
+        off = np.abs(found - structure.trajectories(p, flow.time))
+        assert (off <= declared + 1e-9 * np.abs(found).max()).all()
