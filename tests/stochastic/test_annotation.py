@@ -71,8 +71,13 @@ def test_discs_that_touch_are_covered_by_their_circles_and_ellipses_are_not(dark
         SectionImage("e.png", 1.0, kind).circles(picture)
     found = SectionImage("e.png", 1.0, kind, drop=True).circles(picture)
     assert found.misfit > 1.2 * MISFIT
+
+
+def test_pieces_that_pass_as_round_are_judged_by_what_their_circles_leave_out():
+    """One picture: among others a piece whose neighbours flatten it is refused before."""
+    picture = section(np.random.default_rng(1), aspect=1.8, count=35)
     with pytest.raises(ValueError, match=r"lies outside the circles that would stand for them"):
-        SectionImage("e.png", 1.0, kind, roundness=0.2).circles(picture)
+        SectionImage("e.png", 1.0, "bright", roundness=0.2).circles(picture)
 
 
 def test_the_wrong_phase_is_named_and_naming_it_ends_the_refusal():
