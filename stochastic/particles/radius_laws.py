@@ -210,25 +210,15 @@ class MeasuredRadii:
         return f"{len(self.values)} values of {self.source}"
 
     @cached_property
-    def _grade(self) -> tuple[Array, Array, Array]:
-        """Distinct values, and the distribution function just below and at each of them."""
-        values, first, count = np.unique(self.values, return_index=True, return_counts=True)
-        steps = max(1, len(self.values) - 1)
-        return values, first / steps, (first + count - 1) / steps
+    def _grade(self) -> Array:
+        """Distribution function at the values; a step where some are equal, or there is one."""
+        return np.linspace(0, 1, len(self.values)) if len(self.values) > 1 else np.ones(1)
 
     def cdf(self, radius: ArrayLike) -> Array:
         """P(r ≤ radius), any shape, `radius` in m."""
-        values, below, at = self._grade
-        radius = np.asarray(radius, float)
-        place = np.clip(np.searchsorted(values, radius, side="right"), 1, len(values)) - 1
-        after = np.minimum(place + 1, len(values) - 1)
-        gap = np.where(after > place, values[after] - values[place], 1.0)
-        share = at[place] + (radius - values[place]) / gap * (below[after] - at[place]) * (
-            after > place
-        )
-        return np.where(radius < values[0], 0.0, np.where(radius >= values[-1], 1.0, share))
+        # of equal values `interp` takes the last at them, and the first below them
+        return np.asarray(np.interp(np.asarray(radius, float), self.values, self._grade, left=0))
 
     def sample(self, number: int, generator: np.random.Generator) -> Array:
         """`number` independent radii, shape (number,), in m."""
-        grade = np.linspace(0, 1, len(self.values)) if len(self.values) > 1 else np.zeros(1)
-        return np.interp(generator.random(number), grade, self.values)
+        return np.interp(generator.random(number), self._grade, self.values)
