@@ -60,7 +60,8 @@ class CircleFile:
             cure = "mend them, or drop them: [microstructure.circles] drop = true"
             if overlaps and len(overlaps) == len(reasons) and needed < 1:
                 cure += f", or take overlaps for errors of measurement: overlap = {needed:g}"
-            raise ValueError(f"{self.path}: {_counted(len(reasons))} no sense: {told}; {cure}")
+            make = "1 row makes" if len(reasons) == 1 else f"{len(reasons)} rows make"
+            raise ValueError(f"{self.path}: {make} no sense: {told}; {cure}")
         good = np.array([row not in reasons for row in rows], bool)
         if not good.any():
             raise ValueError(f"{self.path}: no row holds a circle; it takes at least one")
@@ -109,10 +110,6 @@ class CircleFile:
             late: f"overlaps the circle of row {early} by {told(by, 3)}{where}"
             for early, late, by, where in sorted(pairs, reverse=True)
         }, needed
-
-
-def _counted(number: int) -> str:
-    return "1 row makes" if number == 1 else f"{number} rows make"
 
 
 @dataclass(frozen=True, eq=False)

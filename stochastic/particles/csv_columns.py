@@ -97,8 +97,8 @@ def share_column(path: Path, name: str) -> Array | None:
     values = np.array([_number(f[place] if place < len(f) else "", path, n) for n, f in rows])
     percent = unit == "%" or (unit is None and bool((values > 1).any()))
     shares = values / 100 if percent else values
-    if ((shares < 0) | (shares > 1)).any():
-        row = rows[int(np.argmax((shares < 0) | (shares > 1)))][0]
+    if (outside := (shares < 0) | (shares > 1)).any():
+        row = rows[int(np.argmax(outside))][0]
         raise ValueError(f"{path}: row {row} has a share outside 0 to {'100 %' if percent else 1}")
     return np.asarray(shares)
 
@@ -257,7 +257,8 @@ def _places(
 def _metres(unit: str, column: str, path: Path) -> float:
     """Metres in one `unit` of length."""
     if not unit:
-        raise ValueError(f"{path}: column {column!r} has no unit; write it in the header: 'r [mm]'")
+        cure = f"write it in the header: '{column} [mm]'"
+        raise ValueError(f"{path}: column {column!r} has no unit; {cure}")
     try:
         if re.search(PRINTED, unit, re.IGNORECASE):
             raise ValueError

@@ -96,7 +96,8 @@ def test_diameters_and_radii_are_read_with_their_unit(header, factor, tmp_path):
     [
         ("d [mm]\n1\n-2\nx\n", "row 3 holds no positive number; row 4 holds"),
         ("d [kg]\n1\n", "unit 'kg'"),
-        ("d\n1\n", "has no unit"),
+        ("d\n1\n", r"column 'd' has no unit; write it in the header: 'd \[mm\]'$"),
+        ("Diameter\n1\n", r"write it in the header: 'Diameter \[mm\]'$"),
         ("length [mm]\n1\n", "no column r"),
         ("d [mm]\n", "no row"),
         ("", "is empty"),

@@ -99,7 +99,7 @@ def test_the_same_curve_in_other_words(text, tmp_path):
         ("size [µm],volume [%]\n4,20\n6,80\n", "write one row for each particle"),
         ("size [mm],passing [%],passing [%]\n1,0,0\n2,100,100\n", "'passing .%.' is not read"),
         ("d [px]\n4\n6\n", "unit 'px', which is not a length"),
-        ("size,passing [%]\n1,0\n2,100\n", "'size' has no unit"),
+        ("size,passing [%]\n1,0\n2,100\n", r"'size' has no unit; write .*: 'size \[mm\]'$"),
         ("passing [%]\n0\n100\n", "no column r"),
     ],
 )
