@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -101,6 +102,13 @@ def share_column(path: Path, name: str) -> Array | None:
         row = rows[int(np.argmax(outside))][0]
         raise ValueError(f"{path}: row {row} has a share outside 0 to {'100 %' if percent else 1}")
     return np.asarray(shares)
+
+
+def has_places(path: Path) -> bool:
+    """Whether a file can be read and tells where its particles lie, in columns x and y."""
+    with suppress(ValueError):
+        return {"x", "y"} <= {*map(_name, _fields(path, ("r",))[0])}
+    return False
 
 
 BY_AREA = ": in a table of areas add a column 'd [unit]' of 2·√(Area/π)"

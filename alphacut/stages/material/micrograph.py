@@ -67,7 +67,8 @@ def fractions(found: Microstructure, fraction: float) -> Iterator[str]:
     if abs(taken / fraction - 1) > TOLD:
         yield (
             "for E of fibres at the image's own fraction, pack these circles:"
-            f' [microstructure.packing] file = "circles.csv", area_fraction = {fraction:.4f}'
+            f' [microstructure.packing] file = "circles.csv", area_fraction = {fraction:.4f},'
+            ' discs = 2000, in place of [microstructure.image], and cell.particles = "cylinders"'
         )
     if abs(taken / fraction - 1) > FALLEN:
         yield (

@@ -17,6 +17,7 @@ from alphacut.rve.result import effective_modulus
 from alphacut.rve.spheres.bounds import mori_tanaka as of_spheres
 from alphacut.rve.spheres.cubic import cubic_voigt, hill_average, young_along
 from alphacut.rve.spheres.result import HomogenisedSpheres
+from alphacut.stochastic.particles.csv_columns import has_places
 from alphacut.stochastic.theta.truncated_normal import Array
 
 GPA = 1e9
@@ -139,13 +140,15 @@ def says_spheres(case: Case) -> str | None:
     """What of a case says that its particles are round in space; None where nothing does.
 
     A word does, and so do sizes without places, which are of particles out of their matrix; neither
-    where another word says that they are long, or the case names their kind.
+    where another word says that they are long, or the case names their kind. Sizes with places are
+    of a section, as those of an image are.
     """
     if case.names_particles or LONG.search(case.words):
         return None
     if word := WORDS.search(case.words):
         return f"the case says {word.group(0)!r}"
     given = case.sections.microstructure
-    if given and given.packing and given.packing.file:
-        return f"{given.packing.file} has sizes without places, as of particles that were sieved"
-    return None
+    file = given and given.packing and given.packing.file
+    if not file or has_places(case.beside(file)):
+        return None
+    return f"{file} has sizes without places, as of particles that were sieved"

@@ -201,7 +201,7 @@ def test_a_machine_without_voro_is_told_before_anything_runs(monkeypatch, tmp_pa
     assert not (tmp_path / "run").exists()
 
 
-def test_circles_over_the_image_and_the_notes_of_a_run_stand_in_its_report(tmp_path):
+def test_circles_over_the_image_and_the_notes_of_a_run_stand_in_its_report(tmp_path, capfd):
     section_of_discs(tmp_path / "section.png")
     case, folder = tmp_path / "own.toml", tmp_path / "run"
     text = IMAGE.replace(', "modulus"]', "]")
@@ -217,7 +217,20 @@ def test_circles_over_the_image_and_the_notes_of_a_run_stand_in_its_report(tmp_p
     assert told.startswith("area fraction to compare")
     assert "the edge, and what is not round, leave 0." in told
     whole = found["microstructure"]["area_fraction_of_image"]
-    assert cure.endswith(f'packing] file = "circles.csv", area_fraction = {whole:.4f}')
+    assert f"pack these circles: [microstructure.packing] {keys(whole)}, in place of" in cure
+    assert cure.endswith('[microstructure.image], and cell.particles = "cylinders"')
+    packing = f"[microstructure.packing]\n{keys(whole)}\n".replace(", ", "\n")
+    cell = '[cell]\nparticles = "cylinders"'
+    text = re.sub(r"\[microstructure\.image\].*\[cell\]", packing + cell, IMAGE, flags=re.DOTALL)
+    (folder / "own.toml").write_text(text, encoding="utf-8")
+    capfd.readouterr()
+    assert main(["check", str(folder / "own.toml")]) == 0
+    assert "spheres" not in capfd.readouterr().err
+
+
+def keys(fraction):
+    """Keys that pack the circles of an image."""
+    return f'file = "circles.csv", area_fraction = {fraction:.4f}, discs = 2000'
 
 
 @pytest.mark.parametrize(("fraction", "said"), [(0.28, False), (0.3, True), (0.38, True)])

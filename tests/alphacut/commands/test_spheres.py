@@ -316,8 +316,18 @@ def test_fibres_raise_no_alarm(words, tmp_path, capfd):
     assert not remarks_of(words, tmp_path, capfd)
 
 
-@pytest.mark.parametrize(("words", "told"), [("Particles", True), ("Fibres", False)])
-def test_sizes_without_places_say_spheres_before_they_are_packed(words, told, tmp_path, capfd):
+@pytest.mark.parametrize(
+    ("words", "header", "told"),
+    [
+        ("Particles", "d [mm]", True),
+        ("Particles", "d [mm],x [mm]", True),
+        ("Fibres", "d [mm]", False),
+        ("Particles", "d [mm],x [mm],y [mm]", False),
+    ],
+)
+def test_sizes_without_places_say_spheres_before_they_are_packed(
+    words, header, told, tmp_path, capfd
+):
     lines = (Path(PAPER).parent / "concrete.toml").read_text(encoding="utf-8").splitlines()
     ends = ("particles", "smallest_radius", "largest_radius", "title", "about", "Twenty", "of the")
     kept = [line for line in lines if not line.startswith((*ends, "vibration of"))]
@@ -326,7 +336,8 @@ def test_sizes_without_places_say_spheres_before_they_are_packed(words, told, tm
         [f'title = "{words}"', 'about = "-"', *kept[:at], 'file = "d.csv"', *kept[at:]]
     )
     (tmp_path / "own.toml").write_text(text, encoding="utf-8")
-    (tmp_path / "d.csv").write_text("d [mm]\n3\n4\n5\n", encoding="utf-8")
+    rows = "".join(f"{','.join(k * header.count('['))}\n" for k in "345")
+    (tmp_path / "d.csv").write_text(f"{header}\n{rows}", encoding="utf-8")
     assert main(["check", str(tmp_path / "own.toml")]) == 0
     err = capfd.readouterr().err
     assert ("d.csv has sizes without places" in err) == told
