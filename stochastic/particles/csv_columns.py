@@ -15,7 +15,8 @@ import numpy as np
 from alphacut.stochastic.theta.truncated_normal import Array
 
 Rows = list[tuple[int, list[str]]]
-DIAMETERS = ("d", "diameter", "size", "sieve")  # columns of diameters, which may stand in for radii
+DIAMETERS = ("d", "diameter", "size", "sieve")
+SIZES = ("radius", *DIAMETERS)  # columns that may stand in for r
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +48,7 @@ def length_columns(
     Args:
         path: The file; separated by commas, semicolons or tabs; empty lines and those behind # are
             passed over.
-        columns: Names of the columns; one of `DIAMETERS` may stand in for "r".
+        columns: Names of the columns; one of `SIZES` may stand in for "r".
         unit: Unit of columns whose header names none; empty if each does.
         also: Names of columns that the caller reads by itself.
 
@@ -240,7 +241,7 @@ def _places(
     named: dict[str, tuple[int, float, str]] = {}
     for place, cell in enumerate(header):
         match, name = re.fullmatch(HEADER, cell), _name(cell)
-        radius = "r" if name in DIAMETERS else name
+        radius = "r" if name in SIZES else name
         if match and radius in columns:
             if radius in named:
                 first = header[named[radius][0]].strip()
@@ -288,12 +289,9 @@ def _units() -> Callable[[str], object]:
 def _number(text: str, path: Path, row: int) -> float:
     """The number in a field; NaN where there is none."""
     if re.fullmatch(COMMA, text):
-        point = text.strip().replace(",", ".")
-        raise ValueError(
-            f"{path}: row {row} holds {text.strip()!r}, a decimal comma; write decimals with a"
-            f" point: {point}"
-        )
-    try:
+        told = text.strip()
+        cure = f"write decimals with a point: {told.replace(',', '.')}"
+        raise ValueError(f"{path}: row {row} holds {told!r}, a decimal comma; {cure}")
+    with suppress(ValueError):
         return float(text)
-    except ValueError:
-        return float("nan")
+    return float("nan")

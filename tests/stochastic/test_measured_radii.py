@@ -78,7 +78,14 @@ def test_a_packing_has_the_listed_radii():
 
 
 @pytest.mark.parametrize(
-    ("header", "factor"), [("d [mm]", 0.5e-3), ("r [mm]", 1e-3), ("name, D [cm]", 0.5e-2)]
+    ("header", "factor"),
+    [
+        ("d [mm]", 0.5e-3),
+        ("r [mm]", 1e-3),
+        ("name, D [cm]", 0.5e-2),
+        ("Radius [mm]", 1e-3),
+        ("Diameter (um)", 0.5e-6),
+    ],
 )
 def test_diameters_and_radii_are_read_with_their_unit(header, factor, tmp_path):
     path = tmp_path / "sizes.csv"
@@ -115,6 +122,7 @@ def test_diameters_and_radii_are_read_with_their_unit(header, factor, tmp_path):
             r"row 3 holds '1,25', a decimal comma, and row 2 '1\.5', a point",
         ),
         ("d [mm],r [mm]\n2,1\n", "'d .mm.' and 'r .mm.' both give r"),
+        ("r [mm],radius [mm]\n2,2\n", "'r .mm.' and 'radius .mm.' both give r"),
     ],
 )
 def test_a_list_that_makes_no_sense_is_refused(text, pattern, case, capfd):

@@ -144,6 +144,7 @@ def circle_file(tmp_path, text: str, **options) -> CircleFile:
     [
         GOOD,
         "# a comment\n\nx (cm); y [mm]; d [mm]; note\n1;10;8;a\n3;12;10;b\n2;30;6;c\n",
+        "X (mm), Y (mm), Radius (mm), label\n10,10,4,a\n30,12,5,b\n20,30,3,c\n",
         "r,y,x\n4,10,10\n5,12,30\n3,30,20\n",
         "﻿x [m]\ty [m]\tr [m]\n0.01\t0.01\t0.004\n0.03\t0.012\t0.005\n0.02\t0.03\t0.003\n",
     ],
