@@ -54,11 +54,10 @@ def length_columns(
 
     Raises:
         ValueError: The file cannot be read, a column or its unit is missing, two give the same or a
-            column is not read (`_refuse_unread`), a row has more fields than the header, or a
-            number is written with a decimal comma where
-            commas separate fields or other numbers have points.
+            column is not read (`_refuse_unread`), a row has more fields than the header, or
+            a number has a decimal comma where commas separate fields or others have points.
     """
-    header, rows = _fields(path, columns)
+    header, rows = _fields(path, _wanted(columns))
     places = _places(header, columns, unit, path)
     wanted = max(place for place, cell in enumerate(header, 1) if cell.strip())
     table = []
@@ -88,7 +87,7 @@ def share_column(path: Path, name: str) -> Array | None:
     Raises:
         ValueError: The file cannot be read, the column has another unit, or a share lies outside.
     """
-    header, rows = _fields(path, (name,))
+    header, rows = _fields(path, f"'d [mm]' or 'r [mm]', or 'size [mm],{name} [%]'")
     places = [k for k, cell in enumerate(header) if _name(cell) == name]
     if not places:
         return None
@@ -108,7 +107,7 @@ def share_column(path: Path, name: str) -> Array | None:
 def has_places(path: Path) -> bool:
     """Whether a file can be read and tells where its particles lie, in columns x and y."""
     with suppress(ValueError):
-        return {"x", "y"} <= {*map(_name, _fields(path, ("r",))[0])}
+        return {"x", "y"} <= {*map(_name, _fields(path, "")[0])}
     return False
 
 
@@ -124,9 +123,15 @@ def _name(cell: str) -> str:
     return match[1].lower() if match else ""
 
 
-def _fields(path: Path, columns: Sequence[str]) -> tuple[list[str], Rows]:
-    """Fields of the header, and of the rows with their numbers."""
-    lines = _lines(path, columns)
+def _wanted(columns: Sequence[str]) -> str:
+    """The header that these columns need, in words."""
+    needed = ",".join(f"{name} [mm]" for name in columns)
+    return f"'{needed}', units in the header{'; d may stand for r' if 'r' in columns else ''}"
+
+
+def _fields(path: Path, wanted: str) -> tuple[list[str], Rows]:
+    """Fields of the header, and of the rows with their numbers; `wanted` tells what it needs."""
+    lines = _lines(path, wanted)
     separator = ";" if ";" in lines[0][1] else "\t" if "\t" in lines[0][1] else ","
     try:
         split = [(number, next(csv.reader([line], delimiter=separator))) for number, line in lines]
@@ -182,7 +187,7 @@ def not_text(path: Path) -> str:
     return known[0] if known else "is not text in UTF-8; save it as CSV in UTF-8"
 
 
-def _lines(path: Path, columns: Sequence[str]) -> list[tuple[int, str]]:
+def _lines(path: Path, wanted: str) -> list[tuple[int, str]]:
     """Numbered lines that are neither empty nor comments, the header first."""
     try:
         text = path.read_text(encoding="utf-8-sig")
@@ -196,9 +201,7 @@ def _lines(path: Path, columns: Sequence[str]) -> list[tuple[int, str]]:
         if line.strip() and not line.lstrip().startswith("#")
     ]
     if not lines:
-        raise ValueError(
-            f"{path} is empty; it needs a header {', '.join(columns)} and a row for each particle"
-        )
+        raise ValueError(f"{path} is empty; it needs rows of numbers below the header {wanted}")
     return lines
 
 
@@ -255,9 +258,8 @@ def _places(
     missing = [name for name in columns if name not in named]
     if missing:
         told = f"header {', '.join(map(str.strip, header))!r} has no column {', '.join(missing)}"
-        wanted = ", ".join(f"{name} [mm]" for name in columns)
         raise ValueError(
-            f"{path}: the {told}; it needs '{wanted}', units in the header; d may stand for r"
+            f"{path}: the {told}; it needs {_wanted(columns)}"
             + (BY_AREA if "r" in missing and {"area", "feret"} & {*map(_name, header)} else "")
         )
     return [named[name] for name in columns]

@@ -179,7 +179,7 @@ def test_origin_of_the_section(tmp_path):
         (GOOD.replace("r [mm]", "q [mm]"), "has no column r"),
         (GOOD.replace("r [mm]", "Area"), r"no column r; .*add a column 'd \[unit\]' of 2·√"),
         ("x [mm],y [mm],r [mm],count\n10,10,4,3\n", "'count' is not read"),
-        ("", "is empty"),
+        ("", r"is empty; it needs .* header 'x \[mm\],y \[mm\],r \[mm\]'.*; d may stand for r$"),
         ("x [mm],y [mm],r [mm]\n", "no row holds a circle"),
     ],
 )

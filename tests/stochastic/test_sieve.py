@@ -1,5 +1,7 @@
 """Sieve curves as laws of radii, bare sieve sizes refused, order of dense packings measured."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy.stats import kstest
@@ -112,6 +114,18 @@ def test_what_is_no_curve_is_refused_in_one_line(text, pattern, tmp_path, capfd)
     err = capfd.readouterr().err
     assert len(err.splitlines()) == 1
     assert "microstructure.packing.file" in err
+
+
+@pytest.mark.parametrize("text", ["", "\n", "# diameters of 2026\n\n"])
+def test_an_empty_file_is_told_headers_that_are_read(text, tmp_path):
+    with pytest.raises(ValueError, match="is empty; it needs rows of numbers below") as refused:
+        read_radii(written(tmp_path, text))
+    headers = re.findall("'(.*?)'", str(refused.value))
+    assert headers == ["d [mm]", "r [mm]", "size [mm],passing [%]"]
+    for header in headers:
+        rows = "2,0\n4,100\n" if "," in header else "2\n4\n"
+        law = read_radii(written(tmp_path, f"{header}\n{rows}"))
+        assert law.largest == pytest.approx(4e-3 if header == "r [mm]" else 2e-3)
 
 
 NUMBERED = [
