@@ -98,10 +98,8 @@ class CircleFile:
         wrong = share > max(self.overlap, 1e-9)
         needed = math.ceil(100 * share.max(initial=0.0) + 1e-9) / 100
         first, second, depth = first[wrong], second[wrong], depth[wrong]
-        across = (
-            np.hypot(*(table[first, :2] - table[second, :2]).T)
-            >= discs.radii[first] + discs.radii[second]
-        )
+        distance = np.hypot(*(table[first, :2] - table[second, :2]).T)
+        across = distance >= discs.radii[first] + discs.radii[second]
         edge = np.where(across, " across the periodic edge (is the section periodic?)", "")
         pairs = zip(
             rows[first].tolist(), rows[second].tolist(), depth.tolist(), edge.tolist(), strict=True

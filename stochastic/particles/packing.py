@@ -39,12 +39,9 @@ def random_sequential(
     centres = np.zeros((0, 2))
     while len(centres) < len(order):
         block = slice(len(centres), min(len(order), max(64, int(1.5 * len(centres)))))
-        centres = np.concatenate(
-            [
-                centres,
-                _add(centres, grown[: len(centres)], grown[block], side=side, generator=generator),
-            ]
-        )
+        standing = grown[: len(centres)]
+        new = _add(centres, standing, grown[block], side=side, generator=generator)
+        centres = np.concatenate([centres, new])
     placed = np.empty_like(centres)
     placed[order] = centres
     return placed
@@ -97,15 +94,13 @@ class _Standing:
         hit = np.zeros(len(proposal), bool)
         for tree, centres, standing in self.parts:
             ask = np.flatnonzero(~hit)
-            found = tree.query_ball_point(
-                proposal[ask], radii[ask] + standing.max(), return_sorted=False
-            )
+            reach = radii[ask] + standing.max()
+            found = tree.query_ball_point(proposal[ask], reach, return_sorted=False)
             counts = np.fromiter(map(len, found), int, len(found))
             which = np.repeat(ask, counts)
             other = np.fromiter((k for one in found for k in one), int, counts.sum())
-            overlap = _overlap(
-                proposal[which] - centres[other], radii[which] + standing[other], self.side
-            )
+            apart = proposal[which] - centres[other]
+            overlap = _overlap(apart, radii[which] + standing[other], self.side)
             hit[which[overlap]] = True
         return hit
 
@@ -118,10 +113,8 @@ def _first_come(proposal: Array, radii: Array, side: float) -> Array:
     if len(proposal) < 2:
         return np.asarray(state == 0)
     pair = cKDTree(proposal, boxsize=side).query_pairs(2 * radii.max(), output_type="ndarray")
-    early, late = np.sort(
-        pair[_overlap(proposal[pair[:, 0]] - proposal[pair[:, 1]], radii[pair].sum(axis=1), side)],
-        axis=1,
-    ).T
+    apart = proposal[pair[:, 0]] - proposal[pair[:, 1]]
+    early, late = np.sort(pair[_overlap(apart, radii[pair].sum(axis=1), side)], axis=1).T
     while (state == 0).any():
         waits = np.zeros(len(state), bool)
         waits[late[state[early] == 0]] = True

@@ -30,9 +30,8 @@ def close_pairs(discs: Discs, gap: float) -> tuple[Array, Array]:
     for k, members in enumerate(classes):
         found.append(members[trees[k].query_pairs(2 * largest[k] + gap, output_type="ndarray")])
         for m in range(k):
-            near = trees[k].sparse_distance_matrix(
-                trees[m], largest[k] + largest[m] + gap, output_type="ndarray"
-            )
+            reach = largest[k] + largest[m] + gap
+            near = trees[k].sparse_distance_matrix(trees[m], reach, output_type="ndarray")
             found.append(np.stack([members[near["i"]], classes[m][near["j"]]], axis=1))
     first, second = np.concatenate(found).T
     close = surface_distance(discs, first, second) < gap
@@ -42,9 +41,8 @@ def close_pairs(discs: Discs, gap: float) -> tuple[Array, Array]:
 def surface_distance(discs: Discs, first: Array, second: Array) -> Array:
     """Distance between the surfaces of pairs (nearest image), negative where they overlap, in m."""
     apart = discs.separation(first, second)
-    return np.asarray(
-        np.hypot(apart[..., 0], apart[..., 1]) - discs.radii[first] - discs.radii[second]
-    )
+    distance = np.hypot(apart[..., 0], apart[..., 1])
+    return np.asarray(distance - discs.radii[first] - discs.radii[second])
 
 
 def smallest_gap(discs: Discs) -> float:
@@ -101,9 +99,8 @@ def relaxed(
     rule = rule or Relaxation()
     own = radii + gap / 2
     fraction = np.pi * (own**2).sum() / side**2
-    growth = max(
-        1 + 1e-4, float(np.sqrt((fraction + rule.headroom * (rule.densest - fraction)) / fraction))
-    )
+    grown = fraction + rule.headroom * (rule.densest - fraction)
+    growth = max(1 + 1e-4, float(np.sqrt(grown / fraction)))
     centres = _push(side * generator.random((len(radii), 2)), own, growth, side=side, rule=rule)
     return _shake(centres, own, side, generator=generator, sweeps=rule.sweeps)
 
@@ -128,12 +125,8 @@ def _push(centres: Array, own: Array, growth: float, *, side: float, rule: Relax
             if downhill > 5:
                 step, mixing = min(1.1 * step, 0.6), 0.99 * mixing
         else:
-            velocity, step, mixing, downhill = (
-                np.zeros_like(velocity),
-                max(0.5 * step, 0.02),
-                0.1,
-                0,
-            )
+            velocity, mixing, downhill = np.zeros_like(velocity), 0.1, 0
+            step = max(0.5 * step, 0.02)
         velocity = velocity + step * force
         centres = centres + step * velocity
     raise RefusedError(
