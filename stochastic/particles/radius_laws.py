@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from alphacut.stochastic.particles.csv_columns import length_columns
+from alphacut.stochastic.particles.csv_columns import LengthColumns, length_columns
 from alphacut.stochastic.theta.truncated_normal import Array, TruncatedNormal
 
 
@@ -68,9 +68,8 @@ class LogNormalRadii:
     @property
     def sigma(self) -> float:
         """Scale parameter σ_r; ln 10/6 for a factor of ten on [-3, 3]."""
-        return float(np.log(self.largest / self.smallest)) / (
-            self.distribution.upper - self.distribution.lower
-        )
+        width = self.distribution.upper - self.distribution.lower
+        return float(np.log(self.largest / self.smallest)) / width
 
     @property
     def mu(self) -> float:
@@ -79,10 +78,8 @@ class LogNormalRadii:
 
     def __call__(self, theta: ArrayLike) -> Array:
         """Radius at `theta` (any shape), in m."""
-        # eq. 11
-        return np.clip(
-            np.exp(self.mu + self.sigma * np.asarray(theta, float)), self.smallest, self.largest
-        )
+        radius = np.exp(self.mu + self.sigma * np.asarray(theta, float))  # eq. 11
+        return np.clip(radius, self.smallest, self.largest)
 
     def cdf(self, radius: ArrayLike) -> Array:
         """P(r ≤ radius), any shape, `radius` in m."""
@@ -152,6 +149,22 @@ class TabulatedRadii:
         return np.asarray(np.interp(generator.random(number), self.shares, self.radii))
 
 
+SLIP = 1e4
+"""Ratio to the median, up or down, that no size of a sieve curve or of a list of particles has."""
+
+
+def refuse_slip(path: Path, sizes: LengthColumns) -> None:
+    """Refuse positive sizes of which one is out of all proportion, as a slip makes it."""
+    ratios = sizes.values[:, 0] / np.median(sizes.values[:, 0])
+    worst = int(np.abs(np.log(ratios)).argmax())
+    if not 1 / SLIP <= ratios[worst] <= SLIP:
+        raise ValueError(
+            f"{path}: row {sizes.rows[worst]} has a size {ratios[worst]:.3g} times the median, out"
+            f" of all proportion: no list or sieve curve reaches {SLIP:g} times it, up or down;"
+            " correct the row or remove it"
+        )
+
+
 @dataclass(frozen=True)
 class MeasuredRadii:
     """Radii of a list; the distribution function is linear between neighbouring values.
@@ -182,17 +195,17 @@ class MeasuredRadii:
         """Read a CSV file with a column r, or d for diameters, and its unit: ``d [mm]``.
 
         Raises:
-            ValueError: The file cannot be read, or a row holds no positive number (row and reason).
+            ValueError: The file cannot be read, or a row makes no sense (row and reason).
         """
         found = length_columns(path, ("r",), unit)
-        rows = zip(found.rows, found.values[:, 0], strict=True)
-        wrong = [
-            f"row {row} holds no positive number" for row, radius in rows if not 0 < radius < np.inf
-        ]
-        if wrong or not len(found.rows):
-            told = "; ".join(wrong[:10]) or "it holds no row"
+        radii = found.values[:, 0]
+        wrong = found.rows[~((radii > 0) & (radii < np.inf))][:10]
+        if len(wrong) or not len(radii):
+            told = "; ".join(f"row {row} holds no positive number" for row in wrong)
+            told = told or "it holds no row"
             raise ValueError(f"{path}: {told}; it needs a radius or diameter in each row")
-        return cls(tuple(map(float, found.values[:, 0])), path.name)
+        refuse_slip(path, found)
+        return cls(tuple(map(float, radii)), path.name)
 
     @property
     def smallest(self) -> float:

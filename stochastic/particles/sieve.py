@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.stochastic.particles.csv_columns import length_columns, share_column
-from alphacut.stochastic.particles.radius_laws import MeasuredRadii, RadiusLaw
+from alphacut.stochastic.particles.radius_laws import MeasuredRadii, RadiusLaw, refuse_slip
 from alphacut.stochastic.theta.truncated_normal import Array
 
 PASSING, RETAINED = "passing", "retained"
@@ -142,6 +142,7 @@ def read_radii(path: Path, power: int = 2) -> RadiusLaw:
     if not known.all():
         row = int(sizes.rows[np.argmin(known)])
         raise ValueError(f"{path}: row {row} holds no positive size and share that passes it")
+    refuse_slip(path, sizes)
     order = np.argsort(radii, kind="stable")
     if retained is not None:
         _refuse_contradiction(path, 2e3 * radii[order], shares[order], retained[order])

@@ -103,6 +103,11 @@ def test_diameters_and_radii_are_read_with_their_unit(header, factor, tmp_path):
     [
         ("d [mm]\n1\n-2\nx\n", "row 3 holds no positive number; row 4 holds"),
         ("d [kg]\n1\n", "unit 'kg'"),
+        ("d [mm]\n3\n4\n1e9\n5\n", r"row 4 has a size 2.22e\+08 times the median, .*; correct the"),
+        (
+            "r [mm]\n3\n4e-9\n4\n4\n",
+            "row 3 has a size 1.14e-09 times .* 10000 times it, up or down",
+        ),
         ("d\n1\n", r"column 'd' has no unit; write it in the header: 'd \[mm\]'$"),
         ("Diameter\n1\n", r"write it in the header: 'Diameter \[mm\]'$"),
         ("length [mm]\n1\n", "no column r"),
@@ -133,6 +138,13 @@ def test_a_list_that_makes_no_sense_is_refused(text, pattern, case, capfd):
     assert "microstructure.packing.file" in err
     with pytest.raises(ValueError, match=pattern):
         MeasuredRadii.read(case.parent / "diameters.csv")
+
+
+@pytest.mark.parametrize("size", [2.1e-4, 1.9e4])
+def test_a_list_may_be_wider_than_any_that_was_measured(size, tmp_path):
+    path = tmp_path / "sizes.csv"
+    path.write_text(f"d [mm]\n2\n{size}\n2\n", encoding="utf-8")
+    assert 1e-3 * size / 2 in MeasuredRadii.read(path).values
 
 
 def test_a_trailing_comma_and_a_stray_quote_are_no_decimal_comma(tmp_path):

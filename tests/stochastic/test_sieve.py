@@ -85,6 +85,7 @@ def test_the_same_curve_in_other_words(text, tmp_path):
         ("size [mm],passing [kg]\n1,0\n2,100\n", "unit 'kg'; it takes % or 1"),
         ("size [mm],passing [%]\n1,0\nx,50\n2,100\n", "row 3 holds no positive size and share"),
         ("size [mm],passing [%]\n1,0\n2,\n2,100\n", "row 3 holds no positive size and share"),
+        ("size [mm],passing [%]\n2,0\n4,60\n8e9,100\n", "row 4 has a size 2e.09 times the median"),
         ("size [mm],passing [%]\n2,0\n2,100\n", "two or more, positive, all unlike"),
         ("d [µm],count\n4.1,100\n6.6,3000\n5,20\n", "column 'count' is not read, and frequen"),
         ("d [µm],number\n4,20\n6,100\n", "'number' is not read"),
@@ -126,6 +127,12 @@ def test_an_empty_file_is_told_headers_that_are_read(text, tmp_path):
         rows = "2,0\n4,100\n" if "," in header else "2\n4\n"
         law = read_radii(written(tmp_path, f"{header}\n{rows}"))
         assert law.largest == pytest.approx(4e-3 if header == "r [mm]" else 2e-3)
+
+
+def test_the_widest_curve_of_a_soil_from_clay_to_stones_is_read(tmp_path):
+    rows = "".join(f"{size},{5 * k}\n" for k, size in enumerate(np.geomspace(2e-4, 200, 21)))
+    law = read_radii(written(tmp_path, f"size [mm],passing [%]\n{rows}"))
+    assert law.largest / law.smallest == pytest.approx(1e6)
 
 
 NUMBERED = [
