@@ -15,7 +15,7 @@ from alphacut.io.provenance import door
 from alphacut.io.units import engineering
 from alphacut.report.envelopes import between
 from alphacut.report.figures import listed, picture
-from alphacut.report.tables import paragraphs, section, sentence, table
+from alphacut.report.tables import paragraphs, percent, section, sentence, table
 from alphacut.stages.measure_next import GAINS
 from alphacut.stages.vibration import decision, joint, update
 
@@ -31,7 +31,7 @@ def learned(summary: Document, folder: Path) -> Markup:
         (
             name,
             *(f"{low:.5g} … {high:.5g}" for low, high in (found["prior"][name], after)),
-            f"{found['narrowed'][name]:.1%}",
+            percent(found["narrowed"][name]),
         )
         for name, ends in found["inputs"].items()
         for after in [(ends["lower"][0], ends["upper"][0])]
@@ -116,7 +116,7 @@ def next_measured(summary: Document, folder: Path) -> Markup:
 def gains(found: Document, folder: Path, remark: str) -> Iterator[Markup]:
     """What is lost of the width, by input."""
     rows = [
-        (in_words(name), *(f"{gain[kind]:.1%}" for kind in GAINS))
+        (in_words(name), *(percent(gain[kind]) for kind in GAINS))
         for name, gain in found["gains"].items()
     ]
     words = (

@@ -52,19 +52,10 @@ def extremes(studies: Document) -> list[tuple[str, ...]]:
         )
         error = study.get("error", {}).get(output)
         included = " (within the bounds)" if "gap" in study else ""
-        rows.append(
-            (
-                name,
-                output,
-                *ends,
-                "not estimated" if error is None else engineering(error, unit, digits=2) + included,
-            )
-        )
-    return (
-        rows
-        if any(study.get("error") for study in studies.values())
-        else [row[:-1] for row in rows]
-    )
+        told = "not estimated" if error is None else engineering(error, unit, digits=2) + included
+        rows.append((name, output, *ends, told))
+    some = any(study.get("error") for study in studies.values())
+    return rows if some else [row[:-1] for row in rows]
 
 
 def natural(summary: Document) -> Markup:
@@ -139,10 +130,8 @@ def peak_row(of: Document, unit: str, largest: float) -> Iterator[str]:
 
 def between(lower: float, upper: float, unit: str, largest: float) -> str:
     """Interval, or one value where both ends look alike, with the table's prefix."""
-    ends = dict.fromkeys(
-        (engineering(lower, unit, beside=largest), engineering(upper, unit, beside=largest))
-    )
-    return " … ".join(ends)
+    ends = (engineering(end, unit, beside=largest) for end in (lower, upper))
+    return " … ".join(dict.fromkeys(ends))
 
 
 COLUMNS = ("damping", "period [s]", "displacement [m]", "pseudo-acceleration [m/s^2]")

@@ -26,6 +26,7 @@ from alphacut.report.tables import (
     details,
     items,
     paragraphs,
+    percent,
     section,
     sentence,
     table,
@@ -91,10 +92,7 @@ def shares(found: Document, notes: Sequence[str] = ()) -> Markup:
     for inputs in kinds:
         of = [name for name, entry in found.items() if tuple(entry) == inputs]
         rows = [
-            (
-                INPUTS.get(name) or in_words(name),
-                *(f"{found[quantity][name]:.1%}" for quantity in of),
-            )
+            (INPUTS.get(name) or in_words(name), *(percent(found[x][name]) for x in of))
             for name in inputs
         ]
         drawn.append(table(("input", *of), rows))

@@ -72,6 +72,11 @@ def sentence(text: str) -> str:
     return f"{head}{text[1:].rstrip('.')}."
 
 
+def percent(share: float | None) -> str:
+    """A share in percent; a dash where there is none, as of a width of zero."""
+    return "–" if share is None else f"{share:.1%}"
+
+
 def citation() -> str:
     """The citations in BibTeX, from CITATION.cff where that is at hand."""
     file = Path(__file__).resolve().parents[2] / "CITATION.cff"

@@ -132,7 +132,9 @@ def sentences(found: Document) -> list[str]:
             f" {held['measured']:.4g} Hz measured: {where}"
         )
     for output, share in found.get("envelope_width", {}).items():
-        lines.append(f"envelope of {output}: {100 * share:.3g} % of its width before")
+        some = share is not None and not np.isnan(share)
+        told = f"{100 * share:.3g} % of its width before" if some else "no width, as before"
+        lines.append(f"envelope of {output}: {told}")
     if "agreement" in found:
         least, most = found["agreement"]
         lines.append(f"prior and measurement agree to {least:.3g} (to {most:.3g} at most)")

@@ -305,3 +305,15 @@ def test_ranges_that_are_alike_on_every_level_are_told_once():
 def test_notes_on_shares_stand_above_their_table():
     page = str(shares({"q1": {"k": 0.5, "m": 0.5}}, ["shares are rough"]))
     assert "Shares are rough" in page
+
+
+def test_a_width_of_zero_has_no_shares(drawn, tmp_path):
+    out = shutil.copytree(drawn[1], tmp_path / "out")
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    summary["shares"] = {"q1": {"k": None, "m": None}, "q2": {"k": 0.25, "m": None}}
+    (out / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
+    assert main(["report", str(out), "--quiet"]) == 0
+    page = (out / "report.html").read_text(encoding="utf-8")
+    row = '<td class="number">–</td>'
+    assert f'<td>stiffnesses</td>{row}<td class="number">25.0%</td></tr>' in page
+    assert f"<td>masses</td>{row}{row}</tr>" in page
