@@ -21,7 +21,7 @@ from alphacut.figures.style import (
 from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
 from alphacut.io.units import MINUS, axis_prefix
-from alphacut.stages.vibration.decision import degree
+from alphacut.stages.vibration.decision import PASSED, degree
 from alphacut.stages.vibration.update import prior_support
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def decision(found: xarray.Dataset) -> Figure:
     share = 1 - found["margin"] / found["allowed"]
     places, verdicts = np.arange(len(names))[::-1], found.attrs["verdict"].split(", ")
     for place, name, verdict in zip(places, names, verdicts, strict=False):
-        ends, sure = share.sel(output=name), verdict == "unsafe"
+        ends, sure = share.sel(output=name), verdict.startswith(PASSED)
         wide, high = ends.sel(bound="upper").values, ends.sel(bound="lower").values
         low = np.maximum(wide, 1.0) if sure else wide  # every motion exceeds the limit
         for level, left, right, shade in zip(alpha, low, high, colours(alpha), strict=True):

@@ -48,10 +48,12 @@ class Exceeding:
 
     @property
     def verdict(self) -> str:
-        """Safe where exceeding is proved impossible at the lowest cut, unsafe where it is sure."""
+        """Safe where exceeding is impossible, unsafe where it is sure; or from which level up."""
+        whole, up = self.lowest == 0, f"from α = {self.lowest:g} up; open below"
         if self.possibility[1] <= self.lowest:
-            return "safe"
-        return "unsafe" if self.necessity[0] >= 1 - self.lowest else "undecided"
+            return "safe" if whole else f"kept {up}"
+        sure = "unsafe" if whole else f"exceeded {up}"
+        return sure if self.necessity[0] >= 1 - self.lowest else "undecided"
 
     def __str__(self) -> str:
         """The decision with what it rests on."""

@@ -213,6 +213,19 @@ def test_six_stiffnesses_under_one_ratio_are_proved_far_from_the_limit() -> None
         assert (found.verdict, found.scale.nature) == (verdict, "guaranteed")
 
 
+@pytest.mark.parametrize(("limit", "word"), [(2.0, "kept"), (0.4, "exceeded")])
+def test_a_verdict_names_the_lowest_level_that_it_is_of(limit: float, word: str) -> None:
+    """Of cuts below that level nothing is known, and none is called safe or unsafe."""
+    frame, inputs = six_storeys()
+    flow = LinearFlow(replace(frame, outputs=("drift1",)), (), 1.0, 0.05, Exact())
+    peak = float(np.abs(flow.values(np.zeros((1, 0)))).max())
+    limits, time = {"drift1": limit * peak}, {"duration": 1.0, "step": 0.05}
+    for lowest in (0.05, 0.9):
+        found = exceeding(frame, inputs, limits, lowest=lowest, **time)
+        assert found.verdict == f"{word} from α = {lowest:g} up; open below"
+        assert str(found).startswith(found.verdict)
+
+
 @pytest.mark.parametrize(("limit", "passed"), [(0.009, 1), (0.011, 0)])
 def test_of_a_mode_that_does_not_oscillate_the_nominal_motion_tells(
     limit: float, passed: int

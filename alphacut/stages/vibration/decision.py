@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -209,12 +210,16 @@ def _verdicts(found: Mapping[str, Exceeding], margin: Array, nature: str) -> Ite
         elif verdict == "undecided" and high < 0:
             verdict = f"exceeded by the {nature} envelope{unproved}"
         told.append(verdict)
-    if ANY in found and told[-1] == "undecided" and set(told[:-1]) <= {"safe", held}:
+    calm = all(verdict == held or verdict.startswith(KEPT) for verdict in told[:-1])
+    if ANY in found and told[-1] == "undecided" and calm:
         told[-1] = held
     yield from told
 
 
 HOLDS = "holds by the {} envelope"
+KEPT = ("safe", "kept from")
+PASSED = ("unsafe", "exceeded from")
+"""How verdicts begin that are proved: on all levels, or from the lowest one up."""
 
 
 def decision_document(found: xarray.Dataset) -> Document:
@@ -252,7 +257,7 @@ def between_nodes(found: Document, name: str) -> str:
         return "exceeded there, so over time, too"
     if all(one["lower"][0] > 0 for x, one in found["margins"].items() if name in (x, ANY)):
         return f"between them kept by the {found['peaks']} envelope, see the margin"
-    if found["limits"][name]["verdict"] != "safe":
+    if not found["limits"][name]["verdict"].startswith(KEPT):
         return "the motion between them is not included"
     far = _spare(found, name, " by up to {}")
     return f"between them {OPEN}{far}; a smaller step may settle it"
@@ -264,14 +269,14 @@ OPEN = "open"
 def verdict_of(found: Document, name: str) -> str:
     """A verdict in words: a limit is not called safe where the margin between nodes is negative."""
     verdict, between = (found["limits"][name][key] for key in ("verdict", "between_nodes"))
-    kept = verdict == "safe" and between.startswith(f"between them {OPEN}")
-    return "kept at the nodes" if kept else str(verdict)
+    at_nodes = between.startswith(f"between them {OPEN}")
+    return re.sub("^(safe|kept)", "kept at the nodes", verdict) if at_nodes else str(verdict)
 
 
 def worth(found: Document, name: str) -> str:
     """Nature of a verdict, the nodes that it is on, and what it says of the motion between."""
     one, nodes = found["limits"][name], f"at nodes every {found['step']:g} s"
-    of = "" if one["verdict"] in ("safe", "unsafe") else "both degrees "
+    of = "" if one["verdict"].startswith((*KEPT, *PASSED)) else "both degrees "
     of = "" if degree(*one["possibility"]) == UNKNOWN else f"{of}{one['nature']}, "
     return f"{of}{nodes}: {between_nodes(found, name)}"
 
@@ -279,8 +284,8 @@ def worth(found: Document, name: str) -> str:
 def margin_ends(found: Document, name: str, level: int) -> tuple[float, float]:
     """Ends of a safety margin; a limit that every motion exceeds leaves none above 0."""
     low, high = (float(found["margins"][name][side][level]) for side in SIDES)
-    unsafe = found["limits"][name]["verdict"] == "unsafe"
-    return low, max(low, min(high, 0.0)) if unsafe else high
+    passed = found["limits"][name]["verdict"].startswith(PASSED)
+    return low, max(low, min(high, 0.0)) if passed else high
 
 
 SIDES = ("lower", "upper")
@@ -316,22 +321,20 @@ def why(one: Document) -> str:
 
 def _spare(found: Document, name: str, words: str) -> str:
     """`words` on how far peaks between nodes are from a limit; empty for several limits."""
-    each = [
-        (float(one["lower"][0]), one["unit"]) for x, one in found["margins"].items() if x == name
-    ]
-    return "".join(words.format(engineering(abs(low), unit, digits=3)) for low, unit in each)
+    if (one := found["margins"].get(name)) is None:
+        return ""
+    return words.format(engineering(abs(float(one["lower"][0])), one["unit"], digits=3))
 
 
 def sentences(found: Document) -> Iterator[str]:
     """A line for each limit and one for any of them, then the proof and what is claimed."""
     for name, one in found["limits"].items():
         of = name
-        if name in found["margins"]:
-            margin = found["margins"][name]
+        if (margin := found["margins"].get(name)) is not None:
             of = f"|{margin.get('output', name)}| > {engineering(margin['limit'], margin['unit'])}"
         (a, b), (c, d) = one["possibility"], one["necessity"]
         degrees = f"possible to {degree(a, b)}, necessary to {degree(c, d)}"
-        if one["verdict"] in ("safe", "unsafe"):
+        if one["verdict"].startswith((*KEPT, *PASSED)):
             yield f"{of}: {degrees}: {verdict_of(found, name)} ({worth(found, name)})"
             continue
         verdict, more = one["verdict"], f". It is {degrees}, {worth(found, name)}"

@@ -100,6 +100,23 @@ def test_a_safe_limit_and_a_sure_failure(
     assert f"possible to 1, necessary to 1: {over}" in capsys.readouterr().out
 
 
+def test_a_limit_is_not_called_safe_on_levels_that_are_not_computed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Beyond 1100 kg, from α = 0.5 down, the motion passes the limit."""
+    out, from_up = tmp_path / "out", "from α = 0.9 up; open below"
+    path = written(tmp_path, [f"q1 <= {peak(1100)} m", f"base_shear <= {1e-3 * RIGIDITY} N"])
+    asked = ["--out", str(out), "--set", "envelope.alpha=[0.9, 1]"]
+    assert main(["run", str(path), *asked]) == 0
+    told = capsys.readouterr().out
+    assert f"possible to 0 … 0.9, necessary to 0: kept {from_up} (guaranteed, at nodes" in told
+    assert f": exceeded {from_up} (guaranteed, at nodes" in told
+    assert main(["report", str(out), "--quiet"]) == 0
+    page = re.sub("<[^>]*>", "", (out / "report.html").read_text(encoding="utf-8"))
+    assert page.count(f"kept {from_up}") == 2  # key results and decisions
+    assert " safe" not in told + page.partition("Terms")[0]
+
+
 def test_a_verdict_tells_that_motion_between_nodes_is_left_out(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -125,6 +142,10 @@ def test_a_verdict_tells_that_motion_between_nodes_is_left_out(
     first, last = (tuple(rows[k][name] for name in columns) for k in (0, -1))
     limit = str(next(iter(found["margins"].values()))["limit"])
     assert first == (limit, "m", "safe", "guaranteed", left)
+    found["limits"]["q1 <= 1 m"]["verdict"] = "kept from α = 0.9 up; open below"
+    found["limits"]["q1 <= 1 m"]["between_nodes"] = left
+    at_nodes = "kept at the nodes from α = 0.9 up; open below"
+    assert decision.verdict_of(found, "q1 <= 1 m") == at_nodes
     assert last == ("", "", "safe", "guaranteed", f"between them open{end}")
     (name,) = (out / "tables").glob("decision-by-alpha*")
     with name.open(encoding="utf-8") as file:
