@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 
 from markupsafe import Markup
 
@@ -17,20 +18,22 @@ from alphacut.stages.vibration import exceedance as outcomes
 from alphacut.stages.vibration.decision import degree, verdict_of, worth
 from alphacut.stages.vibration.studies import fixed_line
 
-Line = tuple[str, str, str, str]
-HEAD = ("quantity", "most plausible", "whole range", "nature of the range")
+Line = tuple[str, str, str, str, float]
+"""Quantity, its most plausible values, its range, the nature of that, and the level it is of."""
+HEAD = ("quantity", "most plausible", "widest range", "nature of the range")
 
 
 def key_results(summary: Document) -> Markup:
-    """Most plausible value, whole range and its worth of each result; empty without any."""
-    rows, judged = [*moduli(summary), *peaks(summary), *exceeded(summary)], [*decisions(summary)]
+    """Most plausible value, widest range and its worth of each result; empty without any."""
+    found, judged = [*moduli(summary), *peaks(summary), *exceeded(summary)], [*decisions(summary)]
+    rows = [(of, likely, ends + at(level), nature) for of, likely, ends, nature, level in found]
     words = summary.get("structure", {}).get("words", {})
     held = [*fixed_line(words.get("fixed", ())), *words.get("cut", ())]
     if not rows + judged:
         return Markup("")
-    if not rows or any(likely != whole for _, likely, whole, _ in rows):
+    if not rows or any(likely != ends for _, likely, ends, *_ in found):
         return section("Key results", table(HEAD, rows + judged), paragraphs(*map(sentence, held)))
-    one = [(of, ends, nature) for of, ends, _, nature in rows]
+    one = [(of, ends, nature) for of, _, ends, nature in rows]
     one += [(of, f"{verdict}, {possible}", nature) for of, verdict, possible, nature in judged]
     return section("Key results", table(ONE, one), paragraphs(*map(sentence, (ALIKE, *held))))
 
@@ -44,16 +47,11 @@ def moduli(summary: Document) -> Iterator[Line]:
     if found := summary.get("modulus"):
         yield from of_cell(found)
     if found := summary.get("image"):
-        cuts = found["cuts"]
-        inner, outer = (
-            between(cuts["E_GPa"]["lower"][k], cuts["E_GPa"]["upper"][k]) for k in (-1, 0)
-        )
-        yield "Young's modulus E of the image", inner, outer, cuts["nature"][0]
+        cuts, name = found["cuts"], "Young's modulus E of the image"
+        yield name, *both(cuts["E_GPa"]), cuts["nature"][0], cuts["alpha"][0]
     if found := summary.get("given_modulus"):
-        inner, outer = (
-            between(found["E_GPa"]["lower"][k], found["E_GPa"]["upper"][k]) for k in (-1, 0)
-        )
-        yield "Young's modulus E", inner, outer, "given by the case"
+        told, level = "given by the case", found["alpha"][0]
+        yield "Young's modulus E", *both(found["E_GPa"]), told, level
 
 
 def of_cell(found: Document) -> Iterator[Line]:
@@ -61,19 +59,16 @@ def of_cell(found: Document) -> Iterator[Line]:
     mean = MEANS[meaning(found)]
     flag = ": outside the bounds of spheres, see below" if found.get("outside") else ""
     ends, nature = between(found["lower_GPa"], found["upper_GPa"]), f"{found['nature']}{flag}"
-    yield f"Young's modulus E {mean}", core(found), ends, nature
+    level = found["alpha"][0]
+    yield f"Young's modulus E {mean}", core(found), ends, nature, level
     poisson = found.get("nu_cuts", {"lower": ()})
     if len(poisson["lower"]):
-        inner, outer = (
-            " … ".join(dict.fromkeys(f"{poisson[side][k]:.4f}" for side in ("lower", "upper")))
-            for k in (-1, 0)
-        )
-        yield f"Poisson's ratio ν {mean}", inner, outer, nature
+        inner, outer = both(poisson, partial(between, form=".4f", unit=""))
+        yield f"Poisson's ratio ν {mean}", inner, outer, nature, level
     if cuts := found.get("beside", {}).get("cuts"):
         kind = "spheres" if found.get("outside") or found["particles"] == "spheres" else "fibres"
-        inner, outer = (between(cuts[kind]["lower"][k], cuts[kind]["upper"][k]) for k in (-1, 0))
-        name = {"spheres": "spheres", "fibres": "long fibres"}[kind]
-        yield f"Hashin–Shtrikman bounds of E, {name}", inner, outer, "bounds at the inputs' corners"
+        of = f"Hashin–Shtrikman bounds of E, {'long ' * (kind == 'fibres')}{kind}"
+        yield of, *both(cuts[kind]), "bounds at the inputs' corners", level
 
 
 MEANS = {
@@ -84,10 +79,19 @@ MEANS = {
 """What E and ν are of, behind their names."""
 
 
-def between(lower: float, upper: float) -> str:
-    """Interval in GPa, or one value."""
-    ends = dict.fromkeys((f"{lower:#.4g}", f"{upper:#.4g}"))
-    return " … ".join(ends) + " GPa"
+def between(lower: float, upper: float, form: str = "#.4g", unit: str = " GPa") -> str:
+    """Interval, or one value."""
+    return " … ".join(dict.fromkeys((f"{lower:{form}}", f"{upper:{form}}"))) + unit
+
+
+def both(cuts: Document, told: Callable[[float, float], str] = between) -> tuple[str, str]:
+    """Cut on the highest level and on the lowest, in words."""
+    return told(cuts["lower"][-1], cuts["upper"][-1]), told(cuts["lower"][0], cuts["upper"][0])
+
+
+def at(level: float) -> str:
+    """Words on the level of a range that is not the support."""
+    return f" at α = {level:g}" if level else ""
 
 
 def peaks(summary: Document) -> Iterator[Line]:
@@ -100,11 +104,9 @@ def peaks(summary: Document) -> Iterator[Line]:
     largest = largest_by_unit((of["upper"][0], Output(name).unit) for name, of in found.items())
     for name, of in found.items():
         unit = Output(name).unit
-        likely, whole = (
-            envelopes.between(of["lower"][k], of["upper"][k], unit, largest[unit]) for k in (-1, 0)
-        )
+        ends = both(of, partial(envelopes.between, unit=unit, largest=largest[unit]))
         kind = f"Peak of |{name}| at the nodes{every(study)}"
-        yield kind, likely, whole, f"{study['nature']}{beyond(of, unit)}"
+        yield kind, *ends, f"{study['nature']}{beyond(of, unit)}", study["alpha"][0]
 
 
 def every(study: Document) -> str:
@@ -123,19 +125,18 @@ def beyond(of: Document, unit: str) -> str:
 def exceeded(summary: Document) -> Iterator[Line]:
     """Probability that an output exceeds its limit."""
     for found in outcomes.each_event(summary["exceedance"]) if "exceedance" in summary else ():
-        likely, whole = (
-            "undecided"
-            if (found["lower"][k], found["upper"][k]) == (0, 1)
-            else " … ".join(dict.fromkeys(f"{found[side][k]:.2g}" for side in ("lower", "upper")))
-            for k in (-1, 0)
-        )
         limit = f" exceeds {engineering(found['limit'], found['unit'])}"
         name = f"Probability of {outcomes.event_words(found['output'], limit)}"
         nature = f"{found['nature'].split(':')[0]}{outcomes.nodes(found)}"
-        yield name, likely, whole, nature
+        yield name, *both(found, chance), nature, found["alpha"][0]
 
 
-def decisions(summary: Document) -> Iterator[Line]:
+def chance(lower: float, upper: float) -> str:
+    """Interval of a probability."""
+    return "undecided" if (lower, upper) == (0, 1) else between(lower, upper, ".2g", "")
+
+
+def decisions(summary: Document) -> Iterator[tuple[str, str, str, str]]:
     """Whether limits are exceeded, and how possible that is."""
     found = summary.get("decision", {})
     for name, one in found.get("limits", {}).items():

@@ -10,11 +10,12 @@ from pathlib import Path
 from markupsafe import Markup
 
 from alphacut.figures.captions import INPUTS, in_words
+from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.io.files import Document
 from alphacut.io.provenance import sources
 from alphacut.io.units import engineering
-from alphacut.report import glossary, tables
+from alphacut.report import glossary
 from alphacut.report.decisions import decided, learned, next_measured, together
 from alphacut.report.envelopes import envelopes, natural, spectrum
 from alphacut.report.figures import gallery, listed, missing
@@ -63,7 +64,7 @@ def sections(summary: Document, folder: Path) -> Iterator[Markup]:
     if (folder / "measure-next.json").is_file():
         yield next_measured(summary, folder)
     if summary.get("shares"):
-        yield shares(summary["shares"], summary.get("shares_notes", ()))
+        yield shares(summary)
     if summary.get("paper"):
         yield comparison(summary["paper"])
     yield methods(summary)
@@ -80,12 +81,13 @@ def built(words: Document, periods: Markup) -> Markup:
     return section("Structure", sentences, table(words["head"], words["rows"]), periods)
 
 
-def shares(found: Document, notes: Sequence[str] = ()) -> Markup:
+def shares(summary: Document) -> Markup:
     """Contributions of the inputs to the widths."""
+    found, studies = summary["shares"], [*summary.get("envelopes", {}).values()]
     words = paragraphs(
-        "Share of the width at α = 0 that is lost when an input is fixed at its modal value and"
-        " all others are kept.",
-        *map(tables.sentence, notes),
+        "Share of the width, on the lowest level computed, that is lost when an input is fixed at"
+        " its modal value and all others are kept.",
+        *map(sentence, summary.get("shares_notes", ())),
     )
     kinds = dict.fromkeys(tuple(entry) for entry in found.values())
     drawn = []
@@ -95,7 +97,8 @@ def shares(found: Document, notes: Sequence[str] = ()) -> Markup:
             (INPUTS.get(name) or in_words(name), *(percent(found[x][name]) for x in of))
             for name in inputs
         ]
-        drawn.append(table(("input", *of), rows))
+        level = (summary["modulus"] if of[0] in ("E", "ν") else studies[0])["alpha"][0]
+        drawn.append(table((f"input, at α = {level:g}", *of), rows))
     return section("What drives the width", words, *drawn)
 
 
@@ -212,8 +215,6 @@ def explained(rows: Sequence[tuple[object, ...]]) -> Iterator[str]:
 
 def proofs(summary: Document) -> Iterator[str]:
     """Gap of each certified envelope, and what it rests on."""
-    from alphacut.frame.structures.quantities import Output
-
     for name, study in summary.get("envelopes", {}).items():
         if "proved" in study:
             ends = study["proved"]
@@ -238,7 +239,5 @@ def proofs(summary: Document) -> Iterator[str]:
 
 def effort(study: Document) -> str:
     """Cost of an envelope: trajectories, or eigen-analyses."""
-    return (
-        f"{study['trajectories']}"
-        f" {'eigen-analyses' if study['method'] == 'modal' else 'trajectories'}"
-    )
+    kind = "eigen-analyses" if study["method"] == "modal" else "trajectories"
+    return f"{study['trajectories']} {kind}"

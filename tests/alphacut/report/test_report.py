@@ -302,9 +302,30 @@ def test_ranges_that_are_alike_on_every_level_are_told_once():
     assert "most plausible" in str(key_results({"envelopes": {"all": study}}))
 
 
+def test_a_range_that_is_not_the_support_is_told_with_its_level():
+    peak = {"lower": [1.0, 2.0], "upper": [3.0, 2.5]}
+    study = {"alpha": [0.9, 1], "fuzzy": ["E"], "nature": "guaranteed", "peak": {"q1": peak}}
+    found = {"envelopes": {"all": study}}
+    found["given_modulus"] = {"alpha": [0, 1], "E_GPa": {"lower": [3, 4], "upper": [5, 4]}}
+    page = re.sub("<[^>]*>", "|", str(key_results(found)))
+    assert "|1.000 m … 3.000 m at α = 0.9|" in page
+    assert "|3.000 … 5.000 GPa|" in page
+    assert "whole range" not in page
+    peak |= {"lower": [1.0], "upper": [3.0]}
+    page = str(key_results({"envelopes": {"all": study}}))
+    assert "1.000 m … 3.000 m at α = 0.9" in page
+    assert "all inputs are intervals" in page.lower()
+
+
 def test_notes_on_shares_stand_above_their_table():
-    page = str(shares({"q1": {"k": 0.5, "m": 0.5}}, ["shares are rough"]))
+    found = {"shares": {"q1": {"k": 0.5, "m": 0.5}}, "shares_notes": ["shares are rough"]}
+    found |= {"envelopes": {"all": {"alpha": [0.9, 1]}}, "modulus": {"alpha": [0.05, 1]}}
+    page = str(shares(found))
     assert "Shares are rough" in page
+    assert "input, at α = 0.9" in page
+    assert "α = 0 " not in page
+    found["shares"]["E"] = {"a1": 0.5, "a2": 0.5}
+    assert "input, at α = 0.05" in str(shares(found))
 
 
 def test_a_width_of_zero_has_no_shares(drawn, tmp_path):

@@ -120,7 +120,7 @@ def test_a_record_that_is_cut_short_is_remarked(tmp_path, capfd):
     case = load(path)
     (told,) = cut_line(structure(case, Interval(24e9, 25e9)), [task_of(case)])
     assert told == "all results are of the first 8 s of the record: its rest is left out"
-    modulus = {"E_GPa": {"lower": [24.0], "upper": [25.0]}}
+    modulus = {"alpha": [1.0], "E_GPa": {"lower": [24.0], "upper": [25.0]}}
     shown = key_results({"given_modulus": modulus, "structure": {"words": {"cut": [told]}}})
     assert f"{told[1:]}." in shown
     whole = load(own(tmp_path, "building"))
