@@ -175,11 +175,8 @@ def random_threshold(found: Document) -> Markup:
 
 def isotropy(found: Document) -> str:
     """Sentence on the array's anisotropy; empty where it was not computed."""
-    return (
-        sentence(shear_ratio_in_words(float(found["shear_ratio"]), meaning(found)))
-        if found.get("shear_ratio") is not None
-        else ""
-    )
+    ratio = found.get("shear_ratio")
+    return "" if ratio is None else sentence(shear_ratio_in_words(float(ratio), meaning(found)))
 
 
 def stress(found: Document, drawn: Markup) -> Markup:

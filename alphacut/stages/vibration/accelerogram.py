@@ -18,7 +18,8 @@ from alphacut.stochastic.theta.truncated_normal import Array
 COLUMNS = [("time", "s", "time|t"), ("acceleration", "m/s^2", r"acceleration|acc\.?|a")]
 ALLOWED = "time [s],acceleration [m/s^2], [g] or [gal]"
 PAIR = "a finite time and acceleration, such as 0.02,-0.35, with points and no decimal commas"
-NPTS = re.compile(r"NPTS\s*=\s*(\d+)\s*,\s*DT\s*=\s*(\d*\.?\d+)\s*SEC", re.IGNORECASE)
+NPTS = re.compile(r"NPTS\s*=\s*(\d*)\s*,\s*DT\s*=\s*(\d*\.?\d+)?\s*(SEC)?", re.IGNORECASE)
+PARTS = ("NPTS", "DT", "SEC as its unit")
 IN_G = re.compile(r"ACCELERATION .*IN UNITS OF G\b", re.IGNORECASE)
 EVEN = 1e-6  # relative: steps that differ by more are not even
 
@@ -34,8 +35,7 @@ def accelerogram(path: Path, key: str = "frame.accelerogram") -> Accelerogram:
     lines = file.lines()
     for head, text in enumerate(lines[:9]):
         if found := NPTS.search(text):
-            values = peer(file, lines, head, int(found[1]), float(found[2]))
-            return Accelerogram(float(found[2]), values)
+            return peer(file, lines, head, dict(zip(PARTS, found.groups(), strict=True)))
     (line, first), *rows = file.rows(least=2)
     if len(first) != len(COLUMNS):
         what = f"got {len(first)} columns"
@@ -52,8 +52,12 @@ def accelerogram(path: Path, key: str = "frame.accelerogram") -> Accelerogram:
     return Accelerogram(even_step(file, rows, scales[0]), values[:, 1])
 
 
-def peer(file: CsvFile, lines: list[str], head: int, count: int, step: float) -> Array:
-    """Accelerations of a file of PEER's data base: its head ends with NPTS and DT."""
+def peer(file: CsvFile, lines: list[str], head: int, told: dict[str, str | None]) -> Accelerogram:
+    """A file of PEER's data base: its head ends with NPTS and DT, here the text of each part."""
+    if lacking := [part for part, text in told.items() if not text]:
+        what = f"the head of this AT2 file lacks {' and '.join(lacking)}"
+        raise file.refuse(head + 1, what, lines[head].strip(), "NPTS= 4000, DT= .0050 SEC")
+    count, step = int(told["NPTS"] or 0), float(told["DT"] or 0)
     if not any(IN_G.search(line) for line in lines[:head]):
         what = "the lines above NPTS and DT do not say that the values are accelerations in g"
         raise file.refuse(head + 1, what, allowed="ACCELERATION TIME SERIES IN UNITS OF G")
@@ -64,7 +68,7 @@ def peer(file: CsvFile, lines: list[str], head: int, count: int, step: float) ->
     if not (len(values) == count >= 2 and step > 0 and np.isfinite(values).all() and values.any()):
         what = f"{len(values)} numbers follow NPTS = {count} and DT = {step:g} s"
         raise file.unreadable(what, "as many finite numbers, not all 0, at a step above 0")
-    return values * float(factor("g", "m/s^2"))
+    return Accelerogram(step, values * float(factor("g", "m/s^2")))
 
 
 def cut_short(record: Accelerogram, duration: float) -> bool:

@@ -74,6 +74,10 @@ def test_a_record_of_peer_is_read_as_it_comes(tmp_path: Path) -> None:
         (".0050", ".0000", "at a step above 0"),
         ("-.5000000E+00", "nan", "as many finite numbers"),
         ("-.5000000E+00", "end", "could not convert"),
+        ("=      7", "=       ", "lacks NPTS; allowed: NPTS= 4000, DT= .0050 SEC"),
+        ("   .0050", "        ", "lacks DT; allowed"),
+        (".0050 SEC", ".0050", "lacks SEC as its unit; allowed"),
+        ("7, DT=   .0050 SEC", " , DT=", "lacks NPTS and DT and SEC as its unit; allowed"),
     ],
 )
 def test_a_record_of_peer_that_is_none_is_refused(
