@@ -1,4 +1,4 @@
-"""Command ``alphacut update``: what measured natural modes say about a frame's inputs."""
+"""Command ``alphacut update``: what measured modes or motion say about a frame's inputs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from alphacut.stages.vibration.update import Learned, envelopes, learned, narrow
 if TYPE_CHECKING:
     import xarray
 
-ABOUT = "learn inputs of a frame from its measured modes"
+ABOUT = "learn inputs of a frame from its modes or its motion"
 READ = ("frame", "field", "envelope", "update", "modulus")
 
 

@@ -21,8 +21,10 @@ from alphacut.stages.vibration import decision, joint, update
 
 
 def learned(summary: Document, folder: Path) -> Markup:
-    """What measured modes teach about the inputs, and what they do not."""
-    found, title = summary["update"], "Learned from measured modes"
+    """What measured modes or a recorded motion teach about the inputs, and what they do not."""
+    found = summary["update"]
+    modes = "agreement" in found or "modes" in found.get("refuted", "")
+    title = f"Learned from {'measured modes' if modes else 'a recorded motion'}"
     if "refuted" in found:
         refuted = sentence(found["refuted"]) + " The envelopes rest on the priors."
         return section(title, paragraphs(refuted))

@@ -33,20 +33,11 @@ def listed(summary: Document, folder: Path, name: str) -> Markup:
 
 def gallery(summary: Document, folder: Path) -> Markup:
     """Every figure of the run that no other section shows."""
-    names = [
-        name
-        for name in summary.get("figures", [])
-        if name.endswith(".png") and not ELSEWHERE.fullmatch(Path(name).stem)
-    ]
-    paper = bool(summary.get("paper"))
-    figures = [
-        picture(
-            (folder / name).with_suffix(".svg"),
-            caption(Path(name).stem, paper=paper),
-            wide=bool(WIDE.search(name)),
-        )
-        for name in names
-    ]
+    paper, figures = bool(summary.get("paper")), []
+    for path in map(Path, summary.get("figures", [])):
+        if path.suffix == ".png" and not ELSEWHERE.fullmatch(path.stem):
+            words, wide = caption(path.stem, paper=paper), bool(WIDE.search(path.stem))
+            figures.append(picture(folder / path.with_suffix(".svg"), words, wide=wide))
     shown = Markup('<div class="gallery">{}</div>').format(Markup("\n").join(figures))
     return section("Figures", shown) if figures else Markup("")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -76,6 +77,9 @@ def test_a_recorded_motion_teaches_both_storeys(tmp_path: Path) -> None:
     assert main(["report", str(out), "--quiet"]) == 0
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "Envelope of q2 before and after the measurement" in page
+    assert "Learned from a recorded motion" in page
+    assert "Inputs before and after the measurement, level by level" in page
+    assert not re.search("measured modes|modes were measured", page)
 
 
 def test_noise_as_large_as_the_motion_teaches_little(tmp_path: Path) -> None:
