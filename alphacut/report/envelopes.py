@@ -17,7 +17,7 @@ from alphacut.io.problem import BadInput
 from alphacut.io.provenance import door
 from alphacut.io.units import engineering, largest_by_unit
 from alphacut.report.figures import picture
-from alphacut.report.tables import fragment, items, paragraphs, section, table
+from alphacut.report.tables import fragment, items, paragraphs, section, sentence, table
 from alphacut.stages.vibration import exceedance as outcomes
 
 
@@ -88,7 +88,7 @@ def peaks(summary: Document) -> Markup:
     limit = Markup("")
     if "exceedance" in summary:
         lines = outcomes.sentences(summary["exceedance"]).splitlines()
-        limit = paragraphs(*(f"{line[0].upper()}{line[1:]}." for line in lines))
+        limit = paragraphs(*map(sentence, lines))
     study = next(iter(summary["envelopes"].values()))
     low, high = (f"at α = {study['alpha'][level]:g}" for level in (0, -1))
     head = (

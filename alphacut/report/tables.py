@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
+from alphacut.figures.captions import INPUTS
 from alphacut.io.provenance import own_version
 
 if TYPE_CHECKING:
@@ -64,12 +65,15 @@ def code(text: str, tag: str = "code") -> Markup:
     return Markup("<{0}>{1}</{0}>").format(tag, text)
 
 
+SYMBOL = re.compile(r"\w+\.\w|\w*[\d_]|(?!a\b)\w\b")
+"""What is told by its digits, its length or its point: q3, c, frame.masses."""
+
+
 def sentence(text: str) -> str:
-    """Text as a sentence: a capital at its head, unless a key leads it, a full stop at its end."""
-    if not text:
-        return ""
-    head = text[0] if re.match(r"\w+\.\w", text) else text[0].upper()
-    return f"{head}{text[1:].rstrip('.')}."
+    """Text as a sentence: a capital, unless a symbol or key leads it, and a full stop."""
+    symbol = SYMBOL.match(text) or re.split(r"\W", text)[0] in INPUTS
+    head = text[:1] if symbol else text[:1].upper()
+    return f"{head}{text[1:].rstrip('.')}." if text else ""
 
 
 def percent(share: float | None) -> str:

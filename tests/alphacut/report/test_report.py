@@ -16,6 +16,7 @@ from alphacut.report.envelopes import peaks
 from alphacut.report.key_results import key_results
 from alphacut.report.key_results import peaks as key_peaks
 from alphacut.report.sections import shares
+from alphacut.report.tables import sentence
 from tests.alphacut.one_floor import one_floor
 
 PAPER = Path(__file__).parents[3] / "cases" / "paper.toml"
@@ -315,6 +316,19 @@ def test_a_range_that_is_not_the_support_is_told_with_its_level():
     page = str(key_results({"envelopes": {"all": study}}))
     assert "1.000 m … 3.000 m at α = 0.9" in page
     assert "all inputs are intervals" in page.lower()
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["q3 at 3 s", "k1, k2: opinions", "c counts", "zeta: x", "base_shear", "frame.m is", "|q|"],
+)
+def test_a_symbol_at_the_head_of_a_sentence_stays_as_it_is(text):
+    assert sentence(text) == f"{text}."
+
+
+def test_a_sentence_has_a_capital_and_a_full_stop():
+    told = ["a limit is", "mode 3 was.", "in 3 s", ""]
+    assert [*map(sentence, told)] == ["A limit is.", "Mode 3 was.", "In 3 s.", ""]
 
 
 def test_notes_on_shares_stand_above_their_table():
