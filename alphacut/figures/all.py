@@ -18,6 +18,7 @@ from alphacut.figures import modulus as figure_modulus
 from alphacut.figures import questions as figure_questions
 from alphacut.figures import radius as figure_radius
 from alphacut.figures import shares as figure_shares
+from alphacut.figures.captions import is_figure
 from alphacut.figures.mesh import draw_mesh
 from alphacut.figures.style import save, style
 from alphacut.frame.structures.field_frame import FieldFrame
@@ -171,13 +172,29 @@ def keep(folder: Path, key: str, names: Sequence[str]) -> None:
 
 def kept(folder: Path, key: str) -> list[str] | None:
     """Names of an earlier run's figures, if all are there and show what has this fingerprint."""
+    names = written_down(folder / KEPT, key)
+    there = all((folder / name).is_file() and (folder / name).stat().st_size for name in names)
+    return names if names and there else None
+
+
+def sweep(folder: Path, names: Iterable[str]) -> None:
+    """Remove figures that an earlier run has written down and that are not among `names`."""
+    gone = {*written_down(folder / "summary.json"), *written_down(folder / KEPT)} - {*names}
+    for path in map(Path, gone):
+        drawn = path.parent == Path("figures") and path.suffix in (".svg", ".png")
+        if drawn and is_figure(path.stem) and (folder / path).is_file():
+            (folder / path).unlink(missing_ok=True)
+    if gone:
+        (folder / KEPT).unlink(missing_ok=True)
+
+
+def written_down(file: Path, key: str = "") -> list[str]:
+    """Names of an earlier run's figures; none of a damaged file or one of another fingerprint."""
     try:
-        told = json.loads((folder / KEPT).read_text(encoding="utf-8"))
-        names = [str(name) for name in told["figures"]]
-        there = all((folder / name).stat().st_size for name in names)
-        return names if told["fingerprint"] == key and there else None
+        told = json.loads(file.read_text(encoding="utf-8"))
+        return [*map(str, told["figures"])] if not key or told["fingerprint"] == key else []
     except (OSError, ValueError, KeyError, TypeError):
-        return None
+        return []
 
 
 def drawn_in_parts(results: Results, executor: Executor | None, *, quiet: bool) -> list[str]:
@@ -220,7 +237,7 @@ def particle_pictures(folder: Path, results: Results) -> list[str]:
     """Figures of the microstructure stage: 03-04_two_point … 13_pbox, radius_map, circles."""
     if "microstructure" not in results.case.stages:
         return []
-    found = [path for path in sorted(folder.iterdir()) if re.match(r"\d|radi|image_c", path.name)]
+    found = [path for path in sorted(folder.glob("*")) if re.match(r"\d|radi|image_c", path.name)]
     return [str(path.relative_to(results.folder)) for path in found]
 
 

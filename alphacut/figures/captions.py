@@ -47,6 +47,12 @@ def figure_words(name: str) -> str:
     return FIGURES.get(name, name.replace("-", " "))
 
 
+def is_figure(stem: str) -> bool:
+    """Whether a file of this name may be a figure of a run."""
+    name = re.sub(r"^(fig)?\d+(-\d+)?[-_]", "", stem).replace("_", "-")
+    return name in FIGURES or name.startswith(("envelope-", "update-", "exceedance-"))
+
+
 def core(modulus: Document) -> str:
     """Modal value or core interval of a summary's fuzzy modulus, in GPa."""
     low, high = (float(modulus["E_GPa"][side][-1]) for side in ("lower", "upper"))

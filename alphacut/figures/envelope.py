@@ -66,15 +66,8 @@ def exceedance(found: xarray.Dataset) -> Figure:
     limit, unit = float(found.attrs["limit"]), event_unit(output)
     if limit <= 2 * limits[-1]:
         axes.axvline(limit, color=look.ORANGE, lw=1.2, ls="--")
-    axes.set_title(
-        (
-            f"limit {engineering(limit, unit)} (dashed)"
-            if limit <= 2 * limits[-1]
-            else f"limit {engineering(limit, unit)}, far off"
-        ),
-        loc="left",
-        fontsize=10,
-    )
+    where = " (dashed)" if limit <= 2 * limits[-1] else ", far off"
+    axes.set_title(f"limit {engineering(limit, unit)}{where}", loc="left", fontsize=10)
     factor, prefixed = axis_prefix(max(limits[-1], limit if limit <= 2 * limits[-1] else 0.0), unit)
     axes.xaxis.set_major_formatter(lambda value, _: f"{value * factor:.10g}".replace("-", MINUS))
     words = f"limit of {event_words(output)}, {prefixed}" if unit else "all limits, over the case's"

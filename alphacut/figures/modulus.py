@@ -146,12 +146,8 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
     inputs = wanted.inputs(study.task.fuzzy)
     end = min(duration, study.task.duration)
     end = round(end / study.task.step) * study.task.step
-    flow = wanted.flow(
-        tuple(inputs),
-        end,
-        study.task.step,
-        study.task.scheme if wanted.linear else study.task.integrator,
-    )
+    scheme = study.task.scheme if wanted.linear else study.task.integrator
+    flow = wanted.flow(tuple(inputs), end, study.task.step, scheme)
     ends = np.array([number.cut(float(dataset["alpha"])) for number in inputs.values()])
     points = np.random.default_rng(0).uniform(ends[:, 0], ends[:, 1], (count, len(ends)))
     curves = flow.values(points)[:, :, list(flow.outputs).index(output)]
@@ -237,12 +233,5 @@ def quantiles(axes: Axes, found: xarray.Dataset) -> None:
             found["quantile"].sel(probability=probability).transpose("bound", "alpha").values / GPA
         )
         line, grade = np.concatenate([lower, upper[::-1]]), np.concatenate([alpha, alpha[::-1]])
-        axes.plot(
-            line,
-            grade,
-            color=MARKS[number % len(MARKS)],
-            lw=1.3,
-            marker="o",
-            ms=3,
-            label=f"{probability:g}",
-        )
+        colour, words = MARKS[number % len(MARKS)], f"{probability:g}"
+        axes.plot(line, grade, color=colour, lw=1.3, marker="o", ms=3, label=words)

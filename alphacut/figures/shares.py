@@ -28,13 +28,9 @@ def over_time(found: xarray.Dataset) -> Figure:
     import matplotlib.pyplot as plt
 
     outputs = [str(name) for name in found["output"].values][-MOST:]
+    size = (7.2, 1.0 + 1.9 * len(outputs))
     drawn, grid = plt.subplots(
-        len(outputs),
-        1,
-        figsize=(7.2, 1.0 + 1.9 * len(outputs)),
-        sharex=True,
-        squeeze=False,
-        layout="constrained",
+        len(outputs), 1, figsize=size, sharex=True, squeeze=False, layout="constrained"
     )
     for axes, output in zip(grid[:, 0], outputs, strict=True):
         panel(axes, found.sel(output=output), output)
@@ -71,14 +67,8 @@ def panel(axes: Axes, found: xarray.Dataset, output: str) -> None:
         colour = COLOURS[index % len(COLOURS)]
         dashes = STYLES[(index // len(COLOURS)) % len(STYLES)]
         share = weighted(found["share"].sel(input=name).values, width)
-        axes.plot(
-            time,
-            share,
-            color=colour,
-            ls=dashes,
-            lw=1.3,
-            label=INPUTS.get(str(name)) or in_words(str(name)),
-        )
+        words = INPUTS.get(str(name)) or in_words(str(name))
+        axes.plot(time, share, color=colour, ls=dashes, lw=1.3, label=words)
     axes.set_xlim(time[0], time[-1])
     axes.set_ylim(0, 1)
     axes.set_ylabel("share")

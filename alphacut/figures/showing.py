@@ -80,17 +80,21 @@ class Showing:
     def drawn(self, results: Results) -> list[str]:
         """Names of all figures, which are drawn if they or what they show are new."""
         self.make_shares(results)
-        if not self.figures:
-            return []
         key, folder = figures_key(results), self.chain.folder
-        if not self.chain.fresh and (names := figures.kept(folder, key)) is not None:
-            return names
+        kept = figures.kept(folder, key)
+        if not self.figures:
+            stage = figures.particle_pictures(folder / "figures", results)
+            figures.sweep(folder, [*(kept or ()), *stage])
+            return []
+        if kept is not None and not self.chain.fresh:
+            return kept
         meshes = self.meshes
         if meshes is None:
             meshes = figures.begin_meshes(results, self.executor)
         names = figures.draw(
             results, self.driving, meshes, executor=self.executor, quiet=self.chain.quiet
         )
+        figures.sweep(folder, names)
         if all(made.result() for made in meshes.values()):
             figures.keep(folder, key, names)
         return names

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from alphacut.entry import main
-from alphacut.figures.all import keep, kept
+from alphacut.figures.all import keep, kept, sweep
 
 CASES = Path(__file__).parents[3] / "cases"
 
@@ -55,6 +55,48 @@ def test_a_second_run_draws_only_what_is_missing_or_asked_for(tmp_path, capfd, m
     assert all(third[name] > first[name] for name in first)
     anew = drawn("--fresh")
     assert all(anew[name] > third[name] for name in first)
+
+
+def test_figures_of_other_settings_do_not_stay(tmp_path, capfd, monkeypatch):
+    """Those that still show what the case is stay, though a run without figures names none."""
+    monkeypatch.setattr(Figure, "savefig", lambda _, path, **__: Path(path).write_bytes(b"drawn"))
+    words = ["run", str(CASES / "pendulum.toml"), "--quick", "--out", str(tmp_path)]
+    words += ["--set", "envelope.duration=1 s", "--set"]
+
+    def there(*more):
+        """Names in the folder of figures after a run, and those of its summary."""
+        assert main([*words, *more]) == 0, capfd.readouterr().err
+        told = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["figures"]
+        found = {path.name for path in (tmp_path / "figures").iterdir()} - {".kept.json"}
+        return found, {Path(name).name for name in told}
+
+    fuzzy, every = "envelope.fuzzy=phi_0", 'envelope.fuzzy=["phi_0", "l"]'
+    first, told = there(fuzzy)
+    assert first == told
+    own = {"measure-next.svg", "2024-notes.png", "my.svg"}
+    for name in own:
+        (tmp_path / "figures" / name).write_text("own", encoding="utf-8")
+    assert there(fuzzy, "--no-figures") == (first | own, set())
+    assert there("envelope.fuzzy=l", "--no-figures") == (own, set())
+    more, told = there(every)
+    assert more == told | own
+    assert there(fuzzy) == (first | own, first)
+    kept = [(tmp_path / "figures" / name).read_text(encoding="utf-8") for name in own]
+    assert kept == ["own"] * 3
+
+
+def test_only_files_that_a_run_has_drawn_are_removed(tmp_path):
+    """Older programs wrote down every file of the folder whose name begins with a digit."""
+    (tmp_path / "figures").mkdir()
+    names = ["figures/10_cells.png", "figures/envelope-all-q1.svg", "figures/fig26-frame.png"]
+    own = ["figures/2024-notes.png", "figures/1.png", "frame.png", "figures/frame.csv"]
+    for name in names + own:
+        (tmp_path / name).write_text("some", encoding="utf-8")
+    told = [*names, *own, "figures/../frame.png", str(tmp_path / "frame.png"), "figures"]
+    (tmp_path / "summary.json").write_text(json.dumps({"figures": told}), encoding="utf-8")
+    sweep(tmp_path, names[:1])
+    left = {path.relative_to(tmp_path).as_posix() for path in tmp_path.glob("**/*.*")}
+    assert left == {names[0], *own, "summary.json"}
 
 
 def test_studies_side_by_side_give_what_they_give_one_by_one(tmp_path, capfd):
