@@ -11,14 +11,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.stats import bartlett
+from scipy.optimize import least_squares, lsq_linear
+from scipy.stats import bartlett, norm
 from scipy.stats import f as law
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.update.posterior import RefutedError
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.sets.claimed import Claim, Claimed, Joint
 from alphacut.fuzzy.sets.stepwise import outer_steps
@@ -26,7 +28,11 @@ from alphacut.fuzzy.sets.stepwise import outer_steps
 ALIKE = 1e-6
 """Probability below which deviations of outputs so far apart are not those of errors alike."""
 RAYS = 100
-"""Random directions along which the border of a set is searched, besides two for each parameter."""
+"""Random paths along which the border of a set is searched, twice; besides two a parameter."""
+NODES, SHRINK, FARTHEST, HALVINGS = 25, 2**-0.5, 64.0, 12
+"""Nodes of a path, factor on their distances, deviations to the last, halvings between two."""
+ROUNDS = 2
+"""Times that paths begin anew at the extremes found."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,15 +75,14 @@ class RecordedMotion:
 
     def possibility(self, points: Array) -> Array:
         """Possibility of parameters (S, d), shape (S,)."""
-        found = np.empty(len(points))
-        for row, (miss, slopes) in enumerate(zip(*self.misfit(points), strict=True)):
-            size = np.linalg.norm(slopes, axis=0)
-            basis, _ = np.linalg.qr(slopes / np.where(size > 0, size, 1.0))
-            along = float(((basis.T @ miss) ** 2).sum())
-            rest = float(miss @ miss) - along
-            n, d = slopes.shape
-            found[row] = law.sf((along / d) / max(rest / (n - d), 1e-300), d, n - d)
-        return found
+        miss, slopes = self.misfit(points)
+        size = np.linalg.norm(slopes, axis=1, keepdims=True)
+        basis = np.linalg.qr(slopes / np.where(size > 0, size, 1.0))[0]
+        along = np.einsum("snd,sn->sd", basis, miss)
+        part = (along**2).sum(1)
+        rest = np.maximum((miss**2).sum(1) - part, 1e-300)
+        n, d = slopes.shape[1:]
+        return np.asarray(law.sf((part / d) / (rest / (n - d)), d, n - d))
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +146,8 @@ def learn_from_motion(
 
     Raises:
         ValueError: The priors are not those of the flow, levels do not rise within (0, 1], or the
-            outputs' errors are not alike.
+            errors are not alike or not independent.
+        RefutedError: No parameters that were tried agree with the record.
     """
     levels = np.asarray(alpha, float)
     if tuple(prior) != record.flow.names:
@@ -150,19 +156,21 @@ def learn_from_motion(
         )
     if not len(levels) or levels[0] <= 0 or levels[-1] > 1 or (np.diff(levels) <= 0).any():
         raise ValueError(f"alpha: {list(alpha)} must rise within (0, 1]")
-    ends = np.array([number.support for number in prior.values()])
-    best, reach = _fit(record, ends)
-    _require_alike(record, best)
-    rng = np.random.default_rng(seed)
-    rays = np.vstack([rng.normal(size=(RAYS, len(best))) @ reach.T, reach.T, -reach.T])
-    widest = reach @ reach.T
-    rays = np.vstack([rays, widest / np.sqrt(np.maximum(np.diag(widest), 1e-300))[:, None]])
-    rays = np.vstack([rays, -rays[-len(best) :]])
-    lower, upper = [], []
-    for level in levels:
-        points = _border(record, ends, best, rays, float(level))
-        lower.append(points.min(0))
-        upper.append(points.max(0))
+    box = _Box(record, np.array([number.support for number in prior.values()]))
+    best, spread = box.fit()
+    paths = np.concatenate([box.rays(best, spread, seed), box.profiles(best, box.ways)])
+    likely = box.possibility(paths)
+    if likely[0, 0] < levels[0]:
+        raise RefutedError(
+            "the record refutes the frame: the best parameters in the priors' supports agree with"
+            f" it to {likely[0, 0]:.2g} (a true frame is refuted with a probability of about"
+            f" {levels[0]:g}): mend the frame, the record's units or the priors"
+        )
+    top = box.physical(best)
+    _require_alike(record, top)
+    _require_independent(record, top)
+    ends = np.array([box.extremes(paths, likely, float(level)) for level in levels])
+    lower, upper = box.physical(ends[:, 0]), box.physical(ends[:, 1])
     about = "parameter of the recorded structure"
     given = (
         f"{record.values.size} recorded values with independent normal errors of one deviation",
@@ -172,46 +180,154 @@ def learn_from_motion(
     return MotionPosterior(
         record.flow.names,
         levels,
-        np.array(lower),
-        np.array(upper),
-        best,
+        np.minimum.accumulate(lower[::-1])[::-1],
+        np.maximum.accumulate(upper[::-1])[::-1],
+        top,
         Claim(about, given),
         dict(prior),
     )
 
 
-def _fit(record: RecordedMotion, ends: Array) -> tuple[Array, Array]:
-    """Best parameters, and a matrix whose columns span the region about them."""
-    middle, half = ends.mean(1), np.maximum(np.ptp(ends, axis=1) / 2, 1e-300)
-    scale = float(np.abs(record.values).max()) or 1.0
+@dataclass(frozen=True, eq=False)
+class _Box:
+    """The priors' supports, seen as [-1, 1] in each parameter.
 
-    def miss(unit: Array) -> Array:
-        return np.asarray(record.misfit((middle + half * unit)[None])[0][0] / scale)
+    Args:
+        record: The record.
+        ends: Of the supports, shape (d, 2).
+    """
 
-    def slopes(unit: Array) -> Array:
-        return np.asarray(-record.misfit((middle + half * unit)[None])[1][0] * half / scale)
+    record: RecordedMotion
+    ends: Array
 
-    starts = [np.zeros(len(middle)), *np.random.default_rng(0).uniform(-0.9, 0.9, (8, len(middle)))]
-    fits = [
-        least_squares(miss, start, jac=slopes, bounds=(-1.0, 1.0), xtol=1e-14, ftol=1e-14)
-        for start in starts
-    ]
-    fit = min(fits, key=lambda one: float(one.cost))
-    jacobian = slopes(fit.x)
-    deviation = np.sqrt(2 * fit.cost / max(len(jacobian) - len(middle), 1))
-    spread = np.linalg.pinv(jacobian.T @ jacobian) * deviation**2
-    values, vectors = np.linalg.eigh(spread)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    return middle + half * fit.x, half[:, None] * root
+    @property
+    def half(self) -> Array:
+        """Half the widths, shape (d,)."""
+        return np.asarray(np.maximum(np.ptp(self.ends, axis=1) / 2, 1e-300))
+
+    @property
+    def ways(self) -> list[tuple[int, float]]:
+        """The lower end of each parameter, then the upper end of each."""
+        return [(k, end) for end in (-1.0, 1.0) for k in range(len(self.ends))]
+
+    def physical(self, units: Array) -> Array:
+        """Parameters (…, d) of points of the box; its faces are met exactly."""
+        low, high = self.ends.T
+        inner = np.clip(self.ends.mean(1) + self.half * units, low, high)
+        return np.asarray(np.where(units <= -1, low, np.where(units >= 1, high, inner)))
+
+    def possibility(self, units: Array) -> Array:
+        """Possibility of points (…, d) of the box."""
+        points = self.physical(units).reshape(-1, len(self.ends))
+        return self.record.possibility(points).reshape(units.shape[:-1])
+
+    def linear(self, unit: Array) -> tuple[Array, Array]:
+        """Misfit and the motion's derivatives at a point, over the largest recorded value."""
+        scale = float(np.abs(self.record.values).max()) or 1.0
+        miss, slopes = self.record.misfit(self.physical(unit)[None])
+        return miss[0] / scale, slopes[0] * self.half / scale
+
+    def fit(self) -> tuple[Array, Array]:
+        """Best point, and a matrix whose columns span the region about it."""
+        d = len(self.ends)
+        starts = [np.zeros(d), *np.random.default_rng(0).uniform(-0.9, 0.9, (8, d))]
+        tight: dict[str, Any] = {"bounds": (-1.0, 1.0), "xtol": 1e-14, "ftol": 1e-14}
+        fits = [
+            least_squares(
+                lambda unit: self.linear(unit)[0], start, lambda u: -self.linear(u)[1], **tight
+            )
+            for start in starts
+        ]
+        fit = min(fits, key=lambda one: float(one.cost))
+        jacobian = self.linear(fit.x)[1]
+        deviation = np.sqrt(2 * fit.cost / max(len(jacobian) - d, 1))
+        values, vectors = np.linalg.eigh(np.linalg.pinv(jacobian.T @ jacobian) * deviation**2)
+        return fit.x, vectors * np.sqrt(np.maximum(values, 0.0))
+
+    def rays(self, best: Array, spread: Array, seed: int) -> Array:
+        """Paths that leave a point straight and go on along the faces they meet, (P, M, d)."""
+        rng, d = np.random.default_rng(seed), len(best)
+        widest = spread @ spread.T
+        axes = np.vstack([spread.T, widest / np.sqrt(np.maximum(np.diag(widest), 1e-300))[:, None]])
+        straight = rng.uniform(-1, 1, (RAYS, d)) - best  # to anywhere in the box, and through it
+        rays = np.vstack([rng.normal(size=(RAYS, d)) @ spread.T, axes, -axes, straight / FARTHEST])
+        far = FARTHEST * np.append(0.0, SHRINK ** np.arange(NODES - 1)[::-1])
+        return np.asarray(np.clip(best + far[:, None] * rays[:, None], -1.0, 1.0))
+
+    def profiles(self, start: Array, ways: Sequence[tuple[int, float]]) -> Array:
+        """Paths to ends of parameters, the others the best by a linear motion, (P, M, d).
+
+        Args:
+            start: Where the motion is linearised, shape (d,).
+            ways: Parameters and the ends, -1.0 or 1.0.
+        """
+        miss, slopes = self.linear(start)
+        basis, root = np.linalg.qr(slopes)
+        aim = basis.T @ miss + root @ start
+        shares = np.append(0.0, SHRINK ** np.arange(NODES - 1)[::-1])
+        paths = [
+            [_constrained(root, aim, k, start[k] + share * (end - start[k])) for share in shares]
+            for k, end in ways
+        ]
+        return np.array(paths)
+
+    def extremes(self, paths: Array, likely: Array, level: float) -> Array:
+        """Least and greatest values found of a level's set, shape (2, d).
+
+        Args:
+            paths: Shape (P, M, d).
+            likely: Their possibility, shape (P, M).
+            level: The level.
+        """
+        found = self.border(paths, likely, level)
+        if not len(found):  # above the possibility of the best
+            found = paths[0, :1]
+        for _ in range(ROUNDS):
+            turns = np.concatenate([found[found.argmin(0)], found[found.argmax(0)]])
+            pairs = zip(turns, self.ways, strict=True)
+            more = np.concatenate([self.profiles(turn, [way]) for turn, way in pairs])
+            found = np.vstack([found, self.border(more, self.possibility(more), level)])
+        return np.array([found.min(0), found.max(0)])
+
+    def border(self, paths: Array, likely: Array, level: float) -> Array:
+        """Nodes of a level's set on each path until it leaves the set, and where it does, (n, d).
+
+        Sets apart from that of the best parameters may be other fits that are stationary.
+        """
+        held = np.logical_and.accumulate(likely >= level, axis=1)
+        met = held[:, 0]
+        if not met.any():
+            return paths[held]
+        last = held[met].sum(1) - 1
+        rows, following = np.arange(len(last)), np.minimum(last + 1, likely.shape[1] - 1)
+        inside, outside = paths[met][rows, last], paths[met][rows, following]
+        for _ in range(HALVINGS):
+            known = np.vstack([paths[held], inside])
+            low, high = known.min(0), known.max(0)
+            some = ((outside < low) | (outside > high)).any(1)  # may widen the set's hull
+            if not some.any():
+                break
+            middle = (inside[some] + outside[some]) / 2
+            good = (self.possibility(middle) >= level)[:, None]
+            inside[some] = np.where(good, middle, inside[some])
+            outside[some] = np.where(good, outside[some], middle)
+        return np.vstack([paths[held], inside])
+
+
+def _constrained(root: Array, aim: Array, fixed: int, value: float) -> Array:
+    """The point of [-1, 1] nearest to root x = aim with one entry fixed, shape (d,)."""
+    free = np.arange(len(aim)) != fixed
+    point = np.full(len(aim), np.clip(value, -1.0, 1.0))
+    if free.any():
+        rest = aim - root[:, fixed] * point[fixed]
+        point[free] = lsq_linear(root[:, free], rest, (-1.0, 1.0), method="bvls").x
+    return point
 
 
 def _require_alike(record: RecordedMotion, best: Array) -> None:
     """Bartlett's test of one deviation for all outputs (Proc. R. Soc. A 160, 268, 1937)."""
-    miss = record.misfit(best[None])[0].reshape(record.values.shape)
-    deviations = miss.std(0, ddof=1)
-    if miss.shape[1] < 2 or len(miss) <= 10 * len(best):
-        return
-    if deviations.max() <= 1e-9 * np.abs(record.values).max():  # a record without errors
+    miss, deviations = _rest(record, best)
+    if miss.shape[1] < 2 or not deviations.all():
         return
     with np.errstate(divide="ignore"):
         chance = bartlett(*miss.T).pvalue
@@ -225,26 +341,31 @@ def _require_alike(record: RecordedMotion, best: Array) -> None:
         )
 
 
-def _border(record: RecordedMotion, ends: Array, best: Array, rays: Array, level: float) -> Array:
-    """Points of the set of a level on rays from the best point, itself among them."""
-    inside: Array = np.zeros(len(rays))
-    outside: Array = np.ones(len(rays))
-    for _ in range(8):  # outward until beyond the set or the priors
-        held = _held(record, ends, best + outside[:, None] * rays, level)
-        inside = np.where(held, outside, inside)
-        outside = np.where(held, 2 * outside, outside)
-        if not held.any():
-            break
-    for _ in range(14):
-        middle = (inside + outside) / 2
-        held = _held(record, ends, best + middle[:, None] * rays, level)
-        inside, outside = np.where(held, middle, inside), np.where(held, outside, middle)
-    return np.vstack([best[None], best + inside[:, None] * rays])
+def _require_independent(record: RecordedMotion, best: Array) -> None:
+    """Tests that the best fit leaves errors without a mean, and neighbours that do not correlate.
+
+    Both are normal with deviation 1 / √T, of their own size, for independent errors.
+    """
+    miss, deviations = _rest(record, best)
+    if not deviations.all():
+        return
+    miss = miss / np.sqrt((miss**2).mean(0))
+    alike = (miss[1:] * miss[:-1]).mean(0)
+    allowed = float(norm.isf(ALIKE / 4 / miss.shape[1])) / np.sqrt(len(miss))
+    for name, mean, correlation in zip(record.flow.outputs, miss.mean(0), alike, strict=True):
+        if max(abs(mean), abs(correlation)) > allowed:
+            raise ValueError(
+                f"the record's errors of {name} are not independent: the best fit leaves errors"
+                f" with a mean of {mean:.2g} of their size and neighbours that correlate to"
+                f" {correlation:.2g} (by chance up to {allowed:.2g}): mend the frame where it does"
+                " not fit (its damping, start, load or priors), the sensor's offset or timing, or"
+                " keep only every third sample, say"
+            )
 
 
-def _held(record: RecordedMotion, ends: Array, points: Array, level: float) -> Array:
-    within = ((points >= ends[:, 0]) & (points <= ends[:, 1])).all(1)
-    held = np.zeros(len(points), bool)
-    if within.any():
-        held[within] = record.possibility(points[within]) >= level
-    return held
+def _rest(record: RecordedMotion, best: Array) -> tuple[Array, Array]:
+    """Misfit of the outputs (T, m), and deviations (m,), 0 where too few or without errors."""
+    miss = record.misfit(best[None])[0].reshape(record.values.shape)
+    deviations = miss.std(0, ddof=1)
+    known = len(miss) > 10 * len(best) and deviations.max() > 1e-9 * np.abs(record.values).max()
+    return miss, deviations * known

@@ -230,6 +230,7 @@ def require_readable(case: Case, frame: StoreyFrame | None) -> None:
 def _from_motion(case: Case, wanted: Structure, frame: StoreyFrame) -> Learned:
     """The inputs after a recorded motion."""
     from alphacut.frame.update.motion import RecordedMotion, learn_from_motion
+    from alphacut.frame.update.posterior import RefutedError
 
     rows, prior = recorded_motion(case, frame), inputs(case, wanted)
     duration, recorded = (len(rows.values) - 1) * rows.step, replace(frame, outputs=rows.outputs)
@@ -237,6 +238,8 @@ def _from_motion(case: Case, wanted: Structure, frame: StoreyFrame) -> Learned:
     try:
         record = RecordedMotion(flow, rows.values)
         found = learn_from_motion(record, prior, alpha=case.update.alpha)
+    except RefutedError as error:
+        return Learned(None, str(error), prior, (), wanted)
     except ValueError as error:
         raise BadInput.of("update", str(error), file=str(case.path)) from None
     after = replace(wanted, numbers={**wanted.numbers, **found.numbers})
