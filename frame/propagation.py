@@ -13,12 +13,18 @@ from alphacut.frame.boxes import ALPHA, Kept, UnitFlow, boxes
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.checks.admissible import require_admissible
 from alphacut.frame.checks.between_nodes import ground_stray, with_stray
-from alphacut.frame.checks.step_error import require_stable, step_error, with_step_error
+from alphacut.frame.checks.step_error import (
+    require_stable,
+    step_error,
+    step_error_at_bounds,
+    with_step_error,
+)
 from alphacut.frame.checks.tolerance import LIMIT
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import INTEGRATORS, Integrator
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Envelope
+from alphacut.frame.methods.auto import Auto
 from alphacut.frame.methods.foreseen import foreseen
 from alphacut.frame.methods.judged import judged
 from alphacut.frame.methods.named import Method, named, options_of
@@ -112,7 +118,11 @@ def envelope(
     over = replace(asked, boxes=cuts, kept=kept)
     steps = step_error(over)
     with told(progress) as tell:
-        found = with_step_error(way.run(over, tell), over, scheme, steps)
+        found = way.run(over, tell)
+    steps = step_error_at_bounds(found, over, steps)
+    if isinstance(way, Auto):
+        way.left(over, steps)
+    found = with_step_error(found, over, scheme, steps)
     if method.endswith("graph-follower"):
         found = judged(found, over, steps)
     found = with_stray(found, over)

@@ -24,6 +24,8 @@ from alphacut.frame.structures.quantities import Output
 
 CORNERS = 16
 """Corners of the widest box that are looked at, at most."""
+OPTIMA = 64
+"""Points at which bounds are reached that are looked at besides, at most."""
 MARGIN = 1.5
 """Factor on the largest error at these, since other points of the box may exceed it."""
 GROWTH = 1e-6
@@ -63,6 +65,30 @@ def step_error(flow: UnitFlow) -> Array:
                 " times; take a smaller step"
             )
     return MARGIN * so_far
+
+
+def step_error_at_bounds(found: Envelope, flow: UnitFlow, steps: Array) -> Array:
+    """Errors of a linear scheme from the points at which bounds are reached besides, (T, m).
+
+    A structure may resonate between the corners, and the scheme at other parameters than the truth.
+
+    Args:
+        found: The envelope of the scheme's trajectories.
+        flow: These trajectories.
+        steps: From `step_error`, shape (T, m).
+    """
+    linear = isinstance(flow.flow, LinearFlow) and not isinstance(
+        flow.flow.system, ReducedStructure
+    )
+    if exact(flow.flow) or not linear:
+        return steps
+    at, d = np.stack([found.lower_at, found.upper_at]), len(found.parameters)
+    peaks = np.abs([found.lower, found.upper]).argmax(2)[:, :, None, :, None]
+    highest = np.take_along_axis(at, peaks, 2).reshape(-1, d)
+    others = np.random.default_rng(0).permutation(np.unique(at.reshape(-1, d), axis=0))
+    points = np.unique(np.vstack([highest, others[:OPTIMA]]), axis=0)
+    _, error = deviations(flow.flow, points)
+    return np.asarray(np.maximum(steps, MARGIN * np.maximum.accumulate(error.max(0), axis=0)))
 
 
 def exact(flow: Flow) -> bool:

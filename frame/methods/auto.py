@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
+from alphacut.frame.calculus.jet import Array
 from alphacut.frame.checks.step_error import source, step_error
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.batch_graph_follower import BatchFollower
@@ -85,9 +86,9 @@ class Auto:
         Raises:
             ToleranceError: No method left reaches the tolerance.
         """
-        flow, tolerance = self.wanted(flow)
+        left, (flow, tolerance) = self.left(flow, step_error(flow)), self.wanted(flow)
         progress, begun = progress and Stages(progress), time.perf_counter()
-        left, cure = _left(flow, tolerance), "allow more methods, a larger budget or tolerance"
+        cure = "allow more methods, a larger budget or tolerance"
         tried, refused = self._tried(flow)
         if "modal" in tried:
             found, why = self._by_modes(flow, left, progress)
@@ -106,6 +107,22 @@ class Auto:
             refused.append(f"improved-graph-follower needs more than {self.budget} trajectories")
         why = f"no method reaches {flow.told(tolerance)} ({'; '.join(refused)})"
         raise ToleranceError(f"auto: {why}; {cure}")
+
+    def left(self, flow: UnitFlow, steps: Array) -> float:
+        """What of the tolerance errors of time stepping (T, m) leave.
+
+        Raises:
+            ToleranceError: They leave nothing.
+        """
+        flow, tolerance = self.wanted(flow)
+        reached = float((steps / flow.scale).max())
+        if reached >= tolerance:
+            what, cure = source(flow.flow)
+            raise ToleranceError(
+                f"auto: the error of {what}, {flow.told(reached)}, is above the tolerance"
+                f" {flow.told(tolerance)}; {cure}, or a larger tolerance"
+            )
+        return tolerance - reached
 
     def _tried(self, flow: UnitFlow) -> tuple[list[str], list[str]]:
         """Methods that are affordable, and why the others are not begun."""
@@ -142,18 +159,6 @@ class Auto:
         if flow.relative or any(Output(name).unit == "m" for name in flow.outputs):
             return flow, TOLERANCE
         return replace(flow, relative=True), SHARE
-
-
-def _left(flow: UnitFlow, tolerance: float) -> float:
-    """What time stepping leaves of the tolerance; raises ToleranceError if that is nothing."""
-    reached = float((step_error(flow) / flow.scale).max())
-    if reached >= tolerance:
-        what, cure = source(flow.flow)
-        raise ToleranceError(
-            f"auto: the error of {what}, {flow.told(reached)}, is above the tolerance"
-            f" {flow.told(tolerance)}; {cure}, or a larger tolerance"
-        )
-    return tolerance - reached
 
 
 def _proved(

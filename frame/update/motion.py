@@ -297,7 +297,7 @@ class _Box:
         held = np.logical_and.accumulate(likely >= level, axis=1)
         met = held[:, 0]
         if not met.any():
-            return paths[held]
+            return np.asarray(paths[held])
         last = held[met].sum(1) - 1
         rows, following = np.arange(len(last)), np.minimum(last + 1, likely.shape[1] - 1)
         inside, outside = paths[met][rows, last], paths[met][rows, following]

@@ -13,16 +13,20 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from alphacut.frame import (
+    Accelerogram,
     Exact,
     LagrangianSystem,
     LinearFlow,
+    Midpoint,
     RungeKutta4,
     StoreyFrame,
     envelope,
     guard,
 )
-from alphacut.frame.checks.step_error import MARGIN
+from alphacut.frame.boxes import UnitFlow, boxes
+from alphacut.frame.checks.step_error import MARGIN, step_error
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow, StepError
+from alphacut.frame.methods.auto import ToleranceError
 from alphacut.fuzzy import Interval, Triangular
 
 FRAME = StoreyFrame((10.0, 20.0), (3.0, 3.0), 25e9, 1e-6, q0=(0.0, 0.1))
@@ -166,3 +170,23 @@ def test_the_guard_says_what_it_found() -> None:
         guard(DUFFING, 0.02, 10.0)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="step: -1 s"):
         guard(FRAME, -1.0, 10.0)
+
+
+def test_time_stepping_is_judged_where_bounds_are_reached_and_a_resonance_may_be() -> None:
+    """A storey that resonates with a sine between the corners of its support, at a coarse step."""
+    omega, h = np.random.default_rng().uniform(2.9, 3.3), 0.03
+    sine = Accelerogram(h, 0.7 * np.sin(omega * h * np.arange(1001)))
+    frame = StoreyFrame([1e4], stiffness=[1.5e5], damping_ratio=0.01, ground=sine, outputs=("q1",))
+    inputs = {"k1": Interval(0.6e5, 2.4e5)}
+    common: dict[str, Any] = {"duration": 1000 * h, "step": h, "alpha": (0,)}
+    common |= {"integrator": "midpoint", "relative": True}
+    with pytest.warns(UserWarning, match="error of time stepping"):
+        found = envelope(frame, inputs, method="quasi-monte-carlo", samples=128, **common)
+    flow = LinearFlow(frame, ("k1",), 1000 * h, h, Midpoint())
+    at = np.unique(np.concatenate([found.lower_at, found.upper_at]))[:, None]
+    wrong = np.abs(flow.values(at) - replace(flow, integrator=Exact()).values(at)).max()
+    peak = np.maximum(np.abs(found.lower), np.abs(found.upper)).max()
+    at_corners = step_error(UnitFlow(flow, boxes(inputs, (0,)), relative=True)).max()
+    assert at_corners < wrong <= found.facts["step_error"]
+    with pytest.raises(ToleranceError, match=r"auto: the error of time stepping, .* of each peak"):
+        envelope(frame, inputs, tolerance=wrong / peak, **common)

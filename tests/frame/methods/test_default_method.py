@@ -195,8 +195,9 @@ def test_many_inputs_that_miss_the_tolerance_do_not_begin_the_graph_follower(
 def test_time_stepping_takes_its_error_from_the_tolerance() -> None:
     flow = LinearFlow(FRAME, ("m1",), 1.0, 0.02, Midpoint())
     way = UnitFlow(flow, boxes(LIGHT, (0.0,)))
-    reached = float((step_error(way) / way.scale).max())
+    steps = step_error(way)
+    reached = float((steps / way.scale).max())
     assert reached > 0
-    assert auto._left(way, 3 * reached) == pytest.approx(2 * reached)
+    assert auto.Auto(3 * reached).left(way, steps) == pytest.approx(2 * reached)
     with pytest.raises(auto.ToleranceError, match="the error of time stepping"):
-        auto._left(way, reached)
+        auto.Auto(reached).left(way, steps)
