@@ -33,6 +33,7 @@ class JointOutputs:
         nature: What the half planes are worth.
         claim: What the cuts of the inputs claim together.
         result: The ranges in all directions.
+        margin: What the ranges may be wrong by in each direction, shape (levels, directions).
     """
 
     alpha: tuple[float, ...]
@@ -41,9 +42,11 @@ class JointOutputs:
     nature: str
     claim: str
     result: FuzzyResult
+    margin: Array
 
     def holds(self, pairs: Array, level: int = 0, slack: float = 0.0) -> Array:
         """Whether pairs (n, 2) lie in the enclosing polygon of a level."""
+        slack = slack + self.margin[level]
         lower, upper = self.result.lower[level], self.result.upper[level]
         along = pairs @ _directions(len(lower)).T
         return np.asarray(((along >= lower - slack) & (along <= upper + slack)).all(1))
@@ -63,6 +66,7 @@ def joint_outputs(
     known: Known | None = None,
     vectorised: bool = False,
     progress: Progress | bool | None = None,
+    error: tuple[float, float] = (0.0, 0.0),
 ) -> JointOutputs:
     """Hulls of a function's two outputs.
 
@@ -76,6 +80,8 @@ def joint_outputs(
         known: Facts about the function's combinations, as for `propagate`.
         vectorised: Whether the function takes arrays.
         progress: As for `propagate`.
+        error: What the two outputs may be wrong by at any point: the enclosing polygon grows by it,
+            and by the plan's own estimated error, and the inner one shrinks by it.
 
     Raises:
         ValueError: There are fewer than two directions.
@@ -87,15 +93,18 @@ def joint_outputs(
         how = {"alpha": alpha, "known": known, "vectorised": vectorised, "progress": progress}
         found = propagate(turned, inputs, plan, **how)  # type: ignore[arg-type]
     unit = _directions(directions)
+    margin = np.nan_to_num(found.error) + np.abs(unit) @ error
     outer, inner = [], []
     for level in range(len(found.domain.alpha)):
         reached = np.vstack([found.lower_at[level], found.upper_at[level]])
         pairs = [turned.pair(dict(zip(found.domain.names, row, strict=True))) for row in reached]
-        inner.append(_hull(np.array(pairs)))
-        cut = _polygon(unit, found.lower[level], found.upper[level])
+        inner.append(_shrunk(_hull(np.array(pairs)), np.array(error)))
+        own = margin[level]
+        cut = _polygon(unit, found.lower[level] - own, found.upper[level] + own)
         outer.append(cut if len(cut) else inner[-1])  # of one pair alone rounding leaves nothing
     levels, nature = tuple(found.domain.alpha), str(found.nature)
-    return JointOutputs(levels, tuple(outer), tuple(inner), nature, str(found.claim), found)
+    claim = str(found.claim)
+    return JointOutputs(levels, tuple(outer), tuple(inner), nature, claim, found, margin)
 
 
 @dataclass(frozen=True)
@@ -140,6 +149,18 @@ def _polygon(unit: Array, lower: Array, upper: Array) -> Array:
         corners = _cut(corners, unit[k], float(upper[k]))
         corners = _cut(corners, -unit[k], -float(lower[k]))
     return corners
+
+
+def _shrunk(corners: Array, error: Array) -> Array:
+    """What a convex polygon keeps however its corners move by `error`; its middle if nothing."""
+    if len(corners) < 3 or not error.any():
+        return corners
+    sides, kept = np.roll(corners, -1, axis=0) - corners, corners
+    normals = sides[:, ::-1] * [1.0, -1.0]
+    limits = (corners * normals).sum(1) - np.abs(normals) @ error
+    for k in range(len(corners)):
+        kept = _cut(kept, normals[k], float(limits[k]))
+    return kept if len(kept) else corners.mean(0, keepdims=True)
 
 
 def _cut(corners: Array, normal: Array, limit: float) -> Array:

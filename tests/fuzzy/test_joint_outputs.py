@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -79,3 +81,38 @@ def test_two_floors_at_a_node_and_one_floor_at_two_times() -> None:
 def test_one_direction_is_refused() -> None:
     with pytest.raises(ValueError, match=r"a hull needs two or more"):
         joint_outputs(lambda x, y: (x, y), BOX, directions=1)
+
+
+def test_errors_of_the_outputs_grow_the_outer_polygon_and_shrink_the_inner_one() -> None:
+    def pair(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return x + 0.3 * y, x * y - y
+
+    error = np.array([0.05, 0.02])
+    exact, found = (
+        joint_outputs(pair, BOX, Reduced(), alpha=[1.0], vectorised=True, error=wrong)
+        for wrong in ((0.0, 0.0), (0.05, 0.02))
+    )
+    rng = np.random.default_rng()
+    pairs = np.column_stack(pair(rng.uniform(0, 2, 2000), rng.uniform(-1, 1, 2000)))
+    assert found.holds(pairs + error * rng.uniform(-1, 1, pairs.shape)).all()
+    assert not exact.holds(pairs + error * rng.uniform(-1, 1, pairs.shape)).all()
+    assert 0 < found.area()[0] < exact.area()[0] < exact.area()[1] < found.area()[1]
+    for signs in itertools.product((-1, 1), repeat=2):  # the truth may be the hull, moved
+        moved = found.inner[0] + error * signs
+        hull = exact.inner[0]
+        sides = np.roll(hull, -1, axis=0) - hull
+        x, y = np.moveaxis(moved[:, None] - hull, -1, 0)
+        assert (sides[:, 0] * y - sides[:, 1] * x >= -1e-12).all()
+    (lost,) = joint_outputs(pair, BOX, Reduced(), alpha=[1.0], vectorised=True, error=(9, 9)).inner
+    assert lost.shape == (1, 2)
+
+
+def test_the_plans_own_error_is_in_the_outer_polygon() -> None:
+    def pair(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.sin(9 * x) * y, np.cos(9 * x) + y
+
+    plan = Automatic(tolerance=0.2)
+    found = joint_outputs(pair, BOX, plan, directions=8, alpha=[1.0], vectorised=True)
+    error = np.nan_to_num(found.result.error[0])
+    assert error.max() > 0
+    assert found.margin[0] == pytest.approx(error)

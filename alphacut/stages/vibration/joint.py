@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.case.case import Case
+from alphacut.frame.boxes import UnitFlow, boxes
+from alphacut.frame.checks.step_error import step_error
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.joint_outputs import area, joint_outputs
@@ -82,7 +84,16 @@ def joint(case: Case, wanted: Structure) -> xarray.Dataset:
     supports = np.array([number.cut(task.alpha[0]) for number in inputs.values()])
     pair = Pair(flow, (one, other)).scaled(*supports.T)
     try:
-        found = joint_outputs(pair, inputs, alpha=task.alpha, vectorised=True, progress=False)
+        steps = step_error(UnitFlow(flow, boxes(inputs, task.alpha)))
+        wrong = [steps[place] / size for place, size in zip(pair.places, pair.unit, strict=True)]
+        found = joint_outputs(
+            pair,
+            inputs,
+            alpha=task.alpha,
+            vectorised=True,
+            progress=False,
+            error=(float(wrong[0]), float(wrong[1])),
+        )
     except ValueError as error:
         raise BadInput.of("joint", str(error), file=str(case.path)) from None
     words = [

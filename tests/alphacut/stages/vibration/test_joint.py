@@ -63,6 +63,32 @@ def test_two_outputs_at_one_time_of_other_units(tmp_path: Path) -> None:
     assert shares["outer"][0] == pytest.approx(0.5, rel=1e-6)
 
 
+def test_the_error_of_time_stepping_is_in_the_polygons(tmp_path: Path) -> None:
+    """A rough scheme's polygon holds the pairs of the exact motion, a period later."""
+    rough = CASE.replace("[joint]", '[joint]\ntimes = ["0 s", "END s"]\noutputs = ["q1"]\n')
+    found = {}
+    for integrator in ("exact", "midpoint"):
+        path = tmp_path / "one.toml"
+        path.write_text(rough.replace("END", f"{2 * np.pi / OMEGA}"), encoding="utf-8")
+        out = tmp_path / integrator
+        more = [
+            "--set",
+            f"envelope.integrator={integrator}",
+            "--set",
+            f"envelope.step={8 * STEP} s",
+        ]
+        more += ["--set", "envelope.tolerance=1 m", "--no-figures", "--quiet"]
+        assert main(["run", str(path), "--out", str(out), *more]) == 0
+        found[integrator] = json.loads((out / "summary.json").read_text())["joint"]
+    (low, high), (least, most) = (
+        np.array([found[name][side][0] for side in ("lower", "upper")])
+        for name in ("exact", "midpoint")
+    )
+    assert (least <= low + 1e-12).all()
+    assert (high <= most + 1e-12).all()
+    assert (most - least)[1] > 1.2 * (high - low)[1]
+
+
 @pytest.mark.parametrize(
     ("joint", "pattern"),
     [
