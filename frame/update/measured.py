@@ -14,6 +14,7 @@ from alphacut.fuzzy.knowledge.named_law import from_scatter
 from alphacut.fuzzy.sets.claimed import Claimed
 
 NEAR = 0.8  # share of a mode's largest amplitude from which on a floor may be the reference
+ROUGH = 0.2  # deviation of the reference over its amplitude above which ratios have no law
 CHANCE = 1e-6  # probability below which values contradict the deviation that is given of them
 
 
@@ -78,11 +79,12 @@ def measured_mode(
             that of the reference floor, the highest near the largest: no chance decides.
         frequency_deviation: Standard deviation of one value as a share of it, where it is known
             from elsewhere; from the values' own scatter if not given, which takes two at least.
-        shape_deviation: The same of any amplitude, as a share of the largest of the mode.
+        shape_deviation: The same of any amplitude, as a share of the largest of the mode. Those of
+            all floors are taken to scatter alike.
 
     Raises:
         ValueError: Values are too few or contradict their deviation, counts differ, or a reference
-            amplitude is 0.
+            amplitude is 0 or scatters by more than `ROUGH`.
     """
     values = np.asarray(frequencies, float)
     rows = {floor: np.asarray(row, float) for floor, row in (shapes or {}).items()}
@@ -101,11 +103,25 @@ def measured_mode(
     for floor in [floor for floor in rows if floor != reference]:
         what = f"mode {mode}: amplitudes q{floor}/q{reference} of floor {floor}"
         ratios = rows[floor] / rows[reference]
-        # to first order; the reference scatters, too
+        square = _scatter(ratios, shape_deviation and shape_deviation * largest / means[reference])
+        if square > ROUGH**2:
+            raise ValueError(
+                f"{what}: the reference scatters by {np.sqrt(square):.2g} of its amplitude, allowed"
+                f" is up to {ROUGH:g}; write means of several rows in their place"
+            )
+        # the reference scatters, too; the last factor is above the second order's
         share = float(np.hypot(1, ratios.mean())) * largest / means[reference]
-        both = shape_deviation and shape_deviation * share
-        shape[floor] = _mean(ratios, both, what, "shape_deviation")
+        both = shape_deviation and shape_deviation * share * float(np.sqrt(1 + 8 * square))
+        unbiased = ratios / (1 + square + 3 * square**2)  # the mean of 1/(1 + x), x normal
+        shape[floor] = _mean(unbiased, both, what, "shape_deviation")
     return MeasuredMode(mode, number, shape, reference)
+
+
+def _scatter(ratios: Array, deviation: float | None) -> float:
+    """Squared deviation of the reference over its amplitude, if not known from the ratios' own."""
+    if deviation is not None:
+        return deviation**2
+    return float(ratios.var(ddof=1) / (1 + ratios.mean() ** 2)) if len(ratios) > 1 else 0.0
 
 
 def _mean(values: Array, deviation: float | None, what: str, key: str) -> Claimed:

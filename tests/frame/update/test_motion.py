@@ -10,7 +10,13 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Exact, LinearFlow, StoreyFrame, envelope
-from alphacut.frame.update.motion import RecordedMotion, _require_alike, learn_from_motion
+from alphacut.frame.update.motion import (
+    RecordedMotion,
+    _require_alike,
+    _require_independent,
+    learn_from_motion,
+)
+from alphacut.frame.update.posterior import RefutedError
 from alphacut.fuzzy import FuzzyNumber, Interval
 
 FRAME = StoreyFrame(
@@ -72,6 +78,50 @@ def test_points_of_the_set_lie_in_its_hull() -> None:
     slack = 0.05 * (high - low)
     assert (held >= low - slack).all()
     assert (held <= high + slack).all()
+
+
+def test_sets_go_on_along_the_priors_faces_that_the_best_fit_lies_on() -> None:
+    """The truth in a corner: of the sets that hold it by its possibility, all are found to."""
+    rng, right, asked = np.random.default_rng(), 0, 0
+    for _ in range(8):
+        ends = np.array([prior.support for prior in PRIOR.values()])
+        truth = np.where(rng.random(3) < 0.5, *ends.T)
+        record = recorded(truth, rng, 10 ** rng.uniform(-4, -2))
+        try:
+            found = learn_from_motion(record, PRIOR, alpha=(0.05, 0.5))
+        except RefutedError:
+            assert record.possibility(truth[None])[0] < 0.2
+            continue
+        held = record.possibility(truth[None])[0] >= found.alpha
+        inside = (found.lower <= truth).all(1) & (truth <= found.upper).all(1)  # faces exactly
+        asked, right = asked + held.sum(), right + (held & inside).sum()
+    assert asked > 4
+    assert right >= asked - 1
+
+
+@pytest.mark.parametrize("wrong", [lambda y: -y, lambda y: 0.4 * y, np.zeros_like])
+def test_a_record_that_no_parameters_explain_refutes_the_frame(wrong: Any) -> None:
+    record = recorded(np.array([1.9, 2.1, 0.2]), np.random.default_rng())
+    noise = 1e-5 * np.random.default_rng().standard_normal(record.values.shape)
+    with pytest.raises(RefutedError, match=r"the record refutes the frame: .* agree with it to"):
+        learn_from_motion(RecordedMotion(FLOW, wrong(record.values) + noise), PRIOR)
+
+
+def test_errors_that_are_not_independent_are_refused_and_others_are_not() -> None:
+    rng = np.random.default_rng()
+    flow: Any = SimpleNamespace(outputs=("q1", "q2"))
+
+    def require(errors: np.ndarray) -> None:
+        record: Any = SimpleNamespace(values=errors, flow=flow, misfit=lambda _: (errors, None))
+        _require_independent(record, np.zeros(2))
+
+    for _ in range(50):
+        require(rng.normal(size=(rng.integers(21, 400), 2)) * 10.0 ** rng.uniform(-6, 0))
+    white = rng.normal(size=(300, 2))
+    slow = np.column_stack([white[:, 0], np.convolve(white[:, 1], np.ones(8), "same")])
+    for errors in (white + np.array([0.0, 0.8]), slow, np.cumsum(white, axis=0)):
+        with pytest.raises(ValueError, match=r"errors of q. are not independent: .* third sample"):
+            require(errors)
 
 
 def test_the_numbers_feed_an_envelope_and_say_what_they_rest_on() -> None:

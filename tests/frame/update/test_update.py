@@ -345,3 +345,24 @@ def test_modes_and_priors_beyond_the_frame_are_refused() -> None:
     for alpha in ((0.0, 0.5), (0.5, 0.2), (0.5, 1.2), ()):
         with pytest.raises(ValueError, match=r"must rise within"):
             update(FRAME, PRIOR, one, alpha=alpha)
+
+
+@pytest.mark.parametrize("known", [None, 0.1])
+def test_ratios_of_noisy_amplitudes_are_not_biased(known):
+    """A tenth of noise makes the mean ratio a hundredth too large, more than 1000 rows scatter."""
+    rng, inside = np.random.default_rng(), 0
+    for _ in range(100):
+        rows = {1: 0.6 + 0.1 * rng.normal(size=1000), 2: 1 + 0.1 * rng.normal(size=1000)}
+        mode = measured_mode(1, 2 + 0.01 * rng.normal(size=1000), rows, shape_deviation=known)
+        low, high = mode.shape[1].cut(0.05)
+        inside += low <= 0.6 <= high
+    assert inside >= 85
+
+
+def test_amplitudes_whose_reference_is_mostly_noise_are_refused():
+    rng = np.random.default_rng()
+    rows = {floor: 1 + 0.3 * rng.normal(size=400) for floor in (1, 2)}
+    with pytest.raises(
+        ValueError, match=r"the reference scatters by .* allowed is up to 0.2; write"
+    ):
+        measured_mode(1, 2 + 0.01 * rng.normal(size=400), rows, shape_deviation=0.3)
