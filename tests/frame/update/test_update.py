@@ -237,7 +237,7 @@ def test_known_deviations_take_one_value(rng: np.random.Generator) -> None:
     assert (low, high) == pytest.approx((2 - 1.959964 * 0.02, 2 + 1.959964 * 0.02), abs=1e-6)
     low, high = one.shape[1].cut(0.05)
     scatter = 0.02 * np.hypot(1, 0.5)  # of the ratio: both amplitudes scatter
-    assert high - low == pytest.approx(2 * 1.959964 * scatter, abs=1e-6)
+    assert 1.0 < (high - low) / (2 * 1.959964 * scatter) < 1.003  # and a little for second order
 
 
 @pytest.mark.parametrize(
