@@ -12,6 +12,7 @@ import pytest
 from alphacut.frame import Exact, LinearFlow, StoreyFrame, envelope
 from alphacut.frame.update.motion import (
     RecordedMotion,
+    _constrained,
     _require_alike,
     _require_independent,
     learn_from_motion,
@@ -97,6 +98,21 @@ def test_sets_go_on_along_the_priors_faces_that_the_best_fit_lies_on() -> None:
         asked, right = asked + held.sum(), right + (held & inside).sum()
     assert asked > 4
     assert right >= asked - 1
+
+
+def test_a_path_to_the_end_of_a_parameter_holds_the_others_at_their_best() -> None:
+    """No point of the box with that entry is nearer by a linear motion."""
+    rng = np.random.default_rng()
+    for d in (1, 2, 5):
+        root, aim, fixed = rng.normal(size=(d, d)), 3 * rng.normal(size=d), int(rng.integers(d))
+        value = rng.uniform(-1, 1)
+        found = _constrained(root, aim, fixed, value)
+        others = rng.uniform(-1, 1, (5000, d))
+        others[:, fixed] = value
+        assert found[fixed] == value
+        assert np.abs(found).max() <= 1
+        least = np.linalg.norm(others @ root.T - aim, axis=1).min()
+        assert np.linalg.norm(root @ found - aim) <= least + 1e-9
 
 
 @pytest.mark.parametrize("wrong", [lambda y: -y, lambda y: 0.4 * y, np.zeros_like])
