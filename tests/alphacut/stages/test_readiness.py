@@ -171,4 +171,4 @@ def test_a_file_of_circles_is_read_before(command, tmp_path, capfd):
     told = capfd.readouterr().err
     assert "microstructure.circles.file" in told
     assert "has no column x, y" in told
-    assert "'x [mm], y [mm], r [mm]'" in told
+    assert "'x [mm],y [mm],r [mm]'" in told
