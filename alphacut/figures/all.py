@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -182,8 +183,9 @@ def sweep(folder: Path, names: Iterable[str]) -> None:
     gone = {*written_down(folder / "summary.json"), *written_down(folder / KEPT)} - {*names}
     for path in map(Path, gone):
         drawn = path.parent == Path("figures") and path.suffix in (".svg", ".png")
-        if drawn and is_figure(path.stem) and (folder / path).is_file():
-            (folder / path).unlink(missing_ok=True)
+        if drawn and is_figure(path.stem):
+            with suppress(OSError):  # not there, or no name of a file
+                (folder / path).unlink()
     if gone:
         (folder / KEPT).unlink(missing_ok=True)
 
@@ -192,9 +194,10 @@ def written_down(file: Path, key: str = "") -> list[str]:
     """Names of an earlier run's figures; none of a damaged file or one of another fingerprint."""
     try:
         told = json.loads(file.read_text(encoding="utf-8"))
-        return [*map(str, told["figures"])] if not key or told["fingerprint"] == key else []
-    except (OSError, ValueError, KeyError, TypeError):
+        names = told["figures"] if not key or told["fingerprint"] == key else []
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return []
+    return [*map(str, names)] if isinstance(names, list) else []
 
 
 def drawn_in_parts(results: Results, executor: Executor | None, *, quiet: bool) -> list[str]:

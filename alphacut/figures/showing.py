@@ -83,8 +83,9 @@ class Showing:
         key, folder = figures_key(results), self.chain.folder
         kept = figures.kept(folder, key)
         if not self.figures:
-            stage = figures.particle_pictures(folder / "figures", results)
-            figures.sweep(folder, [*(kept or ()), *stage])
+            if (folder / figures.KEPT).is_file():  # tells what the figures there show
+                stage = figures.particle_pictures(folder / "figures", results)
+                figures.sweep(folder, [*figures.written_down(folder / figures.KEPT, key), *stage])
             return []
         if kept is not None and not self.chain.fresh:
             return kept

@@ -126,6 +126,8 @@ def _scatter(ratios: Array, deviation: float | None) -> float:
 
 def _mean(values: Array, deviation: float | None, what: str, key: str) -> Claimed:
     count = len(values)
+    if deviation is not None and not deviation > 0:
+        raise ValueError(f"{what}: {key} must be positive; leave it out, or give 0.01, say")
     if deviation is None and np.allclose(values, values[0], 1e-12, 0.0):
         told = "one value tells" if count < 2 else f"{count} values that are all {values[0]:g} tell"
         cure = "measure more" if count < 2 else "write all digits"

@@ -27,12 +27,15 @@ from alphacut.fuzzy.sets.stepwise import outer_steps
 
 ALIKE = 1e-6
 """Probability below which deviations of outputs so far apart are not those of errors alike."""
-RAYS = 100
+RAYS = 50
 """Random paths along which the border of a set is searched, twice; besides two a parameter."""
+AT_ONCE, EXACT = 10_000_000, 1e-9
+"""Derivatives held at once; error of a record without errors, as a share of its largest value."""
 NODES, SHRINK, FARTHEST, HALVINGS = 25, 2**-0.5, 64.0, 12
 """Nodes of a path, factor on their distances, deviations to the last, halvings between two."""
-ROUNDS = 2
-"""Times that paths begin anew at the extremes found."""
+ROUNDS, GROWN, CORRECTIONS = 4, 0.02, 2
+"""Times that paths begin anew at the extremes found, at most; growth of the set by which they do,
+in half widths of the priors; and Gauss-Newton steps at each node."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,13 +78,18 @@ class RecordedMotion:
 
     def possibility(self, points: Array) -> Array:
         """Possibility of parameters (S, d), shape (S,)."""
+        at_once = max(1, AT_ONCE // (np.size(self.values) * points.shape[1]))
+        parts = np.split(points, range(at_once, len(points), at_once))
+        return np.concatenate([self._possibility(part) for part in parts])
+
+    def _possibility(self, points: Array) -> Array:
         miss, slopes = self.misfit(points)
         size = np.linalg.norm(slopes, axis=1, keepdims=True)
         basis = np.linalg.qr(slopes / np.where(size > 0, size, 1.0))[0]
-        along = np.einsum("snd,sn->sd", basis, miss)
-        part = (along**2).sum(1)
-        rest = np.maximum((miss**2).sum(1) - part, 1e-300)
+        part = (np.einsum("snd,sn->sd", basis, miss) ** 2).sum(1)
         n, d = slopes.shape[1:]
+        least = n * (EXACT * np.abs(self.values).max()) ** 2 + 1e-300
+        rest = np.maximum((miss**2).sum(1) - part, least)
         return np.asarray(law.sf((part / d) / (rest / (n - d)), d, n - d))
 
 
@@ -158,7 +166,8 @@ def learn_from_motion(
         raise ValueError(f"alpha: {list(alpha)} must rise within (0, 1]")
     box = _Box(record, np.array([number.support for number in prior.values()]))
     best, spread = box.fit()
-    paths = np.concatenate([box.rays(best, spread, seed), box.profiles(best, box.ways)])
+    starts = np.tile(best, (len(box.ways), 1))
+    paths = np.concatenate([box.rays(best, spread, seed), box.profiles(starts, box.ways)])
     likely = box.possibility(paths)
     if likely[0, 0] < levels[0]:
         raise RefutedError(
@@ -254,22 +263,29 @@ class _Box:
         far = FARTHEST * np.append(0.0, SHRINK ** np.arange(NODES - 1)[::-1])
         return np.asarray(np.clip(best + far[:, None] * rays[:, None], -1.0, 1.0))
 
-    def profiles(self, start: Array, ways: Sequence[tuple[int, float]]) -> Array:
-        """Paths to ends of parameters, the others the best by a linear motion, (P, M, d).
+    def profiles(self, starts: Array, ways: Sequence[tuple[int, float]]) -> Array:
+        """Paths to ends of parameters on which the others fit best, (P, M, d).
 
         Args:
-            start: Where the motion is linearised, shape (d,).
-            ways: Parameters and the ends, -1.0 or 1.0.
+            starts: First points, shape (P, d).
+            ways: Parameter and end, -1.0 or 1.0, of each path.
         """
-        miss, slopes = self.linear(start)
-        basis, root = np.linalg.qr(slopes)
-        aim = basis.T @ miss + root @ start
-        shares = np.append(0.0, SHRINK ** np.arange(NODES - 1)[::-1])
-        paths = [
-            [_constrained(root, aim, k, start[k] + share * (end - start[k])) for share in shares]
-            for k, end in ways
-        ]
-        return np.array(paths)
+        points, nodes = starts, []
+        which, ends = np.array([k for k, _ in ways]), np.array([end for _, end in ways])
+        first = starts[np.arange(len(which)), which]
+        for share in np.append(0.0, SHRINK ** np.arange(NODES - 1)[::-1]):
+            for _ in range(CORRECTIONS):
+                points = self.corrected(points, which, first + share * (ends - first))
+            nodes.append(points)
+        return np.stack(nodes, axis=1)
+
+    def corrected(self, points: Array, which: Array, values: Array) -> Array:
+        """Best points by motions linearised at some (P, d), one parameter of each at a value."""
+        miss, slopes = self.record.misfit(self.physical(points))
+        basis, root = np.linalg.qr(slopes * self.half)
+        aim = np.einsum("snd,sn->sd", basis, miss)
+        steps = map(_constrained, root, aim, points, which, values)
+        return np.asarray(np.clip(points + np.array([*steps]), -1.0, 1.0))
 
     def extremes(self, paths: Array, likely: Array, level: float) -> Array:
         """Least and greatest values found of a level's set, shape (2, d).
@@ -283,10 +299,12 @@ class _Box:
         if not len(found):  # above the possibility of the best
             found = paths[0, :1]
         for _ in range(ROUNDS):
-            turns = np.concatenate([found[found.argmin(0)], found[found.argmax(0)]])
-            pairs = zip(turns, self.ways, strict=True)
-            more = np.concatenate([self.profiles(turn, [way]) for turn, way in pairs])
+            turns, before = np.concatenate([found[found.argmin(0)], found[found.argmax(0)]]), found
+            more = self.profiles(turns, self.ways)
             found = np.vstack([found, self.border(more, self.possibility(more), level)])
+            grown = before.min(0) - found.min(0), found.max(0) - before.max(0)
+            if np.max(grown) < GROWN:
+                break
         return np.array([found.min(0), found.max(0)])
 
     def border(self, paths: Array, likely: Array, level: float) -> Array:
@@ -314,14 +332,15 @@ class _Box:
         return np.vstack([paths[held], inside])
 
 
-def _constrained(root: Array, aim: Array, fixed: int, value: float) -> Array:
-    """The point of [-1, 1] nearest to root x = aim with one entry fixed, shape (d,)."""
+def _constrained(root: Array, aim: Array, point: Array, fixed: int, value: float) -> Array:
+    """Step from a point of [-1, 1] nearest to root x = aim that brings one entry to a value."""
     free = np.arange(len(aim)) != fixed
-    point = np.full(len(aim), np.clip(value, -1.0, 1.0))
+    step = np.full(len(aim), np.clip(value, -1.0, 1.0) - point[fixed])
     if free.any():
-        rest = aim - root[:, fixed] * point[fixed]
-        point[free] = lsq_linear(root[:, free], rest, (-1.0, 1.0), method="bvls").x
-    return point
+        bounds = -1.0 - point[free], 1.0 - point[free]
+        rest = aim - root[:, fixed] * step[fixed]
+        step[free] = lsq_linear(root[:, free], rest, bounds, method="bvls").x
+    return step
 
 
 def _require_alike(record: RecordedMotion, best: Array) -> None:
@@ -367,5 +386,5 @@ def _rest(record: RecordedMotion, best: Array) -> tuple[Array, Array]:
     """Misfit of the outputs (T, m), and deviations (m,), 0 where too few or without errors."""
     miss = record.misfit(best[None])[0].reshape(record.values.shape)
     deviations = miss.std(0, ddof=1)
-    known = len(miss) > 10 * len(best) and deviations.max() > 1e-9 * np.abs(record.values).max()
+    known = len(miss) > 10 * len(best) and deviations.max() > EXACT * np.abs(record.values).max()
     return miss, deviations * known

@@ -99,6 +99,30 @@ def test_only_files_that_a_run_has_drawn_are_removed(tmp_path):
     assert left == {names[0], *own, "summary.json"}
 
 
+@pytest.mark.parametrize(
+    "text", ["[" * 100_000, '{"figures": {"figures/joint.svg": 1}}', '{"figures": 3}', "{"]
+)
+def test_a_damaged_summary_removes_nothing(text, tmp_path):
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "figures/joint.svg").write_text("some", encoding="utf-8")
+    (tmp_path / "summary.json").write_text(text, encoding="utf-8")
+    sweep(tmp_path, [])
+    assert (tmp_path / "figures/joint.svg").is_file()
+    long = {"figures": ["figures/envelope-" + "a" * 300 + ".svg", "figures/joint.svg"]}
+    (tmp_path / "summary.json").write_text(json.dumps(long), encoding="utf-8")
+    sweep(tmp_path, [])
+    assert not (tmp_path / "figures/joint.svg").is_file()
+
+
+def test_a_lost_figure_does_not_make_the_others_stale(tmp_path, capfd):
+    words = ["run", str(CASES / "pendulum.toml"), "--quick", "--quiet", "--out", str(tmp_path)]
+    assert main(words) == 0, capfd.readouterr().err
+    first, *others = sorted((tmp_path / "figures").iterdir())
+    first.unlink()
+    assert main([*words, "--no-figures"]) == 0, capfd.readouterr().err
+    assert sorted((tmp_path / "figures").iterdir()) == others
+
+
 def test_studies_side_by_side_give_what_they_give_one_by_one(tmp_path, capfd):
     words = ["run", str(CASES / "paper.toml"), "--quick", "--set", "modulus.method=series"]
     told = []

@@ -106,13 +106,38 @@ def test_a_path_to_the_end_of_a_parameter_holds_the_others_at_their_best() -> No
     for d in (1, 2, 5):
         root, aim, fixed = rng.normal(size=(d, d)), 3 * rng.normal(size=d), int(rng.integers(d))
         value = rng.uniform(-1, 1)
-        found = _constrained(root, aim, fixed, value)
+        point = rng.uniform(-1, 1, d)
+        found = point + _constrained(root, aim - root @ point, point, fixed, value)
         others = rng.uniform(-1, 1, (5000, d))
         others[:, fixed] = value
-        assert found[fixed] == value
-        assert np.abs(found).max() <= 1
+        assert found[fixed] == pytest.approx(value, abs=1e-12)
+        assert np.abs(found).max() <= 1 + 1e-12
         least = np.linalg.norm(others @ root.T - aim, axis=1).min()
         assert np.linalg.norm(root @ found - aim) <= least + 1e-9
+
+
+def test_sets_follow_curved_valleys_of_parameters_that_only_their_product_tells() -> None:
+    """E and I of one frame: E may be anything from 0.83 of the truth, whatever the fit."""
+    rng, frame = np.random.default_rng(), FRAME
+    truth = np.array([30e9, 1e-4])
+    flow = LinearFlow(frame, ("E", "I"), 2.0, 0.05, Exact())
+    motion = flow.values(truth[None])[0]
+    record = RecordedMotion(flow, motion + 1e-4 * rng.standard_normal(motion.shape))
+    prior = {"E": Interval(24e9, 36e9), "I": Interval(0.8e-4, 1.2e-4)}
+    level = 0.5 * record.possibility(truth[None])[0]
+    found = learn_from_motion(record, prior, alpha=(level,))
+    assert found.lower[0, 0] < 0.86 * 30e9
+    assert found.upper[0, 0] > 1.17 * 30e9
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-15, 1e-12])
+def test_a_record_without_errors_is_learned_from(noise: float) -> None:
+    rng = np.random.default_rng()
+    truth = rng.uniform((1.6, 1.6, 0.1), (2.4, 2.4, 0.3))
+    found = learn_from_motion(recorded(truth, rng, noise), PRIOR)
+    assert (np.abs(found.lower[0] / truth - 1) < 1e-5).all()
+    assert (found.lower[0] <= truth).all()
+    assert (truth <= found.upper[0]).all()
 
 
 @pytest.mark.parametrize("wrong", [lambda y: -y, lambda y: 0.4 * y, np.zeros_like])

@@ -367,3 +367,8 @@ def test_amplitudes_whose_reference_is_mostly_noise_are_refused():
         ValueError, match=r"the reference scatters by .* allowed is up to 0.2; write"
     ):
         measured_mode(1, 2 + 0.01 * rng.normal(size=400), rows, shape_deviation=0.3)
+
+
+def test_a_deviation_of_0_is_refused():
+    with pytest.raises(ValueError, match=r"shape_deviation must be positive"):
+        measured_mode(1, [2.0, 2.01], {1: [0.5, 0.51], 2: [1, 1.02]}, shape_deviation=0.0)
