@@ -29,6 +29,8 @@ ALIKE = 1e-6
 """Probability below which deviations of outputs so far apart are not those of errors alike."""
 RAYS = 50
 """Random paths along which the border of a set is searched, twice; besides two a parameter."""
+SINGULAR = 1e-12
+"""Squared singular value of unit slopes below which a combination counts as without influence."""
 AT_ONCE, EXACT = 10_000_000, 1e-9
 """Derivatives held at once; error of a record without errors, as a share of its largest value."""
 NODES, SHRINK, FARTHEST, HALVINGS = 25, 2**-0.5, 64.0, 12
@@ -85,9 +87,12 @@ class RecordedMotion:
     def _possibility(self, points: Array) -> Array:
         miss, slopes = self.misfit(points)
         size = np.linalg.norm(slopes, axis=1, keepdims=True)
-        basis = np.linalg.qr(slopes / np.where(size > 0, size, 1.0))[0]
-        part = (np.einsum("snd,sn->sd", basis, miss) ** 2).sum(1)
-        n, d = slopes.shape[1:]
+        slopes = slopes / np.where(size > 0, size, 1.0)
+        squares, ways = np.linalg.eigh(np.swapaxes(slopes, 1, 2) @ slopes)
+        told = squares > SINGULAR  # other combinations of the parameters do not move the motion
+        along = (np.einsum("snd,sn->sd", slopes, miss)[:, None] @ ways)[:, 0]
+        part = np.divide(along**2, squares, out=np.zeros_like(squares), where=told).sum(1)
+        n, d = len(miss[0]), np.maximum(told.sum(1), 1)
         least = n * (EXACT * np.abs(self.values).max()) ** 2 + 1e-300
         rest = np.maximum((miss**2).sum(1) - part, least)
         return np.asarray(law.sf((part / d) / (rest / (n - d)), d, n - d))
