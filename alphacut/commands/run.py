@@ -15,7 +15,7 @@ from alphacut.case.idle import idle_mesh, require_read
 from alphacut.case.load import load
 from alphacut.case.quick import banner, quick, settings
 from alphacut.commands import options as common
-from alphacut.figures.captions import core, in_words
+from alphacut.figures.captions import core, in_words, widest
 from alphacut.figures.showing import Showing
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.campaign.workers import pool
@@ -205,9 +205,10 @@ def modulus_lines(found: Document) -> Iterator[str]:
         nu = f"{cell['nu']:.4f}"
         if inner[0] != inner[1]:
             nu = f"[{', '.join(inner)}] at α = {cell['alpha'][-1]:g}"
-        nu += f", support [{', '.join(ends)}]" if ends[0] != ends[1] else ""
+        outer = widest(cell)
+        nu += f", {outer} [{', '.join(ends)}]" if ends[0] != ends[1] else ""
         support = ", ".join(fixed(cell[f"{end}_GPa"], 4) for end in ("lower", "upper"))
-        yield (f"E = {core(cell)}, support [{support}] GPa, bounds {cell['nature']}; nu = {nu}")
+        yield (f"E = {core(cell)}, {outer} [{support}] GPa, bounds {cell['nature']}; nu = {nu}")
         yield from filter(None, [cell.get("crisp")])
         ranked = sorted(found.get("shares", {}).get("E", {}).items(), key=lambda one: -one[1])
         first = [f"{in_words(name)} {share:.0%}" for name, share in ranked[:3] if share > 0]

@@ -59,3 +59,9 @@ def core(modulus: Document) -> str:
     if high - low <= 1e-9 * abs(high):
         return f"{fixed(modulus['modal_GPa'], 4)} GPa"
     return f"[{fixed(low, 4)}, {fixed(high, 4)}] GPa at α = {modulus['alpha'][-1]:g}"
+
+
+def widest(modulus: Document) -> str:
+    """What a summary calls the widest of its cuts: the support, or the cut of its first level."""
+    first = modulus["alpha"][0]
+    return "support" if first == 0 else f"at α = {first:g}"

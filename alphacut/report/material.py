@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from markupsafe import Markup
 
-from alphacut.figures.captions import core, in_words
+from alphacut.figures.captions import core, in_words, widest
 from alphacut.io.files import Document
 from alphacut.io.units import fixed
 from alphacut.report.tables import code, paragraphs, section, sentence, table
@@ -91,11 +91,12 @@ def modulus(found: Document, drawn: Markup) -> Markup:
     told = [f"{one}." for one in lines(beside, found["particles"])] if beside else []
     told += [found[name] for name in ("outside", "crisp", "publish") if found.get(name)]
     words = Markup(
-        "<p>{} <strong>{}</strong>, support [{}, {}] GPa; Poisson's ratio {:.4f}. {} {}"
+        "<p>{} <strong>{}</strong>, {} [{}, {}] GPa; Poisson's ratio {:.4f}. {} {}"
         " samples, {} linear systems, {:.1f} s. {} {} {}</p>"
     ).format(
         "Core" if "[" in core(found) else "Modal value",
         core(found),
+        widest(found),
         *(fixed(found[name], 4) for name in ("lower_GPa", "upper_GPa")),
         found["nu"],
         MEANING[meaning(found)],

@@ -207,6 +207,9 @@ def test_nu_has_its_support_and_the_three_inputs_that_matter_most_are_named(monk
     found["modulus"]["nu_cuts"] = {"lower": [0.309, 0.32], "upper": [0.351, 0.339]}
     first, *_ = run.modulus_lines(found)
     assert first.endswith("; nu = [0.3200, 0.3390] at α = 1, support [0.3090, 0.3510]")
+    found["modulus"]["alpha"] = [0.5, 1]
+    first, *_ = run.modulus_lines(found)
+    assert first.startswith("E = 6.2000 GPa, at α = 0.5 [5.8000, 6.6000] GPa, bounds")
 
 
 def test_a_support_that_holds_no_scatter_of_the_particles_says_so():
