@@ -19,6 +19,7 @@ from alphacut.fuzzy.surrogates.chebyshev_polynomial import Polynomial
 Level = tuple[int, ...]
 _FIRST = 2  # level that every input reaches before the surface is trusted: 5 points
 _CHECKS = 4  # held-out samples per input, and 8 more
+_ROUNDING = 1e-13  # of an output: a range that says nothing
 
 
 @cache
@@ -123,9 +124,10 @@ class SparseGrid:
         return np.asarray(np.max([held_out, *self._active.values()], axis=0))
 
     def _scale(self) -> Array:
-        """Range of each output over all samples, shape (outputs,); 1 where there is none."""
-        span = np.ptp(self.memo.values.array, axis=0)
-        return np.where(span > 0, span, 1.0)
+        """Range of each output over all samples, shape (outputs,); no limit if it is rounding."""
+        values = self.memo.values.array
+        span = np.ptp(values, axis=0)
+        return np.where(span > _ROUNDING * np.abs(values).max(axis=0), span, np.inf)
 
     def _accept(self, level: Level) -> None:
         del self._active[level]

@@ -32,7 +32,7 @@ def members(group):
 def test_a_campaign_keeps_its_samples_and_ends_its_workers(name, whole, tmp_path):
     store = tmp_path / "s.db"
     words = ["modulus", PAPER, "--method", "prism", "--workers", "2", "--store", str(store)]
-    command = [sys.executable, "-m", "alphacut", *words, "--set", "mesh.size=0.05", "--quiet"]
+    command = [sys.executable, "-m", "alphacut", *words, "--set", "mesh.size=0.1", "--quiet"]
     with subprocess.Popen(command, stderr=-1, cwd=ROOT, start_new_session=True) as campaign:
         before = time.monotonic()
         while not (store.exists() and store.stat().st_size > 4000):
