@@ -2,13 +2,7 @@
 
 from alphacut.frame.checks.step_resolution import StepGuard, guard
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.dynamics.integrators import (
-    INTEGRATORS,
-    Exact,
-    Gauss4,
-    Midpoint,
-    RungeKutta4,
-)
+from alphacut.frame.dynamics.integrators import INTEGRATORS, Exact, Gauss4, Midpoint, RungeKutta4
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.follower_record import FollowerRecord, record

@@ -63,5 +63,4 @@ def core(modulus: Document) -> str:
 
 def widest(modulus: Document) -> str:
     """What a summary calls the widest of its cuts: the support, or the cut of its first level."""
-    first = modulus["alpha"][0]
-    return "support" if first == 0 else f"at α = {first:g}"
+    return f"at α = {modulus['alpha'][0]:g}" if modulus["alpha"][0] else "support"

@@ -104,10 +104,7 @@ class Circles(Section):
     )
     overlap: Annotated[
         float,
-        Key(
-            "overlap that counts as error of measurement, over the smaller radius",
-            allowed=RATIO,
-        ),
+        Key("overlap that counts as error of measurement, over the smaller radius", allowed=RATIO),
     ] = 0.0
 
 
