@@ -7,7 +7,16 @@ import pytest
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
-from alphacut.fuzzy import Automatic, Chebyshev, General, Interval, Known, Linear, Triangular, propagate
+from alphacut.fuzzy import (
+    Automatic,
+    Chebyshev,
+    General,
+    Interval,
+    Known,
+    Linear,
+    Triangular,
+    propagate,
+)
 from alphacut.fuzzy.plans.automatic import Purse, SpentError
 from alphacut.fuzzy.samples.nature import Nature
 
