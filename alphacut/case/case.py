@@ -20,6 +20,7 @@ from alphacut.io.problem import BadInput, Problem
 from alphacut.io.provenance import digest, door
 
 S = TypeVar("S", bound=Section)
+WHOLE = "levels that begin at 0 and end at 1, or 1 alone for one number"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,6 +196,11 @@ class Case:
             "modulus.measured": given.measured,
         }
         return {key: value for key, value in found.items() if value is not None}
+
+    @property
+    def computes_modulus(self) -> bool:
+        """Whether a stage computes the modulus that its structure takes over."""
+        return not self.stand_ins and bool({"modulus", "image"} & set(self.stages))
 
     def without(self, section: str) -> BadInput:
         """The error of a command that cannot do without a section."""

@@ -149,6 +149,20 @@ def unlikely_material(case: Case) -> Iterator[str]:
         yield "radius: a1 is greater than a3, so the radius falls where θ rises; is that meant?"
 
 
+def between_levels(case: Case) -> Iterator[str]:
+    """Remarks on levels of the motion at which E has no cut of its own."""
+    if case.computes_modulus and "envelope" in case.stages:
+        own = case.modulus.alpha
+        if missing := [f"{x:g}" for x in case.envelope.alpha if x not in own and len(own) > 1]:
+            yield (
+                f"envelope.alpha: modulus.alpha has no {', '.join(missing)}; there E's wider cut"
+                " of the level below stands in: add what is missing to modulus.alpha"
+            )
+        if case.sections.decision:
+            known = ", ".join(f"{x:g}" for x in own)
+            yield f"decision: E has cuts at {known}; degrees between two of them stay open"
+
+
 def unlike_words(words: str, moduli: dict[str, float]) -> Iterator[str]:
     """Remarks on phases that are not what a case says: other moduli, or swapped ones."""
     for pattern, (low, high) in (STIFF | SOFT).items():

@@ -90,6 +90,7 @@ def ready(case: Case) -> Readiness:
         *shape(case),
         *dense,
         *plausible.unlikely_material(case),
+        *plausible.between_levels(case),
         *outlasted(case, ground),
         *envelope.wide_gap(case),
         *slips,

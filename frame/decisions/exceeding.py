@@ -9,7 +9,8 @@ them, and may be more necessary than each.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from bisect import bisect_right
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -26,6 +27,7 @@ from alphacut.fuzzy.arguments import fuzzy_inputs
 from alphacut.fuzzy.counted import ranged
 from alphacut.fuzzy.knowledge.joint import JointClaim, joined_once
 from alphacut.fuzzy.progress_bar import Progress
+from alphacut.fuzzy.sets.stepwise import Stepwise
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,25 +102,34 @@ def exceeding(
         return cuts[:, 0], cuts[:, 1]
 
     proof = partial(safe_scale, frame, nominal, reach, limits, duration=duration, step=step)
-    necessity, sampled = (0.0, 0.0), ""
+    necessity, sampled, known = (0.0, 0.0), "", partial(_known, numbers.values())
     seek = partial(limit_search, frame, nominal, reach, limits, duration, step, failed)
     try:
         found = proof(most=most, workers=workers, progress=progress, failed=failed)
         if found.safe is None:
             search = seek()
             sure = sure_exceeding(search, most)
-            necessity, sampled = (sure.size or 0.0, min(sure.kept, 1.0)), search.reason
+            necessity, sampled = (
+                (sure.size or 0.0, 1 - known(1 - min(sure.kept, 1.0))),
+                search.reason,
+            )
     except UnsuitedOutputError:
         raise
     except ModalError as error:
         return _unknown(seek(), str(error), str(JointClaim.of(numbers)), lowest)
     safe = 0.0 if found.safe is None else found.safe
     upper = lowest if safe >= most else 1 - safe
-    lower = 1 - found.unsafe if np.isfinite(found.unsafe) else 0.0
+    lower = known(1 - found.unsafe) if np.isfinite(found.unsafe) else 0.0
     if sampled:
         found = replace(found, nature="verified by sampling", reason=sampled)
     claim = str(JointClaim.of(numbers).resting_on(found.nature))
-    return Exceeding((max(lower, 0.0), upper), necessity, found, claim, lowest)
+    return Exceeding((lower, upper), necessity, found, claim, lowest)
+
+
+def _known(numbers: Iterable[FuzzyNumber], level: float) -> float:
+    """How possible what lies in all cuts at a level is at least: steps may be around truer cuts."""
+    steps = [own for x in numbers if isinstance(own := getattr(x, "number", x), Stepwise)]
+    return max(min([level, *(x.alpha[bisect_right(x.alpha, level) - 1] for x in steps)]), 0.0)
 
 
 def _unknown(search: LimitSearch, why: str, claim: str, lowest: float) -> Exceeding:

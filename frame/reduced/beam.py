@@ -18,8 +18,9 @@ from alphacut.frame.structures.linear import Accelerogram
 class BeamFrame:
     """Regular frame clamped at its foot, with uncertain moduli, floor mass and damping.
 
-    Parameters: "E_columns", "E_columns_top" (upper half), "E_beams", "mass" (of the floors, per
-    length of beam), "rayleigh_mass", "rayleigh_stiffness", "zeta" where a damping ratio is given.
+    Parameters: "E_columns", "E_columns_top" (upper half, with the middle one of an odd number of
+    storeys; one storey has none), "E_beams", "mass" (of the floors, per length of beam),
+    "rayleigh_mass", "rayleigh_stiffness", "zeta" where a damping ratio is given.
     Outputs: "roof" (displacement, m) and "drift" (of the first storey, m).
 
     Args:
@@ -71,7 +72,7 @@ class BeamFrame:
     def structure(self) -> AffineStructure:
         """The frame as an affine structure with 3 (bays + 1) storeys unknowns."""
         columns = [self._column(s, b) for s in range(self.storeys) for b in range(self.bays + 1)]
-        half = (self.storeys // 2) * (self.bays + 1)
+        half = max(self.storeys // 2, 1) * (self.bays + 1)
         beams = [self._beam(s, b) for s in range(1, self.storeys + 1) for b in range(self.bays)]
         stiff = [self._sum(part, 0) for part in (columns[:half], columns[half:], beams)]
         heavy = [self._sum(part, 1) for part in (columns, beams)]
@@ -82,7 +83,7 @@ class BeamFrame:
         roof[3 * joints * (self.storeys - 1)], first[0] = 1.0, 1.0
         parameters = {
             "E_columns": self.modulus,
-            "E_columns_top": self.modulus,
+            **({"E_columns_top": self.modulus} if self.storeys > 1 else {}),
             "E_beams": self.modulus,
             "mass": self.floor,
         }

@@ -109,10 +109,10 @@ class StoreyFrame(StoreyValues):
             at = {name: self._worst(name, *both) for name, both in self.ranges(ends).items()}
             require_standing(springs(self, at), softening(self, at))
 
-    @staticmethod
-    def _worst(name: str, low: float, high: float) -> Jet:
-        """The end at which k_z l_z / P_z is least: it falls with masses and heights alone."""
-        return Jet.constant(np.array([high if name[0] in "ml" else low]), 0)
+    def _worst(self, name: str, low: float, high: float) -> Jet:
+        """The end at which k_z l_z / P_z is least; with k_z of columns it falls with heights."""
+        falling = "m" if self.stiffness else "ml"
+        return Jet.constant(np.array([high if name[0] in falling else low]), 0)
 
     def ranges(self, ends: Ends) -> dict[str, tuple[float, float]]:
         """Lower and upper end of the values of floors and storeys over a box of parameters."""

@@ -20,7 +20,7 @@ from alphacut.fuzzy.samples.model import Model, Values
 from alphacut.fuzzy.samples.nature import Nature, condition
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.claimed import Claimed
-from alphacut.fuzzy.sets.numbers import Array, Mask, PiecewiseLinear, Rows
+from alphacut.fuzzy.sets.numbers import Array, Mask, Rows
 from alphacut.fuzzy.sets.stepwise import Stepwise, outer_steps
 from alphacut.fuzzy.surrogates.response_surface import ResponseSurface
 from alphacut.fuzzy.tables import html_table, write_csv
@@ -343,8 +343,8 @@ class FuzzyResult:
         between = "straight" if self.domain.linear else "at most the steps"
         return f", {between} between levels" if len(self.alpha) > 1 else ""
 
-    def number(self, output: str = "y") -> PiecewiseLinear | Stepwise | Claimed:
-        """One output as a fuzzy number: linear between its α-cuts, in steps where an input is not.
+    def number(self, output: str = "y") -> Stepwise | Claimed:
+        """One output as a fuzzy number: between two levels the wider α-cut holds.
 
         Raises:
             ValueError: The levels do not reach from 0 to 1, and nothing is claimed.
@@ -358,9 +358,7 @@ class FuzzyResult:
                 f"the α-levels of the result are {shown}; a fuzzy number needs some from 0 to 1:"
                 " take alpha=levels(4)"
             )
-        if not self.domain.linear:
-            return outer_steps(self.alpha, lower, upper)
-        return PiecewiseLinear(tuple(self.alpha), tuple(lower), tuple(upper))
+        return outer_steps(self.alpha, lower, upper)
 
     def surface(self, output: str = "y") -> ResponseSurface:
         """Response surface of one output through the samples of the model (Fig. 2)."""

@@ -13,7 +13,8 @@ from alphacut.frame.decisions.safe_scale import limit_search
 from alphacut.frame.decisions.sure_exceeding import surely
 from alphacut.frame.methods import modal
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
-from alphacut.fuzzy import FuzzyNumber, Interval, Triangular
+from alphacut.fuzzy import FuzzyNumber, Interval, PiecewiseLinear, Triangular
+from alphacut.fuzzy.sets.stepwise import outer_steps
 
 # one floor without damping: |q| = v0 / ω, absolute acceleration v0 ω, ω² = 24 E I / (l³ m)
 RIGIDITY = 24 * 2.5e10 * 1e-6 / 27
@@ -54,6 +55,23 @@ def test_one_limit_is_exceeded_as_possibly_as_is_known() -> None:
     assert found.necessity == (0, 0)
     assert found.verdict == "undecided"
     assert "possibility of exceeding" in str(found)
+
+
+def test_between_known_levels_of_an_input_the_possibility_stays_open() -> None:
+    """Of m the cuts at 0, 0.5 and 1 are known, and the true ones between are rounder or straight."""
+    limit = 0.5 * np.sqrt(1.1e3 / RIGIDITY)  # exceeded from m = 1100 on
+    rounder = PiecewiseLinear((0, 0.5, 0.7, 1), (800, 850, 900, 1000), (1200, 1150, 1140, 1000))
+    straight = PiecewiseLinear((0, 0.5, 1), (800, 850, 1000), (1200, 1150, 1000))
+    known = outer_steps((0.0, 0.5, 1.0), (800, 850, 1000), (1200, 1150, 1000))
+    open_ = exceeding(ONE, {"m1": known}, {"q1": limit}, **TIME)
+    for true in (rounder, straight):
+        found = exceeding(ONE, {"m1": true}, {"q1": limit}, **TIME)
+        assert found.possibility == pytest.approx((float(true.membership(1.1e3)),) * 2, abs=0.01)
+        assert open_.possibility[0] <= found.possibility[0]
+        assert found.possibility[1] <= open_.possibility[1]
+    assert open_.possibility == pytest.approx((0.5, 1.0), abs=1e-3)
+    sure = exceeding(ONE, {"m1": known}, {"q1": 0.5 * np.sqrt(900 / RIGIDITY)}, **TIME)
+    assert sure.necessity == pytest.approx((0.0, 0.5), abs=1e-3)  # kept by m = 850 … 900
 
 
 def test_any_of_several_limits_and_accelerations_count() -> None:

@@ -47,7 +47,7 @@ def test_an_input_that_bends_between_levels_is_drawn_and_handed_on_in_steps():
     fine = propagate(lambda x: x, {"x": BENT}, Reduced(), alpha=(0, 0.2, 0.5, 1))
     assert drawn(fine, 0.1) == pytest.approx(BENT.cut(0.1))
     assert "straight between levels" in fine.plot().get_title()
-    assert tuple(fine.number().cut(0.1)) == pytest.approx(BENT.cut(0.1))
+    assert tuple(fine.number().cut(0.1)) == BENT.cut(0)  # its ends may bend where no level is
 
 
 def test_nothing_is_drawn_below_the_lowest_level():

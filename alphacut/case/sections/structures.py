@@ -140,7 +140,10 @@ class Tower(Section):
     beam_moment: Annotated[float, positive("second moment of area of a beam", "m^4")]
     E_columns: Annotated[FuzzyNumber, positive("Young's modulus of the lower half's columns", "Pa")]
     E_columns_top: Annotated[
-        FuzzyNumber, positive("Young's modulus of the upper half's columns", "Pa")
+        FuzzyNumber,
+        positive(
+            "the same of the upper half, the middle one of an odd number of storeys in it", "Pa"
+        ),
     ]
     E_beams: Annotated[FuzzyNumber, positive("Young's modulus of the beams", "Pa")]
     mass: Annotated[

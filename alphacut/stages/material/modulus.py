@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from alphacut.case.case import Case
-from alphacut.fuzzy import Crisp, FuzzyNumber, General, PiecewiseLinear, from_data, propagate
+from alphacut.case.case import WHOLE, Case
+from alphacut.fuzzy import Crisp, FuzzyNumber, General, from_data, propagate
 from alphacut.fuzzy import explain as fuzzy_explain
 from alphacut.fuzzy.dry_run import Explanation
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.fuzzy.samples.result import FuzzyResult
+from alphacut.fuzzy.sets.stepwise import outer_steps
 from alphacut.io.csv_rows import CsvFile
 from alphacut.io.files import Document, say
 from alphacut.io.netcdf import read_dataset, write_dataset
@@ -313,8 +314,11 @@ def listed(dataset: xarray.Dataset, kind: str) -> dict[str, float]:
 def read_number(path: Path | str, option: str = "--modulus", *, warn: bool = True) -> FuzzyNumber:
     """The fuzzy modulus in Pa from a file that `write` made, and its warning unless not to `warn`.
 
+    Between two levels the wider cut holds, since nothing is known of E there.
+
     Raises:
-        BadInput: The file is missing, holds no positive modulus, or was written by a newer program.
+        BadInput: The file is missing, holds no positive modulus or not all of it, or was written by
+            a newer program.
     """
     dataset = read_dataset(Path(path), key=option)
     try:
@@ -331,11 +335,11 @@ def read_number(path: Path | str, option: str = "--modulus", *, warn: bool = Tru
         raise BadInput.of(option, what, allowed=f"an E that is positive throughout: {POSITIVE}")
     if warn and (warned := dataset.attrs.get("outside")):
         say(f"warning: {option}: {warned}")
-    if len(alpha) == 1:
+    if tuple(alpha) == (1.0,):
         return Crisp(float(ends.mean()))
-    return PiecewiseLinear(
-        tuple(map(float, alpha)), tuple(map(float, ends[:, 0])), tuple(map(float, ends[:, 1]))
-    )
+    if (alpha[0], alpha[-1]) != (0, 1):
+        raise BadInput.of(option, "the file's levels leave cuts of E out", f"{[*alpha]}", WHOLE)
+    return outer_steps(alpha, ends[:, 0], ends[:, 1])
 
 
 def stand_in(case: Case) -> FuzzyNumber | None:

@@ -25,6 +25,8 @@ from alphacut.io.provenance import door
 from alphacut.io.units import STANDARD_GRAVITY
 from alphacut.stages.vibration.accelerogram import accelerogram
 
+LARGEST = 10_000  # unknowns of a tower, whose modes are found in dense matrices
+
 
 @dataclass(frozen=True)
 class Structure:
@@ -71,7 +73,9 @@ class Structure:
         except (ValueError, KeyError) as error:
             raise BadInput.of(
                 "envelope.fuzzy",
-                " ".join(str(error.args[0]).split()),
+                "the structure has no such input"
+                if isinstance(error, KeyError)
+                else " ".join(str(error).split()),
                 name,
                 ", ".join(self.numbers),
             ) from None
@@ -136,6 +140,9 @@ def pendulum(given: Pendulum) -> Structure:
 def tower(case: Case) -> Structure:
     """Plane beam frame, reduced for the whole supports of its fuzzy inputs."""
     given, numbers = case.tower, tower_parameters(case.tower)
+    if (unknowns := 3 * (given.bays + 1) * given.storeys) > LARGEST:
+        what, most = f"{unknowns:,} unknowns are too many to reduce", f"at most {LARGEST:,}"
+        raise case.refuse("tower.storeys", what, f"{most}: fewer storeys or bays")
     frame = BeamFrame(
         given.storeys,
         given.bays,
@@ -162,7 +169,7 @@ def tower_parameters(given: Tower) -> dict[str, FuzzyNumber]:
     """Every parameter of the tower, in SI."""
     found = {
         "E_columns": given.E_columns,
-        "E_columns_top": given.E_columns_top,
+        **({"E_columns_top": given.E_columns_top} if given.storeys > 1 else {}),
         "E_beams": given.E_beams,
         "mass": given.mass,
         "rayleigh_mass": given.rayleigh_mass,

@@ -136,6 +136,19 @@ def test_a_record_that_is_cut_short_is_remarked(tmp_path, capfd):
     assert "all results are of the first 1 s of the record" in capfd.readouterr().out
 
 
+def test_levels_at_which_the_modulus_has_no_cut_are_remarked(tmp_path, capfd):
+    levels = ("--set", "envelope.alpha=[0, 0.9, 1]", "--set", "modulus.alpha=[0, 0.5, 1]")
+    (found,) = warnings(own(tmp_path, "paper"), *levels, capfd=capfd)
+    assert "modulus.alpha has no 0.9; there E's wider cut of the level below stands in" in found
+
+
+@pytest.mark.parametrize("levels", ["[0]", "[0, 0.5]", "[0.5, 1]", "[1]"])
+def test_levels_that_leave_cuts_of_the_modulus_out_are_refused_before(levels, tmp_path, capfd):
+    assert main(["check", str(own(tmp_path, "paper")), "--set", f"modulus.alpha={levels}"]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert "levels leave cuts of E out that the structure needs" in line
+
+
 def test_a_coarse_step_is_warned_of(tmp_path, capfd):
     path = own(tmp_path, "building", ('integrator = "exact"', 'integrator = "midpoint"'))
     (found,) = warnings(path, capfd=capfd)

@@ -241,3 +241,12 @@ def test_a_resonance_inside_the_box_is_within_the_declared_error() -> None:
         p = {**structure.parameters, "E_columns": float(point[0])}
         off = np.abs(found - structure.trajectories(p, flow.time))
         assert (off <= declared + 1e-9 * np.abs(found).max()).all()
+
+
+def test_one_storey_has_lower_columns_alone():
+    low = BeamFrame(1, 2, ground=GROUND).structure()
+    assert "E_columns_top" not in low.parameters
+    reduced = low.reduced({"E_columns": (30e9, 60e9)})
+    flow = LinearFlow(reduced, ("E_columns",), 2.0, 0.02, Exact())
+    soft, stiff = np.abs(flow.values(np.array([[30e9], [60e9]]))[..., 0]).max(1)
+    assert abs(stiff / soft - 1) > 0.1

@@ -116,6 +116,15 @@ def test_a_box_that_reaches_buckling_is_refused() -> None:
         frame.require_standing({"m1": (1.9e3, 2.2e3), "l1": (0.9 * inside, inside + 1e-6)})
 
 
+def test_a_given_stiffness_buckles_first_where_its_storey_is_low() -> None:
+    """k l / P falls with the height there, and rises with it where columns make k."""
+    frame = StoreyFrame((2e3,), (2.0,), stiffness=(2e4,), gravity=G)
+    least = 2e3 * G / 2e4
+    frame.require_standing({"l1": (least + 1e-6, 9.0)})
+    with pytest.raises(ValueError, match="storey 1 buckles"):
+        frame.require_standing({"l1": (least - 1e-6, 9.0)})
+
+
 def test_a_field_of_stiffnesses_stays_upright_over_its_whole_box() -> None:
     field = FuzzyField("k", (2.0, 5.2, 8.4), 1e6, 2e5, 8.0)
     rest = {"stiffness": (1e6,) * 3, "lengths": HEIGHTS, "gravity": G}
