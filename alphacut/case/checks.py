@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 
 from alphacut.case import limits as questions
-from alphacut.case.case import WHOLE, Case, files_of
+from alphacut.case.case import Case, files_of
 from alphacut.case.checks_image import image
 from alphacut.case.checks_material import particles, radius, sphere_model
 from alphacut.case.checks_structure import incomplete
@@ -38,7 +38,6 @@ def checks(*, modal: bool = False) -> Iterator[Check]:
     yield one_modulus
     yield image
     yield where("modulus", lambda case: levels("modulus.alpha", case.modulus.alpha))
-    yield where("modulus", whole_modulus)
     yield where("envelope", lambda case: levels("envelope.alpha", case.envelope.alpha))
     yield where("frame", floors)
     yield others
@@ -77,16 +76,6 @@ def one_modulus(case: Case) -> Iterator[Problem]:
             f"more than one modulus is given: {', '.join(case.stand_ins)}",
             allowed="one of them",
         )
-
-
-def whole_modulus(case: Case) -> Iterator[Problem]:
-    """A frame takes over all cuts of E, or one number."""
-    if case.computes_modulus and "envelope" in case.stages:
-        alpha, asked = case.modulus.alpha, (case.envelope, *case.sections.study)
-        fuzzy = any("E" in (one.fuzzy or ()) for one in asked)
-        if (alpha != (1.0,) or fuzzy) and (alpha[0], alpha[-1]) != (0.0, 1.0):
-            what = "these levels leave cuts of E out that the structure needs"
-            yield Problem("modulus.alpha", what, str([*alpha]), WHOLE)
 
 
 def one_structure(case: Case) -> Iterator[Problem]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from alphacut.case.case import Case
+from alphacut.case.case import WHOLE, Case
 from alphacut.case.names import named_inputs
 from alphacut.frame import Accelerogram
 from alphacut.frame.structures.linear import frequencies
@@ -72,7 +72,7 @@ def ready(case: Case) -> Readiness:
             cure = 'stages = ["modulus", "envelope"], with a structure'
             raise BadInput.of("stages", what, str(list(case.stages)), cure)
         return Readiness((*shape(case), *dense, *plausible.unlikely_material(case)))
-    refuse(lacking(case))
+    refuse([*lacking(case), *(parted_modulus(case) if case.computes_modulus else ())])
     wanted = structure(case, stand_in or expected(case))
     refuse([*crisp_names(case, wanted)] or [*unlearned(case, wanted)])
     refuse([*unprovable(case, wanted)])
@@ -172,6 +172,15 @@ def unproved(case: Case, wanted: Structure) -> Iterator[str]:
             "envelope.certify: the error of the modal model of a tower, whose shapes are reduced,"
             " is sampled, not proved; a frame allows a guarantee"
         )
+
+
+def parted_modulus(case: Case) -> Iterator[Problem]:
+    """Levels that do not hold all cuts of E, which a structure takes over, or one number."""
+    alpha, asked = case.modulus.alpha, (case.envelope, *case.sections.study)
+    fuzzy = any("E" in (one.fuzzy or ()) for one in asked)
+    if (alpha != (1.0,) or fuzzy) and (alpha[0], alpha[-1]) != (0.0, 1.0):
+        what = "these levels leave cuts of E out that the structure needs"
+        yield case.problem("modulus.alpha", what, WHOLE)
 
 
 def lacking(case: Case) -> Iterator[Problem]:

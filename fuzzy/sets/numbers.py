@@ -301,7 +301,7 @@ class Trapezoidal(FuzzyNumber):
 
 @dataclass(frozen=True)
 class PiecewiseLinear(FuzzyNumber):
-    """Fuzzy number from nested α-cuts, linear between them: what one stage hands to the next.
+    """Fuzzy number from nested α-cuts, linear between them.
 
     Args:
         alpha: Levels, rising from 0 to 1, at least two.

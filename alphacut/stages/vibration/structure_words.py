@@ -14,7 +14,7 @@ from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.structures.field_frame import FieldFrame
 from alphacut.frame.structures.linear import Accelerogram
 from alphacut.frame.structures.storey_springs import softening, springs
-from alphacut.fuzzy import Crisp, FuzzyNumber
+from alphacut.fuzzy import Crisp, FuzzyNumber, PiecewiseLinear
 from alphacut.fuzzy.sets.stepwise import Stepwise
 from alphacut.io.files import Document
 from alphacut.io.units import MINUS, shown
@@ -47,7 +47,7 @@ SYMBOLS = dict(zip(UNITS, ("m{}", "l{}", "d{}", "q{}_0", "v{}_0"), strict=True))
 def in_unit(number: FuzzyNumber, unit: str, si: str) -> str:
     """Fuzzy number as in a case: ``30 t``, ``[28, 30, 34] t``."""
     (low, high), (left, right) = number.support, number.cut(1.0)
-    if isinstance(number, Stepwise) and low < high and left == right:
+    if isinstance(number, PiecewiseLinear | Stepwise) and low < high and left == right:
         ends = [
             f"{shown(value, unit, si):.5g}".replace("-", MINUS)
             for value in (low, high, number.modal)
