@@ -84,7 +84,7 @@ class Showing:
         kept = figures.kept(folder, key)
         if not self.figures:
             if (folder / figures.KEPT).is_file():  # tells what the figures there show
-                stage = figures.particle_pictures(folder / "figures", results)
+                stage = figures.particle_pictures(results)
                 figures.sweep(folder, [*figures.written_down(folder / figures.KEPT, key), *stage])
             return []
         if kept is not None and not self.chain.fresh:

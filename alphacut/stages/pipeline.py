@@ -11,6 +11,7 @@ from shutil import rmtree
 from typing import TYPE_CHECKING
 
 from alphacut.case.case import Case
+from alphacut.figures.captions import of_particles
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import Document, say
 from alphacut.io.kept_arrays import KeptArrays
@@ -122,6 +123,8 @@ class Chain:
         def compute(path: Path) -> None:
             with progress("Microstructure", quiet=self.quiet) as tick:
                 found = microstructure.compute(self.case, workers=self.workers, progress=tick)
+            for old in of_particles(self.folder):
+                old.unlink()
             write_microstructure(found, path.parent, attributes(self.case.text_of_file, key))
 
         self.stored("microstructure.nc", key, compute)
