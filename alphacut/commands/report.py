@@ -10,6 +10,7 @@ from typing import TextIO
 from alphacut.commands.options import add_quiet, answer
 from alphacut.export.csv_tables import write_tables
 from alphacut.io.files import write_text
+from alphacut.io.netcdf import own_files, read_summary
 from alphacut.report.page import report
 
 ABOUT = "one self-contained HTML page of a run's results, with interactive envelopes"
@@ -35,7 +36,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     path = Path(options.out) if options.out else folder / "report.html"
     page = report(folder)
     write_text(path, page)
-    tables = write_tables(folder, Path(options.csv)) if options.csv else []
+    files = own_files(read_summary(folder), folder) if options.csv else []
+    tables = write_tables(files, Path(options.csv)) if options.csv else []
     found = {"file": str(path), "bytes": len(page.encode()), "tables": [*map(str, tables)]}
     answer(options, found, out, "".join(f"{file}\n" for file in (path, *tables)))
     return 0

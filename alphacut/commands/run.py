@@ -20,6 +20,7 @@ from alphacut.figures.showing import Showing
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.io.files import Document, as_json, rank, say, write_text
+from alphacut.io.netcdf import fingerprint_of, stored
 from alphacut.io.output_paths import alone, unwritable
 from alphacut.io.problem import BadInput, refuse
 from alphacut.io.provenance import door
@@ -88,6 +89,7 @@ def computed(options: argparse.Namespace, chain: Chain, out: TextIO) -> int:
         "figures": drawn,
         "seconds": time.perf_counter() - start,
     }
+    found["fingerprints"] = {name: fingerprint_of(chain.file(name)) for name in stored(found)}
     write_text(chain.file("summary.json"), as_json(found, indent=2))
     if common.answer(options, found, out, words(found)):
         told = f"{len(drawn)} figures among them, after {found['seconds']:.0f} s"

@@ -1,10 +1,10 @@
-"""CSV files of everything in a folder of results, for spreadsheets."""
+"""CSV files of all results of a run, for spreadsheets."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,8 +27,8 @@ OF_EVENT = {"output": "output", **LIMIT, "more between nodes (estimated)": "betw
 """Columns of an event or a limit, and the names of their values in its document."""
 
 
-def write_tables(results: Path, folder: Path) -> list[Path]:
-    """Write every NetCDF file of `results` as CSV files in `folder`, a row for each place.
+def write_tables(results: Iterable[Path], folder: Path) -> list[Path]:
+    """Write NetCDF files as CSV files in `folder`, a row for each place.
 
     An envelope gives a file for each output, a row for each node, and all envelopes together one
     of peaks. Of other results variables over the same axes share a file. Every column is named with
@@ -36,7 +36,7 @@ def write_tables(results: Path, folder: Path) -> list[Path]:
     have all their digits. A table of more than `MOST` rows is left out, which is said.
 
     Args:
-        results: Folder of a run.
+        results: The NetCDF files.
         folder: Where the CSV files go; made if it does not exist.
 
     Returns:
@@ -44,7 +44,7 @@ def write_tables(results: Path, folder: Path) -> list[Path]:
     """
     folder.mkdir(parents=True, exist_ok=True)
     tables, peaks = dict[str, str](), [PEAKS]
-    for path in sorted(results.glob("*.nc")):
+    for path in results:
         dataset = with_worth(read_dataset(path))
         if path.stem.startswith("envelope_") and "output" in dataset.dims:
             tables |= {f"{path.stem}-{name}": text for name, text in _by_output(dataset)}
@@ -90,11 +90,8 @@ def with_worth(dataset: xarray.Dataset) -> xarray.Dataset:
         own = json.loads(facts["document"])["cuts"] if "document" in facts else {}
         told["nature"] = "alpha", own.get("nature", [facts["nature"]] * count)
     if "exceedance" in dataset:
-        rows, several = (
-            outcomes.each_event(outcomes.exceedances_document(dataset)),
-            "event" in dataset.dims,
-        )
-        over, rows = ("event", rows) if several else ("alpha", rows * count)
+        rows = outcomes.each_event(outcomes.exceedances_document(dataset))
+        over, rows = ("event", rows) if "event" in dataset.dims else ("alpha", rows * count)
         told |= {x: (over, [row[key] for row in rows]) for x, key in OF_EVENT.items()}
     if "error_name" in dataset.dims:
         error = sum(listed(dataset, "error").values())

@@ -19,7 +19,7 @@ from alphacut.figures import modulus as figure_modulus
 from alphacut.figures import questions as figure_questions
 from alphacut.figures import radius as figure_radius
 from alphacut.figures import shares as figure_shares
-from alphacut.figures.captions import is_figure
+from alphacut.figures.captions import is_figure, of_particles
 from alphacut.figures.mesh import draw_mesh
 from alphacut.figures.style import save, style
 from alphacut.frame.structures.field_frame import FieldFrame
@@ -155,7 +155,7 @@ def draw(
     names = drawn_in_parts(results, executor, quiet=quiet)
     names += submitted(executor, draw_shares, driving(), results).result()
     names += [name for name, made in meshes.items() if made.result()]
-    return [*particle_pictures(results.folder / "figures", results), *names]
+    return [*particle_pictures(results), *names]
 
 
 def begin_meshes(results: Results, executor: Executor | None) -> dict[str, Future[bool]]:
@@ -236,11 +236,9 @@ def drawn_now(todo: Iterable[Drawing], results: Results) -> list[str]:
         ]
 
 
-def particle_pictures(folder: Path, results: Results) -> list[str]:
-    """Figures of the microstructure stage: 03-04_two_point … 13_pbox, radius_map, circles."""
-    if "microstructure" not in results.case.stages:
-        return []
-    found = [path for path in sorted(folder.glob("*")) if re.match(r"\d|radi|image_c", path.name)]
+def particle_pictures(results: Results) -> list[str]:
+    """Names of the figures of the microstructure stage, where the case has it."""
+    found = of_particles(results.folder) if "microstructure" in results.case.stages else []
     return [str(path.relative_to(results.folder)) for path in found]
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from alphacut.figures import all as figures
 from alphacut.fuzzy.campaign.workers import submitted
 from alphacut.io.files import say
-from alphacut.io.netcdf import load_dataset, write_dataset
+from alphacut.io.netcdf import read_dataset, write_dataset
 from alphacut.io.progress import progress
 from alphacut.io.provenance import NESTED, attributes, fingerprint, version_of
 from alphacut.stages import width_shares as shares
@@ -75,7 +75,7 @@ class Showing:
         """The shares, once they are made."""
         if self.making is not None:
             self.making.result()
-        return load_dataset(self.file)
+        return read_dataset(self.file)
 
     def drawn(self, results: Results) -> list[str]:
         """Names of all figures, which are drawn if they or what they show are new."""
@@ -84,7 +84,7 @@ class Showing:
         kept = figures.kept(folder, key)
         if not self.figures:
             if (folder / figures.KEPT).is_file():  # tells what the figures there show
-                stage = figures.particle_pictures(folder / "figures", results)
+                stage = figures.particle_pictures(results)
                 figures.sweep(folder, [*figures.written_down(folder / figures.KEPT, key), *stage])
             return []
         if kept is not None and not self.chain.fresh:

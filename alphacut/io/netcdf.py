@@ -14,6 +14,10 @@ from alphacut.io.problem import BadInput
 from alphacut.io.provenance import FORMAT, door, own_version
 
 NEEDED = ("case", "title", "case_text", "command", "versions", "seconds")  # of summary.json
+STORED = (
+    "microstructure", "modulus", "image", "response", "update", "exceedance", "decision", "joint",
+    "shares",
+)  # fmt: skip
 
 if TYPE_CHECKING:
     import xarray
@@ -127,14 +131,29 @@ def read_summary(folder: Path) -> Document:
     return found
 
 
-def load_dataset(path: Path) -> xarray.Dataset:
-    """What a NetCDF file holds, in memory."""
-    import xarray
+def stored(summary: Document) -> list[str]:
+    """Names of the NetCDF files that hold the results of a summary."""
+    names = [name for name in STORED if summary.get(name)]
+    return [f"{x}.nc" for x in (*names, *(f"envelope_{x}" for x in summary.get("envelopes", ())))]
 
-    return xarray.load_dataset(path)
+
+def own_files(summary: Document, folder: Path) -> list[Path]:
+    """The NetCDF files of a summary that are in its folder.
+
+    Raises:
+        BadInput: Some are no longer those of the run that wrote the summary.
+    """
+    keys: dict[str, str] = summary.get("fingerprints", {})  # older programs told none
+    files = sorted(path for x in stored(summary) if (path := folder / x).is_file())
+    told = {path.name: fingerprint_of(path, str(folder)) for path in files if path.name in keys}
+    if other := ", ".join(name for name, key in told.items() if key not in ("", keys[name])):
+        what = f"not of the run that wrote summary.json, but of a later one, not ended: {other}"
+        cure = f"results of one run, by {door('run')} CASE.toml --out {quote(str(folder))}"
+        raise BadInput.of(str(folder), what, allowed=cure)
+    return files
 
 
-def fingerprint_of(path: Path) -> str:
+def fingerprint_of(path: Path, key: str = "--out") -> str:
     """The fingerprint in a NetCDF file; empty if it cannot be read.
 
     Raises:
@@ -147,5 +166,5 @@ def fingerprint_of(path: Path) -> str:
             told = dict(dataset.attrs)
     except (OSError, ValueError):
         return ""
-    require_known(told, path, key="--out")
+    require_known(told, path, key=key)
     return str(told.get("fingerprint", ""))

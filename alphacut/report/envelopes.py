@@ -91,17 +91,10 @@ def peaks(summary: Document) -> Markup:
         limit = paragraphs(*map(sentence, lines))
     study = next(iter(summary["envelopes"].values()))
     low, high = (f"at α = {study['alpha'][level]:g}" for level in (0, -1))
-    head = (
-        "study",
-        "output",
-        f"least peak {low} (bound)",
-        "least of motions tried",
-        f"greatest {low}",
-        "between nodes and by error, up to",
-        f"peak {high} (bounds)",
-    )
+    head = ("study", "output", f"least peak {low} (bound)", "least of motions tried")
+    last = (f"greatest {low}", "between nodes and by error, up to", f"peak {high} (bounds)")
     told = claims(summary["envelopes"])
-    shown = Markup("<h3>Peaks</h3>") + words + table(head, rows, numbers=2) + told
+    shown = Markup("<h3>Peaks</h3>") + words + table((*head, *last), rows, numbers=2) + told
     return shown + limit if rows else limit
 
 

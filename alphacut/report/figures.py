@@ -10,6 +10,7 @@ from markupsafe import Markup
 
 from alphacut.figures.captions import caption
 from alphacut.io.files import Document
+from alphacut.io.netcdf import stored
 from alphacut.report.tables import fragment, paragraphs, section
 
 # figures that stand in the section they belong to
@@ -25,9 +26,8 @@ def listed(summary: Document, folder: Path, name: str) -> Markup:
     """Figure by its name without the paper's number, if this run has drawn it."""
     for file in summary.get("figures", []):
         if re.fullmatch(rf"(fig\d+-)?{name}", Path(file).stem) and file.endswith(".svg"):
-            return picture(
-                folder / file, caption(Path(file).stem, paper=bool(summary.get("paper")))
-            )
+            words = caption(Path(file).stem, paper=bool(summary.get("paper")))
+            return picture(folder / file, words)
     return Markup("")
 
 
@@ -42,15 +42,9 @@ def gallery(summary: Document, folder: Path) -> Markup:
     return section("Figures", shown) if figures else Markup("")
 
 
-STORED = (
-    "microstructure", "modulus", "image", "response", "update", "exceedance", "decision", "joint",
-    "shares",
-)  # fmt: skip
-
-
 def missing(summary: Document, folder: Path) -> Markup:
     """What the run wrote and the folder lacks; empty where it lacks nothing."""
-    named = [f"{name}.nc" for name in STORED if summary.get(name)] + summary.get("figures", [])
+    named = [*stored(summary), *summary.get("figures", [])]
     gone = [name for name in named if not (folder / name).is_file()]
     some = ", ".join(gone[:4]) + (f" and {len(gone) - 4} more" if len(gone) > 4 else "")
     told = f"The run wrote files that are no longer here: {some}. The same run makes them anew."
@@ -62,11 +56,8 @@ def picture(svg: Path, caption: str, *, wide: bool = False) -> Markup:
     png = svg.with_suffix(".png")
     if svg.is_file() and svg.stat().st_size < SVG_LIMIT:
         text = re.sub(r"^.*?(?=<svg)", "", svg.read_text(encoding="utf-8"), flags=re.DOTALL)
-        content = Markup(
-            unique_ids(
-                re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL), svg.stem + "-"
-            )
-        )
+        text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+        content = Markup(unique_ids(text, svg.stem + "-"))
     elif png.is_file():
         content = Markup('<img alt="{}" src="data:image/png;base64,{}">').format(
             caption, base64.b64encode(png.read_bytes()).decode()

@@ -14,7 +14,7 @@ from markupsafe import Markup, escape
 from alphacut.case.quick import banner
 from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
-from alphacut.io.netcdf import damaged, read_dataset, read_summary
+from alphacut.io.netcdf import damaged, own_files, read_dataset, read_summary
 from alphacut.report.glossary import explained
 from alphacut.report.sections import sections
 from alphacut.report.tables import environment
@@ -30,10 +30,11 @@ def report(folder: Path) -> str:
     """The page for the results in a folder.
 
     Raises:
-        BadInput: The folder holds no results of a run, or those of a newer program.
+        BadInput: The folder holds no results of a run, those of two, or of a newer program.
     """
     summary = read_summary(folder)
     try:
+        own_files(summary, folder)
         return page(summary, folder)
     except (KeyError, TypeError, AttributeError, IndexError) as error:
         raise damaged(folder / "summary.json", error) from error
@@ -67,10 +68,7 @@ def page(summary: Document, folder: Path) -> str:
 def plot(name: str, study: Document, dataset: xarray.Dataset) -> Document:
     """One study: lower and upper bounds by level and output as 32-bit floats, in base64."""
     time = dataset["time"].values
-    bounds = {
-        side: dataset[side].transpose("alpha", "output", "time").values
-        for side in ("lower", "upper")
-    }
+    bounds = dataset[["lower", "upper"]].transpose("alpha", "output", "time")
     return {
         "name": name,
         "title": f"{name}: fuzzy {', '.join(study['fuzzy'])}",
@@ -80,8 +78,8 @@ def plot(name: str, study: Document, dataset: xarray.Dataset) -> Document:
         "units": [Output(str(output)).unit for output in dataset["output"].values],
         "step": float(time[1] - time[0]),
         **{
-            side: [[packed(row) for row in level] for level in values]
-            for side, values in bounds.items()
+            str(side): [[packed(row) for row in level] for level in ends.values]
+            for side, ends in bounds.items()
         },
     }
 

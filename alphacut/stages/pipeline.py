@@ -11,10 +11,11 @@ from shutil import rmtree
 from typing import TYPE_CHECKING
 
 from alphacut.case.case import Case
+from alphacut.figures.captions import of_particles
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import Document, say
 from alphacut.io.kept_arrays import KeptArrays
-from alphacut.io.netcdf import fingerprint_of, load_dataset, write_dataset
+from alphacut.io.netcdf import fingerprint_of, read_dataset, write_dataset
 from alphacut.io.progress import Tick, progress
 from alphacut.io.provenance import attributes, fingerprint
 from alphacut.stages.contract import keep_modulus
@@ -122,20 +123,20 @@ class Chain:
         def compute(path: Path) -> None:
             with progress("Microstructure", quiet=self.quiet) as tick:
                 found = microstructure.compute(self.case, workers=self.workers, progress=tick)
+            for old in of_particles(self.folder):
+                old.unlink()
             write_microstructure(found, path.parent, attributes(self.case.text_of_file, key))
 
         self.stored("microstructure.nc", key, compute)
-        return microstructure.with_radius(
-            self.case, self.file("radius.toml").read_text(encoding="utf-8")
-        )
+        radius = self.file("radius.toml").read_text(encoding="utf-8")
+        return microstructure.with_radius(self.case, radius)
 
     def modulus(self) -> xarray.Dataset:
         """The fuzzy modulus, in modulus.nc."""
         case = self.case
-        inputs = [case.radius, case.cell, case.mesh, case.modulus]
-        key = fingerprint(
-            {"case": inputs, "petsc": dict(self.petsc)}, ("stochastic", "rve", "fuzzy")
-        )
+        sections = [case.radius, case.cell, case.mesh, case.modulus]
+        inputs = {"case": sections, "petsc": dict(self.petsc)}
+        key = fingerprint(inputs, ("stochastic", "rve", "fuzzy"))
 
         def compute(path: Path) -> None:
             store = self.file("samples.db")
@@ -173,10 +174,8 @@ class Chain:
 
     def response(self, cell: xarray.Dataset) -> xarray.Dataset:
         """The random and fuzzy stress of the cell, in response.nc."""
-        key = fingerprint(
-            {"modulus": cell.attrs["fingerprint"], "wanted": self.case.response},
-            ("stochastic", "fuzzy", "alphacut"),
-        )
+        inputs = {"modulus": cell.attrs["fingerprint"], "wanted": self.case.response}
+        key = fingerprint(inputs, ("stochastic", "fuzzy", "alphacut"))
 
         def compute(path: Path) -> None:
             facts = attributes(self.case.text_of_file, key)
@@ -207,9 +206,8 @@ class Chain:
 
     def key_of(self, study: Study, handed: FuzzyNumber | None) -> str:
         """Fingerprint of one study's envelope."""
-        return self.vibration(
-            {"task": study.task, "holds": ("bounds", "peaks", "tried at nodes")}, handed
-        )
+        holds = ("bounds", "peaks", "tried at nodes")
+        return self.vibration({"task": study.task, "holds": holds}, handed)
 
     def begun(self, study: Study, key: str) -> KeptArrays:
         """What an interrupted run has left of a study's envelope."""
@@ -219,16 +217,10 @@ class Chain:
         """One study's envelope from its file, computed first where that is stale."""
         if stale:
             with progress(f"Envelope {study.name}", quiet=self.quiet) as tick:
-                made = envelope_of(
-                    wanted,
-                    study.task,
-                    self.begun(study, key),
-                    strict=self.strict,
-                    workers=self.workers,
-                    progress=tick,
-                )
+                make = partial(envelope_of, wanted, study.task, self.begun(study, key))
+                made = make(strict=self.strict, workers=self.workers, progress=tick)
             self.write_envelope(study, key, made)
-        found = load_dataset(self.file(study.file))
+        found = read_dataset(self.file(study.file))
         envelope.keep_tolerance(self.case, found, best_effort=self.best_effort)
         return found
 
@@ -264,7 +256,7 @@ class Chain:
         """The dataset in a file: as it is if it has the fingerprint `key`, else computed first."""
         if not self.current(name, key):
             compute(self.file(name))
-        return load_dataset(self.file(name))
+        return read_dataset(self.file(name))
 
     def current(self, name: str, key: str) -> bool:
         """Whether a file has the fingerprint `key` and may be taken, which is then said."""

@@ -425,13 +425,14 @@ def write(
 
     told = [remark.removeprefix("warning: ") for remark in left_out(found)]
     numbers = {**summary(found), "remarks": told}
+    (folder / "microstructure.nc").unlink(missing_ok=True)  # comes last: it vouches for the others
     write_text(folder / "microstructure.json", as_json(numbers, indent=2))
     drawn = draw(found, folder / "figures") if figures else {}
     write_text(folder / "radius.toml", fragment(found))
-    write_dataset(to_dataset(found), folder / "microstructure.nc", said)
     names = ["microstructure.json", "microstructure.nc", "radius.toml"]
     if isinstance(found, Microstructure) and found.sections[0].read.phase_fraction is not None:
         write_text(folder / "circles.csv", circles_of(found))
         names.append("circles.csv")
+    write_dataset(to_dataset(found), folder / "microstructure.nc", said)
     files = [*(folder / name for name in names), *(path for of in drawn.values() for path in of)]
     return [str(path.relative_to(folder)) for path in files]

@@ -206,9 +206,15 @@ def test_circles_over_the_image_and_the_notes_of_a_run_stand_in_its_report(tmp_p
     case, folder = tmp_path / "own.toml", tmp_path / "run"
     text = IMAGE.replace(', "modulus"]', "]")
     case.write_text(text.partition("[modulus]")[0], encoding="utf-8")
+    (folder / "figures").mkdir(parents=True)
+    for name in ("radii_bounds.svg", "2024-notes.svg"):  # of other particles, and of the user
+        (folder / "figures" / name).write_text("<svg></svg>", encoding="utf-8")
     assert main(["run", str(case), "--out", str(folder), "--quiet"]) == 0
     found = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert "figures/image_circles.png" in found["figures"]
+    assert not {"figures/radii_bounds.svg", "figures/2024-notes.svg"} & {*found["figures"]}
+    assert not (folder / "figures" / "radii_bounds.svg").exists()
+    assert (folder / "figures" / "2024-notes.svg").exists()
     assert main(["report", str(folder)]) == 0
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert page.count("Circles that stand for the particles, drawn over the image</") == 1

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import xarray
 from alphacut.entry import main
 from alphacut.export import csv_tables
 from alphacut.export.csv_tables import write_tables
+from tests.alphacut.one_floor import one_floor
 
 
 @pytest.fixture
@@ -32,7 +34,7 @@ def results(tmp_path):
 
 
 def test_every_number_keeps_all_its_digits_and_its_unit(results):
-    made = write_tables(results, results / "tables")
+    made = write_tables(results.glob("*.nc"), results / "tables")
     assert [file.name for file in made] == ["envelope_all.csv", "envelope_all-by-alpha.csv"]
     with made[0].open(encoding="utf-8") as file:
         head, *rows = csv.reader(file)
@@ -44,7 +46,7 @@ def test_every_number_keeps_all_its_digits_and_its_unit(results):
 
 def test_a_table_of_too_many_rows_is_left_out_and_that_is_said(results, monkeypatch, capfd):
     monkeypatch.setattr(csv_tables, "MOST", 5)
-    made = write_tables(results, results / "tables")
+    made = write_tables(results.glob("*.nc"), results / "tables")
     assert [file.name for file in made] == ["envelope_all-by-alpha.csv"]
     told = capfd.readouterr().err
     assert "envelope_all.csv is left out: it had 6 rows; " in told
@@ -94,7 +96,7 @@ def test_an_error_says_whether_the_bounds_hold_it(tmp_path, more, what):
     )
     places = (("alpha", "time", "output", "parameter"), np.ones((1, 2, 1, 1)))
     data.assign(lower_at=places, upper_at=places).to_netcdf(tmp_path / "envelope_all.nc")
-    write_tables(tmp_path, tmp_path / "tables")
+    write_tables(tmp_path.glob("*.nc"), tmp_path / "tables")
     with (tmp_path / "tables" / "envelope_all-q1.csv").open(encoding="utf-8") as file:
         (row, _) = csv.DictReader(file)
     assert row[f"{what} at alpha 0.5 [m]"] == "1.0"
@@ -108,7 +110,7 @@ def test_values_of_several_units_have_theirs_in_a_column(tmp_path):
         {"format_version": 2},
     )
     data.to_netcdf(tmp_path / "decision.nc")
-    (made,) = write_tables(tmp_path, tmp_path / "tables")
+    (made,) = write_tables(tmp_path.glob("*.nc"), tmp_path / "tables")
     lines = made.read_text(encoding="utf-8").splitlines()
     assert lines == ["alpha,output,margin,unit", "0.0,drift1,1.0,m", "0.0,a2,1.0,m/s^2"]
 
@@ -117,7 +119,7 @@ def table(folder: Path, name: str, data: xarray.Dataset) -> list[dict[str, str]]
     """Rows of the CSV file of a dataset."""
     folder.mkdir()
     data.assign_attrs(format_version=2).to_netcdf(folder / f"{name}.nc")
-    write_tables(folder, folder / "tables")
+    write_tables(folder.glob("*.nc"), folder / "tables")
     with (folder / "tables" / f"{name}.csv").open(encoding="utf-8") as file:
         return list(csv.DictReader(file))
 
@@ -157,3 +159,24 @@ def test_a_row_of_a_curve_of_probabilities_says_of_which_limit_it_is(tmp_path):
     told = ["2", "a2", "3.0", "m/s^2", "1.0", "0.0", "0.25", "inner: attained, at draws"]
     assert len(rows) == 12
     assert list(rows[-1].values()) == told
+
+
+def test_results_of_an_earlier_case_are_left_out(tmp_path):
+    """A section removed, a study by another name, and the modulus of another case."""
+    case, out, limits = tmp_path / "case.toml", tmp_path / "out", '["q1 <= 1 m"]'
+    text = one_floor(fuzzy='["m1"]', duration=1, step=0.01, mass="1 t ± 5 %", moved="10 mm")
+    run = ["run", str(case), "--no-figures", "--quiet", "--out", str(out)]
+    case.write_text(f"{text}[decision]\nlimits = {limits}\n", encoding="utf-8")
+    assert main(run) == 0
+    for name in ("envelope_old", "modulus"):
+        shutil.copy(out / "envelope_all.nc", out / f"{name}.nc")
+    report = ["report", str(out), "--quiet", "--csv"]
+    assert main([*report, str(tmp_path / "first")]) == 0
+    case.write_text(text, encoding="utf-8")
+    assert main(run) == 0
+    assert main([*report, str(tmp_path / "later")]) == 0
+    first, later = ({x.name for x in (tmp_path / at).iterdir()} for at in ("first", "later"))
+    assert later == {f"envelope_all-{x}.csv" for x in ("q1", "v1", "attained")} | {"peaks.csv"}
+    assert {name.partition("-")[0] for name in first - later} == {"decision.csv", "decision"}
+    with (tmp_path / "later" / "peaks.csv").open(encoding="utf-8") as file:
+        assert {row["study"] for row in csv.DictReader(file)} == {"all"}

@@ -4,6 +4,7 @@ import html
 import json
 import re
 import shutil
+import signal
 import subprocess
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from alphacut.report.key_results import key_results
 from alphacut.report.key_results import peaks as key_peaks
 from alphacut.report.sections import shares
 from alphacut.report.tables import sentence
+from alphacut.stages.vibration import decision
 from tests.alphacut.one_floor import one_floor
 
 PAPER = Path(__file__).parents[3] / "cases" / "paper.toml"
@@ -151,6 +153,31 @@ def test_a_folder_without_results_is_named(tmp_path, capfd):
     (line,) = capfd.readouterr().err.splitlines()
     assert "the run here has not ended: summary.json is missing, and there are envelope_all" in line
     assert line.endswith(f"{door()} run CASE.toml --out {tmp_path}")
+
+
+def test_results_of_two_runs_are_refused(tmp_path, capfd, monkeypatch):
+    """A run of another case in the same folder, stopped once it has written its envelopes."""
+    text = one_floor(fuzzy='["m1"]', duration=1, step=0.01, mass="1 t ± 5 %", moved="10 mm")
+    case, out = tmp_path / "case.toml", tmp_path / "out"
+    case.write_text(text + '[decision]\nlimits = ["q1 <= 1 m"]\n', encoding="utf-8")
+    run = ["run", str(case), "--no-figures", "--quiet", "--out", str(out)]
+    report = ["report", str(out), "--csv", str(tmp_path / "csv")]
+    assert main(run) == 0
+    with monkeypatch.context() as stopped:
+        stopped.setattr(decision, "decision", lambda *_, **__: signal.raise_signal(signal.SIGINT))
+        assert main([*run, "--set", "frame.masses=2 t ± 5 %"]) == 130
+    capfd.readouterr()
+    assert main(report) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    what = "not of the run that wrote summary.json, but of a later one, not ended: envelope_all.nc"
+    assert what in line
+    assert line.endswith(f"{door()} run CASE.toml --out {out}")
+    assert not (out / "report.html").exists()
+    assert not (tmp_path / "csv").exists()
+    assert main(run) == 0
+    assert main(report) == 0
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert sorted(summary["fingerprints"]) == ["decision.nc", "envelope_all.nc"]
 
 
 def test_a_certificate_is_told_with_its_gap_and_what_it_rests_on():
