@@ -19,13 +19,14 @@ from alphacut.figures import modulus as figure_modulus
 from alphacut.figures import questions as figure_questions
 from alphacut.figures import radius as figure_radius
 from alphacut.figures import shares as figure_shares
-from alphacut.figures.captions import is_figure, of_particles
+from alphacut.figures.captions import is_figure
 from alphacut.figures.mesh import draw_mesh
 from alphacut.figures.style import save, style
 from alphacut.frame.structures.field_frame import FieldFrame
 from alphacut.fuzzy.campaign.workers import submitted
 from alphacut.io.files import as_json, write_text
 from alphacut.io.progress import Tick, progress
+from alphacut.stages.material import microstructure
 from alphacut.stages.pipeline import Results
 from alphacut.stages.vibration.exceedance import events
 
@@ -238,7 +239,9 @@ def drawn_now(todo: Iterable[Drawing], results: Results) -> list[str]:
 
 def particle_pictures(results: Results) -> list[str]:
     """Names of the figures of the microstructure stage, where the case has it."""
-    found = of_particles(results.folder) if "microstructure" in results.case.stages else []
+    found = (
+        microstructure.pictures(results.folder) if "microstructure" in results.case.stages else []
+    )
     return [str(path.relative_to(results.folder)) for path in found]
 
 

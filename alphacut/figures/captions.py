@@ -53,12 +53,6 @@ def is_figure(stem: str) -> bool:
     return name in FIGURES or name.startswith(("envelope-", "update-", "exceedance-"))
 
 
-def of_particles(folder: Path) -> list[Path]:
-    """Figures of the microstructure stage: 03-04_two_point … 13_pbox, radius_map, circles."""
-    found = (path for path in sorted(folder.glob("figures/*")) if is_figure(path.stem))
-    return [path for path in found if re.match(r"\d|radi|image_c", path.name)]
-
-
 def core(modulus: Document) -> str:
     """Modal value or core interval of a summary's fuzzy modulus, in GPa."""
     low, high = (float(modulus["E_GPa"][side][-1]) for side in ("lower", "upper"))

@@ -11,7 +11,6 @@ from shutil import rmtree
 from typing import TYPE_CHECKING
 
 from alphacut.case.case import Case
-from alphacut.figures.captions import of_particles
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import Document, say
 from alphacut.io.kept_arrays import KeptArrays
@@ -123,7 +122,7 @@ class Chain:
         def compute(path: Path) -> None:
             with progress("Microstructure", quiet=self.quiet) as tick:
                 found = microstructure.compute(self.case, workers=self.workers, progress=tick)
-            for old in of_particles(self.folder):
+            for old in microstructure.pictures(self.folder):
                 old.unlink()
             write_microstructure(found, path.parent, attributes(self.case.text_of_file, key))
 

@@ -411,6 +411,12 @@ def circles_of(found: Microstructure) -> str:
     return "x [m],y [m],r [m]\n" + "".join(f"{x:.7g},{y:.7g},{r:.7g}\n" for x, y, r in rows)
 
 
+def pictures(folder: Path) -> list[Path]:
+    """Figures of this stage: 03-04_two_point … 13_pbox, radius_map, radii_bounds, image_circles."""
+    name = re.compile(r"(\d\d(-\d\d)?_\w+|radi\w+_\w+|image_circles)\.(png|svg)")
+    return [path for path in sorted(folder.glob("figures/*")) if name.fullmatch(path.name)]
+
+
 def write(
     found: Microstructure | SphereMicrostructure,
     folder: Path,
