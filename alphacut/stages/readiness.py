@@ -176,8 +176,8 @@ def unproved(case: Case, wanted: Structure) -> Iterator[str]:
 
 def parted_modulus(case: Case) -> Iterator[Problem]:
     """Levels that do not hold all cuts of E, which a structure takes over, or one number."""
-    alpha, asked = case.modulus.alpha, (case.envelope, *case.sections.study)
-    fuzzy = any("E" in (one.fuzzy or ()) for one in asked)
+    alpha = case.modulus.alpha
+    fuzzy = any("E" in study.task.fuzzy for study in studies(case))
     if (alpha != (1.0,) or fuzzy) and (alpha[0], alpha[-1]) != (0.0, 1.0):
         what = "these levels leave cuts of E out that the structure needs"
         yield case.problem("modulus.alpha", what, WHOLE)
