@@ -96,7 +96,7 @@ def _of_spheres(found: SphereMicrostructure) -> dict[str, object]:
         "packings": len(packed.packings),
         "spheres": len(radii),
         "edge": PERIODIC,
-        "law": found.source.packing.radii.label,
+        "law": found.source.laws["the law"].radii.label,
         "volume_fraction": found.source.packing.volume_fraction,
         "volume_fraction_packed": packed.fraction,
         "volume_fraction_of_cells": volume_fraction(found.sample),

@@ -133,13 +133,6 @@ class TabulatedRadii:
         """Greatest radius, in m."""
         return self.radii[-1]
 
-    @property
-    def mean_cube(self) -> float:
-        """Mean of r³, in m³."""
-        radii, weights = np.array(self.radii), np.diff(self.shares)
-        cubes = (radii[1:] ** 2 + radii[:-1] ** 2) * (radii[1:] + radii[:-1]) / 4
-        return float(weights @ cubes)
-
     def cdf(self, radius: ArrayLike) -> Array:
         """P(r ≤ radius), any shape, `radius` in m."""
         return np.asarray(np.interp(np.asarray(radius, float), self.radii, self.shares))
@@ -149,8 +142,7 @@ class TabulatedRadii:
         return np.asarray(np.interp(generator.random(number), self.shares, self.radii))
 
 
-SLIP = 1e4
-"""Ratio to the median, up or down, that no size of a sieve curve or of a list of particles has."""
+SLIP = 1e4  # times the median, or below it: no size of a sieve curve or of a list of particles
 
 
 def refuse_slip(path: Path, sizes: LengthColumns) -> None:
@@ -159,9 +151,8 @@ def refuse_slip(path: Path, sizes: LengthColumns) -> None:
     worst = int(np.abs(np.log(ratios)).argmax())
     if not 1 / SLIP <= ratios[worst] <= SLIP:
         raise ValueError(
-            f"{path}: row {sizes.rows[worst]} has a size {ratios[worst]:.3g} times the median, out"
-            f" of all proportion: no list or sieve curve reaches {SLIP:g} times it, up or down;"
-            " correct the row or remove it"
+            f"{path}: row {sizes.rows[worst]} has a size {ratios[worst]:.3g} times the median,"
+            f" no list or sieve has {SLIP:g} times it, up or down; correct the row or remove it"
         )
 
 
@@ -185,10 +176,8 @@ class MeasuredRadii:
         if not self.values:
             raise ValueError("the list of radii is empty; it needs at least one")
         if not all(0 < value < np.inf for value in self.values):
-            raise ValueError(
-                f"the radii go from {self.values[0]:g} to {self.values[-1]:g} m; they must be"
-                " positive and finite"
-            )
+            span = f"from {self.values[0]:g} to {self.values[-1]:g} m"
+            raise ValueError(f"the radii go {span}; they must be positive and finite")
 
     @classmethod
     def read(cls, path: Path, unit: str = "") -> MeasuredRadii:

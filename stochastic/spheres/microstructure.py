@@ -14,7 +14,6 @@ from time import perf_counter
 
 import numpy as np
 
-from alphacut.stochastic.errors import RefusedError
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.fit.hermite_fit import HermiteFit
 from alphacut.stochastic.microstructure import FittedMap, Study, fitted_map, fraction_of
@@ -28,7 +27,6 @@ NEAR = 5e-3  # relative difference of volume fractions that ends them
 STEEPER = 1.5  # the limit cuts off more than in proportion
 OFF = 5e-3  # relative difference of the final map's that is told
 TOLD = 0.25  # share of the volume beyond the limits that is told; E was 4 % high at 0.38
-_ATTEMPTS = 20  # at one packing
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +71,7 @@ class SphereMicrostructure(FittedMap):
     def remarks(self) -> Iterator[str]:
         """What the map does not hold, and what the section cannot tell."""
         asked, own = self.source.packing.volume_fraction, self.fraction_of_map
+        yield from self.source.remarks
         if self.share_beyond > TOLD:
             yield (
                 f"{self.share_beyond:.1%} of the volume lies in cells tighter than r_n ="
@@ -112,17 +111,15 @@ def sphere_study(
     if not isinstance(source, SpherePackings):
         raise ValueError("this source is one of discs; study takes it")
     begin, tell = perf_counter(), progress or (lambda share: None)
-    laws = {"the law": source.packing, **source.possible()}
     packed = []
-    for number, (name, packing) in enumerate(laws.items()):
+    for number, (name, packing) in enumerate(source.laws.items()):
         count = FEWEST if number else source.packings
         packed.append(_packed(case, (number, name), packing, count, executor))
-        tell(0.9 * (number + 1) / len(laws))
+        tell(0.9 * (number + 1) / len(source.laws))
     filled = perf_counter()
     first, *others = (one.sample for one in packed)
-    found = fitted_map(case, first, others)
+    found, end = fitted_map(case, first, others), perf_counter()
     tell(1.0)
-    end = perf_counter()
     seconds = {"pack": filled - begin, "fit": end - filled, "total": end - begin}
     return SphereMicrostructure(**vars(found), source=source, packed=packed, seconds=seconds)
 
@@ -160,21 +157,12 @@ def _cells(
     packing: SpherePacking, count: int, key: tuple[int, ...], executor: Executor | None
 ) -> tuple[list[Spheres], list[Array]]:
     """Packings and the volumes of their cells; the k-th depends on `key` and k only."""
-    seed, *path = key
-    seeds = np.random.SeedSequence(seed, spawn_key=(2, *path)).spawn(count)
+    seeds = np.random.SeedSequence(key[0], spawn_key=(2, *key[1:])).spawn(count)
     made = list((executor.map if executor else map)(_one, [packing] * count, seeds))
     return [spheres for spheres, _ in made], [volumes for _, volumes in made]
 
 
 def _one(packing: SpherePacking, seed: np.random.SeedSequence) -> tuple[Spheres, Array]:
-    """One packing with the volumes of its cells; a draw too large for its cube is drawn anew."""
-    generator = np.random.default_rng(seed)
-    for _ in range(_ATTEMPTS - 1):
-        try:
-            spheres = packing.make(generator)
-            break
-        except RefusedError:
-            continue
-    else:
-        spheres = packing.make(generator)
+    """One packing with the volumes of its cells."""
+    spheres = packing.make(np.random.default_rng(seed), whole=True)
     return spheres, cell_volumes(spheres)

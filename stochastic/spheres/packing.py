@@ -6,12 +6,14 @@ whose overlaps are pushed apart. Either is measured before it is handed out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from alphacut.stochastic.errors import RefusedError
-from alphacut.stochastic.particles.radius_laws import RadiusLaw
+from alphacut.stochastic.errors import RefusedError, UnfitDataError
+from alphacut.stochastic.particles.radius_laws import RadiusLaw, TabulatedRadii
 from alphacut.stochastic.spheres.spheres import Spheres, close_pairs
 from alphacut.stochastic.spheres.wicksell import RadiiPBox, possible_laws
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -19,8 +21,8 @@ from alphacut.stochastic.theta.truncated_normal import Array
 SEQUENTIAL_LIMIT = 0.25
 MOST_VOLUME = 0.5
 FEWEST = 5  # packings
-MOST_SPHERES = 20_000  # in a packing of a law that is only possible
-_ROOM = 30  # twice the mean number of spheres of one size in a cube four radii wide, over fraction
+MOST_SPHERES = 10_000  # that their number is raised to: minutes, and 2 GB, a packing
+THIN = 0.01  # share of the volume in spheres too large for as many that is left out
 _ATTEMPTS = 20_000  # places tried for one sphere
 _ROUNDS = 4000
 _MARGIN = 1e-3  # by which radii are enlarged while overlaps are pushed apart
@@ -49,26 +51,56 @@ class SpherePacking:
         if not 0 < (share := self.volume_fraction) <= MOST_VOLUME:
             raise ValueError(f"the volume fraction is {share:g}; it must lie in (0, 0.5]")
 
-    def make(self, generator: np.random.Generator) -> Spheres:
+    def raised(self) -> SpherePacking:
+        """With twice the spheres that on average fill the cube, four radii wide, of the largest.
+
+        Where these are too many, the law ends at the largest that has such a cube.
+
+        Raises:
+            UnfitDataError: More than a thin share of the volume lies above.
+        """
+        radii, law = np.geomspace(self.radii.smallest, self.radii.largest, 20_001), self.radii
+        share, cubes = law.cdf(radii), radii**3
+        held = np.cumsum(cubes * np.diff(share, prepend=0.0))
+        needed = 2 * (48 / np.pi * self.volume_fraction - 1) * cubes / held[-1]
+        end = int((needed <= max(self.spheres, MOST_SPHERES)).sum()) - 1
+        if (lost := 1 - held[end] / held[-1]) > THIN:
+            raise UnfitDataError(
+                f"{lost:.1%} of the volume is in those too large for cubes of {MOST_SPHERES}; the"
+                f" largest, of radius {radii[-1]:.4g} m, need {needed[-1]:.0f}: ask for as many (up"
+                " to 1e5), leave out the smallest sizes, or lower the volume fraction"
+            )
+        if end < len(radii) - 1:
+            told = f"{law.label} to {radii[end]:.4g} m, without {lost:.1g} of the volume above"
+            grade = share[1 : end + 1] / share[end]
+            law = TabulatedRadii(tuple(radii[: end + 1]), (0.0, *grade), told)
+        return replace(self, spheres=max(self.spheres, math.ceil(needed[end])), radii=law)
+
+    def make(self, generator: np.random.Generator, *, whole: bool = False) -> Spheres:
         """One packing; the cube is as large as the spheres and the fraction make it.
+
+        Args:
+            generator: Of the radii and places.
+            whole: Draw on while the cube is too small for the largest drawn, which on average keeps
+                the law's shares of the volume (Wald's identity), as drawing anew does not.
 
         Raises:
             RefusedError: A sphere finds no place, or overlaps remain.
         """
-        radii = np.sort(self.radii.sample(self.spheres, generator))[::-1]
-        side = float(np.cbrt(4 / 3 * np.pi * (radii**3).sum() / self.volume_fraction))
+        radii: Array = np.empty(0)
+        side = 0.0
+        while not len(radii) or (whole and 4 * radii[0] > side):
+            more = self.radii.sample(self.spheres, generator)
+            radii = np.sort(np.append(radii, more))[::-1]
+            side = float(np.cbrt(4 / 3 * np.pi * (radii**3).sum() / self.volume_fraction))
         if 4 * radii[0] > side:
-            raise RefusedError(
-                f"a sphere of radius {radii[0]:g} m is too large for its periodic cube of"
-                f" {side:g} m: ask for more spheres"
-            )
+            told = f"too large for its periodic cube of {side:g} m: ask for more spheres"
+            raise RefusedError(f"a sphere of radius {radii[0]:g} m is {told}")
         place = _added if self.volume_fraction <= SEQUENTIAL_LIMIT else _pushed
         packing = Spheres(place(radii, side, generator), radii, side)
         if packing.smallest_gap() < 0:
-            raise RefusedError(
-                f"spheres overlap after {_ROUNDS} rounds at the volume fraction"
-                f" {self.volume_fraction:g}: ask for less"
-            )
+            told = f"at the volume fraction {self.volume_fraction:g}: ask for less"
+            raise RefusedError(f"spheres overlap after {_ROUNDS} rounds {told}")
         return packing
 
 
@@ -80,35 +112,35 @@ class SpherePackings:
         packing: What each one is to be.
         packings: How many, at least 5 (the bootstrap draws them as wholes).
         section: Bounds of the law that the circles of a section leave; None where the law is given.
+        laws: Packings of the law and of those at the ends of the bounds, `raised`, by name.
 
     Raises:
-        ValueError: Fewer than five packings.
+        ValueError: Fewer than five packings, or too many spheres are needed.
     """
 
     packing: SpherePacking
     packings: int = 20
     section: RadiiPBox | None = None
+    laws: dict[str, SpherePacking] = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
         if self.packings < FEWEST:
-            raise ValueError(
-                f"{self.packings} packings were asked for; the bootstrap draws whole packings and"
-                " needs 5 or more"
-            )
+            told = f"{self.packings} packings were asked for"
+            raise ValueError(f"{told}; the bootstrap draws whole packings and needs 5 or more")
+        others = possible_laws(self.section) if self.section else {}
+        laws = {"the law": self.packing.radii, **others}
+        found = {name: replace(self.packing, radii=law).raised() for name, law in laws.items()}
+        object.__setattr__(self, "laws", found)
 
-    def possible(self) -> dict[str, SpherePacking]:
-        """Packings of the laws at the ends of the section's bounds, by name; none without.
-
-        Their number of spheres is raised to what a cube that holds the largest needs.
-        """
-        if self.section is None:
-            return {}
-        found = {}
-        for name, law in possible_laws(self.section).items():
-            least = _ROOM * self.packing.volume_fraction * law.largest**3 / law.mean_cube
-            count = int(min(max(self.packing.spheres, least), MOST_SPHERES))
-            found[name] = replace(self.packing, radii=law, spheres=count)
-        return found
+    @property
+    def remarks(self) -> Iterator[str]:
+        """Where other spheres are packed than those asked for."""
+        for name, law in self.laws.items():
+            if name == "the law" and law.spheres > self.packing.spheres:
+                told = f"of radius {law.radii.largest:.4g} m, needs them"
+                yield f"{law.spheres} spheres or more are packed: a cube for the largest, {told}"
+            if "of the volume above" in law.radii.label:
+                yield f"packed is {law.radii.label}"
 
 
 def _added(radii: Array, side: float, generator: np.random.Generator) -> Array:
@@ -123,10 +155,8 @@ def _added(radii: Array, side: float, generator: np.random.Generator) -> Array:
                 centres[n] = spot
                 break
         else:
-            raise RefusedError(
-                f"no place for a sphere of radius {radius:g} m after {_ATTEMPTS} attempts: ask for"
-                " a smaller volume fraction"
-            )
+            told = f"no place for a sphere of radius {radius:g} m after {_ATTEMPTS} attempts"
+            raise RefusedError(f"{told}: ask for a smaller volume fraction")
     return centres
 
 
@@ -135,15 +165,14 @@ def _pushed(radii: Array, side: float, generator: np.random.Generator) -> Array:
     centres = generator.uniform(0, side, (len(radii), 3))
     enlarged = radii * (1 + _MARGIN)
     for _ in range(_ROUNDS):
-        first, second, apart = close_pairs(centres, radii, side, reach=2 * _MARGIN * radii[0])
+        first, second, way = close_pairs(centres, radii, side, reach=2 * _MARGIN * radii[0])
+        apart = np.linalg.norm(way, axis=1)
         overlap = enlarged[first] + enlarged[second] - apart
         touching = overlap > 0
         if not (overlap > _MARGIN * (radii[first] + radii[second])).any():
             return np.mod(centres, side)
         first, second, overlap = first[touching], second[touching], overlap[touching]
-        way = centres[first] - centres[second]
-        way -= side * np.round(way / side)
-        way *= (overlap / np.maximum(apart[touching], 1e-300))[:, None]
+        way = way[touching] * (overlap / np.maximum(apart[touching], 1e-300))[:, None]
         share = (radii[second] ** 3 / (radii[first] ** 3 + radii[second] ** 3))[:, None]
         np.add.at(centres, first, way * share)
         np.add.at(centres, second, way * (share - 1))

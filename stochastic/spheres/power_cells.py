@@ -39,11 +39,10 @@ def cell_volumes(spheres: Spheres) -> Array:
     """
     program = voro()
     count = len(spheres.radii)
-    table = np.column_stack([np.arange(count), spheres.centres / spheres.side])
-    table = np.column_stack([table, spheres.radii / spheres.side])
+    inside, radii = spheres.centres / spheres.side, spheres.radii / spheres.side
     with TemporaryDirectory() as folder:
         file = Path(folder) / "spheres"
-        np.savetxt(file, table, fmt="%d %.17g %.17g %.17g %.17g")
+        np.savetxt(file, np.c_[np.arange(count), inside, radii], fmt="%d %.17g %.17g %.17g %.17g")
         command = [program, "-r", "-p", "-c", "%i %v", *"010101", str(file)]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         made = file.with_name("spheres.vol")
@@ -72,13 +71,10 @@ def reduced_radii(
         packings: Spheres in their cubes.
         cells: Volumes of the power cells of each; found if None.
     """
-    values, weights, groups = [], [], []
-    cells = [cell_volumes(packing) for packing in packings] if cells is None else cells
-    for number, (packing, volumes) in enumerate(zip(packings, cells, strict=True)):
-        values.append(2 * packing.radii / np.cbrt(volumes))
-        weights.append(volumes)
-        groups.append(np.full(len(volumes), number))
-    return AreaWeighted.of(*(np.concatenate(part) for part in (values, weights, groups)))
+    volumes = np.concatenate([*map(cell_volumes, packings)] if cells is None else cells)
+    radii = np.concatenate([packing.radii for packing in packings])
+    groups = np.repeat(np.arange(len(packings)), [len(packing.radii) for packing in packings])
+    return AreaWeighted.of(2 * radii / np.cbrt(volumes), volumes, groups)
 
 
 def volume_fraction(sample: AreaWeighted) -> float:

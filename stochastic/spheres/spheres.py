@@ -30,8 +30,8 @@ class Spheres:
 
     def smallest_gap(self) -> float:
         """Least distance between surfaces, in m; negative where two overlap, ∞ with one sphere."""
-        first, second, apart = close_pairs(self.centres, self.radii, self.side, reach=0.0)
-        gaps = apart - self.radii[first] - self.radii[second]
+        first, second, way = close_pairs(self.centres, self.radii, self.side, reach=0.0)
+        gaps = np.linalg.norm(way, axis=1) - self.radii[first] - self.radii[second]
         return float(gaps.min(initial=np.inf))
 
     def section(self, axis: int, height: float) -> Array:
@@ -45,18 +45,20 @@ class Spheres:
 def close_pairs(
     centres: Array, radii: Array, side: float, *, reach: float
 ) -> tuple[Array, Array, Array]:
-    """Pairs whose surfaces may be nearer than `reach`, and the distances of their centres.
+    """Pairs whose surfaces may be nearer than `reach`: balls of twice each radius, not the largest.
 
     Returns:
-        First and second index, and the periodic distance, shape (pairs,) each; at least every pair
-        nearer than the two largest radii and `reach` together, and each sphere's nearest.
+        Indices of the larger and the smaller one, shape (pairs,), and the way from the latter's
+        centre, shape (pairs, 3); at least every pair of a gap up to `reach` or the least there is.
     """
     from scipy.spatial import cKDTree
 
-    tree = cKDTree(np.mod(centres, side), boxsize=side)
-    nearest = tree.query(np.mod(centres, side), k=min(2, len(radii)))[0].max()
-    limit = min(max(2 * radii.max() + reach, float(nearest)), 0.49 * side)
-    pairs = tree.query_pairs(limit, output_type="ndarray")
-    apart = centres[pairs[:, 0]] - centres[pairs[:, 1]]
-    apart -= side * np.round(apart / side)
-    return pairs[:, 0], pairs[:, 1], np.linalg.norm(apart, axis=1)
+    inside, rank = np.mod(centres, side), np.argsort(np.argsort(-radii, kind="stable"))
+    tree = cKDTree(inside, boxsize=side)
+    apart, near = tree.query(inside, k=[min(2, len(radii))])
+    least = float((apart[:, 0] - radii - radii[near[:, 0]]).min())
+    found = tree.query_ball_point(inside, 2 * radii + max(reach, least))
+    pairs = np.repeat(np.arange(len(radii)), [*map(len, found)]), np.concatenate(found).astype(int)
+    first, second = (one[rank[pairs[0]] < rank[pairs[1]]] for one in pairs)
+    way = centres[first] - centres[second]
+    return first, second, way - side * np.round(way / side)

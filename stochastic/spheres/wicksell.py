@@ -231,10 +231,8 @@ def _extremes(constraints: Array, *, free: int) -> tuple[Array, Array]:
             cost, whole = sign * ((own >= 0) & (own < k)), (own >= 0).astype(float)[None]
             found = linprog(cost, rows, np.full(len(rows), 1e-12), whole, [1.0])
             if found.status != 0:
-                raise RefusedError(
-                    "no law of spheres makes these circles: are they of spheres, in a random plane,"
-                    " and is every one above the smallest radius among them?"
-                )
+                told = "are they of spheres, in a random plane, all above the smallest radius?"
+                raise RefusedError(f"no law of spheres makes these circles: {told}")
             ends[end, k] = sign * found.fun
     ends[:, -1] = 1.0
     return np.clip(ends[0], 0, 1), np.clip(ends[1], 0, 1)

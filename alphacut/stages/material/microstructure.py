@@ -34,10 +34,9 @@ if TYPE_CHECKING:
     from alphacut.stochastic.spheres.wicksell import RadiiPBox
 
 
-LEAST_SLOPE = 1e-4
-"""Slope at and below which it is that of a map that barely rises."""
-CRYSTALLISE = 0.8
-"""Area fraction from which packings of equal discs were measured to be crystals in part."""
+LEAST_SLOPE = 1e-4  # at and below it a slope is that of a map that barely rises
+FAR = 300  # times the median, or below it: a size perhaps of another unit
+CRYSTALLISE = 0.8  # area fraction from which equal discs were measured to be crystals in part
 
 
 def source(case: Case) -> Simulated | Measured | SpherePackings:
@@ -51,12 +50,9 @@ def source(case: Case) -> Simulated | Measured | SpherePackings:
     if given.spheres:
         return packed_spheres(case, given.spheres)
     if wanted := given.packing:
+        law = radii_of(case, "packing", wanted)
         packing = Packing(
-            wanted.discs,
-            wanted.area_fraction,
-            radii_of(case, "packing", wanted),
-            gap=wanted.gap,
-            method=wanted.method,
+            wanted.discs, wanted.area_fraction, law, gap=wanted.gap, method=wanted.method
         )
         return Simulated(packing, wanted.packings)
     if circles := given.circles:
@@ -75,14 +71,9 @@ def source(case: Case) -> Simulated | Measured | SpherePackings:
         )
     photograph = given.image
     assert photograph is not None  # one of the three is there, or the case is refused
+    file, pixel = case.beside(photograph.file), photograph.pixel
     return Measured(
-        SectionImage(
-            case.beside(photograph.file),
-            photograph.pixel,
-            photograph.particles,
-            drop=photograph.drop,
-            crop=crop_of(case),
-        )
+        SectionImage(file, pixel, photograph.particles, drop=photograph.drop, crop=crop_of(case))
     )
 
 
@@ -90,16 +81,17 @@ def packed_spheres(case: Case, given: PackedSpheres) -> SpherePackings:
     """Packings of spheres: of a law, of measured radii, or of what the circles of a section leave.
 
     Raises:
-        BadInput: A file cannot be read, or no spheres have these circles.
+        BadInput: A file cannot be read, no spheres have these circles, or they need too many.
     """
     from alphacut.stochastic.spheres.packing import SpherePacking, SpherePackings
 
-    count, fraction = given.spheres, given.volume_fraction
-    if given.circles is None:
-        law = radii_of(case, "spheres", given)
-        return SpherePackings(SpherePacking(count, fraction, law), given.packings)
-    middle, box = unfolded_radii(case, given)
-    return SpherePackings(SpherePacking(count, fraction, middle), given.packings, box)
+    unfold = given.circles is not None
+    law, box = unfolded_radii(case, given) if unfold else (radii_of(case, "spheres", given), None)
+    packing = SpherePacking(given.spheres, given.volume_fraction, law)
+    try:
+        return SpherePackings(packing, given.packings, box)
+    except ValueError as error:
+        raise case.refuse("microstructure.spheres.spheres", str(error)) from None
 
 
 def unfolded_radii(case: Case, given: PackedSpheres) -> tuple[RadiusLaw, RadiiPBox]:
@@ -210,8 +202,7 @@ def plan(case: Case) -> Iterator[str]:
 
     if "microstructure" not in case.stages:
         return
-    wanted = source(case)
-    given = case.microstructure
+    wanted, given = source(case), case.microstructure
     if isinstance(wanted, Measured):
         if given.circles:
             radii = wanted.file.read().discs.radii
@@ -227,7 +218,7 @@ def plan(case: Case) -> Iterator[str]:
         yield f"microstructure: {law.label}, {diameters(np.array(read))}"
     if not isinstance(wanted, SpherePackings):
         return
-    packing, law = wanted.packing, wanted.packing.radii
+    law = (packing := wanted.laws["the law"]).radii
     yield (
         f"microstructure: {wanted.packings} packings of {packing.spheres} spheres, volume fraction"
         f" {packing.volume_fraction:g}, radii {engineering(law.smallest, 'm')} …"
@@ -236,7 +227,7 @@ def plan(case: Case) -> Iterator[str]:
     )
     if wanted.section is not None:
         yield (
-            f"microstructure: the map also holds {len(wanted.possible())} other laws that the"
+            f"microstructure: the map also holds {len(wanted.laws) - 1} other laws that the"
             f" circles leave possible; {wanted.section.unknown}"
         )
 
@@ -274,10 +265,9 @@ def compute(
             found = work(wanted, executor=executor, progress=progress)
         except ValueError as error:
             raise BadInput.of("microstructure", str(error), file=str(case.path)) from None
-    for remark in (
-        () if quiet else (*left_out(found), *given_sizes(case), *crisp_slopes(fragment(found)))
-    ):
-        say(remark)
+    if not quiet:
+        for remark in (*left_out(found), *given_sizes(case), *crisp_slopes(fragment(found))):
+            say(remark)
     return found
 
 
@@ -324,10 +314,21 @@ def crystalline(order: float) -> str:
 
 
 def dense_remark(case: Case) -> Iterator[str]:
-    """A remark where particles are packed too densely: equal discs, or spheres for cubic cells."""
+    """Remarks on sizes far off, on more spheres than asked for, on particles packed too densely."""
+    from alphacut.stochastic.particles.radius_laws import MeasuredRadii
+
     packing, spheres = case.microstructure.packing, case.microstructure.spheres
+    if (packed := packing or spheres) is None:
+        return
+    of = "packing" if packing else "spheres"
+    law = radii_of(case, of, packed)
+    sizes = np.array(law.values if isinstance(law, MeasuredRadii) else [law.largest])
+    for ratio in sizes[[0, -1]] / np.median(sizes):
+        if not 1 / FAR <= ratio <= FAR:
+            yield f"microstructure.{of}.file: a size is {ratio:.3g} times the median: check units"
     if spheres is not None:
-        law = radii_of(case, "spheres", spheres)
+        for remark in packed_spheres(case, spheres).remarks:
+            yield f"microstructure.spheres.spheres: {remark}"
         # fitted to packings of log-normal radii over factors of 1.5, 3.1 and 10
         limit = 0.415 - 0.075 * np.log(min(law.largest / law.smallest, 10))
         if spheres.volume_fraction > limit:
@@ -337,10 +338,7 @@ def dense_remark(case: Case) -> Iterator[str]:
                 " E not to be published; Hashin–Shtrikman bounds or benchmarks.rve.many_spheres"
                 " serve"
             )
-    if packing is None or packing.area_fraction < CRYSTALLISE:
-        return
-    law = radii_of(case, "packing", packing)
-    if law.smallest == law.largest:
+    elif packing and packing.area_fraction >= CRYSTALLISE and law.smallest == law.largest:
         yield (
             f"microstructure.packing: equal discs on {packing.area_fraction:g} of the area"
             " crystallise in part; the run measures how far (hexagonal_order) and says so"

@@ -78,6 +78,32 @@ def test_measured_diameters_are_packed(tmp_path, capfd):
     assert found["unknown"] is None
 
 
+def test_check_foretells_how_many_spheres_a_list_needs(tmp_path, capfd):
+    """200 beads of 1 mm and one of 10 mm; one of 1 m has a wrong unit, and no cube."""
+    beads, own = tmp_path / "beads.csv", tmp_path / "own.toml"
+    unfold = r"(?m)^(circles|visible|smallest_radius|largest_radius) .*\n"
+    text = re.sub(unfold, "", CASE.read_text(encoding="utf-8"))
+    own.write_text(text.replace("packings = 6", 'file = "beads.csv"'), encoding="utf-8")
+    sizes = "d [mm]\n" + "".join(f"{0.8 + k / 500}\n" for k in range(200))
+    beads.write_text(sizes + "10\n", encoding="utf-8")
+    assert main(["check", str(own)]) == 0
+    out, err = capfd.readouterr()
+    (count,) = re.findall(r"spheres.spheres: (\d+) spheres or more are packed", err)
+    assert f"20 packings of {count} spheres, " in out
+    assert int(count) > 1000
+    assert "times the median" not in err
+    beads.write_text(sizes + "1000\n", encoding="utf-8")
+    assert main(["check", str(own), "--set", f"{SPHERES}.volume_fraction=0.05"]) == 0
+    assert (
+        f"{SPHERES}.file: a size is 1e+03 times the median: check units" in capfd.readouterr().err
+    )
+    beads.write_text(sizes + "".join(f"{k / 1e3}\n" for k in range(10, 200)) * 9 + "100\n")
+    for command in ("check", "microstructure"):
+        assert main([command, str(own)]) == 2
+        *_, line = capfd.readouterr().err.splitlines()
+        assert "too large for cubes of 10000; the largest, of radius 0.05 m, need" in line
+
+
 SPHERES = "microstructure.spheres"
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.stochastic.errors import RefusedError
+from alphacut.stochastic.errors import RefusedError, UnfitDataError
 from alphacut.stochastic.fit.area_weighted import DISCS, SPHERES, AreaWeighted
 from alphacut.stochastic.fit.hermite_fit import HermiteFit
 from alphacut.stochastic.fit.pbox import least_pbox
@@ -14,8 +14,9 @@ from alphacut.stochastic.microstructure import Study, study
 from alphacut.stochastic.microstructure_summary import fragment, summary
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, TabulatedRadii
+from alphacut.stochastic.particles.sieve import SieveRadii
 from alphacut.stochastic.sections import Simulated
-from alphacut.stochastic.spheres.microstructure import sphere_study
+from alphacut.stochastic.spheres.microstructure import _one, sphere_study
 from alphacut.stochastic.spheres.packing import SpherePacking, SpherePackings
 from alphacut.stochastic.spheres.wicksell import RadiiPBox, by_number, middle_law, possible_laws
 from alphacut.stochastic.theta.quadrature import gauss_rule
@@ -145,7 +146,6 @@ def test_a_band_too_narrow_for_every_law_is_widened_and_told():
 def test_a_table_of_radii_is_a_law():
     law = TabulatedRadii((1.0, 2.0, 4.0), (0.0, 0.5, 1.0))
     drawn = law.sample(200_000, np.random.default_rng())
-    assert (drawn**3).mean() == pytest.approx(law.mean_cube, rel=0.01)
     for radius in (1.5, 3.0):
         assert (drawn <= radius).mean() == pytest.approx(float(law.cdf(radius)), abs=0.01)
     assert (law.smallest, law.largest) == (1.0, 4.0)
@@ -172,6 +172,51 @@ def test_the_middle_law_of_circles_lies_inside_their_bounds():
 def test_shapes_fill_their_cells_at_the_largest_radius():
     for shape in (DISCS, SPHERES):
         assert float(shape.shares(shape.largest)) == pytest.approx(1)
+
+
+def coarse(cubes):
+    """Share of the volume in spheres of more than 4 mm."""
+    drawn = np.concatenate(cubes)
+    return (drawn[drawn > 4e-3] ** 3).sum() / (drawn**3).sum()
+
+
+def test_packings_keep_the_volume_of_the_largest_spheres():
+    """A sieve curve of 1 … 16 mm; draws too large for their cubes were drawn anew."""
+    law = SieveRadii((0.5e-3, 1e-3, 2e-3, 4e-3, 8e-3), (0, 0.15, 0.35, 0.65, 1), 3)
+    wanted = SpherePackings(SpherePacking(60, 0.2, law)).laws["the law"]
+    assert 1000 < wanted.spheres < 1500
+    seeds = np.random.SeedSequence(1).spawn(40)
+    made = [_one(wanted, seed)[0].radii for seed in seeds]
+    assert coarse(made) == pytest.approx(0.35, abs=3 * 0.025 / np.sqrt(2))
+    few = [_one(replace(wanted, spheres=60), seed)[0].radii for seed in seeds * 10]
+    assert max(map(len, few)) > min(map(len, few)) == 60
+    assert coarse(few) > 0.25
+
+
+def test_more_spheres_than_asked_for_are_told_and_too_many_refused():
+    """Of equal volumes of two sizes, a ratio ρ of radii needs about ρ³ as many small ones."""
+    one = SpherePackings(SpherePacking(60, 0.2, two(6)))
+    (told,) = one.remarks
+    assert told.startswith(f"{one.laws['the law'].spheres} spheres or more are packed")
+    assert not list(SpherePackings(SpherePacking(5000, 0.2, two(6))).remarks)
+    assert not list(SpherePackings(SpherePacking(60, 0.06, two(6))).remarks)
+    with pytest.raises(UnfitDataError, match=r"50.0% of the volume .* need .* ask for as many"):
+        SpherePackings(SpherePacking(60, 0.2, two(30)))
+    assert SpherePackings(SpherePacking(100_000, 0.2, two(20))).laws["the law"].spheres == 100_000
+
+
+def test_a_thin_tail_is_cut_off_and_told():
+    one = SpherePackings(SpherePacking(60, 0.2, two(30, 0.004)))
+    law = one.laws["the law"]
+    assert law.radii.largest < 0.9 * two(30).largest
+    assert law.radii.sample(10**5, np.random.default_rng(1)).max() <= law.radii.largest
+    assert any("without 0.004 of the volume above" in told for told in one.remarks)
+
+
+def two(ratio, share=0.5):
+    """Radii about 1 mm, and about `ratio` times that for a share of the volume."""
+    ends = 1e-3 * np.array([0.99, 1.01, 0.99 * ratio, 1.01 * ratio])
+    return by_number(ends, np.array([0, 1 - share, 1 - share, 1]), "two sizes")
 
 
 def test_sources_go_to_their_own_study():
