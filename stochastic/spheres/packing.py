@@ -21,7 +21,7 @@ from alphacut.stochastic.theta.truncated_normal import Array
 SEQUENTIAL_LIMIT = 0.25
 MOST_VOLUME = 0.5
 FEWEST = 5  # packings
-MOST_SPHERES = 10_000  # that their number is raised to: minutes, and 2 GB, a packing
+MOST_SPHERES = 20_000  # that their number is raised to: about a minute a packing
 THIN = 0.01  # share of the volume in spheres too large for as many that is left out
 _ATTEMPTS = 20_000  # places tried for one sphere
 _ROUNDS = 4000

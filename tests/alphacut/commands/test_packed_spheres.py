@@ -101,7 +101,7 @@ def test_check_foretells_how_many_spheres_a_list_needs(tmp_path, capfd):
     for command in ("check", "microstructure"):
         assert main([command, str(own)]) == 2
         *_, line = capfd.readouterr().err.splitlines()
-        assert "too large for cubes of 10000; the largest, of radius 0.05 m, need" in line
+        assert "too large for cubes of 20000; the largest, of radius 0.05 m, need" in line
 
 
 SPHERES = "microstructure.spheres"
