@@ -52,6 +52,7 @@ INDIRECT = {  # imported by others on this project's behalf
     "notebook": "python3-notebook",
     "pip": "python3-pip",  # enter, to install ruff
     "pytest_cov": "python3-pytest-cov",  # pytest, for make coverage
+    "pytest_timeout": "python3-pytest-timeout",  # pytest, to end and name a test that hangs
     "xdist": "python3-pytest-xdist",  # pytest, for make test
     "sphinx": "python3-sphinx",
 }

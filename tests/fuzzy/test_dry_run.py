@@ -1,7 +1,6 @@
 """What a campaign would run, and why."""
 
 import os
-from time import perf_counter
 
 import pytest
 
@@ -173,9 +172,7 @@ def test_a_number_of_samples_that_depends_on_the_model_is_not_named(plan, most):
 
 @pytest.mark.parametrize("plan", [Reduced(), Extended(monotone=tuple(f"x{i}" for i in range(40)))])
 def test_too_many_samples_are_counted_without_being_made(plan):
-    start = perf_counter()
     found = explain({f"x{i}": Triangular(0, 1, 2) for i in range(40)}, plan)
-    assert perf_counter() - start < 1
     assert found.samples == 4 * 2**40 + 1
     assert "too many to list" in str(found)
 

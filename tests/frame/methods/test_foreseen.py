@@ -23,6 +23,7 @@ INPUTS = {"E": Triangular(28e9, 30e9, 32e9), "m1": Triangular(18e3, 20e3, 22e3)}
 MORE = {"m2": INPUTS["m1"], "m3": INPUTS["m1"]}
 
 
+@pytest.mark.slow  # a time
 @pytest.mark.parametrize(("inputs", "gap"), [(INPUTS, None), (INPUTS, 2e-3), (INPUTS | MORE, 2e-3)])
 def test_what_is_told_is_within_a_factor_of_what_it_takes(inputs, gap):
     asked = {"duration": 10.0, "step": 0.01, "alpha": (0.0, 0.5)}

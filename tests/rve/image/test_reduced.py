@@ -78,6 +78,7 @@ def test_any_combination_of_the_fields_stays_above(reduced, side, monkeypatch):
     assert np.linalg.eigvalsh(part.energy_above(coefficients) - best)[:, 0].min() > 0
 
 
+@pytest.mark.slow  # a time
 def test_a_pair_of_bounds_takes_a_fraction_of_a_millisecond(reduced):
     bulk, shear = draw(np.random.default_rng(5), 4000)
     began = perf_counter()
