@@ -20,7 +20,7 @@ run:
 	$(IN) python -m alphacut run $(CASE) --out $(OUT) --workers $(WORKERS) $(if $(FRESH),--fresh)
 
 test:
-	$(IN) python -m pytest -m "not slow" -n $(WORKERS) --dist loadfile --timeout 400 --timeout-method thread $(PYTEST)
+	$(IN) python -m pytest -m "not slow" -n $(WORKERS) --dist loadfile --timeout 400 $(PYTEST)
 
 test-slow:
 	$(IN) python -m pytest -m slow $(PYTEST)

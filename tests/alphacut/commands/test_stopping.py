@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,17 @@ from alphacut.rve.interruption import stoppable
 ROOT = Path(__file__).parents[3]
 PAPER = str(ROOT / "cases" / "paper.toml")
 ENDED = {"SIGTERM": 143, "SIGHUP": 129}
+
+
+@contextmanager
+def started(command, **streams):
+    """A command in a group of its own, of which nothing is left, whatever happens in the block."""
+    with subprocess.Popen(command, stderr=-1, cwd=ROOT, start_new_session=True, **streams) as job:
+        try:
+            yield job
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(job.pid, signal.SIGKILL)
 
 
 def members(group):
@@ -33,7 +45,7 @@ def test_a_campaign_keeps_its_samples_and_ends_its_workers(name, whole, tmp_path
     store = tmp_path / "s.db"
     words = ["modulus", PAPER, "--method", "prism", "--workers", "2", "--store", str(store)]
     command = [sys.executable, "-m", "alphacut", *words, "--set", "mesh.size=0.1", "--quiet"]
-    with subprocess.Popen(command, stderr=-1, cwd=ROOT, start_new_session=True) as campaign:
+    with started(command) as campaign:
         before = time.monotonic()
         while not (store.exists() and store.stat().st_size > 4000):
             assert campaign.poll() is None
@@ -111,7 +123,7 @@ def test_a_signal_that_python_drops_is_heard_when_it_comes_again(monkeypatch):
 def test_a_signal_to_one_rank_ends_all():
     words = ["cell", PAPER, "--method", "prism", "--mesh-size", "0.04", "--layers", "12", "--quiet"]
     command = ["mpirun", "-n", "2", sys.executable, "-m", "alphacut", *words]
-    with subprocess.Popen(command, stdout=-1, stderr=-1, cwd=ROOT, start_new_session=True) as job:
+    with started(command, stdout=-1) as job:
         ranks, before = [], time.monotonic()
         while len(ranks) < 2 and time.monotonic() < before + 60:
             listed = subprocess.run(
@@ -125,5 +137,7 @@ def test_a_signal_to_one_rank_ends_all():
         try:
             job.communicate(timeout=60)
         finally:
-            job.terminate()
+            for rank in [*ranks, job.pid]:  # each rank has a group of its own
+                with suppress(ProcessLookupError):
+                    os.kill(rank, signal.SIGKILL)
         assert job.returncode != 0
