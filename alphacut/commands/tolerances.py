@@ -10,7 +10,6 @@ from alphacut.case.idle import require_read
 from alphacut.case.load import load
 from alphacut.commands import options as common
 from alphacut.frame.decisions.limit_search import TIE
-from alphacut.frame.decisions.safe_scale import SafeScale
 from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import say
 from alphacut.io.problem import BadInput
@@ -83,8 +82,11 @@ def text(found: Tolerances) -> str:
     lines += fixed_line(found.fixed)
     lines += [f"scaled by {found.most:.4g} at most: {found.ended}"] if found.ended else []
     if found.undecided:
+        why = "neither proved nor refuted; narrow some inputs"
+        if scale.nominal_share > 1 - TIE:
+            why = "the nominal motion reaches the limit itself; take a limit a little greater"
         what = f"undecided between {scale.safe:.4g} and {found.most:.4g}"
-        return "\n".join([*lines, f"{what}: {_why_undecided(scale)}", ""])
+        return "\n".join([*lines, f"{what}: {why}", ""])
     if scale.witness is None:
         return "\n".join([*lines, f"nothing unsafe found up to {scale.safe:.4g}", ""])
     point = ", ".join(
@@ -96,10 +98,3 @@ def text(found: Tolerances) -> str:
     lines.append(f"  there {what} is {scale.share:.6g} of the limit")
     lines += ["between the two it is undecided; narrow some inputs"] * (scale.gap > OPEN)
     return "\n".join([*lines, ""])
-
-
-def _why_undecided(scale: SafeScale) -> str:
-    """What keeps a scale from being proved or refuted, with its cure."""
-    if scale.nominal_share > 1 - TIE:
-        return "the nominal motion reaches the limit itself; take a limit a little greater"
-    return "neither proved nor refuted; narrow some inputs"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,13 +12,10 @@ from alphacut.io.files import as_json, write_text
 from alphacut.io.problem import BadInput
 from alphacut.rve.anisotropy import AveragedPlane, shear_ratio, shear_ratio_in_words
 from alphacut.rve.fibre_constants import CONSTANTS, FibreConstants, fibre_constants
-from alphacut.rve.result import error_of_means, error_of_ratio, error_of_stiffness
+from alphacut.rve.result import Homogenised, error_of_means, error_of_ratio, error_of_stiffness
 from alphacut.rve.spheres.cubic import cubic_constants, cubic_voigt, hill_average
 from alphacut.rve.spheres.result import HomogenisedSpheres
 from alphacut.stochastic.theta.truncated_normal import Array
-
-if TYPE_CHECKING:
-    from alphacut.rve.result import Homogenised
 
 
 @dataclass(frozen=True)

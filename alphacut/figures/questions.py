@@ -22,13 +22,11 @@ from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
 from alphacut.io.units import MINUS, axis_prefix
 from alphacut.stages.vibration.decision import PASSED, degree
-from alphacut.stages.vibration.update import prior_support
+from alphacut.stages.vibration.update import Learned, prior_support
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
-
-    from alphacut.stages.vibration.update import Learned
 
 
 def decision(found: xarray.Dataset) -> Figure:

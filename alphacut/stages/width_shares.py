@@ -20,7 +20,7 @@ from alphacut.frame import Envelope
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy import Crisp, FuzzyNumber, Reduced, propagate
-from alphacut.fuzzy.width_contributions import width_shares
+from alphacut.fuzzy.width_contributions import Shares, width_shares
 from alphacut.io.files import Document, say
 from alphacut.io.progress import Tick
 from alphacut.stages.material.campaign import Campaign, campaign
@@ -32,8 +32,6 @@ from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     import xarray
-
-    from alphacut.fuzzy.width_contributions import Shares
 
 
 OF_CELL = ("E", "nu")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -16,15 +16,12 @@ from alphacut.io.problem import BadInput
 from alphacut.io.provenance import versions
 from alphacut.rve.anisotropy import directional_shear, directional_young, shear_ratio
 from alphacut.rve.cell import Phase
-from alphacut.rve.result import error_of_means, error_of_ratio, error_of_stiffness
+from alphacut.rve.result import Homogenised, error_of_means, error_of_ratio, error_of_stiffness
 from alphacut.rve.spheres.result import HomogenisedSpheres
 from alphacut.stages.material import spheres
 from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.radius_map import CaseMap, MapFamily
 from alphacut.stochastic.theta.truncated_normal import Array
-
-if TYPE_CHECKING:
-    from alphacut.rve.result import Homogenised
 
 GPA = 1e9
 POSITIVE = "divide the pixels (cell.division) or take phases of less contrast"  # E of an image

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from math import acos, ceil, cos, pi
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,10 +25,6 @@ from alphacut.io.units import engineering
 from alphacut.stages.vibration.envelope_task import EnvelopeTask
 from alphacut.stages.vibration.structure import Structure
 from alphacut.stochastic.theta.truncated_normal import Array
-
-if TYPE_CHECKING:
-    from alphacut.stages.vibration.envelope_task import EnvelopeTask
-
 
 MISSED = 0.01  # of a peak, between two nodes
 ADDED = 0.03  # of a peak that its bound between nodes adds

@@ -45,12 +45,11 @@ def input_unit(name: str) -> str:
 
 def _all_scaled(numbers: Mapping[str, FuzzyNumber], scale: float) -> dict[str, tuple[float, float]]:
     """Intervals of inputs at a scale of their supports about the nominal values."""
-    return {name: _scaled(number, scale) for name, number in numbers.items()}
-
-
-def _scaled(number: FuzzyNumber, scale: float) -> tuple[float, float]:
-    low, high = number.support
-    return number.modal - scale * (number.modal - low), number.modal + scale * (high - number.modal)
+    ends = {name: (x.modal, *x.support) for name, x in numbers.items()}
+    return {
+        name: (middle - scale * (middle - low), middle + scale * (high - middle))
+        for name, (middle, low, high) in ends.items()
+    }
 
 
 @dataclass(frozen=True)
