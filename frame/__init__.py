@@ -2,7 +2,7 @@
 
 from alphacut.frame.checks.step_resolution import StepGuard, guard
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.dynamics.integrators import INTEGRATORS, Exact, Gauss4, Midpoint, RungeKutta4
+from alphacut.frame.dynamics.integrators import INTEGRATORS, Exact, Midpoint, RungeKutta4
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.follower_record import FollowerRecord, record
@@ -16,7 +16,7 @@ from alphacut.frame.structures.quantities import Output
 from alphacut.frame.structures.storey import StoreyFrame
 
 __all__ = [
-    "INTEGRATORS", "METHODS", "Accelerogram", "Envelope", "Exact", "FollowerRecord", "Gauss4",
+    "INTEGRATORS", "METHODS", "Accelerogram", "Envelope", "Exact", "FollowerRecord",
     "GraphFollower", "LagrangianFlow", "LagrangianSystem", "LinearFlow", "MatrixStructure",
     "Midpoint", "Output", "RungeKutta4", "StepGuard", "StoreyFrame", "envelope", "guard",
     "pendulum", "plan", "record",

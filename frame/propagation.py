@@ -64,8 +64,8 @@ def envelope(
             error of 1e-4 m, or of a thousandth of each peak where no output is a displacement, and
             improved-graph-follower for others.
         integrator: Time stepping. Of linear structures an integrator or its name: exact (of auto
-            and modal unless given), midpoint (of all others), rk4, gauss4. Of general
-            Lagrangian systems midpoint (unless given), composition4 or rk4.
+            and modal unless given), midpoint (of all others), rk4. Of general Lagrangian
+            systems midpoint (unless given), composition4 or rk4.
         relative: Whether the method's tolerance is a share of each output's peak at the modal
             parameters, instead of a length in SI units.
         progress: Called with the share done; a bar on a terminal or in a notebook if not given,

@@ -221,6 +221,6 @@ def require_stable(flow: Flow, cuts: Boxes) -> None:
         raise ValueError(
             f"step: {flow.step:g} s gives omega_max h = {fastest * flow.step:.3g}, where the scheme"
             f" {flow.integrator.name} is unstable; take at most some"
-            f" {below(flow.integrator.stability_limit / fastest)} s, or the integrator exact,"
-            " midpoint or gauss4"
+            f" {below(flow.integrator.stability_limit / fastest)} s, or the integrator exact"
+            " or midpoint"
         )

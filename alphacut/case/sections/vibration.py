@@ -27,7 +27,7 @@ EnvelopeMethod = Literal[
     "monte-carlo",
     "quasi-monte-carlo",
 ]
-IntegratorName = Literal["midpoint", "rk4", "gauss4", "exact", "composition4"]
+IntegratorName = Literal["midpoint", "rk4", "exact", "composition4"]
 ENVELOPE_METHODS: tuple[str, ...] = get_args(EnvelopeMethod)
 INTEGRATORS: tuple[str, ...] = get_args(IntegratorName)
 NONLINEAR = ("midpoint", "composition4", "rk4")  # those that integrate a pendulum

@@ -9,7 +9,6 @@ import pytest
 from scipy.linalg import expm
 
 from alphacut.frame import (
-    INTEGRATORS,
     Accelerogram,
     Exact,
     LinearFlow,
@@ -20,6 +19,7 @@ from alphacut.frame import (
 from alphacut.frame.dynamics.integrators import Integrator
 from alphacut.frame.structures.linear import evaluate
 from benchmarks.frame.envelopes import FRAME
+from benchmarks.frame.integrators import COMPARED
 
 SHAKEN = replace(
     FRAME,
@@ -28,7 +28,7 @@ SHAKEN = replace(
     damper_placement="storey",
 )
 NAMES = ("E", "m1", "l2", "d3", "q2_0", "v3_0")
-ALL = list(INTEGRATORS.values())
+ALL = list(COMPARED.values())
 
 
 def modal(names: tuple[str, ...], system: StoreyFrame = FRAME) -> np.ndarray:

@@ -25,12 +25,13 @@ from alphacut.frame.boxes import Boxes, UnitFlow, boxes
 from alphacut.frame.certificate import certificate
 from alphacut.frame.certificate.branch_and_bound import BranchAndBound
 from alphacut.frame.certificate.remainder import Remainder
-from alphacut.frame.dynamics.integrators import Gauss4, Integrator
+from alphacut.frame.dynamics.integrators import Integrator
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.search import ModalSearch
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy import Triangular
 from benchmarks.frame.envelopes import FRAME
+from benchmarks.frame.integrators import Gauss4
 from tests.frame.nesting import nesting_violation
 
 INPUTS = {"E": Triangular(22.7626e9, 24.7561e9, 25.8312e9)} | {
