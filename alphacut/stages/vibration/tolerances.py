@@ -29,10 +29,13 @@ from alphacut.stages.vibration.studies import left_out
 from alphacut.stochastic.theta.truncated_normal import Array
 
 Range = Callable[[float], tuple[float, float]]
+Ends = Callable[[float], Mapping[str, tuple[float, float]]]
 MOST = 2.0
 """Largest scale that is asked for by default."""
 SCALES = 13
 """Scales at which the range of the cell's modulus is computed; between them it is interpolated."""
+HALVINGS, BEYOND = 60, 1 + 1e-9
+"""Steps towards the scale at which the weight buckles a storey, looked for up to just beyond."""
 MEANINGFUL = 0.9
 """Share of the scale at which a support reaches what its input must not be."""
 
@@ -150,15 +153,19 @@ def tolerances(
         raise BadInput.of("frame", "missing: safe tolerances are those of a storey frame")
     inputs = wanted.inputs(over.fuzzy)
     own = {name: x for name, x in inputs.items() if modulus_range is None or name != "E"}
-    most, ended = _with_meaning(wanted.frame, own, most, ended, near)
+    computed = most
+
+    def ends(scale: float) -> dict[str, tuple[float, float]]:
+        found = _all_scaled(own, scale)
+        if modulus_range is not None and "E" in inputs:
+            found["E"] = modulus_range(min(scale, computed))
+        return {name: found[name] for name in inputs}
 
     def reach(scale: float) -> tuple[Array, Array]:
-        ends = _all_scaled(own, scale)
-        if modulus_range is not None and "E" in inputs:
-            ends["E"] = modulus_range(scale)
-        both = np.array([ends[name] for name in inputs], float)
+        both = np.array([*ends(scale).values()], float)
         return both[:, 0], both[:, 1]
 
+    most, ended = _with_meaning(wanted.frame, own, ends, most, ended, near)
     nominal = {name: number.modal for name, number in inputs.items()}
     proof = partial(safe_scale, _limited(wanted, tuple(limits), case), nominal, reach, limits)
     proof = partial(proof, duration=over.duration, step=over.step, most=most)
@@ -174,20 +181,40 @@ def tolerances(
 
 
 def _with_meaning(
-    frame: StoreyFrame, own: Mapping[str, FuzzyNumber], most: float, ended: str, near: float
+    frame: StoreyFrame,
+    own: Mapping[str, FuzzyNumber],
+    ends: Ends,
+    most: float,
+    ended: str,
+    near: float,
 ) -> tuple[float, str]:
     """The largest scale, lowered to 1 or where every input has a meaning, and which has none.
 
-    A meaning that ends at a scale lowers what is above `near` times that.
+    A meaning, or a frame that stands, that ends at a scale lowers what is above `near` times that.
     """
+    found = [(BEYOND * most / near, "")]
     for name, number in own.items():
         (low, high), modal, rule = number.support, number.modal, of_storey_frame(name).range
-        ends = [modal / (modal - low)] if rule and low < modal else []
-        ends += [(1 - modal) / (high - modal)] if rule == RATIO and high > modal else []
-        if ends and near * min(ends) <= most > 1:
-            most = max(MEANINGFUL * min(ends), 1.0)
-            ended = f"{name}, which must be {rule}, has no meaning from {min(ends):.4g} on"
+        why = f"{name}, which must be {rule}, has no meaning"
+        found += [(modal / (modal - low), why)] if rule and low < modal else []
+        found += [((1 - modal) / (high - modal), why)] if rule == RATIO and high > modal else []
+    end, why = _standing(frame, ends, *min(found))
+    if why and near * end <= most > 1:
+        return max(MEANINGFUL * end, 1.0), f"{why} from {end:.4g} on"
     return most, ended
+
+
+def _standing(frame: StoreyFrame, ends: Ends, end: float, why: str) -> tuple[float, str]:
+    """The scale from which on the weight buckles a storey, and which; `end` and `why` if none."""
+    low = 0.0
+    for _ in range(HALVINGS if frame.gravity else 0):
+        middle = (low + end) / 2
+        try:
+            frame.require_standing(ends(middle))
+            low = middle
+        except ValueError as error:
+            end, why = middle, str(error).partition(" it: ")[0] + " it"
+    return end, why
 
 
 def _limited(wanted: Structure, outputs: tuple[str, ...], case: Case) -> StoreyFrame:

@@ -246,3 +246,18 @@ def test_what_a_measurement_teaches_is_said_to_be_left_out(tmp_path, capfd):
     for text, words in ((CASE, False), (CASE + measured, True)):
         assert told(tmp_path, "44 mm", "--json", "-", text=text) == 0
         assert ("what [update] learns is not taken in" in capfd.readouterr().err) == words
+
+
+def test_supports_are_not_scaled_to_where_the_weight_buckles_a_storey(tmp_path, capfd):
+    heavy = CASE.replace("[900, 1000, 1100] kg", "[900, 1000, 4000] kg")
+    heavy = heavy.replace("[envelope]", "p_delta = true\n\n[envelope]").replace('"4 s"', '"1 s"')
+    assert told(tmp_path, "500 mm", "--json", "-", text=heavy) == 0
+    found = json.loads(capfd.readouterr().out)
+    # 24 (25 - 3 s) 1e3 N m² / (3 m)² = (2000 + 3000 s) kg g
+    end = (24e3 * 25 / 9 - 2000 * 9.80665) / (24e3 * 3 / 9 + 3000 * 9.80665)
+    assert found["most"] == pytest.approx(0.9 * end)
+    what = "P-Delta: storey 1 buckles under the weight above it"
+    assert found["most_reason"] == f"{what} from {end:.4g} on"
+    assert 0 < found["safe_scale"] <= found["most"]
+    assert told(tmp_path, "500 mm", "--most", "1.2", "--json", "-", text=heavy) == 0
+    assert "most_reason" not in json.loads(capfd.readouterr().out)
