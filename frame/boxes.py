@@ -150,12 +150,14 @@ class UnitFlow:
         boxes: The boxes; its names must be those of `flow`.
         relative: Whether tolerances are shares of each output's modal peak instead of lengths.
         kept: Keeps parts of a search of modal intervening variables; None for nothing.
+        called: Names of the outputs where they stand in for others; the flow's own if none.
     """
 
     flow: Flow
     boxes: Boxes
     relative: bool = False
     kept: Kept | None = None
+    called: tuple[str, ...] = ()
 
     @property
     def time(self) -> Array:
@@ -165,7 +167,7 @@ class UnitFlow:
     @property
     def outputs(self) -> tuple[str, ...]:
         """Names of the observed quantities."""
-        return self.flow.outputs
+        return self.called or self.flow.outputs
 
     @property
     def reference(self) -> int:

@@ -17,6 +17,7 @@ from alphacut.frame.checks.step_error import (
     require_stable,
     step_error,
     step_error_at_bounds,
+    warn_of_steps,
     with_step_error,
 )
 from alphacut.frame.checks.tolerance import LIMIT
@@ -104,12 +105,6 @@ def envelope(
         UserWarning: The error of time stepping passes a hundredth of a peak; or the method is
             modal, and its error passes that and the tolerance.
     """
-    if isinstance(model, StoreyFrame) and (moved := relative_to_ground(model)):
-        arguments = {"duration": duration, "step": step, "alpha": alpha, "method": method}
-        arguments |= {"integrator": integrator, "relative": relative, "progress": progress}
-        arguments |= {"kept": kept}
-        still = envelope(absolute(model), inputs, **arguments, **options)  # type: ignore[arg-type]
-        return shifted(still, model, moved)
     own = ", ".join(sorted(set(options) - set(options_of("auto")))) if method is None else ""
     method, way, asked, scheme = _prepared(
         model, inputs, duration, step, alpha, method, integrator, relative, options
@@ -131,6 +126,8 @@ def envelope(
     if own and method == "modal" and "proof" not in found.facts:
         why = f"{own} chose the method modal, which proves nothing without certify; auto does"
         found = replace(found, facts={**found.facts, "unproved": why})
+    found = shifted(found, model) if isinstance(model, StoreyFrame) else found
+    warn_of_steps(found, over, steps.max(0))
     if method == "modal":
         warn_of_roughness(found)
     return found.on_levels(asked.boxes.alpha, which)
@@ -155,8 +152,6 @@ def plan(
     Raises:
         ValueError: As `envelope`.
     """
-    if isinstance(model, StoreyFrame):
-        model = absolute(model)
     method, way, over, _ = _prepared(
         model, inputs, duration, step, alpha, method, integrator, relative, options
     )
@@ -174,7 +169,10 @@ def _prepared(
     relative: bool,
     options: Mapping[str, object],
 ) -> tuple[str, Method, UnitFlow, str]:
-    """The method's name, the method, the trajectories, and the name of the time stepping."""
+    """The method's name, the method, the trajectories, and the name of the time stepping.
+
+    Accelerations relative to the ground are found as absolute ones, under their own names.
+    """
     if not isinstance(model, LagrangianSystem) and not hasattr(model, "matrices"):
         raise ValueError(f"model: {_no_structure(model)}")
     if method is None:
@@ -182,6 +180,8 @@ def _prepared(
     way = named(method, options)
     cuts = boxes(inputs, alpha)
     flow: LagrangianFlow | LinearFlow
+    called = model.outputs
+    model = absolute(model) if isinstance(model, StoreyFrame) else model
     if isinstance(model, LagrangianSystem):
         scheme = str(integrator or "midpoint")
         flow = LagrangianFlow(model, cuts.names, duration, step, scheme)
@@ -190,7 +190,7 @@ def _prepared(
         scheme = flow.integrator.name
     require_admissible(model, cuts, duration, step)
     require_stable(flow, cuts)
-    return method, way, UnitFlow(flow, cuts, relative), scheme
+    return method, way, UnitFlow(flow, cuts, relative, called=called), scheme
 
 
 def absolute(model: StoreyFrame) -> StoreyFrame:
@@ -199,17 +199,17 @@ def absolute(model: StoreyFrame) -> StoreyFrame:
     return replace(model, outputs=names)
 
 
-def shifted(found: Envelope, model: LinearSystem, moved: Sequence[int]) -> Envelope:
-    """An envelope whose absolute accelerations become relative to the ground.
+def shifted(found: Envelope, model: LinearSystem) -> Envelope:
+    """An envelope whose accelerations are relative to the ground where those of `model` are.
 
     The ground's acceleration is known, so that all bounds move alike and stay as proved.
 
     Args:
         found: The envelope with absolute accelerations.
         model: The structure with its outputs.
-        moved: Which outputs are relative.
     """
-    assert model.ground is not None
+    if model.ground is None or not (moved := relative_to_ground(model)):
+        return found
     taken, own = model.ground.at(found.time), ground_stray(model.ground, found.time)
     names = ("lower", "upper", "inner_lower", "inner_upper", "proved_lower", "proved_upper")
     changed: dict[str, Array] = {}
@@ -220,7 +220,7 @@ def shifted(found: Envelope, model: LinearSystem, moved: Sequence[int]) -> Envel
     if found.between is not None:
         changed["between"] = found.between.copy()
         changed["between"][:, moved] += own[:, None]
-    return replace(found, outputs=model.outputs, **changed)  # type: ignore[arg-type]
+    return replace(found, **changed)  # type: ignore[arg-type]
 
 
 def _no_structure(model: object) -> str:

@@ -148,7 +148,6 @@ def with_step_error(found: Envelope, flow: UnitFlow, scheme: str, steps: Array) 
         error = error + steps
         if "estimated_error" in facts:
             facts["estimated_error"] = float((error / flow.scale).max())
-    _warn(found, flow, steps.max(0))
     if found.inner_lower is not None and found.inner_upper is not None and steps.any():
         found = replace(
             found,
@@ -188,8 +187,8 @@ def _dominance(found: Envelope, flow: UnitFlow, steps: Array) -> dict[str, str]:
     }
 
 
-def _warn(found: Envelope, flow: UnitFlow, steps: Array) -> None:
-    """Warns where trajectories are wrong by more than a hundredth of a peak."""
+def warn_of_steps(found: Envelope, flow: UnitFlow, steps: Array) -> None:
+    """Warn where trajectories are wrong, by `steps` (m,), by more than a hundredth of a peak."""
     peak = np.maximum(np.abs(found.lower), np.abs(found.upper)).max((0, 1))
     share = np.divide(steps, peak, out=np.zeros_like(steps), where=peak > 0)
     worst = int(share.argmax())
@@ -197,7 +196,7 @@ def _warn(found: Envelope, flow: UnitFlow, steps: Array) -> None:
         of = f"{steps[worst]:.2g}, {100 * share[worst]:.2g} % of the peak of {found.outputs[worst]}"
         what, cure = source(flow.flow)
         where = f"step: {found.time[1]:g} s leaves an" if what == "time stepping" else "the"
-        warnings.warn(f"{where} error of {what} of {of}; {cure}", stacklevel=4)
+        warnings.warn(f"{where} error of {what} of {of}; {cure}", stacklevel=3)
 
 
 def require_stable(flow: Flow, cuts: Boxes) -> None:

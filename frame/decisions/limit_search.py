@@ -65,7 +65,7 @@ class LimitSearch:
         ends = np.stack([lower, self.nominal]), np.stack([upper, self.nominal])
         boxes = Boxes(self.flow.names, np.array([0.0, 1.0]), *ends, self.nominal)
         require_admissible(self.flow.system, boxes, self.flow.duration, self.flow.step)
-        unit = LimitFlow(self.flow, boxes, False, None, self.limits)
+        unit = LimitFlow(self.flow, boxes, limits=self.limits)
         before = self.hopeless(size)
         method = Modal(tolerance=self.gap)
         model, error, self.reason = model_with_error(

@@ -67,3 +67,14 @@ def test_decisions_refuse_it_by_name_and_probabilities_count_it() -> None:
         exceeding(frame(), INPUTS, {"ar1": 1.0}, **time)
     found = exceedance(frame(), INPUTS, {}, limit=1e-3, alpha=(0,), spread=4, **time)
     assert found.lower[0] == 1
+
+
+def test_warnings_and_facts_call_it_by_its_name_and_peak() -> None:
+    structure = replace(frame(), outputs=("ar1",))
+    time = {"duration": 0.9, "step": 0.05, "alpha": (0,), "integrator": "midpoint"}
+    with pytest.warns(UserWarning, match="% of the peak of ar1;") as told:
+        found = envelope(structure, INPUTS, method="graph-follower", tolerance=1e-3, **time)
+    peak = np.abs([found.lower, found.upper]).max()
+    share = 100 * float(found.facts["step_error"]) / peak
+    assert f", {share:.2g} % of the peak of ar1;" in str(told[0].message)
+    assert " of ar1 against " in str(found.facts["dominant_error"])
