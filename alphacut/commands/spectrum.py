@@ -13,8 +13,9 @@ import numpy as np
 
 from alphacut.commands.options import add_quiet, answer, with_unit
 from alphacut.io import quantity
-from alphacut.io.files import Document, write_text
+from alphacut.io.files import Document, say, write_text
 from alphacut.io.problem import BadInput
+from alphacut.stages.plausible import unlikely_ground
 from alphacut.stages.vibration.accelerogram import accelerogram
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -65,6 +66,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
 
     periods, ratios = wanted_periods(options), wanted_ratios(",".join(options.damping or ["5 %"]))
     ground = accelerogram(Path(options.record), "record")
+    for remark in unlikely_ground("record", ground):
+        say(f"warning: {remark}")
     try:
         found = [response_spectrum(ground, periods, ratio) for ratio in ratios]
     except ValueError as error:

@@ -6,6 +6,7 @@ import csv
 import re
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -46,7 +47,7 @@ class CsvFile:
         """
         kept = [
             (number, line)
-            for number, line in enumerate(self.lines(), start=1)
+            for number, line in enumerate(self.lines, start=1)
             if line.strip() and not line.startswith("#")
         ]
         if len(kept) <= least:
@@ -72,8 +73,9 @@ class CsvFile:
                 raise self.refuse(line, f"this row is {what}", ",".join(row), allowed)
         return table
 
+    @cached_property
     def lines(self) -> list[str]:
-        """All lines of the file as text.
+        """All lines of the file as text, read once, since a pipe gives them once.
 
         Raises:
             BadInput: The file cannot be read.

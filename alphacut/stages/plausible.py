@@ -60,10 +60,15 @@ def unlikely(case: Case, ground: Accelerogram | None, period: float | None) -> I
         more = f"; {floors} storey{'s' * (floors > 1)} usually take {usual} s" * bool(floors)
         yield f"{told}; check the units of masses, lengths, stiffness and moduli{more}"
     if ground is not None:
-        peak = float(abs(ground.acceleration).max())
-        if not PEAKS[0] <= peak <= PEAKS[1]:
-            told = f"a peak of {peak:.3g} m/s² is unusual for the ground"
-            yield f"{record_key(case)}: {told}; check the unit in its header"
+        yield from unlikely_ground(record_key(case), ground)
+
+
+def unlikely_ground(key: str, ground: Accelerogram) -> Iterator[str]:
+    """A remark on a record whose peak is unusual, with the key that names it."""
+    peak = float(abs(ground.acceleration).max())
+    if not PEAKS[0] <= peak <= PEAKS[1]:
+        told = f"a peak of {peak:.3g} m/s² is unusual for the ground"
+        yield f"{key}: {told}; check the unit in its header"
 
 
 def overdamped(case: Case, wanted: Structure) -> Iterator[str]:

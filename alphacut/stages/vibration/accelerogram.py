@@ -32,10 +32,9 @@ def accelerogram(path: Path, key: str = "frame.accelerogram") -> Accelerogram:
             are not even.
     """
     file = CsvFile(path, key, "record", ALLOWED)
-    lines = file.lines()
-    for head, text in enumerate(lines[:9]):
+    for head, text in enumerate(file.lines[:9]):
         if found := NPTS.search(text):
-            return peer(file, lines, head, dict(zip(PARTS, found.groups(), strict=True)))
+            return peer(file, head, dict(zip(PARTS, found.groups(), strict=True)))
     (line, first), *rows = file.rows(least=2)
     if len(first) != len(COLUMNS):
         what = f"got {len(first)} columns"
@@ -52,17 +51,17 @@ def accelerogram(path: Path, key: str = "frame.accelerogram") -> Accelerogram:
     return Accelerogram(even_step(file, rows, scales[0]), values[:, 1])
 
 
-def peer(file: CsvFile, lines: list[str], head: int, told: dict[str, str | None]) -> Accelerogram:
+def peer(file: CsvFile, head: int, told: dict[str, str | None]) -> Accelerogram:
     """A file of PEER's data base: its head ends with NPTS and DT, here the text of each part."""
     if lacking := [part for part, text in told.items() if not text]:
         what = f"the head of this AT2 file lacks {' and '.join(lacking)}"
-        raise file.refuse(head + 1, what, lines[head].strip(), "NPTS= 4000, DT= .0050 SEC")
+        raise file.refuse(head + 1, what, file.lines[head].strip(), "NPTS= 4000, DT= .0050 SEC")
     count, step = int(told["NPTS"] or 0), float(told["DT"] or 0)
-    if not any(IN_G.search(line) for line in lines[:head]):
+    if not any(IN_G.search(line) for line in file.lines[:head]):
         what = "the lines above NPTS and DT do not say that the values are accelerations in g"
         raise file.refuse(head + 1, what, allowed="ACCELERATION TIME SERIES IN UNITS OF G")
     try:
-        values = np.array(" ".join(lines[head + 1 :]).split(), float)
+        values = np.array(" ".join(file.lines[head + 1 :]).split(), float)
     except ValueError as error:
         raise file.unreadable(str(error), "numbers below the line of NPTS and DT") from None
     if not (len(values) == count >= 2 and step > 0 and np.isfinite(values).all() and values.any()):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -132,3 +134,26 @@ def test_a_record_that_is_none_is_refused(
     assert main(["spectrum", str(tmp_path / "none.csv")]) == 2
     assert main(["spectrum", str(record(tmp_path, "m"))]) == 2
     assert capfd.readouterr().err.count("alphacut: ") == 2
+
+
+def test_a_record_may_come_from_a_pipe(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    text, pipe = record(tmp_path).read_bytes(), tmp_path / "pipe"
+    os.mkfifo(pipe)
+    writer = threading.Thread(target=pipe.write_bytes, args=(text,), daemon=True)
+    writer.start()
+    assert main(["spectrum", str(pipe), "--count", "3"]) == 0, capfd.readouterr().err
+    writer.join(10)
+    assert "largest pseudo-acceleration" in capfd.readouterr().out
+
+
+def test_a_peak_that_no_ground_reaches_is_told_with_its_cure(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = record(tmp_path, "m/s^2")
+    path.write_text(path.read_text("utf-8").replace(",0.1\n", ",98.1\n"), "utf-8")  # in gal
+    assert main(["spectrum", str(path), "--count", "3"]) == 0
+    what = "warning: record: a peak of 98.1 m/s² is unusual for the ground; check the unit in its"
+    assert f"{what} header" in capfd.readouterr().err
+    path.write_text(path.read_text("utf-8").replace("m/s^2", "gal"), "utf-8")
+    assert main(["spectrum", str(path), "--count", "3"]) == 0
+    assert capfd.readouterr().err == ""
