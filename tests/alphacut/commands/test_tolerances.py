@@ -67,7 +67,11 @@ def test_safe_supports_are_printed_with_their_units(tmp_path, capfd):
     assert main(["tolerances", str(written(tmp_path))]) == 0
     told = capfd.readouterr().out
     assert re.search(r"\n  E: 2\d\.\d+ GPa … 2\d\.\d+ GPa\n  m1: [\d.]+ kg … [\d.]+ kg\n", told)
-    assert re.search(r"unsafe at .*: E = [\d.]+ GPa, m1 = [\d.]+ kg\n", told)
+    assert re.search(
+        r"unsafe at .*: E = [\d.]+ GPa, m1 = [\d.]+ kg\n"
+        r"  there \|drift1\| passes the limit by [\d.e-]+ %\n",
+        told,
+    )
 
 
 def test_a_limit_below_the_nominal_motion_leaves_no_tolerance(tmp_path, capfd):
