@@ -12,6 +12,7 @@ from alphacut.frame.certificate.remainder import MOST_PARAMETERS
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.methods import modal
 from alphacut.frame.methods.auto import GAPS, Auto
+from alphacut.frame.methods.judged import sample
 from alphacut.frame.methods.plan import Candidate, planned
 from alphacut.frame.modal.fitting import MANY
 from alphacut.frame.structures.modes import ModalError
@@ -21,8 +22,11 @@ DENSE = 0.6  # cost of a node among all beside that among so few, which share le
 
 
 def foreseen(name: str, method: object, flow: UnitFlow) -> tuple[Candidate, ...]:
-    """What a method would do as `planned`, its proof timed on some nodes."""
+    """What a method would do as `planned`, its proof timed on some nodes, its judges counted."""
     found = planned(name, method, flow)
+    if name.endswith("graph-follower") and not isinstance(flow.flow, LinearFlow):
+        runs = len(sample(len(flow.boxes.names), 0)) * len(flow.boxes.alpha)
+        return (replace(found[0], words=f"{found[0].words}, and {runs} without that judge them"),)
     if not isinstance(flow.flow, LinearFlow) or found[0].name != "modal":
         return found
     if len(flow.boxes.names) > min(MANY, MOST_PARAMETERS):

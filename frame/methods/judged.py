@@ -55,7 +55,7 @@ def judged(found: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
     missed = np.array([_missed(found, flow, level) for level in range(len(found.alpha))])
     error = np.broadcast_to(own, found.lower.shape) + SAFETY * missed[:, None]
     error = error + (steps if found.error is None else 0.0)
-    judge = f"{len(_sample(len(flow.boxes.names), 0))} independent trajectories on each level"
+    judge = f"{len(sample(len(flow.boxes.names), 0))} independent trajectories on each level"
     return _told(found, error, flow, judge)
 
 
@@ -146,7 +146,7 @@ def _by_modes(found: Envelope, flow: UnitFlow) -> Array | None:
 def _missed(found: Envelope, flow: UnitFlow, level: int) -> Array:
     """By how much an independent sample of a level leaves the envelope, shape (m,)."""
     lower, upper = flow.boxes.unit(level)
-    points = (lower + upper) / 2 + (upper - lower) / 2 * _sample(len(lower), level)
+    points = (lower + upper) / 2 + (upper - lower) / 2 * sample(len(lower), level)
     worst = np.zeros(len(flow.outputs))
     for chunk in np.array_split(points, len(points) // 32):
         values = flow.values(chunk)
@@ -155,7 +155,7 @@ def _missed(found: Envelope, flow: UnitFlow, level: int) -> Array:
     return worst
 
 
-def _sample(d: int, level: int) -> Array:
+def sample(d: int, level: int) -> Array:
     """Points of [−1, 1]^d where extremes may lie: inside, on faces and edges, at corners."""
     first = [100_003 * (level + 1) + k * SAMPLES for k in range(3)]
     inside, wide, ends = (chebyshev_points(d, SAMPLES, skip=skip) for skip in first)

@@ -1,11 +1,12 @@
 """Seconds that are told before anything is computed come near those that it then takes."""
 
+import re
 import time
 
 import numpy as np
 import pytest
 
-from alphacut.frame import StoreyFrame, envelope, plan
+from alphacut.frame import StoreyFrame, envelope, pendulum, plan
 from alphacut.frame.methods import modal
 from alphacut.frame.methods import plan as planning
 from alphacut.fuzzy import Triangular
@@ -62,3 +63,14 @@ def test_more_inputs_take_more_for_a_step(monkeypatch):
         for inputs in (INPUTS, INPUTS | MORE)
     ]
     assert seconds[1] / seconds[0] == pytest.approx((3 + 4) / (3 + 2), rel=0.01)
+
+
+@pytest.mark.parametrize("method", ["graph-follower", "improved-graph-follower"])
+def test_the_samples_that_judge_a_graph_follower_are_foretold(method: str) -> None:
+    inputs, time = {"phi_0": Triangular(0.5, 0.55, 0.6)}, {"duration": 1.0, "step": 0.05}
+    asked = {"alpha": (0.0, 0.5), "method": method, "tolerance": 1e-3, **time}
+    (told,) = plan(pendulum(), inputs, **asked)
+    each = re.fullmatch(r"(\d+) .*", str(envelope(pendulum(), inputs, **asked).facts["judged_by"]))
+    assert each is not None
+    judging = 2 * int(each[1])
+    assert told.words.endswith(f", and {judging} without that judge them")

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from alphacut.frame.methods.judged import SAMPLES, _sample
+from alphacut.frame.methods.judged import SAMPLES, sample
 
 
 @pytest.mark.parametrize("d", [1, 3, 7, 9, 14])
 def test_it_looks_inside_on_faces_and_at_corners(d):
-    points = _sample(d, 2)
+    points = sample(d, 2)
     assert np.abs(points).max() <= 1
     at_ends = (np.abs(points) == 1).sum(axis=1)
     assert np.count_nonzero(at_ends == 0) >= SAMPLES
@@ -22,5 +22,5 @@ def test_it_looks_inside_on_faces_and_at_corners(d):
 
 
 def test_levels_are_judged_by_points_of_their_own():
-    first, second = ({tuple(x) for x in _sample(14, level)} for level in (0, 1))
+    first, second = ({tuple(x) for x in sample(14, level)} for level in (0, 1))
     assert len(first & second) < 8
