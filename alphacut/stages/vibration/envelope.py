@@ -60,12 +60,8 @@ def compute(
     given = arguments(wanted, task)
     if task.certify is not None:
         given["workers"] = workers
-    try:
-        with told_once():
-            found = frame.envelope(wanted.model, progress=progress or False, kept=kept, **given)
-    except ValueError as error:
-        raise BadInput.of("envelope", str(error)) from None
-    return found
+    with in_words():
+        return frame.envelope(wanted.model, progress=progress or False, kept=kept, **given)
 
 
 def require_affordable(wanted: Structure, task: EnvelopeTask) -> None:
@@ -75,7 +71,7 @@ def require_affordable(wanted: Structure, task: EnvelopeTask) -> None:
         BadInput: It is asked for.
     """
     if task.certify is not None:
-        refuse(too_many("certify", wanted, task))
+        refuse(too_many("envelope.certify", wanted, task))
 
 
 def explain(wanted: Structure, task: EnvelopeTask) -> list[str]:
@@ -88,11 +84,8 @@ def explain(wanted: Structure, task: EnvelopeTask) -> list[str]:
     told = [f"certify: verified by sampling, not proved: {reason}"] if reason else []
     if estimated := estimated_reason(wanted, task):
         told = [f"bounds: estimated, with their error, not proved: {estimated}"]
-    try:
-        told += [str(one) for one in frame.plan(wanted.model, **arguments(wanted, task))]
-    except ValueError as error:
-        raise BadInput.of("envelope", str(error)) from None
-    return told
+    with in_words():
+        return [*told, *map(str, frame.plan(wanted.model, **arguments(wanted, task)))]
 
 
 def arguments(wanted: Structure, task: EnvelopeTask) -> Document:
@@ -110,11 +103,17 @@ def arguments(wanted: Structure, task: EnvelopeTask) -> Document:
 
 
 @contextmanager
-def told_once() -> Iterator[None]:
-    """Warnings of the library in the words of this program, each once."""
+def in_words() -> Iterator[None]:
+    """Warnings, each once, and refusals of the library by this program's keys."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        yield
+        try:
+            yield
+        except ValueError as error:
+            key, _, what = str(error).partition(": ")
+            if key in ("certify", "step"):
+                raise BadInput.of(f"envelope.{key}", what) from None
+            raise BadInput.of("envelope", str(error)) from None
     for text in dict.fromkeys(
         str(warning.message) for warning in caught if issubclass(warning.category, UserWarning)
     ):

@@ -206,6 +206,16 @@ def test_what_cannot_be_certified_is_refused(capfd):
     assert "cannot certify" in capfd.readouterr().err
 
 
+def test_a_gap_that_no_proof_reaches_is_refused_by_its_key(capfd):
+    asked = ["envelope", PAPER, "--fuzzy", "E,m", "--duration", "0.5", "--alpha", "0"]
+    gap = ["--set", "envelope.certify=1e-14 m", "--set", "envelope.method=auto"]
+    for more in (["--certify", "1e-14"], ["--certify", "1e-14", "--explain"], gap):
+        assert main([*asked, *more]) == 2
+        (line,) = capfd.readouterr().err.splitlines()
+        assert line.startswith("alphacut: envelope.certify: the gap 1e-14"), line
+        assert line.endswith("ask for a wider gap or a lower tolerance")
+
+
 def test_what_c_code_prints_does_not_spoil_the_json(capfd):
     with standard_output(True) as out:
         os.write(1, b"noise from a library\n")
