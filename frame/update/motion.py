@@ -245,7 +245,7 @@ class _Box:
         """Best point, and a matrix whose columns span the region about it."""
         d = len(self.ends)
         starts = [np.zeros(d), *np.random.default_rng(0).uniform(-0.9, 0.9, (8, d))]
-        tight: dict[str, Any] = {"bounds": (-1.0, 1.0), "xtol": 1e-14, "ftol": 1e-14}
+        tight: dict[str, Any] = {"bounds": (-1.0, 1.0), "xtol": 1e-14, "ftol": 1e-14, "gtol": 1e-15}
         fits = [
             least_squares(
                 lambda unit: self.linear(unit)[0], start, lambda u: -self.linear(u)[1], **tight
@@ -254,7 +254,7 @@ class _Box:
         ]
         fit = min(fits, key=lambda one: float(one.cost))
         jacobian = self.linear(fit.x)[1]
-        deviation = np.sqrt(2 * fit.cost / max(len(jacobian) - d, 1))
+        deviation = max(np.sqrt(2 * fit.cost / max(len(jacobian) - d, 1)), EXACT)
         values, vectors = np.linalg.eigh(np.linalg.pinv(jacobian.T @ jacobian) * deviation**2)
         return fit.x, vectors * np.sqrt(np.maximum(values, 0.0))
 
