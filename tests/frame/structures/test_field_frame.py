@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -46,6 +47,15 @@ def test_a_motion_is_that_of_the_storeys_values(name: str) -> None:
     step = 1e-5 * np.eye(3)[0]
     moved = (one.values(points + step) - one.values(points - step)) / 2e-5
     np.testing.assert_allclose(jet.first[0], moved, rtol=1e-4, atol=1e-6 * np.abs(moved).max())
+
+
+def test_the_theory_names_the_box_and_the_places_that_frames_take() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "theory.md").read_text(encoding="utf-8")
+    told = " ".join(page.partition("A fuzzy field gives")[2].partition("\n## ")[0].split())
+    assert "the middle of a storey, or the height of a floor where masses are a field" in told
+    assert r"In a frame (`[field]`, `FieldFrame`) the $\xi_k$ vary freely, in the box" in told
+    field = field_frame(5.0, share=0.5).field
+    np.testing.assert_allclose(np.abs(field.free_shapes).sum(1), 1)  # however few directions
 
 
 def test_each_storey_keeps_its_interval_and_neighbours_are_alike() -> None:
