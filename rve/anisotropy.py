@@ -17,8 +17,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from alphacut.rve.cell import square_moduli
+from alphacut.rve.cell import square_moduli, square_voigt
 from alphacut.rve.result import Homogenised, spread
+from alphacut.rve.spheres.result import HomogenisedSpheres
 from alphacut.stochastic.theta.truncated_normal import Array
 
 ISOTROPIC_ENOUGH = 0.1  # difference of the shear ratio from 1 that is not worth a warning
@@ -60,6 +61,19 @@ def shear_ratio(stiffness: Array) -> float:
     Of a plane stiffness, or of one in space, whose last entry is C44.
     """
     return float((stiffness[0, 0] - stiffness[0, 1]) / (2 * stiffness[-1, -1]))
+
+
+def ratio_of(result: Homogenised) -> tuple[float, float]:
+    """Shear ratio of a result with its stiffness, and its declared error, nan where unknown.
+
+    Both moduli come from one discretisation and err alike, so that the ratio is surer than they.
+    """
+    if isinstance(result, HomogenisedSpheres):
+        error = result.error_of(lambda moduli: moduli[1] / moduli[2])
+        return float(result.moduli[1] / result.moduli[2]), float(error)
+    stiffness = np.asarray(result.stiffness)
+    ratio, square = map(shear_ratio, (stiffness, square_voigt(*square_moduli(stiffness))))
+    return ratio, abs(ratio - square) + abs(square) * result.ratio_error
 
 
 def shear_ratio_in_words(ratio: float, meaning: str = "cylinders") -> str:

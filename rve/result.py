@@ -269,17 +269,3 @@ def error_of_stiffness(result: Homogenised, function: Callable[[Array], Array | 
 
     uneven = abs(np.asarray(function(stiffness)) - of_moduli(moduli))
     return np.asarray(uneven + spread(of_moduli, moduli, result.modulus_errors))
-
-
-def error_of_ratio(result: Homogenised, function: Callable[[Array], float]) -> float:
-    """Absolute error of a number that is proportional to (C11 − C12)/C33; nan where unknown.
-
-    Both moduli come from one discretisation and err alike, so that the ratio is surer than they.
-
-    Args:
-        result: With its whole plane stiffness.
-        function: Takes a Voigt matrix, shape (3, 3), in Pa.
-    """
-    stiffness = np.asarray(result.stiffness)
-    square = function(square_voigt(*square_moduli(stiffness)))
-    return float(abs(function(stiffness) - square) + abs(square) * result.ratio_error)

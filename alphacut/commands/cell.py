@@ -16,7 +16,7 @@ from alphacut.export.material_card import check_format, export
 from alphacut.io.files import ranks, say
 from alphacut.io.problem import BadInput, Problem, refuse
 from alphacut.io.units import fixed
-from alphacut.rve.anisotropy import ISOTROPIC_ENOUGH, shear_ratio_in_words
+from alphacut.rve.anisotropy import ISOTROPIC_ENOUGH, ratio_of, shear_ratio_in_words
 from alphacut.rve.auto.model import ORDER
 from alphacut.rve.cell import STRAIN
 from alphacut.rve.model import cross_check
@@ -104,8 +104,9 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     found = {**cell.document(result), **({} if difference is None else {"difference": difference})}
     found["model"] = choice.words
     found["tolerance"] = contract(case, sum(result.error.values()) if result.error else None)
-    particles = case.cell.particles
-    ratio = cell.anisotropy(*cell.modal_parts(case), particles)
+    known = result.stiffness is not None and result.errors
+    parts = cell.modal_parts(case)
+    ratio = ratio_of(result) if known else cell.anisotropy(*parts, case.cell.particles)
     found |= beside(case, result.modulus, result.poisson, ratio and ratio[0])
     if common.answer(options, found, out, summary(result)):
         out.write(agreement(pair, difference, case.modulus.tolerance))

@@ -10,9 +10,9 @@ import numpy as np
 
 from alphacut.io.files import as_json, write_text
 from alphacut.io.problem import BadInput
-from alphacut.rve.anisotropy import AveragedPlane, shear_ratio, shear_ratio_in_words
+from alphacut.rve.anisotropy import AveragedPlane, ratio_of, shear_ratio_in_words
 from alphacut.rve.fibre_constants import CONSTANTS, FibreConstants, fibre_constants
-from alphacut.rve.result import Homogenised, error_of_means, error_of_ratio, error_of_stiffness
+from alphacut.rve.result import Homogenised, error_of_means, error_of_stiffness
 from alphacut.rve.spheres.cubic import cubic_constants, cubic_voigt, hill_average
 from alphacut.rve.spheres.result import HomogenisedSpheres
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -129,8 +129,8 @@ def numbers(result: Homogenised) -> str:
             "unit": "Pa",
             key: result.stiffness,
         }
-        document["shear_ratio"] = shear_ratio(result.stiffness)
-        errors[key], errors["shear_ratio"] = errors_of_stiffness(result)
+        document["shear_ratio"], errors["shear_ratio"] = ratio_of(result)
+        errors[key] = errors_of_stiffness(result)
     if (fibres := constants(result)) is not None:
         name = f"{words.name}_constants"
         document[name], errors[name] = fibres.values, fibres.errors
@@ -151,10 +151,9 @@ def comments(result: Homogenised, mark: str) -> str:
         told = f"E {above(modulus, result.modulus)} Pa, nu {above(nu, 1.0)}"
         lines.append(f"declared absolute errors: {told}")
     if result.stiffness is not None:
-        error, ratio = errors_of_stiffness(result)
-        of_array = shear_ratio(result.stiffness)
-        lines.append(shear_ratio_in_words(of_array, words.meaning))
-        lines.append(f"absolute error of this ratio: {above(ratio + 5e-4, 0.0)}")  # three decimals
+        error, (ratio, off) = errors_of_stiffness(result), ratio_of(result)
+        lines.append(shear_ratio_in_words(ratio, words.meaning))
+        lines.append(f"absolute error of this ratio: {above(off + 5e-4, 0.0)}")  # three decimals
         lines.append(
             f"{words.kind} in Pa, Voigt order {', '.join(words.order)} with engineering shear"
             " strain, and the absolute errors of its entries:"
@@ -181,12 +180,11 @@ def errors_of_constants(result: Homogenised) -> tuple[float, float]:
     return float(modulus), float(nu)
 
 
-def errors_of_stiffness(result: Homogenised) -> tuple[Array, float]:
-    """Declared absolute errors of the stiffness (Pa) and of its shear ratio."""
+def errors_of_stiffness(result: Homogenised) -> Array:
+    """Declared absolute errors of the stiffness (Pa)."""
     if isinstance(result, HomogenisedSpheres):
-        error = result.error_of(lambda moduli: cubic_voigt(*moduli))
-        return error, float(result.error_of(lambda moduli: moduli[1] / moduli[2]))
-    return error_of_stiffness(result, np.asarray), error_of_ratio(result, shear_ratio)
+        return result.error_of(lambda moduli: cubic_voigt(*moduli))
+    return error_of_stiffness(result, np.asarray)
 
 
 def about(result: Homogenised, fibres: FibreConstants) -> str:

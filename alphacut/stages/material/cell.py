@@ -14,9 +14,9 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import Document
 from alphacut.io.problem import BadInput
 from alphacut.io.provenance import versions
-from alphacut.rve.anisotropy import directional_shear, directional_young, shear_ratio
+from alphacut.rve.anisotropy import directional_shear, directional_young, ratio_of
 from alphacut.rve.cell import Phase
-from alphacut.rve.result import Homogenised, error_of_means, error_of_ratio, error_of_stiffness
+from alphacut.rve.result import Homogenised, error_of_means, error_of_stiffness
 from alphacut.rve.spheres.result import HomogenisedSpheres
 from alphacut.stages.material import spheres
 from alphacut.stochastic import RadiusMap
@@ -197,20 +197,16 @@ def anisotropy(
 ) -> tuple[float, float] | None:
     """Shear ratio of a cell and its declared error, by the series whatever model gives E.
 
-    None where the series refuses. See `rve.anisotropy.shear_ratio`.
+    None where the series refuses. See `rve.anisotropy.ratio_of`.
     """
     from alphacut.rve.series.model import SeriesModel
     from alphacut.rve.spheres.series.model import SphereSeriesModel
 
     series = SphereSeriesModel if particles == "spheres" else SeriesModel
     try:
-        result = series(accuracy=1e-4).solve(radius, matrix, [inclusion])[0]
+        return ratio_of(series(accuracy=1e-4).solve(radius, matrix, [inclusion])[0])
     except (RuntimeError, ValueError):
         return None
-    if isinstance(result, HomogenisedSpheres):
-        return spheres.shear_ratio(result)
-    stiffness = np.asarray(result.stiffness)
-    return shear_ratio(stiffness), error_of_ratio(result, shear_ratio)
 
 
 def directions(result: Homogenised) -> Document | None:
@@ -226,7 +222,7 @@ def directions(result: Homogenised) -> Document | None:
         "angle_deg": DIRECTIONS,
         "young_GPa": young / GPA,
         "shear_GPa": shear / GPA,
-        "shear_ratio": shear_ratio(result.stiffness),
+        "shear_ratio": ratio_of(result)[0],
     }
 
 
@@ -263,7 +259,7 @@ def declared_errors(result: Homogenised) -> Document | None:
         found["directions"] = {
             "young_GPa": young,
             "shear_GPa": shear,
-            "shear_ratio": error_of_ratio(result, shear_ratio),
+            "shear_ratio": ratio_of(result)[1],
         }
     return found
 

@@ -11,6 +11,7 @@ from alphacut.case.case import Case
 from alphacut.case.checks_material import taking_spheres
 from alphacut.io.files import Document
 from alphacut.io.units import fixed
+from alphacut.rve.anisotropy import ratio_of
 from alphacut.rve.bounds import mori_tanaka as of_cylinders
 from alphacut.rve.cell import STRAIN, Phase
 from alphacut.rve.result import effective_modulus
@@ -18,7 +19,6 @@ from alphacut.rve.spheres.bounds import mori_tanaka as of_spheres
 from alphacut.rve.spheres.cubic import cubic_voigt, hill_average, young_along
 from alphacut.rve.spheres.result import HomogenisedSpheres
 from alphacut.stochastic.particles.csv_columns import has_places
-from alphacut.stochastic.theta.truncated_normal import Array
 
 GPA = 1e9
 WORDS = re.compile(
@@ -46,7 +46,7 @@ def moduli(result: HomogenisedSpheres) -> Document:
         "K_GPa": bulk,
         "G_GPa": [shear, deviator],
         "C_GPa": np.asarray(result.stiffness) / GPA,
-        "shear_ratio": shear_ratio(result)[0],
+        "shear_ratio": ratio_of(result)[0],
     }
 
 
@@ -69,18 +69,9 @@ def declared_errors(result: HomogenisedSpheres) -> Document | None:
         "K_GPa": bulk,
         "G_GPa": [shear, deviator],
         "C_GPa": result.error_of(lambda values: cubic_voigt(*values)) / GPA,
-        "shear_ratio": shear_ratio(result)[1],
+        "shear_ratio": ratio_of(result)[1],
         "curve": None,
     }
-
-
-def shear_ratio(result: HomogenisedSpheres) -> tuple[float, float]:
-    """(C11 − C12)/(2 C44) and its declared error."""
-
-    def ratio(values: Array) -> float:
-        return float(values[1] / values[2])
-
-    return ratio(result.moduli), float(result.error_of(ratio))
 
 
 def lines(result: HomogenisedSpheres) -> str:

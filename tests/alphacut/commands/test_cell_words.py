@@ -35,6 +35,15 @@ def test_the_cell_names_its_strains_and_its_anisotropy(capfd):
     assert not err
 
 
+@pytest.mark.parametrize("method", ["series", "slices"])
+def test_the_shear_ratio_has_one_error_on_the_screen_and_in_the_export(method, tmp_path, capfd):
+    file = tmp_path / "card.json"
+    assert main(["cell", PAPER, "--method", method, "--export", str(file)]) == 0
+    told = json.loads(file.read_text(encoding="utf-8"))
+    value, error = told["shear_ratio"], told["declared_error"]["shear_ratio"]
+    assert f"shear_ratio = {value:.4f} ± {error:.1e}: " in capfd.readouterr().out
+
+
 @pytest.mark.parametrize("command", ["cell", "modulus"])
 def test_the_isotropic_average_takes_the_place_of_eq_16_where_the_case_says_so(command, capfd):
     """Hill's average of both shear moduli; at 19 % between them E is 9 % higher or so."""
