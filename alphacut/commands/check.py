@@ -16,6 +16,7 @@ from alphacut.io.problem import BadInput
 from alphacut.stages.image.phases import BEYOND, phase_lines
 from alphacut.stages.image.reading import study_of
 from alphacut.stages.material.microstructure import plan
+from alphacut.stages.material.modulus import measured_line
 from alphacut.stages.readiness import motion, ready
 
 ABOUT = (
@@ -38,7 +39,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         problems = [asdict(problem) for problem in error.problems]
         answer(options, {"case": options.case, "ok": False, "problems": problems}, out)
         raise
-    inputs, plans = list(readings(case)), list(plan(case))
+    inputs, plans = list(readings(case)), [*measured_line(case), *plan(case)]
     if "image" in case.stages:
         plans += [*phase_lines(study_of(case)), BEYOND[case.picture.boundary]]
     plans += [] if found.structure is None else motion(case, found.structure)
@@ -57,17 +58,15 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     for warning in warnings:
         say(warning)
     if options.json != "-" and not options.quiet:
-        out.writelines(
-            f"{line}\n" for line in (*inputs, *plans, verdict(options.case, case, found.period))
-        )
+        lines = (*inputs, *plans, verdict(options.case, case, found.period))
+        out.writelines(f"{line}\n" for line in lines)
     return 0
 
 
 def verdict(name: str, case: Case, period: float | None) -> str:
     """The last line: that nothing is wrong, what would run, and the first natural period."""
     computed = {"modulus", "image"} & set(case.stages)  # the modulus is yet to be had
-    about = "about " if computed else ""
-    first = f"; first natural period {about}{period:.3g} s" if period else ""
+    first = f"; first natural period {'about ' * bool(computed)}{period:.3g} s" if period else ""
     passed = computed and case.sections.frame and case.frame.modulus is not None
     over = "; frame.modulus is passed over, stage modulus hands its own on" if passed else ""
     return f"{name}: no problems; stages {', '.join(case.stages)}; {case.top.title}{first}{over}"

@@ -154,8 +154,7 @@ def _by_axes(dataset: xarray.Dataset) -> Iterator[tuple[tuple[str, ...], xarray.
     for name, variable in dataset.data_vars.items():
         if variable.dims:
             groups.setdefault(tuple(map(str, variable.dims)), []).append(str(name))
-    for axes, names in groups.items():
-        yield axes, dataset[names]
+    yield from ((axes, dataset[names]) for axes, names in groups.items())
 
 
 def _csv(part: xarray.Dataset) -> str:

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable
 from decimal import Decimal
 from functools import cache
+from statistics import median
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -197,6 +198,13 @@ def engineering(value: float, si: str, *, digits: int = 4, beside: float = 0.0) 
     places = max(0, digits - 1 - math.floor(math.log10(abs(scaled)))) if scaled else 0
     number = f"{scaled:.{places}f}" if places < digits + 3 else f"{scaled:.{digits}g}"
     return f"{number} {PREFIXES[exponent]}{si}".replace("-", MINUS)
+
+
+def span(values: Iterable[float], unit: str) -> str:
+    """Least and greatest of values in SI, and the median of more than two, in words."""
+    told = sorted(map(float, values))
+    ends = [engineering(x, unit) for x in (told[0], median(told), told[-1])]
+    return f"from {ends[0]} to {ends[2]}" + f", median {ends[1]}" * (len(told) > 2)
 
 
 def fixed(value: float, places: int) -> str:

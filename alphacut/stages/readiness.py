@@ -18,6 +18,7 @@ from alphacut.stages.image.phases import contradicted
 from alphacut.stages.image.reading import expected_modulus, study_of
 from alphacut.stages.material import modulus, spheres
 from alphacut.stages.material.cell import cell_phases, modal_parts, phases_of
+from alphacut.stages.material.microstructure import dense_remark, require_readable
 from alphacut.stages.material.references import mean_share
 from alphacut.stages.vibration import envelope, update
 from alphacut.stages.vibration.accelerogram import cut_short
@@ -59,8 +60,6 @@ def ready(case: Case) -> Readiness:
     """
     dense: tuple[str, ...] = ()
     if "microstructure" in case.stages:
-        from alphacut.stages.material.microstructure import dense_remark, require_readable
-
         require_readable(case)
         dense = tuple(dense_remark(case))
     if "image" in case.stages:
@@ -186,10 +185,9 @@ def parted_modulus(case: Case) -> Iterator[Problem]:
 def lacking(case: Case) -> Iterator[Problem]:
     """A frame needs a modulus from somewhere."""
     given = case.sections.frame
-    computed = {"modulus", "image"} & set(case.stages)
     if given is None or given.stiffness is not None:
         return
-    if given.modulus is None and not computed and not case.stand_ins:
+    if given.modulus is None and not ({"modulus", "image"} & set(case.stages) or case.stand_ins):
         what = (
             "missing; stage envelope needs a modulus: give frame.modulus, modulus.value or"
             ' modulus.measured, or compute one with stages = ["modulus", "envelope"]'

@@ -109,13 +109,10 @@ class FuzzyImage:
     def grains(self) -> tuple[float, float]:
         """Hashin–Shtrikman interval of E of grains, over the inputs at the highest level, in Pa."""
         study, level = self.study, self.study.alpha[-1]
-        shares = [np.bincount(x.ravel(), minlength=len(study.pairs)) for x in study.ranges(level)]
+        counts = [np.bincount(x.ravel(), minlength=len(study.pairs)) for x in study.ranges(level)]
+        shares = [list(count / count.sum()) for count in counts]
         low, high = (
-            [
-                grain_modulus(list(f / f.sum()), m, m)[end]
-                for m in study.corners(level, end)
-                for f in shares
-            ]
+            [grain_modulus(f, m, m)[end] for m in study.corners(level, end) for f in shares]
             for end in (0, 1)
         )
         return min(low), max(high)
@@ -199,8 +196,7 @@ def _computed(study: ImageStudy, progress: Tick | None, kept: Path | None) -> Fu
         say(f"{pixels}, the first took {first:.0f} s, all about {count * first:.0f} s or more")
     random = None if study.random is None else responses(study, model, study.random)
     if random is not None:
-        cuts = random.cuts
-        width = random.width
+        cuts, width = random.cuts, random.width
     else:
         levels = [study.images(level, level) for level in study.alpha]
         cuts = tuple(model.cuts(levels, (modal, crisp)))

@@ -248,19 +248,13 @@ def declared_errors(result: Homogenised) -> Document | None:
         "curve": None,
     }
     if result.curve.error is not None:
-        first, second = result.curve.error.T
-        found["curve"] = {
-            "s11": first * result.curve.s11 / GPA,
-            "s12": second * result.curve.s12 / GPA,
-        }
+        first, second = result.curve.error.T / GPA
+        found["curve"] = {"s11": first * result.curve.s11, "s12": second * result.curve.s12}
     if result.stiffness is not None:
         young, shear = error_of_stiffness(result, _over_directions) / GPA
         found["stiffness_GPa"] = error_of_stiffness(result, np.asarray) / GPA
-        found["directions"] = {
-            "young_GPa": young,
-            "shear_GPa": shear,
-            "shear_ratio": ratio_of(result)[1],
-        }
+        ratio = ratio_of(result)[1]
+        found["directions"] = {"young_GPa": young, "shear_GPa": shear, "shear_ratio": ratio}
     return found
 
 

@@ -21,9 +21,8 @@ from alphacut.io.files import as_json, say, write_text
 from alphacut.io.netcdf import write_dataset
 from alphacut.io.problem import BadInput
 from alphacut.io.progress import Tick
-from alphacut.io.units import engineering
+from alphacut.io.units import engineering, span
 from alphacut.stages.material.micrograph import crop_of, fractions
-from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     from alphacut.stochastic.microstructure import Microstructure, Study
@@ -56,19 +55,9 @@ def source(case: Case) -> Simulated | Measured | SpherePackings:
         )
         return Simulated(packing, wanted.packings)
     if circles := given.circles:
-        width, height = circles.size
-        x, y = circles.origin
-        return Measured(
-            CircleFile(
-                case.beside(circles.file),
-                (width, height),
-                (x, y),
-                unit=circles.unit,
-                overlap=circles.overlap,
-                periodic=circles.periodic,
-                drop=circles.drop,
-            )
-        )
+        (width, height), (x, y), path = circles.size, circles.origin, case.beside(circles.file)
+        own = {key: getattr(circles, key) for key in ("unit", "overlap", "periodic", "drop")}
+        return Measured(CircleFile(path, (width, height), (x, y), **own))
     photograph = given.image
     assert photograph is not None  # one of the three is there, or the case is refused
     file, pixel = case.beside(photograph.file), photograph.pixel
@@ -205,8 +194,8 @@ def plan(case: Case) -> Iterator[str]:
     wanted, given = source(case), case.microstructure
     if isinstance(wanted, Measured):
         if given.circles:
-            radii = wanted.file.read().discs.radii
-            yield f"microstructure.circles.file: {len(radii)} circles, {diameters(radii)}"
+            sizes = 2 * wanted.file.read().discs.radii
+            yield f"microstructure.circles.file: {len(sizes)} circles, diameters {span(sizes, 'm')}"
         elif isinstance(wanted.file, SectionImage):
             sides = wanted.file.pixel * np.array(wanted.file.material().shape)
             told = " × ".join(engineering(float(side), "m") for side in sides[::-1])
@@ -215,7 +204,7 @@ def plan(case: Case) -> Iterator[str]:
     law, packed = wanted.packing.radii, given.packing or given.spheres
     if packed is not None and packed.file:
         read = law.values if isinstance(law, MeasuredRadii) else (law.smallest, law.largest)
-        yield f"microstructure: {law.label}, {diameters(np.array(read))}"
+        yield f"microstructure: {law.label}, diameters {span(2 * np.array(read), 'm')}"
     if not isinstance(wanted, SpherePackings):
         return
     law = (packing := wanted.laws["the law"]).radii
@@ -230,13 +219,6 @@ def plan(case: Case) -> Iterator[str]:
             f"microstructure: the map also holds {len(wanted.laws) - 1} other laws that the"
             f" circles leave possible; {wanted.section.unknown}"
         )
-
-
-def diameters(radii: Array) -> str:
-    """Least, middle and greatest diameter of radii in m."""
-    ends = [engineering(2 * float(np.quantile(radii, share)), "m") for share in (0, 0.5, 1)]
-    middle = f", median {ends[1]}" if len(radii) > 2 else ""
-    return f"diameters from {ends[0]} to {ends[2]}{middle}"
 
 
 def compute(

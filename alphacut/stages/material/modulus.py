@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -24,6 +25,7 @@ from alphacut.io.netcdf import read_dataset, write_dataset
 from alphacut.io.problem import BadInput
 from alphacut.io.progress import Tick
 from alphacut.io.provenance import attributes, versions
+from alphacut.io.units import span
 from alphacut.stages.material.campaign import Campaign, theta_shown
 from alphacut.stages.material.cell import GPA, POSITIVE, CellChoice, anisotropy, parts
 from alphacut.stages.material.cell_models import cell_model
@@ -345,13 +347,19 @@ def read_number(path: Path | str, option: str = "--modulus", *, warn: bool = Tru
 def stand_in(case: Case) -> FuzzyNumber | None:
     """Modulus in Pa that the case gives; None if it gives none."""
     given = case.sections.modulus
-    if given is None:
-        return None
-    if given.value is not None:
-        return given.value
+    if given is None or given.value is not None:
+        return given.value if given else None
     if given.file is not None:
         return read_number(case.beside(given.file), "modulus.file")
     return None if given.measured is None else measured_modulus(case, given.measured)
+
+
+def measured_line(case: Case) -> Iterator[str]:
+    """A line on the measured moduli as they were read."""
+    given = case.sections.modulus
+    if given is not None and given.measured is not None:
+        values = measured_values(case.beside(given.measured))
+        yield f"modulus.measured: {len(values)} values {span(values, 'Pa')}"
 
 
 HEADER = "E [GPa]"

@@ -64,7 +64,7 @@ class References:
 
     def document(self) -> Document:
         """In GPa."""
-        ends = {name: getattr(self, name) for name in ("fibres", "spheres")}
+        ends = {name: getattr(self, name) for name in KINDS}
         return {
             "fraction": self.fraction,
             **{
@@ -77,9 +77,7 @@ class References:
             "isotropic_average_E_GPa": None if self.average is None else self.average / GPA,
             "across": self.across
             and {
-                name if name == "nu_LT" else f"{name}_GPa": value
-                if name == "nu_LT"
-                else value / GPA
+                name if (bare := name == "nu_LT") else f"{name}_GPa": value if bare else value / GPA
                 for name, value in self.across.items()
             },
         }

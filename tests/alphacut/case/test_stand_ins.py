@@ -74,6 +74,22 @@ def test_measured_values_stand_in(tmp_path):
     assert normal.cut(0.05).width < 3e9
 
 
+def test_check_tells_how_measured_values_were_read(tmp_path, capfd):
+    (tmp_path / "cores.csv").write_text("E [GPa]\n24.1\n25.2\n23.9\n", encoding="utf-8")
+    written = 'measured = "cores.csv"\nbounds = "[10, 60] GPa"'
+    assert main(["check", str(with_modulus(tmp_path, written))]) == 0
+    line = "modulus.measured: 3 values from 23.90 GPa to 25.20 GPa, median 24.10 GPa\n"
+    assert line in capfd.readouterr().out
+
+
+def test_a_missing_file_of_a_case_by_its_bare_name_names_the_folder(tmp_path, capfd, monkeypatch):
+    with_modulus(tmp_path, 'measured = "cores.csv"')
+    monkeypatch.chdir(tmp_path)
+    (case,) = tmp_path.glob("*.toml")
+    assert main(["check", case.name]) == 2
+    assert f"a path from the case's folder, {tmp_path}" in capfd.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("written", "pattern"),
     [
