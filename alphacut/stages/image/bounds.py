@@ -125,11 +125,20 @@ class FuzzyImage:
         return reduced_to_pixels(pixels, self.model.parts)
 
 
-def solutions(study: ImageStudy) -> int:
-    """Pairs of solutions for bounds: at the modal values, on levels, and for each fuzzy source."""
+TILED, WHOLE = 1.4, 2.2  # times of pairs of tiles and of a window over that of a periodic image
+
+
+def solutions(study: ImageStudy) -> tuple[int, float]:
+    """Pairs of solutions for bounds, and their time over that of the first, which is periodic.
+
+    They are at the modal values, on levels, and for each fuzzy source.
+    """
     sources = study.fuzzy_threshold + study.fuzzy_phases
-    window = study.model.boundary == "window"
-    return 1 + (len(study.alpha) + sources if sources else 0) + (2 + bool(sources)) * window
+    cuts = len(study.alpha) + sources if sources else 0
+    if study.model.boundary == "periodic":
+        return 1 + cuts, 1.0 + cuts
+    tiled, whole = max(cuts, 1) + 1, 1 + bool(sources)
+    return 1 + tiled + whole, 1 + TILED * tiled + WHOLE * whole
 
 
 def apparent(study: ImageStudy, model: ImageModel) -> tuple[tuple[float, float], ...]:
@@ -143,8 +152,8 @@ def apparent(study: ImageStudy, model: ImageModel) -> tuple[tuple[float, float],
 class Told:
     """Progress of some pairs of solutions: by what is done, and within one by the time spent."""
 
-    def __init__(self, tick: Tick, count: int) -> None:
-        self.tick, self.count = tick, count
+    def __init__(self, tick: Tick, work: float) -> None:
+        self.tick, self.work = tick, work
         self.began, self.first, self.share = perf_counter(), math.inf, 0.0
 
     @property
@@ -159,7 +168,7 @@ class Told:
 
     def still(self) -> None:
         """Tell that a solution goes on; the time of the first one tells how far the others are."""
-        self.tick(max(self.share, min(self.seconds / self.first / self.count, 0.99)))
+        self.tick(max(self.share, min(self.seconds / self.first / self.work, 0.99)))
 
 
 def compute(
@@ -179,21 +188,21 @@ def compute(
 
 
 def _computed(study: ImageStudy, progress: Tick | None, kept: Path | None) -> FuzzyImage:
-    modal, count = study.images(None, None), solutions(study)
-    told = Told(progress or (lambda share: None), count)
+    modal, (count, work) = study.images(None, None), solutions(study)
+    told = Told(progress or (lambda share: None), work)
     pixels = f"image of {modal.bulk[0].size} pixels: {count} pairs of solutions"
     several = progress is not None and count > 1 and study.random is None
-    if several and modal.bulk[0].size * count > MANY:
+    if several and modal.bulk[0].size * work > MANY:
         say(f"{pixels}, or more where pixels are divided: this may take minutes")
     watched = replace(study.model.solver, watch=told.still, kept=kept)
     start = replace(study.model, solver=watched)
     if study.random is not None:  # many images: pixels are divided only where that is asked for
         start = replace(start, division=start.parts)
     model, crisp = start.refined(modal)
-    told.done(0.3 if study.random is not None else 1 / count)
+    told.done(0.3 if study.random is not None else 1 / work)
     told.first = first = told.seconds
     if several:
-        say(f"{pixels}, the first took {first:.0f} s, all about {count * first:.0f} s or more")
+        say(f"{pixels}, the first took {first:.0f} s, all about {work * first:.0f} s or more")
     random = None if study.random is None else responses(study, model, study.random)
     if random is not None:
         cuts, width = random.cuts, random.width

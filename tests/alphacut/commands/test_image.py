@@ -9,12 +9,15 @@ import pytest
 import xarray
 from markupsafe import Markup
 
+from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.io.problem import BadInput
 from alphacut.report import material
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
+from alphacut.rve.image.model import ImageModel
 from alphacut.stages.image import bounds
 from alphacut.stages.image.bounds import Told
+from alphacut.stages.image.reading import study_of
 
 HEAD = 'schema = 1\ntitle = "t"\nabout = "a"\nstages = ["image"]\n'
 IMAGE = {
@@ -93,6 +96,28 @@ def test_the_cost_of_fuzzy_phases_is_told_before_and_nu_with_the_bounds_after(
     assert "Hashin–Shtrikman bounds of E if the particles are grains: [" in told.out
     assert main(["image", written(folder, threshold="[130]")]) == 0
     assert "pairs of solutions" not in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("threshold", "pairs", "work"), [("[130]", 4, 6), ("[[80, 130, 190]]", 7, 11)]
+)
+def test_the_foretold_time_counts_tiles_and_the_window_by_what_they_take(
+    threshold, pairs, work, folder, monkeypatch
+):
+    """Three tilings of a certain image took 5.3 times as long as the first solution, 256 pixels."""
+    solved, tiling = [], ImageModel.tiling
+    monkeypatch.setattr(
+        ImageModel, "tiling", lambda *given: solved.append(given[2]) or tiling(*given)
+    )
+    changes = {"threshold": threshold, "boundary": '"window"', "tiles": "2"}
+    study = study_of(load(written(folder, **changes)))
+    counted, time = bounds.solutions(study)
+    bounds.compute(study)
+    assert counted == 1 + len(solved) == pairs
+    assert time == pytest.approx(
+        1 + bounds.TILED * solved.count(2) + bounds.WHOLE * solved.count(1)
+    )
+    assert time == pytest.approx(work, abs=0.6)
 
 
 def test_bulk_and_shear_moduli_say_the_same_as_young_and_poisson(folder, capfd):
