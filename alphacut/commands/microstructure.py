@@ -55,7 +55,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         )
     section = fragment(found)
     document = {**summary(found), "fragment": section, "files": written, "versions": versions()}
-    for remark in (*microstructure.left_out(found), *microstructure.given_sizes(case)):
+    for remark in microstructure.findings(case, found):
         say(remark)
     if answer(options, document, out, section):
         advise(section, options.out)

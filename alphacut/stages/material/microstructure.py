@@ -248,9 +248,16 @@ def compute(
         except ValueError as error:
             raise BadInput.of("microstructure", str(error), file=str(case.path)) from None
     if not quiet:
-        for remark in (*left_out(found), *given_sizes(case), *crisp_slopes(fragment(found))):
+        for remark in (*findings(case, found), *crisp_slopes(fragment(found))):
             say(remark)
     return found
+
+
+def findings(case: Case, found: Microstructure | SphereMicrostructure) -> Iterator[str]:
+    """Lines on what was found, without what `dense_remark` has told before, and on given sizes."""
+    before = "\n".join(dense_remark(case))
+    yield from (line for line in left_out(found) if line.removeprefix("warning: ") not in before)
+    yield from given_sizes(case)
 
 
 LEFT_OUT = 0.1  # share of the spheres' volume without a cubic cell, above which it is warned of

@@ -104,6 +104,21 @@ def test_check_foretells_how_many_spheres_a_list_needs(tmp_path, capfd):
         assert "too large for cubes of 20000; the largest, of radius 0.05 m, need" in line
 
 
+@pytest.mark.parametrize("command", ["microstructure", "run"])
+def test_a_raised_number_of_spheres_is_told_once(command, tmp_path, capfd):
+    changes = [
+        f'{SMALL[-1].partition("=")[0]}="14 mm"',
+        "--no-figures",
+        "--out",
+        str(tmp_path / "out"),
+    ]
+    changes += ["--set", 'stages=["microstructure"]'] * (command == "run")
+    assert main([command, str(CASE), *SMALL[:-1], *changes]) == 0
+    assert capfd.readouterr().err.count("spheres or more are packed") == 1
+    found = json.loads((tmp_path / "out" / "microstructure.json").read_text(encoding="utf-8"))
+    assert any("spheres or more are packed" in remark for remark in found["remarks"])
+
+
 SPHERES = "microstructure.spheres"
 
 
