@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from alphacut.frame.envelope import error_name
 from alphacut.frame.structures.quantities import Output
-from alphacut.io.files import say, write_text
+from alphacut.io.files import as_json, say, write_text
 from alphacut.io.netcdf import read_dataset
+from alphacut.io.provenance import digest
 from alphacut.stages.material.modulus import listed
 from alphacut.stages.vibration import exceedance as outcomes
 from alphacut.stages.vibration.decision import decision_document
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     import xarray
 
 BY_OUTPUT = "SI, by output"
+KEPT = ".kept.json"  # digests of the tables that a report wrote into a folder, by name
 MOST = 500_000  # rows of a table; spreadsheets end at twice that
 LIMIT = {"limit value": "limit", "limit unit": "unit"}
 OF_LIMIT = LIMIT | {"verdict": "verdict", "nature": "nature", "between nodes": "between_nodes"}
@@ -33,7 +36,8 @@ def write_tables(results: Iterable[Path], folder: Path) -> list[Path]:
     An envelope gives a file for each output, a row for each node, and all envelopes together one
     of peaks. Of other results variables over the same axes share a file. Every column is named with
     its unit, or a column `unit` has it, and one says what the numbers are worth (`nature`). Numbers
-    have all their digits. A table of more than `MOST` rows is left out, which is said.
+    have all their digits. A table of more than `MOST` rows is left out, which is said. Tables that
+    an earlier report left there are removed, unless somebody changed them, which is said.
 
     Args:
         results: The NetCDF files.
@@ -64,10 +68,24 @@ def write_tables(results: Iterable[Path], folder: Path) -> list[Path]:
             tables[name] = _csv(part)
     if len(peaks) > 1:
         tables["peaks"] = "\n".join([*peaks, ""])
-    made = {folder / f"{name}.csv": text for name, text in tables.items()}
-    for file, text in made.items():
-        write_text(file, text)
-    return list(made)
+    sweep(folder, {f"{name}.csv": digest(text) for name, text in tables.items()})
+    for name, text in tables.items():
+        write_text(folder / f"{name}.csv", text)
+    return [folder / f"{name}.csv" for name in tables]
+
+
+def sweep(folder: Path, digests: Mapping[str, str]) -> None:
+    """Remove tables that an earlier report wrote and this one does not; note what this one does."""
+    told: dict[str, str] = {}
+    with suppress(OSError, ValueError, TypeError):
+        told = dict(json.loads((folder / KEPT).read_text(encoding="utf-8")))
+    old = [folder / Path(name).name for name in told if name not in digests]
+    for file in filter(Path.is_file, old):
+        if digest(file.read_bytes().decode(errors="replace")) == told[file.name]:
+            file.unlink()
+        else:
+            say(f"{file} is of an earlier report and stays, since it was changed")
+    write_text(folder / KEPT, as_json(digests))
 
 
 PEAKS = (
@@ -125,10 +143,9 @@ def _peaks(study: str, dataset: xarray.Dataset) -> Iterator[str]:
         one = dataset.sel(output=name)
         for level in one["alpha"].values:
             at = one.sel(alpha=level)
-            low, high = (float(at["peak"].sel(bound=side)) for side in ("lower", "upper"))
-            more = [float(at[x]) if x in at else None for x in ("peak_tried", "peak_error")]
-            numbers = (float(level), low, more[0], high, more[1])
-            cells = ["" if x is None else repr(x) for x in numbers]
+            low, high = (repr(float(at["peak"].sel(bound=x))) for x in ("lower", "upper"))
+            more = [repr(float(at[x])) if x in at else "" for x in ("peak_tried", "peak_error")]
+            cells = (repr(float(level)), low, more[0], high, more[1])
             nature = str(dataset.attrs.get("nature", ""))
             yield ",".join([study, name, Output(name).unit, *cells, nature])
 
@@ -138,13 +155,11 @@ def _curves(dataset: xarray.Dataset) -> str:
     rows = ["place,output,limit,unit,alpha,lower,upper,nature"]
     for one in outcomes.events(dataset):
         output, nature = one.attrs["output"], one.attrs.get("nature", "")
-        curve = one["curve"].transpose("limit", "alpha", "bound").values
+        unit, curve = outcomes.event_unit(output), one["curve"].transpose("limit", "alpha", "bound")
         for place, limit in enumerate(one["limit"].values):
-            for level, ends in zip(one["alpha"].values, curve[place], strict=True):
-                numbers = [repr(float(x)) for x in (level, *ends)]
-                unit = outcomes.event_unit(output)
-                row = [str(place), output, repr(float(limit)), unit, *numbers, f'"{nature}"']
-                rows.append(",".join(row))
+            for level, ends in zip(one["alpha"].values, curve.values[place], strict=True):
+                limited, *told = (repr(float(x)) for x in (limit, level, *ends))
+                rows.append(",".join([str(place), output, limited, unit, *told, f'"{nature}"']))
     return "\n".join([*rows, ""])
 
 
@@ -169,9 +184,8 @@ def _csv(part: xarray.Dataset) -> str:
         table["unit"] = [Output(str(name)).unit for name in outputs]
         names.append("unit")
     names += [str(name) for name in part.coords if name not in names]
-    units = {name: part[name].attrs.get("units", "") if name in part else "" for name in names}
-    kept = table[[name for name in names if name in table]]
     bare = ("", "1", *((BY_OUTPUT,) if "unit" in table else ()))
-    titles = [f"{name} [{units[name]}]" if units[name] not in bare else name for name in kept]
-    text: str = kept.set_axis(titles, axis=1).to_csv(index=False)
-    return text
+    units = {x: part[x].attrs.get("units", "") for x in names if x in part}
+    titles = {x: f"{x} [{unit}]" for x, unit in units.items() if unit not in bare}
+    kept = table[[name for name in names if name in table]].rename(columns=titles)
+    return str(kept.to_csv(index=False))

@@ -161,8 +161,8 @@ def test_a_row_of_a_curve_of_probabilities_says_of_which_limit_it_is(tmp_path):
     assert list(rows[-1].values()) == told
 
 
-def test_results_of_an_earlier_case_are_left_out(tmp_path):
-    """A section removed, a study by another name, and the modulus of another case."""
+def test_results_of_an_earlier_case_are_left_out(tmp_path, capfd):
+    """Or removed from the folder of tables. A section removed, a study by another name, and the modulus of another case."""
     case, out, limits = tmp_path / "case.toml", tmp_path / "out", '["q1 <= 1 m"]'
     text = one_floor(fuzzy='["m1"]', duration=1, step=0.01, mass="1 t ± 5 %", moved="10 mm")
     run = ["run", str(case), "--no-figures", "--quiet", "--out", str(out)]
@@ -175,8 +175,15 @@ def test_results_of_an_earlier_case_are_left_out(tmp_path):
     case.write_text(text, encoding="utf-8")
     assert main(run) == 0
     assert main([*report, str(tmp_path / "later")]) == 0
-    first, later = ({x.name for x in (tmp_path / at).iterdir()} for at in ("first", "later"))
+    first, later = ({x.name for x in (tmp_path / at).glob("*.csv")} for at in ("first", "later"))
     assert later == {f"envelope_all-{x}.csv" for x in ("q1", "v1", "attained")} | {"peaks.csv"}
     assert {name.partition("-")[0] for name in first - later} == {"decision.csv", "decision"}
     with (tmp_path / "later" / "peaks.csv").open(encoding="utf-8") as file:
         assert {row["study"] for row in csv.DictReader(file)} == {"all"}
+    (tmp_path / "first" / "mine.csv").write_text("a,b\n", encoding="utf-8")
+    changed = sorted(name for name in first if name.startswith("decision"))[0]
+    (tmp_path / "first" / changed).write_text("a,b\n", encoding="utf-8")
+    capfd.readouterr()
+    assert main([*report, str(tmp_path / "first")]) == 0
+    assert {x.name for x in (tmp_path / "first").glob("*.csv")} == later | {"mine.csv", changed}
+    assert f"{changed} is of an earlier report and stays, since" in capfd.readouterr().err
