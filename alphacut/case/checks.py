@@ -200,7 +200,7 @@ def files(case: Case) -> Iterator[Problem]:
         for key, name in files_of(found) if found else ():
             if not (path := case.beside(name)).is_file():
                 what = "this is a folder" if path.is_dir() else "there is no such file"
-                cure = hint(path) or f"a path from the case's folder, {case.path.parent}"
+                cure = hint(path) or f"a path from the case's folder, {case.path.absolute().parent}"
                 yield Problem(f"{section}.{key}", what, name, cure)
 
 

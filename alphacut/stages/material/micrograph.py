@@ -69,6 +69,7 @@ def fractions(found: Microstructure, fraction: float) -> Iterator[str]:
             "for E of fibres at the image's own fraction, pack these circles:"
             f' [microstructure.packing] file = "circles.csv", area_fraction = {fraction:.4f},'
             ' discs = 2000, in place of [microstructure.image], and cell.particles = "cylinders"'
+            "; the stage writes them beside radius.toml: put its folder before their name"
         )
     if abs(taken / fraction - 1) > FALLEN:
         yield (

@@ -265,7 +265,8 @@ def test_circles_over_the_image_and_the_notes_of_a_run_stand_in_its_report(tmp_p
     assert "the edge, and what is not round, leave 0." in told
     whole = found["microstructure"]["area_fraction_of_image"]
     assert f"pack these circles: [microstructure.packing] {keys(whole)}, in place of" in cure
-    assert cure.endswith('[microstructure.image], and cell.particles = "cylinders"')
+    assert '[microstructure.image], and cell.particles = "cylinders"; the stage writes' in cure
+    assert cure.endswith("beside radius.toml: put its folder before their name")
     packing = f"[microstructure.packing]\n{keys(whole)}\n".replace(", ", "\n")
     cell = '[cell]\nparticles = "cylinders"'
     text = re.sub(r"\[microstructure\.image\].*\[cell\]", packing + cell, IMAGE, flags=re.DOTALL)
