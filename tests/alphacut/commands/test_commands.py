@@ -391,7 +391,7 @@ SHIPPED = [path for path in sorted(CASES.glob("*.toml")) if not path.stem.endswi
 
 
 # cases whose figures are of the kinds that others draw
-DRAWN_ELSEWHERE = ("concrete", "paper-literal", "building", "spheres", "tower")
+DRAWN_ELSEWHERE = ("paper", "concrete", "paper-literal", "building", "spheres", "tower")
 VARIANTS = ("concrete", "paper-literal")  # of the paper's case, run in the slow tests
 
 

@@ -72,7 +72,9 @@ def test_a_coarse_tolerance_warns_and_is_refused_under_strict(capfd):
     assert capfd.readouterr().err == ""  # that method has no tolerance
 
 
-@pytest.mark.parametrize("name", ["paper", "building", "tower", "pendulum"])
+@pytest.mark.parametrize(
+    "name", ["paper", "building", pytest.param("tower", marks=pytest.mark.slow), "pendulum"]
+)
 def test_shipped_cases_and_their_quick_forms_are_not_rough(name):
     assert ready(load(CASES / f"{name}.toml")).rough == ()
     assert ready(quick(load(CASES / f"{name}.toml"))).rough == ()
