@@ -58,6 +58,14 @@ def shared_numbers(domain: Domain) -> tuple[str, ...]:
     )
 
 
+def wider_steps(domain: Domain) -> tuple[str, ...]:
+    """Note on levels at which a cut stands for a narrower one that is not known."""
+    pairs = zip(domain.alpha, domain.exact, strict=True)
+    between = ", ".join(f"{level:g}" for level, exact in pairs if not exact)
+    what = "an input's cut is that of a level below, as its own is not known: bounds are that cut's"
+    return (f"at α = {between} {what}",) if between else ()
+
+
 def known_facts(known: object, names: Sequence[str]) -> Known:
     """Facts known of the model; none if not given.
 

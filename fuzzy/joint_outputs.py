@@ -95,8 +95,11 @@ def joint_outputs(
     unit = _directions(directions)
     margin = np.nan_to_num(found.error) + np.abs(unit) @ error
     outer, inner = [], []
+    exact = np.flatnonzero(found.domain.exact)
     for level in range(len(found.domain.alpha)):
-        reached = np.vstack([found.lower_at[level], found.upper_at[level]])
+        above = exact[exact >= level]  # what is reached in wider cuts tells nothing
+        ends = [at[k] for k in above[:1] for at in (found.lower_at, found.upper_at)]
+        reached = np.vstack(ends or [found.domain.modal])
         pairs = [turned.pair(dict(zip(found.domain.names, row, strict=True))) for row in reached]
         inner.append(_shrunk(_hull(np.array(pairs)), np.array(error)))
         own = margin[level]

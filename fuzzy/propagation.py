@@ -17,6 +17,7 @@ from alphacut.fuzzy.arguments import (
     require_callable,
     require_plan,
     shared_numbers,
+    wider_steps,
 )
 from alphacut.fuzzy.campaign.call import Call, Function
 from alphacut.fuzzy.campaign.campaign import Campaign
@@ -121,7 +122,8 @@ def propagate(
     if doubt:
         warnings.warn(doubt, stacklevel=2)
     own = filter(None, (TORN if samples is not None and samples.torn else "", doubt))
-    result = replace(result, notes=(*result.notes, *shared_numbers(domain), *own))
+    noted = (*shared_numbers(domain), *wider_steps(domain), *own)
+    result = replace(result, notes=(*result.notes, *noted))
     cost = {"calls": campaign.calls, "reused": campaign.reused, "seconds": perf_counter() - start}
     return replace(result, **cost)  # type: ignore[arg-type]
 

@@ -9,8 +9,7 @@ them, and may be more necessary than each.
 
 from __future__ import annotations
 
-from bisect import bisect_right
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -27,7 +26,6 @@ from alphacut.fuzzy.arguments import fuzzy_inputs
 from alphacut.fuzzy.counted import ranged
 from alphacut.fuzzy.knowledge.joint import JointClaim, joined_once
 from alphacut.fuzzy.progress_bar import Progress
-from alphacut.fuzzy.sets.stepwise import Stepwise
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +100,11 @@ def exceeding(
         return cuts[:, 0], cuts[:, 1]
 
     proof = partial(safe_scale, frame, nominal, reach, limits, duration=duration, step=step)
-    necessity, sampled, known = (0.0, 0.0), "", partial(_known, numbers.values())
+    necessity, sampled = (0.0, 0.0), ""
+
+    def known(level: float) -> float:
+        return max(min([level, *(x.known(max(level, 0.0)) for x in numbers.values())]), 0.0)
+
     seek = partial(limit_search, frame, nominal, reach, limits, duration, step, failed)
     try:
         found = proof(most=most, workers=workers, progress=progress, failed=failed)
@@ -124,12 +126,6 @@ def exceeding(
         found = replace(found, nature="verified by sampling", reason=sampled)
     claim = str(JointClaim.of(numbers).resting_on(found.nature))
     return Exceeding((lower, upper), necessity, found, claim, lowest)
-
-
-def _known(numbers: Iterable[FuzzyNumber], level: float) -> float:
-    """How possible what lies in all cuts at a level is at least: steps may be around truer cuts."""
-    steps = [own for x in numbers if isinstance(own := getattr(x, "number", x), Stepwise)]
-    return max(min([level, *(x.alpha[bisect_right(x.alpha, level) - 1] for x in steps)]), 0.0)
 
 
 def _unknown(search: LimitSearch, why: str, claim: str, lowest: float) -> Exceeding:
@@ -160,4 +156,8 @@ def any_exceeding(each: Mapping[str, Exceeding], together: Exceeding | None = No
     least, high = (max(one.necessity[side] for one in each.values()) for side in (0, 1))
     if together is not None:
         least, high = max(least, together.necessity[0]), together.necessity[1]
-    return replace(most, possibility=(lower, upper), necessity=(least, high))
+    weak, others = most, [*each.values(), *([together] if together else [])]
+    if rank(most) != ((1.0, 1.0), True):  # where any limit may decide, the weakest proof counts
+        weak = next((one for one in others if one.scale.nature != "guaranteed"), most)
+    scale = replace(most.scale, nature=weak.scale.nature, reason=weak.scale.reason)
+    return Exceeding((lower, upper), (least, high), scale, weak.claim, most.lowest)

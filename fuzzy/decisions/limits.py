@@ -7,7 +7,7 @@ Theory, chapter 1). Inputs with claims make a bound of the possibility one of th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -211,9 +211,8 @@ def decide(
             found.append(threshold(family, judge, tolerance=tolerance, progress=tick))
             if tick:
                 tick(1.0)
-    below, *above = found
-    possible = _degree(below)
-    staying = [_degree(one) for one in above]
+    below = found[0]
+    possible, *staying = [_degree(one, domain.inputs.values()) for one in found]
     necessary = max(1 - high for _, high in staying), max(1 - low for low, _ in staying)
     ends = {name: whole.bounds(name) for name in limits}
     margin = {name: (limits[name] - high, limits[name] - low) for name, (low, high) in ends.items()}
@@ -255,11 +254,12 @@ def takes_arrays(
         return False
 
 
-def _degree(found: Threshold) -> tuple[float, float]:
+def _degree(found: Threshold, numbers: Iterable[FuzzyNumber]) -> tuple[float, float]:
     """Bounds of the possibility that a box of the cuts is left: of the highest α with a witness."""
     upper = 1.0 if found.safe is None else max(1 - found.safe, 0.0)
-    lower = 0.0 if found.witness is None else 1 - min(found.unsafe, 1.0)
-    return lower, upper
+    if found.witness is None:
+        return 0.0, upper
+    return min(number.known(1 - min(found.unsafe, 1.0)) for number in numbers), upper
 
 
 def safe_scale(

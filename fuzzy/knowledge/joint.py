@@ -85,11 +85,8 @@ def _widened(number: Claimed, rule: Joint) -> Claimed:
     last = np.flatnonzero(
         np.append(np.diff(level) > 0, True) & (level <= 1)
     )  # of equal levels the last cut
-    moved = Stepwise(
-        tuple(level[last]),
-        tuple(np.asarray(steps.lower)[last]),
-        tuple(np.asarray(steps.upper)[last]),
-    )
+    lower, upper = (tuple(np.asarray(ends)[last]) for ends in (steps.lower, steps.upper))
+    moved = Stepwise(tuple(level[last]), lower, upper, steps.outer)
     decided = float(rule.joined(np.asarray(number.decided)))
     return replace(number, number=moved, decided=decided, joint=rule)
 

@@ -54,6 +54,10 @@ class Expression(FuzzyNumber):
             )
         return cut
 
+    def known(self, alpha: float) -> float:
+        """Greatest level up to `alpha` whose cut is no wider than it is told."""
+        return min([alpha, *(number.known(alpha) for number in self.sources)])
+
     @property
     def cuts(self) -> Cuts:
         """Cuts at 65 levels, between which the membership is drawn straight."""

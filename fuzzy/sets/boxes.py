@@ -99,6 +99,12 @@ class Domain:
         return cuts[..., 0], cuts[..., 1]
 
     @property
+    def exact(self) -> list[bool]:
+        """Whether at each level no input's cut is wider than it is told."""
+        numbers = self.inputs.values()
+        return [all(one.known(level) == level for one in numbers) for level in self.alpha]
+
+    @property
     def linear(self) -> bool:
         """Whether the ends of every input's cut go straight from each level to the next."""
         return all(_straight(number, self.alpha) for number in self.inputs.values())

@@ -120,6 +120,10 @@ class Claimed(FuzzyNumber):
             )
         return self.number.cut(alpha)
 
+    def known(self, alpha: float) -> float:
+        """Greatest level up to `alpha` whose cut is no wider than it is told."""
+        return self.number.known(alpha)
+
     def __str__(self) -> str:
         low, high = self.cut(self.decided)
         ends = f"{low:.6g} … {high:.6g} at α = {self.decided:.4g}"

@@ -79,6 +79,10 @@ class FuzzyNumber(ABC):
             float(_interpolate(alpha, levels, lower)), float(_interpolate(alpha, levels, upper))
         )
 
+    def known(self, alpha: float) -> float:
+        """Greatest level up to `alpha` whose cut is no wider than it is told."""
+        return alpha
+
     def plot(self, axes: Axes | None = None, *, quantity: str = "p", name: str = "") -> Axes:
         """Draw the membership function (Fig. 36).
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +20,7 @@ class Stepwise(FuzzyNumber):
         alpha: Levels from which the cuts hold, rising from 0, at most 1.
         lower: Lower ends, not falling.
         upper: Upper ends, not rising.
+        outer: Whether truer cuts are narrower between the levels.
 
     Raises:
         ValueError: Lengths differ, levels do not rise from 0 within [0, 1], or cuts are not finite,
@@ -29,6 +30,7 @@ class Stepwise(FuzzyNumber):
     alpha: tuple[float, ...]
     lower: tuple[float, ...]
     upper: tuple[float, ...]
+    outer: bool = field(default=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         level, lower, upper = (
@@ -79,6 +81,10 @@ class Stepwise(FuzzyNumber):
         at = bisect_right(self.alpha, alpha) - 1
         return Cut(self.lower[at], self.upper[at])
 
+    def known(self, alpha: float) -> float:
+        """Greatest level up to `alpha` whose cut is no wider than it is told."""
+        return self.alpha[bisect_right(self.alpha, alpha) - 1] if self.outer else alpha
+
 
 def outer_steps(
     alpha: Sequence[float] | Array, lower: Sequence[float] | Array, upper: Sequence[float] | Array
@@ -91,4 +97,4 @@ def outer_steps(
         upper: Upper ends.
     """
     levels = (0.0, *(float(level) for level in alpha[1:]))
-    return Stepwise(levels, tuple(lower), tuple(upper))
+    return Stepwise(levels, tuple(lower), tuple(upper), outer=True)

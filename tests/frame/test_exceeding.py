@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -57,12 +58,13 @@ def test_one_limit_is_exceeded_as_possibly_as_is_known() -> None:
     assert "possibility of exceeding" in str(found)
 
 
-def test_between_known_levels_of_an_input_the_possibility_stays_open() -> None:
+@pytest.mark.parametrize("used", [lambda number: number, lambda number: 2.0 * number / 2.0])
+def test_between_known_levels_of_an_input_the_possibility_stays_open(used: Any) -> None:
     """Of m the cuts at 0, 0.5 and 1 are known, and the true ones between are rounder or straight."""
     limit = 0.5 * np.sqrt(1.1e3 / RIGIDITY)  # exceeded from m = 1100 on
     rounder = PiecewiseLinear((0, 0.5, 0.7, 1), (800, 850, 900, 1000), (1200, 1150, 1140, 1000))
     straight = PiecewiseLinear((0, 0.5, 1), (800, 850, 1000), (1200, 1150, 1000))
-    known = outer_steps((0.0, 0.5, 1.0), (800, 850, 1000), (1200, 1150, 1000))
+    known = used(outer_steps((0.0, 0.5, 1.0), (800, 850, 1000), (1200, 1150, 1000)))
     open_ = exceeding(ONE, {"m1": known}, {"q1": limit}, **TIME)
     for true in (rounder, straight):
         found = exceeding(ONE, {"m1": true}, {"q1": limit}, **TIME)
@@ -96,6 +98,9 @@ def test_one_proved_excess_proves_that_any_limit_is_passed() -> None:
     kept = replace(sampled, possibility=(0.0, 0.0), necessity=(0.0, 0.0))
     proved = replace(kept, scale=sure.scale)
     assert any_exceeding({"a": kept, "b": proved}).scale.nature == "verified by sampling"
+    half = replace(proved, possibility=(0.5, 0.5))
+    below = replace(kept, possibility=(0.2, 0.3))  # sampled: it may be passed more possibly
+    assert any_exceeding({"a": half, "b": below}).scale.nature == "verified by sampling"
 
 
 def test_a_smaller_box_or_a_wider_gap_may_have_a_proof_all_the_same() -> None:

@@ -10,6 +10,7 @@ import pytest
 from alphacut.frame import Exact, LinearFlow, StoreyFrame
 from alphacut.fuzzy import Automatic, BranchAndBound, Interval, QuasiMonteCarlo, Reduced, Triangular
 from alphacut.fuzzy.joint_outputs import Turned, joint_outputs
+from alphacut.fuzzy.sets.stepwise import outer_steps
 
 BOX = {"x": Interval(0.0, 2.0), "y": Interval(-1.0, 1.0)}
 
@@ -116,3 +117,12 @@ def test_the_plans_own_error_is_in_the_outer_polygon() -> None:
     error = np.nan_to_num(found.result.error[0])
     assert error.max() > 0
     assert found.margin[0] == pytest.approx(error)
+
+
+def test_pairs_reached_in_a_wider_cut_than_the_levels_own_are_not_inner() -> None:
+    """At 0.5 only the cut at 0 is known, around the true one, and at 0.75 none above."""
+    number = outer_steps((0.0, 0.6, 1.0), (0.0, 1.0, 2.0), (4.0, 3.0, 2.0))
+    found = joint_outputs(lambda x: (x, -x), {"x": number}, alpha=(0.0, 0.5, 0.6, 0.75))
+    reached = [float(np.ptp(corners[:, 0])) for corners in found.inner]
+    assert reached == pytest.approx([4.0, 2.0, 2.0, 0.0])
+    assert any("at α = 0.5, 0.75 an input's cut is that" in note for note in found.result.notes)

@@ -7,6 +7,7 @@ from alphacut.fuzzy import Triangular, from_data
 from alphacut.fuzzy.campaign.campaign import CampaignError
 from alphacut.fuzzy.decisions.limits import decide, safe_scale
 from alphacut.fuzzy.decisions.nested_boxes import Scaled, Verdict, threshold
+from alphacut.fuzzy.sets.stepwise import outer_steps
 
 X = Triangular(0, 1, 2)
 
@@ -182,3 +183,21 @@ def test_a_decision_names_the_limit_that_may_be_passed_and_its_margin():
     assert head.startswith("possible, not certain: possibility of exceeding 0.2, necessity 0;")
     assert a == "margin of a -0.2 … 1.8 at α = 0, so that its limit may be passed"
     assert b == "margin of b 3 … 5 at α = 0"
+
+
+@pytest.mark.parametrize("used", [lambda number: number, lambda number: number + 0.0])
+def test_a_number_known_at_few_levels_decides_no_more_than_they_do(used):
+    """A computed number's cut between two levels may be narrower, and a witness outside it."""
+    known = used(outer_steps((0.0, 1.0), (0.0, 2.0), (4.0, 2.0)))
+    for limit in (3.0, 1.0):
+        true = decide(lambda x: x, {"x": Triangular(0, 2, 4)}, {"y": limit})
+        found = decide(lambda x: x, {"x": known}, {"y": limit})
+        for each, other in zip(
+            (*found.possibility, *found.necessity),
+            (*true.possibility, *true.necessity),
+            strict=True,
+        ):
+            assert each == pytest.approx(round(each))
+            assert abs(each - other) < 0.5 + 1e-6
+        assert found.possibility[0] <= true.possibility[0]
+        assert found.necessity[1] >= true.necessity[1]
