@@ -33,11 +33,13 @@ SINGULAR = 1e-12
 """Squared singular value of unit slopes below which a combination counts as without influence."""
 AT_ONCE, EXACT = 10_000_000, 1e-9
 """Derivatives held at once; error of a record without errors, as a share of its largest value."""
+BESIDE = 1e-6
+"""Probability below which the true parameters have a misfit so much above that of the best fit."""
 NODES, SHRINK, FARTHEST, HALVINGS = 25, 2**-0.5, 64.0, 12
 """Nodes of a path, factor on their distances, deviations to the last, halvings between two."""
 ROUNDS, GROWN, CORRECTIONS = 4, 0.02, 2
 """Times that paths begin anew at the extremes found, at most; growth of the set by which they do,
-in half widths of the priors; and Gauss-Newton steps at each node."""
+as a share of its width; and Gauss-Newton steps at each node."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,19 +172,19 @@ def learn_from_motion(
     if not len(levels) or levels[0] <= 0 or levels[-1] > 1 or (np.diff(levels) <= 0).any():
         raise ValueError(f"alpha: {list(alpha)} must rise within (0, 1]")
     box = _Box(record, np.array([number.support for number in prior.values()]))
-    best, spread = box.fit()
-    starts = np.tile(best, (len(box.ways), 1))
-    paths = np.concatenate([box.rays(best, spread, seed), box.profiles(starts, box.ways)])
-    likely = box.possibility(paths)
-    if likely[0, 0] < levels[0]:
+    fits = box.fits()
+    best, agreeing = fits[0], float(box.possibility(fits[:1])[0])
+    if agreeing < levels[0]:
         raise RefutedError(
             "the record refutes the frame: the best parameters in the priors' supports agree with"
-            f" it to {likely[0, 0]:.2g} (a true frame is refuted with a probability of about"
+            f" it to {agreeing:.2g} (a true frame is refuted with a probability of about"
             f" {levels[0]:g}): mend the frame, the record's units or the priors"
         )
     top = box.physical(best)
     _require_alike(record, top)
     _require_independent(record, top)
+    paths = np.concatenate([box.paths(fit, seed) for fit in box.apart(fits, float(levels[0]))])
+    likely = box.possibility(paths)
     ends = np.array([box.extremes(paths, likely, float(level)) for level in levels])
     lower, upper = box.physical(ends[:, 0]), box.physical(ends[:, 1])
     about = "parameter of the recorded structure"
@@ -241,9 +243,12 @@ class _Box:
         miss, slopes = self.record.misfit(self.physical(unit)[None])
         return miss[0] / scale, slopes[0] * self.half / scale
 
-    def fit(self) -> tuple[Array, Array]:
-        """Best point, and a matrix whose columns span the region about it."""
-        d = len(self.ends)
+    def fits(self) -> Array:
+        """Points that fit best about several starts, the best first, (F, d).
+
+        A fit is left out where its misfit is too large for the true parameters beside the best's.
+        """
+        d, n = len(self.ends), self.record.values.size
         starts = [np.zeros(d), *np.random.default_rng(0).uniform(-0.9, 0.9, (8, d))]
         tight: dict[str, Any] = {"bounds": (-1.0, 1.0), "xtol": 1e-14, "ftol": 1e-14, "gtol": 1e-15}
         fits = [
@@ -252,11 +257,32 @@ class _Box:
             )
             for start in starts
         ]
-        fit = min(fits, key=lambda one: float(one.cost))
-        jacobian = self.linear(fit.x)[1]
-        deviation = max(np.sqrt(2 * fit.cost / max(len(jacobian) - d, 1)), EXACT)
+        fits.sort(key=lambda one: float(one.cost))
+        most = 1 + d / (n - d) * float(law.isf(BESIDE, d, n - d))
+        most *= max(float(fits[0].cost), n * EXACT**2 / 2)
+        return np.array([one.x for one in fits if one.cost <= most])
+
+    def apart(self, fits: Array, level: float) -> list[Array]:
+        """The first fit, and each that no straight way within a level's set joins to one before."""
+        kept, shares = [fits[0]], np.linspace(0, 1, 9)[:, None]
+        for fit in fits[1:]:
+            ways = np.array([fit + shares * (other - fit) for other in kept])
+            if not (self.possibility(ways) >= level).all(axis=1).any():
+                kept.append(fit)
+        return kept
+
+    def paths(self, fit: Array, seed: int) -> Array:
+        """Paths that leave a fit, (P, M, d)."""
+        starts = np.tile(fit, (len(self.ways), 1))
+        rays = self.rays(fit, self.spread(fit), seed)
+        return np.concatenate([rays, self.profiles(starts, self.ways)])
+
+    def spread(self, fit: Array) -> Array:
+        """Matrix whose columns span the region about a fit."""
+        miss, jacobian = self.linear(fit)
+        deviation = max(np.linalg.norm(miss) / np.sqrt(max(len(miss) - len(fit), 1)), EXACT)
         values, vectors = np.linalg.eigh(np.linalg.pinv(jacobian.T @ jacobian) * deviation**2)
-        return fit.x, vectors * np.sqrt(np.maximum(values, 0.0))
+        return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
 
     def rays(self, best: Array, spread: Array, seed: int) -> Array:
         """Paths that leave a point straight and go on along the faces they meet, (P, M, d)."""
@@ -308,14 +334,14 @@ class _Box:
             more = self.profiles(turns, self.ways)
             found = np.vstack([found, self.border(more, self.possibility(more), level)])
             grown = before.min(0) - found.min(0), found.max(0) - before.max(0)
-            if np.max(grown) < GROWN:
+            if np.max(grown / np.maximum(np.ptp(found, axis=0), 1e-12)) < GROWN:
                 break
         return np.array([found.min(0), found.max(0)])
 
     def border(self, paths: Array, likely: Array, level: float) -> Array:
         """Nodes of a level's set on each path until it leaves the set, and where it does, (n, d).
 
-        Sets apart from that of the best parameters may be other fits that are stationary.
+        Sets apart from those of the fits may be about other points that are stationary.
         """
         held = np.logical_and.accumulate(likely >= level, axis=1)
         met = held[:, 0]
