@@ -185,7 +185,7 @@ def sweep(folder: Path, names: Iterable[str]) -> None:
     for path in map(Path, gone):
         drawn = path.parent == Path("figures") and path.suffix in (".svg", ".png")
         if drawn and is_figure(path.stem):
-            with suppress(OSError):  # not there, or no name of a file
+            with suppress(OSError, ValueError):  # not there, or no name of a file
                 (folder / path).unlink()
     if gone:
         (folder / KEPT).unlink(missing_ok=True)

@@ -146,11 +146,24 @@ def own_files(summary: Document, folder: Path) -> list[Path]:
     keys: dict[str, str] = summary.get("fingerprints", {})  # older programs told none
     files = sorted(path for x in stored(summary) if (path := folder / x).is_file())
     told = {path.name: fingerprint_of(path, str(folder)) for path in files if path.name in keys}
-    if other := ", ".join(name for name, key in told.items() if key not in ("", keys[name])):
-        what = f"not of the run that wrote summary.json, but of a later one, not ended: {other}"
+    others = [name for name, key in told.items() if key not in ("", keys[name])]
+    if not same_particles(summary, folder / "microstructure.json"):
+        others.append("microstructure.json")
+    if other := ", ".join(others):
+        what = f"not of the run that wrote summary.json, but of another run or command: {other}"
         cure = f"results of one run, by {door('run')} CASE.toml --out {quote(str(folder))}"
         raise BadInput.of(str(folder), what, allowed=cure)
     return files
+
+
+def same_particles(summary: Document, path: Path) -> bool:
+    """Whether a file of numbers of a microstructure, if there, holds those of a summary."""
+    if "microstructure" not in summary or not path.is_file():
+        return True
+    try:
+        return bool(json.loads(path.read_text(encoding="utf-8")) == summary["microstructure"])
+    except ValueError:
+        return False
 
 
 def fingerprint_of(path: Path, key: str = "--out") -> str:

@@ -78,11 +78,10 @@ class Chain:
         """The stages from the radius map on."""
         handed = modulus.stand_in(self.case)
         cell = self.modulus() if "modulus" in self.case.stages and handed is None else None
-        if cell is not None:
-            handed = modulus.read_number(self.file("modulus.nc"), warn=False)
         picture = self.image() if "image" in self.case.stages else None
-        if picture is not None:
-            handed = modulus.read_number(self.file("image.nc"), "cell")
+        if "envelope" in self.case.stages and (cell is not None or picture is not None):
+            name = "modulus.nc" if picture is None else "image.nc"
+            handed = modulus.read_number(self.file(name), "modulus.alpha", warn=picture is not None)
         found = Results(self.case, self.folder, cell, {}, handed, image=picture)
         if cell is not None and self.case.sections.response:
             found = replace(found, response=self.response(cell))

@@ -398,10 +398,17 @@ def circles_of(found: Microstructure) -> str:
     return "x [m],y [m],r [m]\n" + "".join(f"{x:.7g},{y:.7g},{r:.7g}\n" for x, y, r in rows)
 
 
+PICTURES = {
+    *("03-04_two_point", "05-08_neighbours", "06-07_neighbour_statistics", "09_correlation"),
+    *("10_cells", "11_radii", "12_areas", "13_pbox"),
+    *("radius_map", "radii_bounds", "image_circles"),
+}
+
+
 def pictures(folder: Path) -> list[Path]:
-    """Figures of this stage: 03-04_two_point … 13_pbox, radius_map, radii_bounds, image_circles."""
-    name = re.compile(r"(\d\d(-\d\d)?_\w+|radi\w+_\w+|image_circles)\.(png|svg)")
-    return [path for path in sorted(folder.glob("figures/*")) if name.fullmatch(path.name)]
+    """Figures of this stage in a folder of results."""
+    found = sorted(folder.glob("figures/*.*"))
+    return [path for path in found if path.stem in PICTURES and path.suffix in (".png", ".svg")]
 
 
 def write(

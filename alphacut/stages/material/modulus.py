@@ -340,7 +340,9 @@ def read_number(path: Path | str, option: str = "--modulus", *, warn: bool = Tru
     if tuple(alpha) == (1.0,):
         return Crisp(float(ends.mean()))
     if (alpha[0], alpha[-1]) != (0, 1):
-        raise BadInput.of(option, "the file's levels leave cuts of E out", f"{[*alpha]}", WHOLE)
+        raise BadInput.of(
+            option, "the file's levels leave cuts of E out", f"{alpha.tolist()}", WHOLE
+        )
     return outer_steps(alpha, ends[:, 0], ends[:, 1])
 
 

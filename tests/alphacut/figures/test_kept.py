@@ -1,6 +1,7 @@
 """Figures that show what they showed are not drawn again; studies side by side are the same."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,7 @@ from matplotlib.figure import Figure
 
 from alphacut.entry import main
 from alphacut.figures.all import keep, kept, sweep
+from alphacut.stages.material.microstructure import PICTURES, pictures
 
 CASES = Path(__file__).parents[3] / "cases"
 
@@ -25,6 +27,22 @@ def test_figures_are_kept_while_all_are_there_and_their_fingerprint_is_the_same(
     assert kept(tmp_path, "key") is None
     (tmp_path / names[0]).unlink()
     assert kept(tmp_path, "key") is None
+
+
+def test_pictures_of_ones_own_are_not_those_of_the_particles(tmp_path):
+    (tmp_path / "figures").mkdir()
+    own = ("12_beam_test.png", "03-04_site_photo.png", "radius_measured_by_me.png", "99_plot.svg")
+    for name in (*own, "10_cells.svg", "10_cells.toml"):
+        (tmp_path / "figures" / name).touch()
+    assert [path.name for path in pictures(tmp_path)] == ["10_cells.svg"]
+    drawing = (CASES.parent / "stochastic" / "figures" / "all.py").read_text(encoding="utf-8")
+    assert {*re.findall(r'"([\w-]+)"(?:: lambda|\] = lambda)', drawing)} == PICTURES
+
+
+def test_a_name_that_is_none_is_not_removed(tmp_path):
+    names = {"figures": ["figures/joint\0.svg", "figures/joint.svg"]}
+    (tmp_path / "summary.json").write_text(json.dumps(names), encoding="utf-8")
+    sweep(tmp_path, [])
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"fingerprint": "key", "figures": 3}'])

@@ -12,6 +12,8 @@ import pytest
 from markupsafe import Markup
 
 from alphacut.entry import main
+from alphacut.io.netcdf import own_files
+from alphacut.io.problem import BadInput
 from alphacut.io.provenance import door
 from alphacut.report.envelopes import peaks
 from alphacut.report.key_results import key_results
@@ -169,7 +171,7 @@ def test_results_of_two_runs_are_refused(tmp_path, capfd, monkeypatch):
     capfd.readouterr()
     assert main(report) == 2
     (line,) = capfd.readouterr().err.splitlines()
-    what = "not of the run that wrote summary.json, but of a later one, not ended: envelope_all.nc"
+    what = "not of the run that wrote summary.json, but of another run or command: envelope_all.nc"
     assert what in line
     assert line.endswith(f"{door()} run CASE.toml --out {out}")
     assert not (out / "report.html").exists()
@@ -178,6 +180,18 @@ def test_results_of_two_runs_are_refused(tmp_path, capfd, monkeypatch):
     assert main(report) == 0
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
     assert sorted(summary["fingerprints"]) == ["decision.nc", "envelope_all.nc"]
+
+
+@pytest.mark.parametrize("text", ['{"share": 0.4}', "{"])
+def test_particles_of_another_run_are_not_shown_beside_a_summary(text, tmp_path):
+    """A run that is stopped while it draws has written its numbers, and no NetCDF file."""
+    summary = {"microstructure": {"share": 0.2}}
+    own_files(summary, tmp_path)
+    (tmp_path / "microstructure.json").write_text('{"share": 0.2}', encoding="utf-8")
+    own_files(summary, tmp_path)
+    (tmp_path / "microstructure.json").write_text(text, encoding="utf-8")
+    with pytest.raises(BadInput, match=r"of another run or command: microstructure.json"):
+        own_files(summary, tmp_path)
 
 
 def test_a_certificate_is_told_with_its_gap_and_what_it_rests_on():

@@ -173,3 +173,11 @@ def test_what_has_no_effect_is_refused_by_name(words, told, capfd, tmp_path, mon
     assert main(words) == 2
     assert told in "\n".join(lines(capfd))
     assert not list(tmp_path.iterdir())
+
+
+def test_levels_that_no_structure_needs_are_not_asked_for(tmp_path, capfd):
+    given = ["--set", 'stages=["modulus"]', "--set", "modulus.alpha=[0.5]", "--quick"]
+    given += ["--set", "modulus.method=series", "--no-figures", "--quiet", "--out", str(tmp_path)]
+    assert main(["run", PAPER, *given]) == 0, capfd.readouterr().err
+    found = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert found["modulus"]["alpha"] == [0.5]
