@@ -1,7 +1,7 @@
 """Case format and commands as pages of the documentation.
 
 python -m alphacut.docs.case_format > docs/case-format.md
-python -m alphacut.case_format commands > docs/commands.md
+python -m alphacut.docs.case_format commands > docs/commands.md
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def commands() -> str:
         f"## alphacut {name}\n\n```text\n{parser.format_help()}```\n"
         for name, parser in made.items()
     ]
-    return "\n".join([head, *parts]) + "\nMade by `python -m alphacut.case_format commands`.\n"
+    return "\n".join([head, *parts]) + "\nMade by `python -m alphacut.docs.case_format commands`.\n"
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from statistics import median_low
 from typing import TYPE_CHECKING
 
@@ -154,14 +154,14 @@ def unlikely_material(case: Case) -> Iterator[str]:
         yield "radius: a1 is greater than a3, so the radius falls where θ rises; is that meant?"
 
 
-def between_levels(case: Case) -> Iterator[str]:
-    """Remarks on levels of the motion at which E has no cut of its own."""
-    if case.computes_modulus and "envelope" in case.stages:
-        own = case.modulus.alpha
+def between_levels(case: Case, own: Sequence[float]) -> Iterator[str]:
+    """Remarks on levels of the motion at which E has no cut of its own, but some at others."""
+    if own:
+        key = "modulus.alpha" if case.computes_modulus else "modulus.file"
         if missing := [f"{x:g}" for x in case.envelope.alpha if x not in own and len(own) > 1]:
             yield (
-                f"envelope.alpha: modulus.alpha has no {', '.join(missing)}; there E's wider cut"
-                " of the level below stands in: add what is missing to modulus.alpha"
+                f"envelope.alpha: {key} has no {', '.join(missing)}; there E's wider cut of the"
+                f" level below stands in: add what is missing to {key}"
             )
         if case.sections.decision:
             known = ", ".join(f"{x:g}" for x in own)

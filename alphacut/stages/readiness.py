@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from alphacut.case.case import WHOLE, Case
@@ -11,6 +11,7 @@ from alphacut.case.names import named_inputs
 from alphacut.frame import Accelerogram
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import FuzzyNumber, Interval, Triangular
+from alphacut.fuzzy.sets.stepwise import Stepwise
 from alphacut.io.problem import BadInput, Problem, refuse
 from alphacut.io.units import STANDARD_GRAVITY, engineering
 from alphacut.stages import plausible
@@ -19,7 +20,7 @@ from alphacut.stages.image.reading import expected_modulus, study_of
 from alphacut.stages.material import modulus, spheres
 from alphacut.stages.material.cell import cell_phases, modal_parts, phases_of
 from alphacut.stages.material.microstructure import dense_remark, require_readable
-from alphacut.stages.material.references import mean_share
+from alphacut.stages.material.references import bounds_of, mean_share
 from alphacut.stages.vibration import envelope, update
 from alphacut.stages.vibration.accelerogram import cut_short
 from alphacut.stages.vibration.envelope_task import task_of
@@ -89,7 +90,7 @@ def ready(case: Case) -> Readiness:
         *shape(case),
         *dense,
         *plausible.unlikely_material(case),
-        *plausible.between_levels(case),
+        *plausible.between_levels(case, known_levels(case, stand_in)),
         *outlasted(case, ground),
         *envelope.wide_gap(case),
         *slips,
@@ -173,10 +174,25 @@ def unproved(case: Case, wanted: Structure) -> Iterator[str]:
         )
 
 
+def takes_fuzzy_modulus(case: Case) -> bool:
+    """Whether some study of a frame takes E as fuzzy."""
+    named = any("E" in study.task.fuzzy for study in studies(case))
+    return named and case.sections.frame is not None
+
+
+def known_levels(case: Case, stand_in: FuzzyNumber | None) -> Sequence[float]:
+    """Levels at which cuts of E are known, where a study takes a computed one; else none."""
+    if not takes_fuzzy_modulus(case):
+        return ()
+    computed = case.modulus.alpha if case.computes_modulus else ()
+    return stand_in.alpha if isinstance(stand_in, Stepwise) else computed
+
+
 def parted_modulus(case: Case) -> Iterator[Problem]:
-    """Levels that do not hold all cuts of E, which a structure takes over, or one number."""
-    alpha = case.modulus.alpha
-    fuzzy = any("E" in study.task.fuzzy for study in studies(case))
+    """Levels that do not hold all cuts of E, which a frame takes over, or one number."""
+    alpha, fuzzy = case.modulus.alpha, takes_fuzzy_modulus(case)
+    if case.sections.frame is None:
+        return
     if (alpha != (1.0,) or fuzzy) and (alpha[0], alpha[-1]) != (0.0, 1.0):
         what = "these levels leave cuts of E out that the structure needs"
         yield case.problem("modulus.alpha", what, WHOLE)
@@ -204,8 +220,13 @@ def expected(case: Case) -> FuzzyNumber | None:
         low, middle, high = expected_modulus(case)
         return Triangular(low, middle, max(high, low * (1 + 1e-9)))
     matrix, inclusion = case.cell.matrix_modulus, case.cell.inclusion_modulus
-    ends = sorted([*matrix.support, *inclusion.support])
-    return Triangular(ends[0], matrix.modal, max(ends[-1], ends[0] * (1 + 1e-9)))
+    ends, modal = sorted([*matrix.support, *inclusion.support]), matrix.modal
+    if case.sections.radius:
+        radius, *phases = modal_parts(case)
+        share, kind = mean_share(radius, case.cell.particles), case.cell.particles == "spheres"
+        softer = inclusion.modal < matrix.modal  # the bound that the matrix makes is the nearer
+        modal = bounds_of(share, (phases[0], phases[1]))[kind][softer]
+    return Triangular(ends[0], modal, max(ends[-1], ends[0] * (1 + 1e-9)))
 
 
 def crisp_names(case: Case, wanted: Structure) -> Iterator[Problem]:

@@ -63,12 +63,14 @@ class SpherePacking:
         share, cubes = law.cdf(radii), radii**3
         held = np.cumsum(cubes * np.diff(share, prepend=0.0))
         needed = 2 * (48 / np.pi * self.volume_fraction - 1) * cubes / held[-1]
-        end = int((needed <= max(self.spheres, MOST_SPHERES)).sum()) - 1
+        most, asked = max(self.spheres, MOST_SPHERES), math.ceil(needed[-1])
+        end = int((needed <= most).sum()) - 1
         if (lost := 1 - held[end] / held[-1]) > THIN:
+            cure = "ask for as many, " if asked <= 100_000 else ""
             raise UnfitDataError(
-                f"{lost:.1%} of the volume is in those too large for cubes of {MOST_SPHERES}; the"
-                f" largest, of radius {radii[-1]:.4g} m, need {needed[-1]:.0f}: ask for as many (up"
-                " to 1e5), leave out the smallest sizes, or lower the volume fraction"
+                f"{lost:.1%} of the volume is in those too large for cubes of {most}; the largest,"
+                f" of radius {radii[-1]:.4g} m, need {asked}: {cure}leave out the smallest sizes,"
+                " or lower the volume fraction"
             )
         if end < len(radii) - 1:
             told = f"{law.label} to {radii[end]:.4g} m, without {lost:.1g} of the volume above"

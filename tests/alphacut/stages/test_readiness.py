@@ -10,7 +10,10 @@ import pytest
 from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.fuzzy import Interval
+from alphacut.fuzzy.sets.stepwise import Stepwise
 from alphacut.report.key_results import key_results
+from alphacut.stages.plausible import between_levels
+from alphacut.stages.readiness import expected, known_levels
 from alphacut.stages.vibration.envelope_task import task_of
 from alphacut.stages.vibration.structure import structure
 from alphacut.stages.vibration.studies import cut_line
@@ -140,6 +143,25 @@ def test_levels_at_which_the_modulus_has_no_cut_are_remarked(tmp_path, capfd):
     levels = ("--set", "envelope.alpha=[0, 0.9, 1]", "--set", "modulus.alpha=[0, 0.5, 1]")
     (found,) = warnings(own(tmp_path, "paper"), *levels, capfd=capfd)
     assert "modulus.alpha has no 0.9; there E's wider cut of the level below stands in" in found
+
+
+def test_a_modulus_yet_to_be_computed_is_expected_at_the_bound_that_the_matrix_makes(tmp_path):
+    text = 'modulus = "[22.7626, 24.7561, 25.8312] GPa" # Table 1; `alphacut run` puts the computed one'
+    number = expected(load(own(tmp_path, "paper", (text, "# of the cell"))))
+    assert number.modal == pytest.approx(24.77e9, rel=0.01)  # the series; the matrix has 20 GPa
+    assert number.support.lower < 24e9
+
+
+def test_levels_of_a_modulus_that_no_study_takes_are_not_remarked(tmp_path):
+    known = Stepwise((0.0, 1.0), (24e9, 25e9), (26e9, 25e9), outer=True)
+    case = load(own(tmp_path, "paper"))
+    assert known_levels(case, known) == (0.0, 1.0)
+    assert known_levels(case, None) == case.modulus.alpha
+    assert any("modulus.alpha has no 0.25" in remark for remark in between_levels(case, (0.0, 1.0)))
+    crisp = own(tmp_path, "building", ('fuzzy = ["E", "m8", "l1",', 'fuzzy = ["m8", "l1",'))
+    for path in (crisp, own(tmp_path, "tower")):
+        assert known_levels(load(path), known) == ()
+    assert not [*between_levels(case, ())]
 
 
 @pytest.mark.parametrize("levels", ["[0]", "[0, 0.5]", "[0.5, 1]", "[1]"])
