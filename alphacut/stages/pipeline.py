@@ -80,8 +80,8 @@ class Chain:
         cell = self.modulus() if "modulus" in self.case.stages and handed is None else None
         picture = self.image() if "image" in self.case.stages else None
         if "envelope" in self.case.stages and (cell is not None or picture is not None):
-            name = "modulus.nc" if picture is None else "image.nc"
-            handed = modulus.read_number(self.file(name), "modulus.alpha", warn=picture is not None)
+            name, key = ("modulus.nc", "modulus.alpha") if picture is None else ("image.nc", "cell")
+            handed = modulus.read_number(self.file(name), key, warn=picture is not None)
         found = Results(self.case, self.folder, cell, {}, handed, image=picture)
         if cell is not None and self.case.sections.response:
             found = replace(found, response=self.response(cell))
