@@ -15,10 +15,12 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares, lsq_linear
+from scipy.spatial import cKDTree
 from scipy.stats import bartlett, norm
 from scipy.stats import f as law
 
 from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.low_discrepancy import halton
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.update.posterior import RefutedError
 from alphacut.fuzzy import FuzzyNumber
@@ -37,6 +39,9 @@ BESIDE = 1e-6
 """Probability below which the true parameters have a misfit so much above that of the best fit."""
 NODES, SHRINK, FARTHEST, HALVINGS = 25, 2**-0.5, 64.0, 12
 """Nodes of a path, factor on their distances, deviations to the last, halvings between two."""
+DRAWN, PARTS, NEAR, STARTS = 1000, 10, 12, 12
+"""Points drawn to begin fits, in so many parts; neighbours of each that fit less well than those
+kept; and how many are kept at most."""
 ROUNDS, GROWN, CORRECTIONS = 4, 0.02, 2
 """Times that paths begin anew at the extremes found, at most; growth of the set by which they do,
 as a share of its width; and Gauss-Newton steps at each node."""
@@ -249,18 +254,37 @@ class _Box:
         A fit is left out where its misfit is too large for the true parameters beside the best's.
         """
         d, n = len(self.ends), self.record.values.size
-        starts = [np.zeros(d), *np.random.default_rng(0).uniform(-0.9, 0.9, (8, d))]
         tight: dict[str, Any] = {"bounds": (-1.0, 1.0), "xtol": 1e-14, "ftol": 1e-14, "gtol": 1e-15}
         fits = [
             least_squares(
                 lambda unit: self.linear(unit)[0], start, lambda u: -self.linear(u)[1], **tight
             )
-            for start in starts
+            for start in self.starts()
         ]
         fits.sort(key=lambda one: float(one.cost))
         most = 1 + d / (n - d) * float(law.isf(BESIDE, d, n - d))
         most *= max(float(fits[0].cost), n * EXACT**2 / 2)
         return np.array([one.x for one in fits if one.cost <= most])
+
+    def starts(self) -> Array:
+        """The centre, and of points drawn those with less misfit than any drawn near, (S, d).
+
+        Half are drawn evenly and half by their logarithms, as priors may span decades.
+        """
+        (low, high), drawn = self.ends.T, halton(len(self.ends), DRAWN)
+        ratio = np.where(low > 0, high / np.maximum(low, 1e-300), 1.0)
+        decades = 2 * low * (ratio**drawn - 1) / np.maximum(high - low, 1e-300) - 1
+        many = np.where((ratio > 1) & (np.arange(DRAWN) % 2 > 0)[:, None], decades, 2 * drawn - 1)
+        misfit = np.concatenate([self.squares(part) for part in np.array_split(many, PARTS)])
+        near = cKDTree(many).query(many, NEAR)[1]
+        lowest = np.flatnonzero(misfit <= misfit[near].min(1))
+        chosen = lowest[np.argsort(misfit[lowest])[:STARTS]]
+        return np.vstack([np.zeros(len(low)), 0.99 * many[chosen]])
+
+    def squares(self, units: Array) -> Array:
+        """Sum of the squares of the misfit at points (S, d) of the box, shape (S,)."""
+        miss = self.record.values - self.record.flow.values(self.physical(units))
+        return np.asarray((miss**2).sum((1, 2)))
 
     def apart(self, fits: Array, level: float) -> list[Array]:
         """The first fit, and each that no straight way within a level's set joins to one before."""
