@@ -96,5 +96,6 @@ def text(found: Tolerances) -> str:
     lines.append(f"unsafe at {scale.unsafe:.4g} ({100 * scale.gap:.2g} % more): {point}")
     what = f"|{next(iter(found.limits))}|" if len(kept) == 1 else "the worst of them"
     lines.append(f"  there {what} passes the limit by {100 * (scale.share - 1):.2g} %")
-    lines += ["between the two it is undecided; narrow some inputs"] * (scale.gap > OPEN)
+    if scale.gap > OPEN:
+        lines.append("between the two it is undecided; narrow some inputs")
     return "\n".join([*lines, ""])
