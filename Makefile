@@ -23,11 +23,11 @@ test:
 	$(IN) python -m pytest -m "not slow" -n $(WORKERS) --dist loadfile --timeout 400 $(PYTEST)
 
 test-slow:
-	$(IN) python -m pytest -m slow $(PYTEST)
+	$(IN) python -m pytest -m slow --timeout 3000 $(PYTEST)
 
 coverage:
 	@mkdir -p build
-	$(IN) env COVERAGE_CORE=sysmon python -m pytest -m "not slow" --cov --cov-report=term-missing:skip-covered $(PYTEST)
+	$(IN) env COVERAGE_CORE=sysmon python -m pytest -m "not slow" --timeout 1200 --cov --cov-report=term-missing:skip-covered $(PYTEST)
 
 bench-solver:
 	$(IN) python -m benchmarks.rve.solvers
