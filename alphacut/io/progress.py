@@ -71,7 +71,7 @@ class Lines:
         self.promised = math.inf
 
     def stage(self, what: str) -> None:
-        """What is being done from now on."""
+        """What is being done from now on; what follows in parentheses is said once."""
         self.doing, self.since = f"{self.title}, {what}", time.monotonic()
         self.promised = math.inf
 
@@ -80,13 +80,16 @@ class Lines:
         now = time.monotonic()
         if now - self.told < EVERY:
             return
-        self.told, spent = now, now - self.begun
+        self.told = now
+        say(f"{self.doing}: {self._reached(done, now)}")
+        self.doing = self.doing.partition(" (")[0]
+
+    def _reached(self, done: float, now: float) -> str:
+        spent = now - self.begun
         if done < 0.005:
-            say(f"{self.doing}: begun, {spent:.0f} s so far")
-            return
+            return f"begun, {spent:.0f} s so far"
         left = (now - self.since) * (1 - done) / done
         if now > self.promised:
-            say(f"{self.doing}: {done:.0%} done after {spent:.0f} s; {UNKNOWN}")
-            return
+            return f"{done:.0%} done after {spent:.0f} s; {UNKNOWN}"
         self.promised = min(self.promised, now + 2 * left) if done >= LATE else math.inf
-        say(f"{self.doing}: {done:.0%} done after {spent:.0f} s, some {left:.0f} s left")
+        return f"{done:.0%} done after {spent:.0f} s, some {left:.0f} s left"

@@ -29,6 +29,8 @@ GAPS = (0.1, 1.0)
 """Gaps of a proof, as shares of the wanted error, of which the second is tried where the error of
 the modes forbids the first.
 """
+UNPROVED = "unproved"
+"""Name under which the reason is kept why no proof was found."""
 CANDIDATES = ("modal", "improved-graph-follower")
 AGREED = 0.25
 """Share of the wanted error by which two passes that share no starting points may differ."""
@@ -136,10 +138,10 @@ class Auto:
     ) -> tuple[Envelope | None, str]:
         """Proved bounds or a search, and why it is taken or does not suffice."""
         try:
-            proof, unproved = _proved(flow, left, progress, self.workers)
+            proof, unproved = _proved_once(flow, left, progress, self.workers)
             if proof is not None:
                 return proof, "modal: polynomials of the modes, whose bounds are proved"
-            stage(progress, f"search, since unproved: {unproved}")
+            stage(progress, f"search (unproved: {unproved})")
             found = Modal(tolerance=left / FINE, seed=self.seed).run(flow, progress)
         except ModalError as error:
             return None, str(error)
@@ -159,6 +161,19 @@ class Auto:
         if flow.relative or any(Output(name).unit == "m" for name in flow.outputs):
             return flow, TOLERANCE
         return replace(flow, relative=True), SHARE
+
+
+def _proved_once(
+    flow: UnitFlow, wanted: float, progress: Progress | None, workers: int | None
+) -> tuple[Envelope | None, str]:
+    """As `_proved`; a reason that was found before the same call was stopped is not sought anew."""
+    old = flow.kept.load(UNPROVED) if flow.kept is not None else None
+    if old is not None:
+        return None, str(old["reason"])
+    found, reason = _proved(flow, wanted, progress, workers)
+    if found is None and flow.kept is not None:
+        flow.kept.save(UNPROVED, {"reason": np.array(reason)})
+    return found, reason
 
 
 def _proved(

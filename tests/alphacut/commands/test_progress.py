@@ -58,10 +58,10 @@ def test_a_line_says_what_is_done_and_no_share_of_nothing(monkeypatch):
     monkeypatch.setattr(sys, "stderr", shown)
     monkeypatch.setattr(told.time, "monotonic", lambda: next(clock))
     with progress("Envelopes") as tick:
-        stage(tick, "search")
+        stage(tick, "search (unproved: it is too wide)")
         tick(0.0)
         tick(0.5)
-    assert "Envelopes, search: begun, 110 s so far\n" in shown.getvalue()
+    assert "Envelopes, search (unproved: it is too wide): begun, 110 s so far\n" in shown.getvalue()
     assert "Envelopes, search: 50% done after 130 s, some 30 s left\n" in shown.getvalue()
 
 

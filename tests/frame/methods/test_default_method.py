@@ -157,7 +157,7 @@ def test_stages_that_are_shown_by_name_begin_anew(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(auto, "guaranteed", unproved(GapError, []))
     envelope(FRAME, LIGHT, alpha=(0,), progress=Named(), duration=1.0, step=0.02)
     names = [one for one in told if isinstance(one, str)]
-    assert [name.partition(",")[0] for name in names[:3]] == [
+    assert [name.partition(" (")[0] for name in names[:3]] == [
         "proof up to 1e-05 m",
         "proof up to 0.0001 m",
         "search",
@@ -166,6 +166,29 @@ def test_stages_that_are_shown_by_name_begin_anew(monkeypatch: pytest.MonkeyPatc
         after = told[told.index(name) + 1 :]
         own = after[: next((k for k, one in enumerate(after) if isinstance(one, str)), len(after))]
         assert own == sorted(own), name  # type: ignore[type-var]
+
+
+class Memory(dict[str, Any]):
+    """Keeps arrays by name, as a file of an unfinished run does."""
+
+    load = dict.get
+    save = dict.__setitem__
+
+
+def test_a_proof_that_failed_is_not_tried_again_by_the_same_call(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    shares: list[float] = []
+    monkeypatch.setattr(auto, "guaranteed", unproved(GapError, shares))
+    kept: Any = Memory()
+    common: dict[str, Any] = {"alpha": (0,), "duration": 1.0, "step": 0.02, "kept": kept}
+    first = envelope(FRAME, LIGHT, progress=shares.append, **common)
+    assert np.isnan(shares).sum() == 2
+    again = envelope(FRAME, LIGHT, progress=shares.append, **common)
+    assert np.isnan(shares).sum() == 2
+    assert again.facts.get("unproved") == first.facts.get("unproved")
+    assert np.array_equal(again.upper, first.upper)
+    assert set(kept) >= {"unproved"}
 
 
 MANY = {name: Triangular(0.97 * x, x, 1.03 * x) for name, x in FRAME.parameters.items() if x}
