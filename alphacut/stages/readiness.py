@@ -21,7 +21,7 @@ from alphacut.stages.material import modulus, spheres
 from alphacut.stages.material.cell import cell_phases, modal_parts, phases_of
 from alphacut.stages.material.microstructure import dense_remark, require_readable
 from alphacut.stages.material.references import bounds_of, mean_share
-from alphacut.stages.vibration import envelope, update
+from alphacut.stages.vibration import envelope, exceedance, update
 from alphacut.stages.vibration.accelerogram import cut_short
 from alphacut.stages.vibration.envelope_task import task_of
 from alphacut.stages.vibration.resolution_checks import (
@@ -97,6 +97,7 @@ def ready(case: Case) -> Readiness:
         *plausible.overdamped(case, wanted),
         *fine_steps(case, wanted),
         *unproved(case, wanted),
+        *exceedance.assumed(case, wanted),
     )
     return Readiness(remarks, found, period, wanted)
 

@@ -133,6 +133,23 @@ def require_random(case: Case, wanted: Structure) -> None:
             ) from None
 
 
+def assumed(case: Case, wanted: Structure) -> Iterator[str]:
+    """Remarks on a probability of which the case says less than it takes."""
+    if not case.sections.exceedance:
+        return
+    if not case.exceedance.random:
+        yield (
+            "exceedance.random: nothing is random, so a probability is 0, 1 or undecided on each"
+            ' level; name inputs that vary by nature, as random = ["E"]'
+        )
+    for name, number in wanted.inputs(case.exceedance.random).items():
+        if number.support == number.cut(1.0):
+            yield (
+                f"exceedance.random: {name} is an interval, drawn uniformly between its ends: an"
+                " assumption that the probability rests on"
+            )
+
+
 def split_inputs(
     case: Case, wanted: Structure
 ) -> tuple[dict[str, FuzzyNumber], dict[str, Sampler]]:

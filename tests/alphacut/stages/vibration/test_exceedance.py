@@ -15,6 +15,7 @@ from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.fuzzy import Interval, Trapezoidal, Triangular
 from alphacut.io.problem import BadInput
+from alphacut.stages.readiness import ready
 from alphacut.stages.vibration import exceedance as outcomes
 from alphacut.stages.vibration.exceedance import shaped_like
 from alphacut.stages.vibration.structure import structure
@@ -44,6 +45,24 @@ def test_random_values_have_the_shape_of_the_membership(number):
     assert len(drawn) == 4000
     # Kolmogorov–Smirnov, 0.1 %
     assert np.abs(share - (np.arange(4000) + 0.5) / 4000).max() < 1.95 / np.sqrt(4000)
+
+
+@pytest.mark.parametrize(
+    ("random", "told"),
+    [
+        ([], "nothing is random, so a probability is 0, 1 or undecided on each level; name inputs"),
+        (["m2"], "m2 is an interval, drawn uniformly between its ends: an assumption"),
+        (["m1"], ""),
+    ],
+)
+def test_what_a_probability_rests_on_beside_the_case_is_said(random, told):
+    masses = 'frame.masses=["[19, 20, 21] t", "[9, 11] t", "[4, 5, 6] t"]'
+    given = f"exceedance.random={json.dumps(random)}"
+    wide = [*SHORT, "exceedance.limit=0.1 m", given, masses]
+    found = [one for one in ready(load(PAPER, wide)).warnings if "exceedance.random" in one]
+    assert [one.removeprefix("exceedance.random: ")[: len(told)] for one in found] == (
+        [told] if told else []
+    )
 
 
 def test_without_random_inputs_the_probability_is_what_the_peaks_say(capfd):
