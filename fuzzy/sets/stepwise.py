@@ -92,9 +92,10 @@ def outer_steps(
     """Steps around nested cuts known at some levels: between two levels the wider cut holds.
 
     Args:
-        alpha: Levels, rising; the first cut holds from 0 on.
+        alpha: Levels, rising; the first cut holds from 0 on. One that rounding has lifted above a
+            decimal, as 0.1 + 0.2, counts as that decimal.
         lower: Lower ends.
         upper: Upper ends.
     """
-    levels = (0.0, *(float(level) for level in alpha[1:]))
+    levels = (0.0, *(min(float(level), round(float(level), 12)) for level in alpha[1:]))
     return Stepwise(levels, tuple(lower), tuple(upper), outer=True)

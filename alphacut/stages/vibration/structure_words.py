@@ -46,16 +46,17 @@ SYMBOLS = dict(zip(UNITS, ("m{}", "l{}", "d{}", "q{}_0", "v{}_0"), strict=True))
 
 def in_unit(number: FuzzyNumber, unit: str, si: str) -> str:
     """Fuzzy number as in a case: ``30 t``, ``[28, 30, 34] t``."""
-    (low, high), (left, right) = number.support, number.cut(1.0)
-    if isinstance(number, PiecewiseLinear | Stepwise) and low < high and left == right:
-        ends = [
-            f"{shown(value, unit, si):.5g}".replace("-", MINUS)
-            for value in (low, high, number.modal)
-        ]
-        return f"{ends[0]} … {ends[1]} {unit}, modal {ends[2]} {unit}".strip()
-    values = dict.fromkeys([low, left, right, high])
-    numbers = [f"{shown(value, unit, si):.5g}".replace("-", MINUS) for value in values]
-    return f"{numbers[0] if len(numbers) == 1 else '[' + ', '.join(numbers) + ']'} {unit}".strip()
+    support, core = number.support, number.cut(1.0)
+    low, high, left, right = (
+        f"{shown(value, unit, si):.5g}".replace("-", MINUS) for value in (*support, *core)
+    )
+    if support == core:
+        return f"{low if support.width == 0 else f'[{low}, {high}]'} {unit}".strip()
+    if isinstance(number, PiecewiseLinear | Stepwise):
+        top = f"core {left} … {right}" if core.width else f"modal {left}"
+        return f"{low} … {high} {unit}, {top} {unit}".replace(" ,", ",").strip()
+    middle = f"{left}, {right}" if core.width else left
+    return f"[{low}, {middle}, {high}] {unit}".strip()
 
 
 def structure_words(case: Case, wanted: Structure) -> Document:

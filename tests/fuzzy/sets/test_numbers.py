@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from alphacut.fuzzy import Crisp, Interval, PiecewiseLinear, Trapezoidal, Triangular
 from alphacut.fuzzy.sets.numbers import Cut
+from alphacut.fuzzy.sets.stepwise import outer_steps
 
 finite = st.floats(-1e6, 1e6, allow_nan=False)
 NUMBERS = [
@@ -89,3 +90,10 @@ def test_an_expression_is_printed_by_its_text():
     assert "Triangular(lower=1, modal=2, upper=3) + Interval(lower=0, upper=1)" in str(
         Triangular(1, 2, 3) + Interval(0, 1)
     )
+
+
+def test_a_level_beside_a_decimal_by_rounding_is_that_decimal():
+    grid = np.linspace(0, 1, 11)
+    steps = outer_steps(grid, grid, 3 - grid)
+    for k in range(11):
+        assert steps.cut(k / 10) == steps.cut(float(grid[k])) == (grid[k], 3 - grid[k])

@@ -12,6 +12,7 @@ from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import PiecewiseLinear, Triangular
+from alphacut.fuzzy.sets.stepwise import outer_steps
 from alphacut.io.problem import BadInput
 from alphacut.io.quantity import fuzzy
 from alphacut.stages.vibration.structure import structure
@@ -21,7 +22,10 @@ CASES = Path(__file__).parents[4] / "cases"
 MODULUS = Triangular(22e9, 25e9, 26e9)
 
 
-@pytest.mark.parametrize("text", ["30 t", "[28, 34] t", "[28, 30, 34] t", "[28, 29, 30, 34] t"])
+@pytest.mark.parametrize(
+    "text",
+    ["30 t", "[28, 34] t", "[28, 30, 34] t", "[28, 28, 34] t", "[28, 34, 34] t", "[2, 3, 4, 5] t"],
+)
 def test_a_fuzzy_number_is_written_as_in_a_case(text):
     assert in_unit(fuzzy(text, "kg"), "t", "kg") == text
 
@@ -31,6 +35,8 @@ def test_many_cuts_are_told_by_support_and_core():
         in_unit(PiecewiseLinear((0, 0.5, 1), (1e9, 2e9, 3e9), (9e9, 5e9, 3e9)), "GPa", "Pa")
         == "1 … 9 GPa, modal 3 GPa"
     )
+    steps = outer_steps((0.0, 1.0), (1.0, 2.0), (9.0, 5.0))
+    assert in_unit(steps, "", "") == "1 … 9, core 2 … 5"
 
 
 def test_an_eight_storey_frame_in_words():
