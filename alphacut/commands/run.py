@@ -92,7 +92,8 @@ def computed(options: argparse.Namespace, chain: Chain, out: TextIO) -> int:
     found["fingerprints"] = {name: fingerprint_of(chain.file(name)) for name in stored(found)}
     write_text(chain.file("summary.json"), as_json(found, indent=2))
     if common.answer(options, found, out, words(found)):
-        told = f"{len(drawn)} figures among them, after {found['seconds']:.0f} s"
+        many = len({Path(name).stem for name in drawn})
+        told = f"{many} figures among them, after {found['seconds']:.0f} s"
         say(f"results are in {chain.folder}, {told}")
         say(f"next: {door('report', chain.folder)}")
     return 0

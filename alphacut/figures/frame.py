@@ -37,6 +37,9 @@ def frame(case: Case) -> Figure:
         beam(axes, floor, level, mass, span)
     axes.set_xlim(-0.6 * span, 1.55 * span)
     axes.set_ylim(-0.05 * height, 1.08 * height)
+    told = (*case.frame.masses, *known, *(case.frame.stiffness or ()))
+    if any(number.support.width > 0 for number in told):
+        axes.set_title("fuzzy numbers by their modal value", fontsize=8)
     axes.set_aspect("equal")
     axes.axis("off")
     return drawn
@@ -103,30 +106,42 @@ def ground(axes: Axes, left: float, right: float) -> None:
     axes.plot(across, [0, 0], color=INK, lw=1)
 
 
+MOST = 5
+"""Most masses of a chain that are drawn."""
+
+
 def chain(case: Case) -> Figure:
-    """Fig. 27: the frame as masses on springs, with its dampers if it has any."""
+    """Fig. 27: the frame as masses on springs, with its dampers if it has any.
+
+    Of more than `MOST` floors those between the third and the last are left out.
+    """
     floors = len(case.frame.masses)
+    names = range(1, floors + 1) if floors <= MOST else (1, 2, 3, 0, floors)
     damped = case.frame.damper_placement is not None and case.frame.damped
     placement = case.frame.damper_placement if damped else "none"
-    wide = min(10.0, 2.2 + 1.5 * floors)
-    drawn, axes = figure(wide, 2.15 * wide / (1.6 * floors + 0.5) + 0.1)
+    slots = len(names)
+    wide = min(7.2, 2.2 + 1.5 * slots)
+    drawn, axes = figure(wide, 2.15 * wide / (1.6 * slots + 0.5) + 0.1)
     foot = -0.9 if placement == "ground" else -0.5
     axes.plot([0, 0], [foot, 0.75], color=INK, lw=1)
     hatched(axes, (-0.12, 0), (foot, 0.75))
-    for floor in range(1, floors + 1):
-        link(axes, floor)
+    for slot, floor in enumerate(names, start=1):
+        if not floor:
+            axes.annotate("…", (1.6 * slot - 0.5, 0.2), ha="center", va="center", fontsize=16)
+            continue
+        link(axes, slot, floor)
         if placement == "ground":
-            ground_damper(axes, floor)
+            ground_damper(axes, slot, floor)
         elif placement == "storey":
-            storey_damper(axes, floor)
+            storey_damper(axes, slot, floor)
     if placement == "ground":
-        right = 1.6 * floors + 0.2
+        right = 1.6 * slots + 0.2
         axes.plot([-0.12, right], [foot, foot], color=INK, lw=1)
         hatched(axes, (-0.12, right), (foot - 0.12, foot))
     if words := "; ".join(spread_damping(case.frame)):
         besides = " besides" if damped else ""
         axes.annotate(f"damping{besides}: {words}", (0.1, foot), va="top", fontsize=9)
-    axes.set_xlim(-0.2, 1.6 * floors + 0.3)
+    axes.set_xlim(-0.2, 1.6 * slots + 0.3)
     axes.set_ylim(-1.1 if placement == "ground" else -0.7, 1.05)
     axes.set_aspect("equal")
     axes.axis("off")
@@ -138,15 +153,15 @@ def hatched(axes: Axes, across: tuple[float, float], up: tuple[float, float]) ->
     axes.fill_between(across, *up, hatch="////", facecolor="white", edgecolor=GREY, lw=0)
 
 
-def places(floor: int) -> tuple[float, float, float]:
-    """Where the spring of a floor's mass starts, and the mass's left and right edges."""
-    left = 1.6 * floor - 1.0
-    return (0.0 if floor == 1 else left - 0.6), left, 1.6 * floor
+def places(slot: int) -> tuple[float, float, float]:
+    """Where the spring of a mass starts, and the mass's left and right edges."""
+    left = 1.6 * slot - 1.0
+    return (0.0 if slot == 1 else left - 0.6), left, 1.6 * slot
 
 
-def link(axes: Axes, floor: int) -> None:
+def link(axes: Axes, slot: int, floor: int) -> None:
     """A mass with its spring and the arrow of its displacement."""
-    start, left, right = places(floor)
+    start, left, right = places(slot)
     spring(axes, start, left, 0.2)
     axes.annotate(f"$k_{{{floor}}}$", ((start + left) / 2, 0.36), ha="center", fontsize=9)
     axes.fill_between(
@@ -158,17 +173,17 @@ def link(axes: Axes, floor: int) -> None:
     axes.annotate(f"$q_{{{floor}}}$", (left + 0.25, 0.85), ha="center", va="center", color=ORANGE)
 
 
-def ground_damper(axes: Axes, floor: int) -> None:
+def ground_damper(axes: Axes, slot: int, floor: int) -> None:
     """The damper between a mass and the ground."""
-    _, left, right = places(floor)
+    _, left, right = places(slot)
     middle = (left + right) / 2
     damper(axes, (middle, -0.3), (middle, -0.9))
     axes.annotate(f"$d_{{{floor}}}$", (middle + 0.16, -0.6), va="center", fontsize=9)
 
 
-def storey_damper(axes: Axes, floor: int) -> None:
+def storey_damper(axes: Axes, slot: int, floor: int) -> None:
     """The damper beside a spring."""
-    start, left, _ = places(floor)
+    start, left, _ = places(slot)
     damper(axes, (start, -0.1), (left, -0.1))
     axes.annotate(f"$d_{{{floor}}}$", ((start + left) / 2, -0.3), ha="center", va="top", fontsize=9)
 

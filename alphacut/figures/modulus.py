@@ -163,7 +163,8 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
             lw=1.3,
             label="envelope" if side == "lower" else None,
         )
-    axes.set_xlabel("time t, s")
+    rest = f", the first {end:g} of {study.task.duration:g}"
+    axes.set_xlabel("time t, s" + rest * bool(end < study.task.duration))
     look.prefix_axis(axes, output, Output(output).unit)
     axes.set_title(
         f"Fuzzy mapping of {output} at α = {float(dataset['alpha']):g}", loc="left", fontsize=10

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from alphacut.figures.captions import INPUTS, in_words
 from alphacut.figures.style import BLUE, GREY, ORANGE, PURPLE, prefix_axis
@@ -36,8 +37,8 @@ def over_time(found: xarray.Dataset) -> Figure:
         panel(axes, found.sel(output=output), output)
     span = float(found["time"].values[-1] - found["time"].values[0])
     title = (
-        f"shares (lines) of the width (grey) at the lowest α; means over {WINDOW * span:.2g} s,"
-        " weighted with the width"
+        f"shares of the width at the lowest α, means over {WINDOW * span:.2g} s weighted with it;"
+        " grey: largest width there"
     )
     grid[0, 0].set_title(title, loc="left", fontsize=10)
     grid[-1, 0].set_xlabel("time t, s")
@@ -57,7 +58,8 @@ def panel(axes: Axes, found: xarray.Dataset, output: str) -> None:
     """The shares in one output's width."""
     time, width = found["time"].values, found["width"].values
     behind = axes.twinx()
-    behind.fill_between(time, 0, width, color="#d9d9d9", lw=0)
+    largest = maximum_filter1d(width, 2 * _half(width) + 1, mode="nearest")
+    behind.fill_between(time, 0, largest, color="#d9d9d9", lw=0)
     behind.set_ylim(bottom=0)
     behind.grid(False)
     prefix_axis(behind, f"width of {output}", Output(output).unit)
@@ -74,9 +76,14 @@ def panel(axes: Axes, found: xarray.Dataset, output: str) -> None:
     axes.set_ylabel("share")
 
 
+def _half(width: Array) -> int:
+    """Nodes on either side of one within its window."""
+    return max(1, round(WINDOW * len(width) / 2))
+
+
 def weighted(share: Array, width: Array) -> Array:
     """Moving means of the share over time, weighted with the width; NaN without width."""
-    half = max(1, round(WINDOW * len(width) / 2))
+    half = _half(width)
     above, below = (
         np.convolve(values, np.ones(2 * half + 1))[half:-half]
         for values in (np.nan_to_num(share) * width, width)

@@ -8,6 +8,7 @@ from functools import partial
 from markupsafe import Markup
 
 from alphacut.figures.captions import core
+from alphacut.frame.exceedance import ANY
 from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
 from alphacut.io.units import engineering, largest_by_unit
@@ -126,7 +127,8 @@ def exceeded(summary: Document) -> Iterator[Line]:
     """Probability that an output exceeds its limit."""
     for found in outcomes.each_event(summary["exceedance"]) if "exceedance" in summary else ():
         limit = f" exceeds {engineering(found['limit'], found['unit'])}"
-        name = f"Probability of {outcomes.event_words(found['output'], limit)}"
+        of_any = " is exceeded" * (found["output"] == ANY)
+        name = f"Probability that {outcomes.event_words(found['output'], limit)}{of_any}"
         nature = f"{found['nature'].split(':')[0]}{outcomes.nodes(found)}"
         yield name, *both(found, chance), nature, found["alpha"][0]
 

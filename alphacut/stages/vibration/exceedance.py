@@ -336,7 +336,7 @@ def sentence(found: Document, worth: str) -> str:
     """The probability in words, at the lowest and the highest level, and what it is worth."""
     levels = dict.fromkeys((0, len(found["alpha"]) - 1))
     cuts = ", ".join(f"{cut(found, k)} at α = {found['alpha'][k]:g}" for k in levels)
-    random = f" with random {found['random']}" if found["random"] else ""
+    random = f" with {found['random']} drawn by membership" if found["random"] else ""
     limit = f" > {engineering(found['limit'], found['unit'])}"
     return f"probability of {event_words(found['output'], limit)}{random}: {cuts} ({worth})\n"
 

@@ -135,7 +135,7 @@ def test_a_run_keeps_peaks_and_probability(tmp_path, capfd):
     assert main(["report", str(tmp_path), "--quiet"]) == 0
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "<h3>Peaks</h3>" in page
-    assert "Probability of |q3| &gt; 90.00 mm" in page
+    assert "Probability that |q3| exceeds 90.00 mm" in page
 
 
 @pytest.mark.parametrize(
@@ -293,7 +293,7 @@ def test_several_limits_in_one_run_are_what_each_is_alone(tmp_path, capfd):
     assert (top[-1] <= top[:-1].sum(0) + 1e-12).all()
     assert main(["report", str(out), "--quiet", "--csv", str(out / "csv")]) == 0
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert "Probability of any of them" in page
+    assert "Probability that any of them is exceeded" in page
     assert "event,alpha" in (out / "csv" / "exceedance.csv").read_text(encoding="utf-8")
     assert main(["tolerances", str(path), "--set", 'exceedance.limits=["drift1 <= 0.2 %"]']) == 0
 
