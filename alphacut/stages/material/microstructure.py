@@ -31,10 +31,12 @@ if TYPE_CHECKING:
     from alphacut.stochastic.spheres.microstructure import SphereMicrostructure
     from alphacut.stochastic.spheres.packing import SpherePackings
     from alphacut.stochastic.spheres.wicksell import RadiiPBox
+    from alphacut.stochastic.theta.truncated_normal import Array
 
 
 LEAST_SLOPE = 1e-4  # at and below it a slope is that of a map that barely rises
 FAR = 300  # times the median, or below it: a size perhaps of another unit
+APART, ALONE = 1.5, 0.1  # ratio of neighbouring sizes, and share of all between, that is told
 CRYSTALLISE = 0.8  # area fraction from which equal discs were measured to be crystals in part
 
 
@@ -315,6 +317,7 @@ def dense_remark(case: Case) -> Iterator[str]:
     for ratio in sizes[[0, -1]] / np.median(sizes):
         if not 1 / FAR <= ratio <= FAR:
             yield f"microstructure.{of}.file: a size is {ratio:.3g} times the median: check units"
+    yield from wide_gap(sizes, of)
     if spheres is not None:
         for remark in packed_spheres(case, spheres).remarks:
             yield f"microstructure.spheres.spheres: {remark}"
@@ -331,6 +334,22 @@ def dense_remark(case: Case) -> Iterator[str]:
         yield (
             f"microstructure.packing: equal discs on {packing.area_fraction:g} of the area"
             " crystallise in part; the run measures how far (hexagonal_order) and says so"
+        )
+
+
+def wide_gap(sizes: Array, of: str) -> Iterator[str]:
+    """A remark where much of the particles has sizes of which a list, (n,) in m, has none."""
+    low, high, power = sizes[:-1], sizes[1:], 2 if of == "packing" else 3
+    held = sum((low**k * high ** (power - k) for k in range(power + 1)), np.zeros(len(low)))
+    empty = np.where(high > APART * low, held, 0.0)  # means of r^power, times power + 1
+    share = empty.max(initial=0.0) / max(held.sum(), 1e-300)
+    if share > ALONE:
+        gap = int(np.argmax(empty))
+        part = "area" if of == "packing" else "volume"
+        yield (
+            f"microstructure.{of}.file: {share:.0%} of the particles' {part} has diameters"
+            f" {span(2 * sizes[gap : gap + 2], 'm')}, of which the list has none: between its"
+            " sizes the law is linear; list more particles, or leave out the lone ones"
         )
 
 

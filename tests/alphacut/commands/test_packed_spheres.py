@@ -2,10 +2,12 @@
 
 import json
 import re
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import integrate
 
 from alphacut.case.load import load
 from alphacut.entry import main
@@ -92,6 +94,12 @@ def test_check_foretells_how_many_spheres_a_list_needs(tmp_path, capfd):
     assert f"20 packings of {count} spheres, " in out
     assert int(count) > 1000
     assert "times the median" not in err
+
+    told = r"file: (\d+)% of the particles' volume has diameters from 1.198 mm to 10.00 mm"
+    (share,) = map(int, re.findall(told, err))
+    diameters = np.append(0.8 + np.arange(200) / 500, 10.0)
+    each = [integrate.quad(lambda d: d**3, a, b)[0] / (b - a) for a, b in pairwise(diameters)]
+    assert share == round(100 * each[-1] / sum(each))
     beads.write_text(sizes + "1000\n", encoding="utf-8")
     assert main(["check", str(own), "--set", f"{SPHERES}.volume_fraction=0.05"]) == 0
     assert (
