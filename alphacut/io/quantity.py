@@ -50,6 +50,8 @@ def listed(inner: str, unit: str, si: str) -> tuple[Decimal, ...]:
         )
     items = [item.strip() for item in inner.split(",")]
     for item in items:
+        if two := re.match(rf"({NUMBER})\s+({NUMBER})", item):
+            raise ValueError(f"a comma is missing: write {two[1]}, {two[2]}")
         if SINGLE.fullmatch(item) is None:
             raise ValueError(f'"{item}" does not begin with a number')
     return tuple(one(f"{item} {unit}" if unit else item, si) for item in items)

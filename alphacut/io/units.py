@@ -180,7 +180,7 @@ def weight(unit: str, si: str) -> str:
 
 PREFIXES = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
 MINUS = "\u2212"
-PREFIXED = ("m", "m/s", "m/s^2", "N", "Pa", "s", "rad", "W", "J")
+PREFIXED = ("m", "m/s", "m/s^2", "N", "N/m", "Pa", "s", "rad", "W", "J")
 
 
 def engineering(value: float, si: str, *, digits: int = 4, beside: float = 0.0) -> str:
@@ -189,7 +189,9 @@ def engineering(value: float, si: str, *, digits: int = 4, beside: float = 0.0) 
     A unit that takes no prefix stands as it is.
     """
     if si not in PREFIXED or not math.isfinite(value) or not (value or beside):
-        return f"{value:.{digits}g} {si}".strip().replace("-", MINUS)
+        short = f"{value:.{digits}g}"
+        told = f"{float(short):.0f}" if 1e4 <= abs(value) < 1e7 else short
+        return f"{told} {si}".strip().replace("-", MINUS)
     largest = float(f"{max(abs(value), abs(beside)):.{digits}g}")
     if not 1e-12 <= largest < 1e15:
         return f"{value:.{digits}g} {si}".replace("-", MINUS)

@@ -41,6 +41,7 @@ triangle | [75, 80, 85] | [85, 80, 75] | inclusion_modulus.*triangle is not in r
 layers | layers = 12 | layers = 0 | mesh.layers = 0.*from 1 to
 layers in parts | layers = 12 | layers = 1.5 | mesh.layers.*whole number
 not a number | "20 GPa" | "twenty GPa" | cell.matrix_modulus.*does not begin with a number
+no comma | "20 GPa" | "[20 21] GPa" | cell.matrix_modulus.*a comma is missing: write 20, 21
 not finite | a1 = 0.1337 | a1 = nan | radius.a1 = nan.*does not begin with a number
 not TOML | "20 GPa" | "20 GPa | cell.matrix_modulus.*not TOML
 written twice | a1 = 0.1337 | a1 = 0.1337\na1 = 0.2 | radius.a1.*not TOML
