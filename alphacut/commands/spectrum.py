@@ -141,6 +141,8 @@ def table(found: Sequence[ResponseSpectrum]) -> str:
             for x in found
         )
         lines.append(f"{found[0].periods[row]:>8.3g} s{cells}")
+    if len(found[0].periods) > len(rows):
+        lines.append(f"{len(rows)} of {len(found[0].periods)} periods; --out has all")
     worst = max(float(x.error.max() / x.displacement.max()) for x in found)
     peak = max(float(x.pseudo_acceleration.max()) for x in found)
     lines.append(
