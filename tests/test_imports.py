@@ -9,10 +9,10 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 MAY_IMPORT = {
-    "stochastic": set(),
     "fuzzy": set(),
-    "rve": {"stochastic"},
-    "frame": {"fuzzy"},
+    "stochastic": {"fuzzy"},
+    "rve": {"stochastic", "fuzzy"},
+    "frame": {"stochastic", "fuzzy"},
     "alphacut": {"stochastic", "fuzzy", "rve", "frame"},
 }
 HEAVY = {
