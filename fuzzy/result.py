@@ -1,0 +1,238 @@
+"""Bounds: what every method of fuzzy analysis returns, for numbers and for motions over time.
+
+The three natures promise, of each output, level (and time):
+
+- attained: values of the function itself, at points in the box which `lower_at` and `upper_at`
+  name. The true range is at least as wide, and may be wider. Where a scheme computed the values
+  (time steps, a mesh), they hold to `error`, which is the scheme's; else `error` is 0.
+- estimated: each true bound lies within `error` of the bound stated, as far as a pass that is
+  independent of the search, or its held-out points, can tell. Nothing is proved.
+- guaranteed: the true range lies inside, which is proved from knowledge that `basis` names: stated
+  by the caller, or verified. `error` is the distance to what is attained; NaN where that is not
+  known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple, Self
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array, Mask
+from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.fuzzy.shown import Shown
+
+if TYPE_CHECKING:
+    from alphacut.fuzzy.sets.numbers import FuzzyNumber
+
+ROUND_OFF = 1e-9
+"""Share of an output's size by which bounds may miss each other for reasons of rounding."""
+
+
+class Nature(StrEnum):
+    """Worth of bounds, from the weakest on."""
+
+    ATTAINED = "attained"
+    ESTIMATED = "estimated"
+    GUARANTEED = "guaranteed"
+
+
+class Ends(NamedTuple):
+    """Lower and upper ends, two arrays of one shape."""
+
+    lower: Array
+    upper: Array
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Bounds(Shown):
+    """α-cuts of the outputs of a function of fuzzy inputs, over time where there is one.
+
+    Args:
+        alpha: Levels, rising within [0, 1], shape (A,).
+        lower: Lower ends, in `units`, shape (A, m), or (A, T, m) over time.
+        upper: Upper ends, same shape.
+        lower_at: Inputs where the lower ends are attained, in their own units, shape (…, m, n); NaN
+            where that is not known.
+        upper_at: The same for the upper ends.
+        error: See the natures above, in `units`, not negative, shape of `lower`.
+        nature: Nature of all outputs, the weakest where `natures` differ.
+        outputs: Names of the outputs, m of them.
+        inputs: Fuzzy numbers by name, n of them, in the order of the last axis of `lower_at`.
+        units: Unit of each output; none where empty.
+        method: Name of the method, the word that a case file has for it.
+        evaluations: All evaluations of the model, those that verify or estimate among them.
+        seconds: Wall time, in s.
+        natures: Nature of each output; all are `nature` where empty.
+        basis: Knowledge on which a guarantee rests, as "the signs of E hold, as stated by the
+            caller"; what a scheme or an estimate rests on.
+        time: Nodes, shape (T,), in s; None where there is no time.
+        inner: Of guaranteed bounds those attained, if any, less the scheme's error.
+        outer: Of other bounds the proved ones, if any.
+        notes: What the method saw on its way, one sentence each.
+
+    Raises:
+        RefusedError: Levels do not rise within [0, 1], shapes differ, an end is not finite or an
+            error negative.
+        FailedError: Attained bounds leave proved ones, or cuts are not nested: the method is wrong.
+    """
+
+    alpha: Array
+    lower: Array
+    upper: Array
+    lower_at: Array
+    upper_at: Array
+    error: Array
+    nature: Nature
+    outputs: tuple[str, ...]
+    inputs: Mapping[str, FuzzyNumber]
+    method: str
+    units: tuple[str, ...] = ()
+    evaluations: int = 0
+    seconds: float = 0.0
+    natures: tuple[Nature, ...] = ()
+    basis: tuple[str, ...] = ()
+    time: Array | None = None
+    inner: Ends | None = None
+    outer: Ends | None = None
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "alpha", np.asarray(self.alpha, float))
+        self._check_shapes()
+        self._check_values()
+        self._check_proof()
+
+    def _check_shapes(self) -> None:
+        middle = () if self.time is None else (len(self.time),)
+        shape = (len(self.alpha), *middle, len(self.outputs))
+        places = (*shape, len(self.inputs))
+        pairs = [pair for pair in (self.inner, self.outer) if pair is not None]
+        for name, array, expected in (
+            *((name, getattr(self, name), shape) for name in ("lower", "upper", "error")),
+            *((name, getattr(self, name), places) for name in ("lower_at", "upper_at")),
+            *((f"inner, outer: {end}", getattr(p, end), shape) for p in pairs for end in p._fields),
+        ):
+            if array.shape != expected:
+                raise RefusedError(f"shape of {name}", array.shape, str(expected))
+        if not {len(self.natures), len(self.units)} <= {0, len(self.outputs)}:
+            raise RefusedError("natures and units", (self.natures, self.units), "one an output")
+
+    def _check_values(self) -> None:
+        if not (self.alpha.size and (np.diff(self.alpha) > 0).all() and self._levels_inside):
+            raise RefusedError("alpha", self.alpha.tolist(), "levels that rise within [0, 1]")
+        if not (np.isfinite(self.lower) & np.isfinite(self.upper)).all():
+            raise RefusedError("lower and upper", "not finite", "finite ends")
+        if not ((self.error >= 0) | (np.isnan(self.error) & self._guaranteed)).all():
+            raise RefusedError("error", "negative or NaN", "errors of 0 or more; NaN if guaranteed")
+
+    @property
+    def _levels_inside(self) -> bool:
+        return bool(self.alpha[0] >= 0 and self.alpha[-1] <= 1)
+
+    def _check_proof(self) -> None:
+        """Refuse bounds that contradict each other by more than their error and rounding."""
+        near = self._near
+        if (self.lower > self.upper + near).any():
+            raise FailedError("a lower bound lies above its upper bound")
+        wide = near + np.nan_to_num(self.error)
+        both = (wide[1:] + wide[:-1])[: len(wide) - 1]
+        if ((np.diff(self.lower, axis=0) < -both) | (np.diff(self.upper, axis=0) > both)).any():
+            raise FailedError("the α-cuts are not nested")
+        inner, outer = self.attained, self.proved
+        beyond = (inner.lower < outer.lower - near) | (inner.upper > outer.upper + near)
+        if beyond.any():
+            far = np.maximum(outer.lower - inner.lower, inner.upper - outer.upper)
+            worst = self.outputs[int(np.unravel_index(far.argmax(), far.shape)[-1])]
+            raise FailedError(
+                f"attained bounds of {worst} lie outside the proved ones, by up to {far.max():.3g}"
+            )
+
+    @property
+    def _near(self) -> Array:
+        """What rounding explains, shape (m,)."""
+        axes = tuple(range(self.lower.ndim - 1))
+        size = np.maximum(np.abs(self.lower), np.abs(self.upper)).max(axis=axes)
+        return np.asarray(ROUND_OFF * size)
+
+    @cached_property
+    def _guaranteed(self) -> Mask:
+        natures = self.natures or (self.nature,) * len(self.outputs)
+        return np.array([nature is Nature.GUARANTEED for nature in natures])
+
+    @cached_property
+    def attained(self) -> Ends:
+        """What the true range reaches at least: NaN where nothing attained is known.
+
+        Bounds that are not guaranteed are taken less their error.
+        """
+        blank = np.full(self.lower.shape, np.nan)
+        inner = self.inner or Ends(blank, blank)
+        lower = np.where(self._guaranteed, inner.lower, self.lower + self.error)
+        return Ends(lower, np.where(self._guaranteed, inner.upper, self.upper - self.error))
+
+    @cached_property
+    def proved(self) -> Ends:
+        """What the true range is proved to lie inside; infinite where nothing is proved."""
+        wide = np.full(self.lower.shape, np.inf)
+        outer = self.outer or Ends(-wide, wide)
+        lower = np.where(self._guaranteed, self.lower, outer.lower)
+        return Ends(lower, np.where(self._guaranteed, self.upper, outer.upper))
+
+    def column(self, output: str = "y") -> int:
+        """Index of an output.
+
+        Raises:
+            RefusedError: There is no such output.
+        """
+        if output not in self.outputs:
+            raise RefusedError("output", output, ", ".join(self.outputs))
+        return self.outputs.index(output)
+
+    def bounds(self, output: str = "y") -> Ends:
+        """Lower and upper ends of one output, two arrays of shape (A,), or (A, T) over time."""
+        column = self.column(output)
+        return Ends(self.lower[..., column], self.upper[..., column])
+
+    def nature_of(self, output: str = "y") -> Nature:
+        """Nature of one output's bounds."""
+        column = self.column(output)
+        return self.natures[column] if self.natures else self.nature
+
+    @property
+    def minimum(self) -> Array:
+        """Least lower end over time, shape (A, m)."""
+        return self.lower if self.time is None else self.lower.min(axis=1)
+
+    @property
+    def maximum(self) -> Array:
+        """Greatest upper end over time, shape (A, m)."""
+        return self.upper if self.time is None else self.upper.max(axis=1)
+
+    def select(self, *outputs: str) -> Self:
+        """The same of some outputs, in their order."""
+        columns = [self.column(name) for name in outputs]
+        natures = tuple(map(self.nature_of, outputs))
+        return replace(
+            self,
+            outputs=outputs,
+            units=tuple(self.units[k] for k in columns if self.units),
+            natures=natures,
+            nature=min(natures, key=list(Nature).index),
+            lower=self.lower[..., columns],
+            upper=self.upper[..., columns],
+            error=self.error[..., columns],
+            lower_at=self.lower_at[..., columns, :],
+            upper_at=self.upper_at[..., columns, :],
+            inner=_of(self.inner, columns),
+            outer=_of(self.outer, columns),
+        )
+
+
+def _of(pair: Ends | None, columns: list[int]) -> Ends | None:
+    """The ends of some outputs."""
+    return pair and Ends(pair.lower[..., columns], pair.upper[..., columns])

@@ -1,0 +1,94 @@
+"""One result: its fields are checked, attained bounds lie inside proved ones, it prints itself."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from alphacut.fuzzy import Triangular
+from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.fuzzy.result import Bounds, Ends, Nature
+
+ALPHA = np.array([0.0, 1.0])
+
+
+def bounds(*, time=None, **changes):
+    """Bounds of x² over the cuts of x = (1, 2, 4), the same at every node of time."""
+    lower, upper = np.array([[1.0], [4.0]]), np.array([[16.0], [4.0]])
+    places = np.sqrt(lower)[..., None], np.sqrt(upper)[..., None]
+    tables = dict(lower=lower, upper=upper, error=0 * lower)
+    tables |= dict(lower_at=places[0], upper_at=places[1])
+    if time is not None:
+        tables = {name: np.repeat(x[:, None], len(time), axis=1) for name, x in tables.items()}
+    facts = dict(outputs=("y",), inputs={"x": Triangular(1, 2, 4)}, method="general")
+    return Bounds(
+        **{"alpha": ALPHA, "nature": Nature.ATTAINED, "time": time} | facts | tables | changes
+    )
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        dict(alpha=np.array([0.0, 2.0])),
+        dict(alpha=np.array([1.0, 0.0])),
+        dict(lower=np.array([[1.0], [np.nan]])),
+        dict(error=np.array([[-1.0], [0.0]])),
+        dict(error=np.array([[np.nan], [0.0]])),  # only of proved bounds
+        dict(outputs=("y", "z")),
+        dict(units=("m", "m")),
+    ],
+)
+def test_values_without_a_meaning_are_refused(changes):
+    with pytest.raises(RefusedError):
+        bounds(**changes)
+
+
+def test_cuts_that_are_not_nested_are_a_failure():
+    with pytest.raises(FailedError, match="not nested"):
+        bounds(lower=np.array([[4.1], [3.9]]), upper=np.array([[16.0], [16.0]]))
+    with pytest.raises(FailedError, match="above"):
+        bounds(lower=np.array([[1.0], [4.1]]))
+
+
+@pytest.mark.parametrize("time", [None, np.array([0.0, 0.5, 1.0])])
+def test_attained_bounds_lie_inside_proved_ones_but_for_the_error_of_the_scheme(time):
+    found = bounds(time=time)
+    outer = Ends(found.lower + 0.1, found.upper - 0.1)
+    with pytest.raises(FailedError, match="attained bounds of y lie outside"):
+        replace(found, outer=outer)
+    replace(found, outer=outer, error=np.full(found.lower.shape, 0.2))
+    proved = replace(found, nature=Nature.GUARANTEED)
+    with pytest.raises(FailedError, match="attained bounds of y lie outside"):
+        replace(proved, inner=Ends(found.lower - 0.1, found.upper))
+    both = replace(proved, inner=Ends(found.lower + 0.1, found.upper - 0.1))
+    assert (both.proved.lower == found.lower).all()
+    assert (both.attained.upper < found.upper).all()
+
+
+def test_an_output_and_its_extremes_over_time_are_read_by_name():
+    found = bounds(time=np.array([0.0, 1.0]))
+    assert found.minimum.tolist() == [[1], [4]]
+    assert found.maximum.tolist() == [[16], [4]]
+    assert found.bounds("y").lower.shape == (2, 2)
+    assert found.select("y").nature_of("y") is Nature.ATTAINED
+    with pytest.raises(RefusedError) as refused:
+        found.bounds("z")
+    assert (refused.value.value, refused.value.allowed) == ("z", "y")
+
+
+def test_text_table_drawing_and_dataset_say_nature_error_and_unit(tmp_path):
+    for time in (None, np.array([0.0, 1.0])):
+        found = bounds(time=time, units=("mm",), evaluations=12)
+        assert "bounds attained" in str(found)
+        assert "12 evaluations" in str(found)
+        assert "y [mm], α = 0: 1 … 16, error 0" in str(found)
+        assert "<td>16</td>" in found._repr_html_()
+        found.to_csv(tmp_path / "y.csv")
+        rows = (tmp_path / "y.csv").read_text(encoding="utf-8").splitlines()
+        assert len(rows) == 3
+        assert "[mm]" in (rows[0] if time is not None else rows[1])
+        dataset = found.to_dataset()
+        assert float(dataset.upper.max()) == 16
+        assert dataset.nature.item() == "attained"
+        wide = replace(found, error=np.full(found.lower.shape, 2.0))
+        assert "error up to 2" in wide.plot().get_title()
