@@ -1,7 +1,6 @@
 # make run         the paper's case, from microstructure to fuzzy vibration, into results/paper/
 # make test        the tests (slower ones: make test-slow)
 # make bench-solver, make bench-scaling, make charts, make stability    what the methods cost and where they end
-# make mutants     plants faults and sees that the tests turn red
 # make coverage    the lines of the five packages that the tests run, and those that they do not
 # make docs, make lint, make pictures    documentation, style and types, the README's picture
 # make figures     every figure of the paper that holds data, and the gallery in docs
@@ -14,7 +13,7 @@ IN = ./enter
 help:
 	@sed -n 's/^# //p' Makefile
 
-.PHONY: help run test test-slow coverage lint charts mutants bench-solver bench-scaling stability docs figures pictures clean clean-env
+.PHONY: help run test test-slow coverage lint charts bench-solver bench-scaling stability docs figures pictures clean clean-env
 
 run:
 	$(IN) python -m alphacut run $(CASE) --out $(OUT) --workers $(WORKERS) $(if $(FRESH),--fresh)
@@ -47,8 +46,6 @@ charts:
 	$(IN) python -m benchmarks.frame.envelopes
 	$(IN) python -m benchmarks.frame.failures
 
-mutants:
-	$(IN) python -m benchmarks.mutation.mutants
 
 stability:
 	$(IN) python -m benchmarks.rve.stability
